@@ -35,15 +35,19 @@ function(rhec_add_library NAME)
   install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 endfunction()
 
+include("${CMAKE_CURRENT_LIST_DIR}/RhecPlugin.cmake")
+
 # rhec_add_plugin(NAME SOURCES ... PRIVATE ...)
-#   A plugin: a module `<NAME>.so` in the plugin directory, which links to what it is given and exports its manifest alone.
+#   A plugin of the house: a module `<NAME>.so` in the plugin directory, built with the flags that all our targets share.
 function(rhec_add_plugin NAME)
-  cmake_parse_arguments(ARG "" "" "SOURCES;PRIVATE" ${ARGN})
-  add_library(${NAME} MODULE ${ARG_SOURCES})
-  target_link_libraries(${NAME} PRIVATE rhec::plugins rhec_flags ${ARG_PRIVATE})
-  set_target_properties(${NAME} PROPERTIES PREFIX ""
+  rhec_plugin_module(${NAME} ${ARGN})
+  target_link_libraries(${NAME} PRIVATE rhec_flags)
+  file(RELATIVE_PATH LIB_FROM_PLUGINS "${CMAKE_INSTALL_FULL_LIBDIR}/rhec/plugins" "${CMAKE_INSTALL_FULL_LIBDIR}")
+  set_target_properties(${NAME} PROPERTIES
     LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/${RHEC_PLUGIN_DIRECTORY}"
-    INSTALL_RPATH "$ORIGIN/../..")
+    INSTALL_RPATH "$ORIGIN/${LIB_FROM_PLUGINS}")
   set_property(GLOBAL APPEND PROPERTY RHEC_PLUGIN_TARGETS ${NAME})
   install(TARGETS ${NAME} LIBRARY DESTINATION "${RHEC_PLUGIN_DIRECTORY}")
 endfunction()
+
+include("${CMAKE_CURRENT_LIST_DIR}/RhecModel.cmake")

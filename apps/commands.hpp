@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace rhec::apps {
+
+/// What the program answers to whoever called it.
+enum ExitCode : int {
+  exit_fine = 0,
+  exit_error = 1,      ///< a mistake that the user can mend: rhec::Error
+  exit_usage = 2,      ///< of the command line itself
+  exit_not_solved = 3  ///< all was done, but some answers are not usable
+};
+
+/// What to do once the command line has been read; returns an exit code.
+using Action = std::function<int()>;
+
+// One function a command: adds it to the program, and puts what it does into `chosen` when it is the one that was
+// called.
+void add_solve(CLI::App& program, Action& chosen);
+void add_plugins(CLI::App& program, Action& chosen);
+
+/// `--plugin-path DIR`, which several commands have.
+void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& directories);
+
+}  // namespace rhec::apps

@@ -1,0 +1,93 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "commands.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/core/option_values.hpp"
+
+namespace rhec::apps {
+
+void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& directories) {
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--plugin-path",
+          [&directories](const std::vector<std::string>& given) { directories.assign(given.begin(), given.end()); },
+          "look for plugins there first; may be given several times")
+      ->type_name("DIR")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+namespace {
+
+constexpr const char* about = "Receding horizon estimation and control of field robots whose wheels slip.";
+constexpr const char* examples =
+    "Examples:\n"
+    "  rhec plugins                       what is installed\n"
+    "  rhec plugins gn_rti                the options of one plugin\n"
+    "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
+    "  rhec solve problems.jsonl --solver gn_rti --sequence > solutions.jsonl\n\n"
+    "'rhec COMMAND --help' says more of each command.";
+
+int usage_error(std::string_view what) {
+  fmt::print(stderr, "rhec: error: {}\n", what);
+  return exit_usage;
+}
+
+/// What is wrong with the command, if it is missing or unknown; empty if all is well.
+std::string wrong_command(const CLI::App& program, int count, char** words) {
+  std::vector<std::string> commands;
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
+    commands.push_back(command->get_name());
+  const std::string expected = fmt::format("expected one of {}; see 'rhec --help'", fmt::join(commands, ", "));
+  if (count < 2) return "no command; " + expected;
+  const std::string word = words[1];
+  if (word.starts_with('-') || std::find(commands.begin(), commands.end(), word) != commands.end()) return {};
+  const std::string near = nearest(word, commands);
+  return fmt::format("unknown command '{}'; {}", word,
+                     near.empty() ? expected : fmt::format("did you mean '{}'?", near));
+}
+
+int run(int count, char** words) {
+  CLI::App program(about, "rhec");
+  program.set_version_flag("--version", "rhec " RHEC_PROJECT_VERSION);
+  program.require_subcommand(1);
+  program.footer(examples);
+  Action chosen;
+  add_solve(program, chosen);
+  add_plugins(program, chosen);
+
+  if (const std::string problem = wrong_command(program, count, words); !problem.empty()) return usage_error(problem);
+  try {
+    program.parse(count, words);
+  } catch (const CLI::ParseError& end) {
+    if (end.get_exit_code() == 0) return program.exit(end);  // --help, --version
+    const auto called = program.get_subcommands();
+    return usage_error(
+        fmt::format("{}; see 'rhec {}--help'", end.what(), called.empty() ? "" : called.front()->get_name() + " "));
+  }
+  return chosen();
+}
+
+}  // namespace
+}  // namespace rhec::apps
+
+int main(int count, char** words) {
+  try {
+    return rhec::apps::run(count, words);
+  } catch (const rhec::Error& mistake) {
+    fmt::print(stderr, "rhec: error: {}\n", mistake.what());
+  } catch (const std::exception& failure) {
+    fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());
+  }
+  return rhec::apps::exit_error;
+}

@@ -1,0 +1,172 @@
+#include "rhec/plugins/host.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/core/option_values.hpp"
+
+namespace rhec::apps {
+namespace {
+
+struct PluginsArguments {
+  std::string name;
+  bool json = false;
+  std::vector<std::filesystem::path> plugin_path;
+};
+
+using Table = std::vector<std::vector<std::string>>;
+
+/// Columns as wide as their widest cell, the last one open.
+void print_table(const Table& rows, std::string_view indent) {
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
+  }
+  for (const auto& row : rows) {
+    std::string line(indent);
+    for (std::size_t c = 0; c < row.size(); ++c)
+      line += c + 1 < row.size() ? fmt::format("{:<{}}  ", row[c], widths[c]) : row[c];
+    fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
+  }
+}
+
+std::string or_dash(const std::string& text) { return text.empty() ? "-" : text; }
+
+std::string backend_of(const PluginRecord& plugin) {
+  if (plugin.backend.empty()) return "-";
+  return plugin.backend_version.empty() ? plugin.backend : plugin.backend + " " + plugin.backend_version;
+}
+
+void list(const Host& host) {
+  Table table{{"KIND", "NAME", "VERSION", "LICENCE", "BACKEND", "PATH"}};
+  Table refused;
+  for (const PluginRecord& plugin : host.discover()) {
+    if (plugin.accepted()) {
+      table.push_back({std::string(word_of(plugin.kind)), plugin.name, plugin.version, or_dash(plugin.licence),
+                       backend_of(plugin), plugin.path.string()});
+    } else {
+      refused.push_back({plugin.path.string() + ":", plugin.refusal});
+    }
+  }
+  std::sort(table.begin() + 1, table.end());
+  if (table.size() > 1) {
+    print_table(table, "");
+  } else {
+    fmt::print("No plugins.\n{}", host.diagnosis());
+  }
+  if (refused.empty()) return;
+  fmt::print("\nNot used:\n");
+  print_table(refused, "  ");
+}
+
+void describe(const Host& host, const PluginRecord& plugin) {
+  Table about{{"kind", std::string(word_of(plugin.kind))},
+              {"name", plugin.name},
+              {"version", plugin.version},
+              {"licence", or_dash(plugin.licence)},
+              {"source", or_dash(plugin.source)},
+              {"backend", backend_of(plugin)},
+              {"can", or_dash(plugin.capabilities)},
+              {"path", plugin.path.string()}};
+  print_table(about, "");
+  const std::vector<OptionRow> options = host.options(plugin.kind, plugin.name);
+  if (options.empty()) {
+    fmt::print("\nIt has no options.\n");
+    return;
+  }
+  Table table{{"OPTION", "TYPE", "DEFAULT", "VALUES", "MEANING"}};
+  for (const OptionRow& option : options)
+    table.push_back(
+        {option.name, option.type, or_dash(option.default_value), or_dash(option.constraint), option.meaning});
+  fmt::print("\n");
+  print_table(table, "");
+}
+
+nlohmann::ordered_json as_json(const Host& host, const PluginRecord& plugin) {
+  nlohmann::ordered_json all;
+  if (!plugin.accepted()) return {{"path", plugin.path.string()}, {"refusal", plugin.refusal}};
+  all["kind"] = std::string(word_of(plugin.kind));
+  all["name"] = plugin.name;
+  all["version"] = plugin.version;
+  all["licence"] = plugin.licence;
+  all["source"] = plugin.source;
+  all["backend"] = plugin.backend;
+  all["backend_version"] = plugin.backend_version;
+  all["capabilities"] = plugin.capabilities;
+  all["path"] = plugin.path.string();
+  all["options"] = nlohmann::ordered_json::array();
+  for (const OptionRow& option : host.options(plugin.kind, plugin.name))
+    all["options"].push_back({{"name", option.name},
+                              {"type", option.type},
+                              {"default", option.default_value},
+                              {"constraint", option.constraint},
+                              {"meaning", option.meaning}});
+  return all;
+}
+
+/// Of the plugins of one kind and name, the first one found is the one that is used.
+std::vector<PluginRecord> named(const Host& host, const std::string& name) {
+  std::vector<PluginRecord> found;
+  std::vector<std::string> known;
+  for (const PluginRecord& plugin : host.discover()) {
+    if (!plugin.accepted()) continue;
+    known.push_back(plugin.name);
+    const auto same = [&](const PluginRecord& other) { return other.kind == plugin.kind; };
+    if (plugin.name == name && std::none_of(found.begin(), found.end(), same)) found.push_back(plugin);
+  }
+  if (!found.empty()) return found;
+  const std::string near = nearest(name, known);
+  std::string diagnosis = host.diagnosis();
+  diagnosis.erase(diagnosis.find_last_not_of('\n') + 1);
+  throw Error(fmt::format("there is no plugin '{}'{}\n{}", name,
+                          near.empty() ? std::string() : fmt::format("; did you mean '{}'?", near), diagnosis));
+}
+
+int show(const PluginsArguments& arguments) {
+  const Host host(arguments.plugin_path);
+  const std::vector<PluginRecord> wanted = arguments.name.empty() ? host.discover() : named(host, arguments.name);
+  if (arguments.json) {
+    auto all = nlohmann::ordered_json::array();
+    for (const PluginRecord& plugin : wanted) all.push_back(as_json(host, plugin));
+    fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  } else if (arguments.name.empty()) {
+    list(host);
+  } else {
+    for (const PluginRecord& plugin : wanted) {
+      if (&plugin != &wanted.front()) fmt::print("\n");
+      describe(host, plugin);
+    }
+  }
+  return exit_fine;
+}
+
+}  // namespace
+
+void add_plugins(CLI::App& program, Action& chosen) {
+  auto arguments = std::make_shared<PluginsArguments>();
+  CLI::App* command =
+      program.add_subcommand("plugins", "Lists the models, blockings and solvers that are found, or says all of one.");
+  command->footer(
+      "Examples:\n"
+      "  rhec plugins\n"
+      "  rhec plugins gn_rti\n"
+      "  rhec plugins --json --plugin-path my/plugins");
+  command->add_option("name", arguments->name, "show this plugin and its options")->type_name("NAME");
+  command->add_flag("--json", arguments->json, "print JSON, options included");
+  add_plugin_path(*command, arguments->plugin_path);
+  command->callback([=, &chosen] { chosen = [=] { return show(*arguments); }; });
+}
+
+}  // namespace rhec::apps

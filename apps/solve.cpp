@@ -1,0 +1,291 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "commands.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/core/kkt.hpp"
+#include "rhec/core/shift.hpp"
+#include "rhec/core/solver.hpp"
+#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/csv.hpp"
+#include "rhec/sim/output_folder.hpp"
+#include "rhec/sim/problem_file.hpp"
+
+namespace rhec::apps {
+namespace {
+
+using sim::Outcome;
+using sim::ProblemRecord;
+
+struct SolveArguments {
+  std::string problems;
+  std::string solver;
+  std::vector<std::string> assignments;
+  bool sequence = false;
+  bool verbose = false;
+  std::string out;
+  std::vector<std::filesystem::path> plugin_path;
+};
+
+/// The model of a record: one object for all records that name it with the same options.
+class Models {
+ public:
+  explicit Models(const Host& host) : host_(&host) {}
+
+  std::shared_ptr<const Model> of(const ProblemRecord& record) {
+    const std::string key = record.model + " " + key_of(record.model_options);
+    std::shared_ptr<const Model>& model = made_[key];
+    if (!model) model = host_->make_model(record.model, record.model_options);
+    return model;
+  }
+
+ private:
+  static std::string key_of(const Settings& settings) {
+    std::string key = settings.text();
+    for (const Settings& item : settings.items()) key += "[" + key_of(item);
+    for (const auto& [name, value] : settings.members()) key += "{" + name + ":" + key_of(value);
+    return key;
+  }
+
+  const Host* host_;
+  std::map<std::string, std::shared_ptr<const Model>> made_;
+};
+
+/// A solver with the problem that it was set up for; takes one record after the other.
+class Bench {
+ public:
+  Bench(std::string name, std::shared_ptr<Solver> solver) : name_(std::move(name)), solver_(std::move(solver)) {}
+
+  /// The problem by itself, from a cold start.
+  std::string solve_alone(const ProblemRecord& record, const std::shared_ptr<const Model>& model, Outcome& outcome) {
+    load(record, model, record.intervals);
+    solver_->reset();
+    sim::cold_start(record, *problem_, point_);
+    outcome = solve(point_);
+    outcome.objective = problem_->evaluate(point_, nullptr, scratch_);
+    return sim::solution_line(record, *problem_, point_, outcome);
+  }
+
+  /// The next problem of a sequence, from the solution of the one before. What is reported is what follows from the
+  /// decisions: the states simulated from the first one, so that no defect flatters the objective.
+  std::string solve_next(const ProblemRecord& record, const std::shared_ptr<const Model>& model, int max_intervals,
+                         Outcome& outcome) {
+    if (last_first_) shifter_->take(*problem_, point_);
+    load(record, model, max_intervals);
+    const std::int64_t first = record.first_interval();
+    const auto steps = last_first_ ? std::clamp<std::int64_t>(first - *last_first_, -1, 1 << 20) : -1;
+    if (!shifter_->apply(static_cast<int>(steps), *problem_, point_)) {
+      solver_->reset();
+      sim::cold_start(record, *problem_, point_);
+    }
+    outcome = solve(point_);
+    last_first_.reset();
+    if (is_usable(outcome.status)) last_first_ = first;
+    reported_ = point_;
+    roll_out(*problem_, reported_, scratch_);
+    outcome.objective = problem_->evaluate(reported_, nullptr, scratch_);
+    return sim::solution_line(record, *problem_, reported_, outcome);
+  }
+
+ private:
+  void load(const ProblemRecord& record, const std::shared_ptr<const Model>& model, int max_intervals) {
+    if (problem_ && problem_->shared_model() == model && sim::refill(record, *problem_)) {
+      check(record);
+      return;
+    }
+    problem_ = sim::build(record, model, max_intervals);
+    check(record);
+    solver_->setup(*problem_);
+    point_ = Iterate(problem_->capacity());
+    qp_ = StageQp(problem_->capacity());
+    scratch_.assign(problem_->scratch_size(), 0.0);
+    shifter_.emplace(*problem_);
+    last_first_.reset();
+  }
+
+  void check(const ProblemRecord& record) const {
+    if (const std::string reason = solver_->why_not(*problem_); !reason.empty())
+      throw Error(fmt::format("{}: {}: solver '{}' cannot take this problem: {}; choose another one of 'rhec plugins'",
+                              record.where, record.id, name_, reason));
+  }
+
+  Outcome solve(Iterate& point) {
+    const auto start = Clock::now();
+    solver_->prepare(*problem_, point);
+    const Report report = solver_->solve(*problem_, point);
+    const std::chrono::duration<double, std::micro> time = Clock::now() - start;
+    Outcome outcome;
+    outcome.solver = name_;
+    outcome.status = report.status;
+    outcome.iterations = report.iterations;
+    outcome.kkt_residual = kkt_residual(*problem_, point, qp_, scratch_).largest();
+    outcome.solve_time_us = time.count();
+    return outcome;
+  }
+
+  std::string name_;
+  std::shared_ptr<Solver> solver_;
+  std::unique_ptr<HorizonProblem> problem_;
+  Iterate point_, reported_;
+  StageQp qp_;
+  std::vector<double> scratch_;
+  std::optional<GuessShifter> shifter_;
+  std::optional<std::int64_t> last_first_;  ///< where the window of `point_` began, if it can be a guess
+};
+
+/// Sequences run in the order of their steps.
+std::map<std::string, int> longest_of_each(const std::vector<ProblemRecord>& records) {
+  std::map<std::string, int> longest;
+  std::map<std::string, const ProblemRecord*> last;
+  for (const ProblemRecord& record : records) {
+    if (record.step < 0)
+      throw Error(
+          fmt::format("{}: id: '{}' has no step; --sequence expects ids such as run/rhe/19", record.where, record.id));
+    const ProblemRecord*& before = last[record.prefix];
+    if (before && before->step >= record.step)
+      throw Error(fmt::format("{}: id: step {} comes after step {} ({}); --sequence expects steps that increase",
+                              record.where, record.step, before->step, before->where));
+    before = &record;
+    int& intervals = longest[record.prefix];
+    intervals = std::max(intervals, record.intervals);
+  }
+  return longest;
+}
+
+/// What the summary tells of one id prefix.
+struct Group {
+  std::map<std::string, int> statuses;
+  std::vector<double> iterations, times;
+
+  void add(const Outcome& outcome) {
+    ++statuses[name_of(outcome.status)];
+    iterations.push_back(outcome.iterations);
+    times.push_back(outcome.solve_time_us);
+  }
+};
+
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  const auto index = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
+  return values[std::clamp<std::size_t>(index, 1, values.size()) - 1];
+}
+
+void print_summary(const std::map<std::string, Group>& groups) {
+  std::size_t width = 8;
+  for (const auto& [prefix, group] : groups) width = std::max(width, prefix.size());
+  fmt::print(stderr, "{:<{}}  {:>8}  {:>14}  {:>14}  {:>14}  {}\n", "PROBLEMS", width, "COUNT", "ITER MED/MAX",
+             "TIME MED [us]", "TIME P99 [us]", "STATUS");
+  for (const auto& [prefix, group] : groups) {
+    std::string statuses;
+    for (const auto& [status, count] : group.statuses)
+      statuses += fmt::format("{}{} {}", statuses.empty() ? "" : ", ", count, status);
+    const std::string iterations =
+        fmt::format("{:g}/{:g}", quantile(group.iterations, 0.5), quantile(group.iterations, 1.0));
+    fmt::print(stderr, "{:<{}}  {:>8}  {:>14}  {:>14.1f}  {:>14.1f}  {}\n", prefix, width, group.times.size(),
+               iterations, quantile(group.times, 0.5), quantile(group.times, 0.99), statuses);
+  }
+}
+
+std::string read_standard_input() {
+  return {std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()};
+}
+
+void print_line(const std::string& line) {
+  if (std::fwrite(line.data(), 1, line.size(), stdout) != line.size() || std::fputc('\n', stdout) == EOF ||
+      std::fflush(stdout) != 0)
+    throw Error("standard output: cannot be written; mend what it goes to, e.g. a full disk");
+}
+
+int solve(const SolveArguments& arguments) {
+  const bool piped = arguments.problems == "-";
+  const std::string name = piped ? "standard input" : arguments.problems;
+  const std::string text = piped ? read_standard_input() : sim::read_text(arguments.problems);
+  const std::vector<ProblemRecord> records = sim::read_problems(text, name);
+  if (records.empty()) throw Error(fmt::format("{}: no problem in it; expected one on each line", name));
+  std::map<std::string, int> longest;
+  if (arguments.sequence) longest = longest_of_each(records);
+
+  const Host host(arguments.plugin_path);
+  Settings options;
+  for (const std::string& assignment : arguments.assignments) apply_assignment(options, assignment);
+  Models models(host);
+  std::map<std::string, Bench> benches;  // one for all, or one a sequence
+  std::map<std::string, Group> groups;
+  std::string lines;
+  bool all_usable = true;
+  for (const ProblemRecord& record : records) {
+    const std::string key = arguments.sequence ? record.prefix : std::string();
+    auto at = benches.find(key);
+    if (at == benches.end())
+      at = benches.emplace(key, Bench(arguments.solver, host.make_solver(arguments.solver, options))).first;
+    Outcome outcome;
+    const std::string line = arguments.sequence
+                                 ? at->second.solve_next(record, models.of(record), longest.at(record.prefix), outcome)
+                                 : at->second.solve_alone(record, models.of(record), outcome);
+    all_usable = all_usable && is_usable(outcome.status);
+    groups[record.prefix].add(outcome);
+    if (arguments.out.empty()) {
+      print_line(line);
+    } else {
+      lines += line + "\n";
+    }
+  }
+  if (!arguments.out.empty()) {
+    const std::filesystem::path file = std::filesystem::absolute(arguments.out);
+    sim::OutputFolder folder(file.parent_path());
+    folder.write(file.filename().string(), lines);
+    folder.commit();
+  }
+  if (arguments.verbose || isatty(STDERR_FILENO)) print_summary(groups);
+  return all_usable ? exit_fine : exit_not_solved;
+}
+
+}  // namespace
+
+void add_solve(CLI::App& program, Action& chosen) {
+  auto arguments = std::make_shared<SolveArguments>();
+  CLI::App* command = program.add_subcommand(
+      "solve", "Solves the problems of a file, one a line, each alone from a cold start; writes one solution a line.");
+  command->footer(
+      "With --sequence the lines of one id prefix (run/rhe of run/rhe/19) are a sequence over time: the guess is the\n"
+      "solution before, shifted by the steps between them. States and objective are then those that follow from the\n"
+      "decisions by simulation: from the inputs, and in estimation the first state and the parameters.\n\n"
+      "The exit code is 3 where the status of a line says that its solution is not usable.\n\n"
+      "Examples:\n"
+      "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
+      "  head -1 problems.jsonl | rhec solve - --solver gn_rti\n"
+      "  rhec solve problems.jsonl --solver gn_rti --sequence --verbose > solutions.jsonl");
+  command->add_option("problems", arguments->problems, "a file of problems; - for standard input")
+      ->required()
+      ->type_name("PROBLEMS.jsonl");
+  command->add_option("--solver", arguments->solver, "a solver of 'rhec plugins'")->required()->type_name("NAME");
+  command->add_option("--set", arguments->assignments, "an option of the solver; may be given several times")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command->add_flag("--sequence", arguments->sequence, "warm starts along each id prefix");
+  command->add_option("--out", arguments->out, "write there, whole or not at all, instead of to standard output")
+      ->type_name("FILE");
+  command->add_flag("--verbose", arguments->verbose, "print a summary even where standard error is no terminal");
+  add_plugin_path(*command, arguments->plugin_path);
+  command->callback([=, &chosen] { chosen = [=] { return solve(*arguments); }; });
+}
+
+}  // namespace rhec::apps

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <memory>
+
+#include <Eigen/Core>
+
+#include "rhec/core/model.hpp"
+#include "rhec/core/solver.hpp"
+
+namespace rhec {
+
+/// What an estimator knows at a time. Valid until the estimator is asked again.
+struct Estimate {
+  double time = 0.0;
+  Eigen::VectorXd state;       ///< x_k, n_x
+  Eigen::VectorXd parameters;  ///< the value of the newest interval, n_p
+  /// Of [x_k; p], from the information in the measurements and the prior; bounds do not narrow it.
+  Eigen::MatrixXd covariance;
+  Report report;            ///< of the solver; trivial for a filter
+  bool fallback = false;    ///< the solver failed, and an open-loop prediction took its place
+  bool predicted = false;   ///< the time lies beyond the newest node: integrated from there
+};
+
+/// What the timeline of an Estimator drives: nodes that follow each other, with intervals between them.
+class RHEC_EXPORT EstimationMethod {
+ public:
+  virtual ~EstimationMethod() = default;
+  virtual const Model& model() const noexcept = 0;
+  virtual int substeps() const noexcept = 0;
+
+  /// The first node, with what was measured at it (n_y, NaN where missing).
+  virtual void start(const double* outputs) noexcept = 0;
+  /// The next node: `duration` [s] after the last, the input measured on the way (n_u, NaN where missing), the outputs.
+  virtual void add_node(double duration, const double* inputs, const double* outputs) noexcept = 0;
+  /// Outputs that came late for the node `back` before the newest one; false if that is out of reach.
+  virtual bool amend(int back, const double* outputs) noexcept = 0;
+  /// The estimate at the newest node.
+  virtual void estimate(Estimate& result, Clock::time_point deadline) noexcept = 0;
+  /// Work that can be done before the next node is known; calling it is never needed.
+  virtual void prepare() noexcept {}
+  virtual void reset() noexcept = 0;
+};
+
+}  // namespace rhec

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "rhec/core/blocking.hpp"
+#include "rhec/core/model.hpp"
+#include "rhec/core/ocp.hpp"
+
+namespace rhec {
+
+/// What the two kinds of problem share: a model over a horizon, with channels (parameters or blocked inputs) whose values
+/// are carried from stage to stage.
+///
+/// Stage state s_i = [x_i; c_i], c_i the carried channels' values on interval i-1 (at node 0: on interval 0). Stage control
+/// w_i = [free inputs; values of the channels whose block starts at interval i]. A channel that does not start keeps its
+/// value: c_{i+1} = c_i; one that starts takes its control's. Where the model sees a channel, it sees c_{i+1}, or, with
+/// Transition::ramp, the line from c_i to c_{i+1}.
+class RHEC_EXPORT HorizonProblem : public Ocp {
+ public:
+  const Model& model() const noexcept { return *model_; }
+  std::shared_ptr<const Model> shared_model() const noexcept { return model_; }
+  int substeps() const noexcept { return substeps_; }
+
+  Capacity capacity() const noexcept override { return capacity_; }
+  int intervals() const noexcept override { return intervals_; }
+  int state_count(int) const noexcept override { return capacity_.states; }
+  int control_count(int interval) const noexcept override { return control_counts_[interval]; }
+  const double* state_lower(int node) const noexcept override { return row(state_lower_, node, capacity_.states); }
+  const double* state_upper(int node) const noexcept override { return row(state_upper_, node, capacity_.states); }
+  const double* control_lower(int i) const noexcept override { return row(control_lower_, i, capacity_.controls); }
+  const double* control_upper(int i) const noexcept override { return row(control_upper_, i, capacity_.controls); }
+  bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
+  std::size_t scratch_size() const noexcept override;
+
+  double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept override;
+  void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept override;
+  void linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                 std::span<double> scratch) const noexcept override;
+  void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
+
+  /// Length of an interval [s].
+  double duration(int interval) const noexcept { return durations_[interval]; }
+  void set_duration(int interval, double seconds) noexcept { durations_[interval] = seconds; }
+
+  /// True where a block of carried channel `channel` starts at an interval.
+  bool begins(int interval, int channel) const noexcept { return begins_[interval * channels_ + channel] != 0; }
+  int channel_count() const noexcept { return channels_; }
+
+  // The point in the vehicle's terms: what interval i uses.
+  const double* vehicle_state(const Iterate& point, int node) const noexcept { return point.state(node); }
+  void inputs_on(const Iterate& point, int interval, double* u) const noexcept;
+  /// With a ramp, the value at the interval's end, which is the block's.
+  void parameters_on(const Iterate& point, int interval, double* p) const noexcept;
+  /// Writes inputs (N x n_u) and parameters (N x n_p) per interval into a point's controls and carried states; where
+  /// intervals share a block, the row of the block's first interval counts.
+  void set_decisions(Iterate& point, const double* inputs, const double* parameters) const noexcept;
+
+ protected:
+  struct Shape {
+    int max_intervals = 0;
+    int substeps = 1;
+    std::vector<int> blocked_inputs;  ///< inputs that are carried channels
+  };
+  HorizonProblem(std::shared_ptr<const Model> model, const Shape& shape);
+
+  int nx() const noexcept { return nx_; }
+  int nu() const noexcept { return nu_; }
+  int np() const noexcept { return np_; }
+  static const double* row(const std::vector<double>& v, int i, int width) noexcept { return v.data() + i * width; }
+  static double* row(std::vector<double>& v, int i, int width) noexcept { return v.data() + i * width; }
+
+  void set_intervals(int intervals) noexcept { intervals_ = intervals; }
+  void set_begins(int interval, int channel, bool begins) noexcept { begins_[interval * channels_ + channel] = begins; }
+  void set_ramp(int channel, bool ramp) noexcept;
+  bool is_ramp(int channel) const noexcept { return ramp_[channel] != 0; }
+  /// Counts the controls of every interval; call it after the structure has changed.
+  void finish_structure() noexcept;
+  /// Carried channel of an input, or -1 where it is free on every interval.
+  int channel_of_input(int input) const noexcept { return input_channel_[input]; }
+  /// Index in w_i of a channel that starts at interval i, or -1.
+  int control_of_channel(int interval, int channel) const noexcept {
+    return control_index_[interval * channels_ + channel];
+  }
+  int control_of_input(int interval, int input) const noexcept;
+
+  std::vector<double> state_lower_, state_upper_, control_lower_, control_upper_;
+
+  // The cost, which makes the kind. Each adds to what is there.
+  virtual double cost(const Iterate& point, std::span<double> scratch) const noexcept = 0;
+  virtual void add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                        std::span<double> scratch) const noexcept = 0;
+  virtual void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept = 0;
+  virtual std::size_t cost_scratch_size() const noexcept = 0;
+
+ private:
+  void gather(const Iterate& point, StageRange range, double* x, double* u, double* p, double* p_end) const noexcept;
+  void fill_bounds(const Iterate& point, StageRange range, StageQp& qp) const noexcept;
+
+  std::shared_ptr<const Model> model_;
+  Capacity capacity_;
+  int nx_, nu_, np_, channels_, substeps_, intervals_ = 0;
+  bool any_ramp_ = false;
+  std::vector<int> input_channel_, free_inputs_;
+  std::vector<double> durations_;
+  std::vector<std::uint8_t> begins_, ramp_;
+  std::vector<int> control_index_, control_counts_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "rhec/core/export.hpp"
+#include "rhec/core/iterate.hpp"
+#include "rhec/core/stage_qp.hpp"
+
+namespace rhec {
+
+enum class OcpKind { rhe, rhc };
+
+/// Which curvature a linearisation carries.
+enum class Hessian {
+  gauss_newton,  ///< of the squared residuals only; positive semidefinite
+  exact          ///< of the Lagrangian, with the point's costates; may be indefinite
+};
+
+/// Consecutive stages first .. last (both included).
+struct StageRange {
+  int first = 0;
+  int last = 0;
+};
+
+/// What is asked over a horizon, stage by stage, and nothing of who solves it:
+///
+///     minimise    sum_{i=0}^{N} l_i(s_i, w_i)
+///     subject to  s_{i+1} = F_i(s_i, w_i),   bounds on every s_i and w_i,   s_0 given or free
+///
+/// A stage state s_i holds the vehicle's state and the values of blocked channels that are carried along; a stage control
+/// w_i holds the inputs and the values of the blocks that start there. So unblocked, blocked and full-horizon structures are
+/// all this one form. RheProblem and RhcProblem are its two kinds. Evaluation is const, thread-safe and allocation-free;
+/// `scratch` is the caller's, of `scratch_size()` doubles.
+class RHEC_EXPORT Ocp {
+ public:
+  virtual ~Ocp() = default;
+
+  virtual OcpKind kind() const noexcept = 0;
+  virtual Capacity capacity() const noexcept = 0;
+  virtual int intervals() const noexcept = 0;
+  virtual int state_count(int node) const noexcept = 0;
+  virtual int control_count(int interval) const noexcept = 0;
+  /// The given initial stage state, or null where it is free.
+  virtual const double* initial_state() const noexcept = 0;
+  virtual const double* state_lower(int node) const noexcept = 0;
+  virtual const double* state_upper(int node) const noexcept = 0;
+  virtual const double* control_lower(int interval) const noexcept = 0;
+  virtual const double* control_upper(int interval) const noexcept = 0;
+  virtual bool has_second_derivatives() const noexcept = 0;
+  virtual std::size_t scratch_size() const noexcept = 0;
+
+  /// The objective at a point; `defects` (N rows of capacity().states, or null) gets F_i(s_i, w_i) - s_{i+1}.
+  virtual double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept = 0;
+
+  /// Overwrites the state of node `interval` + 1 by simulation of one interval.
+  virtual void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept = 0;
+  /// Overwrites the states of nodes 1 .. N by simulation from node 0 with the point's controls.
+  void simulate(Iterate& point, std::span<double> scratch) const noexcept {
+    for (int i = 0; i < intervals(); ++i) simulate_interval(i, point, scratch);
+  }
+
+  /// Fills the stages of a range of the quadratic program at a point: sizes, dynamics, costs and bounds.
+  virtual void linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                         std::span<double> scratch) const noexcept = 0;
+
+  /// Fills again what depends on data that may have come since `linearise` (measurements, references, the initial state,
+  /// bounds): q, r, the bounds and the initial step. Matrices stay.
+  virtual void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept = 0;
+};
+
+/// The whole horizon of an Ocp.
+inline StageRange all_stages(const Ocp& ocp) { return {0, ocp.intervals()}; }
+
+}  // namespace rhec

@@ -1,0 +1,90 @@
+#pragma once
+
+// Packs of doubles for SIMD across stages. Included only by translation units that are compiled for one instruction set
+// (rhec_add_wide_kernels in CMake generates them), each of which defines RHEC_PACK_NAMESPACE as a name of its own.
+// xsimd has helpers that are neither templates nor tied to an instruction set; compiled twice, the linker would keep
+// one of them for all, and a machine without its instructions would stop there. So every such unit has xsimd under a
+// name of its own.
+
+#if defined(RHEC_PACK_NAMESPACE)
+#define xsimd RHEC_PACK_NAMESPACE
+#endif
+
+#include <utility>
+#include <xsimd/xsimd.hpp>
+
+#include "rhec/core/model_kernels.hpp"
+
+namespace rhec {
+
+#if defined(__AVX2__)
+/// Four packs of four as a matrix, transposed.
+inline void transpose(xsimd::batch<double, xsimd::fma3<xsimd::avx2>>* a) {
+  const __m256d low01 = _mm256_unpacklo_pd(a[0], a[1]), high01 = _mm256_unpackhi_pd(a[0], a[1]);
+  const __m256d low23 = _mm256_unpacklo_pd(a[2], a[3]), high23 = _mm256_unpackhi_pd(a[2], a[3]);
+  a[0] = _mm256_permute2f128_pd(low01, low23, 0x20);
+  a[1] = _mm256_permute2f128_pd(high01, high23, 0x20);
+  a[2] = _mm256_permute2f128_pd(low01, low23, 0x31);
+  a[3] = _mm256_permute2f128_pd(high01, high23, 0x31);
+}
+#endif
+
+#if defined(__AVX512F__)
+/// Eight packs of eight as a matrix, transposed: pairs of columns, then quarters of the pack, then its halves.
+inline void transpose(xsimd::batch<double, xsimd::avx512dq>* a) {
+  __m512d pairs[8], quads[8];
+  for (int i = 0; i < 8; i += 2) {
+    pairs[i] = _mm512_unpacklo_pd(a[i], a[i + 1]);
+    pairs[i + 1] = _mm512_unpackhi_pd(a[i], a[i + 1]);
+  }
+  for (int i = 0; i < 8; i += 4) {
+    for (int j = 0; j < 2; ++j) {
+      quads[i + j] = _mm512_shuffle_f64x2(pairs[i + j], pairs[i + j + 2], 0x88);      // columns 0, 4 (1, 5)
+      quads[i + j + 2] = _mm512_shuffle_f64x2(pairs[i + j], pairs[i + j + 2], 0xdd);  // columns 2, 6 (3, 7)
+    }
+  }
+  for (int j = 0; j < 4; ++j) {
+    a[j] = _mm512_shuffle_f64x2(quads[j], quads[j + 4], 0x88);
+    a[j + 4] = _mm512_shuffle_f64x2(quads[j], quads[j + 4], 0xdd);
+  }
+}
+#endif
+
+template <class Arch>
+struct LaneTraits<xsimd::batch<double, Arch>> {
+  using Lane = xsimd::batch<double, Arch>;
+  static constexpr int width = static_cast<int>(Lane::size);
+
+  template <int size>
+  static void load(const double* rows, int count, Lane* out) {
+    const auto load_entry = [&]<int... i>(int k, std::integer_sequence<int, i...>) {
+      return Lane{rows[(i < count ? i : count - 1) * size + k]...};
+    };
+    for (int k = 0; k < size; ++k) out[k] = load_entry(k, std::make_integer_sequence<int, width>());
+  }
+  /// A block of `width` entries of all rows at a time; what is left one entry at a time.
+  template <int size>
+  static void store(const Lane* entries, int count, double* rows) {
+    int k = 0;
+    for (; k + width <= size; k += width) {
+      Lane block[width];
+      for (int i = 0; i < width; ++i) block[i] = entries[k + i];
+      transpose(block);
+      for (int i = 0; i < count; ++i) block[i].store_unaligned(rows + i * size + k);
+    }
+    for (; k < size; ++k) {
+      alignas(64) double spread[width];
+      entries[k].store_aligned(spread);
+      for (int i = 0; i < count; ++i) rows[i * size + k] = spread[i];
+    }
+  }
+};
+
+/// The widest pack of the instruction set that this unit is compiled for.
+#if defined(__AVX512F__)
+using WidestPack = xsimd::batch<double, xsimd::avx512dq>;
+#elif defined(__AVX2__)
+using WidestPack = xsimd::batch<double, xsimd::fma3<xsimd::avx2>>;
+#endif
+
+}  // namespace rhec

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "rhec/core/arrival_cost.hpp"
+#include "rhec/core/blocking.hpp"
+#include "rhec/core/estimate.hpp"
+#include "rhec/core/riccati.hpp"
+#include "rhec/core/shift.hpp"
+
+namespace rhec {
+
+/// Receding horizon estimation with structured blocking (METHOD): a window of at most `problem.max_intervals` intervals
+/// that grows from the start of the run and then slides, with an arrival cost before it.
+///
+/// Blocks that no random walk links (`Blocking::neighbour_sigma` off) are still given a prior as wide as `restart_sigma`
+/// about the block before, the same that a block has once it is the window's first: so what the data determine is theirs,
+/// and a block that they say nothing about keeps its neighbour's value rather than being thrown to a bound by noise.
+class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
+ public:
+  struct Setup {
+    RheProblem::Setup problem;
+    ArrivalKind arrival = ArrivalKind::ekf;
+    std::vector<std::shared_ptr<const Blocking>> blockings;  ///< one a parameter
+    std::vector<ParameterWalk> walks;                        ///< one a parameter
+    Eigen::VectorXd initial_mean;                            ///< of [x; p] at the first node
+    Eigen::MatrixXd initial_covariance;
+    /// Angle-valued states whose start is unknown: while the window still grows, that many starts around the circle are
+    /// tried and the best is kept.
+    int heading_starts = 1;
+    int heading_state = -1;
+  };
+  /// Throws Error where sizes do not fit or a blocking cannot take the horizon.
+  RecedingHorizonEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Setup setup);
+
+  const Model& model() const noexcept override { return problem_.model(); }
+  int substeps() const noexcept override { return problem_.substeps(); }
+  void start(const double* outputs) noexcept override;
+  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
+  bool amend(int back, const double* outputs) noexcept override;
+  void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
+  void prepare() noexcept override;
+  void reset() noexcept override;
+
+  /// The window as it stands, for those who want to look inside.
+  const RheProblem& problem() const noexcept { return problem_; }
+  const Iterate& solution() const noexcept { return point_; }
+  const Window& window() const noexcept { return window_; }
+  const ArrivalCost& arrival() const noexcept { return arrival_; }
+
+ private:
+  void advance_window(double duration, const double* inputs, const double* outputs) noexcept;
+  void slide_arrival() noexcept;
+  void set_structure() noexcept;
+  void search_heading(Clock::time_point deadline) noexcept;
+
+  Setup setup_;
+  RheProblem problem_;
+  ArrivalCost arrival_;
+  std::shared_ptr<Solver> solver_;
+  GuessShifter shifter_;
+  Iterate point_, trial_, best_;
+  Window window_;
+  bool started_ = false, solved_ = false, prepared_ = false;
+  std::vector<std::uint8_t> begins_, next_begins_;
+  std::vector<std::int64_t> first_starts_;
+  std::vector<ArrivalCost::Border> borders_;
+  std::vector<double> scratch_, inputs_, outputs_;
+  StageQp covariance_qp_;
+  Riccati covariance_riccati_;
+  ActiveSet no_active_bounds_;
+  std::vector<double> last_covariance_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "rhec/core/horizon_problem.hpp"
+
+namespace rhec {
+
+/// Receding horizon control over N intervals (METHOD; Wallace et al., eq. 4), x_0 and the parameters p given:
+///
+///     minimise  sum_{i=0}^{N-1} || x_i - xref_i ||^2_Vx + || u_i - uref_i ||^2_Vu  +  || x_N - xref_N ||^2_VN
+///     subject to the dynamics, bounds on the states of nodes 1 .. N and on the inputs.
+///
+/// p is embedded like the initial state: it is part of the given initial stage state, so that both may arrive after the
+/// problem has been linearised. Inputs may be blocked. Data are set in place, without allocation; call `finish` after the
+/// structure, the initial state, or the bounds have changed.
+class RHEC_EXPORT RhcProblem final : public HorizonProblem {
+ public:
+  struct Setup {
+    int max_intervals = 15;
+    int substeps = 1;
+    std::vector<double> state_weights;     ///< n_x, diagonal of Vx
+    std::vector<double> input_weights;     ///< n_u, diagonal of Vu
+    std::vector<double> terminal_weights;  ///< n_x, diagonal of VN
+    std::vector<double> state_lower, state_upper;  ///< n_x; empty: the model's own bounds
+    std::vector<double> input_lower, input_upper;  ///< n_u; empty: the model's own bounds
+    std::vector<int> blocked_inputs;               ///< inputs that get blocks of their own
+  };
+  RhcProblem(std::shared_ptr<const Model> model, Setup setup);
+
+  const Setup& setup() const noexcept { return setup_; }
+
+  double* given_state() noexcept { return initial_.data(); }           ///< x_0, n_x
+  double* given_parameters() noexcept { return initial_.data() + nx(); }  ///< p, n_p
+  double* state_reference(int node) noexcept { return row(state_reference_, node, nx()); }
+  double* input_reference(int interval) noexcept { return row(input_reference_, interval, nu()); }
+  const double* state_reference(int node) const noexcept { return row(state_reference_, node, nx()); }
+  const double* input_reference(int interval) const noexcept { return row(input_reference_, interval, nu()); }
+  /// Bounds of an input, per interval; they start as the set-up's.
+  double& input_lower(int interval, int input) noexcept { return input_lower_[interval * nu() + input]; }
+  double& input_upper(int interval, int input) noexcept { return input_upper_[interval * nu() + input]; }
+
+  void set_intervals(int intervals) noexcept { HorizonProblem::set_intervals(intervals); }
+  /// Marks where the blocks of a blocked input start; begins[0] is taken as 1.
+  void set_blocks(int input, const std::uint8_t* begins) noexcept;
+  /// Ends a change. A state bound that no admissible input can keep from the given initial state (the estimate may violate
+  /// it) is moved to the nearest value within reach, node by node; returns how many were moved.
+  int finish(std::span<double> scratch) noexcept;
+
+  OcpKind kind() const noexcept override { return OcpKind::rhc; }
+  const double* initial_state() const noexcept override { return initial_.data(); }
+
+ private:
+  double cost(const Iterate& point, std::span<double> scratch) const noexcept override;
+  void add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                std::span<double> scratch) const noexcept override;
+  void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
+  std::size_t cost_scratch_size() const noexcept override { return 0; }
+  void add(StageRange range, const Iterate& point, bool matrices, StageQp& qp) const noexcept;
+  double state_error(const Iterate& point, int node, int state) const noexcept;
+  int soften_unreachable_bounds(std::span<double> scratch) noexcept;
+
+  Setup setup_;
+  std::vector<double> initial_, state_reference_, input_reference_, input_lower_, input_upper_;
+};
+
+}  // namespace rhec

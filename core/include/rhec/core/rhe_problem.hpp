@@ -1,0 +1,98 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rhec/core/horizon_problem.hpp"
+
+namespace rhec {
+
+/// A pseudo-Huber loss on a group of outputs: with s the weighted squared residual of the group,
+/// 2 delta^2 (sqrt(1 + s / delta^2) - 1) takes the place of s. Smooth, so that its exact Hessian exists.
+struct RobustLoss {
+  std::vector<int> outputs;  ///< they share one loss, such as the two coordinates of a fix
+  double delta = 3.0;        ///< in standard deviations: where the loss turns from quadratic to linear
+};
+
+/// Receding horizon estimation over N intervals (METHOD; Wallace et al., eq. 2):
+///
+///     minimise  || [chi_0; rho_first] - [xbar; pbar] ||^2_P            arrival cost
+///             + sum over nodes      || h(chi_i) - y_i ||^2_Ry          what is missing (NaN) is left out
+///             + sum over intervals  || nu_i - u_meas_i ||^2_Ru
+///             + sum over block starts (rho_b - rho_a)^2 / variance     where neighbouring blocks are linked
+///     subject to the dynamics, bounds on states at every node, on inputs, and on every parameter block.
+///
+/// Data are set in place, without allocation; after the structure (the number of intervals or the block starts) has changed,
+/// `finish` must be called.
+class RHEC_EXPORT RheProblem final : public HorizonProblem {
+ public:
+  struct Setup {
+    int max_intervals = 15;
+    int substeps = 1;
+    std::vector<double> output_weights;  ///< n_y, diagonal of Ry = 1 / sigma^2
+    std::vector<double> input_weights;   ///< n_u, diagonal of Ru
+    std::vector<RobustLoss> robust;
+    std::vector<double> state_lower, state_upper;          ///< n_x; empty: the model's own bounds
+    std::vector<double> input_lower, input_upper;          ///< n_u; empty: none, since the input was measured
+    std::vector<double> parameter_lower, parameter_upper;  ///< n_p; empty: the model's own bounds
+  };
+  RheProblem(std::shared_ptr<const Model> model, Setup setup);
+
+  const Setup& setup() const noexcept { return setup_; }
+
+  /// Arrival cost: mean and information matrix of [x; p] at node 0.
+  Eigen::VectorXd arrival_mean;         ///< n_x + n_p
+  Eigen::MatrixXd arrival_information;  ///< symmetric positive semidefinite
+
+  /// y at a node (n_y) and measured u on an interval (n_u), NaN where missing.
+  double* output(int node) noexcept { return row(outputs_, node, ny_); }
+  double* measured_input(int interval) noexcept { return row(measured_inputs_, interval, nu()); }
+  const double* output(int node) const noexcept { return row(outputs_, node, ny_); }
+  const double* measured_input(int interval) const noexcept { return row(measured_inputs_, interval, nu()); }
+
+  void set_intervals(int intervals) noexcept { HorizonProblem::set_intervals(intervals); }
+  /// Marks where a parameter's blocks start. `begins` has an entry an interval; the first interval's block is that of node
+  /// 0's value, so begins[0] matters only for a ramp that starts there.
+  void set_blocks(int parameter, const std::uint8_t* begins, Transition transition) noexcept;
+  /// Links the block that starts at an interval to the one before it; infinite variance: not linked.
+  void link(int interval, int parameter, double variance) noexcept;
+  double link_variance(int interval, int parameter) const noexcept {
+    return 1.0 / link_information_[interval * np() + parameter];
+  }
+  void finish() noexcept;
+  /// Moves durations, outputs and measured inputs one interval towards the window's start; the last ones stay where they
+  /// are until they are overwritten.
+  void drop_first_interval() noexcept;
+
+  /// Weight in (0, 1] that the robust loss gives an output at a point: derivative of the loss by s.
+  void robust_weights(const Iterate& point, int node, double* weights, std::span<double> scratch) const noexcept;
+
+  OcpKind kind() const noexcept override { return OcpKind::rhe; }
+  const double* initial_state() const noexcept override { return nullptr; }
+
+ private:
+  double cost(const Iterate& point, std::span<double> scratch) const noexcept override;
+  void add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                std::span<double> scratch) const noexcept override;
+  void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
+  std::size_t cost_scratch_size() const noexcept override;
+
+  void residual(int node, const double* predicted, double* difference) const noexcept;
+  double losses(const double* difference, double* weight, double* curvature) const noexcept;
+  void add_outputs(StageRange range, const Iterate& point, Hessian hessian, bool matrices, StageQp& qp,
+                   std::span<double> scratch) const noexcept;
+  void add_inputs_and_links(StageRange range, const Iterate& point, bool matrices, StageQp& qp) const noexcept;
+  void add_arrival(const Iterate& point, bool matrices, StageQp& qp) const noexcept;
+
+  Setup setup_;
+  int ny_;
+  std::vector<int> robust_group_;  ///< of an output, or -1
+  std::vector<double> outputs_, measured_inputs_, link_information_;
+};
+
+/// The signed difference a - b on the circle, in (-pi, pi].
+RHEC_EXPORT double angle_difference(double a, double b) noexcept;
+
+}  // namespace rhec

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rhec/core/stage_qp.hpp"
+
+namespace rhec {
+
+/// Which bounds of a StageQp are held as equalities: -1 at the lower bound, +1 at the upper, 0 free.
+class RHEC_EXPORT ActiveSet {
+ public:
+  ActiveSet() = default;
+  explicit ActiveSet(const Capacity& capacity);
+
+  std::int8_t* state(int node) noexcept { return states_.data() + node * capacity_.states; }
+  std::int8_t* control(int interval) noexcept { return controls_.data() + interval * capacity_.controls; }
+  const std::int8_t* state(int node) const noexcept { return states_.data() + node * capacity_.states; }
+  const std::int8_t* control(int interval) const noexcept { return controls_.data() + interval * capacity_.controls; }
+  void clear() noexcept;
+  bool operator==(const ActiveSet& other) const noexcept { return states_ == other.states_ && controls_ == other.controls_; }
+
+ private:
+  Capacity capacity_;
+  std::vector<std::int8_t> states_, controls_;
+};
+
+/// Solves a StageQp in which the bounds of an active set hold with equality and all others are ignored, by a backward
+/// Riccati recursion: with the value function V_{i+1}(s) = 1/2 s'Ps + p's subject to C s = d,
+///
+///     G = R + B'PB,  L = S + B'PA,  g = r + B'(Pb + p)
+///     w = -G^-1 (L s + g),   P_i = Q + A'PA - L'G^-1 L,   p_i = q + A'(Pb + p) - L'G^-1 g
+///
+/// on the null space of the active rows. An active control is fixed; an active state bound C s_{i+1} = d becomes
+/// C B w = d - C b - C A s, solved for as many controls as it has pivots; what is left over passes on to node i. The cost is
+/// linear in the horizon. Where a reduced G is not positive definite it is convexified (its negative eigenvalues are
+/// reflected), which changes R on the free directions only; the reduced Hessian is then positive definite.
+///
+/// `factor` needs the matrices and the active set, `solve` the vectors too, so that the former can be done in advance.
+class RHEC_EXPORT Riccati {
+ public:
+  enum class Outcome {
+    done,
+    inconsistent  ///< the active bounds contradict each other
+  };
+  Riccati() = default;
+  explicit Riccati(const Capacity& capacity);
+
+  /// Diagonals to be added to Q and R (barrier terms), or null; rows have the capacity's length.
+  struct Diagonals {
+    const double* states = nullptr;
+    const double* controls = nullptr;
+  };
+  void factor(const StageQp& qp, const ActiveSet& active, const Diagonals& extra) noexcept;
+  void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, {}); }
+  bool was_convexified() const noexcept { return convexified_; }
+  /// After a `factor` without active bounds: puts what convexification changed into the program's R, whose reduced Hessian
+  /// is positive definite from then on, whichever bounds become active.
+  void write_convexified(StageQp& qp) noexcept;
+
+  /// The minimiser as a step, with costates and the multipliers of the active bounds, for vectors that may be newer than
+  /// `factor`; q and r may be replaced by rows of the caller (null: those of the program).
+  Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* q, const double* r) noexcept;
+  Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept {
+    return solve(qp, active, step, nullptr, nullptr);
+  }
+
+  /// The control of stage i as the last `solve` would choose it for any stage-state step: w = T v(s) + Y s + y0.
+  void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
+
+  /// Marginal covariances of all states when the objective is twice a negative log-likelihood's quadratic (METHOD: no
+  /// factor 1/2), from the last factorisation: node i's n_s x n_s block goes to covariance + i * n_s^2, if not null; the
+  /// last node's to `last`.
+  void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
+
+  /// The largest number of controls, and of states, that one stage may have.
+  static constexpr int max_width = 32;
+
+ private:
+  /// How one stage was reduced. Node 0 of a free initial state is a stage too, with s_0 in the place of w.
+  struct Reduction {
+    int free = 0;    ///< directions left to decide
+    int rows = 0;    ///< rows of C that were reduced here
+    int pivots = 0;  ///< of those, solved for a control
+    int left = 0;    ///< of those, passed on
+    bool plain = true;  ///< nothing is fixed and there are no rows: T is the identity
+    bool overflow = false;
+  };
+  /// Pointers to what is kept of one stage; see the members.
+  struct View {
+    double *P, *G, *L, *factor, *K, *T, *Y, *C, *eliminator;
+    int *pivot_row, *pivot_column, *left_row;
+  };
+  View view(int i) noexcept;
+  void factor_stage(const StageQp& qp, const ActiveSet& active, const Diagonals& extra, int i) noexcept;
+  void factor_initial(const StageQp& qp, const ActiveSet& active) noexcept;
+  int count_active(const StageQp& qp, const ActiveSet& active, int node) const noexcept;
+  void write_active_rows(const StageQp& qp, const ActiveSet& active, int node) noexcept;
+  void eliminate(double* D, double* F, int rows, int width, const bool* fixed, Reduction& reduction, View& v) noexcept;
+  void null_space(const double* D, const double* F, int width, const bool* fixed, const Reduction& reduction,
+                  View& v) noexcept;
+  void factor_reduced(double* reduced, int n, double* factor) noexcept;
+  bool transform_rows(const double* right_hand_side, const Reduction& reduction, const View& v, double* transformed,
+                      double scale) const noexcept;
+
+  Capacity capacity_;
+  int ns_ = 0, nw_ = 0, width_ = 0, max_rows_ = 0;
+  bool convexified_ = false;
+  std::vector<Reduction> reductions_;       // N stages, then node 0
+  std::vector<double> P_, G_, L_, factor_;  // value functions; full G and L; Cholesky factor of the reduced G
+  std::vector<double> K_, T_, Y_;           // v = -K s - k, w = T v + Y s + y0
+  std::vector<double> C_, eliminator_;      // rows at each node; row operations of the elimination at each stage
+  std::vector<int> pivot_row_, pivot_column_, left_row_;
+  std::vector<double> p_, d_, g_, y0_, k_, row_multipliers_, work_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "rhec/core/kkt.hpp"
+#include "rhec/core/ocp.hpp"
+
+namespace rhec {
+
+enum class Status {
+  solved,           ///< KKT residual within the tolerance
+  step_taken,       ///< the one real-time iteration asked for was done
+  iteration_limit,  ///< stopped at max_iterations; the best point is returned
+  deadline,         ///< stopped at the deadline; the best point so far is returned
+  infeasible,       ///< no point satisfies the constraints, as far as the method can tell
+  stalled,          ///< no further progress is possible above the tolerance
+  bad_input         ///< a number in the problem or the guess is not finite; nothing was changed
+};
+RHEC_EXPORT const char* name_of(Status status) noexcept;
+/// One sentence on what to do about it.
+RHEC_EXPORT const char* advice_for(Status status) noexcept;
+/// True where the returned point may be used for control: solved, step_taken, iteration_limit or deadline.
+RHEC_EXPORT bool is_usable(Status status) noexcept;
+
+using Clock = std::chrono::steady_clock;
+
+struct Report {
+  Status status = Status::bad_input;
+  int iterations = 0;           ///< of the nonlinear method
+  int factorisations = 0;       ///< of the linear algebra below it
+  bool fallback_used = false;   ///< a robust path had to take over from the fast one
+  double objective = 0.0;       ///< at the returned point
+  KktResidual kkt;              ///< the core's own judgement of the returned point
+  double preparation_us = 0.0;  ///< time spent in prepare [us]
+  double feedback_us = 0.0;     ///< time spent in solve [us]
+};
+
+/// Solves an Ocp from a guess. One instance serves one caller at a time; two instances never disturb each other.
+///
+/// Per sample: optionally `prepare` (what can be done before the newest data arrive), then `solve` with the same problem and
+/// guess. Both are noexcept, allocation-free after `setup`, and never leave a number that is not finite in the iterate.
+class RHEC_EXPORT Solver {
+ public:
+  virtual ~Solver() = default;
+
+  /// Why this solver cannot take this problem; empty: it can.
+  virtual std::string why_not(const Ocp& ocp) const = 0;
+
+  /// Sets memory aside for problems up to this one's capacity. Throws Error.
+  virtual void setup(const Ocp& ocp) = 0;
+
+  /// Work that needs the guess and the structure, but not the newest data.
+  virtual void prepare(const Ocp& ocp, const Iterate& guess) noexcept = 0;
+
+  /// Improves `point` in place; on failure it is left as it was. Stops at `deadline` with the best point so far.
+  virtual Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept = 0;
+  Report solve(const Ocp& ocp, Iterate& point) noexcept { return solve(ocp, point, Clock::time_point::max()); }
+
+  /// Forgets all that was learnt; the next solve gives the same bits as one of a new instance.
+  virtual void reset() noexcept = 0;
+};
+
+}  // namespace rhec

@@ -1,0 +1,156 @@
+#include "rhec/core/controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/error.hpp"
+
+namespace rhec {
+namespace {
+
+RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Setup& setup, const Path& path) {
+  const Roles& roles = model->description().roles;
+  if (roles.position_x < 0 || roles.position_y < 0 || roles.speed < 0)
+    throw Error(fmt::format("controller: the model '{}' names no position or no speed input to follow a path with",
+                            model->description().name));
+  if (path.input_count() != model->input_count())
+    throw Error(fmt::format("controller: the path has {} reference inputs; expected the model's {}", path.input_count(),
+                            model->input_count()));
+  if (setup.blockings.size() != setup.problem.blocked_inputs.size())
+    throw Error("controller: expected one blocking for each blocked input");
+  for (const auto& blocking : setup.blockings)
+    if (const std::string reason = blocking->why_not(setup.problem.max_intervals); !reason.empty())
+      throw Error("controller: blocking: " + reason);
+  if (!(setup.interval > 0.0)) throw Error(fmt::format("controller: interval {} s; expected a positive number", setup.interval));
+  return {std::move(model), setup.problem};
+}
+
+}  // namespace
+
+Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Path path, Setup setup)
+    : setup_(std::move(setup)),
+      path_(std::move(path)),
+      follower_(path_, setup_.search),
+      problem_(make_problem(std::move(model), setup_, path_)),
+      solver_(std::move(solver)),
+      shifter_(problem_),
+      point_(problem_.capacity()) {
+  const int N = setup_.problem.max_intervals;
+  problem_.set_intervals(N);
+  begins_.assign(N, 0);
+  for (int i = 0; i < N; ++i) problem_.set_duration(i, setup_.interval);
+  // Move blocking is counted from the start of the horizon, so it is the same at every sample.
+  for (std::size_t b = 0; b < setup_.blockings.size(); ++b) {
+    setup_.blockings[b]->starts({0, N}, begins_.data());
+    problem_.set_blocks(setup_.problem.blocked_inputs[b], begins_.data());
+  }
+  scratch_.assign(problem_.scratch_size(), 0.0);
+  problem_.finish(scratch_);
+  if (const std::string reason = solver_->why_not(problem_); !reason.empty())
+    throw Error("controller: the solver cannot take this problem: " + reason);
+  solver_->setup(problem_);
+  command_.inputs.assign(problem_.model().input_count(), 0.0);
+  reference_inputs_.assign(problem_.model().input_count(), 0.0);
+  reference_parameters_.assign(problem_.model().parameter_count(), 1.0);
+}
+
+void Controller::reset() noexcept {
+  solver_->reset();
+  shifter_.forget();
+  follower_.reset();
+  has_plan_ = prepared_ = false;
+  fallbacks_ = 0;
+}
+
+/// References and bounds of the horizon that starts at an arc length of the path.
+void Controller::set_reference(double arc_length, const double* parameters) noexcept {
+  const Roles& roles = problem_.model().description().roles;
+  const int N = problem_.intervals(), nu = problem_.model().input_count();
+  command_.reference = path_.point_at(arc_length, reference_inputs_.data());
+  const double ground_speed = reference_inputs_[roles.speed];
+  command_.reference_speed = ground_speed;
+  double factor = 1.0;
+  if (setup_.reference_speed == ReferenceSpeed::ground && roles.speed_factor >= 0)
+    factor = std::max(parameters[roles.speed_factor], setup_.least_speed_factor);
+  const double bound = setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset;
+  for (int i = 0; i <= N; ++i) {
+    double* x = problem_.state_reference(i);
+    const PathPoint target = path_.point_at(arc_length + i * setup_.interval * std::abs(ground_speed));
+    x[roles.position_x] = target.x;
+    x[roles.position_y] = target.y;
+    if (roles.heading >= 0) x[roles.heading] = target.heading;
+    if (i == N) break;
+    double* u = problem_.input_reference(i);
+    std::copy_n(reference_inputs_.data(), nu, u);
+    u[roles.speed] = ground_speed / factor;
+    if (std::isfinite(bound)) {
+      problem_.input_lower(i, roles.speed) = 0.0;
+      problem_.input_upper(i, roles.speed) = bound;
+    }
+    for (int j = 0; j < nu; ++j) u[j] = std::min(std::max(u[j], problem_.input_lower(i, j)), problem_.input_upper(i, j));
+  }
+}
+
+/// A first plan: the reference inputs, rolled out.
+void Controller::start_cold() noexcept {
+  problem_.set_decisions(point_, problem_.input_reference(0), problem_.given_parameters());
+  point_.clear_multipliers();
+  roll_out(problem_, point_, scratch_);
+}
+
+const Controller::Command& Controller::control(const Estimate& estimate, Clock::time_point deadline) noexcept {
+  const Roles& roles = problem_.model().description().roles;
+  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
+  follower_.advance(estimate.state[roles.position_x], estimate.state[roles.position_y]);
+  std::copy_n(estimate.state.data(), nx, problem_.given_state());
+  std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
+  set_reference(follower_.arc_length(), estimate.parameters.data());
+  command_.softened = problem_.finish(scratch_) > 0;
+  bool from_plan = has_plan_;
+  if (!has_plan_) {
+    start_cold();
+  } else if (!prepared_) {
+    from_plan = shifter_.apply(1, problem_, point_);
+    if (!from_plan) start_cold();
+  }
+  // An estimate that has jumped is no small step for the plan of the last sample: start it from a simulation instead.
+  command_.report = solver_->solve(problem_, point_, deadline);
+  if (!is_usable(command_.report.status) && from_plan) {
+    // The plan may have led astray; a fresh start may not.
+    start_cold();
+    command_.report = solver_->solve(problem_, point_, deadline);
+    command_.report.fallback_used = true;
+  }
+  command_.fallback = !is_usable(command_.report.status);
+  fallbacks_ += command_.fallback;
+  prepared_ = false;
+  has_plan_ = true;
+  problem_.inputs_on(point_, 0, command_.inputs.data());
+  for (std::size_t j = 0; j < command_.inputs.size(); ++j)
+    command_.inputs[j] = std::min(std::max(command_.inputs[j], problem_.input_lower(0, static_cast<int>(j))),
+                                  problem_.input_upper(0, static_cast<int>(j)));
+  shifter_.take(problem_, point_);
+  return command_;
+}
+
+void Controller::prepare() noexcept {
+  if (!has_plan_ || prepared_) return;
+  // What the next sample will probably be: the plan's second node, the reference one step further on.
+  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
+  std::copy_n(point_.state(1), nx, problem_.given_state());
+  std::copy_n(problem_.given_parameters(), np, reference_parameters_.data());
+  const PathPoint reference = command_.reference;
+  const double speed = command_.reference_speed;
+  set_reference(follower_.arc_length() + setup_.interval * std::abs(speed), reference_parameters_.data());
+  command_.reference = reference;
+  command_.reference_speed = speed;
+  problem_.finish(scratch_);
+  if (!shifter_.apply(1, problem_, point_)) return;
+  solver_->prepare(problem_, point_);
+  prepared_ = true;
+}
+
+}  // namespace rhec

@@ -1,0 +1,121 @@
+#include "rhec/core/path.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "rhec/core/error.hpp"
+
+namespace rhec {
+namespace {
+
+// Waypoints closer than this are one point: a segment so short has no heading worth following.
+constexpr double smallest_segment = 1e-9;  // [m]
+
+void check(const Waypoint& waypoint, std::size_t number, int input_count) {
+  bool finite = std::isfinite(waypoint.x) && std::isfinite(waypoint.y);
+  for (double input : waypoint.inputs) finite = finite && std::isfinite(input);
+  if (!finite) {
+    throw Error(
+        fmt::format("path: waypoint {} holds a value that is not finite; every coordinate and reference input "
+                    "must be a number",
+                    number));
+  }
+  if (static_cast<int>(waypoint.inputs.size()) > input_count) {
+    throw Error(
+        fmt::format("path: waypoint {} has {} reference inputs, but the model has {}; give at most one value per "
+                    "input of the model",
+                    number, waypoint.inputs.size(), input_count));
+  }
+}
+
+}  // namespace
+
+Path::Path(const std::vector<Waypoint>& waypoints, int input_count) : input_count_(input_count) {
+  if (input_count < 0) throw Error(fmt::format("path: the number of inputs is {}; expected 0 or more", input_count));
+  for (std::size_t i = 0; i < waypoints.size(); ++i) {
+    const Waypoint& waypoint = waypoints[i];
+    check(waypoint, i + 1, input_count);
+    double arc_length = 0.0;
+    if (!x_.empty()) {
+      const double dx = waypoint.x - x_.back(), dy = waypoint.y - y_.back();
+      const double step = std::hypot(dx, dy);
+      if (step < smallest_segment) continue;
+      arc_length = arc_lengths_.back() + step;
+      direction_x_.push_back(dx / step);
+      direction_y_.push_back(dy / step);
+    }
+    x_.push_back(waypoint.x);
+    y_.push_back(waypoint.y);
+    arc_lengths_.push_back(arc_length);
+    inputs_.insert(inputs_.end(), waypoint.inputs.begin(), waypoint.inputs.end());
+    inputs_.resize(x_.size() * static_cast<std::size_t>(input_count), 0.0);
+  }
+  if (x_.size() < 2) {
+    throw Error(fmt::format("path: {} distinct waypoint(s) among the {} given; a path needs at least 2", x_.size(),
+                            waypoints.size()));
+  }
+}
+
+int Path::segment_at(double arc_length) const noexcept {
+  // The first and the last waypoint are left out of the search, so that the end segments reach beyond the ends.
+  const auto after = std::upper_bound(arc_lengths_.begin() + 1, arc_lengths_.end() - 1, arc_length);
+  return static_cast<int>(after - arc_lengths_.begin()) - 1;
+}
+
+PathPoint Path::point_at(double arc_length, double* inputs) const noexcept {
+  const int i = segment_at(arc_length);
+  const double along = arc_length - arc_lengths_[i];
+  if (inputs) {
+    const double fraction = std::clamp(along / (arc_lengths_[i + 1] - arc_lengths_[i]), 0.0, 1.0);
+    const double* start = inputs_.data() + static_cast<std::ptrdiff_t>(i) * input_count_;
+    const double* end = start + input_count_;
+    for (int j = 0; j < input_count_; ++j) inputs[j] = (1.0 - fraction) * start[j] + fraction * end[j];
+  }
+  return {.x = x_[i] + along * direction_x_[i],
+          .y = y_[i] + along * direction_y_[i],
+          .heading = std::atan2(direction_y_[i], direction_x_[i])};
+}
+
+PathProjection Path::closest(double x, double y, double from, double to) const noexcept {
+  PathProjection best{.arc_length = from};
+  double best_square = std::numeric_limits<double>::infinity();
+  const int last = size() - 2;
+  for (int i = segment_at(from); i <= last; ++i) {
+    // The part of this segment that lies in the stretch, as distances from the segment's start.
+    const double begin = from - arc_lengths_[i];
+    const double end = i == last ? to - arc_lengths_[i] : std::min(to, arc_lengths_[i + 1]) - arc_lengths_[i];
+    const double dx = x - x_[i], dy = y - y_[i];
+    const double along =
+        std::clamp(dx * direction_x_[i] + dy * direction_y_[i], i == 0 ? begin : std::max(begin, 0.0), end);
+    const double off_x = dx - along * direction_x_[i], off_y = dy - along * direction_y_[i];
+    const double square = off_x * off_x + off_y * off_y;
+    if (square < best_square) {
+      best_square = square;
+      const double left = direction_x_[i] * off_y - direction_y_[i] * off_x;
+      best = {.arc_length = arc_lengths_[i] + along, .lateral = std::copysign(std::sqrt(square), left)};
+    }
+    if (to <= arc_lengths_[i + 1]) break;
+  }
+  return best;
+}
+
+PathFollower::PathFollower(const Path& path, Window window) : path_(&path), window_(window) {
+  if (!(std::isfinite(window.ahead) && window.ahead > 0.0 && std::isfinite(window.behind) && window.behind >= 0.0)) {
+    throw Error(
+        fmt::format("path follower: the search window is {} m ahead and {} m behind; expected ahead > 0 (more than "
+                    "the vehicle travels in one step) and behind >= 0",
+                    window.ahead, window.behind));
+  }
+}
+
+double PathFollower::advance(double x, double y) noexcept {
+  if (!std::isfinite(x) || !std::isfinite(y)) return last_.arc_length;
+  const double from = std::max(0.0, last_.arc_length - window_.behind);
+  last_ = path_->closest(x, y, from, std::max(from, last_.arc_length + window_.ahead));
+  return last_.arc_length;
+}
+
+}  // namespace rhec

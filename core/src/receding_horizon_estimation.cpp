@@ -1,0 +1,254 @@
+#include "rhec/core/receding_horizon_estimation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/error.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+// Above this standard deviation an angle is searched for around the circle rather than refined [rad].
+constexpr double uncertain_angle = 0.35;
+// Iterations that a start of that search is given.
+constexpr int search_iterations = 12;
+
+RheProblem make_problem(std::shared_ptr<const Model> model, const RecedingHorizonEstimation::Setup& setup) {
+  const auto np = static_cast<std::size_t>(model->parameter_count());
+  if (setup.blockings.size() != np || setup.walks.size() != np)
+    throw Error(fmt::format("estimator: {} blockings and {} parameter walks given; expected {} of each, one a parameter",
+                            setup.blockings.size(), setup.walks.size(), np));
+  const auto n = static_cast<Eigen::Index>(model->state_count() + np);
+  if (setup.initial_mean.size() != n || setup.initial_covariance.rows() != n || setup.initial_covariance.cols() != n)
+    throw Error(fmt::format("estimator: the initial mean and covariance must have the size {} of [x; p]", n));
+  for (std::size_t j = 0; j < np; ++j)
+    if (const std::string reason = setup.blockings[j]->why_not(setup.problem.max_intervals); !reason.empty())
+      throw Error(fmt::format("blocking of '{}': {}", model->description().parameters[j].name, reason));
+  return {std::move(model), setup.problem};
+}
+
+}  // namespace
+
+RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver,
+                                                     Setup setup)
+    : setup_(std::move(setup)),
+      problem_(make_problem(std::move(model), setup_)),
+      arrival_(setup_.arrival, problem_, setup_.walks),
+      solver_(std::move(solver)),
+      shifter_(problem_),
+      point_(problem_.capacity()),
+      trial_(problem_.capacity()),
+      best_(problem_.capacity()),
+      covariance_qp_(problem_.capacity()),
+      covariance_riccati_(problem_.capacity()),
+      no_active_bounds_(problem_.capacity()) {
+  if (const std::string reason = solver_->why_not(problem_); !reason.empty())
+    throw Error("estimator: the solver cannot take this problem: " + reason);
+  solver_->setup(problem_);
+  const int np = problem_.model().parameter_count();
+  const auto intervals = static_cast<std::size_t>(setup_.problem.max_intervals);
+  begins_.assign(intervals, 0);
+  next_begins_.assign(intervals, 0);
+  first_starts_.assign(np, 0);
+  borders_.resize(np);
+  scratch_.assign(problem_.scratch_size(), 0.0);
+  inputs_.assign(problem_.model().input_count(), 0.0);
+  outputs_.assign(problem_.model().output_count(), 0.0);
+  last_covariance_.assign(static_cast<std::size_t>(problem_.capacity().states) * problem_.capacity().states, 0.0);
+  reset();
+}
+
+void RecedingHorizonEstimation::reset() noexcept {
+  arrival_.reset(setup_.initial_mean, setup_.initial_covariance);
+  solver_->reset();
+  shifter_.forget();
+  window_ = {};
+  started_ = solved_ = prepared_ = false;
+}
+
+void RecedingHorizonEstimation::start(const double* outputs) noexcept {
+  reset();
+  started_ = true;
+  problem_.set_intervals(0);
+  std::copy_n(outputs, outputs_.size(), problem_.output(0));
+  arrival_.write(problem_);
+  problem_.finish();
+  point_.clear_multipliers();
+  for (int j = 0; j < problem_.capacity().states; ++j) point_.state(0)[j] = setup_.initial_mean[j];
+  roll_out(problem_, point_, scratch_);
+}
+
+void RecedingHorizonEstimation::slide_arrival() noexcept {
+  const Window next{window_.first + 1, window_.intervals};
+  for (std::size_t j = 0; j < borders_.size(); ++j) {
+    const Blocking& blocking = *setup_.blockings[j];
+    const bool ramp = blocking.transition() == Transition::ramp;
+    const std::int64_t start = blocking.starts(next, next_begins_.data());
+    ArrivalCost::Border& border = borders_[j];
+    border.reached = !ramp && start == next.first;
+    border.steps = static_cast<double>(next.first - first_starts_[j]);
+    border.neighbour_sigma = blocking.neighbour_sigma();
+    border.leaves_as_ramp = ramp && problem_.begins(0, static_cast<int>(j));
+    border.ramp_variance = border.leaves_as_ramp ? problem_.link_variance(0, static_cast<int>(j)) : 0.0;
+  }
+  const bool lost = setup_.heading_state >= 0 &&
+                    arrival_.covariance()(setup_.heading_state, setup_.heading_state) > uncertain_angle * uncertain_angle;
+  arrival_.slide(problem_, point_, borders_, lost);
+}
+
+void RecedingHorizonEstimation::set_structure() noexcept {
+  problem_.set_intervals(window_.intervals);
+  for (std::size_t k = 0; k < borders_.size(); ++k) {
+    const int j = static_cast<int>(k);
+    const Blocking& blocking = *setup_.blockings[k];
+    const bool ramp = blocking.transition() == Transition::ramp;
+    const std::int64_t first_start = blocking.starts(window_, begins_.data());
+    // A ramp can start at the window's edge, but not before the run itself.
+    begins_[0] = ramp && first_start == window_.first && window_.first > 0;
+    problem_.set_blocks(j, begins_.data(), blocking.transition());
+    std::int64_t block = begins_[0] ? first_starts_[k] : first_start;
+    const double restart = setup_.walks[k].restart_sigma;
+    const auto sigma = blocking.neighbour_sigma();
+    for (int i = 0; i < window_.intervals; ++i) {
+      if (!begins_[i]) continue;
+      const std::int64_t start = window_.first + i;
+      const double steps = std::max(1.0, static_cast<double>(start - block));
+      problem_.link(i, j, sigma ? *sigma * *sigma * steps : restart * restart);
+      block = start;
+    }
+    first_starts_[k] = first_start;
+  }
+  problem_.finish();
+}
+
+void RecedingHorizonEstimation::advance_window(double duration, const double* inputs, const double* outputs) noexcept {
+  const bool full = window_.intervals == setup_.problem.max_intervals;
+  const bool was_empty = window_.intervals == 0;
+  if (!was_empty) shifter_.take(problem_, point_);
+  if (full) {
+    slide_arrival();
+    problem_.drop_first_interval();
+    ++window_.first;
+  } else {
+    ++window_.intervals;
+  }
+  const int last = window_.intervals;
+  problem_.set_intervals(last);
+  problem_.set_duration(last - 1, duration);
+  std::copy_n(inputs, inputs_.size(), problem_.measured_input(last - 1));
+  std::copy_n(outputs, outputs_.size(), problem_.output(last));
+  set_structure();
+  arrival_.write(problem_);
+  if (was_empty || !shifter_.apply(full ? 1 : 0, problem_, point_)) {
+    for (std::size_t j = 0; j < inputs_.size(); ++j) point_.control(0)[j] = std::isnan(inputs[j]) ? 0.0 : inputs[j];
+    point_.clear_multipliers();
+    problem_.simulate(point_, scratch_);
+  }
+}
+
+void RecedingHorizonEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+  if (!started_) {
+    start(outputs);
+    return;
+  }
+  solved_ = false;
+  if (!prepared_) {
+    advance_window(duration, inputs, outputs);
+    return;
+  }
+  // The window has moved already, with placeholders for what is now known. Where it fits, the linearisation stays good.
+  prepared_ = false;
+  const int last = window_.intervals;
+  bool fits = problem_.duration(last - 1) == duration;
+  for (std::size_t j = 0; j < outputs_.size(); ++j)
+    fits = fits && std::isnan(problem_.output(last)[j]) == std::isnan(outputs[j]);
+  for (std::size_t j = 0; j < inputs_.size(); ++j)
+    fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) == std::isnan(inputs[j]);
+  problem_.set_duration(last - 1, duration);
+  std::copy_n(inputs, inputs_.size(), problem_.measured_input(last - 1));
+  std::copy_n(outputs, outputs_.size(), problem_.output(last));
+  if (!fits) solver_->prepare(problem_, point_);
+}
+
+bool RecedingHorizonEstimation::amend(int back, const double* outputs) noexcept {
+  const int node = window_.intervals - (prepared_ ? 1 : 0) - back;
+  if (!started_ || node < 0) return false;
+  bool masks_change = false;
+  for (std::size_t j = 0; j < outputs_.size(); ++j) {
+    if (std::isnan(outputs[j])) continue;
+    masks_change = masks_change || std::isnan(problem_.output(node)[j]);
+    problem_.output(node)[j] = outputs[j];
+  }
+  if (masks_change && prepared_) solver_->prepare(problem_, point_);
+  return true;
+}
+
+void RecedingHorizonEstimation::prepare() noexcept {
+  if (!started_ || prepared_ || window_.intervals == 0 || !solved_) return;
+  const int last = window_.intervals;
+  std::copy_n(problem_.measured_input(last - 1), inputs_.size(), inputs_.data());
+  // Placeholders that leave no residual, and the same mask as before.
+  Model::Nodes request;
+  request.count = 1;
+  request.states = point_.state(last);
+  request.outputs = outputs_.data();
+  problem_.model().observe(request);
+  for (std::size_t j = 0; j < outputs_.size(); ++j)
+    if (std::isnan(problem_.output(last)[j])) outputs_[j] = missing;
+  const double duration = problem_.duration(last - 1);
+  advance_window(duration, inputs_.data(), outputs_.data());
+  solver_->prepare(problem_, point_);
+  prepared_ = true;
+}
+
+/// Starts around the circle, each solved from a roll-out; the best objective wins.
+void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexcept {
+  double best_objective = std::numeric_limits<double>::infinity();
+  best_ = point_;
+  for (int start = 0; start <= setup_.heading_starts; ++start) {
+    trial_ = point_;  // the last start is the guess as it is
+    if (start < setup_.heading_starts) {
+      trial_.clear_multipliers();
+      for (int j = 0; j < problem_.model().state_count(); ++j) trial_.state(0)[j] = problem_.arrival_mean[j];
+      trial_.state(0)[setup_.heading_state] += 2.0 * std::numbers::pi * start / setup_.heading_starts;
+      problem_.simulate(trial_, scratch_);
+    }
+    Report report;
+    for (int i = 0; i < search_iterations; ++i) {
+      report = solver_->solve(problem_, trial_, deadline);
+      if (!is_usable(report.status) || report.status == Status::solved) break;
+    }
+    if (!is_usable(report.status) || !(report.kkt.defect < 1e-2) || !(report.objective < best_objective)) continue;
+    best_objective = report.objective;
+    best_ = trial_;
+  }
+  point_ = best_;
+}
+
+void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
+  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count(), N = window_.intervals;
+  const int ns = problem_.capacity().states;
+  const int heading = setup_.heading_state;
+  if (heading >= 0 && setup_.heading_starts > 1 &&
+      arrival_.covariance()(heading, heading) > uncertain_angle * uncertain_angle)
+    search_heading(deadline);
+  result.report = solver_->solve(problem_, point_, deadline);
+  result.fallback = !is_usable(result.report.status);
+  result.predicted = false;
+  solved_ = true;
+  for (int j = 0; j < nx; ++j) result.state[j] = point_.state(N)[j];
+  for (int j = 0; j < np; ++j) result.parameters[j] = point_.state(N)[nx + j];
+  problem_.linearise(all_stages(problem_), point_, Hessian::gauss_newton, covariance_qp_, scratch_);
+  covariance_riccati_.factor(covariance_qp_, no_active_bounds_);
+  covariance_riccati_.covariances(covariance_qp_, nullptr, last_covariance_.data());
+  for (int c = 0; c < nx + np; ++c)
+    for (int r = 0; r < nx + np; ++r) result.covariance(r, c) = last_covariance_[c * ns + r];
+}
+
+}  // namespace rhec

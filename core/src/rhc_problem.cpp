@@ -1,0 +1,179 @@
+#include "rhec/core/rhc_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "checks.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/core/rhe_problem.hpp"
+
+namespace rhec {
+
+RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup)
+    : HorizonProblem(std::move(model), {setup.max_intervals, setup.substeps, setup.blocked_inputs}),
+      setup_(std::move(setup)) {
+  const ModelDescription& about = this->model().description();
+  check_weights("state weights", setup_.state_weights, about.states);
+  check_weights("terminal weights", setup_.terminal_weights, about.states);
+  check_weights("input weights", setup_.input_weights, about.inputs);
+  fill_default_bounds("state bounds", setup_.state_lower, setup_.state_upper, about.states, true);
+  fill_default_bounds("input bounds", setup_.input_lower, setup_.input_upper, about.inputs, true);
+  const auto nodes = static_cast<std::size_t>(setup_.max_intervals) + 1;
+  initial_.assign(capacity().states, 0.0);
+  state_reference_.assign(nodes * nx(), 0.0);
+  input_reference_.assign(nodes * nu(), 0.0);
+  for (std::size_t i = 0; i < nodes; ++i) {
+    input_lower_.insert(input_lower_.end(), setup_.input_lower.begin(), setup_.input_lower.end());
+    input_upper_.insert(input_upper_.end(), setup_.input_upper.begin(), setup_.input_upper.end());
+  }
+}
+
+void RhcProblem::set_blocks(int input, const std::uint8_t* begins) noexcept {
+  const int channel = channel_of_input(input);
+  if (channel < 0) return;
+  for (int i = 0; i < intervals(); ++i) set_begins(i, channel, i == 0 || begins[i]);
+}
+
+int RhcProblem::finish(std::span<double> scratch) noexcept {
+  finish_structure();
+  const double infinity = std::numeric_limits<double>::infinity();
+  const int ns = capacity().states, nw = capacity().controls;
+  std::fill(state_lower_.begin(), state_lower_.end(), -infinity);
+  std::fill(state_upper_.begin(), state_upper_.end(), infinity);
+  for (int i = 0; i <= intervals(); ++i) {
+    if (i > 0) {
+      for (int j = 0; j < nx(); ++j) {
+        state_lower_[i * ns + j] = setup_.state_lower[j];
+        state_upper_[i * ns + j] = setup_.state_upper[j];
+      }
+    }
+    if (i == intervals()) break;
+    for (int j = 0; j < nu(); ++j) {
+      const int control = control_of_input(i, j);
+      if (control < 0) continue;
+      // A block keeps the bounds of every interval that it covers.
+      double lower = input_lower_[i * nu() + j], upper = input_upper_[i * nu() + j];
+      for (int later = i + 1; later < intervals() && control_of_input(later, j) < 0; ++later) {
+        lower = std::max(lower, input_lower_[later * nu() + j]);
+        upper = std::min(upper, input_upper_[later * nu() + j]);
+      }
+      control_lower_[i * nw + control] = lower;
+      control_upper_[i * nw + control] = upper;
+    }
+  }
+  return soften_unreachable_bounds(scratch);
+}
+
+int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
+  const int n = nx(), ns = capacity().states;
+  const auto violated = [&](const double* x, int j) {
+    return x[j] < setup_.state_lower[j] ? -1 : x[j] > setup_.state_upper[j] ? 1 : 0;
+  };
+  int moved = 0;
+  for (int j = 0; j < n; ++j) {
+    if (violated(initial_.data(), j) == 0) continue;
+    // Drive this state back as fast as the corners of the input box allow, and let the bound follow until it is kept.
+    double* x = scratch.data();
+    double *u = x + n, *next = u + nu(), *best = next + n;
+    std::copy_n(initial_.data(), n, x);
+    for (int i = 0; i < intervals(); ++i) {
+      const int side = violated(x, j);
+      if (side == 0) break;
+      double best_value = side * std::numeric_limits<double>::infinity();
+      for (unsigned corner = 0; corner < (1U << nu()); ++corner) {
+        for (int k = 0; k < nu(); ++k) {
+          const double bound = (corner >> k) & 1U ? input_upper_[i * nu() + k] : input_lower_[i * nu() + k];
+          u[k] = std::isfinite(bound) ? bound : input_reference(i)[k];
+        }
+        const double seconds = duration(i);
+        Model::Intervals request;
+        request.count = 1;
+        request.states = x;
+        request.inputs = u;
+        request.parameters = given_parameters();
+        request.durations = &seconds;
+        request.substeps = substeps();
+        request.next_states = next;
+        model().integrate(request);
+        if (side * next[j] < side * best_value) {
+          best_value = next[j];
+          std::copy_n(next, n, best);
+        }
+      }
+      std::copy_n(best, n, x);
+      if (violated(x, j) != side) break;
+      // A hair of slack keeps the feasible set from being a single point.
+      const double slack = 1e-6 * (1.0 + std::abs(best_value));
+      if (side > 0) state_upper_[(i + 1) * ns + j] = best_value + slack;
+      if (side < 0) state_lower_[(i + 1) * ns + j] = best_value - slack;
+      ++moved;
+    }
+  }
+  return moved;
+}
+
+double RhcProblem::state_error(const Iterate& point, int node, int state) const noexcept {
+  const double value = point.state(node)[state], wanted = state_reference(node)[state];
+  return model().description().states[state].is_angle ? angle_difference(value, wanted) : value - wanted;
+}
+
+double RhcProblem::cost(const Iterate& point, std::span<double>) const noexcept {
+  double total = 0.0;
+  std::vector<double>::size_type input = 0;
+  for (int i = 0; i <= intervals(); ++i) {
+    const auto& weights = i == intervals() ? setup_.terminal_weights : setup_.state_weights;
+    for (int j = 0; j < nx(); ++j) {
+      if (weights[j] == 0.0) continue;
+      const double error = state_error(point, i, j);
+      total += weights[j] * error * error;
+    }
+    if (i == intervals()) break;
+    for (int j = 0; j < nu(); ++j, ++input) {
+      const int control = control_of_input(i, j);
+      const double value = control >= 0 ? point.control(i)[control] : point.state(i)[nx() + channel_of_input(j)];
+      const double error = value - input_reference_[input];
+      total += setup_.input_weights[j] * error * error;
+    }
+  }
+  return total;
+}
+
+void RhcProblem::add_cost(StageRange range, const Iterate& point, Hessian, StageQp& qp,
+                          std::span<double>) const noexcept {
+  add(range, point, true, qp);
+}
+
+void RhcProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<double>) const noexcept {
+  add({0, intervals()}, point, false, qp);
+}
+
+void RhcProblem::add(StageRange range, const Iterate& point, bool matrices, StageQp& qp) const noexcept {
+  const int ns = capacity().states, nw = capacity().controls;
+  for (int i = range.first; i <= range.last; ++i) {
+    const auto& weights = i == intervals() ? setup_.terminal_weights : setup_.state_weights;
+    for (int j = 0; j < nx(); ++j) {
+      const double w = 2.0 * weights[j];
+      if (w == 0.0) continue;
+      qp.q(i)[j] += w * state_error(point, i, j);
+      if (matrices) qp.Q(i)[j * ns + j] += w;
+    }
+    if (i == intervals()) break;
+    for (int j = 0; j < nu(); ++j) {
+      const double w = 2.0 * setup_.input_weights[j];
+      const int control = control_of_input(i, j), state = nx() + channel_of_input(j);
+      const double value = control >= 0 ? point.control(i)[control] : point.state(i)[state];
+      const double pull = w * (value - input_reference(i)[j]);
+      if (control >= 0) {
+        qp.r(i)[control] += pull;
+        if (matrices) qp.R(i)[control * nw + control] += w;
+      } else {
+        qp.q(i)[state] += pull;
+        if (matrices) qp.Q(i)[state * ns + state] += w;
+      }
+    }
+  }
+}
+
+}  // namespace rhec

@@ -1,0 +1,89 @@
+#pragma once
+
+// Products of the small column-major matrices of one stage. Written as plain loops over contiguous columns, which the
+// compiler turns into vector code; no temporaries, no allocation.
+
+namespace rhec::small {
+
+/// C = A B;  A is m x k (leading dimension lda), B is k x n (ldb), C is m x n (ldc).
+inline void multiply(const double* A, int lda, const double* B, int ldb, double* C, int ldc, int m, int k, int n) noexcept {
+  for (int j = 0; j < n; ++j) {
+    double* c = C + j * ldc;
+    for (int r = 0; r < m; ++r) c[r] = 0.0;
+    for (int l = 0; l < k; ++l) {
+      const double b = B[j * ldb + l];
+      if (b == 0.0) continue;
+      const double* a = A + l * lda;
+      for (int r = 0; r < m; ++r) c[r] += a[r] * b;
+    }
+  }
+}
+
+/// C += sign A' B;  A is k x m, B is k x n.
+inline void add_transposed(const double* A, int lda, const double* B, int ldb, double* C, int ldc, int m, int k, int n,
+                           double sign = 1.0) noexcept {
+  for (int j = 0; j < n; ++j) {
+    const double* b = B + j * ldb;
+    for (int i = 0; i < m; ++i) {
+      const double* a = A + i * lda;
+      double sum = 0.0;
+      for (int l = 0; l < k; ++l) sum += a[l] * b[l];
+      C[j * ldc + i] += sign * sum;
+    }
+  }
+}
+
+/// y += A x.
+inline void add_product(const double* A, int lda, const double* x, double* y, int m, int n) noexcept {
+  for (int j = 0; j < n; ++j) {
+    const double* a = A + j * lda;
+    for (int r = 0; r < m; ++r) y[r] += a[r] * x[j];
+  }
+}
+
+/// y += sign A' x;  A is m x n.
+inline void add_transposed_product(const double* A, int lda, const double* x, double* y, int m, int n,
+                                   double sign = 1.0) noexcept {
+  for (int j = 0; j < n; ++j) {
+    const double* a = A + j * lda;
+    double sum = 0.0;
+    for (int r = 0; r < m; ++r) sum += a[r] * x[r];
+    y[j] += sign * sum;
+  }
+}
+
+/// Cholesky factor of a symmetric matrix in its lower triangle, in place; false where a pivot is not above the part
+/// `relative` of its own diagonal entry, so that the scale of one variable does not decide about another.
+inline bool factor(double* G, int ld, int n, double relative) noexcept {
+  for (int j = 0; j < n; ++j) {
+    double* column = G + j * ld;
+    const double least = relative * column[j];
+    double pivot = column[j];
+    for (int k = 0; k < j; ++k) pivot -= G[k * ld + j] * G[k * ld + j];
+    if (!(pivot > least && pivot > 0.0)) return false;
+    const double root = __builtin_sqrt(pivot), inverse = 1.0 / root;
+    column[j] = root;
+    for (int i = j + 1; i < n; ++i) {
+      double sum = column[i];
+      for (int k = 0; k < j; ++k) sum -= G[k * ld + i] * G[k * ld + j];
+      column[i] = sum * inverse;
+    }
+  }
+  return true;
+}
+
+/// x := (G G')^-1 x with the factor's lower triangle.
+inline void solve(const double* G, int ld, int n, double* x) noexcept {
+  for (int i = 0; i < n; ++i) {
+    double sum = x[i];
+    for (int k = 0; k < i; ++k) sum -= G[k * ld + i] * x[k];
+    x[i] = sum / G[i * ld + i];
+  }
+  for (int i = n - 1; i >= 0; --i) {
+    double sum = x[i];
+    for (int k = i + 1; k < n; ++k) sum -= G[i * ld + k] * x[k];
+    x[i] = sum / G[i * ld + i];
+  }
+}
+
+}  // namespace rhec::small

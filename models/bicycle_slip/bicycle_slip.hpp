@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cmath>
+
+namespace rhec {
+
+/// Kinematic bicycle with multiplicative slip (Kraus et al. 2013):
+///
+///     x_pos' = kappa u1 cos(beta)      beta'  = kappa u1 / l tan(mu delta)
+///     y_pos' = kappa u1 sin(beta)      delta' = u2
+///     h(x)   = [x_pos - d cos(beta), y_pos - d sin(beta), delta]
+///
+/// with x = [x_pos, y_pos, beta, delta], u = [u1, u2], p = [kappa, mu].
+struct BicycleSlip {
+  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 3;
+
+  double wheelbase = 1.4;   ///< l [m]
+  double gps_offset = 0.4;  ///< d: how far the GPS antenna is behind the rear axle [m]
+
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::cos, std::sin, std::tan;
+    const Scalar &beta = x[2], &delta = x[3], &kappa = p[0], &mu = p[1];
+    const Scalar speed = kappa * u[0];
+    dxdt[0] = speed * cos(beta);
+    dxdt[1] = speed * sin(beta);
+    dxdt[2] = speed * tan(mu * delta) / wheelbase;
+    dxdt[3] = u[1];
+  }
+
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    using std::cos, std::sin;
+    const Scalar& beta = x[2];
+    y[0] = x[0] - gps_offset * cos(beta);
+    y[1] = x[1] - gps_offset * sin(beta);
+    y[2] = x[3];
+  }
+};
+
+}  // namespace rhec

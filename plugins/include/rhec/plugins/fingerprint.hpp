@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>  // defines the macros of the standard library
+
+/// What two libraries must have in common before they may hand each other C++ objects, as one constant text. It is put
+/// together where it is compiled, so that a plugin carries its own and the host compares.
+///
+/// Eigen's alignment follows the compiler's flags (-march, -mavx): compile the file with the plugin's manifest with the
+/// same ones as rhec, and put kernels for wider registers into files of their own.
+
+#define RHEC_TEXT_OF_TOKEN(token) #token
+#define RHEC_TEXT_OF(macro) RHEC_TEXT_OF_TOKEN(macro)
+
+/// The version of rhec that these headers belong to.
+#define RHEC_VERSION_TEXT "0.1.0"
+
+#if defined(__clang__)
+#define RHEC_COMPILER_TEXT "clang " RHEC_TEXT_OF(__clang_major__)
+#elif defined(__GNUC__)
+#define RHEC_COMPILER_TEXT "gcc " RHEC_TEXT_OF(__GNUC__)
+#else
+#error "rhec is built with gcc or clang"
+#endif
+
+#if defined(_GLIBCXX_DEBUG)
+#define RHEC_CONTAINERS_TEXT " debug"  // changes the size of containers
+#else
+#define RHEC_CONTAINERS_TEXT ""
+#endif
+
+#if defined(_GLIBCXX_RELEASE)
+#define RHEC_LIBRARY_TEXT "libstdc++ cxx11-abi " RHEC_TEXT_OF(_GLIBCXX_USE_CXX11_ABI) RHEC_CONTAINERS_TEXT
+#else
+#define RHEC_LIBRARY_TEXT "libc++ " RHEC_TEXT_OF(_LIBCPP_ABI_VERSION)
+#endif
+
+#define RHEC_EIGEN_TEXT                                                                              \
+  "Eigen " RHEC_TEXT_OF(EIGEN_WORLD_VERSION) "." RHEC_TEXT_OF(EIGEN_MAJOR_VERSION) "." RHEC_TEXT_OF( \
+      EIGEN_MINOR_VERSION) " aligned " RHEC_TEXT_OF(EIGEN_MAX_ALIGN_BYTES)
+
+/// e.g. "rhec 0.1.0, gcc 12, libstdc++ cxx11-abi 1, Eigen 3.4.0 aligned 16"
+#define RHEC_BUILD_FINGERPRINT \
+  "rhec " RHEC_VERSION_TEXT ", " RHEC_COMPILER_TEXT ", " RHEC_LIBRARY_TEXT ", " RHEC_EIGEN_TEXT

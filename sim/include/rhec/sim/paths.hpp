@@ -1,0 +1,49 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "rhec/core/export.hpp"
+#include "rhec/core/path.hpp"
+
+namespace rhec::sim {
+
+/// Two tangent circles, driven in turn: from (0, 0) facing +x round the left one (centre (0, radius), anticlockwise),
+/// then round the right one (centre (0, -radius), clockwise), and so on. The default is the paper's 275 m a lap.
+struct FigureEight {
+  double speed = 2.0;    ///< reference ground speed [m/s]
+  int laps = 2;          ///< a lap is both circles
+  double radius = 21.9;  ///< [m]
+  double spacing = 0.1;  ///< largest distance between waypoints [m]
+  int speed_input = 0;   ///< which of the model's inputs the speed is
+};
+RHEC_EXPORT std::vector<Waypoint> figure_eight(const FigureEight& options = {});
+
+/// Straight legs along +x and -x in turn, joined by half circles, as a field is worked between its headlands: from (0,
+/// -20) facing +x, each leg 2 * radius further along +y than the one before it. The first half circle turns left.
+///
+///     length = legs * leg_length + (legs - 1) * pi * radius          (549.4 m by default; the paper's is 'about 550
+///     m')
+///
+/// A half circle of 9 m asks a bicycle of wheelbase 1.4 m for a steering angle of 8.8 deg (17.6 deg at a side slip of
+/// 0.5).
+struct ZigZag {
+  double speed = 2.0;        ///< reference ground speed [m/s]
+  int legs = 6;              ///< number of straight legs
+  double leg_length = 68.0;  ///< [m]
+  double radius = 9.0;       ///< of the half circles [m]
+  double spacing = 0.1;      ///< largest distance between waypoints [m]
+  int speed_input = 0;       ///< which of the model's inputs the speed is
+};
+RHEC_EXPORT std::vector<Waypoint> zig_zag(const ZigZag& options = {});
+
+/// Waypoints from a CSV file: columns x, y [m] and, if there is a third one, the reference speed [m/s]; a first row of
+/// names is allowed. Without that column the speed is `speed`. Throws Error, naming file and row, for rows that are
+/// ragged or not numeric, for missing values, for speeds that are not positive, and for fewer than two rows.
+struct WaypointFile {
+  double speed = 2.0;   ///< where the file has none [m/s]
+  int speed_input = 0;  ///< which of the model's inputs the speed is
+};
+RHEC_EXPORT std::vector<Waypoint> load_waypoints(const std::filesystem::path& file, const WaypointFile& options = {});
+
+}  // namespace rhec::sim

@@ -1,0 +1,133 @@
+#include "rhec/sim/truth.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "rhec/core/error.hpp"
+
+namespace rhec::sim {
+
+TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eigen::VectorXd& initial_state,
+                           const TruthOptions& options)
+    : model_(&model), field_(&field), options_(options), state_(initial_state) {
+  const ModelDescription& description = model.description();
+  const int n_x = model.state_count(), n_p = model.parameter_count();
+  if (description.roles.position_x < 0 || description.roles.position_y < 0) {
+    throw Error(
+        fmt::format("truth vehicle: model '{}' does not say which states are its position, by which slip is looked "
+                    "up; set position_x and position_y among its roles",
+                    description.name));
+  }
+  if (field.channels() != n_p) {
+    throw Error(
+        fmt::format("truth vehicle: the slip field has {} channel(s), but model '{}' has {} parameter(s); give one "
+                    "channel per parameter",
+                    field.channels(), description.name, n_p));
+  }
+  if (initial_state.size() != n_x) {
+    throw Error(fmt::format("truth vehicle: the initial state has {} value(s), but model '{}' has {} state(s)",
+                            initial_state.size(), description.name, n_x));
+  }
+  if (!(std::isfinite(options.step) && options.step > 0.0)) {
+    throw Error(fmt::format("truth vehicle: step is {}; expected a time greater than 0 s", options.step));
+  }
+  lower_.resize(n_x);
+  upper_.resize(n_x);
+  for (int i = 0; i < n_x; ++i) {
+    const Variable& variable = description.states[i];
+    lower_[i] = variable.lower;
+    upper_[i] = variable.upper;
+    const bool inside = !options.mechanical_stops || (state_[i] >= lower_[i] && state_[i] <= upper_[i]);
+    if (!std::isfinite(state_[i]) || !inside) {
+      throw Error(fmt::format("truth vehicle: the initial {} is {} {}; expected a value in [{}, {}]", variable.name,
+                              state_[i], variable.unit, lower_[i], upper_[i]));
+    }
+  }
+  for (Eigen::VectorXd* vector : {&stage_state_, &rates_, &sum_rates_}) vector->setZero(n_x);
+  for (Eigen::VectorXd* vector : {&parameters_, &mean_parameters_, &stage_parameters_, &sum_parameters_}) {
+    vector->setZero(n_p);
+  }
+  look_up(state_, parameters_);
+  mean_parameters_ = parameters_;
+}
+
+void TruthVehicle::look_up(const Eigen::VectorXd& state, Eigen::VectorXd& parameters) const noexcept {
+  const Roles& roles = model_->description().roles;
+  field_->sample(state[roles.position_x], state[roles.position_y], parameters.data());
+}
+
+void TruthVehicle::stop(Eigen::VectorXd& state) const noexcept {
+  if (options_.mechanical_stops) state = state.cwiseMax(lower_).cwiseMin(upper_);
+}
+
+void TruthVehicle::step(const double* inputs, double duration) noexcept {
+  constexpr double reach[] = {0.0, 0.5, 0.5, 1.0};
+  constexpr double weight[] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  sum_rates_.setZero();
+  for (int stage = 0; stage < 4; ++stage) {
+    stage_state_ = state_;
+    if (stage > 0) stage_state_ += reach[stage] * duration * rates_;
+    stop(stage_state_);
+    look_up(stage_state_, stage_parameters_);
+    model_->rates(stage_state_.data(), inputs, stage_parameters_.data(), rates_.data());
+    sum_rates_ += weight[stage] * rates_;
+    sum_parameters_ += weight[stage] * duration * stage_parameters_;
+  }
+  state_ += duration * sum_rates_;
+  stop(state_);
+}
+
+void TruthVehicle::advance(const double* inputs, double duration) noexcept {
+  if (!(duration > 0.0)) return;
+  // A duration that is a whole number of steps but for rounding takes that number.
+  const int steps = std::max(1, static_cast<int>(std::ceil(duration / options_.step - 1e-9)));
+  sum_parameters_.setZero();
+  for (int i = 0; i < steps; ++i) step(inputs, duration / steps);
+  time_ += duration;
+  mean_parameters_ = sum_parameters_ / duration;
+  look_up(state_, parameters_);
+}
+
+namespace {
+
+void check_sigmas(const char* kind, const std::vector<double>& sigmas, const std::vector<Variable>& variables) {
+  if (!sigmas.empty() && sigmas.size() != variables.size()) {
+    throw Error(fmt::format("sensors: {} standard deviation(s) for {} {}(s); give one each, or none at all",
+                            sigmas.size(), variables.size(), kind));
+  }
+  for (std::size_t i = 0; i < sigmas.size(); ++i) {
+    if (!(std::isfinite(sigmas[i]) && sigmas[i] >= 0.0)) {
+      throw Error(fmt::format("sensors: the standard deviation of {} '{}' is {}; expected 0 or more", kind,
+                              variables[i].name, sigmas[i]));
+    }
+  }
+}
+
+}  // namespace
+
+Sensors::Sensors(const Model& model, const SensorNoise& noise, std::uint64_t seed) : model_(&model) {
+  const ModelDescription& description = model.description();
+  const auto fill = [&](std::vector<Channel>& channels, const char* kind, const std::vector<double>& sigmas,
+                        const std::vector<Variable>& variables) {
+    check_sigmas(kind, sigmas, variables);
+    for (std::size_t i = 0; i < variables.size(); ++i) {
+      channels.push_back({sigmas.empty() ? 0.0 : sigmas[i],
+                          RandomStream(seed, fmt::format("noise of {} {}", kind, variables[i].name))});
+    }
+  };
+  fill(outputs_, "output", noise.outputs, description.outputs);
+  fill(inputs_, "input", noise.inputs, description.inputs);
+}
+
+void Sensors::observe(const double* state, double* outputs) noexcept {
+  model_->observe({.count = 1, .states = state, .outputs = outputs});
+  for (Channel& channel : outputs_) *outputs++ += channel.sigma * channel.random.normal();
+}
+
+void Sensors::measure_inputs(const double* inputs, double* measured) noexcept {
+  for (Channel& channel : inputs_) *measured++ = *inputs++ + channel.sigma * channel.random.normal();
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,359 @@
+#include "gn_rti.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rhec/plugins/sdk.hpp"
+
+namespace rhec::gn_rti {
+namespace {
+
+constexpr double sufficient_decrease = 1e-4;
+constexpr double shortest_step = 1e-6;
+// Differences of the merit below this part of it are rounding.
+constexpr double merit_rounding = 1e-13;
+
+double microseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
+
+/// Visits every pair of corresponding rows of two iterates: function(kind-agnostic destination, source, length).
+template <class Function>
+void for_each_primal_row(const Ocp& ocp, Iterate& to, const Iterate& from, const Function& function) {
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    function(to.state(i), from.state(i), ocp.state_count(i));
+    if (i < ocp.intervals()) function(to.control(i), from.control(i), ocp.control_count(i));
+  }
+}
+template <class Function>
+void for_each_dual_row(const Ocp& ocp, Iterate& to, const Iterate& from, const Function& function) {
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    function(to.costate(i), from.costate(i), ocp.state_count(i));
+    function(to.state_bound(i), from.state_bound(i), ocp.state_count(i));
+    if (i < ocp.intervals()) function(to.control_bound(i), from.control_bound(i), ocp.control_count(i));
+  }
+}
+
+bool is_finite(const Ocp& ocp, const Iterate& point) {
+  bool finite = true;
+  const auto check = [&](const double* row, int n) {
+    for (int j = 0; j < n; ++j) finite = finite && std::isfinite(row[j]);
+  };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    for (const double* row : {point.state(i), point.costate(i), point.state_bound(i)}) check(row, ocp.state_count(i));
+    if (i < ocp.intervals())
+      for (const double* row : {point.control(i), point.control_bound(i)}) check(row, ocp.control_count(i));
+  }
+  return finite;
+}
+
+double largest_costate(const Ocp& ocp, const Iterate& point) {
+  double largest = 0.0;
+  for (int i = 1; i <= ocp.intervals(); ++i)
+    for (int j = 0; j < ocp.state_count(i); ++j) largest = std::max(largest, std::abs(point.costate(i)[j]));
+  return largest;
+}
+
+double largest_bound_multiplier(const Ocp& ocp, const Iterate& point) {
+  double largest = 0.0;
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    for (int j = 0; j < ocp.state_count(i); ++j) largest = std::max(largest, std::abs(point.state_bound(i)[j]));
+    if (i < ocp.intervals())
+      for (int j = 0; j < ocp.control_count(i); ++j) largest = std::max(largest, std::abs(point.control_bound(i)[j]));
+  }
+  return largest;
+}
+
+double total_violation(const Ocp& ocp, const Iterate& point) {
+  double total = 0.0;
+  const auto add = [&](const double* value, const double* lower, const double* upper, int n) {
+    for (int j = 0; j < n; ++j) total += std::max({0.0, lower[j] - value[j], value[j] - upper[j]});
+  };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    add(point.state(i), ocp.state_lower(i), ocp.state_upper(i), ocp.state_count(i));
+    if (i < ocp.intervals())
+      add(point.control(i), ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
+  }
+  return total;
+}
+
+}  // namespace
+
+const OptionTable<GnRtiOptions>& GnRtiOptions::table() {
+  static const auto options =
+      OptionTable<GnRtiOptions>()
+          .choice("mode", &GnRtiOptions::mode, {{"rti", Mode::rti}, {"converge", Mode::converge}},
+                  "rti: a fixed number of full steps a sample; converge: to the tolerance, with a line search")
+          .choice("hessian", &GnRtiOptions::hessian,
+                  {{"gauss_newton", Curvature::gauss_newton}, {"exact", Curvature::exact}, {"auto", Curvature::automatic}},
+                  "curvature of the quadratic programs; auto: Gauss-Newton for estimation, exact for control")
+          .integer("iterations", &GnRtiOptions::iterations, "steps a sample in mode rti", between(1, 1000))
+          .integer("max_iterations", &GnRtiOptions::max_iterations, "limit of mode converge", between(1, 100000))
+          .number("tolerance", &GnRtiOptions::tolerance, "KKT residual at which mode converge is content",
+                  greater_than(0.0));
+  return options;
+}
+
+std::string GnRti::why_not(const Ocp& ocp) const {
+  const Capacity capacity = ocp.capacity();
+  if (std::max(capacity.states, capacity.controls) > Riccati::max_width)
+    return "a stage has more than " + std::to_string(Riccati::max_width) +
+           " states or controls; use a sparse solver for so wide a model";
+  const bool exact = options_.hessian == Curvature::exact ||
+                     (options_.hessian == Curvature::automatic && ocp.kind() == OcpKind::rhc);
+  if (exact && !ocp.has_second_derivatives())
+    return "the model has no second derivatives; set hessian: gauss_newton";
+  return {};
+}
+
+void GnRti::setup(const Ocp& ocp) {
+  if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'gn_rti': " + reason);
+  capacity_ = ocp.capacity();
+  qp_ = StageQp(capacity_);
+  qp_solver_ = StageQpSolver(capacity_);
+  for (Iterate* point : {&prepared_point_, &step_, &trial_, &best_}) *point = Iterate(capacity_);
+  scratch_.assign(ocp.scratch_size(), 0.0);
+  defects_.assign(static_cast<std::size_t>(capacity_.intervals) * capacity_.states, 0.0);
+  reset();
+}
+
+void GnRti::reset() noexcept {
+  prepared_ = false;
+  qp_solver_.reset();
+}
+
+Hessian GnRti::hessian_for(const Ocp& ocp) const noexcept {
+  if (use_exact_ && ocp.has_second_derivatives()) return Hessian::exact;
+  if (options_.hessian == Curvature::automatic)
+    return ocp.kind() == OcpKind::rhc ? Hessian::exact : Hessian::gauss_newton;
+  return options_.hessian == Curvature::exact ? Hessian::exact : Hessian::gauss_newton;
+}
+
+/// Linearises at the point; a point without costates gets those that fit it first, since the exact Hessian needs them.
+void GnRti::linearise(const Ocp& ocp, Iterate& point) noexcept {
+  const Hessian hessian = hessian_for(ocp);
+  if (hessian == Hessian::exact && largest_costate(ocp, point) == 0.0) {
+    ocp.linearise(all_stages(ocp), point, Hessian::gauss_newton, qp_, scratch_);
+    set_costates(qp_, point);
+  }
+  ocp.linearise(all_stages(ocp), point, hessian, qp_, scratch_);
+}
+
+void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
+  const auto start = Clock::now();
+  prepared_ = false;
+  use_exact_ = false;
+  if (!(ocp.capacity() == capacity_) || !is_finite(ocp, guess)) return;
+  prepared_point_ = guess;
+  linearise(ocp, prepared_point_);
+  qp_solver_.guess_from(qp_, prepared_point_);
+  qp_solver_.prepare(qp_);
+  prepared_ = true;
+  preparation_us_ = microseconds_since(start);
+}
+
+bool GnRti::is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept {
+  if (!prepared_ || qp_.intervals() != ocp.intervals()) return false;
+  bool same = true;
+  const auto compare = [&](const double* a, const double* b, int n) { same = same && std::equal(a, a + n, b); };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    if (qp_.states(i) != ocp.state_count(i)) return false;
+    compare(prepared_point_.state(i), point.state(i), ocp.state_count(i));
+    if (i == ocp.intervals()) break;
+    if (qp_.controls(i) != ocp.control_count(i)) return false;
+    compare(prepared_point_.control(i), point.control(i), ocp.control_count(i));
+  }
+  return same;
+}
+
+void GnRti::add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept {
+  to = from;
+  for_each_primal_row(ocp, to, step_, [&](double* row, const double* step, int n) {
+    for (int j = 0; j < n; ++j) row[j] += length * step[j];
+  });
+  for_each_dual_row(ocp, to, step_, [&](double* row, const double* value, int n) {
+    for (int j = 0; j < n; ++j) row[j] += length * (value[j] - row[j]);
+  });
+}
+
+/// The step as a policy: controls go the given length towards the new ones and answer to where simulation really leads, so
+/// that the result has no defect. Far from the solution this carries much further than the linearised states do.
+void GnRti::roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept {
+  add_step(ocp, from, length, to);
+  double deviation[Riccati::max_width], policy[Riccati::max_width];
+  for (int i = 0; i < ocp.intervals(); ++i) {
+    const int n = ocp.state_count(i), m = ocp.control_count(i);
+    // Of the policy's step, what it does at the linearised states is scaled; its answer to the deviation is not.
+    for (int j = 0; j < n; ++j)
+      deviation[j] = step_.state(i)[j] + (to.state(i)[j] - from.state(i)[j] - length * step_.state(i)[j]);
+    qp_solver_.feedback(qp_, i, deviation, policy);
+    for (int j = 0; j < m; ++j) {
+      const double value = from.control(i)[j] + length * step_.control(i)[j] + (policy[j] - step_.control(i)[j]);
+      to.control(i)[j] = std::min(std::max(value, ocp.control_lower(i)[j]), ocp.control_upper(i)[j]);
+    }
+    ocp.simulate_interval(i, to, scratch_);
+  }
+}
+
+double GnRti::merit(const Ocp& ocp, const Iterate& point) noexcept {
+  const double objective = ocp.evaluate(point, defects_.data(), scratch_);
+  double defect = 0.0;
+  for (int i = 0; i < ocp.intervals(); ++i)
+    for (int j = 0; j < ocp.state_count(i + 1); ++j) defect += std::abs(defects_[i * capacity_.states + j]);
+  return objective + defect_penalty_ * defect + bound_penalty_ * total_violation(ocp, point);
+}
+
+void GnRti::judge(const Ocp& ocp, const Iterate& point, Report& report) noexcept {
+  report.objective = ocp.evaluate(point, nullptr, scratch_);
+  report.kkt = kkt_residual(ocp, point, qp_, scratch_);
+}
+
+Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+  const auto start = Clock::now();
+  Report report;
+  use_exact_ = false;
+  if (ocp.capacity() == capacity_ && is_finite(ocp, point) && std::isfinite(ocp.evaluate(point, nullptr, scratch_))) {
+    report = options_.mode == Mode::rti ? real_time(ocp, point, deadline) : converge(ocp, point, deadline);
+  }
+  report.preparation_us = prepared_ ? preparation_us_ : 0.0;
+  prepared_ = false;
+  report.feedback_us = microseconds_since(start);
+  return report;
+}
+
+Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+  Report report;
+  best_ = point;
+  bool ready = is_prepared_for(ocp, point);
+  report.status = Status::step_taken;
+  for (int iteration = 0; iteration < options_.iterations; ++iteration) {
+    if (iteration > 0 && Clock::now() > deadline) {
+      report.status = Status::deadline;
+      break;
+    }
+    if (ready) {
+      ocp.refresh(best_, qp_, scratch_);
+    } else {
+      linearise(ocp, best_);
+      qp_solver_.guess_from(qp_, best_);
+    }
+    ready = false;
+    const auto outcome = qp_solver_.solve(qp_, step_);
+    report.factorisations += qp_solver_.factorisations();
+    report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
+    if (outcome == StageQpSolver::Outcome::infeasible) {
+      report.status = Status::infeasible;
+      break;
+    }
+    add_step(ocp, best_, 1.0, trial_);
+    if (!is_finite(ocp, trial_) || !std::isfinite(ocp.evaluate(trial_, nullptr, scratch_))) {
+      report.status = Status::stalled;
+      break;
+    }
+    std::swap(best_, trial_);
+    ++report.iterations;
+  }
+  if (report.iterations > 0) {
+    if (report.status == Status::infeasible || report.status == Status::stalled) report.status = Status::iteration_limit;
+    std::swap(point, best_);
+  }
+  judge(ocp, point, report);
+  return report;
+}
+
+Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+  Report report;
+  defect_penalty_ = bound_penalty_ = 0.0;
+  best_ = point;
+  // A given initial state is not for the line search to negotiate about.
+  if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), best_.state(0));
+  report.status = Status::iteration_limit;
+  double last_residual = std::numeric_limits<double>::infinity();
+  int slow = 0;
+  for (;; ++report.iterations) {
+    linearise(ocp, best_);
+    report.kkt = kkt_residual(qp_, best_);
+    const double residual = report.kkt.largest();
+    if (residual <= options_.tolerance) {
+      report.status = Status::solved;
+      break;
+    }
+    if (report.iterations == options_.max_iterations) break;
+    if (Clock::now() > deadline) {
+      report.status = Status::deadline;
+      break;
+    }
+    // Gauss-Newton that gains little has met large residuals: from there the exact Hessian serves better.
+    if (options_.hessian == Curvature::automatic && !use_exact_ && ocp.has_second_derivatives()) {
+      slow = residual > 0.3 * last_residual ? slow + 1 : 0;
+      if (slow >= 4) {
+        use_exact_ = true;
+        linearise(ocp, best_);
+      }
+    }
+    last_residual = residual;
+
+    qp_solver_.guess_from(qp_, best_);
+    const auto outcome = qp_solver_.solve(qp_, step_);
+    report.factorisations += qp_solver_.factorisations();
+    report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
+    if (outcome == StageQpSolver::Outcome::infeasible || !is_finite(ocp, step_)) {
+      report.status = Status::infeasible;
+      break;
+    }
+    defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(ocp, step_));
+    bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(ocp, step_));
+    const double before = merit(ocp, best_);
+    double defect = 0.0, slope = 0.0;
+    for (int i = 0; i <= ocp.intervals(); ++i) {
+      for (int j = 0; j < ocp.state_count(i); ++j) slope += qp_.q(i)[j] * step_.state(i)[j];
+      if (i == ocp.intervals()) break;
+      for (int j = 0; j < ocp.state_count(i + 1); ++j) defect += std::abs(qp_.b(i)[j]);
+      for (int j = 0; j < ocp.control_count(i); ++j) slope += qp_.r(i)[j] * step_.control(i)[j];
+    }
+    slope -= defect_penalty_ * defect + bound_penalty_ * total_violation(ocp, best_);
+    double length = 1.0;
+    bool accepted = false;
+    for (; length >= shortest_step; length *= 0.5) {
+      if (ocp.kind() == OcpKind::rhc) {
+        roll_out_step(ocp, best_, length, trial_);
+      } else {
+        add_step(ocp, best_, length, trial_);
+      }
+      const double after = merit(ocp, trial_);
+      const double allowed =
+          before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
+      if (std::isfinite(after) && after <= allowed) {
+        accepted = true;
+        break;
+      }
+      // Near the solution the merit may refuse a step that Newton's method is right about.
+      if (length == 1.0 && residual < 1e-3 && std::isfinite(after)) {
+        const KktResidual full = kkt_residual(ocp, trial_, qp_, scratch_);
+        if (full.largest() < 0.5 * residual) {
+          accepted = true;
+          break;
+        }
+      }
+    }
+    if (!accepted) {
+      report.status = Status::stalled;
+      break;
+    }
+    std::swap(best_, trial_);
+  }
+  const double objective = ocp.evaluate(best_, nullptr, scratch_);
+  if (is_finite(ocp, best_) && std::isfinite(objective)) std::swap(point, best_);
+  judge(ocp, point, report);
+  return report;
+}
+
+}  // namespace rhec::gn_rti
+
+RHEC_PLUGIN(rhec::PluginKind::solver, rhec::gn_rti::GnRti,
+            {.name = "gn_rti",
+             .version = "0.1.0",
+             .licence = "BSD-2-Clause",
+             .source = "Sequential quadratic programming with a stage-wise Riccati recursion; real-time iteration of "
+                       "Diehl et al. (2002)",
+             .capabilities = "rhe, rhc, bounds on states, inputs and parameters, real-time iteration"});

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <vector>
+
+#include "rhec/core/options.hpp"
+#include "rhec/core/solver.hpp"
+#include "stage_qp_solver.hpp"
+
+namespace rhec::gn_rti {
+
+enum class Mode {
+  rti,      ///< a fixed number of full steps a sample (Diehl 2002)
+  converge  ///< to the tolerance, globalised by a line search
+};
+enum class Curvature {
+  gauss_newton,
+  exact,
+  automatic  ///< Gauss-Newton for estimation, exact for control
+};
+
+struct GnRtiOptions {
+  Mode mode = Mode::rti;
+  Curvature hessian = Curvature::automatic;
+  int iterations = 1;
+  int max_iterations = 60;
+  double tolerance = 1e-8;
+
+  static const OptionTable<GnRtiOptions>& table();
+};
+
+/// Sequential quadratic programming on the stages of an Ocp, with a Riccati recursion inside.
+///
+/// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers claim; `solve` then
+/// needs only vectors, unless the newest data change the active set. Estimation problems have small residuals and take
+/// Gauss-Newton's Hessian; control problems under slip have large ones, on which Gauss-Newton does not even converge
+/// locally, and take the exact one with the guess' costates, convexified inside the recursion.
+class GnRti final : public Solver {
+ public:
+  using Options = GnRtiOptions;
+  static const OptionTable<Options>& table() { return Options::table(); }
+  explicit GnRti(const Options& options) : options_(options) {}
+
+  std::string why_not(const Ocp& ocp) const override;
+  void setup(const Ocp& ocp) override;
+  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override;
+  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
+  void reset() noexcept override;
+
+ private:
+  Hessian hessian_for(const Ocp& ocp) const noexcept;
+  void linearise(const Ocp& ocp, Iterate& point) noexcept;
+  bool is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept;
+  Report real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept;
+  Report converge(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept;
+  void add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept;
+  void roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept;
+  double merit(const Ocp& ocp, const Iterate& point) noexcept;
+  void judge(const Ocp& ocp, const Iterate& point, Report& report) noexcept;
+
+  Options options_;
+  Capacity capacity_;
+  StageQp qp_;
+  StageQpSolver qp_solver_;
+  Iterate prepared_point_, step_, trial_, best_;
+  std::vector<double> scratch_, defects_;
+  bool prepared_ = false;
+  bool use_exact_ = false;
+  double preparation_us_ = 0.0;
+  double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
+};
+
+}  // namespace rhec::gn_rti

@@ -1,0 +1,296 @@
+#include "stage_qp_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rhec::gn_rti {
+namespace {
+
+constexpr int warm_rounds = 8;     // corrections of the active set before the interior-point method is called
+constexpr int polish_rounds = 6;   // the same from the interior-point method's active set
+constexpr int max_interior_iterations = 60;
+// The interior point stops well before rounding spoils its Newton systems; polishing does the rest.
+constexpr double interior_gap = 1e-8;
+constexpr double interior_infeasibility = 1e-7;
+constexpr double divergence = 1e10;
+constexpr double bound_tolerance = 1e-10;
+constexpr double multiplier_tolerance = 1e-9;
+
+bool is_equality(double lower, double upper) { return upper - lower <= 1e-14 * (1.0 + std::abs(lower)); }
+
+}  // namespace
+
+StageQpSolver::StageQpSolver(const Capacity& capacity) : capacity_(capacity), riccati_(capacity), active_(capacity) {
+  const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1;
+  bounded_.reserve(nodes * (capacity.states + capacity.controls));
+  for (auto* v : {&state_diagonal_, &q_}) v->assign(nodes * capacity.states, 0.0);
+  for (auto* v : {&control_diagonal_, &r_}) v->assign(nodes * capacity.controls, 0.0);
+}
+
+void StageQpSolver::reset() noexcept {
+  active_.clear();
+  factored_ = false;
+  factorisations_ = 0;
+}
+
+void StageQpSolver::guess_from(const StageQp& qp, const Iterate& point) noexcept {
+  active_.clear();
+  factored_ = false;
+  factorisations_ = 0;
+  const auto side = [](double multiplier, double lower, double upper) -> std::int8_t {
+    if (is_equality(lower, upper)) return 1;
+    if (multiplier > 0.0 && std::isfinite(upper)) return 1;
+    if (multiplier < 0.0 && std::isfinite(lower)) return -1;
+    return 0;
+  };
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    if (i > 0 || !qp.initial_state_is_given)
+      for (int j = 0; j < qp.states(i); ++j)
+        active_.state(i)[j] = side(point.state_bound(i)[j], qp.state_lower(i)[j], qp.state_upper(i)[j]);
+    for (int j = 0; j < qp.controls(i); ++j)
+      active_.control(i)[j] = side(point.control_bound(i)[j], qp.control_lower(i)[j], qp.control_upper(i)[j]);
+  }
+}
+
+void StageQpSolver::factor(const StageQp& qp) noexcept {
+  riccati_.factor(qp, active_);
+  factored_ = true;
+  ++factorisations_;
+}
+
+void StageQpSolver::prepare(const StageQp& qp) noexcept { factor(qp); }
+
+StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, const Iterate& step) noexcept {
+  Violations found;
+  double scale = 0.0;
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    for (int j = 0; j < qp.states(i); ++j) scale = std::max(scale, std::abs(step.costate(i)[j]));
+    for (int j = 0; j < qp.states(i); ++j) found.finite = found.finite && std::isfinite(step.state(i)[j]);
+    for (int j = 0; j < qp.controls(i); ++j) found.finite = found.finite && std::isfinite(step.control(i)[j]);
+  }
+  if (!found.finite) return found;
+  const double pull_tolerance = multiplier_tolerance * (1.0 + scale);
+  const auto correct = [&](std::int8_t& side, double value, double multiplier, double lower, double upper) {
+    const std::int8_t before = side;
+    if (side == 0) {
+      if (value < lower - bound_tolerance * (1.0 + std::abs(lower))) side = -1;
+      if (value > upper + bound_tolerance * (1.0 + std::abs(upper))) side = 1;
+    } else if (side * multiplier < -pull_tolerance && !is_equality(lower, upper)) {
+      side = 0;
+    }
+    found.count += side != before;
+  };
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    if (i > 0 || !qp.initial_state_is_given)
+      for (int j = 0; j < qp.states(i); ++j)
+        correct(active_.state(i)[j], step.state(i)[j], step.state_bound(i)[j], qp.state_lower(i)[j],
+                qp.state_upper(i)[j]);
+    for (int j = 0; j < qp.controls(i); ++j)
+      correct(active_.control(i)[j], step.control(i)[j], step.control_bound(i)[j], qp.control_lower(i)[j],
+              qp.control_upper(i)[j]);
+  }
+  return found;
+}
+
+bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds) noexcept {
+  for (int round = 0; round < rounds; ++round) {
+    if (!factored_) factor(qp);
+    if (riccati_.solve(qp, active_, step) != Riccati::Outcome::done) return false;
+    const Violations violations = correct_active_set(qp, step);
+    if (!violations.finite) return false;
+    if (violations.count == 0) return true;
+    factored_ = false;
+  }
+  return false;
+}
+
+StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step) noexcept {
+  return try_active_sets(qp, step, warm_rounds) ? Outcome::active_set : solve_by_interior_point(qp, step);
+}
+
+StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Iterate& step) noexcept {
+  // From here on one fixed, convex program is solved.
+  convexify(qp);
+  if (!interior_point(qp, step)) {
+    active_.clear();
+    factored_ = false;
+    return Outcome::infeasible;
+  }
+  // The set on which the interior point has settled; kept only if it leads to the exact solution.
+  active_.clear();
+  for (const Bounded& v : bounded_) {
+    std::int8_t& side = v.is_state ? active_.state(v.stage)[v.component] : active_.control(v.stage)[v.component];
+    const bool at_lower = std::isfinite(v.lower) && v.below.multiplier > v.below.slack;
+    const bool at_upper = std::isfinite(v.upper) && v.above.multiplier > v.above.slack;
+    side = at_lower && (!at_upper || v.below.multiplier > v.above.multiplier) ? std::int8_t{-1}
+           : at_upper                                                         ? std::int8_t{1}
+                                                                              : std::int8_t{0};
+  }
+  factored_ = false;
+  if (try_active_sets(qp, step, polish_rounds)) return Outcome::interior_point;
+  interior_point(qp, step);  // polishing has overwritten the step
+  factored_ = false;
+  return Outcome::interior_point;
+}
+
+void StageQpSolver::convexify(StageQp& qp) noexcept {
+  active_.clear();
+  riccati_.factor(qp, active_);
+  ++factorisations_;
+  if (riccati_.was_convexified()) riccati_.write_convexified(qp);
+}
+
+void StageQpSolver::collect_bounded(const StageQp& qp) noexcept {
+  bounded_.clear();
+  const auto add = [&](bool is_state, int stage, int component, double lower, double upper) {
+    if (!std::isfinite(lower) && !std::isfinite(upper)) return;
+    Bounded v;
+    v.is_state = is_state;
+    v.stage = stage;
+    v.component = component;
+    v.lower = lower;
+    v.upper = upper;
+    bounded_.push_back(v);
+  };
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    if (i > 0 || !qp.initial_state_is_given)
+      for (int j = 0; j < qp.states(i); ++j) add(true, i, j, qp.state_lower(i)[j], qp.state_upper(i)[j]);
+    for (int j = 0; j < qp.controls(i); ++j) add(false, i, j, qp.control_lower(i)[j], qp.control_upper(i)[j]);
+  }
+}
+
+/// Barrier Hessian and gradient for the Newton system that aims at complementarity `target`, in terms of the new values.
+void StageQpSolver::barrier_terms(const StageQp& qp, double target) noexcept {
+  const int ns = capacity_.states, nw = capacity_.controls;
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    std::fill_n(state_diagonal_.data() + i * ns, ns, 0.0);
+    std::fill_n(control_diagonal_.data() + i * nw, nw, 0.0);
+    std::copy_n(qp.q(i), ns, q_.data() + i * ns);
+    if (i < qp.intervals()) std::copy_n(qp.r(i), nw, r_.data() + i * nw);
+  }
+  for (const Bounded& v : bounded_) {
+    double& diagonal = v.is_state ? state_diagonal_[v.stage * ns + v.component] : control_diagonal_[v.stage * nw + v.component];
+    double& gradient = v.is_state ? q_[v.stage * ns + v.component] : r_[v.stage * nw + v.component];
+    if (std::isfinite(v.lower)) {
+      const Side& s = v.below;
+      const double weight = s.multiplier / s.slack;
+      diagonal += weight;
+      gradient -= (target - s.correction) / s.slack + weight * (v.lower + s.slack);
+    }
+    if (std::isfinite(v.upper)) {
+      const Side& s = v.above;
+      const double weight = s.multiplier / s.slack;
+      diagonal += weight;
+      gradient += (target - s.correction) / s.slack - weight * (v.upper - s.slack);
+    }
+  }
+}
+
+bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step) noexcept {
+  collect_bounded(qp);
+  double scale = 1.0;
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    for (int j = 0; j < qp.states(i); ++j) scale = std::max(scale, std::abs(qp.q(i)[j]));
+    for (int j = 0; j < qp.controls(i); ++j) scale = std::max(scale, std::abs(qp.r(i)[j]));
+  }
+  int sides = 0;
+  for (Bounded& v : bounded_) {
+    const double range = std::min(v.upper - v.lower, 2.0);
+    v.value = std::min(std::max(0.0, v.lower), v.upper);
+    const auto start = [&](Side& side, double distance) {
+      side = {};
+      side.slack = std::max({distance, 0.1 * range, 1e-3});
+      side.multiplier = 0.1 * scale / std::max(1.0, side.slack);
+      ++sides;
+    };
+    if (std::isfinite(v.lower)) start(v.below, v.value - v.lower);
+    if (std::isfinite(v.upper)) start(v.above, v.upper - v.value);
+  }
+  if (sides == 0) return try_active_sets(qp, step, 1);
+  active_.clear();
+
+  const auto value_in = [](const Iterate& trial, const Bounded& v) {
+    return v.is_state ? trial.state(v.stage)[v.component] : trial.control(v.stage)[v.component];
+  };
+  // Newton's direction for both sides of every bounded variable, given the new values.
+  const auto directions = [&](double target) {
+    for (Bounded& v : bounded_) {
+      const double value = value_in(step, v);
+      const auto side_step = [&](Side& s, double new_slack) {
+        s.slack_step = new_slack - s.slack;
+        s.multiplier_step = (target - s.correction - s.multiplier * s.slack_step) / s.slack - s.multiplier;
+      };
+      if (std::isfinite(v.lower)) side_step(v.below, value - v.lower);
+      if (std::isfinite(v.upper)) side_step(v.above, v.upper - value);
+    }
+  };
+  const auto each_side = [&](const auto& function) {
+    for (Bounded& v : bounded_) {
+      if (std::isfinite(v.lower)) function(v, v.below);
+      if (std::isfinite(v.upper)) function(v, v.above);
+    }
+  };
+  const auto longest_step = [&] {
+    double length = 1.0;
+    each_side([&](const Bounded&, const Side& s) {
+      if (s.slack_step < 0.0) length = std::min(length, -s.slack / s.slack_step);
+      if (s.multiplier_step < 0.0) length = std::min(length, -s.multiplier / s.multiplier_step);
+    });
+    return length;
+  };
+  const auto mean_complementarity = [&](double length) {
+    double sum = 0.0;
+    each_side([&](const Bounded&, const Side& s) {
+      sum += (s.slack + length * s.slack_step) * (s.multiplier + length * s.multiplier_step);
+    });
+    return sum / sides;
+  };
+
+  for (int iteration = 0; iteration < max_interior_iterations; ++iteration) {
+    each_side([](const Bounded&, Side& s) { s.slack_step = s.multiplier_step = s.correction = 0.0; });
+    const double complementarity = mean_complementarity(0.0);
+    barrier_terms(qp, 0.0);
+    riccati_.factor(qp, active_, {state_diagonal_.data(), control_diagonal_.data()});
+    ++factorisations_;
+    if (riccati_.solve(qp, active_, step, q_.data(), r_.data()) != Riccati::Outcome::done) return false;
+    directions(0.0);
+    const double affine = longest_step();
+    const double ratio = mean_complementarity(affine) / complementarity;
+    const double target = std::max(ratio * ratio * ratio * complementarity, 1e-3 * interior_gap * scale);
+    each_side([](const Bounded&, Side& s) { s.correction = s.slack_step * s.multiplier_step; });
+    barrier_terms(qp, target);
+    if (riccati_.solve(qp, active_, step, q_.data(), r_.data()) != Riccati::Outcome::done) return false;
+    directions(target);
+    const double length = std::min(1.0, 0.995 * longest_step());
+    if (!std::isfinite(length) || !std::isfinite(target)) return false;
+    double infeasibility = 0.0;
+    each_side([&](const Bounded& v, Side& s) {
+      s.slack += length * s.slack_step;
+      s.multiplier += length * s.multiplier_step;
+      const bool is_lower = &s == &v.below;
+      const double value = value_in(step, v);
+      infeasibility = std::max(infeasibility, std::abs((is_lower ? value - v.lower : v.upper - value) - s.slack));
+    });
+    double gap = 0.0, largest_multiplier = 0.0;
+    each_side([&](const Bounded&, const Side& s) {
+      gap = std::max(gap, s.slack * s.multiplier);
+      largest_multiplier = std::max(largest_multiplier, s.multiplier);
+    });
+    // Multipliers that grow without end are the certificate of bounds that contradict each other.
+    if (largest_multiplier > divergence * scale) return false;
+    if (gap < interior_gap * scale && infeasibility < interior_infeasibility) {
+      for (int i = 0; i <= qp.intervals(); ++i) {
+        std::fill_n(step.state_bound(i), qp.states(i), 0.0);
+        if (i < qp.intervals()) std::fill_n(step.control_bound(i), qp.controls(i), 0.0);
+      }
+      for (const Bounded& v : bounded_) {
+        double& multiplier = v.is_state ? step.state_bound(v.stage)[v.component] : step.control_bound(v.stage)[v.component];
+        multiplier = (std::isfinite(v.upper) ? v.above.multiplier : 0.0) - (std::isfinite(v.lower) ? v.below.multiplier : 0.0);
+      }
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace rhec::gn_rti

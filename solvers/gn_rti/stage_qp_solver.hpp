@@ -1,0 +1,76 @@
+#pragma once
+
+#include <vector>
+
+#include "rhec/core/riccati.hpp"
+
+namespace rhec::gn_rti {
+
+/// Solves a StageQp with all its bounds, exactly.
+///
+/// The active set of the last sample is tried first: one factorisation, accepted only if the KKT conditions hold. Where they
+/// do not, the set is corrected by the primal-dual rule (Hintermueller, Ito & Kunisch 2002: what is violated is added, what
+/// pulls the wrong way is dropped) for a few rounds. Should that not settle, a primal-dual interior-point method takes over,
+/// whose active set is then polished to the exact solution.
+class StageQpSolver {
+ public:
+  enum class Outcome {
+    active_set,      ///< exact, by active sets alone
+    interior_point,  ///< the interior-point method was needed; exact after polishing, or to its tolerance
+    infeasible       ///< the bounds cannot be satisfied
+  };
+  StageQpSolver() = default;
+  explicit StageQpSolver(const Capacity& capacity);
+
+  /// The active set that a point's bound multipliers claim.
+  void guess_from(const StageQp& qp, const Iterate& point) noexcept;
+  /// Factorises with the guess, so that `solve` needs only vectors if the guess is right.
+  void prepare(const StageQp& qp) noexcept;
+
+  /// The minimiser goes to `step`: primal steps, new costates and bound multipliers. The program's R may be convexified.
+  Outcome solve(StageQp& qp, Iterate& step) noexcept;
+  /// The robust path alone: convexify, interior point, polish.
+  Outcome solve_by_interior_point(StageQp& qp, Iterate& step) noexcept;
+
+  /// The control of stage i that the last solution's policy chooses for a stage-state step.
+  void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept {
+    riccati_.feedback(qp, i, state_step, control_step);
+  }
+  bool was_convexified() const noexcept { return riccati_.was_convexified(); }
+  int factorisations() const noexcept { return factorisations_; }
+  void reset() noexcept;
+
+ private:
+  struct Violations {
+    int count = 0;
+    bool finite = true;
+  };
+  void factor(const StageQp& qp) noexcept;
+  Violations correct_active_set(const StageQp& qp, const Iterate& step) noexcept;
+  bool try_active_sets(const StageQp& qp, Iterate& step, int rounds) noexcept;
+  bool interior_point(const StageQp& qp, Iterate& step) noexcept;
+  void convexify(StageQp& qp) noexcept;
+
+  /// One bounded variable in the interior-point method: slacks and multipliers of its two sides.
+  struct Side {
+    double slack = 0.0, multiplier = 0.0, slack_step = 0.0, multiplier_step = 0.0, correction = 0.0;
+  };
+  struct Bounded {
+    bool is_state = false;
+    int stage = 0, component = 0;
+    double lower = 0.0, upper = 0.0, value = 0.0;
+    Side below, above;
+  };
+  void collect_bounded(const StageQp& qp) noexcept;
+  void barrier_terms(const StageQp& qp, double target) noexcept;
+
+  Capacity capacity_;
+  Riccati riccati_;
+  ActiveSet active_;
+  bool factored_ = false;
+  int factorisations_ = 0;
+  std::vector<Bounded> bounded_;
+  std::vector<double> state_diagonal_, control_diagonal_, q_, r_;
+};
+
+}  // namespace rhec::gn_rti

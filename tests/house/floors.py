@@ -1,0 +1,206 @@
+#!/usr/bin/env python3
+"""The order of the floors, in what files include and in what libraries link to.
+
+    floors.py <source root> [--lib <directory of the libraries> --plugins <directory of the plugins>]
+    floors.py --self-test
+
+A folder includes folders on lower floors, and itself; a plugin includes its own folder, core and plugins.
+"""
+import argparse
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+import house
+
+# folder -> the folders whose public headers ("rhec/<folder>/x.hpp") it may include, and whose libraries it may link to
+MAY_USE = {
+    "core": ("core",),
+    "plugins": ("core", "plugins"),
+    "solvers": ("core", "plugins"),
+    "models": ("core", "plugins"),
+    "blocking": ("core", "plugins"),
+    "sim": ("core", "plugins", "sim"),
+    "apps": ("core", "plugins", "sim", "apps"),
+}
+PLUGIN_FOLDERS = ("solvers", "models", "blocking")
+CORE_THIRD_PARTY = ("Eigen", "unsupported/Eigen", "fmt", "xsimd")
+CORE_LIBRARIES = ("libfmt", "libstdc++", "libm.", "libgcc_s", "libc.", "ld-linux", "libasan", "libubsan")
+STANDARD = set("""
+algorithm any array atomic barrier bit bitset charconv chrono codecvt compare complex concepts condition_variable
+coroutine deque exception execution filesystem format forward_list fstream functional future initializer_list iomanip
+ios iosfwd iostream istream iterator latch limits list locale map memory memory_resource mutex new numbers numeric
+optional ostream queue random ranges ratio regex scoped_allocator semaphore set shared_mutex source_location span
+sstream stack stdexcept stop_token streambuf string string_view strstream syncstream system_error thread tuple
+type_traits typeindex typeinfo unordered_map unordered_set utility valarray variant vector version
+cassert cctype cerrno cfenv cfloat cinttypes climits clocale cmath csetjmp csignal cstdarg cstddef cstdint cstdio
+cstdlib cstring ctime cuchar cwchar cwctype
+""".split())
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+
+def allowed_text(folder):
+    names = ", ".join(f'"rhec/{name}/..."' for name in MAY_USE[folder])
+    if folder == "core":
+        return f"{names}, own files, the standard library, Eigen, fmt, xsimd"
+    if folder in PLUGIN_FOLDERS:
+        return f"{names}, files of the plugin's own folder, third parties in <>"
+    return f"{names}, own files, third parties in <>"
+
+
+def own_folder(root, file):
+    """The folder within which a file may include by relative name: for a plugin its own, else that of the floor."""
+    parts = file.relative_to(root).parts
+    return root.joinpath(*parts[: 2 if parts[0] in PLUGIN_FOLDERS and len(parts) > 2 else 1])
+
+
+def why_not_include(root, file, quote, name):
+    folder = file.relative_to(root).parts[0]
+    if name.startswith("rhec/"):
+        if quote == "<":
+            return f'ours is included with quotes, as "{name}"'
+        parts = name.split("/")
+        if len(parts) < 3:
+            return 'public headers are named "rhec/<folder>/<header>.hpp"'
+        if parts[1] not in MAY_USE[folder]:
+            return f"{folder}/ does not reach {parts[1]}/"
+        return None
+    if quote == '"':
+        own = own_folder(root, file).resolve()
+        places = [file.parent, own, own / "src"]
+        targets = [(place / name).resolve() for place in places]
+        if any(target.is_file() and target.is_relative_to(own) for target in targets):
+            return None
+        return f'"{name}" is not a file of {own.relative_to(root.resolve())}/'
+    if folder == "core" and name not in STANDARD and not name.startswith(tuple(p + "/" for p in CORE_THIRD_PARTY)):
+        return f"core does not depend on <{name}>"
+    return None
+
+
+def include_violations(root):
+    violations, looked_at = [], 0
+    for file in house.cpp_files(root, house.FOLDERS):
+        looked_at += 1
+        folder = file.relative_to(root).parts[0]
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+            match = INCLUDE.match(line)
+            reason = match and why_not_include(root, file, *match.groups())
+            if reason:
+                violations.append(f"{file}:{number}: {reason}; allowed: {allowed_text(folder)}")
+    return violations, looked_at
+
+
+def needed(library):
+    """The libraries that a shared library asks the loader for (DT_NEEDED)."""
+    text = subprocess.run(["readelf", "--dynamic", "--wide", str(library)], check=True, capture_output=True, text=True).stdout
+    return re.findall(r"\(NEEDED\).*\[(.*)\]", text)
+
+
+def link_violations(label, folder, needs, plugin_names):
+    """`needs` are the names that the library `label` of `folder` asks for."""
+    violations = []
+    allowed = [name for name in MAY_USE[folder] if name != folder]
+    for name in needs:
+        ours = re.match(r"librhec_(\w+)\.so", name)
+        bad = (
+            (ours and ours.group(1) not in allowed)
+            or name in plugin_names
+            or (folder == "core" and not ours and not name.startswith(CORE_LIBRARIES))
+        )
+        if bad:
+            libraries = ", ".join(f"librhec_{other}" for other in allowed) or "no other library of rhec"
+            extra = "; of others only " + ", ".join(CORE_LIBRARIES) if folder == "core" else " and third parties"
+            violations.append(f"{label}: links to {name}; allowed: {libraries}{extra}")
+    return violations
+
+
+def library_violations(lib, plugins):
+    violations, looked_at = [], 0
+    modules = sorted(plugins.glob("*.so"))
+    plugin_names = {module.name for module in modules}
+    for folder in ("core", "plugins", "sim"):
+        library = lib / f"librhec_{folder}.so"
+        if library.exists():
+            looked_at += 1
+            violations += link_violations(library, folder, needed(library), plugin_names)
+        else:
+            violations.append(f"{library}: is not there; build first")
+    if not modules:
+        violations.append(f"{plugins}: no plugin is there; build first")
+    for module in modules:
+        looked_at += 1
+        violations += link_violations(module, "models", needed(module), plugin_names)
+    return violations, looked_at
+
+
+def self_test():
+    """Plants violations, and things that are none, in a small tree; each must be told apart."""
+    wrong = {
+        "core/src/up.cpp": '#include "rhec/plugins/host.hpp"',
+        "core/src/angle.cpp": "#include <rhec/core/model.hpp>",
+        "core/src/boost.cpp": "#include <boost/dll.hpp>",
+        "core/include/rhec/core/escapes.hpp": '#include "../../../../sim/src/own.hpp"',
+        "plugins/src/up.cpp": '  #  include "rhec/sim/world.hpp"',
+        "models/a/other.cpp": '#include "../b/b.hpp"',
+        "solvers/s/sim.cpp": '#include "rhec/sim/world.hpp"',
+        "sim/src/model.cpp": '#include "rhec/models/a.hpp"',
+    }
+    right = {
+        "core/src/good.cpp": '#include <vector>\n#include <Eigen/Core>\n#include <fmt/format.h>\n#include "rhec/core/model.hpp"',
+        "core/src/own_user.cpp": '#include "own.hpp"',
+        "core/src/own.hpp": "#pragma once\n// #include \"rhec/sim/world.hpp\"",
+        "plugins/src/good.cpp": '#include <boost/dll.hpp>\n#include "rhec/core/model.hpp"',
+        "models/b/b.hpp": '#include "rhec/plugins/sdk.hpp"',
+        "models/b/b.cpp": '#include "b.hpp"',
+        "sim/src/own.hpp": '#include "rhec/plugins/host.hpp"\n#include "rhec/sim/world.hpp"',
+        "apps/main.cpp": '#include <CLI/CLI.hpp>\n#include "rhec/sim/world.hpp"',
+    }
+    failures = []
+    with tempfile.TemporaryDirectory() as directory:
+        root = pathlib.Path(directory)
+        for name, text in {**wrong, **right}.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text + "\n")
+        told = {violation.split(":")[0] for violation in include_violations(root)[0]}
+        failures += [f"not noticed: {name}" for name in wrong if str(root / name) not in told]
+        failures += [f"wrongly blamed: {name}" for name in right if str(root / name) in told]
+    links = [
+        ("core", "librhec_plugins.so.0.1", True),
+        ("core", "libboost_filesystem.so.1.74.0", True),
+        ("core", "libfmt.so.9", False),
+        ("plugins", "librhec_sim.so.0.1", True),
+        ("plugins", "librhec_core.so.0.1", False),
+        ("models", "other.so", True),
+        ("models", "librhec_sim.so.0.1", True),
+        ("models", "librhec_plugins.so.0.1", False),
+        ("sim", "librhec_plugins.so.0.1", False),
+        ("sim", "other.so", True),
+    ]
+    for folder, name, bad in links:
+        if bool(link_violations("planted", folder, [name], {"other.so"})) != bad:
+            failures.append(f"{folder} linking to {name}: should be {'refused' if bad else 'accepted'}")
+    house.tell("floors self-test", failures, len(wrong) + len(right) + len(links))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("root", nargs="?", type=pathlib.Path)
+    parser.add_argument("--lib", type=pathlib.Path)
+    parser.add_argument("--plugins", type=pathlib.Path)
+    parser.add_argument("--self-test", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.self_test:
+        self_test()
+    if not arguments.root:
+        parser.error("the source root is missing")
+    violations, looked_at = include_violations(arguments.root.resolve())
+    if arguments.lib and arguments.plugins:
+        more, libraries = library_violations(arguments.lib, arguments.plugins)
+        violations, looked_at = violations + more, looked_at + libraries
+    house.tell("floors", violations, looked_at)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,109 @@
+// Every model plugin that is found: derivatives, instruction sets, and no allocation in evaluation.
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <memory>
+#include <new>
+
+#include "model_checks.hpp"
+#include "rhec/plugins/host.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+// Not inlined, lest the compiler takes malloc and delete for a mismatched pair.
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace rhec {
+namespace {
+
+class EveryModel : public testing::TestWithParam<std::string> {
+ protected:
+  std::shared_ptr<Model> model_ = Host().make_model(GetParam());
+
+  template <class Check>
+  void for_each_instruction_set(Check check) {
+    for (const std::string& set : model_->instruction_sets()) {
+      SCOPED_TRACE(set);
+      ASSERT_TRUE(model_->use_instruction_set(set));
+      check();
+    }
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Found, EveryModel, testing::ValuesIn(Host().names(PluginKind::model)),
+                         [](const auto& found) { return found.param; });
+
+TEST(Models, TheBicycleIsFound) {
+  EXPECT_THAT(Host().names(PluginKind::model), testing::Contains("bicycle_slip")) << Host().diagnosis();
+}
+
+TEST_P(EveryModel, DescribesItself) {
+  const ModelDescription& d = model_->description();
+  EXPECT_FALSE(d.source.empty());
+  for (const auto* kind : {&d.states, &d.inputs, &d.parameters, &d.outputs}) {
+    for (const Variable& v : *kind) {
+      EXPECT_FALSE(v.name.empty() || v.unit.empty() || v.meaning.empty()) << v.name;
+      EXPECT_LT(v.lower, v.upper) << v.name;
+      EXPECT_GT(v.scale, 0.0) << v.name;
+    }
+  }
+  const auto expect_in = [](int role, const std::vector<Variable>& variables) {
+    EXPECT_GE(role, -1);
+    EXPECT_LT(role, static_cast<int>(variables.size()));
+  };
+  for (const int role : {d.roles.position_x, d.roles.position_y, d.roles.heading}) expect_in(role, d.states);
+  expect_in(d.roles.speed, d.inputs);
+  expect_in(d.roles.speed_factor, d.parameters);
+}
+
+TEST_P(EveryModel, IntegratesByRungeKutta) {
+  for_each_instruction_set([&] {
+    for (const int substeps : {1, 2, 5})
+      for (const bool ramp : {false, true}) checks::integrate_is_runge_kutta(*model_, ramp, substeps);
+  });
+}
+
+TEST_P(EveryModel, DerivativesAreThoseOfTheValues) {
+  for_each_instruction_set([&] {
+    for (const unsigned seed : {1u, 2u, 3u}) {
+      for (const int substeps : {1, 3})
+        for (const bool ramp : {false, true}) checks::derivatives_of_integrate(*model_, ramp, substeps, seed);
+      checks::derivatives_of_observe(*model_, seed);
+    }
+  });
+}
+
+TEST_P(EveryModel, AllInstructionSetsAgreeAndWriteWhatIsAskedFor) {
+  const std::shared_ptr<Model> generic = Host().make_model(GetParam());
+  ASSERT_TRUE(generic->use_instruction_set(generic->instruction_sets().front()));
+  for_each_instruction_set([&] { checks::same_as_generic(*model_, *generic); });
+}
+
+TEST_P(EveryModel, RefusesAnUnknownInstructionSetAndKeepsItsOwn) {
+  EXPECT_FALSE(model_->use_instruction_set("mmx"));
+  checks::integrate_is_runge_kutta(*model_, false, 1);
+}
+
+TEST_P(EveryModel, EvaluatesWithoutAllocation) {
+  const bool second = model_->has_second_derivatives();
+  for_each_instruction_set([&] {
+    checks::Stages s = checks::random_stages(*model_, 15, true, 5);
+    const auto intervals = s.intervals(true, true, second);
+    const auto nodes = s.nodes(true, true, second);
+    const long before = allocations;
+    model_->integrate(intervals);
+    model_->observe(nodes);
+    EXPECT_EQ(allocations, before);
+  });
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,69 @@
+// A formula with all that formulas may use, compiled for every instruction set as models are.
+#include "every_function.hpp"
+
+#include "model_checks.hpp"
+#include "rhec/core/formula_model.hpp"
+
+namespace rhec {
+
+WideKernels every_function_wide_kernels();  // defined by rhec_add_wide_kernels
+
+namespace {
+
+std::vector<Variable> variables(const std::vector<std::string>& names, double scale = 1.0) {
+  std::vector<Variable> all;
+  for (const std::string& name : names) all.push_back({.name = name, .unit = "1", .meaning = name, .scale = scale});
+  return all;
+}
+
+FormulaModel<EveryFunction> make_model() {
+  ModelDescription description;
+  description.states = variables({"a", "b", "c"});
+  description.inputs = variables({"u"});
+  description.parameters = variables({"p", "q"});
+  description.outputs =
+      variables({"sqrt", "exp", "log", "sin", "cos", "tan", "tanh", "asin", "acos", "atan", "atan2"},
+                100.0);  // derivatives of the fifth order are large, and the error of differences with them
+  return FormulaModel<EveryFunction>({}, description, every_function_wide_kernels());
+}
+
+TEST(EveryFunction, HasTheDerivativesOfItsValues) {
+  auto model = make_model();
+  for (const std::string& set : model.instruction_sets()) {
+    SCOPED_TRACE(set);
+    ASSERT_TRUE(model.use_instruction_set(set));
+    for (const bool ramp : {false, true}) checks::derivatives_of_integrate(model, ramp, 2, 7);
+    checks::integrate_is_runge_kutta(model, true, 2);
+  }
+}
+
+TEST(EveryFunction, IsTheSameOnEveryInstructionSet) {
+  auto model = make_model();
+  auto generic = make_model();
+  ASSERT_TRUE(generic.use_instruction_set("generic"));
+  for (const std::string& set : model.instruction_sets()) {
+    SCOPED_TRACE(set);
+    ASSERT_TRUE(model.use_instruction_set(set));
+    checks::same_as_generic(model, generic);
+  }
+}
+
+// Packs reduce the arguments of sine and cosine by another way when they are large, and must not lose digits there.
+TEST(EveryFunction, KnowsLargeAngles) {
+  auto model = make_model();
+  for (const std::string& set : model.instruction_sets()) {
+    SCOPED_TRACE(set);
+    ASSERT_TRUE(model.use_instruction_set(set));
+    for (const double angle : {0.0, 0.7, 1.5, 3.2, -40.0, 90.0, 1e3, -1e5, 1e7, -1e12}) {
+      const double x[3] = {angle, 0.3, 0.4};
+      double y[11], jacobian[33];
+      model.observe({.count = 1, .states = x, .outputs = y, .jacobians = jacobian});
+      EXPECT_NEAR(y[3], std::sin(angle), 1e-15) << angle;
+      EXPECT_NEAR(y[4], std::cos(10 * angle), 1e-15) << angle;
+      EXPECT_NEAR(jacobian[3], std::cos(angle), 1e-15) << angle;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rhec

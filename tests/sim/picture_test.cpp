@@ -1,0 +1,122 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "rhec/core/error.hpp"
+#include "rhec/sim/run_picture.hpp"
+
+namespace rhec::sim {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(NiceTicks, AreRoundAndWithinTheAxis) {
+  EXPECT_EQ(nice_ticks(0.0, 1.0, 5).labels, (std::vector<std::string>{"0", "0.2", "0.4", "0.6", "0.8", "1.0"}));
+  EXPECT_EQ(nice_ticks(-25.0, 72.0, 5).labels, (std::vector<std::string>{"-20", "0", "20", "40", "60"}));
+  EXPECT_EQ(nice_ticks(0.0012, 0.0031, 4).labels, (std::vector<std::string>{"0.0015", "0.0020", "0.0025", "0.0030"}));
+  EXPECT_EQ(nice_ticks(0.0, 99.0, 10).labels.back(), "90");
+  EXPECT_TRUE(nice_ticks(1.0, 1.0, 5).values.empty());
+  EXPECT_TRUE(nice_ticks(nan, 1.0, 5).values.empty());
+}
+
+TEST(ThinCurve, KeepsPeaksAndGaps) {
+  std::vector<double> values(100000);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = std::sin(0.001 * static_cast<double>(i));
+  values[31234] = 7.0;
+  values[77777] = -9.0;
+  values[50000] = nan;
+  const auto kept = thin_curve(values, 2000);
+  EXPECT_LE(kept.size(), 2001u);
+  EXPECT_TRUE(std::is_sorted(kept.begin(), kept.end()));
+  for (std::size_t index : {0u, 31234u, 50000u, 77777u, 99999u}) {
+    EXPECT_TRUE(std::binary_search(kept.begin(), kept.end(), index)) << index;
+  }
+  EXPECT_EQ(thin_curve(std::vector<double>(100, 1.0), 2000).size(), 100u);
+}
+
+TEST(ThinTrack, StaysWithinItsToleranceAndItsNumber) {
+  std::vector<Point> track;
+  for (int i = 0; i <= 50000; ++i) track.push_back({100.0 * std::cos(1e-3 * i), 100.0 * std::sin(1e-3 * i)});
+  const auto kept = thin_track(track, 0.3, 2000);
+  EXPECT_LE(kept.size(), 2000u);
+  EXPECT_GT(kept.size(), 500u);
+  EXPECT_EQ(kept.front().x, track.front().x);
+  EXPECT_EQ(kept.back().x, track.back().x);
+  const auto gappy = thin_track(std::vector<Point>{{0, 0}, {nan, nan}, {nan, nan}, {5, 5}}, 0.3);
+  EXPECT_EQ(gappy.size(), 3u);
+  std::vector<Point> shreds;
+  for (int i = 0; i < 100; ++i) shreds.push_back(i % 2 ? Point{nan, nan} : Point{1.0 * i, 0.0});
+  EXPECT_FALSE(thin_track(shreds, 0.3, 10).empty()) << "it ends, even where it cannot get below the number";
+}
+
+TEST(SlipPalette, GrowsEvenlyLighter) {
+  double before = -1.0;
+  for (int i = 0; i <= 20; ++i) {
+    const Colour colour = slip_palette(i / 20.0);
+    const double luminance =
+        0.2126 * std::pow(colour.red, 2.2) + 0.7152 * std::pow(colour.green, 2.2) + 0.0722 * std::pow(colour.blue, 2.2);
+    EXPECT_GT(luminance, before);
+    before = luminance;
+  }
+  EXPECT_EQ(hex({1.0, 0.5, 0.0}), "#ff8000");
+}
+
+RunPicture example(std::size_t samples) {
+  RunPicture picture;
+  picture.title = "A <run> & more";
+  Curve curve{"estimate", {}, {}, {}, CurveRole::estimate};
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double t = 0.2 * static_cast<double>(i);
+    picture.path.push_back({t, std::sin(t)});
+    picture.driven.push_back({t, std::sin(t) + 0.1});
+    curve.times.push_back(t);
+    curve.values.push_back(i % 97 == 5 ? nan : std::cos(t));
+    curve.sigmas.push_back(0.1);
+  }
+  picture.panels = {{"Kappa", "1", {curve}}, {"Speed", "m/s", {}}};
+  picture.base = BaseMap{"kappa", [](double x, double y) { return std::abs(std::sin(x + y)); }, 0.0, 1.0};
+  return picture;
+}
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t found = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
+  return found;
+}
+
+TEST(DrawRun, IsWellFormedAndSmall) {
+  for (std::size_t samples : {0u, 1u, 2u, 500u, 100000u}) {
+    const std::string svg = draw_run(example(samples));
+    EXPECT_TRUE(svg.starts_with("<svg")) << samples;
+    EXPECT_TRUE(svg.ends_with("</svg>\n")) << samples;
+    EXPECT_EQ(count(svg, "<g "), count(svg, "</g>")) << samples;
+    EXPECT_EQ(count(svg, "nan"), 0u) << samples;
+    EXPECT_EQ(count(svg, "inf"), 0u) << samples;
+    EXPECT_NE(svg.find("A &lt;run&gt; &amp; more"), std::string::npos);
+    EXPECT_LT(svg.size(), 1500000u) << samples;
+  }
+}
+
+TEST(DrawRun, ManagesWithoutAnything) {
+  EXPECT_TRUE(draw_run({}).starts_with("<svg"));
+  RunPicture lost = example(10);
+  for (Point& point : lost.driven) point.x = nan;
+  lost.panels[0].curves[0].values.assign(10, nan);
+  EXPECT_EQ(count(draw_run(lost), "nan"), 0u);
+}
+
+TEST(DrawRun, RefusesCurvesThatDoNotFit) {
+  RunPicture picture = example(10);
+  picture.panels[0].curves[0].times.pop_back();
+  EXPECT_THROW(draw_run(picture), Error);
+  picture = example(10);
+  picture.base->value = nullptr;
+  EXPECT_THROW(draw_run(picture), Error);
+}
+
+}  // namespace
+}  // namespace rhec::sim

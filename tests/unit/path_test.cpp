@@ -1,0 +1,197 @@
+#include "rhec/core/path.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <string>
+
+#include "rhec/core/error.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+// An L: 3 m along +x, then 4 m along +y.
+Path corner() { return Path({{0, 0, {1.0, 0.1}}, {3, 0, {2.0}}, {3, 4, {4.0, 0.5}}}, 2); }
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Path, IsAddressedByArcLength) {
+  const Path path = corner();
+  EXPECT_DOUBLE_EQ(path.length(), 7.0);
+  std::array<double, 2> inputs{};
+  const PathPoint point = path.point_at(5.0, inputs.data());
+  EXPECT_DOUBLE_EQ(point.x, 3.0);
+  EXPECT_DOUBLE_EQ(point.y, 2.0);
+  EXPECT_DOUBLE_EQ(point.heading, pi / 2);
+  EXPECT_DOUBLE_EQ(inputs[0], 3.0);
+  EXPECT_DOUBLE_EQ(inputs[1], 0.25);
+  EXPECT_DOUBLE_EQ(path.point_at(3.0).heading, pi / 2) << "at a waypoint the segment that follows counts";
+  EXPECT_DOUBLE_EQ(path.point_at(2.999).heading, 0.0);
+}
+
+TEST(Path, GoesStraightOnBeyondItsEnds) {
+  const Path path = corner();
+  std::array<double, 2> inputs{};
+  const PathPoint beyond = path.point_at(10.0, inputs.data());
+  EXPECT_DOUBLE_EQ(beyond.x, 3.0);
+  EXPECT_DOUBLE_EQ(beyond.y, 7.0);
+  EXPECT_DOUBLE_EQ(inputs[0], 4.0) << "inputs are held, not extrapolated";
+  const PathPoint before = path.point_at(-2.0, inputs.data());
+  EXPECT_DOUBLE_EQ(before.x, -2.0);
+  EXPECT_DOUBLE_EQ(before.y, 0.0);
+  EXPECT_DOUBLE_EQ(inputs[0], 1.0);
+  EXPECT_DOUBLE_EQ(inputs[1], 0.1);
+}
+
+TEST(Path, DropsRepeatedWaypoints) {
+  const Path path({{0, 0, {}}, {0, 0, {}}, {1, 0, {}}, {1, 0, {}}, {1, 0, {}}, {2, 0, {}}, {2, 0, {}}}, 1);
+  EXPECT_EQ(path.size(), 3);
+  EXPECT_DOUBLE_EQ(path.length(), 2.0);
+  double input = -1.0;
+  const PathPoint point = path.point_at(1.0, &input);
+  EXPECT_DOUBLE_EQ(point.x, 1.0);
+  EXPECT_DOUBLE_EQ(input, 0.0) << "inputs left out are 0";
+}
+
+TEST(Path, RefusesWhatIsNoPath) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(Path({}, 1), Error);
+  EXPECT_THROW(Path({{1, 2, {}}}, 1), Error);
+  EXPECT_THROW(Path({{1, 2, {}}, {1, 2, {}}}, 1), Error);
+  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {nan, 0, {}}}, 1); }).find("waypoint 2"), std::string::npos);
+  EXPECT_NE(message_of([&] { Path({{0, infinity, {}}, {1, 0, {}}}, 1); }).find("waypoint 1"), std::string::npos);
+  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {1, 0, {nan}}}, 1); }).find("waypoint 2"), std::string::npos);
+  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {1, 0, {1, 2}}}, 1); }).find("2 reference inputs"), std::string::npos);
+}
+
+TEST(Path, ClosestPointIsWhatAFineSearchFinds) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> place(-10.0, 10.0);
+  std::vector<Waypoint> waypoints;
+  for (int i = 0; i < 12; ++i) waypoints.push_back({place(random), place(random), {}});
+  const Path path(waypoints, 0);
+  for (int trial = 0; trial < 50; ++trial) {
+    const double x = place(random), y = place(random);
+    double from = path.length() * (place(random) + 10.0) / 20.0, to = path.length() * (place(random) + 10.0) / 20.0;
+    if (from > to) std::swap(from, to);
+    double smallest = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= 20000; ++i) {
+      const PathPoint point = path.point_at(from + (to - from) * i / 20000.0);
+      smallest = std::min(smallest, std::hypot(point.x - x, point.y - y));
+    }
+    const PathProjection found = path.closest(x, y, from, to);
+    EXPECT_GE(found.arc_length, from - 1e-9);
+    EXPECT_LE(found.arc_length, to + 1e-9);
+    const PathPoint point = path.point_at(found.arc_length);
+    EXPECT_NEAR(std::hypot(point.x - x, point.y - y), std::abs(found.lateral), 1e-9);
+    EXPECT_LE(std::abs(found.lateral), smallest + 1e-9);
+    EXPECT_GE(std::abs(found.lateral), smallest - 0.01);
+  }
+}
+
+TEST(PathFollower, ProjectsOnSegmentsWithASignedDistance) {
+  const Path path = corner();
+  PathFollower follower(path);
+  EXPECT_DOUBLE_EQ(follower.advance(1.25, 0.5), 1.25);
+  EXPECT_DOUBLE_EQ(follower.lateral(), 0.5) << "left of +x is +y";
+  EXPECT_DOUBLE_EQ(follower.advance(1.5, -0.25), 1.5);
+  EXPECT_DOUBLE_EQ(follower.lateral(), -0.25);
+  EXPECT_DOUBLE_EQ(follower.advance(4.0, -1.0), 3.0) << "outside the corner the corner itself is closest";
+  EXPECT_DOUBLE_EQ(follower.lateral(), -std::sqrt(2.0));
+}
+
+TEST(PathFollower, StopsAtTheStartAndFinishesAtTheEnd) {
+  const Path path = corner();
+  PathFollower follower(path);
+  EXPECT_DOUBLE_EQ(follower.advance(-5.0, 0.0), 0.0);
+  EXPECT_FALSE(follower.finished());
+  follower.advance(2.9, 1.0);
+  follower.advance(3.0, 3.99);
+  EXPECT_FALSE(follower.finished());
+  EXPECT_DOUBLE_EQ(follower.advance(2.5, 4.5), 7.5) << "the last segment goes on";
+  EXPECT_TRUE(follower.finished());
+  EXPECT_DOUBLE_EQ(follower.lateral(), 0.5);
+  follower.reset();
+  EXPECT_FALSE(follower.finished());
+  EXPECT_DOUBLE_EQ(follower.arc_length(), 0.0);
+}
+
+TEST(PathFollower, StaysWhereItIsOnANonFinitePosition) {
+  const Path path = corner();
+  PathFollower follower(path);
+  follower.advance(1.0, 0.2);
+  EXPECT_DOUBLE_EQ(follower.advance(std::numeric_limits<double>::quiet_NaN(), 0.0), 1.0);
+  EXPECT_DOUBLE_EQ(follower.lateral(), 0.2);
+}
+
+TEST(PathFollower, RefusesAWindowThatSeesNothing) {
+  const Path path = corner();
+  EXPECT_THROW(PathFollower(path, {.ahead = 0.0}), Error);
+  EXPECT_THROW(PathFollower(path, {.ahead = 5.0, .behind = -1.0}), Error);
+  EXPECT_THROW(PathFollower(path, {.ahead = std::numeric_limits<double>::quiet_NaN()}), Error);
+}
+
+// A figure-8 whose branches really cross at the origin (a lemniscate of Gerono, 40 m wide), two laps.
+Path crossing_eight() {
+  std::vector<Waypoint> waypoints;
+  for (int i = 0; i <= 4000; ++i) {
+    const double t = pi / 2 + 4.0 * pi * i / 4000.0;
+    waypoints.push_back({40.0 * std::sin(t), 40.0 * std::sin(t) * std::cos(t), {}});
+  }
+  return Path(waypoints, 0);
+}
+
+TEST(PathFollower, NeverJumpsBranchesAtACrossing) {
+  const Path path = crossing_eight();
+  const double stride = 1.0, noise = 0.4;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> lateral(0.0, noise);
+    PathFollower follower(path);
+    for (double arc_length = 0.0; arc_length < path.length(); arc_length += stride) {
+      const PathPoint point = path.point_at(arc_length);
+      const double offset = lateral(random);
+      const double found =
+          follower.advance(point.x - offset * std::sin(point.heading), point.y + offset * std::cos(point.heading));
+      ASSERT_NEAR(found, arc_length, 1.0) << "seed " << seed;
+    }
+  }
+  // The test could fail: a search over the whole path does jump.
+  const PathPoint before_crossing = path.point_at(path.length() / 8.0 + 0.3);
+  const PathProjection anywhere =
+      path.closest(before_crossing.x + 0.3, before_crossing.y + 0.3, path.length() / 4, path.length());
+  EXPECT_LT(std::abs(anywhere.lateral), 1.0);
+  EXPECT_GT(anywhere.arc_length, path.length() / 4);
+}
+
+TEST(PathFollower, ResultDoesNotDependOnResolution) {
+  // A straight line given coarsely and finely; the window cuts the coarse segments.
+  std::vector<Waypoint> fine;
+  for (int i = 0; i <= 10000; ++i) fine.push_back({0.01 * i, 0.0, {}});
+  const Path coarse_path({{0, 0, {}}, {100, 0, {}}}, 0), fine_path(fine, 0);
+  PathFollower coarse(coarse_path), finely(fine_path);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> step(-1.5, 3.0), side(-2.0, 2.0);
+  for (double x = 0.0; x < 100.0; x += step(random)) {
+    const double y = side(random);
+    ASSERT_NEAR(coarse.advance(x, y), finely.advance(x, y), 1e-9);
+    ASSERT_NEAR(coarse.lateral(), finely.lateral(), 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace rhec
