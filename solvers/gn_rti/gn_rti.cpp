@@ -109,9 +109,9 @@ std::string GnRti::why_not(const Ocp& ocp) const {
 void GnRti::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'gn_rti': " + reason);
   capacity_ = ocp.capacity();
-  qp_ = StageQp(capacity_);
+  qp_ = other_qp_ = StageQp(capacity_);
   qp_solver_ = StageQpSolver(capacity_);
-  for (Iterate* point : {&prepared_point_, &step_, &trial_, &best_}) *point = Iterate(capacity_);
+  for (Iterate* point : {&prepared_point_, &step_, &trial_, &best_, &other_trial_}) *point = Iterate(capacity_);
   scratch_.assign(ocp.scratch_size(), 0.0);
   defects_.assign(static_cast<std::size_t>(capacity_.intervals) * capacity_.states, 0.0);
   reset();
@@ -261,6 +261,40 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
   return report;
 }
 
+/// Solves the quadratic program in `qp_` at `best_` and searches along its step by the l1 merit; the accepted point goes to
+/// `trial_`. False where no length is acceptable.
+bool GnRti::search_along_step(const Ocp& ocp, double residual, double& merit_after) noexcept {
+  defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(ocp, step_));
+  bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(ocp, step_));
+  const double before = merit(ocp, best_);
+  double defect = 0.0, slope = 0.0;
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    for (int j = 0; j < ocp.state_count(i); ++j) slope += qp_.q(i)[j] * step_.state(i)[j];
+    if (i == ocp.intervals()) break;
+    for (int j = 0; j < ocp.state_count(i + 1); ++j) defect += std::abs(qp_.b(i)[j]);
+    for (int j = 0; j < ocp.control_count(i); ++j) slope += qp_.r(i)[j] * step_.control(i)[j];
+  }
+  slope -= defect_penalty_ * defect + bound_penalty_ * total_violation(ocp, best_);
+  for (double length = 1.0; length >= shortest_step; length *= 0.5) {
+    if (ocp.kind() == OcpKind::rhc) {
+      roll_out_step(ocp, best_, length, trial_);
+    } else {
+      add_step(ocp, best_, length, trial_);
+    }
+    merit_after = merit(ocp, trial_);
+    if (!std::isfinite(merit_after)) continue;
+    const double allowed =
+        before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
+    if (merit_after <= allowed) return true;
+    // Near the solution the merit may refuse a step that Newton's method is right about.
+    if (length == 1.0 && residual < 1e-3) {
+      ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_qp_, scratch_);
+      if (kkt_residual(other_qp_, trial_).largest() < 0.5 * residual) return true;
+    }
+  }
+  return false;
+}
+
 Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
   Report report;
   defect_penalty_ = bound_penalty_ = 0.0;
@@ -293,51 +327,32 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
     }
     last_residual = residual;
 
-    qp_solver_.guess_from(qp_, best_);
-    const auto outcome = qp_solver_.solve(qp_, step_);
-    report.factorisations += qp_solver_.factorisations();
-    report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
-    if (outcome == StageQpSolver::Outcome::infeasible || !is_finite(ocp, step_)) {
-      report.status = Status::infeasible;
-      break;
-    }
-    defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(ocp, step_));
-    bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(ocp, step_));
-    const double before = merit(ocp, best_);
-    double defect = 0.0, slope = 0.0;
-    for (int i = 0; i <= ocp.intervals(); ++i) {
-      for (int j = 0; j < ocp.state_count(i); ++j) slope += qp_.q(i)[j] * step_.state(i)[j];
-      if (i == ocp.intervals()) break;
-      for (int j = 0; j < ocp.state_count(i + 1); ++j) defect += std::abs(qp_.b(i)[j]);
-      for (int j = 0; j < ocp.control_count(i); ++j) slope += qp_.r(i)[j] * step_.control(i)[j];
-    }
-    slope -= defect_penalty_ * defect + bound_penalty_ * total_violation(ocp, best_);
-    double length = 1.0;
-    bool accepted = false;
-    for (; length >= shortest_step; length *= 0.5) {
-      if (ocp.kind() == OcpKind::rhc) {
-        roll_out_step(ocp, best_, length, trial_);
-      } else {
-        add_step(ocp, best_, length, trial_);
-      }
-      const double after = merit(ocp, trial_);
-      const double allowed =
-          before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
-      if (std::isfinite(after) && after <= allowed) {
+    double merit_after = 0.0;
+    bool feasible = false, accepted = false;
+    const auto try_step = [&] {
+      qp_solver_.guess_from(qp_, best_);
+      const auto outcome = qp_solver_.solve(qp_, step_);
+      report.factorisations += qp_solver_.factorisations();
+      report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
+      if (outcome == StageQpSolver::Outcome::infeasible || !is_finite(ocp, step_)) return false;
+      feasible = true;
+      return search_along_step(ocp, residual, merit_after);
+    };
+    accepted = try_step();
+    // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own.
+    if (hessian_for(ocp) == Hessian::exact && (!accepted || qp_solver_.was_bent())) {
+      std::swap(trial_, other_trial_);
+      const bool exact_accepted = accepted;
+      const double exact_merit = merit_after;
+      ocp.linearise(all_stages(ocp), best_, Hessian::gauss_newton, qp_, scratch_);
+      accepted = try_step();
+      if (exact_accepted && (!accepted || exact_merit < merit_after)) {
+        std::swap(trial_, other_trial_);
         accepted = true;
-        break;
-      }
-      // Near the solution the merit may refuse a step that Newton's method is right about.
-      if (length == 1.0 && residual < 1e-3 && std::isfinite(after)) {
-        const KktResidual full = kkt_residual(ocp, trial_, qp_, scratch_);
-        if (full.largest() < 0.5 * residual) {
-          accepted = true;
-          break;
-        }
       }
     }
     if (!accepted) {
-      report.status = Status::stalled;
+      report.status = feasible ? Status::stalled : Status::infeasible;
       break;
     }
     std::swap(best_, trial_);

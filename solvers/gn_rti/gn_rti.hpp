@@ -55,13 +55,14 @@ class GnRti final : public Solver {
   void add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept;
   void roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept;
   double merit(const Ocp& ocp, const Iterate& point) noexcept;
+  bool search_along_step(const Ocp& ocp, double residual, double& merit_after) noexcept;
   void judge(const Ocp& ocp, const Iterate& point, Report& report) noexcept;
 
   Options options_;
   Capacity capacity_;
-  StageQp qp_;
+  StageQp qp_, other_qp_;
   StageQpSolver qp_solver_;
-  Iterate prepared_point_, step_, trial_, best_;
+  Iterate prepared_point_, step_, trial_, best_, other_trial_;
   std::vector<double> scratch_, defects_;
   bool prepared_ = false;
   bool use_exact_ = false;

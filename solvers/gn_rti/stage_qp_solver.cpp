@@ -35,7 +35,7 @@ void StageQpSolver::reset() noexcept {
 
 void StageQpSolver::guess_from(const StageQp& qp, const Iterate& point) noexcept {
   active_.clear();
-  factored_ = false;
+  factored_ = bent_ = false;
   factorisations_ = 0;
   const auto side = [](double multiplier, double lower, double upper) -> std::int8_t {
     if (is_equality(lower, upper)) return 1;
@@ -137,7 +137,9 @@ void StageQpSolver::convexify(StageQp& qp) noexcept {
   active_.clear();
   riccati_.factor(qp, active_);
   ++factorisations_;
-  if (riccati_.was_convexified()) riccati_.write_convexified(qp);
+  if (!riccati_.was_convexified()) return;
+  riccati_.write_convexified(qp);
+  bent_ = true;
 }
 
 void StageQpSolver::collect_bounded(const StageQp& qp) noexcept {

@@ -36,7 +36,8 @@ class StageQpSolver {
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept {
     riccati_.feedback(qp, i, state_step, control_step);
   }
-  bool was_convexified() const noexcept { return riccati_.was_convexified(); }
+  /// True where the last solution is that of a program whose curvature had to be convexified.
+  bool was_bent() const noexcept { return bent_ || riccati_.was_convexified(); }
   int factorisations() const noexcept { return factorisations_; }
   void reset() noexcept;
 
@@ -67,7 +68,7 @@ class StageQpSolver {
   Capacity capacity_;
   Riccati riccati_;
   ActiveSet active_;
-  bool factored_ = false;
+  bool factored_ = false, bent_ = false;
   int factorisations_ = 0;
   std::vector<Bounded> bounded_;
   std::vector<double> state_diagonal_, control_diagonal_, q_, r_;
