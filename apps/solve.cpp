@@ -82,8 +82,8 @@ class Bench {
     return sim::solution_line(record, *problem_, point_, outcome);
   }
 
-  /// The next problem of a sequence, from the solution of the one before. What is reported is what follows from the
-  /// decisions: the states simulated from the first one, so that no defect flatters the objective.
+  /// The next problem of a sequence, from the solution of the one before. What a controller is judged by is what its inputs
+  /// do, so its states are simulated: no defect flatters the objective. An estimator hands out its states as they are.
   std::string solve_next(const ProblemRecord& record, const std::shared_ptr<const Model>& model, int max_intervals,
                          Outcome& outcome) {
     if (last_first_) shifter_->take(*problem_, point_);
@@ -98,7 +98,7 @@ class Bench {
     last_first_.reset();
     if (is_usable(outcome.status)) last_first_ = first;
     reported_ = point_;
-    roll_out(*problem_, reported_, scratch_);
+    if (problem_->kind() == OcpKind::rhc) roll_out(*problem_, reported_, scratch_);
     outcome.objective = problem_->evaluate(reported_, nullptr, scratch_);
     return sim::solution_line(record, *problem_, reported_, outcome);
   }
@@ -265,7 +265,7 @@ void add_solve(CLI::App& program, Action& chosen) {
   command->footer(
       "With --sequence the lines of one id prefix (run/rhe of run/rhe/19) are a sequence over time: the guess is the\n"
       "solution before, shifted by the steps between them. States and objective are then those that follow from the\n"
-      "decisions by simulation: from the inputs, and in estimation the first state and the parameters.\n\n"
+      "inputs by simulation in control; an estimate is reported as it is, defects and all.\n\n"
       "The exit code is 3 where the status of a line says that its solution is not usable.\n\n"
       "Examples:\n"
       "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"

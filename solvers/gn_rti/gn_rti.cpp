@@ -213,7 +213,9 @@ Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) 
   Report report;
   use_exact_ = false;
   if (ocp.capacity() == capacity_ && is_finite(ocp, point) && std::isfinite(ocp.evaluate(point, nullptr, scratch_))) {
-    report = options_.mode == Mode::rti ? real_time(ocp, point, deadline) : converge(ocp, point, deadline);
+    // A real-time iteration lives on the sample before; a point without costates has none.
+    const bool step = options_.mode == Mode::rti && largest_costate(ocp, point) > 0.0;
+    report = step ? real_time(ocp, point, deadline) : converge(ocp, point, deadline);
   }
   report.preparation_us = prepared_ ? preparation_us_ : 0.0;
   prepared_ = false;

@@ -16,7 +16,9 @@ constexpr double divergence = 1e10;
 constexpr double bound_tolerance = 1e-10;
 constexpr double multiplier_tolerance = 1e-9;
 
-bool is_equality(double lower, double upper) { return upper - lower <= 1e-14 * (1.0 + std::abs(lower)); }
+bool is_equality(double lower, double upper) {
+  return std::isfinite(lower) && upper - lower <= 1e-14 * (1.0 + std::abs(lower));
+}
 
 }  // namespace
 
