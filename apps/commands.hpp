@@ -23,6 +23,7 @@ using Action = std::function<int()>;
 
 // One function a command: adds it to the program, and puts what it does into `chosen` when it is the one that was
 // called.
+void add_run(CLI::App& program, Action& chosen);
 void add_solve(CLI::App& program, Action& chosen);
 void add_plugins(CLI::App& program, Action& chosen);
 

@@ -32,6 +32,7 @@ namespace {
 constexpr const char* about = "Receding horizon estimation and control of field robots whose wheels slip.";
 constexpr const char* examples =
     "Examples:\n"
+    "  rhec run scenarios/figure8.yaml --out out/figure8\n"
     "  rhec plugins                       what is installed\n"
     "  rhec plugins gn_rti                the options of one plugin\n"
     "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
@@ -63,6 +64,7 @@ int run(int count, char** words) {
   program.require_subcommand(1);
   program.footer(examples);
   Action chosen;
+  add_run(program, chosen);
   add_solve(program, chosen);
   add_plugins(program, chosen);
 

@@ -12,6 +12,7 @@ namespace {
 
 std::vector<Variable> variables(const std::vector<std::string>& names, double scale = 1.0) {
   std::vector<Variable> all;
+  all.reserve(names.size());
   for (const std::string& name : names) all.push_back({.name = name, .unit = "1", .meaning = name, .scale = scale});
   return all;
 }

@@ -103,6 +103,7 @@ inline Stages random_stages(const Model& model, int count, bool ramp, unsigned s
 
 inline std::vector<double> scales(const std::vector<Variable>& variables) {
   std::vector<double> all;
+  all.reserve(variables.size());
   for (const Variable& v : variables) all.push_back(v.scale);
   return all;
 }
@@ -123,7 +124,7 @@ inline double& entry(Stages& s, int i, int j) {
 /// Of all stages at once, the derivative of what `evaluate` gives (an array with `size` entries a stage) by entry j of
 /// z, from five points of a line; their distance is h.
 template <class Evaluate>
-std::vector<double> difference(Stages stages, int j, double h, int size, Evaluate evaluate) {
+std::vector<double> difference(const Stages& stages, int j, double h, int size, Evaluate evaluate) {
   std::vector<double> slope(stages.count * size, 0.0);
   for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
     Stages moved = stages;

@@ -60,7 +60,7 @@ inline void store(const Lane* entries, Rows rows, double* array) {
 template <int size, class Scalar>
 inline void load_variables(const double* array, Rows rows, int first_direction, Scalar* out) {
   if constexpr (Differentiable<Scalar>) {
-    typename Scalar::Value values[size > 0 ? size : 1];
+    typename Scalar::Value values[room_for(size)];
     load<size>(array, rows, values);
     for (int j = 0; j < size; ++j) out[j] = Scalar::variable(values[j], first_direction + j);
   } else {
@@ -121,7 +121,7 @@ template <bool ramp, class Scalar, class Formula>
 inline void integrate_pack(const Formula& formula, const Model::Intervals& q, Rows rows) {
   using Lane = typename LaneOf<Scalar>::Type;
   constexpr int nx = Formula::state_count, nu = Formula::input_count, np = Formula::parameter_count;
-  Scalar x[nx], u[nu > 0 ? nu : 1], p[np > 0 ? np : 1], p_end[np > 0 ? np : 1];
+  Scalar x[nx], u[room_for(nu)], p[room_for(np)], p_end[room_for(np)];
   load_variables<nx>(q.states, rows, 0, x);
   load_variables<nu>(q.inputs, rows, nx, u);
   load_variables<np>(q.parameters, rows, nx + nu, p);

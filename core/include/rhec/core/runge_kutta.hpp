@@ -4,6 +4,9 @@
 
 namespace rhec::kernels {
 
+/// The length of an array for `size` entries, of which there may be none.
+constexpr int room_for(int size) { return size > 0 ? size : 1; }
+
 /// out = a + b * factor, without the copies that numbers with many derivatives would make on the way.
 template <class Scalar, class Lane>
 inline void add_scaled(const Scalar& a, const Scalar& b, const Lane& factor, Scalar& out) {
@@ -23,7 +26,7 @@ inline void runge_kutta(const Formula& formula, Scalar* x, const Scalar* u, cons
   constexpr int nx = Formula::state_count, np = Formula::parameter_count;
   const Lane h = duration * Lane(1.0 / substeps);
   const Lane half = h * Lane(0.5), third = h * Lane(1.0 / 3.0), sixth = h * Lane(1.0 / 6.0);
-  Scalar p_now[np > 0 ? np : 1];
+  Scalar p_now[room_for(np)];
   for (int j = 0; j < np; ++j) p_now[j] = p[j];
   const auto move_parameters_to = [&](double step) {
     if (!p_end) return;

@@ -1,0 +1,85 @@
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/output_folder.hpp"
+
+namespace rhec::apps {
+namespace {
+
+struct RunArguments {
+  std::string scenario, out = "out";
+  std::vector<std::string> assignments;
+  std::vector<std::filesystem::path> plugin_path;
+};
+
+void print_table(const sim::RunSummary& summary, const std::filesystem::path& folder) {
+  fmt::print("{:<12} {:>12} {:>12}\n", "ERROR", "MEAN ABS", "RMS");
+  for (const auto& [name, value] : summary.mae.parameters)
+    fmt::print("{:<12} {:>12.4f} {:>12.4f}\n", name, value, summary.rmse.parameters.at(name));
+  fmt::print("{:<12} {:>10.3f} m {:>10.3f} m\n", "position", summary.mae.position, summary.rmse.position);
+  fmt::print("{:<12} {:>8.4f} rad {:>8.4f} rad\n", "heading", summary.mae.heading, summary.rmse.heading);
+  fmt::print("{:<12} {:>10.3f} m {:>10.3f} m\n\n", "tracking", summary.mae.tracking, summary.rmse.tracking);
+  fmt::print("{:<12} {:>12} {:>12} {:>12}\n", "SOLVE [us]", "MEDIAN", "P99", "MAX");
+  const auto times = [](const char* name, const sim::TimeSummary& t) {
+    fmt::print("{:<12} {:>12.1f} {:>12.1f} {:>12.1f}\n", name, t.median, t.p99, t.max);
+  };
+  if (!summary.estimator_statuses.empty()) times("rhe", summary.estimator_us);
+  times("rhc", summary.controller_us);
+  fmt::print("\n{} steps: {}; {} of {} solves fell back\n", summary.steps, summary.ended, summary.fallbacks, summary.solves);
+  fmt::print("pictures and numbers: {}\n", folder.string());
+}
+
+int run(const RunArguments& arguments) {
+  Settings settings = load_yaml(arguments.scenario);
+  for (const std::string& assignment : arguments.assignments) apply_assignment(settings, assignment);
+  const sim::Scenario scenario(Host(arguments.plugin_path), settings);
+  sim::OutputFolder folder(arguments.out);
+  ProgressBar bar(scenario.options().name);
+  const sim::RunLog log = sim::run_closed_loop(scenario, [&](double share) { bar.show(share); });
+  bar.finish();
+  const sim::RunSummary summary = sim::summarise(log, scenario);
+  folder.write("steps.csv", sim::steps_csv(log, scenario));
+  folder.write("times.csv", sim::times_csv(log));
+  folder.write("summary.json", sim::summary_json(summary));
+  folder.write("run.svg", sim::run_svg(log, scenario));
+  folder.commit();
+  print_table(summary, folder.path());
+  return log.completed ? exit_fine : exit_not_solved;
+}
+
+}  // namespace
+
+void add_run(CLI::App& program, Action& chosen) {
+  auto arguments = std::make_shared<RunArguments>();
+  CLI::App* command = program.add_subcommand("run", "Runs a scenario: a robot on simulated ground learns its slip and holds its path.");
+  command->footer(
+      "Writes steps.csv, times.csv, summary.json and run.svg to the output folder. The exit code is 3 where the robot did\n"
+      "not reach the end of its path.\n\n"
+      "Examples:\n"
+      "  rhec run scenarios/figure8.yaml --out out/figure8\n"
+      "  rhec run scenarios/figure8.yaml --set speed=4 --set blocking.kappa.name=full_horizon --out out/slow\n"
+      "  rhec run scenarios/zigzag.yaml --set estimator.name=ekf --set seed=3 --out out/ekf");
+  command->add_option("scenario", arguments->scenario, "a YAML file")->required();
+  command->add_option("--set", arguments->assignments, "KEY=VALUE over any key of the scenario; may be given several times")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command->add_option("--out", arguments->out, "folder of the results")->capture_default_str();
+  add_plugin_path(*command, arguments->plugin_path);
+  command->callback([&chosen, arguments] { chosen = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace rhec::apps

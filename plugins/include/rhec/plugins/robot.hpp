@@ -1,0 +1,101 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rhec/core/controller.hpp"
+#include "rhec/core/estimator.hpp"
+#include "rhec/core/options.hpp"
+#include "rhec/core/rhe_problem.hpp"
+#include "rhec/plugins/host.hpp"
+
+namespace rhec {
+
+/// What of a configuration file a robot needs; each is a section of its own, described in docs/configuration.md.
+struct RobotOptions {
+  double step = 0.2;  ///< dt: longest interval of the estimator, interval of the controller [s]
+  Settings model, noise, bounds, blocking, estimator, controller;
+
+  static const OptionTable<RobotOptions>& table();
+  /// The same rows for a struct that has more keys beside them.
+  template <class Derived>
+  static OptionTable<Derived>& add_to(OptionTable<Derived>& rows) {
+    return rows
+        .number("step", &Derived::step, "longest interval of the estimator, interval of the controller [s]", greater_than(0.0))
+        .subtree("model", &Derived::model, "the vehicle: name and options of a model plugin")
+        .subtree("noise", &Derived::noise, "standard deviations: outputs and inputs, by the variable's name")
+        .subtree("bounds", &Derived::bounds, "[lower, upper] by the variable's name; the model's own where none is given")
+        .subtree("blocking", &Derived::blocking, "by parameter: name and options of a blocking plugin")
+        .subtree("estimator", &Derived::estimator, "how state and parameters are estimated")
+        .subtree("controller", &Derived::controller, "how the path is followed");
+  }
+};
+
+/// The section `estimator`.
+struct EstimatorOptions {
+  enum class Name { rhe, ekf, truth };
+  Name name = Name::rhe;
+  int horizon = 15;
+  int substeps = 1;
+  Settings arrival, forgetting, restart_sigma, initial, robust, solver;
+  int heading_starts = 1;
+  static const OptionTable<EstimatorOptions>& table();
+};
+
+/// The section `controller`.
+struct ControllerOptions {
+  int horizon = 15;
+  int substeps = 1;
+  ReferenceSpeed reference_speed = ReferenceSpeed::ground;
+  double least_speed_factor = 0.3;
+  double speed_bound_factor = 2.5, speed_bound_offset = 1.0;
+  Settings weights, blocking, solver;
+  static const OptionTable<ControllerOptions>& table();
+};
+
+/// Numbers that a map gives by the names of variables; `defaults` for those that it does not name. Throws Error for unknown
+/// names (with the nearest) and for values outside `range`.
+RHEC_EXPORT std::vector<double> numbers_by_name(const Settings& map, const std::vector<Variable>& variables,
+                                                std::vector<double> defaults, const Range& range,
+                                                const std::string& owner);
+/// Throws Error unless every key of a map (or null) is known; the nearest known one is suggested.
+RHEC_EXPORT void require_known_keys(const Settings& map, const std::vector<std::string>& known, const std::string& owner);
+
+/// Makes models, estimators and controllers from configuration, with plugins by name.
+class RHEC_EXPORT Robot {
+ public:
+  /// Throws Error, naming file, line and key, for whatever is wrong in any section.
+  Robot(const Host& host, const RobotOptions& options);
+  /// From a file that has just the keys of RobotOptions.
+  static Robot from_file(const Host& host, const std::string& yaml_file);
+
+  const std::shared_ptr<const Model>& model() const noexcept { return model_; }
+  double step() const noexcept { return options_.step; }
+  const EstimatorOptions& estimator_options() const noexcept { return estimator_; }
+  const std::vector<double>& output_sigmas() const noexcept { return output_sigmas_; }
+  const std::vector<double>& input_sigmas() const noexcept { return input_sigmas_; }
+
+  /// The estimator of the section `estimator`; the initial state, where given, takes the place of that section's.
+  std::unique_ptr<Estimator> make_estimator(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
+  std::unique_ptr<Controller> make_controller(const Path& path) const;
+
+ private:
+  void read_initial(const std::optional<Eigen::VectorXd>& initial_state, Eigen::VectorXd& mean,
+                    Eigen::MatrixXd& covariance) const;
+  void read_bounds();
+  std::unique_ptr<EstimationMethod> make_receding_horizon(const Eigen::VectorXd& mean,
+                                                          const Eigen::MatrixXd& covariance) const;
+  std::vector<RobustLoss> read_robust() const;
+
+  Host host_;
+  RobotOptions options_;
+  EstimatorOptions estimator_;
+  ControllerOptions controller_;
+  std::shared_ptr<const Model> model_;
+  std::vector<double> output_sigmas_, input_sigmas_;
+  std::vector<double> state_lower_, state_upper_, input_lower_, input_upper_, parameter_lower_, parameter_upper_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,327 @@
+#include "rhec/plugins/robot.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/error.hpp"
+#include "rhec/core/filter_estimation.hpp"
+#include "rhec/core/receding_horizon_estimation.hpp"
+#include "rhec/plugins/yaml.hpp"
+
+namespace rhec {
+namespace {
+
+std::vector<std::string> names_of(const std::vector<Variable>& variables) {
+  std::vector<std::string> names;
+  for (const Variable& variable : variables) names.push_back(variable.name);
+  return names;
+}
+
+const Settings& member_or_null(const Settings& map, std::string_view key) {
+  static const Settings nothing;
+  const Settings* member = map.find(key);
+  return member ? *member : nothing;
+}
+
+/// The plugin named by `name` in a section, or the default.
+std::string plugin_name(const Settings& section, std::string_view otherwise) {
+  if (section.is_null()) return std::string(otherwise);
+  if (section.kind() != Settings::Kind::map) throw section.mismatch("a map with the key 'name' and the plugin's options");
+  const Settings* name = section.find("name");
+  return name ? name->as_text() : std::string(otherwise);
+}
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+void require_known_keys(const Settings& map, const std::vector<std::string>& known, const std::string& owner) {
+  check_keys(map, known, owner, {});
+}
+
+std::vector<double> numbers_by_name(const Settings& map, const std::vector<Variable>& variables,
+                                    std::vector<double> defaults, const Range& range, const std::string& owner) {
+  require_known_keys(map, names_of(variables), owner);
+  for (std::size_t j = 0; j < variables.size(); ++j)
+    if (const Settings* value = map.find(variables[j].name))
+      defaults[j] = NumberValue{range}.read(*value, OptionContext{owner, variables[j].unit});
+  return defaults;
+}
+
+const OptionTable<RobotOptions>& RobotOptions::table() {
+  static const auto rows = [] {
+    OptionTable<RobotOptions> table;
+    add_to(table);
+    return table;
+  }();
+  return rows;
+}
+
+const OptionTable<EstimatorOptions>& EstimatorOptions::table() {
+  static const auto rows =
+      OptionTable<EstimatorOptions>()
+          .choice("name", &EstimatorOptions::name,
+                  {{"rhe", Name::rhe}, {"ekf", Name::ekf}, {"truth", Name::truth}},
+                  "rhe: receding horizon; ekf: extended Kalman filter; truth: what the simulation knows")
+          .integer("horizon", &EstimatorOptions::horizon, "N_e, intervals", between(1, 100000))
+          .integer("substeps", &EstimatorOptions::substeps, "Runge-Kutta steps per interval", between(1, 1000))
+          .subtree("arrival", &EstimatorOptions::arrival, "name: ekf | smoothing | constant | off")
+          .subtree("forgetting", &EstimatorOptions::forgetting,
+                   "by parameter: standard deviation per square root of a step, added at each slide (0.03)")
+          .subtree("restart_sigma", &EstimatorOptions::restart_sigma,
+                   "by parameter: standard deviation with which an unlinked block starts (1)")
+          .subtree("initial", &EstimatorOptions::initial,
+                   "state, parameters: means by name; sigma: standard deviations by name")
+          .subtree("robust", &EstimatorOptions::robust,
+                   "outputs: names that share one pseudo-Huber loss; delta: where it turns linear, in sigmas")
+          .integer("heading_starts", &EstimatorOptions::heading_starts,
+                   "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
+          .subtree("solver", &EstimatorOptions::solver, "name and options of a solver plugin");
+  return rows;
+}
+
+const OptionTable<ControllerOptions>& ControllerOptions::table() {
+  static const auto rows =
+      OptionTable<ControllerOptions>()
+          .integer("horizon", &ControllerOptions::horizon, "N_c, intervals", between(1, 100000))
+          .integer("substeps", &ControllerOptions::substeps, "Runge-Kutta steps per interval", between(1, 1000))
+          .choice("reference_speed", &ControllerOptions::reference_speed,
+                  {{"ground", ReferenceSpeed::ground}, {"literal", ReferenceSpeed::literal}},
+                  "ground: wheels turn faster by the estimated slip; literal: the path's speed is the wheels'")
+          .number("least_speed_factor", &ControllerOptions::least_speed_factor,
+                  "the estimated speed factor is not trusted below this", greater_than(0.0))
+          .number("speed_bound_factor", &ControllerOptions::speed_bound_factor,
+                  "the wheel speed is at most this times the reference plus speed_bound_offset", at_least(0.0))
+          .number("speed_bound_offset", &ControllerOptions::speed_bound_offset, "[m/s]", at_least(0.0))
+          .subtree("weights", &ControllerOptions::weights, "stage and terminal: weights by the variable's name")
+          .subtree("blocking", &ControllerOptions::blocking, "by input: name and options of a blocking plugin")
+          .subtree("solver", &ControllerOptions::solver, "name and options of a solver plugin");
+  return rows;
+}
+
+Robot::Robot(const Host& host, const RobotOptions& options)
+    : host_(host),
+      options_(options),
+      estimator_(EstimatorOptions::table().parse(options.estimator, "estimator")),
+      controller_(ControllerOptions::table().parse(options.controller, "controller")) {
+  model_ = host.make_model(plugin_name(options.model, "bicycle_slip"), options.model);
+  const ModelDescription& about = model_->description();
+  require_known_keys(options.noise, {"outputs", "inputs"}, "noise");
+  const auto scales = [](const std::vector<Variable>& variables) {
+    std::vector<double> values;
+    for (const Variable& variable : variables) values.push_back(0.01 * variable.scale);
+    return values;
+  };
+  output_sigmas_ = numbers_by_name(member_or_null(options.noise, "outputs"), about.outputs, scales(about.outputs),
+                                   greater_than(0.0), "noise of outputs");
+  input_sigmas_ = numbers_by_name(member_or_null(options.noise, "inputs"), about.inputs, scales(about.inputs),
+                                  greater_than(0.0), "noise of inputs");
+  read_bounds();
+  require_known_keys(options.blocking, names_of(about.parameters), "blocking");
+}
+
+Robot Robot::from_file(const Host& host, const std::string& yaml_file) {
+  return {host, RobotOptions::table().parse(load_yaml(yaml_file), yaml_file)};
+}
+
+void Robot::read_bounds() {
+  const ModelDescription& about = model_->description();
+  std::vector<std::string> known;
+  for (const auto* variables : {&about.states, &about.inputs, &about.parameters})
+    for (const Variable& variable : *variables) known.push_back(variable.name);
+  require_known_keys(options_.bounds, known, "bounds");
+  const auto read = [&](const std::vector<Variable>& variables, std::vector<double>& lower, std::vector<double>& upper) {
+    for (const Variable& variable : variables) {
+      double low = variable.lower, high = variable.upper;
+      if (const Settings* pair = options_.bounds.find(variable.name)) {
+        if (pair->kind() != Settings::Kind::list || pair->items().size() != 2)
+          throw pair->mismatch("a list [lower, upper]; null for no bound");
+        const Settings &first = pair->items()[0], &second = pair->items()[1];
+        low = first.is_null() ? -infinity : first.as_number();
+        high = second.is_null() ? infinity : second.as_number();
+        if (!(low <= high)) throw pair->mismatch("lower <= upper");
+      }
+      lower.push_back(low);
+      upper.push_back(high);
+    }
+  };
+  read(about.states, state_lower_, state_upper_);
+  read(about.inputs, input_lower_, input_upper_);
+  read(about.parameters, parameter_lower_, parameter_upper_);
+}
+
+void Robot::read_initial(const std::optional<Eigen::VectorXd>& initial_state, Eigen::VectorXd& mean,
+                         Eigen::MatrixXd& covariance) const {
+  const ModelDescription& about = model_->description();
+  require_known_keys(estimator_.initial, {"state", "parameters", "sigma"}, "estimator: initial");
+  const int nx = model_->state_count(), np = model_->parameter_count();
+  std::vector<double> state(nx, 0.0), parameters(np, 0.0);
+  for (int j = 0; j < np; ++j) {
+    const double middle = 0.5 * (parameter_lower_[j] + parameter_upper_[j]);
+    parameters[j] = std::isfinite(middle) ? middle : 0.0;
+  }
+  state = numbers_by_name(member_or_null(estimator_.initial, "state"), about.states, state, any(), "initial state");
+  parameters = numbers_by_name(member_or_null(estimator_.initial, "parameters"), about.parameters, parameters, any(),
+                               "initial parameters");
+  if (initial_state && !estimator_.initial.find("state"))
+    for (int j = 0; j < nx; ++j) state[j] = (*initial_state)[j];
+  std::vector<Variable> both = about.states;
+  both.insert(both.end(), about.parameters.begin(), about.parameters.end());
+  std::vector<double> sigma;
+  for (const Variable& variable : about.states) sigma.push_back(0.1 * variable.scale);
+  for (const Variable& variable : about.parameters) sigma.push_back(variable.scale);
+  sigma = numbers_by_name(member_or_null(estimator_.initial, "sigma"), both, sigma, greater_than(0.0), "initial sigma");
+  mean.resize(nx + np);
+  covariance.setZero(nx + np, nx + np);
+  for (int j = 0; j < nx + np; ++j) {
+    mean[j] = j < nx ? state[j] : parameters[j - nx];
+    covariance(j, j) = sigma[j] * sigma[j];
+  }
+}
+
+std::vector<RobustLoss> Robot::read_robust() const {
+  const Settings& section = estimator_.robust;
+  if (section.is_null()) return {};
+  require_known_keys(section, {"outputs", "delta"}, "estimator: robust");
+  RobustLoss loss;
+  if (const Settings* delta = section.find("delta"))
+    loss.delta = NumberValue{greater_than(0.0)}.read(*delta, OptionContext{"robust", "in standard deviations"});
+  const Settings* outputs = section.find("outputs");
+  if (!outputs) throw section.error("expected the key 'outputs', a list of outputs that share the loss");
+  const auto known = names_of(model_->description().outputs);
+  for (const Settings& item : outputs->items()) {
+    const auto found = std::find(known.begin(), known.end(), item.as_text());
+    if (found == known.end()) throw item.mismatch(fmt::format("one of {}", fmt::join(known, ", ")));
+    loss.outputs.push_back(static_cast<int>(found - known.begin()));
+  }
+  if (loss.outputs.empty()) throw outputs->mismatch("a list of at least one output");
+  return {loss};
+}
+
+std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::VectorXd& mean,
+                                                               const Eigen::MatrixXd& covariance) const {
+  const ModelDescription& about = model_->description();
+  RecedingHorizonEstimation::Setup setup;
+  setup.problem.max_intervals = estimator_.horizon;
+  setup.problem.substeps = estimator_.substeps;
+  for (const double sigma : output_sigmas_) setup.problem.output_weights.push_back(1.0 / (sigma * sigma));
+  for (const double sigma : input_sigmas_) setup.problem.input_weights.push_back(1.0 / (sigma * sigma));
+  setup.problem.robust = read_robust();
+  setup.problem.state_lower = state_lower_;
+  setup.problem.state_upper = state_upper_;
+  setup.problem.parameter_lower = parameter_lower_;
+  setup.problem.parameter_upper = parameter_upper_;
+  struct Arrival {
+    ArrivalKind name = ArrivalKind::ekf;
+  };
+  static const auto arrival_table =
+      OptionTable<Arrival>().choice("name", &Arrival::name,
+                                    {{"ekf", ArrivalKind::ekf},
+                                     {"smoothing", ArrivalKind::smoothing},
+                                     {"constant", ArrivalKind::constant},
+                                     {"off", ArrivalKind::off}},
+                                    "how what has left the window is remembered");
+  setup.arrival = arrival_table.parse(estimator_.arrival, "estimator: arrival").name;
+  const std::size_t np = about.parameters.size();
+  const auto forgetting = numbers_by_name(estimator_.forgetting, about.parameters, std::vector<double>(np, 0.03),
+                                          at_least(0.0), "forgetting");
+  const auto restart = numbers_by_name(estimator_.restart_sigma, about.parameters, std::vector<double>(np, 1.0),
+                                       greater_than(0.0), "restart_sigma");
+  for (std::size_t j = 0; j < np; ++j) {
+    setup.walks.push_back({forgetting[j], restart[j]});
+    const Settings& section = member_or_null(options_.blocking, about.parameters[j].name);
+    auto blocking = host_.make_blocking(plugin_name(section, "full_horizon"), section);
+    if (const std::string reason = blocking->why_not(estimator_.horizon); !reason.empty())
+      throw section.error(fmt::format("{}; change it or estimator.horizon", reason));
+    setup.blockings.push_back(std::move(blocking));
+  }
+  setup.initial_mean = mean;
+  setup.initial_covariance = covariance;
+  setup.heading_starts = estimator_.heading_starts;
+  setup.heading_state = about.roles.heading;
+  auto solver = host_.make_solver(plugin_name(estimator_.solver, "gn_rti"), estimator_.solver);
+  return std::make_unique<RecedingHorizonEstimation>(model_, std::move(solver), std::move(setup));
+}
+
+std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::VectorXd>& initial_state) const {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+  read_initial(initial_state, mean, covariance);
+  std::unique_ptr<EstimationMethod> method;
+  switch (estimator_.name) {
+    case EstimatorOptions::Name::rhe: method = make_receding_horizon(mean, covariance); break;
+    case EstimatorOptions::Name::ekf: {
+      FilterEstimation::Setup setup;
+      for (const double sigma : output_sigmas_) setup.noise.output_variances.push_back(sigma * sigma);
+      for (const double sigma : input_sigmas_) setup.noise.input_variances.push_back(sigma * sigma);
+      setup.noise.parameter_lower = parameter_lower_;
+      setup.noise.parameter_upper = parameter_upper_;
+      setup.walk = numbers_by_name(estimator_.forgetting, model_->description().parameters,
+                                   std::vector<double>(model_->parameter_count(), 0.03), at_least(0.0), "forgetting");
+      setup.initial_mean = mean;
+      setup.initial_covariance = covariance;
+      setup.substeps = estimator_.substeps;
+      setup.heading_starts = estimator_.heading_starts;
+      setup.heading_state = model_->description().roles.heading;
+      method = std::make_unique<FilterEstimation>(model_, std::move(setup));
+      break;
+    }
+    case EstimatorOptions::Name::truth:
+      throw options_.estimator.error("name: 'truth' is known to a simulation only; choose rhe or ekf");
+  }
+  Estimator::Timeline timeline;
+  timeline.longest_interval = options_.step;
+  return std::make_unique<Estimator>(std::move(method), timeline);
+}
+
+std::unique_ptr<Controller> Robot::make_controller(const Path& path) const {
+  const ModelDescription& about = model_->description();
+  const int nx = model_->state_count(), nu = model_->input_count();
+  Controller::Setup setup;
+  setup.problem.max_intervals = controller_.horizon;
+  setup.problem.substeps = controller_.substeps;
+  std::vector<double> position(nx, 0.0), terminal(nx, 0.0), inputs(nu, 5.0);
+  for (const int j : {about.roles.position_x, about.roles.position_y}) {
+    if (j < 0) continue;
+    position[j] = 1.0;
+    terminal[j] = 10.0;
+  }
+  require_known_keys(controller_.weights, {"stage", "terminal"}, "controller: weights");
+  std::vector<Variable> both = about.states;
+  both.insert(both.end(), about.inputs.begin(), about.inputs.end());
+  std::vector<double> stage = position;
+  stage.insert(stage.end(), inputs.begin(), inputs.end());
+  stage = numbers_by_name(member_or_null(controller_.weights, "stage"), both, stage, at_least(0.0), "weights: stage");
+  setup.problem.state_weights.assign(stage.begin(), stage.begin() + nx);
+  setup.problem.input_weights.assign(stage.begin() + nx, stage.end());
+  setup.problem.terminal_weights = numbers_by_name(member_or_null(controller_.weights, "terminal"), about.states,
+                                                   terminal, at_least(0.0), "weights: terminal");
+  setup.problem.state_lower = state_lower_;
+  setup.problem.state_upper = state_upper_;
+  setup.problem.input_lower = input_lower_;
+  setup.problem.input_upper = input_upper_;
+  setup.interval = options_.step;
+  setup.reference_speed = controller_.reference_speed;
+  setup.least_speed_factor = controller_.least_speed_factor;
+  setup.speed_bound_factor = controller_.speed_bound_factor;
+  setup.speed_bound_offset = controller_.speed_bound_offset;
+  require_known_keys(controller_.blocking, names_of(about.inputs), "controller: blocking");
+  for (int j = 0; j < nu; ++j) {
+    const Settings* section = controller_.blocking.find(about.inputs[j].name);
+    if (!section) continue;
+    setup.problem.blocked_inputs.push_back(j);
+    auto blocking = host_.make_blocking(plugin_name(*section, "unblocked"), *section);
+    if (const std::string reason = blocking->why_not(controller_.horizon); !reason.empty())
+      throw section->error(fmt::format("{}; change it or controller.horizon", reason));
+    setup.blockings.push_back(std::move(blocking));
+  }
+  auto solver = host_.make_solver(plugin_name(controller_.solver, "gn_rti"), controller_.solver);
+  return std::make_unique<Controller>(model_, std::move(solver), path, std::move(setup));
+}
+
+}  // namespace rhec

@@ -1,0 +1,160 @@
+#include "rhec/sim/scenario.hpp"
+
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/error.hpp"
+#include "rhec/sim/paths.hpp"
+
+namespace rhec::sim {
+namespace {
+
+struct PathOptions {
+  enum class Name { figure8, zigzag, file };
+  Name name = Name::figure8;
+  int laps = 2, legs = 6;
+  double radius = 21.9, leg_length = 68.0, turn_radius = 9.0, spacing = 0.1;
+  std::string file;
+};
+
+struct TerrainOptions {
+  enum class Name { gaussian, constant, patches, raster };
+  Name name = Name::gaussian;
+  double correlation_length = 10.0, period = 500.0, patch_size = 10.0;
+  double lower = 0.5, upper = 1.0;
+  Settings values;
+  std::vector<std::string> files;
+  RasterField::Interpolation interpolation = RasterField::Interpolation::bilinear;
+};
+
+const OptionTable<PathOptions>& path_table() {
+  using P = PathOptions;
+  static const auto rows =
+      OptionTable<P>()
+          .choice("name", &P::name, {{"figure8", P::Name::figure8}, {"zigzag", P::Name::zigzag}, {"file", P::Name::file}},
+                  "which path")
+          .integer("laps", &P::laps, "of figure8", between(1, 1000))
+          .number("radius", &P::radius, "of the circles of figure8 [m]", greater_than(0.0))
+          .integer("legs", &P::legs, "of zigzag", between(1, 1000))
+          .number("leg_length", &P::leg_length, "of zigzag [m]", greater_than(0.0))
+          .number("turn_radius", &P::turn_radius, "of the half circles of zigzag [m]", greater_than(0.0))
+          .number("spacing", &P::spacing, "largest distance between waypoints [m]", greater_than(0.0))
+          .text("file", &P::file, "of waypoints x, y (, speed), for path.name: file");
+  return rows;
+}
+
+const OptionTable<TerrainOptions>& terrain_table() {
+  using T = TerrainOptions;
+  static const auto rows =
+      OptionTable<T>()
+          .choice("name", &T::name,
+                  {{"gaussian", T::Name::gaussian},
+                   {"constant", T::Name::constant},
+                   {"patches", T::Name::patches},
+                   {"raster", T::Name::raster}},
+                  "how the true parameters vary over the ground")
+          .number("correlation_length", &T::correlation_length, "L of the gaussian field [m]", greater_than(0.0))
+          .number("period", &T::period, "after which the gaussian field repeats itself [m]", greater_than(0.0))
+          .number("patch_size", &T::patch_size, "of patches [m]", greater_than(0.0))
+          .number("lower", &T::lower, "least value of gaussian and patches")
+          .number("upper", &T::upper, "largest value of gaussian and patches")
+          .subtree("values", &T::values, "of constant: by parameter (1)")
+          .names("files", &T::files, "of raster: one a parameter")
+          .choice("interpolation", &T::interpolation,
+                  {{"bilinear", RasterField::Interpolation::bilinear}, {"nearest", RasterField::Interpolation::nearest}},
+                  "of raster");
+  return rows;
+}
+
+/// A file named in a scenario is meant beside it, unless it is absolute or is found where the user stands.
+std::filesystem::path beside(const Settings& section, const std::string& file) {
+  const std::filesystem::path given(file);
+  if (given.is_absolute()) return given;
+  const std::filesystem::path near = std::filesystem::path(section.origin().file).parent_path() / given;
+  return std::filesystem::exists(near) ? near : given;
+}
+
+std::vector<Waypoint> make_waypoints(const ScenarioOptions& options, int speed_input) {
+  const PathOptions path = path_table().parse(options.path, "path");
+  switch (path.name) {
+    case PathOptions::Name::figure8:
+      return figure_eight({options.speed, path.laps, path.radius, path.spacing, speed_input});
+    case PathOptions::Name::zigzag:
+      return zig_zag({options.speed, path.legs, path.leg_length, path.turn_radius, path.spacing, speed_input});
+    case PathOptions::Name::file:
+      if (path.file.empty()) throw options.path.error("path.name is 'file'; expected path.file, a CSV file of waypoints x, y (, speed)");
+      return load_waypoints(beside(options.path, path.file), {options.speed, speed_input});
+  }
+  return {};
+}
+
+std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, const ModelDescription& about) {
+  const TerrainOptions terrain = terrain_table().parse(options.terrain, "terrain");
+  if (!(terrain.lower <= terrain.upper)) throw options.terrain.error("lower is above upper; expected lower <= upper");
+  const std::vector<SlipRange> ranges(about.parameters.size(), SlipRange{terrain.lower, terrain.upper});
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+  switch (terrain.name) {
+    case TerrainOptions::Name::gaussian:
+      return gaussian_random_field({seed, ranges, terrain.correlation_length, terrain.period});
+    case TerrainOptions::Name::patches: return patch_field({seed, ranges, terrain.patch_size});
+    case TerrainOptions::Name::constant:
+      return constant_field(numbers_by_name(terrain.values, about.parameters,
+                                            std::vector<double>(about.parameters.size(), 1.0), any(), "terrain values"));
+    case TerrainOptions::Name::raster: {
+      if (terrain.files.size() != about.parameters.size())
+        throw options.terrain.error(fmt::format("files: {} given; expected {}, one a parameter of the model",
+                                                terrain.files.size(), about.parameters.size()));
+      RasterField raster;
+      for (const std::string& file : terrain.files) raster.files.push_back(beside(options.terrain, file));
+      raster.interpolation = terrain.interpolation;
+      return raster_field(raster);
+    }
+  }
+  return nullptr;
+}
+
+int speed_input_of(const Robot& robot) {
+  const ModelDescription& about = robot.model()->description();
+  if (about.roles.speed < 0 || about.roles.position_x < 0 || about.roles.position_y < 0)
+    throw Error(fmt::format("model '{}' has no speed input or no position; it cannot follow a path", about.name));
+  return about.roles.speed;
+}
+
+}  // namespace
+
+const OptionTable<ScenarioOptions>& ScenarioOptions::table() {
+  static const auto rows = [] {
+    OptionTable<ScenarioOptions> table;
+    table.text("name", &ScenarioOptions::name, "of the run, for titles")
+        .number("speed", &ScenarioOptions::speed, "reference ground speed [m/s]", between(0.01, 100.0))
+        .integer("seed", &ScenarioOptions::seed, "of terrain and noise", between(0, 2147483647))
+        .subtree("path", &ScenarioOptions::path, "name: figure8 | zigzag | file, and its options")
+        .subtree("terrain", &ScenarioOptions::terrain, "name: gaussian | constant | patches | raster, and its options")
+        .subtree("vehicle", &ScenarioOptions::vehicle, "the true vehicle: step, mechanical_stops");
+    RobotOptions::add_to(table);
+    return table;
+  }();
+  return rows;
+}
+
+Scenario::Scenario(const Host& host, const Settings& settings)
+    : options_(ScenarioOptions::table().parse(settings, "scenario")),
+      robot_(host, options_),
+      path_(make_waypoints(options_, speed_input_of(robot_)), robot_.model()->input_count()),
+      terrain_(make_terrain(options_, robot_.model()->description())) {
+  static const auto vehicle_table =
+      OptionTable<TruthOptions>()
+          .number("step", &TruthOptions::step, "largest integration step of the truth [s]", greater_than(0.0))
+          .flag("mechanical_stops", &TruthOptions::mechanical_stops, "bounded states cannot leave their bounds");
+  vehicle_ = vehicle_table.parse(options_.vehicle, "vehicle");
+  const Roles& roles = robot_.model()->description().roles;
+  const PathPoint start = path_.point_at(0.0);
+  initial_state_ = Eigen::VectorXd::Zero(robot_.model()->state_count());
+  initial_state_[roles.position_x] = start.x;
+  initial_state_[roles.position_y] = start.y;
+  if (roles.heading >= 0) initial_state_[roles.heading] = start.heading;
+}
+
+}  // namespace rhec::sim
