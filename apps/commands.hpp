@@ -23,8 +23,10 @@ using Action = std::function<int()>;
 
 // One function a command: adds it to the program, and puts what it does into `chosen` when it is the one that was
 // called.
+void add_estimate(CLI::App& program, Action& chosen);
 void add_run(CLI::App& program, Action& chosen);
 void add_solve(CLI::App& program, Action& chosen);
+void add_options(CLI::App& program, Action& chosen);
 void add_plugins(CLI::App& program, Action& chosen);
 
 /// `--plugin-path DIR`, which several commands have.

@@ -19,7 +19,14 @@ void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& dire
   command
       .add_option_function<std::vector<std::string>>(
           "--plugin-path",
-          [&directories](const std::vector<std::string>& given) { directories.assign(given.begin(), given.end()); },
+          [&directories](const std::vector<std::string>& given) {
+            // The search passes over what is not there; who names a directory here means it.
+            for (const std::string& directory : given)
+              if (!std::filesystem::is_directory(directory))
+                throw Error(fmt::format("--plugin-path {}: found no such directory; give one that holds plugins",
+                                        directory.empty() ? "''" : directory));
+            directories.assign(given.begin(), given.end());
+          },
           "look for plugins there first; may be given several times")
       ->type_name("DIR")
       ->expected(1)
@@ -33,6 +40,7 @@ constexpr const char* about = "Receding horizon estimation and control of field 
 constexpr const char* examples =
     "Examples:\n"
     "  rhec run scenarios/figure8.yaml --out out/figure8\n"
+    "  rhec options                       every key of a scenario\n"
     "  rhec plugins                       what is installed\n"
     "  rhec plugins gn_rti                the options of one plugin\n"
     "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
@@ -52,7 +60,9 @@ std::string wrong_command(const CLI::App& program, int count, char** words) {
   const std::string expected = fmt::format("expected one of {}; see 'rhec --help'", fmt::join(commands, ", "));
   if (count < 2) return "no command; " + expected;
   const std::string word = words[1];
-  if (word.starts_with('-') || std::find(commands.begin(), commands.end(), word) != commands.end()) return {};
+  if (word == "-h" || word == "--help" || word == "--version") return {};
+  if (word.starts_with('-')) return fmt::format("unknown option '{}'; {}", word, expected);
+  if (std::find(commands.begin(), commands.end(), word) != commands.end()) return {};
   const std::string near = nearest(word, commands);
   return fmt::format("unknown command '{}'; {}", word,
                      near.empty() ? expected : fmt::format("did you mean '{}'?", near));
@@ -65,7 +75,9 @@ int run(int count, char** words) {
   program.footer(examples);
   Action chosen;
   add_run(program, chosen);
+  add_estimate(program, chosen);
   add_solve(program, chosen);
+  add_options(program, chosen);
   add_plugins(program, chosen);
 
   if (const std::string problem = wrong_command(program, count, words); !problem.empty()) return usage_error(problem);

@@ -38,7 +38,8 @@ void print_table(const sim::RunSummary& summary, const std::filesystem::path& fo
   };
   if (!summary.estimator_statuses.empty()) times("rhe", summary.estimator_us);
   times("rhc", summary.controller_us);
-  fmt::print("\n{} steps: {}; {} of {} solves fell back\n", summary.steps, summary.ended, summary.fallbacks, summary.solves);
+  fmt::print("\n{} steps: {}; {} of {} solves fell back\n", summary.steps, summary.ended, summary.fallbacks,
+             summary.solves);
   fmt::print("pictures and numbers: {}\n", folder.string());
 }
 
@@ -64,16 +65,20 @@ int run(const RunArguments& arguments) {
 
 void add_run(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<RunArguments>();
-  CLI::App* command = program.add_subcommand("run", "Runs a scenario: a robot on simulated ground learns its slip and holds its path.");
+  CLI::App* command =
+      program.add_subcommand("run", "Runs a scenario: a robot on simulated ground learns its slip and holds its path.");
   command->footer(
-      "Writes steps.csv, times.csv, summary.json and run.svg to the output folder. The exit code is 3 where the robot did\n"
+      "Writes steps.csv, times.csv, summary.json and run.svg to the output folder. The exit code is 3 where the robot "
+      "did\n"
       "not reach the end of its path.\n\n"
       "Examples:\n"
       "  rhec run scenarios/figure8.yaml --out out/figure8\n"
-      "  rhec run scenarios/figure8.yaml --set speed=4 --set blocking.kappa.name=full_horizon --out out/slow\n"
+      "  rhec run scenarios/figure8.yaml --set speed=4 --set 'blocking.kappa={name: full_horizon}' --out out/fhb\n"
       "  rhec run scenarios/zigzag.yaml --set estimator.name=ekf --set seed=3 --out out/ekf");
   command->add_option("scenario", arguments->scenario, "a YAML file")->required();
-  command->add_option("--set", arguments->assignments, "KEY=VALUE over any key of the scenario; may be given several times")
+  command
+      ->add_option("--set", arguments->assignments,
+                   "KEY=VALUE over any key of the scenario; may be given several times")
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);

@@ -51,7 +51,12 @@ class Models {
   std::shared_ptr<const Model> of(const ProblemRecord& record) {
     const std::string key = record.model + " " + key_of(record.model_options);
     std::shared_ptr<const Model>& model = made_[key];
-    if (!model) model = host_->make_model(record.model, record.model_options);
+    try {
+      if (!model) model = host_->make_model(record.model, record.model_options);
+    } catch (const Error& mistake) {
+      const std::string text = mistake.what();  // of the model's options it names the place, of the model itself not
+      throw text.starts_with(record.where) ? mistake : Error(fmt::format("{}: model: {}", record.where, text));
+    }
     return model;
   }
 
@@ -82,8 +87,9 @@ class Bench {
     return sim::solution_line(record, *problem_, point_, outcome);
   }
 
-  /// The next problem of a sequence, from the solution of the one before. What a controller is judged by is what its inputs
-  /// do, so its states are simulated: no defect flatters the objective. An estimator hands out its states as they are.
+  /// The next problem of a sequence, from the solution of the one before. What a controller is judged by is what its
+  /// inputs do, so its states are simulated: no defect flatters the objective. An estimator hands out its states as
+  /// they are.
   std::string solve_next(const ProblemRecord& record, const std::shared_ptr<const Model>& model, int max_intervals,
                          Outcome& outcome) {
     if (last_first_) shifter_->take(*problem_, point_);
@@ -180,6 +186,37 @@ struct Group {
   }
 };
 
+std::shared_ptr<Solver> make_solver(const Host& host, const std::string& name, const Settings& options) {
+  try {
+    return host.make_solver(name, options);
+  } catch (const Error& mistake) {
+    const std::string text = mistake.what();  // of an option it names the place
+    throw text.starts_with("--set ") ? mistake : Error(fmt::format("--solver {}: {}", name, text));
+  }
+}
+
+/// Where the solutions go, if not to standard output. Known before anything is solved: it may take long.
+class Destination {
+ public:
+  explicit Destination(const std::string& out) {
+    if (out.empty()) return;
+    const std::filesystem::path file = std::filesystem::absolute(out);
+    if (std::filesystem::is_directory(file))
+      throw Error(fmt::format("--out {}: is a folder; give the name of a file", out));
+    folder_.emplace(file.parent_path());
+    name_ = file.filename().string();
+  }
+  bool is_file() const { return folder_.has_value(); }
+  void commit(const std::string& lines) {
+    folder_->write(name_, lines);
+    folder_->commit();
+  }
+
+ private:
+  std::optional<sim::OutputFolder> folder_;
+  std::string name_;
+};
+
 double quantile(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());
   const auto index = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
@@ -224,6 +261,7 @@ int solve(const SolveArguments& arguments) {
   const Host host(arguments.plugin_path);
   Settings options;
   for (const std::string& assignment : arguments.assignments) apply_assignment(options, assignment);
+  Destination destination(arguments.out);
   Models models(host);
   std::map<std::string, Bench> benches;  // one for all, or one a sequence
   std::map<std::string, Group> groups;
@@ -233,25 +271,20 @@ int solve(const SolveArguments& arguments) {
     const std::string key = arguments.sequence ? record.prefix : std::string();
     auto at = benches.find(key);
     if (at == benches.end())
-      at = benches.emplace(key, Bench(arguments.solver, host.make_solver(arguments.solver, options))).first;
+      at = benches.emplace(key, Bench(arguments.solver, make_solver(host, arguments.solver, options))).first;
     Outcome outcome;
     const std::string line = arguments.sequence
                                  ? at->second.solve_next(record, models.of(record), longest.at(record.prefix), outcome)
                                  : at->second.solve_alone(record, models.of(record), outcome);
     all_usable = all_usable && is_usable(outcome.status);
     groups[record.prefix].add(outcome);
-    if (arguments.out.empty()) {
-      print_line(line);
-    } else {
+    if (destination.is_file()) {
       lines += line + "\n";
+    } else {
+      print_line(line);
     }
   }
-  if (!arguments.out.empty()) {
-    const std::filesystem::path file = std::filesystem::absolute(arguments.out);
-    sim::OutputFolder folder(file.parent_path());
-    folder.write(file.filename().string(), lines);
-    folder.commit();
-  }
+  if (destination.is_file()) destination.commit(lines);
   if (arguments.verbose || isatty(STDERR_FILENO)) print_summary(groups);
   return all_usable ? exit_fine : exit_not_solved;
 }

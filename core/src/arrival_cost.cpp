@@ -4,11 +4,15 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include "small_matrix.hpp"
 
 namespace rhec {
 namespace {
+
+// A variable that is known exactly is given this part of its typical magnitude as a standard deviation.
+constexpr double least_sigma = 1e-9;
+// Pivots of a correlation matrix below this are rounding.
+constexpr double least_pivot = 1e-15;
 
 KalmanFilter make_filter(const RheProblem& like) {
   const RheProblem::Setup& setup = like.setup();
@@ -20,6 +24,29 @@ KalmanFilter make_filter(const RheProblem& like) {
   return {like.shared_model(), std::move(noise), like.substeps()};
 }
 
+/// Householder reduction of the columns but the last one, in place: afterwards the upper triangle holds R, and the last
+/// column Q' times what was there.
+void triangularise(Eigen::MatrixXd& rows) noexcept {
+  const Eigen::Index m = rows.rows(), n = rows.cols() - 1;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    double square = 0.0;
+    for (Eigen::Index r = k; r < m; ++r) square += rows(r, k) * rows(r, k);
+    if (square == 0.0) continue;
+    const double pivot = rows(k, k) > 0.0 ? -std::sqrt(square) : std::sqrt(square);
+    // v = a - pivot e_k; 2 / v'v = -1 / (pivot v_k)
+    const double top = rows(k, k) - pivot;
+    for (Eigen::Index c = k + 1; c <= n; ++c) {
+      double sum = top * rows(k, c);
+      for (Eigen::Index r = k + 1; r < m; ++r) sum += rows(r, k) * rows(r, c);
+      sum /= pivot * top;
+      rows(k, c) += sum * top;
+      for (Eigen::Index r = k + 1; r < m; ++r) rows(r, c) += sum * rows(r, k);
+    }
+    rows(k, k) = pivot;
+    for (Eigen::Index r = k + 1; r < m; ++r) rows(r, k) = 0.0;
+  }
+}
+
 }  // namespace
 
 ArrivalCost::ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<ParameterWalk> walks)
@@ -29,17 +56,20 @@ ArrivalCost::ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<P
   initial_covariance_ = filter_.covariance;
   robust_.assign(ny, 1.0);
   inputs_.assign(nu, 0.0);
+  ends_.assign(np, 0.0);
   scratch_.assign(2 * static_cast<std::size_t>(ny), 0.0);
   ramp_variances_.assign(np, 0.0);
   next_.assign(nx, 0.0);
   jacobian_.assign(static_cast<std::size_t>(nx) * (nx + nu + 2 * np), 0.0);
   predicted_.assign(ny, 0.0);
   output_jacobian_.assign(static_cast<std::size_t>(ny) * nx, 0.0);
+  scale_ = Eigen::VectorXd::Ones(nx + np);
+  factor_ = inverse_ = Eigen::MatrixXd::Identity(nx + np, nx + np);
   const int unknowns = nx + nu + 2 * np;  // x_0, u_0, p_0 and, on a ramp, its change
-  rows_ = Eigen::MatrixXd::Zero(unknowns + ny, unknowns);
-  right_ = Eigen::VectorXd::Zero(rows_.rows());
+  rows_ = Eigen::MatrixXd::Zero(unknowns + ny, unknowns + 1);
   map_ = spread_ = Eigen::MatrixXd::Zero(nx + np, unknowns);
   shift_ = Eigen::VectorXd::Zero(unknowns);
+  next_mean_ = Eigen::VectorXd::Zero(nx + np);
 }
 
 void ArrivalCost::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
@@ -47,27 +77,40 @@ void ArrivalCost::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& cova
   filter_.covariance = initial_covariance_ = covariance;
 }
 
+/// Where rounding has made the covariance singular it gets the least ridge that lets it be factorised.
+void ArrivalCost::factor_covariance() noexcept {
+  const ModelDescription& about = filter_.model().description();
+  const int n = static_cast<int>(scale_.size()), nx = filter_.model().state_count();
+  for (int j = 0; j < n; ++j) {
+    const double least = least_sigma * (j < nx ? about.states[j] : about.parameters[j - nx]).scale;
+    scale_[j] = std::sqrt(std::max(filter_.covariance(j, j), least * least));
+  }
+  double ridge = 0.0;
+  do {
+    for (int c = 0; c < n; ++c) {
+      for (int r = 0; r < n; ++r)
+        factor_(r, c) = r == c ? 1.0 + ridge : filter_.covariance(r, c) / (scale_[r] * scale_[c]);
+    }
+    ridge = ridge == 0.0 ? least_pivot : 10.0 * ridge;
+  } while (!small::factor(factor_.data(), n, n, least_pivot) && ridge < 100.0);
+}
+
 void ArrivalCost::write(RheProblem& problem) noexcept {
+  const int n = static_cast<int>(scale_.size());
   problem.arrival_mean = filter_.mean;
   if (kind_ == ArrivalKind::off) {
     problem.arrival_information.setZero();
     return;
   }
-  // A covariance that rounding has made singular gets the least ridge that lets it be inverted.
-  const double size = filter_.covariance.diagonal().cwiseAbs().maxCoeff();
-  double ridge = 0.0;
-  for (int attempt = 0; attempt < 12; ++attempt) {
-    spread_.leftCols(filter_.mean.size()) = filter_.covariance;
-    spread_.leftCols(filter_.mean.size()).diagonal().array() += ridge;
-    const Eigen::LLT<Eigen::MatrixXd> factor(spread_.leftCols(filter_.mean.size()));
-    if (factor.info() == Eigen::Success) {
-      problem.arrival_information.setIdentity();
-      factor.solveInPlace(problem.arrival_information);
-      break;
-    }
-    ridge = ridge == 0.0 ? 1e-15 * size : 10.0 * ridge;
+  factor_covariance();
+  for (int c = 0; c < n; ++c) {
+    inverse_.col(c).setZero();
+    inverse_(c, c) = 1.0;
+    small::solve(factor_.data(), n, n, inverse_.col(c).data());
   }
-  problem.arrival_information = 0.5 * (problem.arrival_information + problem.arrival_information.transpose()).eval();
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < n; ++r)
+      problem.arrival_information(r, c) = 0.5 * (inverse_(r, c) + inverse_(c, r)) / (scale_[r] * scale_[c]);
 }
 
 void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, const std::vector<Border>& borders,
@@ -75,8 +118,12 @@ void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, cons
   const int nx = problem.model().state_count(), np = problem.model().parameter_count();
   for (int j = 0; j < np; ++j) ramp_variances_[j] = borders[j].leaves_as_ramp ? borders[j].ramp_variance : 0.0;
   switch (kind_ == ArrivalKind::ekf && mean_is_lost ? ArrivalKind::smoothing : kind_) {
-    case ArrivalKind::ekf: filter_first_interval(problem, solution); break;
-    case ArrivalKind::smoothing: smooth_first_interval(problem, solution); break;
+    case ArrivalKind::ekf:
+      filter_first_interval(problem, solution);
+      break;
+    case ArrivalKind::smoothing:
+      smooth_first_interval(problem, solution);
+      break;
     case ArrivalKind::constant:
     case ArrivalKind::off:
       for (int j = 0; j < nx + np; ++j) filter_.mean[j] = solution.state(1)[j];
@@ -100,7 +147,8 @@ void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate
   filter_.update(problem.output(0), robust_.data());
   problem.inputs_on(solution, 0, inputs_.data());
   const bool ramp = std::any_of(ramp_variances_.begin(), ramp_variances_.end(), [](double v) { return v > 0.0; });
-  filter_.predict(problem.measured_input(0), inputs_.data(), problem.duration(0), ramp ? ramp_variances_.data() : nullptr);
+  filter_.predict(problem.measured_input(0), inputs_.data(), problem.duration(0),
+                  ramp ? ramp_variances_.data() : nullptr);
 }
 
 /// Rows in [dx; du; dp; dramp] about the solution: prior, outputs, measured inputs, ramp. Their QR factor R gives the
@@ -112,6 +160,9 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
   const double* x = solution.state(0);
   const double* p = x + nx;
   problem.inputs_on(solution, 0, inputs_.data());
+  problem.parameters_on(solution, 0, ends_.data());
+  for (int j = 0; j < np; ++j)
+    if (!(ramp_variances_[j] > 0.0)) ends_[j] = p[j];
   problem.robust_weights(solution, 0, robust_.data(), scratch_);
   Model::Nodes nodes;
   nodes.count = 1;
@@ -124,7 +175,8 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
   step.count = 1;
   step.states = x;
   step.inputs = inputs_.data();
-  step.parameters = step.parameters_end = p;
+  step.parameters = p;
+  step.parameters_end = ends_.data();
   step.durations = &duration;
   step.substeps = problem.substeps();
   step.next_states = next_.data();
@@ -132,16 +184,19 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
   model.integrate(step);
 
   rows_.setZero();
-  right_.setZero();
-  // Prior: L^-1 ([x; p] + [dx; dp] - mean), with Pi = L L'.
-  Eigen::MatrixXd whitening = Eigen::MatrixXd::Identity(n, n);
-  const double ridge = 1e-15 * filter_.covariance.diagonal().maxCoeff();
-  const Eigen::LLT<Eigen::MatrixXd> factor(filter_.covariance + ridge * Eigen::MatrixXd::Identity(n, n));
-  factor.matrixL().solveInPlace(whitening);
-  const Eigen::VectorXd error = Eigen::Map<const Eigen::VectorXd>(x, n) - filter_.mean;
-  rows_.topLeftCorner(n, nx) = whitening.leftCols(nx);
-  rows_.block(0, nx + nu, n, np) = whitening.rightCols(np);
-  right_.head(n) = -whitening * error;
+  auto right = rows_.col(unknowns);
+  // Prior: L^-1 D^-1 ([x; p] + [dx; dp] - mean). Columns of p stand behind those of u.
+  factor_covariance();
+  const auto column_of = [&](int j) { return j < nx ? j : nu + j; };
+  for (int c = 0; c < n; ++c) {
+    for (int r = c; r < n; ++r) {
+      double value = r == c ? 1.0 : 0.0;
+      for (int k = c; k < r; ++k) value -= factor_(r, k) * inverse_(k, c);
+      inverse_(r, c) = value / factor_(r, r);
+      rows_(r, column_of(c)) = inverse_(r, c) / scale_[c];
+      right[r] -= rows_(r, column_of(c)) * (x[c] - filter_.mean[c]);
+    }
+  }
   int row = n;
   for (int j = 0; j < nu; ++j, ++row) {
     const double measured = problem.measured_input(0)[j];
@@ -149,22 +204,29 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
     const double sigma =
         missing ? 100.0 * model.description().inputs[j].scale : std::sqrt(filter_.noise().input_variances[j]);
     rows_(row, nx + j) = 1.0 / sigma;
-    right_[row] = missing ? 0.0 : (measured - inputs_[j]) / sigma;
+    right[row] = missing ? 0.0 : (measured - inputs_[j]) / sigma;
   }
   for (int j = 0; j < np; ++j, ++row) {
     // No ramp: no change, by a row of any weight, since nothing else speaks of that column.
-    rows_(row, nx + nu + np + j) = ramp_variances_[j] > 0.0 ? 1.0 / std::sqrt(ramp_variances_[j]) : 1.0;
+    const double sigma = ramp_variances_[j] > 0.0 ? std::sqrt(ramp_variances_[j]) : 1.0;
+    rows_(row, nx + nu + np + j) = 1.0 / sigma;
+    right[row] = (p[j] - ends_[j]) / sigma;
   }
   for (int j = 0; j < ny; ++j, ++row) {
     const double y = problem.output(0)[j];
     if (std::isnan(y)) continue;
-    const double difference = model.description().outputs[j].is_angle ? angle_difference(y, predicted_[j]) : y - predicted_[j];
+    const double difference =
+        model.description().outputs[j].is_angle ? angle_difference(y, predicted_[j]) : y - predicted_[j];
     const double weight = std::sqrt(robust_[j] / filter_.noise().output_variances[j]);
     for (int c = 0; c < nx; ++c) rows_(row, c) = weight * output_jacobian_[c * ny + j];
-    right_[row] = weight * difference;
+    right[row] = weight * difference;
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(rows_);
-  shift_ = qr.solve(right_);
+  triangularise(rows_);
+  for (int r = unknowns - 1; r >= 0; --r) {
+    double value = right[r];
+    for (int c = r + 1; c < unknowns; ++c) value -= rows_(r, c) * shift_[c];
+    shift_[r] = value / rows_(r, r);
+  }
 
   map_.setZero();
   for (int c = 0; c < nx + nu + np; ++c)
@@ -179,13 +241,23 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
     map_(nx + c, nx + nu + c) = 1.0;
     map_(nx + c, change) = ramp_variances_[c] > 0.0 ? 1.0 : 0.0;
   }
-  filter_.mean = map_ * shift_;
-  for (int r = 0; r < nx; ++r) filter_.mean[r] += next_[r];
-  for (int r = 0; r < np; ++r) filter_.mean[nx + r] += p[r];
   // covariance = (M R^-1)(M R^-1)'
-  spread_ = map_;
-  qr.matrixQR().topRows(unknowns).triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(spread_);
-  filter_.covariance = spread_ * spread_.transpose();
+  for (int c = 0; c < unknowns; ++c) {
+    for (int r = 0; r < n; ++r) {
+      double value = map_(r, c);
+      for (int k = 0; k < c; ++k) value -= spread_(r, k) * rows_(k, c);
+      spread_(r, c) = value / rows_(c, c);
+    }
+  }
+  inverse_.noalias() = spread_.lazyProduct(spread_.transpose());
+  for (int r = 0; r < n; ++r) next_mean_[r] = (r < nx ? next_[r] : ends_[r - nx]) + map_.row(r).dot(shift_);
+  if (!next_mean_.allFinite() || !inverse_.allFinite()) {
+    // A solution that is not one tells nothing of the next node: begin anew from what is known of this one.
+    filter_.covariance = initial_covariance_;
+    return;
+  }
+  filter_.mean = next_mean_;
+  filter_.covariance = inverse_;
 }
 
 }  // namespace rhec

@@ -13,6 +13,13 @@ namespace rhec {
 namespace {
 
 constexpr std::size_t remembered_nodes = 1024;
+constexpr int most_parts = 1000;  // that one gap, or one prediction, is divided into
+
+/// Intervals of at most a length that a time is divided into.
+int parts_of(double duration, double longest) noexcept {
+  const double parts = std::ceil(duration / longest - 1e-6);
+  return parts < most_parts ? std::max(1, static_cast<int>(parts)) : most_parts;
+}
 
 }  // namespace
 
@@ -52,31 +59,50 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
       inputs_(timeline.capacity, method_->model().input_count()) {
   if (!(timeline.longest_interval > 0.0))
     throw Error(fmt::format("estimator: longest interval {} s; expected a positive number", timeline.longest_interval));
+  if (!(timeline.tolerance >= 0.0 && timeline.tolerance < timeline.longest_interval))
+    throw Error(fmt::format("estimator: tolerance {} s; expected a number from 0 to below the longest interval, {} s",
+                            timeline.tolerance, timeline.longest_interval));
+  if (timeline.capacity < 1) throw Error("estimator: capacity 0; expected room for at least 1 row");
   const Model& m = method_->model();
-  const int n = m.state_count() + m.parameter_count();
-  for (Estimate* e : {&estimate_, &predicted_}) {
-    e->state = Eigen::VectorXd::Zero(m.state_count());
-    e->parameters = Eigen::VectorXd::Zero(m.parameter_count());
-    e->covariance = Eigen::MatrixXd::Zero(n, n);
-  }
+  clear_estimates();
   node_times_.assign(remembered_nodes, 0.0);
   mean_.assign(m.input_count(), 0.0);
   weight_.assign(m.input_count(), 0.0);
   nothing_.assign(m.output_count(), std::numeric_limits<double>::quiet_NaN());
   next_.assign(m.state_count(), 0.0);
+  values_.assign(std::max(m.output_count(), m.input_count()), 0.0);
+}
+
+void Estimator::clear_estimates() noexcept {
+  const Model& m = method_->model();
+  const int n = m.state_count() + m.parameter_count();
+  for (Estimate* e : {&estimate_, &predicted_}) {
+    e->time = 0.0;
+    e->state.setZero(m.state_count());
+    e->parameters.setZero(m.parameter_count());
+    e->covariance.setZero(n, n);
+    e->report = {};
+    e->fallback = e->predicted = false;
+  }
 }
 
 void Estimator::reset() noexcept {
   method_->reset();
   measurements_.clear();
   inputs_.clear();
+  clear_estimates();
   started_ = stale_ = false;
   newest_ = 0;
   counts_ = {};
 }
 
 void Estimator::push_measurement(double time, const double* outputs) noexcept {
-  for (std::size_t j = 0; j < nothing_.size(); ++j) counts_.missing += std::isnan(outputs[j]);
+  for (std::size_t j = 0; j < nothing_.size(); ++j) {
+    const bool missing = !is_measurement(outputs[j]);
+    counts_.missing += missing;
+    values_[j] = missing ? std::numeric_limits<double>::quiet_NaN() : outputs[j];
+  }
+  outputs = values_.data();
   if (!std::isfinite(time)) {
     ++counts_.dropped;
     return;
@@ -97,7 +123,10 @@ void Estimator::push_measurement(double time, const double* outputs) noexcept {
 }
 
 void Estimator::push_input(double time, const double* inputs) noexcept {
-  if (std::isfinite(time)) inputs_.insert(time, inputs);
+  if (!std::isfinite(time)) return;
+  for (std::size_t j = 0; j < mean_.size(); ++j)
+    values_[j] = is_measurement(inputs[j]) ? inputs[j] : std::numeric_limits<double>::quiet_NaN();
+  inputs_.insert(time, values_.data());
 }
 
 /// Mean over an interval of inputs that hold from their stamps on; NaN where none is known.
@@ -112,7 +141,7 @@ void Estimator::mean_input(double from, double to) noexcept {
     if (seconds <= 0.0) continue;
     for (std::size_t j = 0; j < mean_.size(); ++j) {
       const double value = inputs_.values(i)[j];
-      if (!std::isfinite(value)) continue;
+      if (std::isnan(value)) continue;
       mean_[j] += value * seconds;
       weight_[j] += seconds;
     }
@@ -144,7 +173,7 @@ void Estimator::add_node(double time, const double* outputs) noexcept {
 void Estimator::add_nodes_until(double time, const double* outputs) noexcept {
   if (started_) {
     const double last = node_times_[newest_ % remembered_nodes];
-    const int parts = std::max(1, static_cast<int>(std::ceil((time - last) / timeline_.longest_interval - 1e-6)));
+    const int parts = parts_of(time - last, timeline_.longest_interval);
     for (int i = 1; i < parts; ++i) add_node(last + (time - last) * i / parts, nothing_.data());
   }
   add_node(time, outputs);
@@ -164,12 +193,12 @@ void Estimator::predict_to(double time) noexcept {
   request.inputs = mean_.data();
   request.parameters = estimate_.parameters.data();
   request.durations = &duration;
-  request.substeps =
-      method_->substeps() * std::max(1, static_cast<int>(std::ceil(duration / timeline_.longest_interval)));
+  request.substeps = method_->substeps() * parts_of(duration, timeline_.longest_interval);
   request.next_states = next_.data();
   method_->model().integrate(request);
-  std::copy(next_.begin(), next_.end(), predicted_.state.data());
   predicted_.time = time;
+  if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))
+    std::copy(next_.begin(), next_.end(), predicted_.state.data());
 }
 
 const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noexcept {
@@ -194,7 +223,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
     ++counts_.estimates;
     counts_.fallbacks += estimate_.fallback;
   }
-  if (time <= estimate_.time + timeline_.tolerance) return estimate_;
+  if (!std::isfinite(time) || time <= estimate_.time + timeline_.tolerance) return estimate_;
   predict_to(time);
   return predicted_;
 }

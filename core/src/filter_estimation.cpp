@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "rhec/core/error.hpp"
 #include "rhec/core/rhe_problem.hpp"
@@ -19,10 +22,15 @@ constexpr double decisive = 25.0;
 FilterEstimation::FilterEstimation(std::shared_ptr<const Model> model, Setup setup) : setup_(std::move(setup)) {
   if (setup_.walk.size() != static_cast<std::size_t>(model->parameter_count()))
     throw Error("filter: expected one random walk a parameter");
+  const auto n = static_cast<Eigen::Index>(model->state_count() + model->parameter_count());
+  if (setup_.initial_mean.size() != n || setup_.initial_covariance.rows() != n || setup_.initial_covariance.cols() != n)
+    throw Error(fmt::format("filter: the initial mean and covariance must have the size {} of [x; p]", n));
   const int count = setup_.heading_state >= 0 ? std::max(1, setup_.heading_starts) : 1;
   for (int i = 0; i < count; ++i) bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps), 0.0});
   no_input_.assign(model->input_count(), 0.0);
   predicted_.assign(model->output_count(), 0.0);
+  measured_.assign(model->output_count(), 0.0);
+  inputs_.assign(model->input_count(), 0.0);
   jacobian_.assign(static_cast<std::size_t>(model->output_count()) * model->state_count(), 0.0);
   reset();
 }
@@ -58,8 +66,9 @@ double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double
   m.observe(request);
   double sum = 0.0;
   for (int j = 0; j < ny; ++j) {
-    if (std::isnan(outputs[j])) continue;
-    const double error = m.description().outputs[j].is_angle ? angle_difference(outputs[j], predicted_[j]) : outputs[j] - predicted_[j];
+    if (!is_measurement(outputs[j])) continue;
+    const double error =
+        m.description().outputs[j].is_angle ? angle_difference(outputs[j], predicted_[j]) : outputs[j] - predicted_[j];
     double variance = filter.noise().output_variances[j];
     for (int c = 0; c < nx; ++c)
       for (int r = 0; r < nx; ++r) variance += jacobian_[c * ny + j] * filter.covariance(r, c) * jacobian_[r * ny + j];
@@ -70,9 +79,11 @@ double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double
 }
 
 void FilterEstimation::take(const double* outputs) noexcept {
+  for (std::size_t j = 0; j < measured_.size(); ++j)
+    measured_[j] = is_measurement(outputs[j]) ? outputs[j] : std::numeric_limits<double>::quiet_NaN();
   for (std::size_t i = 0; i < alive_; ++i) {
-    if (alive_ > 1) bank_[i].log_likelihood += log_likelihood(bank_[i].filter, outputs);
-    bank_[i].filter.update(outputs, nullptr);
+    if (alive_ > 1) bank_[i].log_likelihood += log_likelihood(bank_[i].filter, measured_.data());
+    bank_[i].filter.update(measured_.data(), nullptr);
   }
   if (alive_ == 1) return;
   best_ = 0;
@@ -94,8 +105,14 @@ void FilterEstimation::start(const double* outputs) noexcept {
 }
 
 void FilterEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+  if (!(duration > 0.0) || !std::isfinite(duration)) {
+    take(outputs);
+    return;
+  }
+  for (std::size_t j = 0; j < inputs_.size(); ++j)
+    inputs_[j] = is_measurement(inputs[j]) ? inputs[j] : std::numeric_limits<double>::quiet_NaN();
   for (std::size_t i = 0; i < alive_; ++i) {
-    bank_[i].filter.predict(inputs, no_input_.data(), duration);
+    bank_[i].filter.predict(inputs_.data(), no_input_.data(), duration);
     for (std::size_t j = 0; j < setup_.walk.size(); ++j)
       bank_[i].filter.add_parameter_variance(static_cast<int>(j), setup_.walk[j] * setup_.walk[j]);
   }

@@ -26,8 +26,8 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   input_.assign(nu_, 0.0);
   transition_ = Eigen::MatrixXd::Identity(n, n);
   input_map_ = Eigen::MatrixXd::Zero(n, nu_ + np_);
-  work_ = update_ = Eigen::MatrixXd::Zero(n, n);
-  gain_ = row_ = Eigen::VectorXd::Zero(n);
+  work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
+  gain_ = row_ = correction_ = Eigen::VectorXd::Zero(n);
 }
 
 void KalmanFilter::clip() noexcept {
@@ -43,26 +43,38 @@ void KalmanFilter::update(const double* y, const double* robust_weights) noexcep
   request.jacobians = output_jacobian_.data();
   model_->observe(request);
   // One output after the other, all linearised at the same point; noises are independent.
-  work_.col(0).setZero();
-  for (int j = 0; j < ny_; ++j) {
-    if (std::isnan(y[j])) continue;
-    double innovation = model_->description().outputs[j].is_angle ? angle_difference(y[j], predicted_[j]) : y[j] - predicted_[j];
-    row_.setZero();
-    for (int c = 0; c < nx_; ++c) {
-      row_[c] = output_jacobian_[c * ny_ + j];
-      innovation -= row_[c] * work_(c, 0);
-    }
-    const double variance = noise_.output_variances[j] / (robust_weights ? robust_weights[j] : 1.0);
-    gain_.noalias() = covariance.lazyProduct(row_);
-    const double total = row_.dot(gain_) + variance;
-    if (!(total > 0.0)) continue;
-    work_.col(0) += gain_ * (innovation / total);
-    covariance -= (gain_ / total).lazyProduct(gain_.transpose());
-  }
-  mean += work_.col(0);
-  update_ = covariance.transpose();
-  covariance = 0.5 * (covariance + update_);
+  correction_.setZero();
+  for (int j = 0; j < ny_; ++j)
+    if (std::isfinite(y[j]))
+      take_output(j, y[j], noise_.output_variances[j] / (robust_weights ? robust_weights[j] : 1.0));
+  mean += correction_;
   clip();
+}
+
+void KalmanFilter::take_output(int output, double measured, double variance) noexcept {
+  const int n = nx_ + np_;
+  double innovation = model_->description().outputs[output].is_angle ? angle_difference(measured, predicted_[output])
+                                                                     : measured - predicted_[output];
+  row_.setZero();
+  for (int c = 0; c < nx_; ++c) row_[c] = output_jacobian_[c * ny_ + output];
+  innovation -= row_.dot(correction_);
+  gain_.noalias() = covariance.lazyProduct(row_);
+  const double total = row_.dot(gain_) + variance;
+  if (!(total > 0.0)) return;
+  gain_ /= total;
+  // Joseph's form, (I - k h') Pi (I - k h')' + k r k': it stays positive semidefinite, and exact where a vague prior
+  // meets a good measurement.
+  work_.setIdentity();
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < n; ++r) work_(r, c) -= gain_[r] * row_[c];
+  transition_.noalias() = work_.lazyProduct(covariance);
+  next_covariance_.noalias() = transition_.lazyProduct(work_.transpose());
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < n; ++r) next_covariance_(r, c) += gain_[r] * variance * gain_[c];
+  if (!std::isfinite(innovation) || !gain_.allFinite() || !next_covariance_.allFinite()) return;
+  correction_ += gain_ * innovation;
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < n; ++r) covariance(r, c) = 0.5 * (next_covariance_(r, c) + next_covariance_(c, r));
 }
 
 void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration) noexcept {
@@ -71,7 +83,8 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
 
 void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration,
                            const double* ramp_variances) noexcept {
-  for (int j = 0; j < nu_; ++j) input_[j] = std::isnan(measured_input[j]) ? input_guess[j] : measured_input[j];
+  const int n = nx_ + np_;
+  for (int j = 0; j < nu_; ++j) input_[j] = std::isfinite(measured_input[j]) ? measured_input[j] : input_guess[j];
   Model::Intervals request;
   request.count = 1;
   request.states = mean.data();
@@ -83,6 +96,7 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   request.next_states = next_.data();
   request.jacobians = jacobian_.data();
   model_->integrate(request);
+  transition_.setIdentity();
   for (int r = 0; r < nx_; ++r) {
     for (int c = 0; c < nx_; ++c) transition_(r, c) = jacobian_[c * nx_ + r];
     for (int c = 0; c < np_; ++c) {
@@ -93,7 +107,7 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   // Noise enters through the inputs and, on a ramp, through the change of the parameter over the interval.
   for (int c = 0; c < nu_; ++c) {
     const double wide = 100.0 * model_->description().inputs[c].scale;
-    const double sigma = std::isnan(measured_input[c]) ? wide : std::sqrt(noise_.input_variances[c]);
+    const double sigma = std::isfinite(measured_input[c]) ? std::sqrt(noise_.input_variances[c]) : wide;
     for (int r = 0; r < nx_; ++r) input_map_(r, c) = jacobian_[(nx_ + c) * nx_ + r] * sigma;
   }
   for (int c = 0; c < np_; ++c) {
@@ -104,10 +118,12 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
     input_map_(nx_ + c, nu_ + c) = sigma;
   }
   work_.noalias() = transition_.lazyProduct(covariance);
-  update_.noalias() = work_.lazyProduct(transition_.transpose());
-  update_.noalias() += input_map_.lazyProduct(input_map_.transpose());
-  work_ = update_.transpose();
-  covariance = 0.5 * (update_ + work_);
+  next_covariance_.noalias() = work_.lazyProduct(transition_.transpose());
+  next_covariance_.noalias() += input_map_.lazyProduct(input_map_.transpose());
+  const bool finite = std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); });
+  if (!finite || !next_covariance_.allFinite()) return;
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < n; ++r) covariance(r, c) = 0.5 * (next_covariance_(r, c) + next_covariance_(c, r));
   std::copy(next_.begin(), next_.end(), mean.data());
 }
 

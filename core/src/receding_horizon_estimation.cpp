@@ -22,8 +22,9 @@ constexpr int search_iterations = 12;
 RheProblem make_problem(std::shared_ptr<const Model> model, const RecedingHorizonEstimation::Setup& setup) {
   const auto np = static_cast<std::size_t>(model->parameter_count());
   if (setup.blockings.size() != np || setup.walks.size() != np)
-    throw Error(fmt::format("estimator: {} blockings and {} parameter walks given; expected {} of each, one a parameter",
-                            setup.blockings.size(), setup.walks.size(), np));
+    throw Error(
+        fmt::format("estimator: {} blockings and {} parameter walks given; expected {} of each, one a parameter",
+                    setup.blockings.size(), setup.walks.size(), np));
   const auto n = static_cast<Eigen::Index>(model->state_count() + np);
   if (setup.initial_mean.size() != n || setup.initial_covariance.rows() != n || setup.initial_covariance.cols() != n)
     throw Error(fmt::format("estimator: the initial mean and covariance must have the size {} of [x; p]", n));
@@ -60,7 +61,9 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
   scratch_.assign(problem_.scratch_size(), 0.0);
   inputs_.assign(problem_.model().input_count(), 0.0);
   outputs_.assign(problem_.model().output_count(), 0.0);
-  last_covariance_.assign(static_cast<std::size_t>(problem_.capacity().states) * problem_.capacity().states, 0.0);
+  const auto states = static_cast<std::size_t>(problem_.capacity().states);
+  covariances_.assign((intervals + 1) * states * states, 0.0);
+  last_state_ = setup_.initial_mean;
   reset();
 }
 
@@ -69,19 +72,73 @@ void RecedingHorizonEstimation::reset() noexcept {
   solver_->reset();
   shifter_.forget();
   window_ = {};
+  std::fill(first_starts_.begin(), first_starts_.end(), 0);
+  last_state_ = setup_.initial_mean;
   started_ = solved_ = prepared_ = false;
+  searching_ = setup_.heading_state >= 0 && setup_.heading_starts > 1;
 }
 
 void RecedingHorizonEstimation::start(const double* outputs) noexcept {
   reset();
   started_ = true;
   problem_.set_intervals(0);
-  std::copy_n(outputs, outputs_.size(), problem_.output(0));
+  take_outputs(0, outputs);
   arrival_.write(problem_);
   problem_.finish();
+  start_cold();
+}
+
+void RecedingHorizonEstimation::take_outputs(int node, const double* outputs) noexcept {
+  for (std::size_t j = 0; j < outputs_.size(); ++j)
+    problem_.output(node)[j] = is_measurement(outputs[j]) ? outputs[j] : missing;
+}
+
+void RecedingHorizonEstimation::take_inputs(int interval, const double* inputs) noexcept {
+  for (std::size_t j = 0; j < inputs_.size(); ++j)
+    problem_.measured_input(interval)[j] = is_measurement(inputs[j]) ? inputs[j] : missing;
+}
+
+/// A guess out of nothing: the prior, rolled out with the inputs as measured.
+void RecedingHorizonEstimation::start_cold() noexcept {
+  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
+  const auto& lower = problem_.setup().parameter_lower;
+  const auto& upper = problem_.setup().parameter_upper;
+  for (int j = 0; j < nx; ++j) point_.state(0)[j] = problem_.arrival_mean[j];
+  for (int j = 0; j < np; ++j)
+    point_.state(0)[nx + j] = std::min(std::max(problem_.arrival_mean[nx + j], lower[j]), upper[j]);
+  for (int i = 0; i < window_.intervals; ++i) {
+    double* w = point_.control(i);
+    for (std::size_t j = 0; j < inputs_.size(); ++j) {
+      const double measured = problem_.measured_input(i)[j];
+      w[j] = std::isnan(measured) ? 0.0 : measured;
+    }
+    for (int j = static_cast<int>(inputs_.size()), c = 0; c < np; ++c)
+      if (problem_.begins(i, c)) w[j++] = point_.state(0)[nx + c];
+  }
   point_.clear_multipliers();
-  for (int j = 0; j < problem_.capacity().states; ++j) point_.state(0)[j] = setup_.initial_mean[j];
-  roll_out(problem_, point_, scratch_);
+  problem_.simulate(point_, scratch_);
+}
+
+/// After a solve that came to nothing: leaves a guess that is finite, and from which the next solve starts anew.
+void RecedingHorizonEstimation::recover() noexcept {
+  const int N = window_.intervals;
+  const auto is_finite = [&] {
+    bool finite = true;
+    for (int i = 0; i <= N; ++i) {
+      for (int j = 0; j < problem_.capacity().states; ++j) finite = finite && std::isfinite(point_.state(i)[j]);
+      for (int j = 0; i < N && j < problem_.control_count(i); ++j)
+        finite = finite && std::isfinite(point_.control(i)[j]);
+    }
+    return finite;
+  };
+  if (!is_finite()) start_cold();
+  if (!is_finite()) {
+    // Not even the prior leads anywhere: the vehicle is where it was last.
+    for (int i = 0; i <= N; ++i) std::copy_n(last_state_.data(), last_state_.size(), point_.state(i));
+    for (int i = 0; i < N; ++i) std::fill_n(point_.control(i), problem_.control_count(i), 0.0);
+  }
+  point_.clear_multipliers();
+  solver_->reset();
 }
 
 void RecedingHorizonEstimation::slide_arrival() noexcept {
@@ -97,8 +154,8 @@ void RecedingHorizonEstimation::slide_arrival() noexcept {
     border.leaves_as_ramp = ramp && problem_.begins(0, static_cast<int>(j));
     border.ramp_variance = border.leaves_as_ramp ? problem_.link_variance(0, static_cast<int>(j)) : 0.0;
   }
-  const bool lost = setup_.heading_state >= 0 &&
-                    arrival_.covariance()(setup_.heading_state, setup_.heading_state) > uncertain_angle * uncertain_angle;
+  const bool lost = setup_.heading_state >= 0 && arrival_.covariance()(setup_.heading_state, setup_.heading_state) >
+                                                     uncertain_angle * uncertain_angle;
   arrival_.slide(problem_, point_, borders_, lost);
 }
 
@@ -113,13 +170,13 @@ void RecedingHorizonEstimation::set_structure() noexcept {
     begins_[0] = ramp && first_start == window_.first && window_.first > 0;
     problem_.set_blocks(j, begins_.data(), blocking.transition());
     std::int64_t block = begins_[0] ? first_starts_[k] : first_start;
-    const double restart = setup_.walks[k].restart_sigma;
+    const double alone = setup_.walks[k].block_sigma;
     const auto sigma = blocking.neighbour_sigma();
     for (int i = 0; i < window_.intervals; ++i) {
       if (!begins_[i]) continue;
       const std::int64_t start = window_.first + i;
       const double steps = std::max(1.0, static_cast<double>(start - block));
-      problem_.link(i, j, sigma ? *sigma * *sigma * steps : restart * restart);
+      problem_.link(i, j, sigma ? *sigma * *sigma * steps : alone * alone);
       block = start;
     }
     first_starts_[k] = first_start;
@@ -141,20 +198,29 @@ void RecedingHorizonEstimation::advance_window(double duration, const double* in
   const int last = window_.intervals;
   problem_.set_intervals(last);
   problem_.set_duration(last - 1, duration);
-  std::copy_n(inputs, inputs_.size(), problem_.measured_input(last - 1));
-  std::copy_n(outputs, outputs_.size(), problem_.output(last));
+  take_inputs(last - 1, inputs);
+  take_outputs(last, outputs);
   set_structure();
   arrival_.write(problem_);
-  if (was_empty || !shifter_.apply(full ? 1 : 0, problem_, point_)) {
-    for (std::size_t j = 0; j < inputs_.size(); ++j) point_.control(0)[j] = std::isnan(inputs[j]) ? 0.0 : inputs[j];
+  if (was_empty) {
+    for (std::size_t j = 0; j < inputs_.size(); ++j) {
+      const double measured = problem_.measured_input(0)[j];
+      point_.control(0)[j] = std::isnan(measured) ? 0.0 : measured;
+    }
     point_.clear_multipliers();
     problem_.simulate(point_, scratch_);
+  } else if (!shifter_.apply(full ? 1 : 0, problem_, point_)) {
+    start_cold();
   }
 }
 
 void RecedingHorizonEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
   if (!started_) {
     start(outputs);
+    return;
+  }
+  if (!(duration > 0.0) || !std::isfinite(duration)) {
+    amend(0, outputs);
     return;
   }
   solved_ = false;
@@ -165,26 +231,29 @@ void RecedingHorizonEstimation::add_node(double duration, const double* inputs, 
   // The window has moved already, with placeholders for what is now known. Where it fits, the linearisation stays good.
   prepared_ = false;
   const int last = window_.intervals;
-  bool fits = problem_.duration(last - 1) == duration;
+  const bool same_duration = problem_.duration(last - 1) == duration;
+  bool fits = same_duration;
   for (std::size_t j = 0; j < outputs_.size(); ++j)
-    fits = fits && std::isnan(problem_.output(last)[j]) == std::isnan(outputs[j]);
+    fits = fits && std::isnan(problem_.output(last)[j]) != is_measurement(outputs[j]);
   for (std::size_t j = 0; j < inputs_.size(); ++j)
-    fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) == std::isnan(inputs[j]);
+    fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) != is_measurement(inputs[j]);
   problem_.set_duration(last - 1, duration);
-  std::copy_n(inputs, inputs_.size(), problem_.measured_input(last - 1));
-  std::copy_n(outputs, outputs_.size(), problem_.output(last));
+  take_inputs(last - 1, inputs);
+  take_outputs(last, outputs);
+  if (!same_duration) problem_.simulate_interval(last - 1, point_, scratch_);
   if (!fits) solver_->prepare(problem_, point_);
 }
 
 bool RecedingHorizonEstimation::amend(int back, const double* outputs) noexcept {
   const int node = window_.intervals - (prepared_ ? 1 : 0) - back;
-  if (!started_ || node < 0) return false;
+  if (!started_ || back < 0 || node < 0) return false;
   bool masks_change = false;
   for (std::size_t j = 0; j < outputs_.size(); ++j) {
-    if (std::isnan(outputs[j])) continue;
+    if (!is_measurement(outputs[j])) continue;
     masks_change = masks_change || std::isnan(problem_.output(node)[j]);
     problem_.output(node)[j] = outputs[j];
   }
+  solved_ = solved_ && prepared_;
   if (masks_change && prepared_) solver_->prepare(problem_, point_);
   return true;
 }
@@ -233,22 +302,42 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
 
 void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count(), N = window_.intervals;
-  const int ns = problem_.capacity().states;
   const int heading = setup_.heading_state;
-  if (heading >= 0 && setup_.heading_starts > 1 &&
-      arrival_.covariance()(heading, heading) > uncertain_angle * uncertain_angle)
-    search_heading(deadline);
+  result.state.resize(nx);
+  result.parameters.resize(np);
+  result.covariance.resize(nx + np, nx + np);
+  // A window that was moved in advance ends in a node that is not there yet. What stands for it says nothing of the
+  // nodes before, once nothing is measured there.
+  const int newest = prepared_ ? N - 1 : N;
+  if (prepared_) {
+    std::fill_n(problem_.output(N), outputs_.size(), missing);
+    solver_->prepare(problem_, point_);
+  }
+  // Once found, a heading is followed, even where it grows uncertain again in a gap: it cannot have turned about unseen.
+  searching_ = searching_ && arrival_.covariance()(heading, heading) > uncertain_angle * uncertain_angle;
+  if (searching_) search_heading(deadline);
   result.report = solver_->solve(problem_, point_, deadline);
   result.fallback = !is_usable(result.report.status);
   result.predicted = false;
+  if (result.fallback) recover();
   solved_ = true;
-  for (int j = 0; j < nx; ++j) result.state[j] = point_.state(N)[j];
-  for (int j = 0; j < np; ++j) result.parameters[j] = point_.state(N)[nx + j];
+  std::copy_n(point_.state(newest), nx + np, last_state_.data());
+  result.state = last_state_.head(nx);
+  result.parameters = last_state_.tail(np);
+  write_covariance(newest, result);
+}
+
+/// Of the state of a node and the parameters before it. Where it comes to nothing, the last one stays.
+void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noexcept {
+  const int n = static_cast<int>(last_state_.size()), ns = problem_.capacity().states;
   problem_.linearise(all_stages(problem_), point_, Hessian::gauss_newton, covariance_qp_, scratch_);
   covariance_riccati_.factor(covariance_qp_, no_active_bounds_);
-  covariance_riccati_.covariances(covariance_qp_, nullptr, last_covariance_.data());
-  for (int c = 0; c < nx + np; ++c)
-    for (int r = 0; r < nx + np; ++r) result.covariance(r, c) = last_covariance_[c * ns + r];
+  const bool is_last = node == window_.intervals;
+  double* of_node = covariances_.data() + (is_last ? 0 : static_cast<std::ptrdiff_t>(node) * ns * ns);
+  covariance_riccati_.covariances(covariance_qp_, is_last ? nullptr : covariances_.data(), is_last ? of_node : nullptr);
+  if (!std::all_of(of_node, of_node + ns * ns, [](double value) { return std::isfinite(value); })) return;
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < n; ++r) result.covariance(r, c) = of_node[c * ns + r];
 }
 
 }  // namespace rhec

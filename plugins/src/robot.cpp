@@ -31,12 +31,63 @@ const Settings& member_or_null(const Settings& map, std::string_view key) {
 /// The plugin named by `name` in a section, or the default.
 std::string plugin_name(const Settings& section, std::string_view otherwise) {
   if (section.is_null()) return std::string(otherwise);
-  if (section.kind() != Settings::Kind::map) throw section.mismatch("a map with the key 'name' and the plugin's options");
+  if (section.kind() != Settings::Kind::map)
+    throw section.mismatch("a map with the key 'name' and the plugin's options");
   const Settings* name = section.find("name");
   return name ? name->as_text() : std::string(otherwise);
 }
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// Defaults of what is given by the names of variables; the documentation is made of them too.
+constexpr double noise_share = 0.01, initial_share = 0.1, parameter_share = 1.0;  // of a variable's typical magnitude
+constexpr double position_weight = 1.0, terminal_weight = 10.0, input_weight = 5.0;
+constexpr const char *default_model = "bicycle_slip", *default_solver = "gn_rti", *default_blocking = "full_horizon",
+                     *default_input_blocking = "unblocked";
+
+/// True where a message begins with a place that is written in this part of the settings.
+bool names_place_of(const Settings& settings, std::string_view message) {
+  const std::string& file = settings.origin().file;
+  if (!file.empty() && message.starts_with(file + ":")) return true;
+  const auto in_item = [&](const Settings& item) { return names_place_of(item, message); };
+  const auto in_member = [&](const auto& member) { return names_place_of(member.second, message); };
+  return std::any_of(settings.items().begin(), settings.items().end(), in_item) ||
+         std::any_of(settings.members().begin(), settings.members().end(), in_member);
+}
+
+/// What `make` makes of a section. A plugin that finds its options at odds with each other does not know where they are
+/// written: its error gets the section's place.
+template <class Make>
+auto made_from(const Settings& section, const Make& make) {
+  try {
+    return make();
+  } catch (const Error& mistake) {
+    if (section.is_null() || names_place_of(section, mistake.what())) throw;
+    throw section.error(mistake.what());
+  }
+}
+
+std::shared_ptr<Blocking> blocking_of(const Host& host, const Settings& section, std::string_view otherwise) {
+  return made_from(section, [&] { return host.make_blocking(plugin_name(section, otherwise), section); });
+}
+
+std::shared_ptr<Solver> solver_of(const Host& host, const Settings& section) {
+  return made_from(section, [&] { return host.make_solver(plugin_name(section, default_solver), section); });
+}
+
+struct ArrivalOptions {
+  ArrivalKind name = ArrivalKind::ekf;
+
+  static const OptionTable<ArrivalOptions>& table() {
+    static const auto rows = OptionTable<ArrivalOptions>().choice("name", &ArrivalOptions::name,
+                                                                  {{"ekf", ArrivalKind::ekf},
+                                                                   {"smoothing", ArrivalKind::smoothing},
+                                                                   {"constant", ArrivalKind::constant},
+                                                                   {"off", ArrivalKind::off}},
+                                                                  "how what has left the window is remembered");
+    return rows;
+  }
+};
 
 }  // namespace
 
@@ -47,9 +98,12 @@ void require_known_keys(const Settings& map, const std::vector<std::string>& kno
 std::vector<double> numbers_by_name(const Settings& map, const std::vector<Variable>& variables,
                                     std::vector<double> defaults, const Range& range, const std::string& owner) {
   require_known_keys(map, names_of(variables), owner);
-  for (std::size_t j = 0; j < variables.size(); ++j)
-    if (const Settings* value = map.find(variables[j].name))
-      defaults[j] = NumberValue{range}.read(*value, OptionContext{owner, variables[j].unit});
+  for (std::size_t j = 0; j < variables.size(); ++j) {
+    const Settings* value = map.find(variables[j].name);
+    if (!value) continue;
+    defaults[j] = NumberValue{range}.read(*value, OptionContext{owner, variables[j].unit});
+    if (!std::isfinite(defaults[j])) throw value->mismatch("a finite number");
+  }
   return defaults;
 }
 
@@ -65,22 +119,25 @@ const OptionTable<RobotOptions>& RobotOptions::table() {
 const OptionTable<EstimatorOptions>& EstimatorOptions::table() {
   static const auto rows =
       OptionTable<EstimatorOptions>()
-          .choice("name", &EstimatorOptions::name,
-                  {{"rhe", Name::rhe}, {"ekf", Name::ekf}, {"truth", Name::truth}},
+          .choice("name", &EstimatorOptions::name, {{"rhe", Name::rhe}, {"ekf", Name::ekf}, {"truth", Name::truth}},
                   "rhe: receding horizon; ekf: extended Kalman filter; truth: what the simulation knows")
           .integer("horizon", &EstimatorOptions::horizon, "N_e, intervals", between(1, 100000))
           .integer("substeps", &EstimatorOptions::substeps, "Runge-Kutta steps per interval", between(1, 1000))
           .subtree("arrival", &EstimatorOptions::arrival, "name: ekf | smoothing | constant | off")
           .subtree("forgetting", &EstimatorOptions::forgetting,
                    "by parameter: standard deviation per square root of a step, added at each slide (0.03)")
-          .subtree("restart_sigma", &EstimatorOptions::restart_sigma,
-                   "by parameter: standard deviation with which an unlinked block starts (1)")
+          .subtree(
+              "restart_sigma", &EstimatorOptions::restart_sigma,
+              "by parameter: standard deviation with which an unlinked block starts once it is the window's first (1)")
+          .subtree("block_sigma", &EstimatorOptions::block_sigma,
+                   "by parameter: the same for a block inside the window; .inf: none, as in the paper (0.25)")
           .subtree("initial", &EstimatorOptions::initial,
                    "state, parameters: means by name; sigma: standard deviations by name")
           .subtree("robust", &EstimatorOptions::robust,
                    "outputs: names that share one pseudo-Huber loss; delta: where it turns linear, in sigmas")
           .integer("heading_starts", &EstimatorOptions::heading_starts,
-                   "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
+                   "starts around the circle while the heading is unknown; 1: the initial mean is trusted",
+                   between(1, 64))
           .subtree("solver", &EstimatorOptions::solver, "name and options of a solver plugin");
   return rows;
 }
@@ -104,17 +161,82 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
   return rows;
 }
 
+std::vector<OptionSection> robot_sections() {
+  const auto number = [](double value) { return fmt::format("{}", value); };
+  // The rows of a table, those of its maps spelt out.
+  const auto spelt_out = [](std::vector<OptionRow> rows, const std::vector<OptionRow>& details) {
+    std::erase_if(rows, [](const OptionRow& row) { return row.type == SubtreeValue{}.type(); });
+    rows.insert(rows.end(), details.begin(), details.end());
+    return rows;
+  };
+  std::vector<OptionRow> estimator = ArrivalOptions::table().schema();
+  for (OptionRow& row : estimator) row.name = "arrival." + row.name;
+  const std::vector<OptionRow> by_name = {
+      {"forgetting.PARAMETER", "number", number(ParameterWalk{}.forgetting), at_least(0.0).text(),
+       "standard deviation per square root of a step, added at each slide"},
+      {"restart_sigma.PARAMETER", "number", number(ParameterWalk{}.restart_sigma), greater_than(0.0).text(),
+       "standard deviation with which an unlinked block starts once it is the window's first"},
+      {"block_sigma.PARAMETER", "number", number(ParameterWalk{}.block_sigma), greater_than(0.0).text(),
+       "standard deviation of an unlinked block inside the window about the block before; .inf: none, as in the paper"},
+      {"initial.state.STATE", "number", "0; in a simulation the true start", "", "mean at the start"},
+      {"initial.parameters.PARAMETER", "number", "the middle of its bounds, else 0", "", "mean at the start"},
+      {"initial.sigma.STATE", "number", number(initial_share) + " x its typical magnitude", greater_than(0.0).text(),
+       "standard deviation at the start"},
+      {"initial.sigma.PARAMETER", "number", number(parameter_share) + " x its typical magnitude",
+       greater_than(0.0).text(), "standard deviation at the start"},
+      {"robust.outputs", "list of texts", "[]", "outputs", "these share one pseudo-Huber loss"},
+      {"robust.delta", "number", number(RobustLoss{}.delta), greater_than(0.0).text(),
+       "where that loss turns from quadratic to linear, in standard deviations"},
+      {"solver.name", "text", default_solver, "a solver plugin", "its options stand beside the name"},
+  };
+  estimator.insert(estimator.end(), by_name.begin(), by_name.end());
+  const std::vector<OptionRow> controller = {
+      {"weights.stage.STATE", "number", fmt::format("{} for the position, else 0", position_weight),
+       at_least(0.0).text(), "of the squared distance from the reference at a node"},
+      {"weights.stage.INPUT", "number", number(input_weight), at_least(0.0).text(),
+       "of the squared distance from the reference on an interval"},
+      {"weights.terminal.STATE", "number", fmt::format("{} for the position, else 0", terminal_weight),
+       at_least(0.0).text(), "of the squared distance from the reference at the last node"},
+      {"blocking.INPUT.name", "text", default_input_blocking, "a blocking plugin",
+       "move blocking; its options stand beside the name; an input that is not named is free on every interval"},
+      {"solver.name", "text", default_solver, "a solver plugin", "its options stand beside the name"},
+  };
+  const std::string noise_default = number(noise_share) + " x its typical magnitude";
+  return {
+      {"model",
+       "The vehicle.",
+       {{"name", "text", default_model, "a model plugin", "its options stand beside the name"}}},
+      {"noise",
+       "Standard deviations of what is measured, in the variable's unit; a simulation draws its noise from them too.",
+       {{"outputs.OUTPUT", "number", noise_default, greater_than(0.0).text(), "of a measured output"},
+        {"inputs.INPUT", "number", noise_default, greater_than(0.0).text(), "of a measured input"}}},
+      {"bounds",
+       "Lower and upper bounds. Those of states hold for estimator and controller, those of parameters for the "
+       "estimator, "
+       "those of inputs for the controller.",
+       {{"STATE, INPUT or PARAMETER", "list of 2 numbers", "the model's own", "lower <= upper; null for none",
+         "[lower, upper]"}}},
+      {"blocking",
+       "Which intervals of the estimator share one value of a parameter.",
+       {{"PARAMETER.name", "text", default_blocking, "a blocking plugin", "its options stand beside the name"}}},
+      {"estimator", "How state and parameters are estimated.",
+       spelt_out(EstimatorOptions::table().schema(), estimator)},
+      {"controller", "How the path is followed.", spelt_out(ControllerOptions::table().schema(), controller)},
+  };
+}
+
 Robot::Robot(const Host& host, const RobotOptions& options)
     : host_(host),
       options_(options),
       estimator_(EstimatorOptions::table().parse(options.estimator, "estimator")),
       controller_(ControllerOptions::table().parse(options.controller, "controller")) {
-  model_ = host.make_model(plugin_name(options.model, "bicycle_slip"), options.model);
+  model_ = made_from(options.model,
+                     [&] { return host.make_model(plugin_name(options.model, default_model), options.model); });
   const ModelDescription& about = model_->description();
   require_known_keys(options.noise, {"outputs", "inputs"}, "noise");
   const auto scales = [](const std::vector<Variable>& variables) {
     std::vector<double> values;
-    for (const Variable& variable : variables) values.push_back(0.01 * variable.scale);
+    for (const Variable& variable : variables) values.push_back(noise_share * variable.scale);
     return values;
   };
   output_sigmas_ = numbers_by_name(member_or_null(options.noise, "outputs"), about.outputs, scales(about.outputs),
@@ -123,6 +245,23 @@ Robot::Robot(const Host& host, const RobotOptions& options)
                                   greater_than(0.0), "noise of inputs");
   read_bounds();
   require_known_keys(options.blocking, names_of(about.parameters), "blocking");
+  check_estimator();
+}
+
+/// Also what the estimator of this name does not use: a mistake there would show only once another one is chosen.
+void Robot::check_estimator() const {
+  const ModelDescription& about = model_->description();
+  const std::vector<double> none(about.parameters.size(), 0.0);
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+  read_initial({}, mean, covariance);
+  read_robust();
+  ArrivalOptions::table().parse(estimator_.arrival, "estimator: arrival");
+  numbers_by_name(estimator_.forgetting, about.parameters, none, at_least(0.0), "forgetting");
+  numbers_by_name(estimator_.restart_sigma, about.parameters, none, greater_than(0.0), "restart_sigma");
+  numbers_by_name(estimator_.block_sigma, about.parameters, none, greater_than(0.0), "block_sigma");
+  for (const Variable& parameter : about.parameters)
+    blocking_of(host_, member_or_null(options_.blocking, parameter.name), default_blocking);
 }
 
 Robot Robot::from_file(const Host& host, const std::string& yaml_file) {
@@ -135,7 +274,8 @@ void Robot::read_bounds() {
   for (const auto* variables : {&about.states, &about.inputs, &about.parameters})
     for (const Variable& variable : *variables) known.push_back(variable.name);
   require_known_keys(options_.bounds, known, "bounds");
-  const auto read = [&](const std::vector<Variable>& variables, std::vector<double>& lower, std::vector<double>& upper) {
+  const auto read = [&](const std::vector<Variable>& variables, std::vector<double>& lower,
+                        std::vector<double>& upper) {
     for (const Variable& variable : variables) {
       double low = variable.lower, high = variable.upper;
       if (const Settings* pair = options_.bounds.find(variable.name)) {
@@ -144,7 +284,7 @@ void Robot::read_bounds() {
         const Settings &first = pair->items()[0], &second = pair->items()[1];
         low = first.is_null() ? -infinity : first.as_number();
         high = second.is_null() ? infinity : second.as_number();
-        if (!(low <= high)) throw pair->mismatch("lower <= upper");
+        if (!(low <= high)) throw pair->error(fmt::format("found [{}, {}], expected lower <= upper", low, high));
       }
       lower.push_back(low);
       upper.push_back(high);
@@ -173,8 +313,8 @@ void Robot::read_initial(const std::optional<Eigen::VectorXd>& initial_state, Ei
   std::vector<Variable> both = about.states;
   both.insert(both.end(), about.parameters.begin(), about.parameters.end());
   std::vector<double> sigma;
-  for (const Variable& variable : about.states) sigma.push_back(0.1 * variable.scale);
-  for (const Variable& variable : about.parameters) sigma.push_back(variable.scale);
+  for (const Variable& variable : about.states) sigma.push_back(initial_share * variable.scale);
+  for (const Variable& variable : about.parameters) sigma.push_back(parameter_share * variable.scale);
   sigma = numbers_by_name(member_or_null(estimator_.initial, "sigma"), both, sigma, greater_than(0.0), "initial sigma");
   mean.resize(nx + np);
   covariance.setZero(nx + np, nx + np);
@@ -216,26 +356,21 @@ std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::Vect
   setup.problem.state_upper = state_upper_;
   setup.problem.parameter_lower = parameter_lower_;
   setup.problem.parameter_upper = parameter_upper_;
-  struct Arrival {
-    ArrivalKind name = ArrivalKind::ekf;
-  };
-  static const auto arrival_table =
-      OptionTable<Arrival>().choice("name", &Arrival::name,
-                                    {{"ekf", ArrivalKind::ekf},
-                                     {"smoothing", ArrivalKind::smoothing},
-                                     {"constant", ArrivalKind::constant},
-                                     {"off", ArrivalKind::off}},
-                                    "how what has left the window is remembered");
-  setup.arrival = arrival_table.parse(estimator_.arrival, "estimator: arrival").name;
+  setup.arrival = ArrivalOptions::table().parse(estimator_.arrival, "estimator: arrival").name;
   const std::size_t np = about.parameters.size();
-  const auto forgetting = numbers_by_name(estimator_.forgetting, about.parameters, std::vector<double>(np, 0.03),
-                                          at_least(0.0), "forgetting");
-  const auto restart = numbers_by_name(estimator_.restart_sigma, about.parameters, std::vector<double>(np, 1.0),
-                                       greater_than(0.0), "restart_sigma");
+  const auto forgetting =
+      numbers_by_name(estimator_.forgetting, about.parameters, std::vector<double>(np, ParameterWalk{}.forgetting),
+                      at_least(0.0), "forgetting");
+  const auto restart =
+      numbers_by_name(estimator_.restart_sigma, about.parameters,
+                      std::vector<double>(np, ParameterWalk{}.restart_sigma), greater_than(0.0), "restart_sigma");
+  const auto alone =
+      numbers_by_name(estimator_.block_sigma, about.parameters, std::vector<double>(np, ParameterWalk{}.block_sigma),
+                      greater_than(0.0), "block_sigma");
   for (std::size_t j = 0; j < np; ++j) {
-    setup.walks.push_back({forgetting[j], restart[j]});
+    setup.walks.push_back({forgetting[j], restart[j], alone[j]});
     const Settings& section = member_or_null(options_.blocking, about.parameters[j].name);
-    auto blocking = host_.make_blocking(plugin_name(section, "full_horizon"), section);
+    auto blocking = blocking_of(host_, section, default_blocking);
     if (const std::string reason = blocking->why_not(estimator_.horizon); !reason.empty())
       throw section.error(fmt::format("{}; change it or estimator.horizon", reason));
     setup.blockings.push_back(std::move(blocking));
@@ -244,7 +379,7 @@ std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::Vect
   setup.initial_covariance = covariance;
   setup.heading_starts = estimator_.heading_starts;
   setup.heading_state = about.roles.heading;
-  auto solver = host_.make_solver(plugin_name(estimator_.solver, "gn_rti"), estimator_.solver);
+  auto solver = solver_of(host_, estimator_.solver);
   return std::make_unique<RecedingHorizonEstimation>(model_, std::move(solver), std::move(setup));
 }
 
@@ -254,7 +389,9 @@ std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::Vect
   read_initial(initial_state, mean, covariance);
   std::unique_ptr<EstimationMethod> method;
   switch (estimator_.name) {
-    case EstimatorOptions::Name::rhe: method = make_receding_horizon(mean, covariance); break;
+    case EstimatorOptions::Name::rhe:
+      method = make_receding_horizon(mean, covariance);
+      break;
     case EstimatorOptions::Name::ekf: {
       FilterEstimation::Setup setup;
       for (const double sigma : output_sigmas_) setup.noise.output_variances.push_back(sigma * sigma);
@@ -262,7 +399,8 @@ std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::Vect
       setup.noise.parameter_lower = parameter_lower_;
       setup.noise.parameter_upper = parameter_upper_;
       setup.walk = numbers_by_name(estimator_.forgetting, model_->description().parameters,
-                                   std::vector<double>(model_->parameter_count(), 0.03), at_least(0.0), "forgetting");
+                                   std::vector<double>(model_->parameter_count(), ParameterWalk{}.forgetting),
+                                   at_least(0.0), "forgetting");
       setup.initial_mean = mean;
       setup.initial_covariance = covariance;
       setup.substeps = estimator_.substeps;
@@ -285,11 +423,11 @@ std::unique_ptr<Controller> Robot::make_controller(const Path& path) const {
   Controller::Setup setup;
   setup.problem.max_intervals = controller_.horizon;
   setup.problem.substeps = controller_.substeps;
-  std::vector<double> position(nx, 0.0), terminal(nx, 0.0), inputs(nu, 5.0);
+  std::vector<double> position(nx, 0.0), terminal(nx, 0.0), inputs(nu, input_weight);
   for (const int j : {about.roles.position_x, about.roles.position_y}) {
     if (j < 0) continue;
-    position[j] = 1.0;
-    terminal[j] = 10.0;
+    position[j] = position_weight;
+    terminal[j] = terminal_weight;
   }
   require_known_keys(controller_.weights, {"stage", "terminal"}, "controller: weights");
   std::vector<Variable> both = about.states;
@@ -315,12 +453,15 @@ std::unique_ptr<Controller> Robot::make_controller(const Path& path) const {
     const Settings* section = controller_.blocking.find(about.inputs[j].name);
     if (!section) continue;
     setup.problem.blocked_inputs.push_back(j);
-    auto blocking = host_.make_blocking(plugin_name(*section, "unblocked"), *section);
+    auto blocking = blocking_of(host_, *section, default_input_blocking);
     if (const std::string reason = blocking->why_not(controller_.horizon); !reason.empty())
       throw section->error(fmt::format("{}; change it or controller.horizon", reason));
+    if (blocking->transition() != Transition::step || blocking->neighbour_sigma())
+      throw section->error(
+          "an input jumps from block to block and no walk links its blocks; drop transition and neighbour_sigma");
     setup.blockings.push_back(std::move(blocking));
   }
-  auto solver = host_.make_solver(plugin_name(controller_.solver, "gn_rti"), controller_.solver);
+  auto solver = solver_of(host_, controller_.solver);
   return std::make_unique<Controller>(model_, std::move(solver), path, std::move(setup));
 }
 

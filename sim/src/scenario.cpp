@@ -1,6 +1,7 @@
 #include "rhec/sim/scenario.hpp"
 
 #include <filesystem>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -33,8 +34,8 @@ const OptionTable<PathOptions>& path_table() {
   using P = PathOptions;
   static const auto rows =
       OptionTable<P>()
-          .choice("name", &P::name, {{"figure8", P::Name::figure8}, {"zigzag", P::Name::zigzag}, {"file", P::Name::file}},
-                  "which path")
+          .choice("name", &P::name,
+                  {{"figure8", P::Name::figure8}, {"zigzag", P::Name::zigzag}, {"file", P::Name::file}}, "which path")
           .integer("laps", &P::laps, "of figure8", between(1, 1000))
           .number("radius", &P::radius, "of the circles of figure8 [m]", greater_than(0.0))
           .integer("legs", &P::legs, "of zigzag", between(1, 1000))
@@ -62,52 +63,92 @@ const OptionTable<TerrainOptions>& terrain_table() {
           .number("upper", &T::upper, "largest value of gaussian and patches")
           .subtree("values", &T::values, "of constant: by parameter (1)")
           .names("files", &T::files, "of raster: one a parameter")
-          .choice("interpolation", &T::interpolation,
-                  {{"bilinear", RasterField::Interpolation::bilinear}, {"nearest", RasterField::Interpolation::nearest}},
-                  "of raster");
+          .choice(
+              "interpolation", &T::interpolation,
+              {{"bilinear", RasterField::Interpolation::bilinear}, {"nearest", RasterField::Interpolation::nearest}},
+              "of raster");
   return rows;
 }
 
-/// A file named in a scenario is meant beside it, unless it is absolute or is found where the user stands.
-std::filesystem::path beside(const Settings& section, const std::string& file) {
-  const std::filesystem::path given(file);
-  if (given.is_absolute()) return given;
-  const std::filesystem::path near = std::filesystem::path(section.origin().file).parent_path() / given;
-  return std::filesystem::exists(near) ? near : given;
+const OptionTable<TruthOptions>& vehicle_table() {
+  static const auto rows =
+      OptionTable<TruthOptions>()
+          .number("step", &TruthOptions::step, "largest integration step of the truth [s]", between(1e-6, 1.0))
+          .flag("mechanical_stops", &TruthOptions::mechanical_stops, "bounded states cannot leave their bounds");
+  return rows;
+}
+
+/// A file that a scenario names is meant beside it; one that the command line names, where the user stands.
+std::filesystem::path file_at(const Settings& named) {
+  const std::filesystem::path given(named.as_text());
+  const bool in_a_file = named.origin().line > 0;
+  const std::filesystem::path folder = in_a_file ? std::filesystem::path(named.origin().file).parent_path() : "";
+  if (std::filesystem::exists(folder / given)) return folder / given;
+  throw named.error(
+      fmt::format("found '{}', expected a file; there is no {}", given.string(), (folder / given).string()));
+}
+
+/// The key of a section; the section itself where it does not have it.
+const Settings& key_or_section(const Settings& section, std::string_view key) {
+  const Settings* found = section.find(key);
+  return found ? *found : section;
+}
+
+// A path or a run beyond this is a slip of a unit, and would not fit into memory.
+constexpr double most_waypoints = 2e6, most_samples = 1e6;
+
+void require_few_waypoints(const Settings& section, double length, double spacing) {
+  if (length / spacing <= most_waypoints) return;
+  throw key_or_section(section, "spacing")
+      .error(fmt::format("a path of {:.4g} m has a waypoint every {} m, more than {:g} of them; make it shorter or the "
+                         "spacing larger",
+                         length, spacing, most_waypoints));
 }
 
 std::vector<Waypoint> make_waypoints(const ScenarioOptions& options, int speed_input) {
   const PathOptions path = path_table().parse(options.path, "path");
   switch (path.name) {
     case PathOptions::Name::figure8:
+      require_few_waypoints(options.path, path.laps * 4.0 * std::numbers::pi * path.radius, path.spacing);
       return figure_eight({options.speed, path.laps, path.radius, path.spacing, speed_input});
     case PathOptions::Name::zigzag:
+      require_few_waypoints(options.path, path.legs * (path.leg_length + std::numbers::pi * path.turn_radius),
+                            path.spacing);
       return zig_zag({options.speed, path.legs, path.leg_length, path.turn_radius, path.spacing, speed_input});
     case PathOptions::Name::file:
-      if (path.file.empty()) throw options.path.error("path.name is 'file'; expected path.file, a CSV file of waypoints x, y (, speed)");
-      return load_waypoints(beside(options.path, path.file), {options.speed, speed_input});
+      if (path.file.empty())
+        throw key_or_section(options.path, "name")
+            .error("found 'file', but no path.file; expected there a CSV file of waypoints x, y (, speed)");
+      return load_waypoints(file_at(*options.path.find("file")), {options.speed, speed_input});
   }
   return {};
 }
 
 std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, const ModelDescription& about) {
   const TerrainOptions terrain = terrain_table().parse(options.terrain, "terrain");
-  if (!(terrain.lower <= terrain.upper)) throw options.terrain.error("lower is above upper; expected lower <= upper");
+  if (!(terrain.lower <= terrain.upper))
+    throw key_or_section(options.terrain, "lower")
+        .error(fmt::format("lower is {} and upper is {}; expected lower <= upper", terrain.lower, terrain.upper));
+  const std::vector<double> constant = numbers_by_name(
+      terrain.values, about.parameters, std::vector<double>(about.parameters.size(), 1.0), any(), "terrain values");
   const std::vector<SlipRange> ranges(about.parameters.size(), SlipRange{terrain.lower, terrain.upper});
   const auto seed = static_cast<std::uint64_t>(options.seed);
   switch (terrain.name) {
     case TerrainOptions::Name::gaussian:
       return gaussian_random_field({seed, ranges, terrain.correlation_length, terrain.period});
-    case TerrainOptions::Name::patches: return patch_field({seed, ranges, terrain.patch_size});
+    case TerrainOptions::Name::patches:
+      return patch_field({seed, ranges, terrain.patch_size});
     case TerrainOptions::Name::constant:
-      return constant_field(numbers_by_name(terrain.values, about.parameters,
-                                            std::vector<double>(about.parameters.size(), 1.0), any(), "terrain values"));
+      return constant_field(constant);
     case TerrainOptions::Name::raster: {
       if (terrain.files.size() != about.parameters.size())
-        throw options.terrain.error(fmt::format("files: {} given; expected {}, one a parameter of the model",
-                                                terrain.files.size(), about.parameters.size()));
+        throw key_or_section(options.terrain, "files")
+            .error(fmt::format("{} raster files given; expected {}, one a parameter of the model", terrain.files.size(),
+                               about.parameters.size()));
       RasterField raster;
-      for (const std::string& file : terrain.files) raster.files.push_back(beside(options.terrain, file));
+      if (terrain.files.empty())
+        throw options.terrain.error("the model has no parameters; a raster has nothing to say");
+      for (const Settings& file : options.terrain.find("files")->items()) raster.files.push_back(file_at(file));
       raster.interpolation = terrain.interpolation;
       return raster_field(raster);
     }
@@ -139,16 +180,31 @@ const OptionTable<ScenarioOptions>& ScenarioOptions::table() {
   return rows;
 }
 
+std::vector<OptionSection> scenario_sections() {
+  std::vector<OptionSection> sections = {
+      {"", "A scenario: a robot, and the world that it drives in.", ScenarioOptions::table().schema()},
+      {"path", "What the robot shall follow.", path_table().schema()},
+      {"terrain", "The ground: the true parameters of the model as a function of position.", terrain_table().schema()},
+      {"vehicle", "The vehicle as it really moves.", vehicle_table().schema()},
+  };
+  OptionRow values{"values.PARAMETER", "number", "1", "", "of constant"};
+  for (OptionRow& row : sections[2].rows)
+    if (row.name == "values") row = values;
+  for (OptionSection& section : robot_sections()) sections.push_back(std::move(section));
+  return sections;
+}
+
 Scenario::Scenario(const Host& host, const Settings& settings)
     : options_(ScenarioOptions::table().parse(settings, "scenario")),
       robot_(host, options_),
       path_(make_waypoints(options_, speed_input_of(robot_)), robot_.model()->input_count()),
       terrain_(make_terrain(options_, robot_.model()->description())) {
-  static const auto vehicle_table =
-      OptionTable<TruthOptions>()
-          .number("step", &TruthOptions::step, "largest integration step of the truth [s]", greater_than(0.0))
-          .flag("mechanical_stops", &TruthOptions::mechanical_stops, "bounded states cannot leave their bounds");
-  vehicle_ = vehicle_table.parse(options_.vehicle, "vehicle");
+  vehicle_ = vehicle_table().parse(options_.vehicle, "vehicle");
+  const double samples = path_.length() / (options_.speed * options_.step);
+  if (!(samples >= 1.0 && samples <= most_samples))
+    throw key_or_section(settings, "step")
+        .error(fmt::format("a path of {:.4g} m at {} m/s has {:.4g} steps of {} s; expected between 1 and {:g}",
+                           path_.length(), options_.speed, samples, options_.step, most_samples));
   const Roles& roles = robot_.model()->description().roles;
   const PathPoint start = path_.point_at(0.0);
   initial_state_ = Eigen::VectorXd::Zero(robot_.model()->state_count());

@@ -102,7 +102,7 @@ inline std::shared_ptr<Solver> gn_rti(const std::string& options = "{mode: rti}"
 /// What is measured in a run. Sample 0 has outputs only.
 struct Sample {
   double duration = 0.0;
-  std::vector<double> inputs, outputs;
+  std::vector<double> inputs = {}, outputs = {};
 };
 
 struct Noise {
@@ -128,8 +128,8 @@ inline Eigen::MatrixXd initial_covariance(const Model& model) {
   return root * root.transpose();
 }
 
-/// A run with noise, a parameter that wanders, intervals of equal or of different lengths, and gaps: single outputs, and
-/// whole nodes.
+/// A run with noise, a parameter that wanders, intervals of equal or of different lengths, and gaps: single outputs,
+/// and whole nodes.
 inline std::vector<Sample> simulate(const Model& model, int steps, bool equal_intervals, unsigned seed) {
   std::mt19937_64 bits(seed);
   std::normal_distribution<double> normal;
@@ -176,8 +176,8 @@ inline std::vector<Sample> simulate(const Model& model, int steps, bool equal_in
 
 /// How a parameter moves: at which intervals it changes, by what variance, and whether within the interval.
 struct Change {
-  int size = 1;            ///< blocks start at multiples of it; 0: never
-  double variance = 0.0;   ///< a step
+  int size = 1;           ///< blocks start at multiples of it; 0: never
+  double variance = 0.0;  ///< a step
   bool ramp = false;
   double forgetting = 0.0;  ///< variance added at every interval but the first, wherever blocks start
 };
@@ -283,7 +283,8 @@ inline double deviation(const Estimate& estimate, const ReferenceFilter& referen
     const double value = r < nx ? estimate.state[r] : estimate.parameters[r - nx];
     add(std::abs(static_cast<double>(value - reference.mean[r])) / sigma(r));
     for (Eigen::Index c = 0; c < n; ++c)
-      add(std::abs(static_cast<double>(estimate.covariance(r, c) - reference.covariance(r, c))) / (sigma(r) * sigma(c)));
+      add(std::abs(static_cast<double>(estimate.covariance(r, c) - reference.covariance(r, c))) /
+          (sigma(r) * sigma(c)));
   }
   return worst;
 }

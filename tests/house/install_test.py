@@ -4,9 +4,11 @@
     install_test.py <build directory> --source <source root> [--cxxflags <flags>] [--cmake <cmake>] [--cxx <compiler>]
 """
 import argparse
+import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -115,6 +117,27 @@ def check_consumer(prefix, work, arguments):
     return len(headers)
 
 
+def check_examples(prefix, work, arguments):
+    """What the README shows, built as a reader would: a program with a robot in it, and a model as a plugin."""
+    settings = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={arguments.cxxflags}", "-DCMAKE_BUILD_TYPE=Debug"]
+    if arguments.cxx:
+        settings.append(f"-DCMAKE_CXX_COMPILER={arguments.cxx}")
+    for name in ("robot", "model"):
+        source, build = work / "examples" / name, work / f"build-{name}"
+        shutil.copytree(arguments.source / "examples" / name, source)
+        run(arguments.cmake, "-S", source, "-B", build, *settings)
+        run(arguments.cmake, "--build", build)
+    robot, model = work / "examples" / "robot", work / "examples" / "model"
+    lines = run(work / "build-robot" / "robot", robot / "robot.yaml", cwd="/").splitlines()
+    expect(len(lines) > 20 and "kappa 0.7" in lines[-1], "the robot did not learn its slip:\n" + "\n".join(lines))
+    rhec, out = prefix / "bin" / "rhec", work / "out"
+    run(rhec, "run", model / "field.yaml", "--plugin-path", work / "build-model", "--out", out, cwd="/")
+    summary = json.loads((out / "summary.json").read_text())
+    expect(summary["completed"] and summary["mae"]["kappa"] < 0.05, f"the model outside does not drive: {summary['mae']}")
+    run(arguments.cmake, "--install", work / "build-model")
+    expect("skid_steer" in run(rhec, "plugins", cwd="/"), "the model outside is not found once it is installed")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("build", type=pathlib.Path)
@@ -131,7 +154,8 @@ def main():
         check_relocatable(moved, [str(place.resolve()) for place in (arguments.build, arguments.source, first)])
         plugins = check_plugins(moved)
         headers = check_consumer(moved, work, arguments)
-    print(f"install: moved, {plugins} plugins seen, {headers} headers included from outside")
+        check_examples(moved, work, arguments)
+    print(f"install: moved, {plugins} plugins seen, {headers} headers included from outside, examples run")
 
 
 if __name__ == "__main__":

@@ -8,8 +8,8 @@
 
 namespace rhec {
 
-/// Extended Kalman filter with random-walk parameters behind the Estimator: the baseline. Where the heading at the start is
-/// unknown, a bank of filters with starts around the circle runs until one explains the measurements best.
+/// Extended Kalman filter with random-walk parameters behind the Estimator: the baseline. Where the heading at the
+/// start is unknown, a bank of filters with starts around the circle runs until one explains the measurements best.
 class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
  public:
   struct Setup {
@@ -42,7 +42,7 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   Setup setup_;
   std::vector<Hypothesis> bank_;
   std::size_t alive_ = 1, best_ = 0;
-  std::vector<double> no_input_, predicted_, jacobian_;
+  std::vector<double> no_input_, predicted_, jacobian_, measured_, inputs_;
 };
 
 }  // namespace rhec

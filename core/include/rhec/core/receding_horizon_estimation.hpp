@@ -15,9 +15,10 @@ namespace rhec {
 /// Receding horizon estimation with structured blocking (METHOD): a window of at most `problem.max_intervals` intervals
 /// that grows from the start of the run and then slides, with an arrival cost before it.
 ///
-/// Blocks that no random walk links (`Blocking::neighbour_sigma` off) are still given a prior as wide as `restart_sigma`
-/// about the block before, the same that a block has once it is the window's first: so what the data determine is theirs,
-/// and a block that they say nothing about keeps its neighbour's value rather than being thrown to a bound by noise.
+/// Blocks that no random walk links (`Blocking::neighbour_sigma` off) still get a wide prior, `block_sigma`, about the block
+/// before: what the data determine is theirs, and a block that they say little about keeps near its neighbour's value
+/// rather than being thrown to a bound by noise. Infinite, it reproduces the paper, which reports that blocks of one and
+/// three intervals then do not converge.
 class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
  public:
   struct Setup {
@@ -55,6 +56,11 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   void slide_arrival() noexcept;
   void set_structure() noexcept;
   void search_heading(Clock::time_point deadline) noexcept;
+  void take_outputs(int node, const double* outputs) noexcept;
+  void take_inputs(int interval, const double* inputs) noexcept;
+  void start_cold() noexcept;
+  void recover() noexcept;
+  void write_covariance(int node, Estimate& result) noexcept;
 
   Setup setup_;
   RheProblem problem_;
@@ -64,6 +70,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   Iterate point_, trial_, best_;
   Window window_;
   bool started_ = false, solved_ = false, prepared_ = false;
+  bool searching_ = false;  ///< the heading has not been found yet
   std::vector<std::uint8_t> begins_, next_begins_;
   std::vector<std::int64_t> first_starts_;
   std::vector<ArrivalCost::Border> borders_;
@@ -71,7 +78,8 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   StageQp covariance_qp_;
   Riccati covariance_riccati_;
   ActiveSet no_active_bounds_;
-  std::vector<double> last_covariance_;
+  std::vector<double> covariances_;
+  Eigen::VectorXd last_state_;  ///< of the newest node, with the parameters of the interval before it
 };
 
 }  // namespace rhec

@@ -23,10 +23,12 @@ struct RobotOptions {
   template <class Derived>
   static OptionTable<Derived>& add_to(OptionTable<Derived>& rows) {
     return rows
-        .number("step", &Derived::step, "longest interval of the estimator, interval of the controller [s]", greater_than(0.0))
+        .number("step", &Derived::step, "longest interval of the estimator, interval of the controller [s]",
+                greater_than(0.0))
         .subtree("model", &Derived::model, "the vehicle: name and options of a model plugin")
         .subtree("noise", &Derived::noise, "standard deviations: outputs and inputs, by the variable's name")
-        .subtree("bounds", &Derived::bounds, "[lower, upper] by the variable's name; the model's own where none is given")
+        .subtree("bounds", &Derived::bounds,
+                 "[lower, upper] by the variable's name; the model's own where none is given")
         .subtree("blocking", &Derived::blocking, "by parameter: name and options of a blocking plugin")
         .subtree("estimator", &Derived::estimator, "how state and parameters are estimated")
         .subtree("controller", &Derived::controller, "how the path is followed");
@@ -39,7 +41,7 @@ struct EstimatorOptions {
   Name name = Name::rhe;
   int horizon = 15;
   int substeps = 1;
-  Settings arrival, forgetting, restart_sigma, initial, robust, solver;
+  Settings arrival, forgetting, restart_sigma, block_sigma, initial, robust, solver;
   int heading_starts = 1;
   static const OptionTable<EstimatorOptions>& table();
 };
@@ -55,13 +57,24 @@ struct ControllerOptions {
   static const OptionTable<ControllerOptions>& table();
 };
 
-/// Numbers that a map gives by the names of variables; `defaults` for those that it does not name. Throws Error for unknown
-/// names (with the nearest) and for values outside `range`.
+/// A section of a configuration file with its keys, for people. A name in capitals stands for each variable of its
+/// kind.
+struct OptionSection {
+  std::string name;
+  std::string meaning;
+  std::vector<OptionRow> rows;
+};
+/// The sections of RobotOptions: model, noise, bounds, blocking, estimator, controller.
+RHEC_EXPORT std::vector<OptionSection> robot_sections();
+
+/// Numbers that a map gives by the names of variables; `defaults` for those that it does not name. Throws Error for
+/// unknown names (with the nearest) and for values outside `range`.
 RHEC_EXPORT std::vector<double> numbers_by_name(const Settings& map, const std::vector<Variable>& variables,
                                                 std::vector<double> defaults, const Range& range,
                                                 const std::string& owner);
 /// Throws Error unless every key of a map (or null) is known; the nearest known one is suggested.
-RHEC_EXPORT void require_known_keys(const Settings& map, const std::vector<std::string>& known, const std::string& owner);
+RHEC_EXPORT void require_known_keys(const Settings& map, const std::vector<std::string>& known,
+                                    const std::string& owner);
 
 /// Makes models, estimators and controllers from configuration, with plugins by name.
 class RHEC_EXPORT Robot {
@@ -85,6 +98,7 @@ class RHEC_EXPORT Robot {
   void read_initial(const std::optional<Eigen::VectorXd>& initial_state, Eigen::VectorXd& mean,
                     Eigen::MatrixXd& covariance) const;
   void read_bounds();
+  void check_estimator() const;
   std::unique_ptr<EstimationMethod> make_receding_horizon(const Eigen::VectorXd& mean,
                                                           const Eigen::MatrixXd& covariance) const;
   std::vector<RobustLoss> read_robust() const;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "rhec/core/path.hpp"
 #include "rhec/plugins/robot.hpp"
@@ -19,6 +20,9 @@ struct ScenarioOptions : RobotOptions {
   Settings path, terrain, vehicle;
   static const OptionTable<ScenarioOptions>& table();
 };
+
+/// The sections of a scenario, its first one without a name: the root.
+RHEC_EXPORT std::vector<OptionSection> scenario_sections();
 
 /// A scenario with all that it names made: the path, the ground, the vehicle on it. Throws Error for whatever is wrong,
 /// naming file, line and key.

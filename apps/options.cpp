@@ -1,0 +1,138 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/core/model.hpp"
+#include "rhec/plugins/host.hpp"
+#include "rhec/sim/scenario.hpp"
+
+namespace rhec::apps {
+namespace {
+
+struct OptionsArguments {
+  std::string section;
+  std::vector<std::filesystem::path> plugin_path;
+};
+
+using Row = std::vector<std::string>;
+
+/// A row of a Markdown table; a bar within a cell would end it.
+std::string line_of(const Row& cells) {
+  std::string line = "|";
+  for (const std::string& cell : cells) {
+    line += ' ';
+    for (const char c : cell) line += c == '|' ? std::string("\\|") : std::string(1, c);
+    line += " |";
+  }
+  return line + "\n";
+}
+
+std::string table_of(const Row& head, const std::vector<Row>& rows) {
+  std::string text = line_of(head) + "|";
+  for (std::size_t i = 0; i < head.size(); ++i) text += "---|";
+  text += "\n";
+  for (const Row& row : rows) text += line_of(row);
+  return text;
+}
+
+std::string table_of(const std::vector<OptionRow>& options, const std::string& prefix) {
+  std::vector<Row> rows;
+  for (const OptionRow& option : options) {
+    const bool is_section = option.type == "map";
+    rows.push_back({fmt::format("`{}{}`", prefix, option.name), option.type, is_section ? "" : option.default_value,
+                    is_section ? "a section of its own" : option.constraint, option.meaning});
+  }
+  return table_of({"key", "type", "default", "values", "meaning"}, rows);
+}
+
+std::string section_text(const OptionSection& section) {
+  return section.name.empty() ? fmt::format("## Root\n\n{}\n\n{}", section.meaning, table_of(section.rows, ""))
+                              : fmt::format("## {0}\n\n{1}\n\n{2}", section.name, section.meaning,
+                                            table_of(section.rows, section.name + "."));
+}
+
+std::string variables_of(const ModelDescription& about) {
+  std::vector<Row> rows;
+  const auto add = [&](const char* kind, const std::vector<Variable>& variables) {
+    for (const Variable& variable : variables)
+      rows.push_back({fmt::format("`{}`", variable.name), kind, variable.unit,
+                      fmt::format("[{:.4g}, {:.4g}]", variable.lower, variable.upper),
+                      fmt::format("{:g}", variable.scale), variable.meaning});
+  };
+  add("state", about.states);
+  add("input", about.inputs);
+  add("parameter", about.parameters);
+  add("output", about.outputs);
+  return table_of({"name", "kind", "unit", "bounds", "typical magnitude", "meaning"}, rows);
+}
+
+std::string plugin_text(const Host& host, const PluginRecord& plugin) {
+  std::string text = fmt::format("## {} `{}`\n\n", word_of(plugin.kind), plugin.name);
+  if (!plugin.capabilities.empty()) text += fmt::format("{}.\n\n", plugin.capabilities);
+  const std::vector<OptionRow> options = host.options(plugin.kind, plugin.name);
+  text += options.empty() ? "It has no options.\n" : table_of(options, "");
+  if (plugin.kind == PluginKind::model)
+    text += "\nIts variables:\n\n" + variables_of(host.make_model(plugin.name)->description());
+  return text;
+}
+
+constexpr const char* introduction = R"(# Configuration
+
+Every key of a scenario, as `rhec options` prints it. A key of a section is written below the section's name in YAML, and
+joined to it by a dot on the command line: `--set estimator.horizon=20`. A whole section is replaced by
+`--set 'blocking.kappa={name: full_horizon}'`. The sections `path`, `terrain` and `vehicle`, and the keys `name`, `speed` and
+`seed`, are those of a simulation; the others make a robot (`rhec::Robot::from_file`). Unknown keys are errors.
+
+Words in capitals stand for names: STATE, INPUT, PARAMETER and OUTPUT for each variable of the model of that kind. Where a key
+names a plugin, the plugin's own options stand beside that name; they are listed behind the sections. Solvers that are
+backed by another program are not, since not every installation has them: `rhec plugins` lists all, and
+`rhec plugins NAME` the options of one.
+)";
+
+int show(const OptionsArguments& arguments) {
+  const std::vector<OptionSection> sections = sim::scenario_sections();
+  if (!arguments.section.empty()) {
+    std::vector<std::string> known;
+    for (const OptionSection& section : sections) {
+      if (section.name == arguments.section) {
+        fmt::print("{}", section_text(section));
+        return exit_fine;
+      }
+      if (!section.name.empty()) known.push_back(section.name);
+    }
+    throw Error(fmt::format("there is no section '{}'; expected one of {}", arguments.section, fmt::join(known, ", ")));
+  }
+  const Host host(arguments.plugin_path);
+  std::string text = introduction;
+  for (const OptionSection& section : sections) text += "\n" + section_text(section);
+  std::vector<PluginRecord> plugins = host.discover();
+  std::erase_if(plugins, [](const PluginRecord& plugin) { return !plugin.accepted() || !plugin.backend.empty(); });
+  std::sort(plugins.begin(), plugins.end(), [](const PluginRecord& a, const PluginRecord& b) {
+    return a.kind != b.kind ? a.kind < b.kind : a.name < b.name;
+  });
+  for (const PluginRecord& plugin : plugins) text += "\n" + plugin_text(host, plugin);
+  fmt::print("{}", text);
+  return exit_fine;
+}
+
+}  // namespace
+
+void add_options(CLI::App& program, Action& chosen) {
+  auto arguments = std::make_shared<OptionsArguments>();
+  CLI::App* command = program.add_subcommand("options", "Lists every key of a scenario with its default, as Markdown.");
+  command->footer(
+      "Examples:\n"
+      "  rhec options\n"
+      "  rhec options estimator");
+  command->add_option("section", arguments->section, "show this section alone")->type_name("SECTION");
+  add_plugin_path(*command, arguments->plugin_path);
+  command->callback([=, &chosen] { chosen = [=] { return show(*arguments); }; });
+}
+
+}  // namespace rhec::apps

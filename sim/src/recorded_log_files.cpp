@@ -1,0 +1,155 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "rhec/sim/recorded_log.hpp"
+#include "rhec/sim/run_picture.hpp"
+
+namespace rhec::sim {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const PredictionErrors& errors) {
+  Json json = {{"count", errors.count}};
+  // Nothing to speak of is null rather than a perfect zero.
+  json["median_m"] = errors.count > 0 ? Json(errors.median) : Json();
+  json["rmse_capped_m"] = errors.count > 0 ? Json(errors.rmse_capped) : Json();
+  return json;
+}
+
+Json json_of(const HeldOutSummary& held_out) {
+  Json json = json_of(held_out.all);
+  json["consistent"] = json_of(held_out.consistent);
+  return json;
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+Json json_of(const Replay& replay, const RecordedLog& log) {
+  Json json;
+  json["held_out"] = json_of(summarise(replay, log));
+  json["unpredicted"] = replay.unpredicted;
+  json["nodes"] = replay.counts.nodes;
+  json["solves"] = replay.counts.estimates;
+  json["fallbacks"] = replay.counts.fallbacks;
+  json["dropped"] = replay.counts.dropped;
+  json["seconds"] = replay.seconds;
+  json["solve_time_us"] = {{"median", quantile(replay.solve_us, 0.5)},
+                           {"p99", quantile(replay.solve_us, 0.99)},
+                           {"max", quantile(replay.solve_us, 1.0)}};
+  return json;
+}
+
+}  // namespace
+
+std::string estimates_csv(const std::vector<Replay>& replays, const RecordedLog& log, const LogScenario& scenario) {
+  const ModelDescription& about = scenario.variants().front().robot.model()->description();
+  std::string text = "variant,time,kind";
+  for (const char* prefix : {"", "sigma_"})
+    for (const auto* variables : {&about.states, &about.parameters})
+      for (const Variable& variable : *variables) text += fmt::format(",{}{}", prefix, variable.name);
+  text += ",fix_x,fix_y,residual,held_out,fallback\n";
+  auto out = std::back_inserter(text);
+  const auto number = [&](double value) {
+    // A missing value is an empty field.
+    if (std::isfinite(value)) {
+      fmt::format_to(out, ",{:.9g}", value);
+    } else {
+      text += ',';
+    }
+  };
+  for (std::size_t i = 0; i < replays.size(); ++i) {
+    for (const LoggedEstimate& entry : replays[i].estimates) {
+      const bool is_fix = entry.fix >= 0;
+      fmt::format_to(out, "{},{:.10g},{}", scenario.variants()[i].name, entry.time, is_fix ? "fix" : "node");
+      for (const double value : entry.values) number(value);
+      for (const double value : entry.sigmas) number(value);
+      const Fix none{0.0, std::nan(""), std::nan("")};
+      const Fix& fix = is_fix ? log.fixes[static_cast<std::size_t>(entry.fix)] : none;
+      number(fix.x);
+      number(fix.y);
+      number(entry.residual);
+      fmt::format_to(out, ",{:d},{:d}\n", entry.held_out, entry.fallback);
+    }
+  }
+  return text;
+}
+
+std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& log, const LogScenario& scenario,
+                         const HoldOut& hold_out) {
+  Json json;
+  json["name"] = scenario.name();
+  json["dead_reckoning"] = {{"rows", log.rows.size()},
+                            {"missing", {{"speed", log.missing_speeds}, {"steering", log.missing_steerings}}}};
+  json["fixes"] = {{"rows", log.fixes.size()},
+                   {"missing_coordinates", log.missing_coordinates},
+                   {"consistent", std::count_if(log.fixes.begin(), log.fixes.end(), [](const Fix& f) { return f.agrees; })}};
+  json["hold_out"] = {{"every", hold_out.every}, {"phase", hold_out.phase}, {"error_cap_m", error_cap}};
+  // That of the first variant, the one that the scenario is about; the others are beside it below.
+  json["variant"] = scenario.variants().front().name;
+  json["held_out"] = json_of(summarise(replays.front(), log));
+  Json& variants = json["variants"];
+  for (std::size_t i = 0; i < replays.size(); ++i) variants[scenario.variants()[i].name] = json_of(replays[i], log);
+  return json.dump(2) + "\n";
+}
+
+std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogScenario& scenario) {
+  const ModelDescription& about = scenario.variants().front().robot.model()->description();
+  RunPicture picture;
+  picture.title = scenario.name();
+  const HeldOutSummary summary = summarise(replay, log);
+  picture.subtitle = scenario.variants().front().name;
+  if (summary.all.count > 0)
+    picture.subtitle += fmt::format("; {} withheld fixes predicted to {:.3f} m in the median", summary.all.count, summary.all.median);
+  for (const Fix& fix : log.fixes) picture.fixes.push_back({fix.x, fix.y});
+  for (const LoggedEstimate& entry : replay.estimates)
+    if (!entry.held_out) picture.estimated.push_back({entry.values[about.roles.position_x], entry.values[about.roles.position_y]});
+  const auto nx = static_cast<Eigen::Index>(about.states.size());
+  for (std::size_t j = 0; j < about.parameters.size(); ++j) {
+    const Variable& variable = about.parameters[j];
+    Panel panel;
+    panel.title = variable.meaning.empty() ? variable.name : fmt::format("{} ({})", variable.name, variable.meaning);
+    panel.unit = variable.unit;
+    Curve curve;
+    curve.label = "estimated, 2 sigma";
+    for (const LoggedEstimate& entry : replay.estimates) {
+      if (entry.held_out) continue;
+      curve.times.push_back(entry.time);
+      curve.values.push_back(entry.values[nx + static_cast<Eigen::Index>(j)]);
+      curve.sigmas.push_back(entry.sigmas[nx + static_cast<Eigen::Index>(j)]);
+    }
+    panel.curves.push_back(std::move(curve));
+    panel.lower = 0.0;
+    panel.upper = 1.5;
+    picture.panels.push_back(std::move(panel));
+  }
+  Panel errors;
+  errors.title = "Distance of fixes from the estimate";
+  errors.unit = "m";
+  Curve held_out, used;
+  held_out.label = "withheld";
+  held_out.role = CurveRole::other;
+  used.label = "used";
+  for (const LoggedEstimate& entry : replay.estimates) {
+    if (entry.fix < 0) continue;
+    Curve& curve = entry.held_out ? held_out : used;
+    curve.times.push_back(entry.time);
+    curve.values.push_back(entry.residual);
+  }
+  if (!used.times.empty()) errors.curves.push_back(std::move(used));
+  if (!held_out.times.empty()) errors.curves.push_back(std::move(held_out));
+  errors.lower = 0.0;
+  errors.upper = error_cap;
+  picture.panels.push_back(std::move(errors));
+  return draw_run(picture);
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+"""What the documentation shows is what is there: readme.py <rhec>
+
+A block of README.md below a line `<!-- file: examples/... -->` is that file, word for word. Commands of the README and of
+docs/ that begin with `rhec run`, `rhec options` or `rhec plugins` work (with shorter paths). Links lead to files.
+"""
+import pathlib
+import re
+import shlex
+import sys
+import tempfile
+
+import cli
+from cli import FINE, Program, assignments
+
+SHOWN = re.compile(r"<!-- file: (\S+) -->\n```\w*\n(.*?)```\n", re.DOTALL)
+BLOCK = re.compile(r"```(\w*)\n(.*?)```\n", re.DOTALL)
+LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)\)")
+
+
+def commands(text):
+    for language, block in BLOCK.findall(text):
+        if language in ("sh", "bash"):
+            for line in block.replace("\\\n", " ").splitlines():
+                yield line.split("  #")[0].strip()
+
+
+def main():
+    rhec, findings = Program(sys.argv[1]), cli.Findings("readme")
+    readme = (cli.ROOT / "README.md").read_text()
+    shown = SHOWN.findall(readme)
+    findings.expect(len(shown) >= 4, "README.md", f"shows {len(shown)} files")
+    for name, text in shown:
+        findings.expect((cli.ROOT / name).read_text() == text, "README.md", f"what it shows of {name} is not what is there")
+    pages = [cli.ROOT / "README.md", cli.ROOT / "CHANGELOG.md", *sorted((cli.ROOT / "docs").rglob("*.md"))]
+    with tempfile.TemporaryDirectory(prefix="rhec-readme-") as work:
+        for page in pages:
+            text = page.read_text()
+            for link in LINK.findall(text):
+                findings.expect((page.parent / link).exists(), page.name, f"leads to {link}, which is not there")
+            for command in commands(text):
+                words = shlex.split(command, comments=True)
+                if words[:1] != ["rhec"] or words[1:2] not in (["run"], ["options"], ["plugins"]) or "--plugin-path" in words:
+                    continue
+                if words[1] == "run":
+                    words[3:3] = assignments("path.laps=1", "path.legs=2")
+                    words = [str(pathlib.Path(work) / "out") if before == "--out" else word
+                             for before, word in zip([""] + words, words)]
+                    if "--out" not in words:
+                        words += ["--out", str(pathlib.Path(work) / "out")]
+                result = rhec(*words[1:], cwd=cli.ROOT)
+                findings.expect(result.returncode == FINE, f"{page.name}: {command}", f"{result.returncode}: {result.stderr}")
+    findings.tell()
+
+
+if __name__ == "__main__":
+    main()

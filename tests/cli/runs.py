@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+"""Good runs of the command line: every choice of a scenario ends at the end of the path, and results repeat themselves.
+
+    runs.py <rhec>
+"""
+import csv
+import json
+import math
+import pathlib
+import sys
+import tempfile
+
+import cli
+from cli import FIGURE8, FINE, SHORT, ZIGZAG, Program, assignments
+
+EXACT = {"steps", "completed", "mae", "rmse", "nees", "solve_time_us", "statuses", "fallbacks"}
+ERRORS = {"kappa", "mu", "position", "heading", "tracking"}
+TIMES = {"median", "p99", "max"}
+# name: scenario, settings, words that the summary's statuses and error bounds are judged by
+CHOICES = {
+    "estimator rhe": (FIGURE8, ["estimator.name=rhe"]),
+    "estimator ekf": (FIGURE8, ["estimator.name=ekf"]),
+    "estimator truth": (FIGURE8, ["estimator.name=truth"]),
+    "reference_speed literal": (FIGURE8, ["controller.reference_speed=literal"]),
+    "reference_speed ground": (FIGURE8, ["controller.reference_speed=ground"]),
+    "arrival smoothing": (FIGURE8, ["estimator.arrival.name=smoothing"]),
+    "arrival constant": (FIGURE8, ["estimator.arrival.name=constant"]),
+    "arrival off": (FIGURE8, ["estimator.arrival.name=off"]),
+    "terrain constant": (FIGURE8, ["terrain={name: constant, values: {kappa: 0.8, mu: 0.9}}"]),
+    "terrain patches": (FIGURE8, ["terrain={name: patches, patch_size: 5, lower: 0.6}"]),
+    "terrain raster": (FIGURE8, ["terrain={name: raster, files: [kappa.csv, mu.csv], interpolation: nearest}"]),
+    "path zigzag": (ZIGZAG, []),
+    "path file": (FIGURE8, ["path={name: file, file: path.csv}"]),
+    "path file with speeds": (FIGURE8, ["path={name: file, file: speeds.csv}"]),
+    "blocking full_horizon": (FIGURE8, ["blocking.kappa={name: full_horizon}"]),
+    "blocking unblocked": (FIGURE8, ["blocking.kappa={name: unblocked, neighbour_sigma: 0.04}"]),
+    "blocking unblocked, not linked": (FIGURE8, ["blocking.kappa={name: unblocked}"]),
+    "blocking structured": (FIGURE8, ["blocking.kappa={name: structured, size: 3}"]),
+    "blocking structured, overlap": (FIGURE8, ["blocking.kappa={name: structured, size: 5, overlap: 4}"]),
+    "blocking structured, ramp": (FIGURE8, ["blocking.kappa={name: structured, size: 5, overlap: 2, transition: ramp}"]),
+    "blocking structured, both": (FIGURE8, ["blocking.mu={name: structured, size: 5, overlap: 4, neighbour_sigma: 0.04}"]),
+    "blocking pattern": (FIGURE8, ["blocking.kappa={name: pattern, lengths: [2, 4], anchor: time}"]),
+    "blocking pattern of the horizon": (FIGURE8, ["blocking.kappa={name: pattern, lengths: [8, 4, 3]}"]),
+    "move blocking": (FIGURE8, ["controller.blocking={u1: {name: pattern, lengths: [1, 2, 4, 8]}, "
+                                "u2: {name: structured, size: 3, anchor: horizon}}"]),
+    "horizons of one": (FIGURE8, ["estimator.horizon=1", "controller.horizon=8", "blocking.kappa={name: unblocked, "
+                                  "neighbour_sigma: 0.04}"]),
+    "long horizons": (FIGURE8, ["estimator.horizon=40", "controller.horizon=30"]),
+    "several iterations": (FIGURE8, ["estimator.solver.iterations=3", "controller.solver.iterations=3"]),
+    "converge": (FIGURE8, ["estimator.solver.mode=converge", "controller.solver.mode=converge"]),
+    "robust": (FIGURE8, ["estimator.robust={outputs: [x_gps, y_gps], delta: 3}"]),
+    "substeps": (FIGURE8, ["estimator.substeps=3", "controller.substeps=2"]),
+    "no bounds": (FIGURE8, ["bounds.kappa=[null, null]", "bounds.mu=[0, null]"]),
+    "defaults alone": (None, []),
+}
+# These hold the vehicle less well on paths so narrow: that they get to the end of it is all that is asked.
+LOOSE = {"path zigzag", "long horizons", "reference_speed literal", "arrival off", "horizons of one", "blocking full_horizon"}
+
+
+def circle(points, speed=None):
+    """A path round a circle of 12 m."""
+    rows = ["x,y,speed" if speed else "x,y"]
+    for i in range(points):
+        angle = 2.0 * math.pi * i / (points - 1)
+        rows.append(f"{12 * math.sin(angle):.6f},{12 - 12 * math.cos(angle):.6f}" + (f",{speed(i)}" if speed else ""))
+    return "\n".join(rows) + "\n"
+
+
+class Test(cli.Findings):
+    def __init__(self, rhec, work):
+        super().__init__("runs")
+        self.rhec, self.work, self.count_of_runs = rhec, work, 0
+        (work / "path.csv").write_text(circle(200))
+        (work / "speeds.csv").write_text(circle(200, lambda i: 4 + i % 3))
+        for name, values in (("kappa", "0.7,0.9\n0.8,0.6\n"), ("mu", "0.9,0.8\n0.7,0.9\n")):
+            (work / f"{name}.csv").write_text(f"origin_x,origin_y,cell_size\n-20,-20,20\n{values}")
+        (work / "empty.yaml").write_text("")
+
+    def run(self, name, settings, scenario=FIGURE8, words=()):
+        """The folder of a run that must go well."""
+        self.count_of_runs += 1
+        out = self.work / f"out-{self.count_of_runs}"
+        result = self.rhec("run", scenario, "--out", out, *assignments(*SHORT, *settings), *words, cwd=self.work)
+        self.expect(result.returncode == FINE and not result.stderr, name, f"exit code {result.returncode}: {result.stderr}")
+        return out if (out / "summary.json").is_file() else None
+
+    def choices(self):
+        for name, (scenario, settings) in CHOICES.items():
+            out = self.run(name, settings, scenario or self.work / "empty.yaml")
+            if out is None:
+                continue
+            files = sorted(path.name for path in out.iterdir())
+            self.expect(files == ["run.svg", "steps.csv", "summary.json", "times.csv"], name, f"files: {files}")
+            summary = json.loads((out / "summary.json").read_text())
+            self.check_summary(name, summary)
+            self.check_steps(name, out / "steps.csv", summary)
+
+    def check_summary(self, name, summary):
+        self.expect(EXACT <= summary.keys(), name, f"keys: {sorted(summary)}")
+        self.expect(set(summary["mae"]) == ERRORS == set(summary["rmse"]), name, f"errors: {summary['mae']}")
+        self.expect(set(summary["solve_time_us"]) == {"rhe", "rhc"}, name, f"times: {summary['solve_time_us']}")
+        self.expect(all(set(times) == TIMES for times in summary["solve_time_us"].values()), name, "times")
+        self.expect(set(summary["statuses"]) == {"rhe", "rhc"}, name, f"statuses: {summary['statuses']}")
+        self.expect(summary["completed"] is True and summary["steps"] > 10, name, f"{summary['steps']}, {summary['ended']}")
+        self.expect(summary["fallbacks"] == 0, name, f"{summary['fallbacks']} fallbacks: {summary['statuses']}")
+        self.expect(sum(summary["statuses"]["rhc"].values()) == summary["steps"], name, f"statuses: {summary['statuses']}")
+        truth, rhe = name == "estimator truth", summary["statuses"]["rhe"]
+        self.expect(bool(rhe) == (name not in ("estimator truth", "estimator ekf")), name, f"statuses of rhe: {rhe}")
+        self.expect((summary["nees"] is None) == truth, name, f"nees: {summary['nees']}")
+        if name not in LOOSE:
+            self.expect(summary["mae"]["tracking"] < 1.5 and summary["mae"]["kappa"] < 0.15, name, f"{summary['mae']}")
+        if truth:
+            self.expect(summary["mae"]["kappa"] == 0 and summary["mae"]["position"] == 0, name, f"{summary['mae']}")
+
+    def check_steps(self, name, file, summary):
+        with file.open(newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        self.expect(len(rows) == summary["steps"], name, f"{len(rows)} rows for {summary['steps']} steps")
+        texts = {"estimator_status", "controller_status"}
+        numbers = [value for row in rows for key, value in row.items() if key not in texts and value != ""]
+        self.expect(all(math.isfinite(float(value)) for value in numbers), name, "a number in steps.csv is not finite")
+        kappa = [abs(float(row["kappa"]) - float(row["true_kappa"])) for row in rows]
+        self.expect(math.isclose(sum(kappa) / len(kappa), summary["mae"]["kappa"], rel_tol=1e-6, abs_tol=1e-9), name,
+                    "mae.kappa is not that of steps.csv")
+
+    def repeats(self):
+        one, same = self.run("seed 1", ["seed=1"]), self.run("seed 1 again", ["seed=1"])
+        other = self.run("seed 2", ["seed=2"])
+        for file in ("steps.csv", "run.svg"):
+            first = (one / file).read_bytes()
+            self.expect(first == (same / file).read_bytes(), file, "two runs of one scenario and seed differ")
+            self.expect(first != (other / file).read_bytes(), file, "runs of different seeds are the same")
+
+    def overrides(self):
+        scenario = self.work / "scenario.yaml"
+        scenario.write_text("seed: 7\nblocking: {kappa: {name: structured, size: 5, overlap: 4}}\n")
+        base = self.run("scenario", [], scenario)
+        same = self.run("what is there already", ["seed=7"], scenario)
+        other = self.run("another seed", ["seed=7", "seed=8"], scenario)
+        last = self.run("the last one counts", ["seed=8", "seed=7"], scenario)
+        size = self.run("a key of a section", ["blocking.kappa.size=3"], scenario)
+        section = self.run("a whole section", ["blocking.kappa={name: full_horizon}"], scenario)
+        steps = {name: (out / "steps.csv").read_bytes() for name, out in
+                 [("base", base), ("same", same), ("other", other), ("last", last), ("size", size), ("section", section)]}
+        self.expect(steps["base"] == steps["same"] == steps["last"], "--set", "a value that was there changed the run")
+        self.expect(len({steps[name] for name in ("base", "other", "size", "section")}) == 4, "--set", "changed nothing")
+
+    def others(self):
+        result = self.rhec("plugins", "--json")
+        self.expect(result.returncode == FINE, "plugins --json", result.stderr)
+        names = {(plugin["kind"], plugin["name"]) for plugin in json.loads(result.stdout) if "kind" in plugin}
+        for plugin in [("model", "bicycle_slip"), ("solver", "gn_rti"), ("blocking", "structured"), ("blocking", "pattern"),
+                       ("blocking", "unblocked"), ("blocking", "full_horizon")]:
+            self.expect(plugin in names, "plugins --json", f"{plugin} is missing in {names}")
+        result = self.rhec("plugins", "structured")
+        self.expect(result.returncode == FINE and "neighbour_sigma" in result.stdout, "plugins structured", result.stdout)
+        result = self.rhec("options", "controller")
+        self.expect(result.returncode == FINE and "`controller.horizon`" in result.stdout, "options", result.stdout)
+        for words in (["--help"], ["--version"], ["run", "--help"], ["solve", "--help"], ["plugins", "--help"]):
+            result = self.rhec(*words)
+            self.expect(result.returncode == FINE and result.stdout and not result.stderr, " ".join(words), result.stderr)
+        for line in self.rhec("run", "--help").stdout.splitlines():
+            if line.strip().startswith("rhec run ") and "--out" in line:
+                self.expect("{name:" in line or "blocking.kappa.name" not in line, "run --help", f"cannot work: {line}")
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="rhec-cli-") as work:
+        test = Test(Program(sys.argv[1]), pathlib.Path(work).resolve())
+        for part in (test.choices, test.repeats, test.overrides, test.others):
+            part()
+        test.tell()
+
+
+if __name__ == "__main__":
+    main()
