@@ -86,8 +86,9 @@ constexpr const char* introduction = R"(# Configuration
 
 Every key of a scenario, as `rhec options` prints it. A key of a section is written below the section's name in YAML, and
 joined to it by a dot on the command line: `--set estimator.horizon=20`. A whole section is replaced by
-`--set 'blocking.kappa={name: full_horizon}'`. The sections `path`, `terrain` and `vehicle`, and the keys `name`, `speed` and
-`seed`, are those of a simulation; the others make a robot (`rhec::Robot::from_file`). Unknown keys are errors.
+`--set 'blocking.kappa={name: full_horizon}'`. The sections `path`, `terrain` and `vehicle`, and the keys `speed` and `seed`,
+are those of a simulation (`rhec run`); `log` and `variants` are those of a recorded drive (`rhec estimate`); the others make a
+robot (`rhec::Robot::from_file`). Unknown keys are errors.
 
 Words in capitals stand for names: STATE, INPUT, PARAMETER and OUTPUT for each variable of the model of that kind. Where a key
 names a plugin, the plugin's own options stand beside that name; they are listed behind the sections. Solvers that are

@@ -153,6 +153,9 @@ void RecedingHorizonEstimation::slide_arrival() noexcept {
     border.neighbour_sigma = blocking.neighbour_sigma();
     border.leaves_as_ramp = ramp && problem_.begins(0, static_cast<int>(j));
     border.ramp_variance = border.leaves_as_ramp ? problem_.link_variance(0, static_cast<int>(j)) : 0.0;
+    // What leaves has to have a covariance, so here a block that nothing links is only as free as one that restarts.
+    if (!std::isfinite(border.ramp_variance))
+      border.ramp_variance = setup_.walks[j].restart_sigma * setup_.walks[j].restart_sigma;
   }
   const bool lost = setup_.heading_state >= 0 && arrival_.covariance()(setup_.heading_state, setup_.heading_state) >
                                                      uncertain_angle * uncertain_angle;
@@ -313,7 +316,8 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
     std::fill_n(problem_.output(N), outputs_.size(), missing);
     solver_->prepare(problem_, point_);
   }
-  // Once found, a heading is followed, even where it grows uncertain again in a gap: it cannot have turned about unseen.
+  // Once found, a heading is followed, even where it grows uncertain again in a gap: it cannot have turned about
+  // unseen.
   searching_ = searching_ && arrival_.covariance()(heading, heading) > uncertain_angle * uncertain_angle;
   if (searching_) search_heading(deadline);
   result.report = solver_->solve(problem_, point_, deadline);

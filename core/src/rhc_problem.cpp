@@ -66,49 +66,80 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
   return soften_unreachable_bounds(scratch);
 }
 
+/// For each state that starts outside its bounds: drive it back as fast as the corners of the input box (and standing
+/// still) allow, block by block, and let the bound follow that trajectory until it is kept.
 int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
-  const int n = nx(), ns = capacity().states;
-  const auto violated = [&](const double* x, int j) {
-    return x[j] < setup_.state_lower[j] ? -1 : x[j] > setup_.state_upper[j] ? 1 : 0;
+  const int n = nx(), ns = capacity().states, inputs = nu();
+  double* x = scratch.data();
+  double *trial = x + n, *u = trial + n, *next = u + inputs;
+  int candidates = 1;
+  for (int k = 0; k < inputs; ++k) candidates *= 3;
+
+  const auto choose = [&](int candidate, int interval) {
+    for (int k = 0; k < inputs; ++k, candidate /= 3) {
+      const double lower = input_lower(interval, k), upper = input_upper(interval, k);
+      const double middle = std::min(std::max(0.0, lower), upper);
+      const double wanted = candidate % 3 == 0 ? lower : candidate % 3 == 1 ? upper : middle;
+      u[k] = std::isfinite(wanted) ? wanted : std::min(std::max(input_reference(interval)[k], lower), upper);
+    }
   };
+  // A stretch ends where every input may change.
+  const auto stretch_end = [&](int interval) {
+    int end = interval + 1;
+    const auto all_change = [&](int at) {
+      for (int k = 0; k < inputs; ++k)
+        if (control_of_input(at, k) < 0) return false;
+      return true;
+    };
+    while (end < intervals() && !all_change(end)) ++end;
+    return end;
+  };
+  const auto step = [&](double* state, int interval) {
+    const double seconds = duration(interval);
+    Model::Intervals request;
+    request.count = 1;
+    request.states = state;
+    request.inputs = u;
+    request.parameters = given_parameters();
+    request.durations = &seconds;
+    request.substeps = substeps();
+    request.next_states = next;
+    model().integrate(request);
+    std::copy_n(next, n, state);
+  };
+
   int moved = 0;
   for (int j = 0; j < n; ++j) {
-    if (violated(initial_.data(), j) == 0) continue;
-    // Drive this state back as fast as the corners of the input box allow, and let the bound follow until it is kept.
-    double* x = scratch.data();
-    double *u = x + n, *next = u + nu(), *best = next + n;
+    const auto violation = [&](const double* state) {
+      return std::max({0.0, setup_.state_lower[j] - state[j], state[j] - setup_.state_upper[j]});
+    };
     std::copy_n(initial_.data(), n, x);
-    for (int i = 0; i < intervals(); ++i) {
-      const int side = violated(x, j);
-      if (side == 0) break;
-      double best_value = side * std::numeric_limits<double>::infinity();
-      for (unsigned corner = 0; corner < (1U << nu()); ++corner) {
-        for (int k = 0; k < nu(); ++k) {
-          const double bound = (corner >> k) & 1U ? input_upper_[i * nu() + k] : input_lower_[i * nu() + k];
-          u[k] = std::isfinite(bound) ? bound : input_reference(i)[k];
+    for (int first = 0; first < intervals() && violation(x) > 0.0;) {
+      const int end = stretch_end(first);
+      double least = std::numeric_limits<double>::infinity();
+      int best = 0;
+      for (int candidate = 0; candidate < candidates; ++candidate) {
+        std::copy_n(x, n, trial);
+        choose(candidate, first);
+        double sum = 0.0;
+        for (int i = first; i < end; ++i) {
+          step(trial, i);
+          sum += violation(trial);
         }
-        const double seconds = duration(i);
-        Model::Intervals request;
-        request.count = 1;
-        request.states = x;
-        request.inputs = u;
-        request.parameters = given_parameters();
-        request.durations = &seconds;
-        request.substeps = substeps();
-        request.next_states = next;
-        model().integrate(request);
-        if (side * next[j] < side * best_value) {
-          best_value = next[j];
-          std::copy_n(next, n, best);
-        }
+        if (sum < least) least = sum, best = candidate;
       }
-      std::copy_n(best, n, x);
-      if (violated(x, j) != side) break;
-      // A hair of slack keeps the feasible set from being a single point.
-      const double slack = 1e-6 * (1.0 + std::abs(best_value));
-      if (side > 0) state_upper_[(i + 1) * ns + j] = best_value + slack;
-      if (side < 0) state_lower_[(i + 1) * ns + j] = best_value - slack;
-      ++moved;
+      choose(best, first);
+      for (int i = first; i < end; ++i) {
+        step(x, i);
+        if (violation(x) <= 0.0) continue;
+        // A hair of slack keeps the feasible set from being a single point.
+        const double slack = 1e-6 * (1.0 + std::abs(x[j]));
+        double &lower = state_lower_[(i + 1) * ns + j], &upper = state_upper_[(i + 1) * ns + j];
+        lower = std::min(lower, x[j] - slack);
+        upper = std::max(upper, x[j] + slack);
+        ++moved;
+      }
+      first = end;
     }
   }
   return moved;

@@ -18,6 +18,7 @@ namespace {
 
 std::vector<std::string> names_of(const std::vector<Variable>& variables) {
   std::vector<std::string> names;
+  names.reserve(variables.size());
   for (const Variable& variable : variables) names.push_back(variable.name);
   return names;
 }
@@ -96,13 +97,14 @@ void require_known_keys(const Settings& map, const std::vector<std::string>& kno
 }
 
 std::vector<double> numbers_by_name(const Settings& map, const std::vector<Variable>& variables,
-                                    std::vector<double> defaults, const Range& range, const std::string& owner) {
+                                    std::vector<double> defaults, const Range& range, const std::string& owner,
+                                    bool may_be_infinite) {
   require_known_keys(map, names_of(variables), owner);
   for (std::size_t j = 0; j < variables.size(); ++j) {
     const Settings* value = map.find(variables[j].name);
     if (!value) continue;
     defaults[j] = NumberValue{range}.read(*value, OptionContext{owner, variables[j].unit});
-    if (!std::isfinite(defaults[j])) throw value->mismatch("a finite number");
+    if (!may_be_infinite && !std::isfinite(defaults[j])) throw value->mismatch("a finite number");
   }
   return defaults;
 }
@@ -236,6 +238,7 @@ Robot::Robot(const Host& host, const RobotOptions& options)
   require_known_keys(options.noise, {"outputs", "inputs"}, "noise");
   const auto scales = [](const std::vector<Variable>& variables) {
     std::vector<double> values;
+    values.reserve(variables.size());
     for (const Variable& variable : variables) values.push_back(noise_share * variable.scale);
     return values;
   };
@@ -259,7 +262,7 @@ void Robot::check_estimator() const {
   ArrivalOptions::table().parse(estimator_.arrival, "estimator: arrival");
   numbers_by_name(estimator_.forgetting, about.parameters, none, at_least(0.0), "forgetting");
   numbers_by_name(estimator_.restart_sigma, about.parameters, none, greater_than(0.0), "restart_sigma");
-  numbers_by_name(estimator_.block_sigma, about.parameters, none, greater_than(0.0), "block_sigma");
+  numbers_by_name(estimator_.block_sigma, about.parameters, none, greater_than(0.0), "block_sigma", true);
   for (const Variable& parameter : about.parameters)
     blocking_of(host_, member_or_null(options_.blocking, parameter.name), default_blocking);
 }
@@ -366,7 +369,7 @@ std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::Vect
                       std::vector<double>(np, ParameterWalk{}.restart_sigma), greater_than(0.0), "restart_sigma");
   const auto alone =
       numbers_by_name(estimator_.block_sigma, about.parameters, std::vector<double>(np, ParameterWalk{}.block_sigma),
-                      greater_than(0.0), "block_sigma");
+                      greater_than(0.0), "block_sigma", true);
   for (std::size_t j = 0; j < np; ++j) {
     setup.walks.push_back({forgetting[j], restart[j], alone[j]});
     const Settings& section = member_or_null(options_.blocking, about.parameters[j].name);

@@ -8,6 +8,7 @@
 
 #include "rhec/core/error.hpp"
 #include "rhec/sim/paths.hpp"
+#include "rhec/sim/recorded_log.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -191,6 +192,12 @@ std::vector<OptionSection> scenario_sections() {
   for (OptionRow& row : sections[2].rows)
     if (row.name == "values") row = values;
   for (OptionSection& section : robot_sections()) sections.push_back(std::move(section));
+  sections.push_back({"log", "For `rhec estimate`: how a drive was recorded, and what its columns mean to the model.",
+                      LogOptions::table().schema()});
+  sections.push_back(
+      {"variants",
+       "For `rhec estimate`: robots that run side by side on one recorded drive.",
+       {{"NAME", "keys of a robot", "", "", "put over those of the scenario, for the variant so called"}}});
   return sections;
 }
 

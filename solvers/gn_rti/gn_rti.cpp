@@ -10,6 +10,8 @@ namespace {
 
 constexpr double sufficient_decrease = 1e-4;
 constexpr double shortest_step = 1e-6;
+// A KKT residual below which Newton's method is trusted more than the merit function.
+constexpr double near_solution = 1e-3;
 // Differences of the merit below this part of it are rounding.
 constexpr double merit_rounding = 1e-13;
 
@@ -277,22 +279,30 @@ bool GnRti::search_along_step(const Ocp& ocp, double residual, double& merit_aft
     for (int j = 0; j < ocp.control_count(i); ++j) slope += qp_.r(i)[j] * step_.control(i)[j];
   }
   slope -= defect_penalty_ * defect + bound_penalty_ * total_violation(ocp, best_);
+  const auto acceptable = [&](double length) {
+    merit_after = merit(ocp, trial_);
+    const double allowed =
+        before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
+    return std::isfinite(merit_after) && merit_after <= allowed;
+  };
+  // Control follows the policy, from a given start; estimation, whose every node is measured, takes the linearised states,
+  // and the policy only where those lead nowhere.
+  const bool policy_first = ocp.kind() == OcpKind::rhc;
   for (double length = 1.0; length >= shortest_step; length *= 0.5) {
-    if (ocp.kind() == OcpKind::rhc) {
+    if (policy_first) {
       roll_out_step(ocp, best_, length, trial_);
     } else {
       add_step(ocp, best_, length, trial_);
     }
-    merit_after = merit(ocp, trial_);
-    if (!std::isfinite(merit_after)) continue;
-    const double allowed =
-        before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
-    if (merit_after <= allowed) return true;
+    if (acceptable(length)) return true;
     // Near the solution the merit may refuse a step that Newton's method is right about.
-    if (length == 1.0 && residual < 1e-3) {
+    if (length == 1.0 && residual < near_solution && std::isfinite(merit_after)) {
       ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_qp_, scratch_);
       if (kkt_residual(other_qp_, trial_).largest() < 0.5 * residual) return true;
     }
+    if (policy_first) continue;
+    roll_out_step(ocp, best_, length, trial_);
+    if (acceptable(length)) return true;
   }
   return false;
 }
@@ -341,8 +351,9 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
       return search_along_step(ocp, residual, merit_after);
     };
     accepted = try_step();
-    // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own.
-    if (hessian_for(ocp) == Hessian::exact && (!accepted || qp_solver_.was_bent())) {
+    // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own. Near the solution merits
+    // differ by rounding only, and the exact curvature is what converges.
+    if (hessian_for(ocp) == Hessian::exact && (!accepted || (qp_solver_.was_bent() && residual > near_solution))) {
       std::swap(trial_, other_trial_);
       const bool exact_accepted = accepted;
       const double exact_merit = merit_after;

@@ -10,8 +10,9 @@ constexpr int warm_rounds = 8;     // corrections of the active set before the i
 constexpr int polish_rounds = 6;   // the same from the interior-point method's active set
 constexpr int max_interior_iterations = 60;
 // The interior point stops well before rounding spoils its Newton systems; polishing does the rest.
-constexpr double interior_gap = 1e-8;
-constexpr double interior_infeasibility = 1e-7;
+constexpr StageQpSolver::Accuracy ready_to_polish{1e-8, 1e-7};
+// Where polishing does not settle, the interior point itself has to be accurate.
+constexpr StageQpSolver::Accuracy on_its_own{1e-12, 1e-10};
 constexpr double divergence = 1e10;
 constexpr double bound_tolerance = 1e-10;
 constexpr double multiplier_tolerance = 1e-9;
@@ -113,7 +114,7 @@ StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step) noexcept
 StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Iterate& step) noexcept {
   // From here on one fixed, convex program is solved.
   convexify(qp);
-  if (!interior_point(qp, step)) {
+  if (!interior_point(qp, step, ready_to_polish)) {
     active_.clear();
     factored_ = false;
     return Outcome::infeasible;
@@ -122,16 +123,17 @@ StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Itera
   active_.clear();
   for (const Bounded& v : bounded_) {
     std::int8_t& side = v.is_state ? active_.state(v.stage)[v.component] : active_.control(v.stage)[v.component];
-    const bool at_lower = std::isfinite(v.lower) && v.below.multiplier > v.below.slack;
-    const bool at_upper = std::isfinite(v.upper) && v.above.multiplier > v.above.slack;
+    const bool at_lower = std::isfinite(v.lower) && v.below.multiplier > gradient_scale_ * v.below.slack;
+    const bool at_upper = std::isfinite(v.upper) && v.above.multiplier > gradient_scale_ * v.above.slack;
     side = at_lower && (!at_upper || v.below.multiplier > v.above.multiplier) ? std::int8_t{-1}
            : at_upper                                                         ? std::int8_t{1}
                                                                               : std::int8_t{0};
   }
   factored_ = false;
   if (try_active_sets(qp, step, polish_rounds)) return Outcome::interior_point;
-  interior_point(qp, step);  // polishing has overwritten the step
+  // Polishing has overwritten the step. If rounding keeps the second run from its accuracy, the first one's must do.
   factored_ = false;
+  if (!interior_point(qp, step, on_its_own)) interior_point(qp, step, ready_to_polish);
   return Outcome::interior_point;
 }
 
@@ -190,13 +192,14 @@ void StageQpSolver::barrier_terms(const StageQp& qp, double target) noexcept {
   }
 }
 
-bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step) noexcept {
+bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted) noexcept {
   collect_bounded(qp);
   double scale = 1.0;
   for (int i = 0; i <= qp.intervals(); ++i) {
     for (int j = 0; j < qp.states(i); ++j) scale = std::max(scale, std::abs(qp.q(i)[j]));
     for (int j = 0; j < qp.controls(i); ++j) scale = std::max(scale, std::abs(qp.r(i)[j]));
   }
+  gradient_scale_ = scale;
   int sides = 0;
   for (Bounded& v : bounded_) {
     const double range = std::min(v.upper - v.lower, 2.0);
@@ -260,7 +263,7 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step) noexcept {
     directions(0.0);
     const double affine = longest_step();
     const double ratio = mean_complementarity(affine) / complementarity;
-    const double target = std::max(ratio * ratio * ratio * complementarity, 1e-3 * interior_gap * scale);
+    const double target = std::max(ratio * ratio * ratio * complementarity, 1e-3 * wanted.gap * scale);
     each_side([](const Bounded&, Side& s) { s.correction = s.slack_step * s.multiplier_step; });
     barrier_terms(qp, target);
     if (riccati_.solve(qp, active_, step, q_.data(), r_.data()) != Riccati::Outcome::done) return false;
@@ -282,7 +285,7 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step) noexcept {
     });
     // Multipliers that grow without end are the certificate of bounds that contradict each other.
     if (largest_multiplier > divergence * scale) return false;
-    if (gap < interior_gap * scale && infeasibility < interior_infeasibility) {
+    if (gap < wanted.gap * scale && infeasibility < wanted.infeasibility) {
       for (int i = 0; i <= qp.intervals(); ++i) {
         std::fill_n(step.state_bound(i), qp.states(i), 0.0);
         if (i < qp.intervals()) std::fill_n(step.control_bound(i), qp.controls(i), 0.0);

@@ -19,6 +19,10 @@ class StageQpSolver {
     interior_point,  ///< the interior-point method was needed; exact after polishing, or to its tolerance
     infeasible       ///< the bounds cannot be satisfied
   };
+  /// When the interior-point method stops: complementarity relative to the gradient, and violation of the bounds.
+  struct Accuracy {
+    double gap, infeasibility;
+  };
   StageQpSolver() = default;
   explicit StageQpSolver(const Capacity& capacity);
 
@@ -49,7 +53,7 @@ class StageQpSolver {
   void factor(const StageQp& qp) noexcept;
   Violations correct_active_set(const StageQp& qp, const Iterate& step) noexcept;
   bool try_active_sets(const StageQp& qp, Iterate& step, int rounds) noexcept;
-  bool interior_point(const StageQp& qp, Iterate& step) noexcept;
+  bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted) noexcept;
   void convexify(StageQp& qp) noexcept;
 
   /// One bounded variable in the interior-point method: slacks and multipliers of its two sides.
@@ -70,6 +74,7 @@ class StageQpSolver {
   ActiveSet active_;
   bool factored_ = false, bent_ = false;
   int factorisations_ = 0;
+  double gradient_scale_ = 1.0;  ///< of the last interior-point solution: what a slack of one weighs
   std::vector<Bounded> bounded_;
   std::vector<double> state_diagonal_, control_diagonal_, q_, r_;
 };

@@ -90,6 +90,8 @@ SETTINGS = [
     ("estimator.initial.parameters={kappa: .inf}", "finite"),
     ("estimator.forgetting.kappa=-1", "at least 0"),
     ("estimator.restart_sigma.kappa=.inf", "finite"),
+    ("estimator.block_sigma.kappa=0", "greater than 0"),
+    ("estimator.block_sigma.kapa=1", "did you mean 'kappa'"),
     ("estimator.robust={outputs: [x_gps], delta: 0}", "greater than 0"),
     ("bounds.kappa=[1, 0]", "found [1, 0], expected lower <= upper"),
     ("controller.least_speed_factor=0", "greater than 0"),
@@ -374,7 +376,8 @@ class Test(cli.Findings):
         files = sorted(path.name for path in self.out.iterdir())
         self.expect(files == ["run.svg", "steps.csv", "summary.json", "times.csv"], "lost", f"files: {files}")
         summary = json.loads((self.out / "summary.json").read_text())
-        self.expect(summary["completed"] is False and "lost" in summary["ended"], "lost", str(summary["ended"]))
+        self.expect(summary["completed"] is False and "end of the path" not in summary["ended"], "lost", summary["ended"])
+        self.expect(summary["ended"] in result.stdout, "lost", f"it does not say why it ended: {result.stdout}")
 
 
 def main():

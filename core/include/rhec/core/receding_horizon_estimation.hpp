@@ -15,10 +15,10 @@ namespace rhec {
 /// Receding horizon estimation with structured blocking (METHOD): a window of at most `problem.max_intervals` intervals
 /// that grows from the start of the run and then slides, with an arrival cost before it.
 ///
-/// Blocks that no random walk links (`Blocking::neighbour_sigma` off) still get a wide prior, `block_sigma`, about the block
-/// before: what the data determine is theirs, and a block that they say little about keeps near its neighbour's value
-/// rather than being thrown to a bound by noise. Infinite, it reproduces the paper, which reports that blocks of one and
-/// three intervals then do not converge.
+/// Blocks that no random walk links (`Blocking::neighbour_sigma` off) still get a wide prior, `block_sigma`, about the
+/// block before: what the data determine is theirs, and a block that they say little about keeps near its neighbour's
+/// value rather than being thrown to a bound by noise. Infinite, it reproduces the paper, which reports that blocks of
+/// one and three intervals then do not converge.
 class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
  public:
   struct Setup {

@@ -68,10 +68,10 @@ struct OptionSection {
 RHEC_EXPORT std::vector<OptionSection> robot_sections();
 
 /// Numbers that a map gives by the names of variables; `defaults` for those that it does not name. Throws Error for
-/// unknown names (with the nearest) and for values outside `range`.
+/// unknown names (with the nearest) and for values that are outside `range`, or infinite where they may not be.
 RHEC_EXPORT std::vector<double> numbers_by_name(const Settings& map, const std::vector<Variable>& variables,
                                                 std::vector<double> defaults, const Range& range,
-                                                const std::string& owner);
+                                                const std::string& owner, bool may_be_infinite = false);
 /// Throws Error unless every key of a map (or null) is known; the nearest known one is suggested.
 RHEC_EXPORT void require_known_keys(const Settings& map, const std::vector<std::string>& known,
                                     const std::string& owner);

@@ -21,7 +21,7 @@ struct ScenarioOptions : RobotOptions {
   static const OptionTable<ScenarioOptions>& table();
 };
 
-/// The sections of a scenario, its first one without a name: the root.
+/// The sections of a scenario, its first one without a name (the root), its last ones those of a recorded drive.
 RHEC_EXPORT std::vector<OptionSection> scenario_sections();
 
 /// A scenario with all that it names made: the path, the ground, the vehicle on it. Throws Error for whatever is wrong,
