@@ -55,7 +55,8 @@ int estimate(const EstimateArguments& arguments) {
   const sim::LogScenario scenario(Host(arguments.plugin_path), settings, arguments.variants);
   const int phase = arguments.phase >= 0 ? arguments.phase : arguments.hold_out - 1;
   if (arguments.hold_out > 0 && phase >= arguments.hold_out)
-    throw Error(fmt::format("--hold-out-phase {} with --hold-out {}; expected a number below it", phase, arguments.hold_out));
+    throw Error(
+        fmt::format("--hold-out-phase {} with --hold-out {}; expected a number below it", phase, arguments.hold_out));
   const sim::HoldOut hold_out{arguments.hold_out, phase};
   const sim::RecordedLog log = sim::read_recorded_log(arguments.dead_reckoning, arguments.gps, scenario);
   sim::OutputFolder folder(arguments.out);
@@ -63,7 +64,8 @@ int estimate(const EstimateArguments& arguments) {
   bool all_usable = true;
   for (const sim::LogVariant& variant : scenario.variants()) {
     ProgressBar bar(variant.name);
-    replays.push_back(sim::replay(variant.robot, log, scenario.log(), hold_out, [&](double share) { bar.show(share); }));
+    replays.push_back(
+        sim::replay(variant.robot, log, scenario.log(), hold_out, [&](double share) { bar.show(share); }));
     all_usable = all_usable && replays.back().counts.fallbacks == 0;
   }
   folder.write("estimates.csv", sim::estimates_csv(replays, log, scenario));
@@ -78,7 +80,8 @@ int estimate(const EstimateArguments& arguments) {
 
 void add_estimate(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<EstimateArguments>();
-  CLI::App* command = program.add_subcommand("estimate", "Estimates state and slip from a recorded drive, and predicts what it withholds.");
+  CLI::App* command = program.add_subcommand(
+      "estimate", "Estimates state and slip from a recorded drive, and predicts what it withholds.");
   command->footer(
       "Files are comma-separated without a header: time, wheel speed, steering angle; and time, x, y. Writes\n"
       "estimates.csv, summary.json and run.svg to the output folder. The exit code is 3 where a solve failed.\n\n"
@@ -86,20 +89,25 @@ void add_estimate(CLI::App& program, Action& chosen) {
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/park\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 --variant ekf");
   command->add_option("scenario", arguments->scenario, "a YAML file")->required();
-  command->add_option("--dead-reckoning", arguments->dead_reckoning, "time [s], wheel speed [m/s], steering angle [rad]")
+  command
+      ->add_option("--dead-reckoning", arguments->dead_reckoning, "time [s], wheel speed [m/s], steering angle [rad]")
       ->type_name("FILE")
       ->required();
   command->add_option("--gps", arguments->gps, "time [s], x [m], y [m]")->type_name("FILE")->required();
   command->add_option("--hold-out", arguments->hold_out, "withhold one of so many fixes and predict it; 0: none")
       ->check(CLI::Range(0, 1000000))
       ->capture_default_str();
-  command->add_option("--hold-out-phase", arguments->phase, "place of the first one withheld, from 0; default: the last of them")
+  command
+      ->add_option("--hold-out-phase", arguments->phase,
+                   "place of the first one withheld, from 0; default: the last of them")
       ->check(CLI::Range(0, 1000000));
   command->add_option("--variant", arguments->variants, "run this variant alone; may be given several times")
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command->add_option("--set", arguments->assignments, "KEY=VALUE over any key of the scenario; may be given several times")
+  command
+      ->add_option("--set", arguments->assignments,
+                   "KEY=VALUE over any key of the scenario; may be given several times")
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);

@@ -18,6 +18,10 @@ namespace {
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 // Stamps are decimal: two that differ by less are the same [s].
 constexpr double same_time = 1e-6;
+// A log that is silent for longer is two logs, or has a broken stamp [s].
+constexpr double longest_silence = 3600.0;
+// Rows of one stamp are not spread over more than this, since nobody knows when the silence after them began [s].
+constexpr double longest_spread = 0.1;
 
 /// Puts the keys of a variant over the scenario: maps are merged, all else is replaced.
 void put_over(Settings& base, const Settings& variant, const std::string& prefix) {
@@ -31,12 +35,14 @@ void put_over(Settings& base, const Settings& variant, const std::string& prefix
   }
 }
 
-int index_of(const std::string& name, const std::vector<Variable>& variables, const Settings& section, const char* what) {
+int index_of(const std::string& name, const std::vector<Variable>& variables, const Settings& section,
+             const char* what) {
   std::vector<std::string> names;
   for (const Variable& variable : variables) names.push_back(variable.name);
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end())
-    throw section.error(fmt::format("the model has no {} '{}'; expected one of {}", what, name, fmt::join(names, ", ")));
+    throw section.error(
+        fmt::format("the model has no {} '{}'; expected one of {}", what, name, fmt::join(names, ", ")));
   return static_cast<int>(found - names.begin());
 }
 
@@ -65,12 +71,22 @@ void spread_rows(std::vector<DeadReckoning>& rows) {
     std::size_t next = first + 1;
     while (next < rows.size() && rows[next].stamp == rows[first].stamp) ++next;
     if (next < rows.size()) {
-      const double gap = std::min(rows[next].stamp - rows[first].stamp, 0.1);
+      const double gap = std::min(rows[next].stamp - rows[first].stamp, longest_spread);
       for (std::size_t i = first; i < next; ++i)
         rows[i].time = rows[first].stamp + gap * static_cast<double>(i - first) / static_cast<double>(next - first);
     }
     first = next;
   }
+}
+
+void check_times(const CsvTable& table) {
+  check_time_order(table);
+  for (std::int64_t row = 1; row < table.rows(); ++row)
+    if (table.at(row, 0) - table.at(row - 1, 0) > longest_silence)
+      throw Error(
+          fmt::format("{}:{}: time leaps from {} s to {} s; expected rows at most {} s apart; mend the stamp, or cut "
+                      "the log there",
+                      table.name, table.line_of(row), table.at(row - 1, 0), table.at(row, 0), longest_silence));
 }
 
 void mark_agreement(std::vector<Fix>& fixes, const LogOptions& options) {
@@ -122,7 +138,8 @@ class Driver {
       const DeadReckoning& row = log_.rows[known_];
       double rate = missing;
       if (known_ > 0) {
-        // Now that the row has come, what went on since the one before is known, and takes the place of what was assumed.
+        // Now that the row has come, what went on since the one before is known, and takes the place of what was
+        // assumed.
         const DeadReckoning& before = log_.rows[known_ - 1];
         const double duration = row.time - before.time;
         if (duration > 0.0) {
@@ -164,7 +181,6 @@ class Driver {
   void take_fix(const Fix& fix, std::int64_t index) {
     if (known_ == 0) return;  // before the first row of dead reckoning nobody knows how it moved
     if (started_) {
-      // Stamps are decimal, so a thousandth more than the step is no reason for a node of its own.
       const double from = newest_;
       const int parts = static_cast<int>(std::ceil((fix.time - from) / step_ - 1e-6));
       for (int i = 1; i < parts; ++i) add_node(from + (fix.time - from) * i / parts);
@@ -250,8 +266,10 @@ const OptionTable<LogOptions>& LogOptions::table() {
           .number("steering_bias", &LogOptions::steering_bias, "the steering's reading when driving straight [rad]")
           .number("fix_delay", &LogOptions::fix_delay, "how much later than the dead reckoning a fix is stamped [s]")
           .number("agreement", &LogOptions::agreement,
-                  "a fix agrees with its neighbours where it is this near to the line between them [m]", greater_than(0.0))
-          .number("neighbour_time", &LogOptions::neighbour_time, "and they are this near in time [s]", greater_than(0.0))
+                  "a fix agrees with its neighbours where it is this near to the line between them [m]",
+                  greater_than(0.0))
+          .number("neighbour_time", &LogOptions::neighbour_time, "and they are this near in time [s]",
+                  greater_than(0.0))
           .names("position", &LogOptions::position, "the two outputs that a fix measures")
           .text("steering", &LogOptions::steering, "the output that the steering's reading is")
           .text("speed", &LogOptions::speed, "the input that is the speed of the wheels")
@@ -295,7 +313,8 @@ LogScenario::LogScenario(const Host& host, const Settings& settings, const std::
   for (const auto& [name, keys] : base.variants.members()) names.push_back(name);
   for (const std::string& name : chosen)
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw base.variants.error(fmt::format("there is no variant '{}'; expected one of {}", name, fmt::join(names, ", ")));
+      throw base.variants.error(
+          fmt::format("there is no variant '{}'; expected one of {}", name, fmt::join(names, ", ")));
   for (const auto& [name, keys] : base.variants.members()) {
     if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), name) == chosen.end()) continue;
     if (!keys.is_null() && keys.kind() != Settings::Kind::map) throw keys.mismatch("a map of keys of the scenario");
@@ -313,8 +332,12 @@ RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const
   const LogOptions& options = scenario.log();
   const CsvTable rows = read_csv(dead_reckoning, {.columns = 3});
   const CsvTable fixes = read_csv(gps, {.columns = 3});
-  check_time_order(rows);
-  check_time_order(fixes);
+  check_times(rows);
+  check_times(fixes);
+  if (fixes.at(fixes.rows() - 1, 0) < rows.at(0, 0) || fixes.at(0, 0) > rows.at(rows.rows() - 1, 0))
+    throw Error(fmt::format("{}: from {} s to {} s, but {}: from {} s to {} s; expected logs of one drive by one clock",
+                            rows.name, rows.at(0, 0), rows.at(rows.rows() - 1, 0), fixes.name, fixes.at(0, 0),
+                            fixes.at(fixes.rows() - 1, 0)));
   RecordedLog log;
   log.missing_speeds = rows.missing[1];
   log.missing_steerings = rows.missing[2];
@@ -327,9 +350,10 @@ RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const
       // In a bend a wheel beside the middle runs on a circle of another radius.
       const double factor = 1.0 - std::tan(steering) * options.wheel_offset / scenario.wheelbase();
       if (!(factor > 0.1))
-        throw Error(fmt::format("{}:{}: with a steering angle of {} rad the wheel would stand still or run backwards; "
-                                "expected an angle in radians; check the column and log.wheel_offset",
-                                rows.name, rows.line_of(i), steering));
+        throw Error(
+            fmt::format("{}:{}: with a steering angle of {} rad the wheel would stand still or run backwards; "
+                        "expected an angle in radians; check the column and log.wheel_offset",
+                        rows.name, rows.line_of(i), steering));
       row.speed /= factor;
     }
     log.rows.push_back(row);

@@ -89,9 +89,10 @@ std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& 
   json["name"] = scenario.name();
   json["dead_reckoning"] = {{"rows", log.rows.size()},
                             {"missing", {{"speed", log.missing_speeds}, {"steering", log.missing_steerings}}}};
-  json["fixes"] = {{"rows", log.fixes.size()},
-                   {"missing_coordinates", log.missing_coordinates},
-                   {"consistent", std::count_if(log.fixes.begin(), log.fixes.end(), [](const Fix& f) { return f.agrees; })}};
+  json["fixes"] = {
+      {"rows", log.fixes.size()},
+      {"missing_coordinates", log.missing_coordinates},
+      {"consistent", std::count_if(log.fixes.begin(), log.fixes.end(), [](const Fix& f) { return f.agrees; })}};
   json["hold_out"] = {{"every", hold_out.every}, {"phase", hold_out.phase}, {"error_cap_m", error_cap}};
   // That of the first variant, the one that the scenario is about; the others are beside it below.
   json["variant"] = scenario.variants().front().name;
@@ -108,10 +109,12 @@ std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogSc
   const HeldOutSummary summary = summarise(replay, log);
   picture.subtitle = scenario.variants().front().name;
   if (summary.all.count > 0)
-    picture.subtitle += fmt::format("; {} withheld fixes predicted to {:.3f} m in the median", summary.all.count, summary.all.median);
+    picture.subtitle +=
+        fmt::format("; {} withheld fixes predicted to {:.3f} m in the median", summary.all.count, summary.all.median);
   for (const Fix& fix : log.fixes) picture.fixes.push_back({fix.x, fix.y});
   for (const LoggedEstimate& entry : replay.estimates)
-    if (!entry.held_out) picture.estimated.push_back({entry.values[about.roles.position_x], entry.values[about.roles.position_y]});
+    if (!entry.held_out)
+      picture.estimated.push_back({entry.values[about.roles.position_x], entry.values[about.roles.position_y]});
   const auto nx = static_cast<Eigen::Index>(about.states.size());
   for (std::size_t j = 0; j < about.parameters.size(); ++j) {
     const Variable& variable = about.parameters[j];

@@ -132,7 +132,7 @@ TEST(UnmeasuredBlock, WithALinkOrAsOneBlockSideSlipSeldomReachesABound) {
     for_each_blocking([&](Drive drive) {
       drive.more = linked;
       drive.side_slip_in_one_block = whole;
-      for (drive.seed = 1; drive.seed <= 12; ++drive.seed) {
+      for (drive.seed = 1; drive.seed <= 6; ++drive.seed) {
         at_bound += drive_straight(drive).at_bound;
         all += samples;
       }
@@ -144,22 +144,23 @@ TEST(UnmeasuredBlock, WithALinkOrAsOneBlockSideSlipSeldomReachesABound) {
 }
 
 // Blocks that are not linked are held by `block_sigma` while they are in the window, and restart when they become its
-// first.
+// first. A parameter that is hardly seen needs a restart no wider than its bounds.
 TEST(UnmeasuredBlock, WithoutALinkTheWalkHoldsTheSideSlip) {
-  for (const double block : {std::numeric_limits<double>::infinity(), 1.0, 0.25, 0.1}) {
-    for (const double restart : {1.0, 0.3, 0.1}) {
-      int at_bound = 0, all = 0;
-      for_each_blocking([&](Drive drive) {
-        drive.walk.restart_sigma = restart;
-        drive.walk.block_sigma = block;
-        for (drive.seed = 1; drive.seed <= 6; ++drive.seed) {
-          at_bound += drive_straight(drive).at_bound;
-          all += samples;
-        }
-      });
-      std::printf("mu restarted at %g, held by %g: at a bound in %.1f %% of the samples\n", restart, block,
-                  100.0 * at_bound / all);
-    }
+  struct Row {
+    double restart_sigma, most;
+  };
+  for (const Row row : {Row{1.0, 0.25}, Row{0.3, 0.12}, Row{0.1, 0.08}}) {
+    int at_bound = 0, all = 0;
+    for_each_blocking([&](Drive drive) {
+      drive.walk.restart_sigma = row.restart_sigma;
+      for (drive.seed = 1; drive.seed <= 6; ++drive.seed) {
+        at_bound += drive_straight(drive).at_bound;
+        all += samples;
+      }
+    });
+    std::printf("mu restarted at %g: at a bound in %.1f %% of the samples\n", row.restart_sigma,
+                100.0 * at_bound / all);
+    EXPECT_LT(at_bound, row.most * all);
   }
 }
 

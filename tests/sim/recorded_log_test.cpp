@@ -107,9 +107,10 @@ TEST_F(RecordedLogTest, FindsTheHeadingAndTheSlipAndPredictsWhatIsWithheld) {
     EXPECT_EQ(result.counts.fallbacks, 0) << variant.name;
     EXPECT_LT(summary.all.median, 0.1) << variant.name;
     const LoggedEstimate& last = result.estimates.back();
-    EXPECT_NEAR(std::remainder(last.values[2] - (heading + kappa * speed / wheelbase * std::tan(steering) * (last.time - 2.0)),
-                               2.0 * M_PI),
-                0.0, 0.1)
+    EXPECT_NEAR(
+        std::remainder(last.values[2] - (heading + kappa * speed / wheelbase * std::tan(steering) * (last.time - 2.0)),
+                       2.0 * M_PI),
+        0.0, 0.1)
         << variant.name;
     EXPECT_NEAR(last.values[4], kappa, 0.05) << variant.name;
   }
@@ -187,8 +188,8 @@ TEST_F(RecordedLogTest, AWithheldFixWithoutAnEstimateCountsWithTheCap) {
 
 TEST_F(RecordedLogTest, TellsFixesThatAgreeWithTheirNeighbours) {
   const std::string rows = "0,0,0\n1,0,0\n";
-  const RecordedLog drive =
-      log(scenario_of(), rows, "0,0,0\n0.2,0.1,0\n0.4,9,0\n0.6,0.3,0\n0.8,0.4,0\n1.0,0.5,0\n2.5,1,0\n2.7,1,0\n2.9,1,nan\n");
+  const RecordedLog drive = log(
+      scenario_of(), rows, "0,0,0\n0.2,0.1,0\n0.4,9,0\n0.6,0.3,0\n0.8,0.4,0\n1.0,0.5,0\n2.5,1,0\n2.7,1,0\n2.9,1,nan\n");
   std::vector<bool> agrees;
   for (const Fix& fix : drive.fixes) agrees.push_back(fix.agrees);
   // The ends have one neighbour; 9 jumps, and so both beside it stand off; 2.5 s is too far from 1.0 s.
@@ -201,6 +202,8 @@ TEST_F(RecordedLogTest, NamesFileLineAndWhatIsWrong) {
   EXPECT_THAT(message_for("0,1,0\n2,1,0\n1,1,0\n", fixes_), HasSubstr("drs.txt:3: time runs backwards"));
   EXPECT_THAT(message_for(rows_, "0,1,0\n2,1,0\n1,1,0\n"), HasSubstr("gps.txt:3: time runs backwards"));
   EXPECT_THAT(message_for(rows_, "nan,1,0\n"), HasSubstr("gps.txt:1: the time is missing"));
+  EXPECT_THAT(message_for(rows_, "0,1,0\n1e9,1,0\n"), HasSubstr("gps.txt:2: time leaps"));
+  EXPECT_THAT(message_for(rows_, "100,1,0\n101,1,0\n"), HasSubstr("expected logs of one drive"));
   EXPECT_THAT(message_for("0,1,80\n", fixes_), AllOf(HasSubstr("drs.txt:1: "), HasSubstr("expected")));
   EXPECT_THAT(message_of([&] { read_recorded_log(root_ / "none.txt", root_ / "none.txt", scenario_of()); }),
               HasSubstr("none.txt: cannot be read"));
@@ -213,11 +216,14 @@ TEST(LogScenario, RefusesWhatDoesNotFit) {
     return message_of([&] { scenario_of(text); });
   };
   EXPECT_THAT(message("wheel_offset", "wheel_ofset"), AllOf(HasSubstr("circle.yaml:5"), HasSubstr("wheel_offset")));
-  EXPECT_THAT(message("{wheel_offset: 0.5}", "{steering: gamma}"), AllOf(HasSubstr("circle.yaml:5"), HasSubstr("gamma")));
+  EXPECT_THAT(message("{wheel_offset: 0.5}", "{steering: gamma}"),
+              AllOf(HasSubstr("circle.yaml:5"), HasSubstr("gamma")));
   EXPECT_THAT(message("wheelbase: 2.0, ", ""), HasSubstr("needs model.wheelbase"));
-  EXPECT_THAT(message("rhe: {}", "rhe: {estimator: {horizont: 3}}"), AllOf(HasSubstr("horizont"), HasSubstr("horizon")));
+  EXPECT_THAT(message("rhe: {}", "rhe: {estimator: {horizont: 3}}"),
+              AllOf(HasSubstr("horizont"), HasSubstr("horizon")));
   EXPECT_THAT(message("rhe: {}", "rhe: {log: {}}"), HasSubstr("shared by all variants"));
-  EXPECT_THAT(message_of([] { scenario_of(scenario_text, {"best"}); }), AllOf(HasSubstr("'best'"), HasSubstr("rhe, robust, ekf")));
+  EXPECT_THAT(message_of([] { scenario_of(scenario_text, {"best"}); }),
+              AllOf(HasSubstr("'best'"), HasSubstr("rhe, robust, ekf")));
 }
 
 }  // namespace

@@ -14,11 +14,11 @@ namespace rhec::sim {
 
 /// The section `log` of a scenario: how a drive was recorded, and what its columns mean to the model.
 struct LogOptions {
-  double wheel_offset = 0.0;   ///< the speed was measured at a wheel this far left of the axle's middle [m]
-  double steering_bias = 0.0;  ///< the steering's reading when driving straight [rad]
-  double fix_delay = 0.0;      ///< how much later than the dead reckoning a fix is stamped [s]
-  double agreement = 1.0;      ///< a fix agrees with its neighbours where it is this near to the line between them [m]
-  double neighbour_time = 1.0; ///< and they are this near in time [s]
+  double wheel_offset = 0.0;    ///< the speed was measured at a wheel this far left of the axle's middle [m]
+  double steering_bias = 0.0;   ///< the steering's reading when driving straight [rad]
+  double fix_delay = 0.0;       ///< how much later than the dead reckoning a fix is stamped [s]
+  double agreement = 1.0;       ///< a fix agrees with its neighbours where it is this near to the line between them [m]
+  double neighbour_time = 1.0;  ///< and they are this near in time [s]
   std::vector<std::string> position{"x_gps", "y_gps"};  ///< outputs that a fix measures
   std::string steering = "delta";                       ///< output that the steering's reading is
   std::string speed = "u1", steering_rate = "u2";       ///< inputs
@@ -38,8 +38,8 @@ struct LogVariant {
   Robot robot;
 };
 
-/// A scenario for recorded data with all that it names made. Throws Error for whatever is wrong, naming file, line and key.
-/// Without `variants` it is one variant itself; `chosen` (where not empty) are the names of those to be made.
+/// A scenario for recorded data with all that it names made. Throws Error for whatever is wrong, naming file, line and
+/// key. Without `variants` it is one variant itself; `chosen` (where not empty) are the names of those to be made.
 class RHEC_EXPORT LogScenario {
  public:
   LogScenario(const Host& host, const Settings& settings, const std::vector<std::string>& chosen = {});
@@ -57,8 +57,8 @@ class RHEC_EXPORT LogScenario {
 
 /// A row of dead reckoning; NaN where a reading is missing.
 struct DeadReckoning {
-  double time = 0.0;   ///< [s]; rows of one stamp are spread evenly until the next
-  double stamp = 0.0;  ///< as recorded: when the row is known
+  double time = 0.0;                   ///< [s]; rows of one stamp are spread evenly until the next
+  double stamp = 0.0;                  ///< as recorded: when the row is known
   double speed = 0.0, steering = 0.0;  ///< of the axle's middle [m/s], without the bias [rad]
 };
 /// A measured position; NaN where a coordinate is missing.
@@ -79,8 +79,8 @@ struct RecordedLog {
 RHEC_EXPORT RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const std::filesystem::path& gps,
                                           const LogScenario& scenario);
 
-/// Which fixes are withheld from the estimator, so that they can be predicted: those whose place in the file, counted from
-/// 0, leaves the rest `phase` when divided by `every`; every = 0: none.
+/// Which fixes are withheld from the estimator, so that they can be predicted: those whose place in the file, counted
+/// from 0, leaves the rest `phase` when divided by `every`; every = 0: none.
 struct HoldOut {
   int every = 0;
   int phase = 0;
@@ -105,11 +105,11 @@ struct Replay {
   std::vector<double> solve_us;  ///< preparation and feedback of each solve [us]
   double seconds = 0.0;          ///< of the whole replay
 };
-/// Drives through a log with an estimator made anew: everything is pushed in the order in which it became known, and the
-/// estimator is asked at each node. Nodes lie at the fixes that are not withheld and at most the robot's step apart; between
-/// fixes they measure the steering alone. A withheld fix is asked for at its time and leaves no trace.
-RHEC_EXPORT Replay replay(const Robot& robot, const RecordedLog& log, const LogOptions& options, const HoldOut& hold_out,
-                          const std::function<void(double)>& progress = {});
+/// Drives through a log with an estimator made anew: everything is pushed in the order in which it became known, and
+/// the estimator is asked at each node. Nodes lie at the fixes that are not withheld and at most the robot's step
+/// apart; between fixes they measure the steering alone. A withheld fix is asked for at its time and leaves no trace.
+RHEC_EXPORT Replay replay(const Robot& robot, const RecordedLog& log, const LogOptions& options,
+                          const HoldOut& hold_out, const std::function<void(double)>& progress = {});
 
 /// How well withheld fixes were predicted.
 struct PredictionErrors {
@@ -125,9 +125,10 @@ struct HeldOutSummary {
 RHEC_EXPORT HeldOutSummary summarise(const Replay& replay, const RecordedLog& log);
 
 /// The files of a replay; entry i of `replays` is that of variant i. The picture shows the first variant.
-RHEC_EXPORT std::string estimates_csv(const std::vector<Replay>& replays, const RecordedLog& log, const LogScenario& scenario);
-RHEC_EXPORT std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& log, const LogScenario& scenario,
-                                     const HoldOut& hold_out);
+RHEC_EXPORT std::string estimates_csv(const std::vector<Replay>& replays, const RecordedLog& log,
+                                      const LogScenario& scenario);
+RHEC_EXPORT std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& log,
+                                     const LogScenario& scenario, const HoldOut& hold_out);
 RHEC_EXPORT std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogScenario& scenario);
 
 }  // namespace rhec::sim
