@@ -24,7 +24,8 @@ RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Se
   for (const auto& blocking : setup.blockings)
     if (const std::string reason = blocking->why_not(setup.problem.max_intervals); !reason.empty())
       throw Error("controller: blocking: " + reason);
-  if (!(setup.interval > 0.0)) throw Error(fmt::format("controller: interval {} s; expected a positive number", setup.interval));
+  if (!(setup.interval > 0.0))
+    throw Error(fmt::format("controller: interval {} s; expected a positive number", setup.interval));
   return {std::move(model), setup.problem};
 }
 
@@ -90,7 +91,8 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
       problem_.input_lower(i, roles.speed) = 0.0;
       problem_.input_upper(i, roles.speed) = bound;
     }
-    for (int j = 0; j < nu; ++j) u[j] = std::min(std::max(u[j], problem_.input_lower(i, j)), problem_.input_upper(i, j));
+    for (int j = 0; j < nu; ++j)
+      u[j] = std::min(std::max(u[j], problem_.input_lower(i, j)), problem_.input_upper(i, j));
   }
 }
 

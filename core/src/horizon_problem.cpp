@@ -121,7 +121,9 @@ struct Rows {
   Rows(std::span<double> scratch, int count, int nx, int nu, int np) {
     const int nz = nx + nu + 2 * np;
     double* position = scratch.data();
-    const auto take = [&](int width) { return std::exchange(position, position + static_cast<std::ptrdiff_t>(count) * width); };
+    const auto take = [&](int width) {
+      return std::exchange(position, position + static_cast<std::ptrdiff_t>(count) * width);
+    };
     x = take(nx);
     u = take(nu);
     p = take(np);

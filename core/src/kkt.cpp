@@ -25,7 +25,8 @@ double max_abs(const double* v, int n, double so_far) noexcept {
 constexpr int max_width = 64;  // a stage's states or controls; set-up refuses more
 
 /// Violation of bounds on a step of zero, and complementarity of the multipliers, against them.
-void check_bounds(const double* lower, const double* upper, const double* multipliers, int n, KktResidual& kkt) noexcept {
+void check_bounds(const double* lower, const double* upper, const double* multipliers, int n,
+                  KktResidual& kkt) noexcept {
   for (int j = 0; j < n; ++j) {
     kkt.bound_violation = std::max({kkt.bound_violation, lower[j], -upper[j]});
     const double gap = multipliers[j] > 0.0 ? std::abs(upper[j]) : multipliers[j] < 0.0 ? std::abs(lower[j]) : 0.0;

@@ -8,14 +8,12 @@
 
 #include <fmt/format.h>
 
-#include "rhec/core/error.hpp"
 #include "checks.hpp"
+#include "rhec/core/error.hpp"
 
 namespace rhec {
 
-double angle_difference(double a, double b) noexcept {
-  return std::remainder(a - b, 2.0 * std::numbers::pi);
-}
+double angle_difference(double a, double b) noexcept { return std::remainder(a - b, 2.0 * std::numbers::pi); }
 
 RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
     : HorizonProblem(std::move(model), {setup.max_intervals, setup.substeps, {}}),
@@ -30,7 +28,8 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   robust_group_.assign(ny_, -1);
   for (std::size_t g = 0; g < setup_.robust.size(); ++g) {
     const RobustLoss& loss = setup_.robust[g];
-    if (!(loss.delta > 0.0)) throw Error(fmt::format("robust loss: delta is {}; expected a number above 0", loss.delta));
+    if (!(loss.delta > 0.0))
+      throw Error(fmt::format("robust loss: delta is {}; expected a number above 0", loss.delta));
     for (const int output : loss.outputs) {
       if (output < 0 || output >= ny_ || robust_group_[output] >= 0)
         throw Error(fmt::format("robust loss: output {} does not exist or has a loss already", output));
@@ -147,7 +146,8 @@ double RheProblem::cost(const Iterate& point, std::span<double> scratch) const n
   const int n = nx() + np();
   for (int r = 0; r < n; ++r)
     for (int c = 0; c < n; ++c)
-      total += (point.state(0)[r] - arrival_mean[r]) * arrival_information(r, c) * (point.state(0)[c] - arrival_mean[c]);
+      total +=
+          (point.state(0)[r] - arrival_mean[r]) * arrival_information(r, c) * (point.state(0)[c] - arrival_mean[c]);
   for (int i = 0; i < count; ++i) {
     residual(i, predicted + i * ny_, difference);
     total += losses(difference, weight, nullptr);

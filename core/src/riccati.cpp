@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
+#include <Eigen/Eigenvalues>
 
 #include "rhec/core/error.hpp"
 #include "small_matrix.hpp"
@@ -38,8 +38,8 @@ Riccati::Riccati(const Capacity& capacity)
       width_(std::max(capacity.states, capacity.controls)),
       max_rows_(3 * capacity.states) {
   if (width_ > max_width)
-    throw Error(fmt::format("a stage has {} states and {} controls; the Riccati recursion takes at most {} of each", ns_,
-                            nw_, max_width));
+    throw Error(fmt::format("a stage has {} states and {} controls; the Riccati recursion takes at most {} of each",
+                            ns_, nw_, max_width));
   // Node 0 is kept as one more stage, whose 'controls' are the initial state: hence matrices of the larger width.
   const auto stages = static_cast<std::size_t>(capacity.intervals) + 1;
   const std::size_t wide = width_, rows = max_rows_;
@@ -58,18 +58,10 @@ Riccati::Riccati(const Capacity& capacity)
 
 Riccati::View Riccati::view(int i) noexcept {
   const std::ptrdiff_t wide = width_, rows = max_rows_, ns = ns_, k = i;
-  return {P_.data() + k * ns * ns,
-          G_.data() + k * wide * wide,
-          L_.data() + k * wide * ns,
-          factor_.data() + k * wide * wide,
-          K_.data() + k * wide * ns,
-          T_.data() + k * wide * wide,
-          Y_.data() + k * wide * ns,
-          C_.data() + k * rows * ns,
-          eliminator_.data() + k * rows * rows,
-          pivot_row_.data() + k * rows,
-          pivot_column_.data() + k * rows,
-          left_row_.data() + k * rows};
+  return {P_.data() + k * ns * ns,          G_.data() + k * wide * wide,     L_.data() + k * wide * ns,
+          factor_.data() + k * wide * wide, K_.data() + k * wide * ns,       T_.data() + k * wide * wide,
+          Y_.data() + k * wide * ns,        C_.data() + k * rows * ns,       eliminator_.data() + k * rows * rows,
+          pivot_row_.data() + k * rows,     pivot_column_.data() + k * rows, left_row_.data() + k * rows};
 }
 
 int Riccati::count_active(const StageQp& qp, const ActiveSet& active, int node) const noexcept {
@@ -112,8 +104,8 @@ void Riccati::factor(const StageQp& qp, const ActiveSet& active, const Diagonals
   if (!qp.initial_state_is_given) factor_initial(qp, active);
 }
 
-/// Gauss-Jordan elimination with complete pivoting of D w + F s = e on the columns of w that are not fixed. Afterwards the
-/// pivot rows have a unit column for their control and the left rows none; `eliminator` holds the row operations.
+/// Gauss-Jordan elimination with complete pivoting of D w + F s = e on the columns of w that are not fixed. Afterwards
+/// the pivot rows have a unit column for their control and the left rows none; `eliminator` holds the row operations.
 void Riccati::eliminate(double* D, double* F, int rows, int width, const bool* fixed, Reduction& reduction,
                         View& v) noexcept {
   const int ld = max_rows_;
@@ -168,7 +160,8 @@ void Riccati::eliminate(double* D, double* F, int rows, int width, const bool* f
     if (done[r]) continue;
     double largest = 0.0;
     for (int c = 0; c < ns_; ++c) largest = std::max(largest, std::abs(F[c * ld + r]));
-    // Rows that say nothing about s either are copies of others; whether they agree is checked with the right-hand side.
+    // Rows that say nothing about s either are copies of others; whether they agree is checked with the right-hand
+    // side.
     if (largest > pivot_tolerance * size[r]) v.left_row[reduction.left++] = r;
   }
 }

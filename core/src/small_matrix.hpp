@@ -6,7 +6,8 @@
 namespace rhec::small {
 
 /// C = A B;  A is m x k (leading dimension lda), B is k x n (ldb), C is m x n (ldc).
-inline void multiply(const double* A, int lda, const double* B, int ldb, double* C, int ldc, int m, int k, int n) noexcept {
+inline void multiply(const double* A, int lda, const double* B, int ldb, double* C, int ldc, int m, int k,
+                     int n) noexcept {
   for (int j = 0; j < n; ++j) {
     double* c = C + j * ldc;
     for (int r = 0; r < m; ++r) c[r] = 0.0;

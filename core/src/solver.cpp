@@ -4,26 +4,40 @@ namespace rhec {
 
 const char* name_of(Status status) noexcept {
   switch (status) {
-    case Status::solved: return "solved";
-    case Status::step_taken: return "step_taken";
-    case Status::iteration_limit: return "iteration_limit";
-    case Status::deadline: return "deadline";
-    case Status::infeasible: return "infeasible";
-    case Status::stalled: return "stalled";
-    case Status::bad_input: return "bad_input";
+    case Status::solved:
+      return "solved";
+    case Status::step_taken:
+      return "step_taken";
+    case Status::iteration_limit:
+      return "iteration_limit";
+    case Status::deadline:
+      return "deadline";
+    case Status::infeasible:
+      return "infeasible";
+    case Status::stalled:
+      return "stalled";
+    case Status::bad_input:
+      return "bad_input";
   }
   return "unknown";
 }
 
 const char* advice_for(Status status) noexcept {
   switch (status) {
-    case Status::solved: return "Nothing to do.";
-    case Status::step_taken: return "One real-time iteration was taken; use mode: converge where full accuracy is needed.";
-    case Status::iteration_limit: return "Raise max_iterations, give a better initial guess, or loosen the tolerance.";
-    case Status::deadline: return "Shorten the horizon, block more, or allow more time; the best point so far was returned.";
-    case Status::infeasible: return "Check the bounds against the initial state: no trajectory satisfies them all.";
-    case Status::stalled: return "Check the scaling of weights and bounds; the tolerance may be below what rounding allows.";
-    case Status::bad_input: return "Look for a NaN or an infinity in measurements, references, weights or the guess.";
+    case Status::solved:
+      return "Nothing to do.";
+    case Status::step_taken:
+      return "One real-time iteration was taken; use mode: converge where full accuracy is needed.";
+    case Status::iteration_limit:
+      return "Raise max_iterations, give a better initial guess, or loosen the tolerance.";
+    case Status::deadline:
+      return "Shorten the horizon, block more, or allow more time; the best point so far was returned.";
+    case Status::infeasible:
+      return "Check the bounds against the initial state: no trajectory satisfies them all.";
+    case Status::stalled:
+      return "Check the scaling of weights and bounds; the tolerance may be below what rounding allows.";
+    case Status::bad_input:
+      return "Look for a NaN or an infinity in measurements, references, weights or the guess.";
   }
   return "";
 }

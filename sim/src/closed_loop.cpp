@@ -70,7 +70,8 @@ TimeSummary summarise_times(std::vector<double> times) {
   if (times.empty()) return {};
   std::sort(times.begin(), times.end());
   const auto at = [&](double share) {
-    return times[std::min(times.size() - 1, static_cast<std::size_t>(std::ceil(share * static_cast<double>(times.size())) - 1))];
+    return times[std::min(times.size() - 1,
+                          static_cast<std::size_t>(std::ceil(share * static_cast<double>(times.size())) - 1))];
   };
   return {at(0.5), at(0.99), times.back()};
 }
@@ -92,7 +93,8 @@ RunLog run_closed_loop(const Scenario& scenario, const std::function<void(double
 
   const double step = robot.step();
   // Three times as long as the path should take, which a vehicle that lags behind its literal reference still keeps.
-  const auto limit = static_cast<std::int64_t>(3.0 * scenario.path().length() / (scenario.options().speed * step)) + 100;
+  const auto limit =
+      static_cast<std::int64_t>(3.0 * scenario.path().length() / (scenario.options().speed * step)) + 100;
   std::vector<double> outputs(model.output_count()), measured(model.input_count());
   Estimate known;
   known.state.resize(nx);

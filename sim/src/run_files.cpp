@@ -50,8 +50,9 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
   head("sigma_", about.states);
   head("sigma_", about.parameters);
   head("", about.inputs);
-  text += ",reference_x,reference_y,reference_heading,tracking,nees,estimator_status,controller_status,estimator_fallback,"
-          "controller_fallback,softened\n";
+  text +=
+      ",reference_x,reference_y,reference_heading,tracking,nees,estimator_status,controller_status,estimator_fallback,"
+      "controller_fallback,softened\n";
   auto out = std::back_inserter(text);
   const std::size_t sigmas = about.states.size() + about.parameters.size();
   for (const Sample& sample : log.samples) {
@@ -81,7 +82,8 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
 std::string times_csv(const RunLog& log) {
   std::string text = "step,rhe_us,rhc_us\n";
   for (const Sample& sample : log.samples)
-    fmt::format_to(std::back_inserter(text), "{},{:.3f},{:.3f}\n", sample.step, sample.estimator_us, sample.controller_us);
+    fmt::format_to(std::back_inserter(text), "{},{:.3f},{:.3f}\n", sample.step, sample.estimator_us,
+                   sample.controller_us);
   return text;
 }
 
@@ -130,12 +132,15 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
   const auto states = static_cast<Eigen::Index>(about.states.size());
   for (std::size_t j = 0; j < about.parameters.size(); ++j) {
     Panel panel;
-    panel.title = about.parameters[j].meaning.empty() ? about.parameters[j].name
-                                                      : fmt::format("{} ({})", about.parameters[j].name, about.parameters[j].meaning);
+    panel.title = about.parameters[j].meaning.empty()
+                      ? about.parameters[j].name
+                      : fmt::format("{} ({})", about.parameters[j].name, about.parameters[j].meaning);
     panel.unit = about.parameters[j].unit;
     const auto index = static_cast<Eigen::Index>(j);
-    panel.curves.push_back(curve_of(log, "true", CurveRole::truth, about, [=](const Sample& s) { return s.true_parameters[index]; }));
-    Curve estimate = curve_of(log, "estimated", CurveRole::estimate, about, [=](const Sample& s) { return s.parameters[index]; });
+    panel.curves.push_back(
+        curve_of(log, "true", CurveRole::truth, about, [=](const Sample& s) { return s.true_parameters[index]; }));
+    Curve estimate =
+        curve_of(log, "estimated", CurveRole::estimate, about, [=](const Sample& s) { return s.parameters[index]; });
     for (const Sample& sample : log.samples)
       if (sample.sigma.size() > 0) estimate.sigmas.push_back(sample.sigma[states + index]);
     panel.curves.push_back(std::move(estimate));
@@ -146,7 +151,8 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
   Panel tracking;
   tracking.title = "Distance from the path";
   tracking.unit = "m";
-  tracking.curves.push_back(curve_of(log, "tracking error", CurveRole::other, about, [](const Sample& s) { return s.tracking; }));
+  tracking.curves.push_back(
+      curve_of(log, "tracking error", CurveRole::other, about, [](const Sample& s) { return s.tracking; }));
   picture.panels.push_back(std::move(tracking));
   return draw_run(picture);
 }

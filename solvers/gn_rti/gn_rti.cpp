@@ -73,8 +73,7 @@ double total_violation(const Ocp& ocp, const Iterate& point) {
   };
   for (int i = 0; i <= ocp.intervals(); ++i) {
     add(point.state(i), ocp.state_lower(i), ocp.state_upper(i), ocp.state_count(i));
-    if (i < ocp.intervals())
-      add(point.control(i), ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
+    if (i < ocp.intervals()) add(point.control(i), ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
   }
   return total;
 }
@@ -86,9 +85,10 @@ const OptionTable<GnRtiOptions>& GnRtiOptions::table() {
       OptionTable<GnRtiOptions>()
           .choice("mode", &GnRtiOptions::mode, {{"rti", Mode::rti}, {"converge", Mode::converge}},
                   "rti: a fixed number of full steps a sample; converge: to the tolerance, with a line search")
-          .choice("hessian", &GnRtiOptions::hessian,
-                  {{"gauss_newton", Curvature::gauss_newton}, {"exact", Curvature::exact}, {"auto", Curvature::automatic}},
-                  "curvature of the quadratic programs; auto: Gauss-Newton for estimation, exact for control")
+          .choice(
+              "hessian", &GnRtiOptions::hessian,
+              {{"gauss_newton", Curvature::gauss_newton}, {"exact", Curvature::exact}, {"auto", Curvature::automatic}},
+              "curvature of the quadratic programs; auto: Gauss-Newton for estimation, exact for control")
           .integer("iterations", &GnRtiOptions::iterations, "steps a sample in mode rti", between(1, 1000))
           .integer("max_iterations", &GnRtiOptions::max_iterations, "limit of mode converge", between(1, 100000))
           .number("tolerance", &GnRtiOptions::tolerance, "KKT residual at which mode converge is content",
@@ -101,10 +101,9 @@ std::string GnRti::why_not(const Ocp& ocp) const {
   if (std::max(capacity.states, capacity.controls) > Riccati::max_width)
     return "a stage has more than " + std::to_string(Riccati::max_width) +
            " states or controls; use a sparse solver for so wide a model";
-  const bool exact = options_.hessian == Curvature::exact ||
-                     (options_.hessian == Curvature::automatic && ocp.kind() == OcpKind::rhc);
-  if (exact && !ocp.has_second_derivatives())
-    return "the model has no second derivatives; set hessian: gauss_newton";
+  const bool exact =
+      options_.hessian == Curvature::exact || (options_.hessian == Curvature::automatic && ocp.kind() == OcpKind::rhc);
+  if (exact && !ocp.has_second_derivatives()) return "the model has no second derivatives; set hessian: gauss_newton";
   return {};
 }
 
@@ -178,8 +177,8 @@ void GnRti::add_step(const Ocp& ocp, const Iterate& from, double length, Iterate
   });
 }
 
-/// The step as a policy: controls go the given length towards the new ones and answer to where simulation really leads, so
-/// that the result has no defect. Far from the solution this carries much further than the linearised states do.
+/// The step as a policy: controls go the given length towards the new ones and answer to where simulation really leads,
+/// so that the result has no defect. Far from the solution this carries much further than the linearised states do.
 void GnRti::roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept {
   add_step(ocp, from, length, to);
   double deviation[Riccati::max_width], policy[Riccati::max_width];
@@ -258,15 +257,16 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
     ++report.iterations;
   }
   if (report.iterations > 0) {
-    if (report.status == Status::infeasible || report.status == Status::stalled) report.status = Status::iteration_limit;
+    if (report.status == Status::infeasible || report.status == Status::stalled)
+      report.status = Status::iteration_limit;
     std::swap(point, best_);
   }
   judge(ocp, point, report);
   return report;
 }
 
-/// Solves the quadratic program in `qp_` at `best_` and searches along its step by the l1 merit; the accepted point goes to
-/// `trial_`. False where no length is acceptable.
+/// Solves the quadratic program in `qp_` at `best_` and searches along its step by the l1 merit; the accepted point
+/// goes to `trial_`. False where no length is acceptable.
 bool GnRti::search_along_step(const Ocp& ocp, double residual, double& merit_after) noexcept {
   defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(ocp, step_));
   bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(ocp, step_));
@@ -285,8 +285,8 @@ bool GnRti::search_along_step(const Ocp& ocp, double residual, double& merit_aft
         before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
     return std::isfinite(merit_after) && merit_after <= allowed;
   };
-  // Control follows the policy, from a given start; estimation, whose every node is measured, takes the linearised states,
-  // and the policy only where those lead nowhere.
+  // Control follows the policy, from a given start; estimation, whose every node is measured, takes the linearised
+  // states, and the policy only where those lead nowhere.
   const bool policy_first = ocp.kind() == OcpKind::rhc;
   for (double length = 1.0; length >= shortest_step; length *= 0.5) {
     if (policy_first) {
@@ -351,8 +351,8 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
       return search_along_step(ocp, residual, merit_after);
     };
     accepted = try_step();
-    // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own. Near the solution merits
-    // differ by rounding only, and the exact curvature is what converges.
+    // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own. Near the solution
+    // merits differ by rounding only, and the exact curvature is what converges.
     if (hessian_for(ocp) == Hessian::exact && (!accepted || (qp_solver_.was_bent() && residual > near_solution))) {
       std::swap(trial_, other_trial_);
       const bool exact_accepted = accepted;

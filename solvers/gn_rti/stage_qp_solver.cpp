@@ -6,8 +6,8 @@
 namespace rhec::gn_rti {
 namespace {
 
-constexpr int warm_rounds = 8;     // corrections of the active set before the interior-point method is called
-constexpr int polish_rounds = 6;   // the same from the interior-point method's active set
+constexpr int warm_rounds = 8;    // corrections of the active set before the interior-point method is called
+constexpr int polish_rounds = 6;  // the same from the interior-point method's active set
 constexpr int max_interior_iterations = 60;
 // The interior point stops well before rounding spoils its Newton systems; polishing does the rest.
 constexpr StageQpSolver::Accuracy ready_to_polish{1e-8, 1e-7};
@@ -165,7 +165,8 @@ void StageQpSolver::collect_bounded(const StageQp& qp) noexcept {
   }
 }
 
-/// Barrier Hessian and gradient for the Newton system that aims at complementarity `target`, in terms of the new values.
+/// Barrier Hessian and gradient for the Newton system that aims at complementarity `target`, in terms of the new
+/// values.
 void StageQpSolver::barrier_terms(const StageQp& qp, double target) noexcept {
   const int ns = capacity_.states, nw = capacity_.controls;
   for (int i = 0; i <= qp.intervals(); ++i) {
@@ -175,7 +176,8 @@ void StageQpSolver::barrier_terms(const StageQp& qp, double target) noexcept {
     if (i < qp.intervals()) std::copy_n(qp.r(i), nw, r_.data() + i * nw);
   }
   for (const Bounded& v : bounded_) {
-    double& diagonal = v.is_state ? state_diagonal_[v.stage * ns + v.component] : control_diagonal_[v.stage * nw + v.component];
+    double& diagonal =
+        v.is_state ? state_diagonal_[v.stage * ns + v.component] : control_diagonal_[v.stage * nw + v.component];
     double& gradient = v.is_state ? q_[v.stage * ns + v.component] : r_[v.stage * nw + v.component];
     if (std::isfinite(v.lower)) {
       const Side& s = v.below;
@@ -291,8 +293,10 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accur
         if (i < qp.intervals()) std::fill_n(step.control_bound(i), qp.controls(i), 0.0);
       }
       for (const Bounded& v : bounded_) {
-        double& multiplier = v.is_state ? step.state_bound(v.stage)[v.component] : step.control_bound(v.stage)[v.component];
-        multiplier = (std::isfinite(v.upper) ? v.above.multiplier : 0.0) - (std::isfinite(v.lower) ? v.below.multiplier : 0.0);
+        double& multiplier =
+            v.is_state ? step.state_bound(v.stage)[v.component] : step.control_bound(v.stage)[v.component];
+        multiplier =
+            (std::isfinite(v.upper) ? v.above.multiplier : 0.0) - (std::isfinite(v.lower) ? v.below.multiplier : 0.0);
       }
       return true;
     }

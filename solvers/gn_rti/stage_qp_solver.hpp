@@ -8,10 +8,10 @@ namespace rhec::gn_rti {
 
 /// Solves a StageQp with all its bounds, exactly.
 ///
-/// The active set of the last sample is tried first: one factorisation, accepted only if the KKT conditions hold. Where they
-/// do not, the set is corrected by the primal-dual rule (Hintermueller, Ito & Kunisch 2002: what is violated is added, what
-/// pulls the wrong way is dropped) for a few rounds. Should that not settle, a primal-dual interior-point method takes over,
-/// whose active set is then polished to the exact solution.
+/// The active set of the last sample is tried first: one factorisation, accepted only if the KKT conditions hold. Where
+/// they do not, the set is corrected by the primal-dual rule (Hintermueller, Ito & Kunisch 2002: what is violated is
+/// added, what pulls the wrong way is dropped) for a few rounds. Should that not settle, a primal-dual interior-point
+/// method takes over, whose active set is then polished to the exact solution.
 class StageQpSolver {
  public:
   enum class Outcome {
@@ -31,7 +31,8 @@ class StageQpSolver {
   /// Factorises with the guess, so that `solve` needs only vectors if the guess is right.
   void prepare(const StageQp& qp) noexcept;
 
-  /// The minimiser goes to `step`: primal steps, new costates and bound multipliers. The program's R may be convexified.
+  /// The minimiser goes to `step`: primal steps, new costates and bound multipliers. The program's R may be
+  /// convexified.
   Outcome solve(StageQp& qp, Iterate& step) noexcept;
   /// The robust path alone: convexify, interior point, polish.
   Outcome solve_by_interior_point(StageQp& qp, Iterate& step) noexcept;

@@ -73,11 +73,13 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
       gradient(moved, i, s_down, w_down);
       for (int r = 0; r < ocp.state_count(i); ++r) {
         const double entry = is_state ? exact.Q(i)[j * ns + r] : exact.S(i)[r * nw + j];
-        ASSERT_NEAR((s_up[r] - s_down[r]) / (2.0 * h), entry, tolerance * (1.0 + std::abs(entry))) << "Q, S at stage " << i;
+        ASSERT_NEAR((s_up[r] - s_down[r]) / (2.0 * h), entry, tolerance * (1.0 + std::abs(entry)))
+            << "Q, S at stage " << i;
       }
       for (int r = 0; r < controls; ++r) {
         const double entry = is_state ? exact.S(i)[j * nw + r] : exact.R(i)[j * nw + r];
-        ASSERT_NEAR((w_up[r] - w_down[r]) / (2.0 * h), entry, tolerance * (1.0 + std::abs(entry))) << "S, R at stage " << i;
+        ASSERT_NEAR((w_up[r] - w_down[r]) / (2.0 * h), entry, tolerance * (1.0 + std::abs(entry)))
+            << "S, R at stage " << i;
       }
     }
   }

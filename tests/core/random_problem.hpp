@@ -23,7 +23,8 @@ class RandomProblem {
 
   /// A value well inside the bounds of a variable, of its typical size where it has none.
   double typical(const Variable& v) {
-    const double lower = std::isfinite(v.lower) ? v.lower : -v.scale, upper = std::isfinite(v.upper) ? v.upper : v.scale;
+    const double lower = std::isfinite(v.lower) ? v.lower : -v.scale,
+                 upper = std::isfinite(v.upper) ? v.upper : v.scale;
     return uniform(0.8 * lower + 0.2 * upper, 0.2 * lower + 0.8 * upper);
   }
 
@@ -61,7 +62,8 @@ class RandomProblem {
         request.next_states = next.data();
         model_->integrate(request);
         bool inside = true;
-        for (int j = 0; j < nx; ++j) inside = inside && next[j] >= about.states[j].lower && next[j] <= about.states[j].upper;
+        for (int j = 0; j < nx; ++j)
+          inside = inside && next[j] >= about.states[j].lower && next[j] <= about.states[j].upper;
         if (inside || attempt > 20) break;
         for (double& value : u) value *= -0.5;  // turn back
       }
@@ -77,12 +79,12 @@ class RandomProblem {
   struct RheSpec {
     int intervals = 15;
     double dt = 0.2;
-    double missing = 0.0;      ///< share of outputs and inputs that are masked
+    double missing = 0.0;  ///< share of outputs and inputs that are masked
     bool robust = false;
-    int block = 0;             ///< 0: one value for the horizon; otherwise a block every so many intervals
+    int block = 0;  ///< 0: one value for the horizon; otherwise a block every so many intervals
     bool linked = true;
     Transition transition = Transition::step;
-    double noise = 0.01;       ///< of everything measured, as a share of the scale
+    double noise = 0.01;  ///< of everything measured, as a share of the scale
   };
   std::unique_ptr<RheProblem> rhe(const RheSpec& spec) {
     const auto& about = model_->description();
@@ -110,7 +112,9 @@ class RandomProblem {
     model_->observe(nodes);
     for (int i = 0; i <= spec.intervals; ++i) {
       for (int j = 0; j < ny; ++j)
-        problem->output(i)[j] = uniform(0.0, 1.0) < spec.missing ? nan : outputs[i * ny + j] + spec.noise * about.outputs[j].scale * normal();
+        problem->output(i)[j] = uniform(0.0, 1.0) < spec.missing
+                                    ? nan
+                                    : outputs[i * ny + j] + spec.noise * about.outputs[j].scale * normal();
       if (i == spec.intervals) break;
       problem->set_duration(i, spec.dt);
       for (int j = 0; j < nu; ++j)
@@ -179,7 +183,8 @@ class RandomProblem {
   /// The usual cold start: prior or initial state, rolled out with measured or reference inputs.
   static Iterate cold_start(const HorizonProblem& problem) {
     Iterate point(problem.capacity());
-    const int nx = problem.model().state_count(), nu = problem.model().input_count(), np = problem.model().parameter_count();
+    const int nx = problem.model().state_count(), nu = problem.model().input_count(),
+              np = problem.model().parameter_count();
     std::vector<double> inputs, parameters;
     const auto* rhe = dynamic_cast<const RheProblem*>(&problem);
     const auto* rhc = dynamic_cast<const RhcProblem*>(&problem);

@@ -14,7 +14,8 @@ double kkt_violation(const StageQp& qp, const Iterate& step) {
   double worst = 0.0;
   const int N = qp.intervals();
   for (int i = 0; i <= N; ++i) {
-    const Eigen::Map<const Eigen::VectorXd> s(step.state(i), qp.states(i)), w(step.control(i < N ? i : 0), qp.controls(i));
+    const Eigen::Map<const Eigen::VectorXd> s(step.state(i), qp.states(i)),
+        w(step.control(i < N ? i : 0), qp.controls(i));
     Eigen::VectorXd by_state = qp.Q_of(i) * s + qp.q_of(i);
     Eigen::VectorXd by_control = Eigen::VectorXd::Zero(qp.controls(i));
     if (i < N) {

@@ -1,5 +1,5 @@
-// Every solver that is found, on problems of every model that is found. Answers are judged by the core's own KKT residual,
-// never by the solver's word. A new plugin gets all of this by being found.
+// Every solver that is found, on problems of every model that is found. Answers are judged by the core's own KKT
+// residual, never by the solver's word. A new plugin gets all of this by being found.
 
 #include <gtest/gtest.h>
 
@@ -272,9 +272,8 @@ std::vector<Pair> all_pairs() {
     for (const std::string& model : host().names(PluginKind::model)) pairs.push_back({solver, model});
   return pairs;
 }
-INSTANTIATE_TEST_SUITE_P(Every, Conformance, ::testing::ValuesIn(all_pairs()), [](const auto& of) {
-  return of.param.solver + "_on_" + of.param.model;
-});
+INSTANTIATE_TEST_SUITE_P(Every, Conformance, ::testing::ValuesIn(all_pairs()),
+                         [](const auto& of) { return of.param.solver + "_on_" + of.param.model; });
 INSTANTIATE_TEST_SUITE_P(Every, SolverAlone, ::testing::ValuesIn(host().names(PluginKind::solver)),
                          [](const auto& of) { return of.param; });
 

@@ -56,7 +56,8 @@ TEST(GnRti, AllocatesNothingAfterSetup) {
   const long before_all = allocations;
   const auto model = bicycle();
   EXPECT_GT(allocations, before_all) << "the counter does not count";
-  for (const char* options : {"{mode: rti}", "{mode: converge}", "{mode: converge, hessian: exact}", "{mode: rti, iterations: 3}"}) {
+  for (const char* options :
+       {"{mode: rti}", "{mode: converge}", "{mode: converge, hessian: exact}", "{mode: rti, iterations: 3}"}) {
     for (unsigned seed = 1; seed <= 4; ++seed) {
       RandomProblem random(model, seed);
       RandomProblem::RheSpec spec;
@@ -160,8 +161,8 @@ std::vector<double> estimates(const std::string& kappa, const std::string& mu, i
   estimate.covariance.resize(6, 6);
   std::vector<double> all;
   for (int k = 0; k <= steps; ++k) {
-    const double y[3] = {x[0] - 0.4 * std::cos(x[2]) + 0.03 * normal(random), x[1] - 0.4 * std::sin(x[2]) + 0.03 * normal(random),
-                         x[3] + 0.017 * normal(random)};
+    const double y[3] = {x[0] - 0.4 * std::cos(x[2]) + 0.03 * normal(random),
+                         x[1] - 0.4 * std::sin(x[2]) + 0.03 * normal(random), x[3] + 0.017 * normal(random)};
     const double u[2] = {4.0, 0.3 * std::sin(0.3 * k)};
     if (k == 0) {
       method.start(y);
@@ -195,14 +196,17 @@ void expect_same_bits(const std::vector<double>& a, const std::vector<double>& b
 
 TEST(Identities, OverlapZeroAndOneAreTheSameToTheLastBit) {
   for (const int size : {1, 2, 3, 5, 30})
-    expect_same_bits(estimates("{name: structured, size: " + std::to_string(size) + ", overlap: 0}", "{name: full_horizon}", 15, 40),
-                     estimates("{name: structured, size: " + std::to_string(size) + ", overlap: 1}", "{name: full_horizon}", 15, 40));
+    expect_same_bits(
+        estimates("{name: structured, size: " + std::to_string(size) + ", overlap: 0}", "{name: full_horizon}", 15, 40),
+        estimates("{name: structured, size: " + std::to_string(size) + ", overlap: 1}", "{name: full_horizon}", 15,
+                  40));
 }
 
 TEST(Identities, BlocksOfOneAreUnblockedToTheLastBit) {
   for (const char* link : {"", ", neighbour_sigma: 0.04"})
-    expect_same_bits(estimates(std::string("{name: structured, size: 1, overlap: 1") + link + "}", "{name: full_horizon}", 15, 40),
-                     estimates(std::string("{name: unblocked") + link + "}", "{name: full_horizon}", 15, 40));
+    expect_same_bits(
+        estimates(std::string("{name: structured, size: 1, overlap: 1") + link + "}", "{name: full_horizon}", 15, 40),
+        estimates(std::string("{name: unblocked") + link + "}", "{name: full_horizon}", 15, 40));
 }
 
 TEST(Identities, WithNoBorderInViewTheStructureIsThatOfFullHorizonBlocking) {

@@ -28,13 +28,15 @@ class RHEC_EXPORT Blocking {
  public:
   virtual ~Blocking() = default;
 
-  /// Marks the window's interval i with begins[i] = 1 where a block starts, 0 elsewhere. `begins` has `window.intervals`
-  /// entries; begins[0] is 1 always. Returns the absolute index at which the first block really started: at most
-  /// `window.first`, and less where the window's edge cuts that block.
+  /// Marks the window's interval i with begins[i] = 1 where a block starts, 0 elsewhere. `begins` has
+  /// `window.intervals` entries; begins[0] is 1 always. Returns the absolute index at which the first block really
+  /// started: at most `window.first`, and less where the window's edge cuts that block.
   virtual std::int64_t starts(const Window& window, std::uint8_t* begins) const noexcept = 0;
 
   /// Why a horizon of so many intervals cannot be blocked this way; empty if it can.
-  virtual std::string why_not(int intervals) const { return intervals >= 1 ? std::string() : "a horizon has at least one interval"; }
+  virtual std::string why_not(int intervals) const {
+    return intervals >= 1 ? std::string() : "a horizon has at least one interval";
+  }
 
   virtual Transition transition() const noexcept { return Transition::step; }
 

@@ -19,9 +19,9 @@ enum class ReferenceSpeed {
 
 /// Drives along a path: estimate in, input out (METHOD, receding horizon control with a space-based reference).
 ///
-/// At each call the closest point of the path is searched for ahead of the last one; the local reference is that point and
-/// the next N_c, each dt * u1ref metres further on. Where the solver fails, the plan of the last sample goes on, and is
-/// counted. Allocates in its constructor only.
+/// At each call the closest point of the path is searched for ahead of the last one; the local reference is that point
+/// and the next N_c, each dt * u1ref metres further on. Where the solver fails, the plan of the last sample goes on,
+/// and is counted. Allocates in its constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {

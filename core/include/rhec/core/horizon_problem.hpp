@@ -10,13 +10,13 @@
 
 namespace rhec {
 
-/// What the two kinds of problem share: a model over a horizon, with channels (parameters or blocked inputs) whose values
-/// are carried from stage to stage.
+/// What the two kinds of problem share: a model over a horizon, with channels (parameters or blocked inputs) whose
+/// values are carried from stage to stage.
 ///
-/// Stage state s_i = [x_i; c_i], c_i the carried channels' values on interval i-1 (at node 0: on interval 0). Stage control
-/// w_i = [free inputs; values of the channels whose block starts at interval i]. A channel that does not start keeps its
-/// value: c_{i+1} = c_i; one that starts takes its control's. Where the model sees a channel, it sees c_{i+1}, or, with
-/// Transition::ramp, the line from c_i to c_{i+1}.
+/// Stage state s_i = [x_i; c_i], c_i the carried channels' values on interval i-1 (at node 0: on interval 0). Stage
+/// control w_i = [free inputs; values of the channels whose block starts at interval i]. A channel that does not start
+/// keeps its value: c_{i+1} = c_i; one that starts takes its control's. Where the model sees a channel, it sees
+/// c_{i+1}, or, with Transition::ramp, the line from c_i to c_{i+1}.
 class RHEC_EXPORT HorizonProblem : public Ocp {
  public:
   const Model& model() const noexcept { return *model_; }

@@ -17,7 +17,8 @@ struct Capacity {
 
 /// A primal-dual point of an Ocp. Rows have the capacity's length, whatever a stage really uses. With the Lagrangian
 ///
-///     L = sum_i l_i(s_i, w_i) + sum_i costate_{i+1}' (F_i(s_i, w_i) - s_{i+1}) + sum_i state_bound_i' s_i + control_bound_i' w_i
+///     L = sum_i l_i(s_i, w_i) + sum_i costate_{i+1}' (F_i(s_i, w_i) - s_{i+1}) + sum_i state_bound_i' s_i +
+///     control_bound_i' w_i
 ///
 /// a bound multiplier is positive at an upper bound, negative at a lower one and zero between. costate_0 belongs to a
 /// given initial state; it is zero where the initial state is free.

@@ -8,12 +8,12 @@ namespace rhec {
 
 /// How far a primal-dual point is from a first-order optimum: the one judge of every backend.
 ///
-/// Stationarity and complementarity are relative to 1 + the largest term of the Lagrangian's gradient (objective, costates
-/// and bound multipliers each count), so that scaling the objective does not change the verdict. Defect and bound violation
-/// are absolute, in the units of their variables.
+/// Stationarity and complementarity are relative to 1 + the largest term of the Lagrangian's gradient (objective,
+/// costates and bound multipliers each count), so that scaling the objective does not change the verdict. Defect and
+/// bound violation are absolute, in the units of their variables.
 struct RHEC_EXPORT KktResidual {
   double stationarity = 0.0;
-  double defect = 0.0;           ///< max |F_i(s_i, w_i) - s_{i+1}|, the given initial state included
+  double defect = 0.0;  ///< max |F_i(s_i, w_i) - s_{i+1}|, the given initial state included
   double bound_violation = 0.0;
   double complementarity = 0.0;  ///< max |multiplier| x distance from the bound that it claims to be at
 
@@ -27,11 +27,12 @@ RHEC_EXPORT KktResidual kkt_residual(const Ocp& ocp, const Iterate& point, Stage
 /// The same from a linearisation at the point that the caller already has.
 RHEC_EXPORT KktResidual kkt_residual(const StageQp& linearisation, const Iterate& point) noexcept;
 
-/// Costates that make the point stationary in all states, by one backward sweep; bound multipliers are taken as they are.
+/// Costates that make the point stationary in all states, by one backward sweep; bound multipliers are taken as they
+/// are.
 RHEC_EXPORT void set_costates(const StageQp& linearisation, Iterate& point) noexcept;
 
-/// States from the controls by simulation; the first stage state is taken as it is. Controls are clipped to their bounds
-/// first, so that the result has no defect.
+/// States from the controls by simulation; the first stage state is taken as it is. Controls are clipped to their
+/// bounds first, so that the result has no defect.
 RHEC_EXPORT void roll_out(const Ocp& ocp, Iterate& point, std::span<double> scratch) noexcept;
 
 }  // namespace rhec

@@ -10,13 +10,13 @@ namespace rhec {
 
 /// One component of a model's state, input, parameter or output.
 struct Variable {
-  std::string name;     ///< as it is spelt in configuration and in result files
-  std::string unit;     ///< SI, e.g. "m", "rad/s"; "1" for a pure number
-  std::string meaning;  ///< one phrase for people
+  std::string name;                                         ///< as it is spelt in configuration and in result files
+  std::string unit;                                         ///< SI, e.g. "m", "rad/s"; "1" for a pure number
+  std::string meaning;                                      ///< one phrase for people
   double lower = -std::numeric_limits<double>::infinity();  ///< default bound
   double upper = std::numeric_limits<double>::infinity();   ///< default bound
-  double scale = 1.0;       ///< a typical magnitude, for finite differences and random tests
-  bool is_angle = false;    ///< compared on the circle
+  double scale = 1.0;     ///< a typical magnitude, for finite differences and random tests
+  bool is_angle = false;  ///< compared on the circle
 };
 
 /// Which variables a path follower needs to know; -1 where the model has none.
@@ -40,8 +40,8 @@ struct ModelDescription {
 ///     dx/dt = f(x, u, p),    y = h(x)
 ///
 /// with state x (n_x), input u (n_u), parameter p (n_p) and output y (n_y). Between two nodes the input is constant and
-/// x_{i+1} = F(x_i, u_i, p_i, dt_i) is a number of classical Runge-Kutta steps. All calls are const, thread-safe, do not
-/// allocate and do not throw; they cover a range of stages, so that an implementation may evaluate several at once.
+/// x_{i+1} = F(x_i, u_i, p_i, dt_i) is a number of classical Runge-Kutta steps. All calls are const, thread-safe, do
+/// not allocate and do not throw; they cover a range of stages, so that an implementation may evaluate several at once.
 class RHEC_EXPORT Model {
  public:
   virtual ~Model() = default;
@@ -95,8 +95,8 @@ class RHEC_EXPORT Model {
   /// False where `hessians` cannot be asked for; such a model can be used with Gauss-Newton only.
   virtual bool has_second_derivatives() const noexcept = 0;
 
-  /// The instruction sets that this machine can run of those that the model was built for, slowest first; the last one is
-  /// used. Tests walk through all of them by `use_instruction_set`, which answers false to an unknown name.
+  /// The instruction sets that this machine can run of those that the model was built for, slowest first; the last one
+  /// is used. Tests walk through all of them by `use_instruction_set`, which answers false to an unknown name.
   virtual std::vector<std::string> instruction_sets() const { return {"generic"}; }
   virtual bool use_instruction_set(const std::string& name) { return name == "generic"; }
 };

@@ -28,10 +28,10 @@ struct StageRange {
 ///     minimise    sum_{i=0}^{N} l_i(s_i, w_i)
 ///     subject to  s_{i+1} = F_i(s_i, w_i),   bounds on every s_i and w_i,   s_0 given or free
 ///
-/// A stage state s_i holds the vehicle's state and the values of blocked channels that are carried along; a stage control
-/// w_i holds the inputs and the values of the blocks that start there. So unblocked, blocked and full-horizon structures are
-/// all this one form. RheProblem and RhcProblem are its two kinds. Evaluation is const, thread-safe and allocation-free;
-/// `scratch` is the caller's, of `scratch_size()` doubles.
+/// A stage state s_i holds the vehicle's state and the values of blocked channels that are carried along; a stage
+/// control w_i holds the inputs and the values of the blocks that start there. So unblocked, blocked and full-horizon
+/// structures are all this one form. RheProblem and RhcProblem are its two kinds. Evaluation is const, thread-safe and
+/// allocation-free; `scratch` is the caller's, of `scratch_size()` doubles.
 class RHEC_EXPORT Ocp {
  public:
   virtual ~Ocp() = default;
@@ -64,8 +64,8 @@ class RHEC_EXPORT Ocp {
   virtual void linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                          std::span<double> scratch) const noexcept = 0;
 
-  /// Fills again what depends on data that may have come since `linearise` (measurements, references, the initial state,
-  /// bounds): q, r, the bounds and the initial step. Matrices stay.
+  /// Fills again what depends on data that may have come since `linearise` (measurements, references, the initial
+  /// state, bounds): q, r, the bounds and the initial step. Matrices stay.
   virtual void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept = 0;
 };
 

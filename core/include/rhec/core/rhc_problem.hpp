@@ -13,16 +13,16 @@ namespace rhec {
 ///     subject to the dynamics, bounds on the states of nodes 1 .. N and on the inputs.
 ///
 /// p is embedded like the initial state: it is part of the given initial stage state, so that both may arrive after the
-/// problem has been linearised. Inputs may be blocked. Data are set in place, without allocation; call `finish` after the
-/// structure, the initial state, or the bounds have changed.
+/// problem has been linearised. Inputs may be blocked. Data are set in place, without allocation; call `finish` after
+/// the structure, the initial state, or the bounds have changed.
 class RHEC_EXPORT RhcProblem final : public HorizonProblem {
  public:
   struct Setup {
     int max_intervals = 15;
     int substeps = 1;
-    std::vector<double> state_weights;     ///< n_x, diagonal of Vx
-    std::vector<double> input_weights;     ///< n_u, diagonal of Vu
-    std::vector<double> terminal_weights;  ///< n_x, diagonal of VN
+    std::vector<double> state_weights;             ///< n_x, diagonal of Vx
+    std::vector<double> input_weights;             ///< n_u, diagonal of Vu
+    std::vector<double> terminal_weights;          ///< n_x, diagonal of VN
     std::vector<double> state_lower, state_upper;  ///< n_x; empty: the model's own bounds
     std::vector<double> input_lower, input_upper;  ///< n_u; empty: the model's own bounds
     std::vector<int> blocked_inputs;               ///< inputs that get blocks of their own
@@ -31,7 +31,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
 
   const Setup& setup() const noexcept { return setup_; }
 
-  double* given_state() noexcept { return initial_.data(); }           ///< x_0, n_x
+  double* given_state() noexcept { return initial_.data(); }              ///< x_0, n_x
   double* given_parameters() noexcept { return initial_.data() + nx(); }  ///< p, n_p
   double* state_reference(int node) noexcept { return row(state_reference_, node, nx()); }
   double* input_reference(int interval) noexcept { return row(input_reference_, interval, nu()); }
@@ -44,8 +44,8 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   void set_intervals(int intervals) noexcept { HorizonProblem::set_intervals(intervals); }
   /// Marks where the blocks of a blocked input start; begins[0] is taken as 1.
   void set_blocks(int input, const std::uint8_t* begins) noexcept;
-  /// Ends a change. A state bound that no admissible input can keep from the given initial state (the estimate may violate
-  /// it) is moved to the nearest value within reach, node by node; returns how many were moved.
+  /// Ends a change. A state bound that no admissible input can keep from the given initial state (the estimate may
+  /// violate it) is moved to the nearest value within reach, node by node; returns how many were moved.
   int finish(std::span<double> scratch) noexcept;
 
   OcpKind kind() const noexcept override { return OcpKind::rhc; }

@@ -24,8 +24,8 @@ struct RobustLoss {
 ///             + sum over block starts (rho_b - rho_a)^2 / variance     where neighbouring blocks are linked
 ///     subject to the dynamics, bounds on states at every node, on inputs, and on every parameter block.
 ///
-/// Data are set in place, without allocation; after the structure (the number of intervals or the block starts) has changed,
-/// `finish` must be called.
+/// Data are set in place, without allocation; after the structure (the number of intervals or the block starts) has
+/// changed, `finish` must be called.
 class RHEC_EXPORT RheProblem final : public HorizonProblem {
  public:
   struct Setup {
@@ -53,8 +53,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   const double* measured_input(int interval) const noexcept { return row(measured_inputs_, interval, nu()); }
 
   void set_intervals(int intervals) noexcept { HorizonProblem::set_intervals(intervals); }
-  /// Marks where a parameter's blocks start. `begins` has an entry an interval; the first interval's block is that of node
-  /// 0's value, so begins[0] matters only for a ramp that starts there.
+  /// Marks where a parameter's blocks start. `begins` has an entry an interval; the first interval's block is that of
+  /// node 0's value, so begins[0] matters only for a ramp that starts there.
   void set_blocks(int parameter, const std::uint8_t* begins, Transition transition) noexcept;
   /// Links the block that starts at an interval to the one before it; infinite variance: not linked.
   void link(int interval, int parameter, double variance) noexcept;
@@ -62,8 +62,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
     return 1.0 / link_information_[interval * np() + parameter];
   }
   void finish() noexcept;
-  /// Moves durations, outputs and measured inputs one interval towards the window's start; the last ones stay where they
-  /// are until they are overwritten.
+  /// Moves durations, outputs and measured inputs one interval towards the window's start; the last ones stay where
+  /// they are until they are overwritten.
   void drop_first_interval() noexcept;
 
   /// Weight in (0, 1] that the robust loss gives an output at a point: derivative of the loss by s.

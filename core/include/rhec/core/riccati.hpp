@@ -18,7 +18,9 @@ class RHEC_EXPORT ActiveSet {
   const std::int8_t* state(int node) const noexcept { return states_.data() + node * capacity_.states; }
   const std::int8_t* control(int interval) const noexcept { return controls_.data() + interval * capacity_.controls; }
   void clear() noexcept;
-  bool operator==(const ActiveSet& other) const noexcept { return states_ == other.states_ && controls_ == other.controls_; }
+  bool operator==(const ActiveSet& other) const noexcept {
+    return states_ == other.states_ && controls_ == other.controls_;
+  }
 
  private:
   Capacity capacity_;
@@ -32,9 +34,10 @@ class RHEC_EXPORT ActiveSet {
 ///     w = -G^-1 (L s + g),   P_i = Q + A'PA - L'G^-1 L,   p_i = q + A'(Pb + p) - L'G^-1 g
 ///
 /// on the null space of the active rows. An active control is fixed; an active state bound C s_{i+1} = d becomes
-/// C B w = d - C b - C A s, solved for as many controls as it has pivots; what is left over passes on to node i. The cost is
-/// linear in the horizon. Where a reduced G is not positive definite it is convexified (its negative eigenvalues are
-/// reflected), which changes R on the free directions only; the reduced Hessian is then positive definite.
+/// C B w = d - C b - C A s, solved for as many controls as it has pivots; what is left over passes on to node i. The
+/// cost is linear in the horizon. Where a reduced G is not positive definite it is convexified (its negative
+/// eigenvalues are reflected), which changes R on the free directions only; the reduced Hessian is then positive
+/// definite.
 ///
 /// `factor` needs the matrices and the active set, `solve` the vectors too, so that the former can be done in advance.
 class RHEC_EXPORT Riccati {
@@ -54,12 +57,12 @@ class RHEC_EXPORT Riccati {
   void factor(const StageQp& qp, const ActiveSet& active, const Diagonals& extra) noexcept;
   void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, {}); }
   bool was_convexified() const noexcept { return convexified_; }
-  /// After a `factor` without active bounds: puts what convexification changed into the program's R, whose reduced Hessian
-  /// is positive definite from then on, whichever bounds become active.
+  /// After a `factor` without active bounds: puts what convexification changed into the program's R, whose reduced
+  /// Hessian is positive definite from then on, whichever bounds become active.
   void write_convexified(StageQp& qp) noexcept;
 
-  /// The minimiser as a step, with costates and the multipliers of the active bounds, for vectors that may be newer than
-  /// `factor`; q and r may be replaced by rows of the caller (null: those of the program).
+  /// The minimiser as a step, with costates and the multipliers of the active bounds, for vectors that may be newer
+  /// than `factor`; q and r may be replaced by rows of the caller (null: those of the program).
   Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* q, const double* r) noexcept;
   Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept {
     return solve(qp, active, step, nullptr, nullptr);
@@ -69,8 +72,8 @@ class RHEC_EXPORT Riccati {
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
 
   /// Marginal covariances of all states when the objective is twice a negative log-likelihood's quadratic (METHOD: no
-  /// factor 1/2), from the last factorisation: node i's n_s x n_s block goes to covariance + i * n_s^2, if not null; the
-  /// last node's to `last`.
+  /// factor 1/2), from the last factorisation: node i's n_s x n_s block goes to covariance + i * n_s^2, if not null;
+  /// the last node's to `last`.
   void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
 
   /// The largest number of controls, and of states, that one stage may have.
@@ -79,10 +82,10 @@ class RHEC_EXPORT Riccati {
  private:
   /// How one stage was reduced. Node 0 of a free initial state is a stage too, with s_0 in the place of w.
   struct Reduction {
-    int free = 0;    ///< directions left to decide
-    int rows = 0;    ///< rows of C that were reduced here
-    int pivots = 0;  ///< of those, solved for a control
-    int left = 0;    ///< of those, passed on
+    int free = 0;       ///< directions left to decide
+    int rows = 0;       ///< rows of C that were reduced here
+    int pivots = 0;     ///< of those, solved for a control
+    int left = 0;       ///< of those, passed on
     bool plain = true;  ///< nothing is fixed and there are no rows: T is the identity
     bool overflow = false;
   };

@@ -39,8 +39,9 @@ struct Report {
 
 /// Solves an Ocp from a guess. One instance serves one caller at a time; two instances never disturb each other.
 ///
-/// Per sample: optionally `prepare` (what can be done before the newest data arrive), then `solve` with the same problem and
-/// guess. Both are noexcept, allocation-free after `setup`, and never leave a number that is not finite in the iterate.
+/// Per sample: optionally `prepare` (what can be done before the newest data arrive), then `solve` with the same
+/// problem and guess. Both are noexcept, allocation-free after `setup`, and never leave a number that is not finite in
+/// the iterate.
 class RHEC_EXPORT Solver {
  public:
   virtual ~Solver() = default;

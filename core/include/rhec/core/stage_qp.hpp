@@ -15,8 +15,8 @@ namespace rhec {
 ///                 state_lower_i <= ds_i <= state_upper_i,  control_lower_i <= dw_i <= control_upper_i
 ///                 ds_0 = initial_step where the initial state is given
 ///
-/// Sizes are per stage and at run time; storage is column-major with the capacity's leading dimensions (n_s for A B Q, n_w
-/// for S R), so that it never moves. S is n_w x n_s.
+/// Sizes are per stage and at run time; storage is column-major with the capacity's leading dimensions (n_s for A B Q,
+/// n_w for S R), so that it never moves. S is n_w x n_s.
 class RHEC_EXPORT StageQp {
  public:
   using Matrix = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;

@@ -89,7 +89,7 @@ struct PluginFunctions {
     void* made = nullptr;
     guarded(error, error_size, [&] {
       const Options options = Options::table().parse(*settings, title(), {"name"});
-      made = static_cast<Interface*>(new Product(options));
+      made = static_cast<Interface*>(std::make_unique<Product>(options).release());
     });
     return made;
   }

@@ -28,20 +28,20 @@ struct Sample {
 
 struct RunLog {
   std::vector<Sample> samples;
-  bool completed = false;   ///< the end of the path was reached
-  std::string ended = {};   ///< why the run ended, in words
+  bool completed = false;  ///< the end of the path was reached
+  std::string ended = {};  ///< why the run ended, in words
 };
 
-/// Runs estimator -> controller -> truth until the path ends, the vehicle is lost, or it takes far too long. `progress` is
-/// told the share of the path that is done.
+/// Runs estimator -> controller -> truth until the path ends, the vehicle is lost, or it takes far too long. `progress`
+/// is told the share of the path that is done.
 RHEC_EXPORT RunLog run_closed_loop(const Scenario& scenario, const std::function<void(double)>& progress = {});
 
 /// Mean absolute and root mean square errors of a run, and what its solvers reported.
 struct ErrorSummary {
   std::map<std::string, double> parameters;  ///< by the model's names
-  double position = 0.0;  ///< Euclidean [m]
-  double heading = 0.0;   ///< [rad]
-  double tracking = 0.0;  ///< distance of the true position from the path [m]
+  double position = 0.0;                     ///< Euclidean [m]
+  double heading = 0.0;                      ///< [rad]
+  double tracking = 0.0;                     ///< distance of the true position from the path [m]
 };
 struct TimeSummary {
   double median = 0.0, p99 = 0.0, max = 0.0;
@@ -60,8 +60,8 @@ struct RunSummary {
 };
 RHEC_EXPORT RunSummary summarise(const RunLog& log, const Scenario& scenario);
 
-/// The files of a run: steps.csv, summary.json, run.svg (the same bytes for the same scenario and seed, but for the solve
-/// times in the summary), and times.csv.
+/// The files of a run: steps.csv, summary.json, run.svg (the same bytes for the same scenario and seed, but for the
+/// solve times in the summary), and times.csv.
 RHEC_EXPORT std::string steps_csv(const RunLog& log, const Scenario& scenario);
 RHEC_EXPORT std::string times_csv(const RunLog& log);
 RHEC_EXPORT std::string summary_json(const RunSummary& summary);
