@@ -19,10 +19,10 @@ constexpr double decisive = 25.0;
 
 }  // namespace
 
-FilterEstimation::FilterEstimation(std::shared_ptr<const Model> model, Setup setup) : setup_(std::move(setup)) {
+FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Setup setup) : setup_(std::move(setup)) {
   if (setup_.walk.size() != static_cast<std::size_t>(model->parameter_count()))
     throw Error("filter: expected one random walk a parameter");
-  const auto n = static_cast<Eigen::Index>(model->state_count() + model->parameter_count());
+  const Eigen::Index n = Eigen::Index{model->state_count()} + model->parameter_count();
   if (setup_.initial_mean.size() != n || setup_.initial_covariance.rows() != n || setup_.initial_covariance.cols() != n)
     throw Error(fmt::format("filter: the initial mean and covariance must have the size {} of [x; p]", n));
   const int count = setup_.heading_state >= 0 ? std::max(1, setup_.heading_starts) : 1;

@@ -21,7 +21,7 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
     int heading_starts = 1;
     int heading_state = -1;
   };
-  FilterEstimation(std::shared_ptr<const Model> model, Setup setup);
+  FilterEstimation(const std::shared_ptr<const Model>& model, Setup setup);
 
   const Model& model() const noexcept override { return bank_.front().filter.model(); }
   int substeps() const noexcept override { return setup_.substeps; }
