@@ -16,6 +16,8 @@ namespace {
 constexpr double pivot_tolerance = 1e-9;
 // A reduced Hessian with a pivot below this part of its diagonal entry is not positive definite enough.
 constexpr double definite_tolerance = 1e-11;
+// For the initial state, whose prior may be ill-conditioned for good reasons, only rounding counts as not definite.
+constexpr double initial_definite_tolerance = 1e-14;
 // Contradiction between active bounds, relative to their size.
 constexpr double consistency_tolerance = 1e-9;
 
@@ -187,9 +189,9 @@ void Riccati::null_space(const double* D, const double* F, int width, const bool
 }
 
 /// Cholesky factor of a reduced Hessian, which is made positive definite first where it is not.
-void Riccati::factor_reduced(double* reduced, int n, double* factor) noexcept {
+void Riccati::factor_reduced(double* reduced, int n, double tolerance, double* factor) noexcept {
   for (int j = 0; j < n; ++j) std::copy_n(reduced + j * width_, n, factor + j * width_);
-  if (small::factor(factor, width_, n, definite_tolerance)) return;
+  if (small::factor(factor, width_, n, tolerance)) return;
   convexified_ = true;
   using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_width, max_width>;
   Small matrix(n, n);
@@ -302,7 +304,7 @@ void Riccati::factor_stage(const StageQp& qp, const ActiveSet& active, const Dia
     reduced_L = L;
   }
   const int f = reduction.free;
-  factor_reduced(const_cast<double*>(reduced_G), f, v.factor);
+  factor_reduced(const_cast<double*>(reduced_G), f, definite_tolerance, v.factor);
   for (int c = 0; c < n; ++c) {
     std::copy_n(reduced_L + c * width_, f, v.K + c * width_);
     small::solve(v.factor, width_, f, v.K + c * width_);
@@ -336,7 +338,7 @@ void Riccati::factor_initial(const StageQp& qp, const ActiveSet&) noexcept {
   } else {
     for (int c = 0; c < n; ++c) std::copy_n(first.P + c * ns_, n, reduced + c * width_);
   }
-  factor_reduced(reduced, reduction.free, v.factor);
+  factor_reduced(reduced, reduction.free, initial_definite_tolerance, v.factor);
 }
 
 /// Right-hand sides through the row operations; false where a row that says nothing contradicts itself.

@@ -42,9 +42,6 @@ const char* advice_for(Status status) noexcept {
   return "";
 }
 
-bool is_usable(Status status) noexcept {
-  return status == Status::solved || status == Status::step_taken || status == Status::iteration_limit ||
-         status == Status::deadline;
-}
+bool is_usable(Status status) noexcept { return status != Status::infeasible && status != Status::bad_input; }
 
 }  // namespace rhec

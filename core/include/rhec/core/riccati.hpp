@@ -102,7 +102,7 @@ class RHEC_EXPORT Riccati {
   void eliminate(double* D, double* F, int rows, int width, const bool* fixed, Reduction& reduction, View& v) noexcept;
   void null_space(const double* D, const double* F, int width, const bool* fixed, const Reduction& reduction,
                   View& v) noexcept;
-  void factor_reduced(double* reduced, int n, double* factor) noexcept;
+  void factor_reduced(double* reduced, int n, double tolerance, double* factor) noexcept;
   bool transform_rows(const double* right_hand_side, const Reduction& reduction, const View& v, double* transformed,
                       double scale) const noexcept;
 

@@ -21,7 +21,7 @@ enum class Status {
 RHEC_EXPORT const char* name_of(Status status) noexcept;
 /// One sentence on what to do about it.
 RHEC_EXPORT const char* advice_for(Status status) noexcept;
-/// True where the returned point may be used for control: solved, step_taken, iteration_limit or deadline.
+/// True where the returned point is the best found and may be used for control: all but infeasible and bad_input.
 RHEC_EXPORT bool is_usable(Status status) noexcept;
 
 using Clock = std::chrono::steady_clock;
