@@ -318,7 +318,11 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   }
   // Once found, a heading is followed, even where it grows uncertain again in a gap: it cannot have turned about
   // unseen.
-  searching_ = searching_ && arrival_.covariance()(heading, heading) > uncertain_angle * uncertain_angle;
+  const bool remembers = setup_.arrival == ArrivalKind::ekf || setup_.arrival == ArrivalKind::smoothing;
+  const auto is_known = [&](const Eigen::MatrixXd& covariance) {
+    return covariance(heading, heading) <= uncertain_angle * uncertain_angle;
+  };
+  if (searching_ && remembers && is_known(arrival_.covariance())) searching_ = false;
   if (searching_) search_heading(deadline);
   result.report = solver_->solve(problem_, point_, deadline);
   result.fallback = !is_usable(result.report.status);
@@ -329,6 +333,8 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   result.state = last_state_.head(nx);
   result.parameters = last_state_.tail(np);
   write_covariance(newest, result);
+  // An arrival cost that learns nothing never knows the heading: there the window has to.
+  if (searching_ && !remembers && is_known(result.covariance)) searching_ = false;
 }
 
 /// Of the state of a node and the parameters before it. Where it comes to nothing, the last one stays.

@@ -32,7 +32,7 @@ class PlaceList {
     std::error_code problem;
     const fs::path canonical = fs::canonical(directory, problem);
     if (problem || !fs::is_directory(canonical, problem)) return skip(directory, origin, "no such directory");
-    fs::directory_iterator(canonical, problem);
+    const fs::directory_iterator readable(canonical, problem);
     if (problem) return skip(canonical, origin, problem.message());
     const bool seen = std::any_of(places_.begin(), places_.end(), [&](const PluginPlace& place) {
       return place.skipped.empty() && place.directory == canonical;
@@ -204,7 +204,9 @@ struct Host::Search {
   std::vector<Library> libraries_;  ///< one a record
 };
 
-Host::Host(std::vector<fs::path> given) : search_(std::make_shared<Search>()) { search_->places = places_of(given); }
+Host::Host(const std::vector<fs::path>& given) : search_(std::make_shared<Search>()) {
+  search_->places = places_of(given);
+}
 
 const std::vector<PluginPlace>& Host::places() const { return search_->places; }
 

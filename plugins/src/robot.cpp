@@ -16,13 +16,6 @@
 namespace rhec {
 namespace {
 
-std::vector<std::string> names_of(const std::vector<Variable>& variables) {
-  std::vector<std::string> names;
-  names.reserve(variables.size());
-  for (const Variable& variable : variables) names.push_back(variable.name);
-  return names;
-}
-
 const Settings& member_or_null(const Settings& map, std::string_view key) {
   static const Settings nothing;
   const Settings* member = map.find(key);

@@ -304,8 +304,7 @@ class Names {
   }
   void check_count(std::string_view key, std::size_t count, const std::vector<Variable>& variables) const {
     if (count == variables.size()) return;
-    std::vector<std::string> names;
-    for (const Variable& variable : variables) names.push_back(variable.name);
+    const std::vector<std::string> names = names_of(variables);
     throw error(key, fmt::format("{} numbers, expected {}, for {} of model '{}'", count, names.size(),
                                  fmt::join(names, ", "), about_.name));
   }

@@ -26,7 +26,9 @@ constexpr double longest_spread = 0.1;
 /// Puts the keys of a variant over the scenario: maps are merged, all else is replaced.
 void put_over(Settings& base, const Settings& variant, const std::string& prefix) {
   for (const auto& [key, value] : variant.members()) {
-    const std::string path = prefix.empty() ? key : prefix + "." + key;
+    std::string path = prefix;
+    if (!path.empty()) path += '.';
+    path += key;
     if (value.kind() == Settings::Kind::map && !value.members().empty()) {
       put_over(base, value, path);
     } else {
@@ -37,8 +39,7 @@ void put_over(Settings& base, const Settings& variant, const std::string& prefix
 
 int index_of(const std::string& name, const std::vector<Variable>& variables, const Settings& section,
              const char* what) {
-  std::vector<std::string> names;
-  for (const Variable& variable : variables) names.push_back(variable.name);
+  const std::vector<std::string> names = names_of(variables);
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end())
     throw section.error(

@@ -19,6 +19,9 @@ struct Variable {
   bool is_angle = false;  ///< compared on the circle
 };
 
+/// The names of variables, in their order.
+RHEC_EXPORT std::vector<std::string> names_of(const std::vector<Variable>& variables);
+
 /// Which variables a path follower needs to know; -1 where the model has none.
 struct Roles {
   int position_x = -1;    ///< state: x of the point that shall follow the path [m]

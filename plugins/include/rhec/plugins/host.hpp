@@ -50,7 +50,7 @@ struct PluginRecord {
 /// search.
 class RHEC_EXPORT Host {
  public:
-  explicit Host(std::vector<std::filesystem::path> given = {});
+  explicit Host(const std::vector<std::filesystem::path>& given = {});
 
   const std::vector<PluginPlace>& places() const;
   /// All candidates, accepted or not, in search order.
