@@ -64,6 +64,21 @@ std::size_t HorizonProblem::scratch_size() const noexcept {
   return (capacity_.intervals + 1) * per_interval + cost_scratch_size();
 }
 
+void HorizonProblem::mark_dynamics(int i, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept {
+  const int ns = capacity_.states, inputs = static_cast<int>(free_inputs_.size());
+  // The vehicle's next state depends on all of the vehicle's own, and on a channel's value where that is in use.
+  for (int c = 0; c < ns; ++c) {
+    const int channel = c - nx_;
+    const bool carried = channel < 0 || control_of_channel(i, channel) < 0;
+    const bool starts_ramp = channel >= 0 && !carried && is_ramp(channel);
+    for (int r = 0; r < nx_; ++r) state_flags[c * ns + r] = carried || starts_ramp;
+    for (int r = nx_; r < ns; ++r) state_flags[c * ns + r] = channel >= 0 && carried && r == c;
+  }
+  for (int c = 0; c < control_counts_[i]; ++c)
+    for (int r = 0; r < ns; ++r)
+      control_flags[c * ns + r] = r < nx_ || (c >= inputs && control_of_channel(i, r - nx_) == c);
+}
+
 void HorizonProblem::inputs_on(const Iterate& point, int interval, double* u) const noexcept {
   const double* w = point.control(interval);
   for (int j = 0; j < nu_; ++j) {

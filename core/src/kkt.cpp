@@ -11,18 +11,17 @@ double KktResidual::largest() const noexcept {
 
 namespace {
 
-/// y += M' v for a column-major rows x columns matrix with leading dimension `ld`.
-void add_transposed_product(const double* M, int ld, int rows, int columns, const double* v, double* y) noexcept {
-  for (int c = 0; c < columns; ++c)
-    for (int r = 0; r < rows; ++r) y[c] += M[c * ld + r] * v[r];
+/// Column `c` of a column-major matrix with leading dimension `ld`, times v.
+double column_product(const double* M, int ld, int c, int rows, const double* v) noexcept {
+  double sum = 0.0;
+  for (int r = 0; r < rows; ++r) sum += M[c * ld + r] * v[r];
+  return sum;
 }
 
 double max_abs(const double* v, int n, double so_far) noexcept {
   for (int j = 0; j < n; ++j) so_far = std::max(so_far, std::abs(v[j]));
   return so_far;
 }
-
-constexpr int max_width = 64;  // a stage's states or controls; set-up refuses more
 
 /// Violation of bounds on a step of zero, and complementarity of the multipliers, against them.
 void check_bounds(const double* lower, const double* upper, const double* multipliers, int n,
@@ -41,21 +40,24 @@ void check_bounds(const double* lower, const double* upper, const double* multip
 KktResidual kkt_residual(const StageQp& qp, const Iterate& point) noexcept {
   KktResidual kkt;
   const int N = qp.intervals(), ns = qp.capacity().states;
-  double largest_term = 0.0, sum[max_width];
+  double largest_term = 0.0;
   for (int i = 0; i <= N; ++i) {
     const int n = qp.states(i), m = qp.controls(i);
     const int n_next = i < N ? qp.states(i + 1) : 0;
     const double *costate = point.costate(i), *bound = point.state_bound(i);
-    for (int j = 0; j < n; ++j) sum[j] = bound[j] - costate[j];
     largest_term = max_abs(bound, n, max_abs(costate, n, max_abs(qp.q(i), n, largest_term)));
-    if (i < N) add_transposed_product(qp.A(i), ns, n_next, n, point.costate(i + 1), sum);
-    for (int j = 0; j < n; ++j) kkt.stationarity = std::max(kkt.stationarity, std::abs(sum[j] + qp.q(i)[j]));
+    for (int j = 0; j < n; ++j) {
+      double sum = qp.q(i)[j] + bound[j] - costate[j];
+      if (i < N) sum += column_product(qp.A(i), ns, j, n_next, point.costate(i + 1));
+      kkt.stationarity = std::max(kkt.stationarity, std::abs(sum));
+    }
     check_bounds(qp.state_lower(i), qp.state_upper(i), bound, n, kkt);
     if (i == N) break;
-    for (int j = 0; j < m; ++j) sum[j] = qp.r(i)[j] + point.control_bound(i)[j];
     largest_term = max_abs(point.control_bound(i), m, max_abs(qp.r(i), m, largest_term));
-    add_transposed_product(qp.B(i), ns, n_next, m, point.costate(i + 1), sum);
-    kkt.stationarity = max_abs(sum, m, kkt.stationarity);
+    for (int j = 0; j < m; ++j)
+      kkt.stationarity =
+          std::max(kkt.stationarity, std::abs(qp.r(i)[j] + point.control_bound(i)[j] +
+                                              column_product(qp.B(i), ns, j, n_next, point.costate(i + 1))));
     check_bounds(qp.control_lower(i), qp.control_upper(i), point.control_bound(i), m, kkt);
     kkt.defect = max_abs(qp.b(i), n_next, kkt.defect);
   }
@@ -75,8 +77,10 @@ void set_costates(const StageQp& qp, Iterate& point) noexcept {
   const int N = qp.intervals(), ns = qp.capacity().states;
   for (int i = N; i >= 0; --i) {
     double* costate = point.costate(i);
-    for (int j = 0; j < qp.states(i); ++j) costate[j] = qp.q(i)[j] + point.state_bound(i)[j];
-    if (i < N) add_transposed_product(qp.A(i), ns, qp.states(i + 1), qp.states(i), point.costate(i + 1), costate);
+    for (int j = 0; j < qp.states(i); ++j) {
+      costate[j] = qp.q(i)[j] + point.state_bound(i)[j];
+      if (i < N) costate[j] += column_product(qp.A(i), ns, j, qp.states(i + 1), point.costate(i + 1));
+    }
   }
   if (!qp.initial_state_is_given) std::fill_n(point.costate(0), qp.states(0), 0.0);
 }

@@ -44,4 +44,6 @@ const char* advice_for(Status status) noexcept {
 
 bool is_usable(Status status) noexcept { return status != Status::infeasible && status != Status::bad_input; }
 
+bool Solver::covariances(const Ocp&, const Iterate&, std::span<double>) noexcept { return false; }
+
 }  // namespace rhec

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rhec/core/point.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec::gn_rti {
@@ -34,48 +35,6 @@ void for_each_dual_row(const Ocp& ocp, Iterate& to, const Iterate& from, const F
     function(to.state_bound(i), from.state_bound(i), ocp.state_count(i));
     if (i < ocp.intervals()) function(to.control_bound(i), from.control_bound(i), ocp.control_count(i));
   }
-}
-
-bool is_finite(const Ocp& ocp, const Iterate& point) {
-  bool finite = true;
-  const auto check = [&](const double* row, int n) {
-    for (int j = 0; j < n; ++j) finite = finite && std::isfinite(row[j]);
-  };
-  for (int i = 0; i <= ocp.intervals(); ++i) {
-    for (const double* row : {point.state(i), point.costate(i), point.state_bound(i)}) check(row, ocp.state_count(i));
-    if (i < ocp.intervals())
-      for (const double* row : {point.control(i), point.control_bound(i)}) check(row, ocp.control_count(i));
-  }
-  return finite;
-}
-
-double largest_costate(const Ocp& ocp, const Iterate& point) {
-  double largest = 0.0;
-  for (int i = 1; i <= ocp.intervals(); ++i)
-    for (int j = 0; j < ocp.state_count(i); ++j) largest = std::max(largest, std::abs(point.costate(i)[j]));
-  return largest;
-}
-
-double largest_bound_multiplier(const Ocp& ocp, const Iterate& point) {
-  double largest = 0.0;
-  for (int i = 0; i <= ocp.intervals(); ++i) {
-    for (int j = 0; j < ocp.state_count(i); ++j) largest = std::max(largest, std::abs(point.state_bound(i)[j]));
-    if (i < ocp.intervals())
-      for (int j = 0; j < ocp.control_count(i); ++j) largest = std::max(largest, std::abs(point.control_bound(i)[j]));
-  }
-  return largest;
-}
-
-double total_violation(const Ocp& ocp, const Iterate& point) {
-  double total = 0.0;
-  const auto add = [&](const double* value, const double* lower, const double* upper, int n) {
-    for (int j = 0; j < n; ++j) total += std::max({0.0, lower[j] - value[j], value[j] - upper[j]});
-  };
-  for (int i = 0; i <= ocp.intervals(); ++i) {
-    add(point.state(i), ocp.state_lower(i), ocp.state_upper(i), ocp.state_count(i));
-    if (i < ocp.intervals()) add(point.control(i), ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
-  }
-  return total;
 }
 
 }  // namespace
@@ -213,7 +172,7 @@ Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) 
   const auto start = Clock::now();
   Report report;
   use_exact_ = false;
-  if (ocp.capacity() == capacity_ && is_finite(ocp, point) && std::isfinite(ocp.evaluate(point, nullptr, scratch_))) {
+  if (ocp.capacity() == capacity_ && is_sound_start(ocp, point, scratch_)) {
     // A real-time iteration lives on the sample before; a point without costates has none.
     const bool step = options_.mode == Mode::rti && largest_costate(ocp, point) > 0.0;
     report = step ? real_time(ocp, point, deadline) : converge(ocp, point, deadline);
@@ -249,7 +208,7 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
       break;
     }
     add_step(ocp, best_, 1.0, trial_);
-    if (!is_finite(ocp, trial_) || !std::isfinite(ocp.evaluate(trial_, nullptr, scratch_))) {
+    if (!is_sound_start(ocp, trial_, scratch_)) {
       report.status = Status::stalled;
       break;
     }

@@ -33,6 +33,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   const double* control_upper(int i) const noexcept override { return row(control_upper_, i, capacity_.controls); }
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   std::size_t scratch_size() const noexcept override;
+  void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
 
   double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept override;
   void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept override;

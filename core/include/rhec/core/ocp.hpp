@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "rhec/core/export.hpp"
@@ -49,6 +50,10 @@ class RHEC_EXPORT Ocp {
   virtual const double* control_upper(int interval) const noexcept = 0;
   virtual bool has_second_derivatives() const noexcept = 0;
   virtual std::size_t scratch_size() const noexcept = 0;
+
+  /// Marks which derivatives of F_i can be other than zero, whatever the point: entry [c * state_count(i + 1) + r] of
+  /// `state_flags` for dF_r/ds_c, of `control_flags` for dF_r/dw_c. By default all can.
+  virtual void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept;
 
   /// The objective at a point; `defects` (N rows of capacity().states, or null) gets F_i(s_i, w_i) - s_{i+1}.
   virtual double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept = 0;

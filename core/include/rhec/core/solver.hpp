@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "rhec/core/kkt.hpp"
@@ -40,8 +41,8 @@ struct Report {
 /// Solves an Ocp from a guess. One instance serves one caller at a time; two instances never disturb each other.
 ///
 /// Per sample: optionally `prepare` (what can be done before the newest data arrive), then `solve` with the same
-/// problem and guess. Both are noexcept, allocation-free after `setup`, and never leave a number that is not finite in
-/// the iterate.
+/// problem and guess. Both are noexcept and never leave a number that is not finite in the iterate. A solver for real
+/// time (gn_rti) does not allocate after `setup`; one whose backend does says so in its manifest.
 class RHEC_EXPORT Solver {
  public:
   virtual ~Solver() = default;
@@ -58,6 +59,11 @@ class RHEC_EXPORT Solver {
   /// Improves `point` in place; on failure it is left as it was. Stops at `deadline` with the best point so far.
   virtual Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept = 0;
   Report solve(const Ocp& ocp, Iterate& point) noexcept { return solve(ocp, point, Clock::time_point::max()); }
+
+  /// Marginal covariances of all stage states at a point, from the Hessian there with all bounds ignored, when the
+  /// objective is twice a negative log-likelihood (as RheProblem's is): column-major n_s x n_s blocks of the capacity's
+  /// n_s, one a node. False, with nothing written, where the solver has no such factor or the Hessian has no inverse.
+  virtual bool covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept;
 
   /// Forgets all that was learnt; the next solve gives the same bits as one of a new instance.
   virtual void reset() noexcept = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>
@@ -77,8 +78,12 @@ class RHEC_EXPORT StageQp {
   ConstVector r_of(int i) const { return {r(i), controls(i)}; }
 
  private:
-  static double* at(std::vector<double>& v, int i, int size) noexcept { return v.data() + i * size; }
-  static const double* at(const std::vector<double>& v, int i, int size) noexcept { return v.data() + i * size; }
+  static double* at(std::vector<double>& v, int i, int size) noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * size;
+  }
+  static const double* at(const std::vector<double>& v, int i, int size) noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * size;
+  }
 
   Capacity capacity_;
   int ns_ = 0, nw_ = 0, intervals_ = 0;

@@ -22,7 +22,7 @@ inline constexpr std::uint64_t kManifestMagic = 0x47554C5043454852u;
 /// Counts changes of the layout of Manifest.
 inline constexpr std::uint32_t kManifestAbi = 1;
 /// Counts changes of the interfaces that plugins implement or are handed: Model, Blocking, Solver, Settings, OptionRow.
-inline constexpr std::uint32_t kInterfaceRevision = 1;
+inline constexpr std::uint32_t kInterfaceRevision = 2;
 /// The name of the one symbol that a plugin exports.
 inline constexpr const char* kManifestSymbol = "rhec_plugin_manifest";
 

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <span>
+
+#include "rhec/core/ocp.hpp"
+
+namespace rhec {
+
+// What solvers ask of a primal-dual point, over the stages that the problem really uses.
+
+/// Every state, control and multiplier is finite.
+RHEC_EXPORT bool is_finite(const Ocp& ocp, const Iterate& point) noexcept;
+/// A solver can start here: the point and its objective are finite. `scratch` is of the Ocp's `scratch_size()`.
+RHEC_EXPORT bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept;
+/// max |costate| of nodes 1 .. N; zero means that the point has no history.
+RHEC_EXPORT double largest_costate(const Ocp& ocp, const Iterate& point) noexcept;
+RHEC_EXPORT double largest_bound_multiplier(const Ocp& ocp, const Iterate& point) noexcept;
+/// Sum of what bounds are violated by.
+RHEC_EXPORT double total_violation(const Ocp& ocp, const Iterate& point) noexcept;
+
+}  // namespace rhec

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rhec/core/ocp.hpp"
+
+namespace rhec {
+
+/// An Ocp seen as one sparse nonlinear program, for solvers that know no stages:
+///
+///     minimise f(z)  subject to  c(z) = 0,  lower <= z <= upper
+///
+/// z = [s_0; w_0; s_1; w_1; ...; s_N], without s_0 where it is given; rows of c are the defects F_i(s_i, w_i) -
+/// s_{i+1}, interval after interval. With L = f + multipliers' c + bound_multipliers' z the multipliers are the
+/// costates of nodes 1 .. N, and bound multipliers have the signs of Iterate's.
+///
+/// Patterns hold for every point of one structure; values are scattered from the Ocp's own linearisation (StageQp), so
+/// nothing is evaluated twice. Matrices are in compressed columns with rows in order.
+class RHEC_EXPORT SparseNlp {
+ public:
+  struct Pattern {
+    int rows = 0, columns = 0;
+    std::vector<int> starts;       ///< columns + 1
+    std::vector<int> row_indices;  ///< starts.back()
+    int entries() const noexcept { return starts.empty() ? 0 : starts.back(); }
+  };
+
+  /// Takes over the Ocp's present structure. True where it differs from the one before, so that what was derived from
+  /// the patterns (orderings, symbolic factors) has to be made anew.
+  bool take_structure(const Ocp& ocp);
+  /// Numbers that tell structures apart: equal signatures, equal patterns.
+  const std::vector<std::int32_t>& signature() const noexcept { return signature_; }
+
+  int variables() const noexcept { return hessian_.columns; }
+  int constraints() const noexcept { return jacobian_.rows; }
+  int intervals() const noexcept { return static_cast<int>(control_starts_.size()); }
+  const Pattern& jacobian() const noexcept { return jacobian_; }
+  /// The lower triangle. The block of each stage [s_i; w_i] is full, and there is nothing outside of these blocks.
+  const Pattern& hessian() const noexcept { return hessian_; }
+  /// Where in z the states of a node (-1: given), or the controls of an interval, begin.
+  int state_start(int node) const noexcept { return state_starts_[node]; }
+  int control_start(int interval) const noexcept { return control_starts_[interval]; }
+  /// The first row of c that interval i contributes.
+  int constraint_start(int interval) const noexcept { return constraint_starts_[interval]; }
+
+  // Between points and vectors. Multipliers and bound multipliers may be null.
+  void read(const Ocp& ocp, const Iterate& point, double* z, double* multipliers,
+            double* bound_multipliers) const noexcept;
+  /// A given s_0 is written too. costate_0 is left as it is: it follows from the stationarity in s_0 (`set_costate_0`).
+  void write(const Ocp& ocp, const double* z, const double* multipliers, const double* bound_multipliers,
+             Iterate& point) const noexcept;
+  /// The costate of a given initial state, from a linearisation at the point; zero where the initial state is free.
+  static void set_costate_0(const StageQp& linearisation, Iterate& point) noexcept;
+
+  /// Bounds of z; infinite where there is none.
+  void bounds(const Ocp& ocp, double* lower, double* upper) const noexcept;
+  /// c from the defects that Ocp::evaluate gives (rows of the capacity's states).
+  void constraints(const Ocp& ocp, const double* defects, double* c) const noexcept;
+
+  // Values at the point of a linearisation. The Hessian is that of the Lagrangian if the linearisation was made with
+  // Hessian::exact and the point's costates.
+  void constraints(const StageQp& linearisation, double* c) const noexcept;
+  void gradient(const StageQp& linearisation, double* g) const noexcept;
+  void jacobian(const StageQp& linearisation, double* values) const noexcept;
+  void hessian(const StageQp& linearisation, double* values) const noexcept;
+
+ private:
+  std::vector<std::int32_t> signature_, next_signature_;
+  std::vector<std::uint8_t> state_flags_, control_flags_;  ///< of the interval being marked
+  std::vector<int> state_starts_, control_starts_, constraint_starts_, state_counts_, control_counts_;
+  Pattern jacobian_, hessian_;
+  /// Of each entry of the Jacobian: its offset in the stage's A or B; -1 for the -1 of s_{i+1} itself.
+  std::vector<int> jacobian_sources_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,54 @@
+#include "rhec/core/point.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rhec {
+
+bool is_finite(const Ocp& ocp, const Iterate& point) noexcept {
+  bool finite = true;
+  const auto check = [&](const double* row, int n) {
+    for (int j = 0; j < n; ++j) finite = finite && std::isfinite(row[j]);
+  };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    for (const double* row : {point.state(i), point.costate(i), point.state_bound(i)}) check(row, ocp.state_count(i));
+    if (i < ocp.intervals())
+      for (const double* row : {point.control(i), point.control_bound(i)}) check(row, ocp.control_count(i));
+  }
+  return finite;
+}
+
+bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept {
+  return is_finite(ocp, point) && std::isfinite(ocp.evaluate(point, nullptr, scratch));
+}
+
+double largest_costate(const Ocp& ocp, const Iterate& point) noexcept {
+  double largest = 0.0;
+  for (int i = 1; i <= ocp.intervals(); ++i)
+    for (int j = 0; j < ocp.state_count(i); ++j) largest = std::max(largest, std::abs(point.costate(i)[j]));
+  return largest;
+}
+
+double largest_bound_multiplier(const Ocp& ocp, const Iterate& point) noexcept {
+  double largest = 0.0;
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    for (int j = 0; j < ocp.state_count(i); ++j) largest = std::max(largest, std::abs(point.state_bound(i)[j]));
+    if (i < ocp.intervals())
+      for (int j = 0; j < ocp.control_count(i); ++j) largest = std::max(largest, std::abs(point.control_bound(i)[j]));
+  }
+  return largest;
+}
+
+double total_violation(const Ocp& ocp, const Iterate& point) noexcept {
+  double total = 0.0;
+  const auto add = [&](const double* value, const double* lower, const double* upper, int n) {
+    for (int j = 0; j < n; ++j) total += std::max({0.0, lower[j] - value[j], value[j] - upper[j]});
+  };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    add(point.state(i), ocp.state_lower(i), ocp.state_upper(i), ocp.state_count(i));
+    if (i < ocp.intervals()) add(point.control(i), ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
+  }
+  return total;
+}
+
+}  // namespace rhec
