@@ -12,6 +12,7 @@
 #include "commands.hpp"
 #include "rhec/core/error.hpp"
 #include "rhec/core/option_values.hpp"
+#include "rhec/plugins/yaml.hpp"
 
 namespace rhec::apps {
 
@@ -34,6 +35,22 @@ void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& dire
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+void add_assignments(CLI::App& command, std::vector<std::string>& assignments, const std::string& what) {
+  command.add_option("--set", assignments, what + "; may be given several times")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+void apply_assignments(Settings& settings, const std::vector<std::string>& assignments) {
+  for (const std::string& assignment : assignments) apply_assignment(settings, assignment);
+}
+
+void add_out(CLI::App& command, std::string& out, const std::string& type, const std::string& meaning) {
+  command.add_option("--out", out, meaning)->type_name(type)->capture_default_str();
+}
+
 namespace {
 
 constexpr const char* about = "Receding horizon estimation and control of field robots whose wheels slip.";
@@ -44,7 +61,8 @@ constexpr const char* examples =
     "  rhec plugins                       what is installed\n"
     "  rhec plugins gn_rti                the options of one plugin\n"
     "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
-    "  rhec solve problems.jsonl --solver gn_rti --sequence > solutions.jsonl\n\n"
+    "  rhec solve problems.jsonl --solver gn_rti --sequence > solutions.jsonl\n"
+    "  rhec compare scenarios/figure8.yaml --solvers gn_rti,sparse_sqp\n\n"
     "'rhec COMMAND --help' says more of each command.";
 
 int usage_error(std::string_view what) {
@@ -76,7 +94,9 @@ int run(int count, char** words) {
   Action chosen;
   add_run(program, chosen);
   add_estimate(program, chosen);
+  add_smooth(program, chosen);
   add_solve(program, chosen);
+  add_compare(program, chosen);
   add_options(program, chosen);
   add_plugins(program, chosen);
 

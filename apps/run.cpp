@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "dump.hpp"
 #include "progress.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
@@ -23,6 +24,7 @@ struct RunArguments {
   std::string scenario, out = "out";
   std::vector<std::string> assignments;
   std::vector<std::filesystem::path> plugin_path;
+  DumpArguments dump;
 };
 
 void print_table(const sim::RunSummary& summary, const std::filesystem::path& folder) {
@@ -45,11 +47,14 @@ void print_table(const sim::RunSummary& summary, const std::filesystem::path& fo
 
 int run(const RunArguments& arguments) {
   Settings settings = load_yaml(arguments.scenario);
-  for (const std::string& assignment : arguments.assignments) apply_assignment(settings, assignment);
+  apply_assignments(settings, arguments.assignments);
   const sim::Scenario scenario(Host(arguments.plugin_path), settings);
   sim::OutputFolder folder(arguments.out);
+  Dump dump(arguments.dump, {OcpKind::rhe, OcpKind::rhc});
   ProgressBar bar(scenario.options().name);
-  const sim::RunLog log = sim::run_closed_loop(scenario, [&](double share) { bar.show(share); });
+  const sim::RunLog log =
+      sim::run_closed_loop(scenario, {.progress = [&](double share) { bar.show(share); },
+                                      .solved = dump.watch(scenario.options().name, scenario.robot())});
   bar.finish();
   const sim::RunSummary summary = sim::summarise(log, scenario);
   folder.write("steps.csv", sim::steps_csv(log, scenario));
@@ -57,7 +62,9 @@ int run(const RunArguments& arguments) {
   folder.write("summary.json", sim::summary_json(summary));
   folder.write("run.svg", sim::run_svg(log, scenario));
   folder.commit();
+  dump.commit();
   print_table(summary, folder.path());
+  dump.tell();
   return log.completed ? exit_fine : exit_not_solved;
 }
 
@@ -74,15 +81,12 @@ void add_run(CLI::App& program, Action& chosen) {
       "Examples:\n"
       "  rhec run scenarios/figure8.yaml --out out/figure8\n"
       "  rhec run scenarios/figure8.yaml --set speed=4 --set 'blocking.kappa={name: full_horizon}' --out out/fhb\n"
-      "  rhec run scenarios/zigzag.yaml --set estimator.name=ekf --set seed=3 --out out/ekf");
+      "  rhec run scenarios/zigzag.yaml --set estimator.name=ekf --set seed=3 --out out/ekf\n"
+      "  rhec run scenarios/zigzag.yaml --dump out/problems --dump-every 10");
   command->add_option("scenario", arguments->scenario, "a YAML file")->required();
-  command
-      ->add_option("--set", arguments->assignments,
-                   "KEY=VALUE over any key of the scenario; may be given several times")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command->add_option("--out", arguments->out, "folder of the results")->capture_default_str();
+  add_assignments(*command, arguments->assignments, "a key of the scenario");
+  add_out(*command, arguments->out, "DIR", "folder of the results");
+  add_dump(*command, arguments->dump);
   add_plugin_path(*command, arguments->plugin_path);
   command->callback([&chosen, arguments] { chosen = [arguments] { return run(*arguments); }; });
 }

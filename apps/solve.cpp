@@ -38,6 +38,7 @@ struct SolveArguments {
   std::string solver;
   std::vector<std::string> assignments;
   bool sequence = false;
+  bool cold = false;
   bool verbose = false;
   std::string out;
   std::vector<std::filesystem::path> plugin_path;
@@ -75,13 +76,13 @@ class Models {
 /// A solver with the problem that it was set up for; takes one record after the other.
 class Bench {
  public:
-  Bench(std::string name, std::shared_ptr<Solver> solver) : name_(std::move(name)), solver_(std::move(solver)) {}
+  Bench(std::string name, std::shared_ptr<Solver> solver, bool cold)
+      : name_(std::move(name)), solver_(std::move(solver)), cold_(cold) {}
 
-  /// The problem by itself, from a cold start.
+  /// The problem by itself, from its guess or a cold start.
   std::string solve_alone(const ProblemRecord& record, const std::shared_ptr<const Model>& model, Outcome& outcome) {
     load(record, model, record.intervals);
-    solver_->reset();
-    sim::cold_start(record, *problem_, point_);
+    begin(record);
     outcome = solve(point_);
     outcome.objective = problem_->evaluate(point_, nullptr, scratch_);
     return sim::solution_line(record, *problem_, point_, outcome);
@@ -96,10 +97,7 @@ class Bench {
     load(record, model, max_intervals);
     const std::int64_t first = record.first_interval();
     const auto steps = last_first_ ? std::clamp<std::int64_t>(first - *last_first_, -1, 1 << 20) : -1;
-    if (!shifter_->apply(static_cast<int>(steps), *problem_, point_)) {
-      solver_->reset();
-      sim::cold_start(record, *problem_, point_);
-    }
+    if (!shifter_->apply(static_cast<int>(steps), *problem_, point_)) begin(record);
     outcome = solve(point_);
     last_first_.reset();
     if (is_usable(outcome.status)) last_first_ = first;
@@ -110,6 +108,15 @@ class Bench {
   }
 
  private:
+  void begin(const ProblemRecord& record) {
+    solver_->reset();
+    if (cold_) {
+      sim::cold_start(record, *problem_, point_);
+    } else {
+      sim::start(record, *problem_, point_);
+    }
+  }
+
   void load(const ProblemRecord& record, const std::shared_ptr<const Model>& model, int max_intervals) {
     if (problem_ && problem_->shared_model() == model && sim::refill(record, *problem_)) {
       check(record);
@@ -147,6 +154,7 @@ class Bench {
 
   std::string name_;
   std::shared_ptr<Solver> solver_;
+  bool cold_;
   std::unique_ptr<HorizonProblem> problem_;
   Iterate point_, reported_;
   StageQp qp_;
@@ -260,7 +268,7 @@ int solve(const SolveArguments& arguments) {
 
   const Host host(arguments.plugin_path);
   Settings options;
-  for (const std::string& assignment : arguments.assignments) apply_assignment(options, assignment);
+  apply_assignments(options, arguments.assignments);
   Destination destination(arguments.out);
   Models models(host);
   std::map<std::string, Bench> benches;  // one for all, or one a sequence
@@ -271,7 +279,8 @@ int solve(const SolveArguments& arguments) {
     const std::string key = arguments.sequence ? record.prefix : std::string();
     auto at = benches.find(key);
     if (at == benches.end())
-      at = benches.emplace(key, Bench(arguments.solver, make_solver(host, arguments.solver, options))).first;
+      at = benches.emplace(key, Bench(arguments.solver, make_solver(host, arguments.solver, options), arguments.cold))
+               .first;
     Outcome outcome;
     const std::string line = arguments.sequence
                                  ? at->second.solve_next(record, models.of(record), longest.at(record.prefix), outcome)
@@ -294,8 +303,10 @@ int solve(const SolveArguments& arguments) {
 void add_solve(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<SolveArguments>();
   CLI::App* command = program.add_subcommand(
-      "solve", "Solves the problems of a file, one a line, each alone from a cold start; writes one solution a line.");
+      "solve", "Solves the problems of a file, one a line, each alone; writes one solution a line.");
   command->footer(
+      "A solve begins at the line's guess, where it has one, and otherwise (or with --cold) at a simulation with the\n"
+      "measured or the reference inputs.\n\n"
       "With --sequence the lines of one id prefix (run/rhe of run/rhe/19) are a sequence over time: the guess is the\n"
       "solution before, shifted by the steps between them. States and objective are then those that follow from the\n"
       "inputs by simulation in control; an estimate is reported as it is, defects and all.\n\n"
@@ -308,14 +319,10 @@ void add_solve(CLI::App& program, Action& chosen) {
       ->required()
       ->type_name("PROBLEMS.jsonl");
   command->add_option("--solver", arguments->solver, "a solver of 'rhec plugins'")->required()->type_name("NAME");
-  command->add_option("--set", arguments->assignments, "an option of the solver; may be given several times")
-      ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  add_assignments(*command, arguments->assignments, "an option of the solver");
   command->add_flag("--sequence", arguments->sequence, "warm starts along each id prefix");
-  command->add_option("--out", arguments->out, "write there, whole or not at all, instead of to standard output")
-      ->type_name("FILE");
+  command->add_flag("--cold", arguments->cold, "pass over the guesses of the file");
+  add_out(*command, arguments->out, "FILE", "write there, whole or not at all, instead of to standard output");
   command->add_flag("--verbose", arguments->verbose, "print a summary even where standard error is no terminal");
   add_plugin_path(*command, arguments->plugin_path);
   command->callback([=, &chosen] { chosen = [=] { return solve(*arguments); }; });

@@ -18,8 +18,25 @@ bool is_finite(const Ocp& ocp, const Iterate& point) noexcept {
   return finite;
 }
 
+namespace {
+
+bool bounds_are_numbers(const Ocp& ocp) noexcept {
+  bool numbers = true;
+  const auto check = [&](const double* row, int n) {
+    for (int j = 0; j < n; ++j) numbers = numbers && !std::isnan(row[j]);
+  };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    for (const double* row : {ocp.state_lower(i), ocp.state_upper(i)}) check(row, ocp.state_count(i));
+    if (i < ocp.intervals())
+      for (const double* row : {ocp.control_lower(i), ocp.control_upper(i)}) check(row, ocp.control_count(i));
+  }
+  return numbers;
+}
+
+}  // namespace
+
 bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept {
-  return is_finite(ocp, point) && std::isfinite(ocp.evaluate(point, nullptr, scratch));
+  return is_finite(ocp, point) && bounds_are_numbers(ocp) && std::isfinite(ocp.evaluate(point, nullptr, scratch));
 }
 
 double largest_costate(const Ocp& ocp, const Iterate& point) noexcept {

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "block_structure.hpp"
 #include "rhec/core/error.hpp"
 
 namespace rhec {
@@ -162,31 +163,6 @@ void RecedingHorizonEstimation::slide_arrival() noexcept {
   arrival_.slide(problem_, point_, borders_, lost);
 }
 
-void RecedingHorizonEstimation::set_structure() noexcept {
-  problem_.set_intervals(window_.intervals);
-  for (std::size_t k = 0; k < borders_.size(); ++k) {
-    const int j = static_cast<int>(k);
-    const Blocking& blocking = *setup_.blockings[k];
-    const bool ramp = blocking.transition() == Transition::ramp;
-    const std::int64_t first_start = blocking.starts(window_, begins_.data());
-    // A ramp can start at the window's edge, but not before the run itself.
-    begins_[0] = ramp && first_start == window_.first && window_.first > 0;
-    problem_.set_blocks(j, begins_.data(), blocking.transition());
-    std::int64_t block = begins_[0] ? first_starts_[k] : first_start;
-    const double alone = setup_.walks[k].block_sigma;
-    const auto sigma = blocking.neighbour_sigma();
-    for (int i = 0; i < window_.intervals; ++i) {
-      if (!begins_[i]) continue;
-      const std::int64_t start = window_.first + i;
-      const double steps = std::max(1.0, static_cast<double>(start - block));
-      problem_.link(i, j, sigma ? *sigma * *sigma * steps : alone * alone);
-      block = start;
-    }
-    first_starts_[k] = first_start;
-  }
-  problem_.finish();
-}
-
 void RecedingHorizonEstimation::advance_window(double duration, const double* inputs, const double* outputs) noexcept {
   const bool full = window_.intervals == setup_.problem.max_intervals;
   const bool was_empty = window_.intervals == 0;
@@ -203,7 +179,7 @@ void RecedingHorizonEstimation::advance_window(double duration, const double* in
   problem_.set_duration(last - 1, duration);
   take_inputs(last - 1, inputs);
   take_outputs(last, outputs);
-  set_structure();
+  set_block_structure(window_, setup_.blockings, setup_.walks, first_starts_, begins_, problem_);
   arrival_.write(problem_);
   if (was_empty) {
     for (std::size_t j = 0; j < inputs_.size(); ++j) {
@@ -235,7 +211,8 @@ void RecedingHorizonEstimation::add_node(double duration, const double* inputs, 
   prepared_ = false;
   const int last = window_.intervals;
   const bool same_duration = problem_.duration(last - 1) == duration;
-  bool fits = same_duration;
+  // The weights of robust losses were those of the predicted outputs, so with them the matrices change too.
+  bool fits = same_duration && setup_.problem.robust.empty();
   for (std::size_t j = 0; j < outputs_.size(); ++j)
     fits = fits && std::isnan(problem_.output(last)[j]) != is_measurement(outputs[j]);
   for (std::size_t j = 0; j < inputs_.size(); ++j)

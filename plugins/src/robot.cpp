@@ -22,13 +22,19 @@ const Settings& member_or_null(const Settings& map, std::string_view key) {
   return member ? *member : nothing;
 }
 
-/// The plugin named by `name` in a section, or the default.
+/// The plugin named by `name` in a section, or by the section itself where that is only a word, or the default.
 std::string plugin_name(const Settings& section, std::string_view otherwise) {
   if (section.is_null()) return std::string(otherwise);
+  if (section.kind() == Settings::Kind::scalar) return section.text();
   if (section.kind() != Settings::Kind::map)
-    throw section.mismatch("a map with the key 'name' and the plugin's options");
+    throw section.mismatch("the name of a plugin, or a map with the key 'name' and the plugin's options");
   const Settings* name = section.find("name");
   return name ? name->as_text() : std::string(otherwise);
+}
+
+/// The options beside a plugin's name.
+Settings plugin_options(const Settings& section) {
+  return section.kind() == Settings::Kind::scalar ? Settings::map(section.origin()) : section;
 }
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -37,7 +43,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double noise_share = 0.01, initial_share = 0.1, parameter_share = 1.0;  // of a variable's typical magnitude
 constexpr double position_weight = 1.0, terminal_weight = 10.0, input_weight = 5.0;
 constexpr const char *default_model = "bicycle_slip", *default_solver = "gn_rti", *default_blocking = "full_horizon",
-                     *default_input_blocking = "unblocked";
+                     *default_input_blocking = "unblocked", *default_smoothing_solver = "sparse_sqp";
 
 /// True where a message begins with a place that is written in this part of the settings.
 bool names_place_of(const Settings& settings, std::string_view message) {
@@ -62,11 +68,15 @@ auto made_from(const Settings& section, const Make& make) {
 }
 
 std::shared_ptr<Blocking> blocking_of(const Host& host, const Settings& section, std::string_view otherwise) {
-  return made_from(section, [&] { return host.make_blocking(plugin_name(section, otherwise), section); });
+  return made_from(section,
+                   [&] { return host.make_blocking(plugin_name(section, otherwise), plugin_options(section)); });
 }
 
-std::shared_ptr<Solver> solver_of(const Host& host, const Settings& section) {
-  return made_from(section, [&] { return host.make_solver(plugin_name(section, default_solver), section); });
+PluginChoice choice_of(const Settings& section, std::string_view otherwise) {
+  PluginChoice choice{plugin_name(section, otherwise), Settings::map(section.origin())};
+  for (const auto& [key, value] : section.members())
+    if (key != "name") choice.options.add(key, value);
+  return choice;
 }
 
 struct ArrivalOptions {
@@ -108,6 +118,18 @@ const OptionTable<RobotOptions>& RobotOptions::table() {
     add_to(table);
     return table;
   }();
+  return rows;
+}
+
+const OptionTable<SmootherOptions>& SmootherOptions::table() {
+  static const auto rows =
+      OptionTable<SmootherOptions>()
+          .subtree("blocking", &SmootherOptions::blocking,
+                   "by parameter: name and options of a blocking plugin; as in `blocking` where none is given")
+          .subtree("robust", &SmootherOptions::robust, "as in `estimator`, whose loss is used where none is given")
+          .number("deadline", &SmootherOptions::deadline,
+                  "the solver stops after so long, with the best that it has; .inf: never [s]", greater_than(0.0))
+          .subtree("solver", &SmootherOptions::solver, "name and options of a solver plugin");
   return rows;
 }
 
@@ -196,6 +218,13 @@ std::vector<OptionSection> robot_sections() {
        "move blocking; its options stand beside the name; an input that is not named is free on every interval"},
       {"solver.name", "text", default_solver, "a solver plugin", "its options stand beside the name"},
   };
+  const std::vector<OptionRow> smoother = {
+      {"blocking.PARAMETER.name", "text", "as in `blocking`", "a blocking plugin", "its options stand beside the name"},
+      {"robust.outputs", "list of texts", "as in `estimator`", "outputs", "these share one pseudo-Huber loss"},
+      {"robust.delta", "number", number(RobustLoss{}.delta), greater_than(0.0).text(),
+       "where that loss turns from quadratic to linear, in standard deviations"},
+      {"solver.name", "text", default_smoothing_solver, "a solver plugin", "its options stand beside the name"},
+  };
   const std::string noise_default = number(noise_share) + " x its typical magnitude";
   return {
       {"model",
@@ -217,6 +246,9 @@ std::vector<OptionSection> robot_sections() {
       {"estimator", "How state and parameters are estimated.",
        spelt_out(EstimatorOptions::table().schema(), estimator)},
       {"controller", "How the path is followed.", spelt_out(ControllerOptions::table().schema(), controller)},
+      {"smoother",
+       "How a whole log is estimated at once. What is not here is as in `estimator`; its own estimates are the start.",
+       spelt_out(SmootherOptions::table().schema(), smoother)},
   };
 }
 
@@ -224,9 +256,11 @@ Robot::Robot(const Host& host, const RobotOptions& options)
     : host_(host),
       options_(options),
       estimator_(EstimatorOptions::table().parse(options.estimator, "estimator")),
-      controller_(ControllerOptions::table().parse(options.controller, "controller")) {
-  model_ = made_from(options.model,
-                     [&] { return host.make_model(plugin_name(options.model, default_model), options.model); });
+      controller_(ControllerOptions::table().parse(options.controller, "controller")),
+      smoother_(SmootherOptions::table().parse(options.smoother, "smoother")) {
+  model_ = made_from(options.model, [&] {
+    return host.make_model(plugin_name(options.model, default_model), plugin_options(options.model));
+  });
   const ModelDescription& about = model_->description();
   require_known_keys(options.noise, {"outputs", "inputs"}, "noise");
   const auto scales = [](const std::vector<Variable>& variables) {
@@ -251,7 +285,8 @@ void Robot::check_estimator() const {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
   read_initial({}, mean, covariance);
-  read_robust();
+  read_robust(estimator_.robust, "estimator");
+  read_robust(smoother_.robust, "smoother");
   ArrivalOptions::table().parse(estimator_.arrival, "estimator: arrival");
   numbers_by_name(estimator_.forgetting, about.parameters, none, at_least(0.0), "forgetting");
   numbers_by_name(estimator_.restart_sigma, about.parameters, none, greater_than(0.0), "restart_sigma");
@@ -320,10 +355,9 @@ void Robot::read_initial(const std::optional<Eigen::VectorXd>& initial_state, Ei
   }
 }
 
-std::vector<RobustLoss> Robot::read_robust() const {
-  const Settings& section = estimator_.robust;
+std::vector<RobustLoss> Robot::read_robust(const Settings& section, const std::string& owner) const {
   if (section.is_null()) return {};
-  require_known_keys(section, {"outputs", "delta"}, "estimator: robust");
+  require_known_keys(section, {"outputs", "delta"}, owner + ": robust");
   RobustLoss loss;
   if (const Settings* delta = section.find("delta"))
     loss.delta = NumberValue{greater_than(0.0)}.read(*delta, OptionContext{"robust", "in standard deviations"});
@@ -339,20 +373,41 @@ std::vector<RobustLoss> Robot::read_robust() const {
   return {loss};
 }
 
-std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::VectorXd& mean,
-                                                               const Eigen::MatrixXd& covariance) const {
+PluginChoice Robot::model_choice() const { return choice_of(options_.model, default_model); }
+
+PluginChoice Robot::solver_choice(OcpKind kind) const {
+  return choice_of(kind == OcpKind::rhe ? estimator_.solver : controller_.solver, default_solver);
+}
+
+void Robot::wrap_solvers(SolverWrap wrap) {
+  if (!wrap_) {
+    wrap_ = std::move(wrap);
+    return;
+  }
+  wrap_ = [inner = std::move(wrap_), outer = std::move(wrap)](OcpKind kind, std::shared_ptr<Solver> solver) {
+    return outer(kind, inner(kind, std::move(solver)));
+  };
+}
+
+std::shared_ptr<Solver> Robot::make_solver(OcpKind kind) const {
+  const Settings& section = kind == OcpKind::rhe ? estimator_.solver : controller_.solver;
+  auto solver = made_from(
+      section, [&] { return host_.make_solver(plugin_name(section, default_solver), plugin_options(section)); });
+  return wrap_ ? wrap_(kind, std::move(solver)) : solver;
+}
+
+FullInformationEstimation::Setup Robot::estimation_setup(int horizon, const Settings& blocking) const {
   const ModelDescription& about = model_->description();
-  RecedingHorizonEstimation::Setup setup;
-  setup.problem.max_intervals = estimator_.horizon;
+  FullInformationEstimation::Setup setup;
+  setup.problem.max_intervals = horizon;
   setup.problem.substeps = estimator_.substeps;
   for (const double sigma : output_sigmas_) setup.problem.output_weights.push_back(1.0 / (sigma * sigma));
   for (const double sigma : input_sigmas_) setup.problem.input_weights.push_back(1.0 / (sigma * sigma));
-  setup.problem.robust = read_robust();
+  setup.problem.robust = read_robust(estimator_.robust, "estimator");
   setup.problem.state_lower = state_lower_;
   setup.problem.state_upper = state_upper_;
   setup.problem.parameter_lower = parameter_lower_;
   setup.problem.parameter_upper = parameter_upper_;
-  setup.arrival = ArrivalOptions::table().parse(estimator_.arrival, "estimator: arrival").name;
   const std::size_t np = about.parameters.size();
   const auto forgetting =
       numbers_by_name(estimator_.forgetting, about.parameters, std::vector<double>(np, ParameterWalk{}.forgetting),
@@ -363,20 +418,49 @@ std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::Vect
   const auto alone =
       numbers_by_name(estimator_.block_sigma, about.parameters, std::vector<double>(np, ParameterWalk{}.block_sigma),
                       greater_than(0.0), "block_sigma", true);
+  require_known_keys(blocking, names_of(about.parameters), "blocking");
   for (std::size_t j = 0; j < np; ++j) {
     setup.walks.push_back({forgetting[j], restart[j], alone[j]});
-    const Settings& section = member_or_null(options_.blocking, about.parameters[j].name);
-    auto blocking = blocking_of(host_, section, default_blocking);
-    if (const std::string reason = blocking->why_not(estimator_.horizon); !reason.empty())
-      throw section.error(fmt::format("{}; change it or estimator.horizon", reason));
-    setup.blockings.push_back(std::move(blocking));
+    setup.blockings.push_back(blocking_of(host_, member_or_null(blocking, about.parameters[j].name), default_blocking));
   }
+  return setup;
+}
+
+std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::VectorXd& mean,
+                                                               const Eigen::MatrixXd& covariance) const {
+  const ModelDescription& about = model_->description();
+  auto common = estimation_setup(estimator_.horizon, options_.blocking);
+  for (std::size_t j = 0; j < about.parameters.size(); ++j)
+    if (const std::string reason = common.blockings[j]->why_not(estimator_.horizon); !reason.empty())
+      throw member_or_null(options_.blocking, about.parameters[j].name)
+          .error(fmt::format("{}; change it or estimator.horizon", reason));
+  RecedingHorizonEstimation::Setup setup;
+  setup.problem = std::move(common.problem);
+  setup.blockings = std::move(common.blockings);
+  setup.walks = std::move(common.walks);
+  setup.arrival = ArrivalOptions::table().parse(estimator_.arrival, "estimator: arrival").name;
   setup.initial_mean = mean;
   setup.initial_covariance = covariance;
   setup.heading_starts = estimator_.heading_starts;
   setup.heading_state = about.roles.heading;
-  auto solver = solver_of(host_, estimator_.solver);
+  auto solver = make_solver(OcpKind::rhe);
   return std::make_unique<RecedingHorizonEstimation>(model_, std::move(solver), std::move(setup));
+}
+
+FullInformationEstimation Robot::make_smoother(const std::optional<Eigen::VectorXd>& initial_state) const {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+  read_initial(initial_state, mean, covariance);
+  // The horizon is that of the log, once it is there.
+  auto setup =
+      estimation_setup(estimator_.horizon, smoother_.blocking.is_null() ? options_.blocking : smoother_.blocking);
+  if (!smoother_.robust.is_null()) setup.problem.robust = read_robust(smoother_.robust, "smoother");
+  setup.initial_mean = std::move(mean);
+  setup.initial_covariance = std::move(covariance);
+  auto solver = made_from(smoother_.solver, [&] {
+    return host_.make_solver(plugin_name(smoother_.solver, default_smoothing_solver), plugin_options(smoother_.solver));
+  });
+  return {model_, std::move(solver), std::move(setup)};
 }
 
 std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::VectorXd>& initial_state) const {
@@ -408,6 +492,7 @@ std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::Vect
     case EstimatorOptions::Name::truth:
       throw options_.estimator.error("name: 'truth' is known to a simulation only; choose rhe or ekf");
   }
+  if (method_wrap_) method = method_wrap_(std::move(method));
   Estimator::Timeline timeline;
   timeline.longest_interval = options_.step;
   return std::make_unique<Estimator>(std::move(method), timeline);
@@ -457,7 +542,7 @@ std::unique_ptr<Controller> Robot::make_controller(const Path& path) const {
           "an input jumps from block to block and no walk links its blocks; drop transition and neighbour_sigma");
     setup.blockings.push_back(std::move(blocking));
   }
-  auto solver = solver_of(host_, controller_.solver);
+  auto solver = make_solver(OcpKind::rhc);
   return std::make_unique<Controller>(model_, std::move(solver), path, std::move(setup));
 }
 

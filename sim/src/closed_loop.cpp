@@ -78,8 +78,9 @@ TimeSummary summarise_times(std::vector<double> times) {
 
 }  // namespace
 
-RunLog run_closed_loop(const Scenario& scenario, const std::function<void(double)>& progress) {
-  const Robot& robot = scenario.robot();
+RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
+  std::int64_t k = 0;
+  const Robot robot = with_hooks(scenario.robot(), hooks, [&k] { return k; });
   const Model& model = *robot.model();
   const Roles& roles = model.description().roles;
   const int nx = model.state_count(), np = model.parameter_count();
@@ -101,7 +102,7 @@ RunLog run_closed_loop(const Scenario& scenario, const std::function<void(double
   known.parameters.resize(np);
   RunLog log;
   log.samples.reserve(static_cast<std::size_t>(limit));
-  for (std::int64_t k = 0;; ++k) {
+  for (;; ++k) {
     const double time = static_cast<double>(k) * step;
     const Estimate* estimate = &known;
     if (oracle) {
@@ -144,7 +145,7 @@ RunLog run_closed_loop(const Scenario& scenario, const std::function<void(double
     sample.estimator_us = estimate->report.preparation_us + estimate->report.feedback_us;
     sample.controller_us = command.report.preparation_us + command.report.feedback_us;
     log.samples.push_back(std::move(sample));
-    if (progress) progress(std::min(1.0, true_follower.arc_length() / scenario.path().length()));
+    if (hooks.progress) hooks.progress(std::min(1.0, true_follower.arc_length() / scenario.path().length()));
 
     if (controller->finished() || true_follower.finished()) {
       log.completed = true;

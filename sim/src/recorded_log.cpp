@@ -106,16 +106,21 @@ void mark_agreement(std::vector<Fix>& fixes, const LogOptions& options) {
 /// Drives an estimator through a log.
 class Driver {
  public:
-  Driver(const Robot& robot, const RecordedLog& log, const LogOptions& options, const HoldOut& hold_out)
+  Driver(const Robot& robot, const RecordedLog& log, const LogOptions& options, const HoldOut& hold_out,
+         const LoopHooks& hooks)
       : log_(log),
         hold_out_(hold_out),
+        hooks_(hooks),
         places_(options, robot.model()->description()),
         step_(robot.step()),
-        estimator_(robot.make_estimator()),
+        estimator_(with_hooks(robot, hooks, [this] { return estimator_->counts().nodes - 1; }).make_estimator()),
         outputs_(robot.model()->description().outputs.size(), missing),
         inputs_(robot.model()->description().inputs.size(), missing) {}
 
-  Replay run(const std::function<void(double)>& progress) {
+  Driver(const Driver&) = delete;  // the estimator's solver asks this one for the step
+  Driver& operator=(const Driver&) = delete;
+
+  Replay run() {
     const auto start = Clock::now();
     for (std::size_t i = 0; i < log_.fixes.size(); ++i) {
       const Fix& fix = log_.fixes[i];
@@ -125,7 +130,7 @@ class Driver {
       } else {
         take_fix(fix, static_cast<std::int64_t>(i));
       }
-      if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(log_.fixes.size()));
+      if (hooks_.progress) hooks_.progress(static_cast<double>(i + 1) / static_cast<double>(log_.fixes.size()));
     }
     take_rows_until(std::numeric_limits<double>::infinity());
     result_.counts = estimator_->counts();
@@ -234,6 +239,7 @@ class Driver {
 
   const RecordedLog& log_;
   HoldOut hold_out_;
+  const LoopHooks& hooks_;
   Places places_;
   double step_;
   std::unique_ptr<Estimator> estimator_;
@@ -367,8 +373,8 @@ RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const
 }
 
 Replay replay(const Robot& robot, const RecordedLog& log, const LogOptions& options, const HoldOut& hold_out,
-              const std::function<void(double)>& progress) {
-  return Driver(robot, log, options, hold_out).run(progress);
+              const LoopHooks& hooks) {
+  return Driver(robot, log, options, hold_out, hooks).run();
 }
 
 HeldOutSummary summarise(const Replay& replay, const RecordedLog& log) {

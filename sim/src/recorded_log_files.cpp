@@ -66,10 +66,10 @@ std::string estimates_csv(const std::vector<Replay>& replays, const RecordedLog&
       text += ',';
     }
   };
-  for (std::size_t i = 0; i < replays.size(); ++i) {
-    for (const LoggedEstimate& entry : replays[i].estimates) {
+  for (const Replay& replay : replays) {
+    for (const LoggedEstimate& entry : replay.estimates) {
       const bool is_fix = entry.fix >= 0;
-      fmt::format_to(out, "{},{:.10g},{}", scenario.variants()[i].name, entry.time, is_fix ? "fix" : "node");
+      fmt::format_to(out, "{},{:.10g},{}", replay.name, entry.time, is_fix ? "fix" : "node");
       for (const double value : entry.values) number(value);
       for (const double value : entry.sigmas) number(value);
       const Fix none{0.0, std::nan(""), std::nan("")};
@@ -94,20 +94,21 @@ std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& 
       {"missing_coordinates", log.missing_coordinates},
       {"consistent", std::count_if(log.fixes.begin(), log.fixes.end(), [](const Fix& f) { return f.agrees; })}};
   json["hold_out"] = {{"every", hold_out.every}, {"phase", hold_out.phase}, {"error_cap_m", error_cap}};
-  // That of the first variant, the one that the scenario is about; the others are beside it below.
-  json["variant"] = scenario.variants().front().name;
+  // That of the first one, which the scenario is about; the others are beside it below.
+  json["variant"] = replays.front().name;
   json["held_out"] = json_of(summarise(replays.front(), log));
   Json& variants = json["variants"];
-  for (std::size_t i = 0; i < replays.size(); ++i) variants[scenario.variants()[i].name] = json_of(replays[i], log);
+  for (const Replay& replay : replays) variants[replay.name] = json_of(replay, log);
   return json.dump(2) + "\n";
 }
 
-std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogScenario& scenario) {
+std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogScenario& scenario,
+                       const Replay* beside) {
   const ModelDescription& about = scenario.variants().front().robot.model()->description();
   RunPicture picture;
   picture.title = scenario.name();
   const HeldOutSummary summary = summarise(replay, log);
-  picture.subtitle = scenario.variants().front().name;
+  picture.subtitle = replay.name;
   if (summary.all.count > 0)
     picture.subtitle +=
         fmt::format("; {} withheld fixes predicted to {:.3f} m in the median", summary.all.count, summary.all.median);
@@ -121,14 +122,25 @@ std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogSc
     Panel panel;
     panel.title = variable.meaning.empty() ? variable.name : fmt::format("{} ({})", variable.name, variable.meaning);
     panel.unit = variable.unit;
-    Curve curve;
-    curve.label = "estimated, 2 sigma";
-    for (const LoggedEstimate& entry : replay.estimates) {
-      if (entry.held_out) continue;
-      curve.times.push_back(entry.time);
-      curve.values.push_back(entry.values[nx + static_cast<Eigen::Index>(j)]);
-      curve.sigmas.push_back(entry.sigmas[nx + static_cast<Eigen::Index>(j)]);
+    const auto curve_of = [&](const Replay& of) {
+      Curve curve;
+      for (const LoggedEstimate& entry : of.estimates) {
+        if (entry.held_out) continue;
+        curve.times.push_back(entry.time);
+        curve.values.push_back(entry.values[nx + static_cast<Eigen::Index>(j)]);
+        curve.sigmas.push_back(entry.sigmas[nx + static_cast<Eigen::Index>(j)]);
+      }
+      return curve;
+    };
+    if (beside) {
+      Curve other = curve_of(*beside);
+      other.label = beside->name;
+      other.sigmas.clear();
+      other.role = CurveRole::other;
+      panel.curves.push_back(std::move(other));
     }
+    Curve curve = curve_of(replay);
+    curve.label = beside ? replay.name + ", 2 sigma" : "estimated, 2 sigma";
     panel.curves.push_back(std::move(curve));
     panel.lower = 0.0;
     panel.upper = 1.5;

@@ -60,9 +60,13 @@ std::string GnRti::why_not(const Ocp& ocp) const {
   if (std::max(capacity.states, capacity.controls) > Riccati::max_width)
     return "a stage has more than " + std::to_string(Riccati::max_width) +
            " states or controls; use a sparse solver for so wide a model";
-  const bool exact =
-      options_.hessian == Curvature::exact || (options_.hessian == Curvature::automatic && ocp.kind() == OcpKind::rhc);
-  if (exact && !ocp.has_second_derivatives()) return "the model has no second derivatives; set hessian: gauss_newton";
+  if (ocp.has_second_derivatives()) return {};
+  if (options_.hessian == Curvature::exact)
+    return "the exact Hessian was asked for and the model has no second derivatives; set hessian: gauss_newton";
+  // A line search makes Gauss-Newton's step safe; a full one need not lead anywhere.
+  if (options_.hessian == Curvature::automatic && options_.mode == Mode::rti && ocp.kind() == OcpKind::rhc)
+    return "the model has no second derivatives, and full Gauss-Newton steps need not converge in control; set mode: "
+           "converge, or hessian: gauss_newton if residuals are small";
   return {};
 }
 
@@ -85,7 +89,7 @@ void GnRti::reset() noexcept {
 Hessian GnRti::hessian_for(const Ocp& ocp) const noexcept {
   if (use_exact_ && ocp.has_second_derivatives()) return Hessian::exact;
   if (options_.hessian == Curvature::automatic)
-    return ocp.kind() == OcpKind::rhc ? Hessian::exact : Hessian::gauss_newton;
+    return ocp.kind() == OcpKind::rhc && ocp.has_second_derivatives() ? Hessian::exact : Hessian::gauss_newton;
   return options_.hessian == Curvature::exact ? Hessian::exact : Hessian::gauss_newton;
 }
 
@@ -273,7 +277,7 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
   // A given initial state is not for the line search to negotiate about.
   if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), best_.state(0));
   report.status = Status::iteration_limit;
-  double last_residual = std::numeric_limits<double>::infinity();
+  double least_residual = std::numeric_limits<double>::infinity();
   int slow = 0;
   for (;; ++report.iterations) {
     linearise(ocp, best_);
@@ -288,15 +292,16 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
       report.status = Status::deadline;
       break;
     }
-    // Gauss-Newton that gains little has met large residuals: from there the exact Hessian serves better.
+    // Gauss-Newton that gains little, or goes round in circles, has met large residuals: from there the exact Hessian
+    // serves better.
     if (options_.hessian == Curvature::automatic && !use_exact_ && ocp.has_second_derivatives()) {
-      slow = residual > 0.3 * last_residual ? slow + 1 : 0;
+      slow = residual > 0.3 * least_residual ? slow + 1 : 0;
       if (slow >= 4) {
         use_exact_ = true;
         linearise(ocp, best_);
       }
     }
-    last_residual = residual;
+    least_residual = std::min(least_residual, residual);
 
     double merit_after = 0.0;
     bool feasible = false, accepted = false;
@@ -330,7 +335,7 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
     std::swap(best_, trial_);
   }
   const double objective = ocp.evaluate(best_, nullptr, scratch_);
-  if (is_finite(ocp, best_) && std::isfinite(objective)) std::swap(point, best_);
+  if (report.status != Status::infeasible && is_finite(ocp, best_) && std::isfinite(objective)) std::swap(point, best_);
   judge(ocp, point, report);
   return report;
 }

@@ -21,6 +21,19 @@ bool is_equality(double lower, double upper) {
   return std::isfinite(lower) && upper - lower <= 1e-14 * (1.0 + std::abs(lower));
 }
 
+/// A lower bound above its upper bound, by more than rounding.
+bool has_crossed_bounds(const StageQp& qp) noexcept {
+  bool crossed = false;
+  const auto check = [&](const double* lower, const double* upper, int n) {
+    for (int j = 0; j < n; ++j) crossed = crossed || lower[j] - upper[j] > bound_tolerance * (1.0 + std::abs(lower[j]));
+  };
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    if (i > 0 || !qp.initial_state_is_given) check(qp.state_lower(i), qp.state_upper(i), qp.states(i));
+    check(qp.control_lower(i), qp.control_upper(i), qp.controls(i));
+  }
+  return crossed;
+}
+
 }  // namespace
 
 StageQpSolver::StageQpSolver(const Capacity& capacity) : capacity_(capacity), riccati_(capacity), active_(capacity) {
@@ -108,6 +121,8 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
 }
 
 StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step) noexcept {
+  // An active set takes one side of such bounds and does not see that the other is violated.
+  if (has_crossed_bounds(qp)) return Outcome::infeasible;
   return try_active_sets(qp, step, warm_rounds) ? Outcome::active_set : solve_by_interior_point(qp, step);
 }
 

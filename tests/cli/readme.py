@@ -2,7 +2,8 @@
 """What the documentation shows is what is there: readme.py <rhec>
 
 A block of README.md below a line `<!-- file: examples/... -->` is that file, word for word. Commands of the README and of
-docs/ that begin with `rhec run`, `rhec options` or `rhec plugins` work (with shorter paths). Links lead to files.
+docs/ that begin with `rhec run`, `rhec compare`, `rhec options` or `rhec plugins` work (with shorter paths). Links lead to
+files.
 """
 import pathlib
 import re
@@ -13,6 +14,7 @@ import tempfile
 import cli
 from cli import FINE, Program, assignments
 
+COMMANDS = (["run"], ["compare"], ["options"], ["plugins"])
 SHOWN = re.compile(r"<!-- file: (\S+) -->\n```\w*\n(.*?)```\n", re.DOTALL)
 BLOCK = re.compile(r"```(\w*)\n(.*?)```\n", re.DOTALL)
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)\)")
@@ -40,9 +42,9 @@ def main():
                 findings.expect((page.parent / link).exists(), page.name, f"leads to {link}, which is not there")
             for command in commands(text):
                 words = shlex.split(command, comments=True)
-                if words[:1] != ["rhec"] or words[1:2] not in (["run"], ["options"], ["plugins"]) or "--plugin-path" in words:
+                if words[:1] != ["rhec"] or words[1:2] not in COMMANDS or "--plugin-path" in words:
                     continue
-                if words[1] == "run":
+                if words[1] in ("run", "compare"):
                     words[3:3] = assignments("path.laps=1", "path.legs=2")
                     words = [str(pathlib.Path(work) / "out") if before == "--out" else word
                              for before, word in zip([""] + words, words)]

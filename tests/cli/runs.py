@@ -146,6 +146,11 @@ class Test(cli.Findings):
                  [("base", base), ("same", same), ("other", other), ("last", last), ("size", size), ("section", section)]}
         self.expect(steps["base"] == steps["same"] == steps["last"], "--set", "a value that was there changed the run")
         self.expect(len({steps[name] for name in ("base", "other", "size", "section")}) == 4, "--set", "changed nothing")
+        # A plugin without options is one word; another backend is that one word changed.
+        word = self.run("a solver as a word", ["estimator.solver=gn_rti", "seed=7"], scenario)
+        self.expect((word / "steps.csv").read_bytes() == steps["base"], "--set", "a word is not the plugin of that name")
+        for solver in ("sparse_sqp", "ipopt", "nlopt"):
+            self.run(solver, [f"estimator.solver={solver}", f"controller.solver={solver}"], scenario)
 
     def others(self):
         result = self.rhec("plugins", "--json")

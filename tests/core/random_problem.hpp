@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <random>
@@ -29,13 +30,14 @@ class RandomProblem {
   }
 
   struct Drive {
-    std::vector<double> states, inputs, parameters;  // (N+1) x n_x, N x n_u, N x n_p
+    std::vector<double> durations, states, inputs, parameters;  // N, (N+1) x n_x, N x n_u, N x n_p
   };
   /// Inputs and parameters wander a little from interval to interval; states stay inside their bounds.
-  Drive drive(int N, double dt, bool constant_parameters) {
+  Drive drive(const std::vector<double>& durations, bool constant_parameters) {
     const auto& about = model_->description();
-    const int nx = model_->state_count(), nu = model_->input_count(), np = model_->parameter_count();
+    const int nx = model_->state_count(), N = static_cast<int>(durations.size());
     Drive d;
+    d.durations = durations;
     std::vector<double> x, u, p;
     for (const auto& v : about.states) x.push_back(typical(v));
     for (const auto& v : about.inputs) u.push_back(typical(v));
@@ -58,7 +60,7 @@ class RandomProblem {
         request.states = d.states.data() + static_cast<std::ptrdiff_t>(i) * nx;
         request.inputs = u.data();
         request.parameters = p.data();
-        request.durations = &dt;
+        request.durations = d.durations.data() + i;
         request.next_states = next.data();
         model_->integrate(request);
         bool inside = true;
@@ -71,27 +73,39 @@ class RandomProblem {
       d.inputs.insert(d.inputs.end(), u.begin(), u.end());
       d.parameters.insert(d.parameters.end(), p.begin(), p.end());
     }
-    (void)nu;
-    (void)np;
     return d;
+  }
+
+  /// Lengths of intervals: all `dt`, or random between dt and `longest` where that is more, evenly on a logarithmic
+  /// scale.
+  std::vector<double> durations(int N, double dt, double longest) {
+    std::vector<double> all(N, dt);
+    if (longest > dt)
+      for (double& each : all) each = std::exp(uniform(std::log(dt), std::log(longest)));
+    return all;
   }
 
   struct RheSpec {
     int intervals = 15;
+    int room = 0;  ///< intervals of capacity, where that is more than are used
     double dt = 0.2;
-    double missing = 0.0;  ///< share of outputs and inputs that are masked
+    double longest = 0.0;         ///< if more than dt, intervals last from dt to this [s]
+    double missing = 0.0;         ///< share of outputs that are masked
+    double missing_inputs = 0.0;  ///< share of measured inputs that are masked
     bool robust = false;
     int block = 0;  ///< 0: one value for the horizon; otherwise a block every so many intervals
     bool linked = true;
     Transition transition = Transition::step;
     double noise = 0.01;  ///< of everything measured, as a share of the scale
+    /// Changes what cannot be changed once the problem is made: weights, losses and bounds. It sees the true drive.
+    std::function<void(RheProblem::Setup&, const Drive&)> adjust;
   };
   std::unique_ptr<RheProblem> rhe(const RheSpec& spec) {
     const auto& about = model_->description();
     const int nx = model_->state_count(), nu = model_->input_count(), np = model_->parameter_count();
     const int ny = model_->output_count();
     RheProblem::Setup setup;
-    setup.max_intervals = spec.intervals;
+    setup.max_intervals = std::max({spec.intervals, spec.room, 1});
     for (const auto& v : about.outputs) setup.output_weights.push_back(1.0 / std::pow(spec.noise * v.scale, 2));
     for (const auto& v : about.inputs) setup.input_weights.push_back(1.0 / std::pow(spec.noise * v.scale, 2));
     if (spec.robust) {
@@ -100,9 +114,11 @@ class RandomProblem {
       loss.delta = 1.5;
       setup.robust.push_back(loss);
     }
+    // A horizon of one node has the start of a drive.
+    const Drive d = drive(durations(std::max(spec.intervals, 1), spec.dt, spec.longest), spec.block == 0);
+    if (spec.adjust) spec.adjust(setup, d);
     auto problem = std::make_unique<RheProblem>(model_, setup);
     problem->set_intervals(spec.intervals);
-    const Drive d = drive(spec.intervals, spec.dt, spec.block == 0);
     const double nan = std::numeric_limits<double>::quiet_NaN();
     std::vector<double> outputs(static_cast<std::size_t>(spec.intervals + 1) * ny);
     Model::Nodes nodes;
@@ -116,11 +132,13 @@ class RandomProblem {
                                     ? nan
                                     : outputs[i * ny + j] + spec.noise * about.outputs[j].scale * normal();
       if (i == spec.intervals) break;
-      problem->set_duration(i, spec.dt);
-      for (int j = 0; j < nu; ++j)
+      problem->set_duration(i, d.durations[i]);
+      for (int j = 0; j < nu; ++j) {
         problem->measured_input(i)[j] = d.inputs[i * nu + j] + spec.noise * about.inputs[j].scale * normal();
+        if (spec.missing_inputs > 0.0 && uniform(0.0, 1.0) < spec.missing_inputs) problem->measured_input(i)[j] = nan;
+      }
     }
-    std::vector<std::uint8_t> begins(spec.intervals, 0);
+    std::vector<std::uint8_t> begins(std::max(spec.intervals, 1), 0);
     begins[0] = 1;
     for (int i = 1; spec.block > 0 && i < spec.intervals; i += spec.block) begins[i] = 1;
     for (int j = 0; j < np; ++j) {
@@ -144,35 +162,41 @@ class RandomProblem {
 
   struct RhcSpec {
     int intervals = 15;
+    int room = 0;  ///< intervals of capacity, where that is more than are used
     double dt = 0.2;
-    double off = 0.1;  ///< how far the initial state is from the drive to be followed, as a share of the scales
+    double longest = 0.0;  ///< if more than dt, intervals last from dt to this [s]
+    double off = 0.1;      ///< how far the initial state is from the drive to be followed, as a share of the scales
     std::vector<int> blocked_inputs;
     int block = 3;
+    /// Changes what cannot be changed once the problem is made: weights and bounds. It sees the drive to be followed.
+    std::function<void(RhcProblem::Setup&, const Drive&)> adjust;
   };
   std::unique_ptr<RhcProblem> rhc(const RhcSpec& spec) {
     const auto& about = model_->description();
     const int nx = model_->state_count(), nu = model_->input_count(), np = model_->parameter_count();
     RhcProblem::Setup setup;
-    setup.max_intervals = spec.intervals;
+    setup.max_intervals = std::max(spec.intervals, spec.room);
     for (const auto& v : about.states) setup.state_weights.push_back(1.0 / (v.scale * v.scale));
     for (const auto& v : about.inputs) setup.input_weights.push_back(0.5 / (v.scale * v.scale));
     for (const auto& v : about.states) setup.terminal_weights.push_back(5.0 / (v.scale * v.scale));
     setup.blocked_inputs = spec.blocked_inputs;
+    const Drive d = drive(durations(spec.intervals, spec.dt, spec.longest), true);
+    if (spec.adjust) spec.adjust(setup, d);
     auto problem = std::make_unique<RhcProblem>(model_, setup);
     problem->set_intervals(spec.intervals);
-    const Drive d = drive(spec.intervals, spec.dt, true);
     std::vector<std::uint8_t> begins(spec.intervals, 0);
     for (int i = 0; i < spec.intervals; i += spec.block) begins[i] = 1;
     for (const int input : spec.blocked_inputs) problem->set_blocks(input, begins.data());
     for (int i = 0; i <= spec.intervals; ++i) {
       std::copy_n(d.states.data() + static_cast<std::ptrdiff_t>(i) * nx, nx, problem->state_reference(i));
       if (i == spec.intervals) break;
-      problem->set_duration(i, spec.dt);
+      problem->set_duration(i, d.durations[i]);
       std::copy_n(d.inputs.data() + static_cast<std::ptrdiff_t>(i) * nu, nu, problem->input_reference(i));
     }
     for (int j = 0; j < nx; ++j) {
       const double value = d.states[j] + spec.off * about.states[j].scale * normal();
-      problem->given_state()[j] = std::min(std::max(value, about.states[j].lower), about.states[j].upper);
+      problem->given_state()[j] =
+          std::min(std::max(value, problem->setup().state_lower[j]), problem->setup().state_upper[j]);
     }
     std::copy_n(d.parameters.data(), np, problem->given_parameters());
     std::vector<double> scratch(problem->scratch_size());

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs `rhec estimate` on the Victoria Park log, and holds its figures against what is claimed of them.
+"""Runs `rhec estimate` and `rhec smooth` on the Victoria Park log, and holds its figures against what is claimed of them.
 
     victoria_park.py <rhec> <scenario> <folder of DRS.txt and GPS.txt>
 
@@ -80,6 +80,23 @@ def main():
                                           variants["ekf"]["held_out"]["rmse_capped_m"])}.items():
         expect(best["median_m"] < median, f"median {best['median_m']:.4f} m is not below that of {other}, {median:.4f} m")
         expect(best["rmse_capped_m"] < rmse, f"rmse {best['rmse_capped_m']:.4f} m is not below that of {other}, {rmse:.4f} m")
+    with tempfile.TemporaryDirectory() as out:
+        command = [rhec, "smooth", scenario, "--variant", "rhe_robust", "--hold-out", "5", "--out", out]
+        for option, path in files.items():
+            command += [option, str(path)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        print(done.stdout)
+        expect(done.returncode == 0 and ": solved after" in done.stdout, f"smooth ends with {done.returncode}: {done.stderr}")
+        if done.returncode == 0:
+            smoothed = json.loads((pathlib.Path(out) / "summary.json").read_text())["variants"]
+            own, causal = (smoothed[name]["held_out"] for name in ("rhe_robust", "rhe_robust causal"))
+            expect(own["count"] == WITHHELD, f"smoothed: {own['count']} withheld fixes")
+            for figure in ("median_m", "rmse_capped_m"):
+                expect(own[figure] < causal[figure], f"{figure}: smoothed {own[figure]}, causal {causal[figure]}")
+            with open(pathlib.Path(out) / "estimates.csv", newline="") as file:
+                nodes = [row for row in csv.DictReader(file) if row["variant"] == "rhe_robust" and row["held_out"] == "0"]
+            sigmas = [float(row[key] or "nan") for row in nodes for key in row if key.startswith("sigma_")]
+            expect(len(sigmas) == 6 * len(nodes) and all(0.0 < sigma < 50.0 for sigma in sigmas), "smoothed sigmas")
     for complaint in complaints:
         print("FAILED:", complaint)
     return 1 if complaints else 0

@@ -48,6 +48,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   /// True where a block of carried channel `channel` starts at an interval.
   bool begins(int interval, int channel) const noexcept { return begins_[interval * channels_ + channel] != 0; }
   int channel_count() const noexcept { return channels_; }
+  /// True where a carried channel's blocks are reached by a ramp.
+  bool is_ramp(int channel) const noexcept { return ramp_[channel] != 0; }
 
   // The point in the vehicle's terms: what interval i uses.
   const double* vehicle_state(const Iterate& point, int node) const noexcept { return point.state(node); }
@@ -75,7 +77,6 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   void set_intervals(int intervals) noexcept { intervals_ = intervals; }
   void set_begins(int interval, int channel, bool begins) noexcept { begins_[interval * channels_ + channel] = begins; }
   void set_ramp(int channel, bool ramp) noexcept;
-  bool is_ramp(int channel) const noexcept { return ramp_[channel] != 0; }
   /// Counts the controls of every interval; call it after the structure has changed.
   void finish_structure() noexcept;
   /// Carried channel of an input, or -1 where it is free on every interval.

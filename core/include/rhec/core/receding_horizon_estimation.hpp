@@ -54,7 +54,6 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
  private:
   void advance_window(double duration, const double* inputs, const double* outputs) noexcept;
   void slide_arrival() noexcept;
-  void set_structure() noexcept;
   void search_heading(Clock::time_point deadline) noexcept;
   void take_outputs(int node, const double* outputs) noexcept;
   void take_inputs(int interval, const double* inputs) noexcept;

@@ -40,6 +40,8 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   /// Bounds of an input, per interval; they start as the set-up's.
   double& input_lower(int interval, int input) noexcept { return input_lower_[interval * nu() + input]; }
   double& input_upper(int interval, int input) noexcept { return input_upper_[interval * nu() + input]; }
+  double input_lower(int interval, int input) const noexcept { return input_lower_[interval * nu() + input]; }
+  double input_upper(int interval, int input) const noexcept { return input_upper_[interval * nu() + input]; }
 
   void set_intervals(int intervals) noexcept { HorizonProblem::set_intervals(intervals); }
   /// Marks where the blocks of a blocked input start; begins[0] is taken as 1.

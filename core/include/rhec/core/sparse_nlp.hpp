@@ -41,6 +41,7 @@ class RHEC_EXPORT SparseNlp {
   /// Where in z the states of a node (-1: given), or the controls of an interval, begin.
   int state_start(int node) const noexcept { return state_starts_[node]; }
   int control_start(int interval) const noexcept { return control_starts_[interval]; }
+  int state_count(int node) const noexcept { return state_counts_[node]; }
   /// The first row of c that interval i contributes.
   int constraint_start(int interval) const noexcept { return constraint_starts_[interval]; }
 

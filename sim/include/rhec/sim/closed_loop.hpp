@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "rhec/sim/recording_solver.hpp"
 #include "rhec/sim/scenario.hpp"
 
 namespace rhec::sim {
@@ -32,9 +32,8 @@ struct RunLog {
   std::string ended = {};  ///< why the run ended, in words
 };
 
-/// Runs estimator -> controller -> truth until the path ends, the vehicle is lost, or it takes far too long. `progress`
-/// is told the share of the path that is done.
-RHEC_EXPORT RunLog run_closed_loop(const Scenario& scenario, const std::function<void(double)>& progress = {});
+/// Runs estimator -> controller -> truth until the path ends, the vehicle is lost, or it takes far too long.
+RHEC_EXPORT RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks = {});
 
 /// Mean absolute and root mean square errors of a run, and what its solvers reported.
 struct ErrorSummary {

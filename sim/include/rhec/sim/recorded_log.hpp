@@ -2,13 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "rhec/core/estimator.hpp"
 #include "rhec/plugins/robot.hpp"
+#include "rhec/sim/recording_solver.hpp"
 
 namespace rhec::sim {
 
@@ -99,6 +99,7 @@ struct LoggedEstimate {
   bool fallback = false;
 };
 struct Replay {
+  std::string name;  ///< of the variant, for files and pictures
   std::vector<LoggedEstimate> estimates;
   Estimator::Counts counts;
   std::int64_t unpredicted = 0;  ///< withheld fixes before there was an estimate
@@ -109,7 +110,7 @@ struct Replay {
 /// the estimator is asked at each node. Nodes lie at the fixes that are not withheld and at most the robot's step
 /// apart; between fixes they measure the steering alone. A withheld fix is asked for at its time and leaves no trace.
 RHEC_EXPORT Replay replay(const Robot& robot, const RecordedLog& log, const LogOptions& options,
-                          const HoldOut& hold_out, const std::function<void(double)>& progress = {});
+                          const HoldOut& hold_out, const LoopHooks& hooks = {});
 
 /// How well withheld fixes were predicted.
 struct PredictionErrors {
@@ -124,11 +125,12 @@ struct HeldOutSummary {
 /// A withheld fix of which there was no prediction counts with the cap.
 RHEC_EXPORT HeldOutSummary summarise(const Replay& replay, const RecordedLog& log);
 
-/// The files of a replay; entry i of `replays` is that of variant i. The picture shows the first variant.
+/// The files of a replay. The picture shows one, and the parameters of another one beside it.
 RHEC_EXPORT std::string estimates_csv(const std::vector<Replay>& replays, const RecordedLog& log,
                                       const LogScenario& scenario);
 RHEC_EXPORT std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& log,
                                      const LogScenario& scenario, const HoldOut& hold_out);
-RHEC_EXPORT std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogScenario& scenario);
+RHEC_EXPORT std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogScenario& scenario,
+                                   const Replay* beside = nullptr);
 
 }  // namespace rhec::sim

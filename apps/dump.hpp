@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rhec/sim/problem_dump.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace rhec::apps {
+
+struct DumpArguments {
+  std::optional<std::string> folder;  ///< none: nothing is saved
+  int every = 0;
+};
+
+/// `--dump DIR` and `--dump-every N`.
+void add_dump(CLI::App& command, DumpArguments& arguments);
+
+/// The problems that a command saves, if it was asked to.
+class Dump {
+ public:
+  Dump(const DumpArguments& arguments, const std::vector<OcpKind>& kinds);
+
+  decltype(sim::LoopHooks::solved) watch(const std::string& run, const Robot& robot);
+  void commit();
+  /// Prints what was saved, and how it is replayed.
+  void tell() const;
+
+ private:
+  std::optional<sim::ProblemDump> dump_;
+};
+
+}  // namespace rhec::apps

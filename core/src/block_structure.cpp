@@ -1,0 +1,34 @@
+#include "block_structure.hpp"
+
+#include <algorithm>
+
+namespace rhec {
+
+void set_block_structure(const Window& window, const std::vector<std::shared_ptr<const Blocking>>& blockings,
+                         const std::vector<ParameterWalk>& walks, std::vector<std::int64_t>& first_starts,
+                         std::vector<std::uint8_t>& begins, RheProblem& problem) noexcept {
+  problem.set_intervals(window.intervals);
+  for (std::size_t k = 0; k < blockings.size(); ++k) {
+    const int j = static_cast<int>(k);
+    const Blocking& blocking = *blockings[k];
+    const bool ramp = blocking.transition() == Transition::ramp;
+    const std::int64_t first_start = blocking.starts(window, begins.data());
+    // A ramp can start at the window's edge, but not before the run itself.
+    begins[0] = ramp && first_start == window.first && window.first > 0;
+    problem.set_blocks(j, begins.data(), blocking.transition());
+    std::int64_t block = begins[0] ? first_starts[k] : first_start;
+    const double alone = walks[k].block_sigma;
+    const auto sigma = blocking.neighbour_sigma();
+    for (int i = 0; i < window.intervals; ++i) {
+      if (!begins[i]) continue;
+      const std::int64_t start = window.first + i;
+      const double steps = std::max(1.0, static_cast<double>(start - block));
+      problem.link(i, j, sigma ? *sigma * *sigma * steps : alone * alone);
+      block = start;
+    }
+    first_starts[k] = first_start;
+  }
+  problem.finish();
+}
+
+}  // namespace rhec

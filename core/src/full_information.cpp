@@ -1,0 +1,268 @@
+#include "rhec/core/full_information.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "block_structure.hpp"
+#include "rhec/core/error.hpp"
+
+namespace rhec {
+
+void NodeRecorder::append_outputs(const double* outputs) {
+  const int ny = model().output_count();
+  log_->outputs.insert(log_->outputs.end(), outputs, outputs + ny);
+  log_->states.resize(log_->states.size() + static_cast<std::size_t>(model().state_count()), std::nan(""));
+  log_->parameters.resize(log_->parameters.size() + static_cast<std::size_t>(model().parameter_count()), std::nan(""));
+}
+
+void NodeRecorder::start(const double* outputs) noexcept {
+  method_->start(outputs);
+  *log_ = {};
+  append_outputs(outputs);
+  started_ = true;
+}
+
+void NodeRecorder::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+  if (!started_) {
+    start(outputs);
+    return;
+  }
+  method_->add_node(duration, inputs, outputs);
+  if (!(duration > 0.0) || !std::isfinite(duration)) return;
+  log_->durations.push_back(duration);
+  log_->inputs.insert(log_->inputs.end(), inputs, inputs + model().input_count());
+  append_outputs(outputs);
+}
+
+bool NodeRecorder::amend(int back, const double* outputs) noexcept {
+  if (!method_->amend(back, outputs)) return false;
+  const int ny = model().output_count();
+  double* row = log_->outputs.data() + static_cast<std::ptrdiff_t>(log_->intervals() - back) * ny;
+  for (int j = 0; j < ny; ++j)
+    if (is_measurement(outputs[j])) row[j] = outputs[j];
+  return true;
+}
+
+void NodeRecorder::estimate(Estimate& result, Clock::time_point deadline) noexcept {
+  method_->estimate(result, deadline);
+  const auto node = static_cast<std::ptrdiff_t>(log_->intervals());
+  std::copy_n(result.state.data(), result.state.size(), log_->states.data() + node * result.state.size());
+  std::copy_n(result.parameters.data(), result.parameters.size(),
+              log_->parameters.data() + node * result.parameters.size());
+}
+
+void NodeRecorder::reset() noexcept {
+  method_->reset();
+  *log_ = {};
+  started_ = false;
+}
+
+FullInformationEstimation::FullInformationEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver,
+                                                     Setup setup)
+    : model_(std::move(model)), solver_(std::move(solver)), setup_(std::move(setup)) {
+  const auto np = static_cast<std::size_t>(model_->parameter_count());
+  const auto n = static_cast<Eigen::Index>(model_->state_count() + model_->parameter_count());
+  if (setup_.blockings.size() != np || setup_.walks.size() != np)
+    throw Error(fmt::format("smoother: {} blockings and {} parameter walks given; expected {} of each, one a parameter",
+                            setup_.blockings.size(), setup_.walks.size(), np));
+  if (setup_.initial_mean.size() != n || setup_.initial_covariance.rows() != n || setup_.initial_covariance.cols() != n)
+    throw Error(fmt::format("smoother: the initial mean and covariance must have the size {} of [x; p]", n));
+}
+
+namespace {
+
+/// Rows that were not estimated take over those before them (at the start: after them).
+void fill_gaps(std::vector<double>& rows, int width) {
+  const std::ptrdiff_t count = width > 0 ? static_cast<std::ptrdiff_t>(rows.size()) / width : 0;
+  const auto is_known = [&](std::ptrdiff_t i) {
+    return std::all_of(rows.begin() + i * width, rows.begin() + (i + 1) * width,
+                       [](double v) { return std::isfinite(v); });
+  };
+  for (std::ptrdiff_t i = 1; i < count; ++i)
+    if (!is_known(i) && is_known(i - 1)) std::copy_n(rows.begin() + (i - 1) * width, width, rows.begin() + i * width);
+  for (std::ptrdiff_t i = count - 2; i >= 0; --i)
+    if (!is_known(i)) std::copy_n(rows.begin() + (i + 1) * width, width, rows.begin() + i * width);
+}
+
+void fill_data(const NodeLog& log, RheProblem& problem) {
+  const int nu = problem.model().input_count(), ny = problem.model().output_count(), N = log.intervals();
+  const auto take = [](const double* from, int count, double* to) {
+    for (int j = 0; j < count; ++j) to[j] = is_measurement(from[j]) ? from[j] : std::nan("");
+  };
+  for (std::ptrdiff_t i = 0; i <= N; ++i) {
+    take(log.outputs.data() + i * ny, ny, problem.output(static_cast<int>(i)));
+    if (i == N) break;
+    take(log.inputs.data() + i * nu, nu, problem.measured_input(static_cast<int>(i)));
+    problem.set_duration(static_cast<int>(i), log.durations[i]);
+  }
+}
+
+/// Closes the gaps that dead reckoning left: where an estimate jumped when a position was measured again, the track
+/// since the last measured position is turned and stretched about its start so that it ends where the vehicle was
+/// found. A wrong heading at the start of a gap is what mostly opens it, and no linearisation at the open track closes
+/// it well.
+void close_gaps(const RheProblem& problem, std::vector<double>& states, std::vector<double>& inputs,
+                const std::vector<double>& parameters) {
+  const Model& model = problem.model();
+  const Roles& roles = model.description().roles;
+  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(), N = problem.intervals();
+  if (roles.position_x < 0 || roles.position_y < 0 || roles.heading < 0) return;
+  constexpr double least_jump = 1.0;                         // below, linearisation is good enough [m]
+  constexpr double least_stretch = 0.5, most_stretch = 2.0;  // beyond, it was not the heading alone
+  // Which outputs tell of the position: those that a small shift of it changes.
+  std::vector<double> jacobian(static_cast<std::size_t>(model.output_count()) * nx);
+  const auto state = [&](int node) { return states.data() + static_cast<std::ptrdiff_t>(node) * nx; };
+  const auto is_fixed = [&](int node) {
+    Model::Nodes request;
+    request.count = 1;
+    request.states = state(node);
+    request.jacobians = jacobian.data();
+    model.observe(request);
+    bool x = false, y = false;
+    for (int j = 0; j < model.output_count(); ++j) {
+      if (std::isnan(problem.output(node)[j])) continue;
+      x = x || jacobian[static_cast<std::ptrdiff_t>(roles.position_x) * model.output_count() + j] != 0.0;
+      y = y || jacobian[static_cast<std::ptrdiff_t>(roles.position_y) * model.output_count() + j] != 0.0;
+    }
+    return x && y;
+  };
+  std::vector<double> predicted(nx);
+  int last_fixed = -1;
+  for (int k = 0; k <= N; ++k) {
+    if (!is_fixed(k)) continue;
+    const int start = std::exchange(last_fixed, k);
+    if (start < 0) continue;
+    const double duration = problem.duration(k - 1);
+    Model::Intervals request;
+    request.count = 1;
+    request.states = state(k - 1);
+    request.inputs = inputs.data() + static_cast<std::ptrdiff_t>(k - 1) * nu;
+    request.parameters = parameters.data() + static_cast<std::ptrdiff_t>(k - 1) * np;
+    request.durations = &duration;
+    request.substeps = problem.substeps();
+    request.next_states = predicted.data();
+    model.integrate(request);
+    const double from_x = state(start)[roles.position_x], from_y = state(start)[roles.position_y];
+    const double was_x = predicted[roles.position_x] - from_x, was_y = predicted[roles.position_y] - from_y;
+    const double is_x = state(k)[roles.position_x] - from_x, is_y = state(k)[roles.position_y] - from_y;
+    const double jump = std::hypot(is_x - was_x, is_y - was_y),
+                 stretch = std::hypot(is_x, is_y) / std::hypot(was_x, was_y);
+    if (!(jump > least_jump) || !(stretch > least_stretch && stretch < most_stretch)) continue;
+    const double turn = angle_difference(std::atan2(is_y, is_x), std::atan2(was_y, was_x));
+    const double c = stretch * std::cos(turn), s = stretch * std::sin(turn);
+    for (int i = start; i < k; ++i) {
+      const double x = state(i)[roles.position_x] - from_x, y = state(i)[roles.position_y] - from_y;
+      state(i)[roles.position_x] = from_x + c * x - s * y;
+      state(i)[roles.position_y] = from_y + s * x + c * y;
+      state(i)[roles.heading] += turn;
+      if (roles.speed >= 0) inputs[static_cast<std::ptrdiff_t>(i) * nu + roles.speed] *= stretch;
+    }
+  }
+}
+
+/// The log's own estimates as a point; the value of a block is that of its last interval, which had seen most of it.
+Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
+  const int nx = problem.model().state_count(), np = problem.model().parameter_count(), N = log.intervals();
+  Iterate guess(problem.capacity());
+  std::vector<double> states = log.states, at_nodes = log.parameters, inputs = log.inputs;
+  fill_gaps(states, nx);
+  fill_gaps(at_nodes, np);
+  for (double& value : states) value = std::isfinite(value) ? value : 0.0;
+  for (double& value : inputs) value = is_measurement(value) ? value : 0.0;
+  std::vector<double> parameters(static_cast<std::size_t>(N) * np);
+  for (int j = 0; j < np; ++j) {
+    const double lower = problem.setup().parameter_lower[j], upper = problem.setup().parameter_upper[j];
+    double value = 0.0;
+    for (int i = N - 1; i >= 0; --i) {
+      const bool ends = i == N - 1 || problem.begins(i + 1, j);
+      if (ends) value = at_nodes[static_cast<std::ptrdiff_t>(i + 1) * np + j];
+      if (!std::isfinite(value)) value = problem.arrival_mean[nx + j];
+      parameters[static_cast<std::ptrdiff_t>(i) * np + j] = std::clamp(value, lower, upper);
+    }
+  }
+  close_gaps(problem, states, inputs, parameters);
+  problem.set_decisions(guess, inputs.data(), parameters.data());
+  for (std::ptrdiff_t i = 0; i <= N; ++i) std::copy_n(states.data() + i * nx, nx, guess.state(static_cast<int>(i)));
+  return guess;
+}
+
+}  // namespace
+
+SmoothedRun FullInformationEstimation::estimate(const NodeLog& log, Clock::time_point deadline) const {
+  const int N = log.intervals(), nx = model_->state_count(), nu = model_->input_count(), np = model_->parameter_count();
+  if (N < 1) throw Error("smoother: the log has fewer than two nodes; there is nothing between them to estimate");
+  RheProblem::Setup problem_setup = setup_.problem;
+  problem_setup.max_intervals = N;
+  for (int j = 0; j < np; ++j)
+    if (const std::string reason = setup_.blockings[j]->why_not(N); !reason.empty())
+      throw Error(fmt::format("blocking of '{}': {}", model_->description().parameters[j].name, reason));
+  RheProblem problem(model_, problem_setup);
+  std::vector<std::int64_t> first_starts(np, 0);
+  std::vector<std::uint8_t> begins(N, 0);
+  set_block_structure({0, N}, setup_.blockings, setup_.walks, first_starts, begins, problem);
+  fill_data(log, problem);
+  ArrivalCost prior(ArrivalKind::constant, problem, setup_.walks);
+  prior.reset(setup_.initial_mean, setup_.initial_covariance);
+  prior.write(problem);
+  if (const std::string reason = solver_->why_not(problem); !reason.empty())
+    throw Error("smoother: the solver cannot take this problem: " + reason);
+  solver_->setup(problem);
+
+  Iterate point = guess_from(log, problem);
+  SmoothedRun run;
+  run.report = solver_->solve(problem, point, deadline);
+  run.times.assign(1, 0.0);
+  run.inputs.resize(static_cast<std::size_t>(N) * nu);
+  run.parameters.resize(static_cast<std::size_t>(N) * np);
+  for (std::ptrdiff_t i = 0; i <= N; ++i) {
+    const int node = static_cast<int>(i);
+    run.states.insert(run.states.end(), point.state(node), point.state(node) + nx);
+    if (i == N) break;
+    run.times.push_back(run.times.back() + log.durations[i]);
+    problem.inputs_on(point, node, run.inputs.data() + i * nu);
+    problem.parameters_on(point, node, run.parameters.data() + i * np);
+    for (int j = 0; j < np; ++j) {
+      const bool ramp = setup_.blockings[j]->transition() == Transition::ramp;
+      run.start_parameters.push_back(ramp ? point.state(node)[nx + j] : run.parameters[i * np + j]);
+    }
+  }
+  const auto n = static_cast<std::size_t>(nx + np);
+  run.covariances.resize((static_cast<std::size_t>(N) + 1) * n * n);
+  if (!solver_->covariances(problem, point, run.covariances)) run.covariances.clear();
+  return run;
+}
+
+void state_at(const SmoothedRun& run, const Model& model, int substeps, double time, double* state) {
+  const int nx = model.state_count();
+  const auto after = std::upper_bound(run.times.begin(), run.times.end(), time);
+  const std::ptrdiff_t node = std::max<std::ptrdiff_t>(0, after - run.times.begin() - 1);
+  const double* from = run.states.data() + node * nx;
+  const double duration = time - run.times[node];
+  if (node == run.intervals() || !(duration > 0.0)) {
+    std::copy_n(from, nx, state);
+    return;
+  }
+  Model::Intervals request;
+  request.count = 1;
+  request.states = from;
+  request.inputs = run.inputs.data() + node * model.input_count();
+  // Of a ramp, the part that the time is into the interval.
+  const int np = model.parameter_count();
+  const double share = duration / (run.times[node + 1] - run.times[node]);
+  std::vector<double> ends(np);
+  for (int j = 0; j < np; ++j) {
+    const double start = run.start_parameters[node * np + j];
+    ends[j] = start + share * (run.parameters[node * np + j] - start);
+  }
+  request.parameters = run.start_parameters.data() + node * np;
+  request.parameters_end = ends.data();
+  request.durations = &duration;
+  request.substeps = substeps;
+  request.next_states = state;
+  model.integrate(request);
+}
+
+}  // namespace rhec

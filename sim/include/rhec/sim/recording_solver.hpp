@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "rhec/core/horizon_problem.hpp"
+#include "rhec/core/solver.hpp"
+#include "rhec/plugins/robot.hpp"
+
+namespace rhec::sim {
+
+/// A solver that shows what it is asked and what it answers, and else is the one it is made of.
+class RHEC_EXPORT RecordingSolver final : public Solver {
+ public:
+  /// Called after each solve of a HorizonProblem, in the caller's thread. `guess` is the point as it came in, `result`
+  /// as it went out. It must not throw, since `solve` does not.
+  using Callback = std::function<void(const HorizonProblem& problem, const Iterate& guess, const Iterate& result,
+                                      const Report& report)>;
+  RecordingSolver(std::shared_ptr<Solver> solver, Callback callback);
+
+  std::string why_not(const Ocp& ocp) const override { return solver_->why_not(ocp); }
+  void setup(const Ocp& ocp) override;
+  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override { solver_->prepare(ocp, guess); }
+  using Solver::solve;
+  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
+  bool covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept override {
+    return solver_->covariances(ocp, point, blocks);
+  }
+  void reset() noexcept override { solver_->reset(); }
+
+ private:
+  std::shared_ptr<Solver> solver_;
+  Callback callback_;
+  Iterate guess_;
+};
+
+/// What a caller can hang into a loop (a closed one, or the replay of a log).
+struct LoopHooks {
+  /// Told the share of the way that is done.
+  std::function<void(double share)> progress;
+  /// Told of each solve, as RecordingSolver::Callback is. `step` is the absolute index of the node that is the newest
+  /// of an estimator's window and the first of a controller's; one step may solve several times.
+  std::function<void(std::int64_t step, const HorizonProblem& problem, const Iterate& guess, const Iterate& result,
+                     const Report& report)>
+      solved;
+};
+
+/// A copy of a robot whose solvers tell `hooks.solved`; `step` is asked at each solve. The robot alone, where nobody
+/// wants to be told. What the hooks and `step` refer to must outlive the estimators and controllers made of it.
+RHEC_EXPORT Robot with_hooks(Robot robot, const LoopHooks& hooks, std::function<std::int64_t()> step);
+
+}  // namespace rhec::sim

@@ -1,0 +1,559 @@
+#include "rhec/sim/comparison.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/error.hpp"
+#include "rhec/core/kkt.hpp"
+#include "rhec/core/point.hpp"
+#include "rhec/core/rhc_problem.hpp"
+#include "rhec/core/rhe_problem.hpp"
+
+namespace rhec::sim {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+// A point may be the best one if its defects and violations are at most this.
+constexpr double feasible = 1e-6;
+// Problems of each kind that are left if the caller does not say how many: enough for a 99th percentile.
+constexpr std::int64_t wanted_problems = 400;
+// Tolerances that are tried for equal accuracy: 10^-2 ... 10^-12.
+constexpr int loosest_exponent = -2, tightest_exponent = -12;
+
+/// A problem of the reference's run, the guess that its solver was given, and its answer.
+struct Recorded {
+  SameProblems::Place place;
+  std::unique_ptr<const HorizonProblem> problem;
+  Iterate guess, reference;
+  bool reference_is_usable = false;
+};
+
+/// The recorded problems by kind.
+using Records = std::map<OcpKind, std::vector<Recorded>>;
+
+std::unique_ptr<const HorizonProblem> copy_of(const HorizonProblem& problem) {
+  if (const auto* rhe = dynamic_cast<const RheProblem*>(&problem)) return std::make_unique<RheProblem>(*rhe);
+  if (const auto* rhc = dynamic_cast<const RhcProblem*>(&problem)) return std::make_unique<RhcProblem>(*rhc);
+  throw Error("compare: a problem that is neither an RheProblem nor an RhcProblem cannot be kept");
+}
+
+Settings section_of(const Backend& backend, const Settings& options) {
+  Settings section = Settings::map(options.origin());
+  section.add("name", Settings::scalar(backend.solver));
+  for (const auto& [key, value] : options.members()) section.add(key, value);
+  return section;
+}
+
+/// The scenario of a seed, with a backend as the solver of both loops.
+Scenario scenario_with(const Host& host, Settings settings, std::int64_t seed, const Backend& backend,
+                       const Settings& estimator_options, const Settings& controller_options) {
+  settings.set("seed", Settings::scalar(std::to_string(seed)));
+  settings.set("estimator.solver", section_of(backend, estimator_options));
+  settings.set("controller.solver", section_of(backend, controller_options));
+  return {host, settings};
+}
+
+/// What every part of a comparison needs.
+struct Task {
+  const Host& host;
+  const Settings& scenario;
+  const ComparisonOptions& options;
+  std::vector<std::int64_t> seeds;
+  double work = 1.0, done = 0.0;  // in about equal pieces
+
+  void show(double share_of_piece) const {
+    if (options.progress) options.progress(std::min(1.0, (done + share_of_piece) / work));
+  }
+  void end_piece() {
+    done += 1.0;
+    show(0.0);
+  }
+};
+
+// ---- the problems
+
+/// Drives a seed with the reference and adds the problems of every n-th step.
+RunSummary record(const Task& task, std::int64_t seed, int every, Records& records) {
+  const Backend& reference = task.options.reference;
+  const Scenario scenario =
+      scenario_with(task.host, task.scenario, seed, reference, reference.options, reference.options);
+  std::exception_ptr failure;
+  LoopHooks hooks;
+  hooks.progress = [&](double share) { task.show(share); };
+  hooks.solved = [&](std::int64_t step, const HorizonProblem& problem, const Iterate& guess, const Iterate& result,
+                     const Report& report) {
+    if (failure || step % every != 0) return;
+    try {
+      Recorded kept;
+      kept.place = {seed, step};
+      kept.problem = copy_of(problem);
+      kept.guess = guess;
+      kept.reference = result;
+      kept.reference_is_usable = is_usable(report.status);
+      records[problem.kind()].push_back(std::move(kept));
+    } catch (const std::exception&) {
+      failure = std::current_exception();  // a solver must not throw
+    }
+  };
+  const RunLog log = run_closed_loop(scenario, hooks);
+  if (failure) std::rethrow_exception(failure);
+  return summarise(log, scenario);
+}
+
+/// The least n for which every n-th step leaves the wanted number of problems, if all seeds are as this one.
+int thinning_for(const Records& first_seed, std::size_t seeds) {
+  std::int64_t most = 0;
+  for (const auto& [kind, records] : first_seed) most = std::max<std::int64_t>(most, records.size());
+  return static_cast<int>((most * static_cast<std::int64_t>(seeds) + wanted_problems - 1) / wanted_problems);
+}
+
+// ---- one backend
+
+/// Solves problems of a kind in their order, with one instance a seed.
+class Bench {
+ public:
+  Bench(const Host& host, const Backend& backend, Settings options)
+      : host_(&host), backend_(&backend), options_(std::move(options)) {
+    make();
+  }
+
+  /// Empty: it takes the problem, and is ready for it.
+  std::string why_not(const Recorded& record) {
+    if (solver_->why_not(*record.problem).empty() && (!ready_ || seed_ != record.place.seed)) {
+      if (ready_) make();
+      solver_->setup(*record.problem);
+      ready_ = true;
+      seed_ = record.place.seed;
+    }
+    return solver_->why_not(*record.problem);
+  }
+
+  /// Puts the answer into `point`.
+  Answer solve(const Recorded& record, Iterate& point) {
+    point = record.guess;
+    const auto start = Clock::now();
+    solver_->prepare(*record.problem, point);
+    const Report report = solver_->solve(*record.problem, point);
+    const std::chrono::duration<double, std::micro> time = Clock::now() - start;
+    Answer answer;
+    answer.status = report.status;
+    answer.usable = rhec::is_usable(report.status) && is_finite(*record.problem, point);
+    answer.iterations = report.iterations;
+    answer.time_us = time.count();
+    return answer;
+  }
+
+ private:
+  void make() { solver_ = host_->make_solver(backend_->solver, options_); }
+
+  const Host* host_;
+  const Backend* backend_;
+  Settings options_;
+  std::shared_ptr<Solver> solver_;
+  bool ready_ = false;
+  std::int64_t seed_ = 0;
+};
+
+// ---- the judge
+
+double violation_of(double value, double lower, double upper) { return std::max({0.0, lower - value, value - upper}); }
+
+/// Judges the answers to one problem after the other.
+class Judge {
+ public:
+  void begin(const HorizonProblem& problem) {
+    problem_ = &problem;
+    if (qp_.capacity() != problem.capacity()) qp_ = StageQp(problem.capacity());
+    scratch_.resize(problem.scratch_size());
+    defects_.resize(static_cast<std::size_t>(problem.capacity().intervals) * problem.capacity().states);
+  }
+
+  /// For a time that does not depend on who is asked first: brings the problem and its model into the caches.
+  void warm_up(const Iterate& guess) { problem_->evaluate(guess, nullptr, scratch_); }
+
+  double kkt_of(const Iterate& point, Answer& answer) {
+    const KktResidual kkt = kkt_residual(*problem_, point, qp_, scratch_);
+    answer.defect = kkt.defect;
+    return kkt.largest();
+  }
+
+  /// The point that counts: an estimate as it is, a plan by what its inputs do.
+  void make_judged(Iterate& point) {
+    if (problem_->kind() == OcpKind::rhc) roll_out(*problem_, point, scratch_);
+  }
+
+  struct Verdict {
+    double objective = 0.0, charged = 0.0, defect = 0.0, violation = 0.0;
+    bool is_feasible() const { return defect <= feasible && violation <= feasible; }
+  };
+  /// Defects and violations cost what the multipliers of `prices` say.
+  Verdict verdict_on(const Iterate& judged, const Iterate& prices) {
+    Verdict verdict;
+    verdict.objective = problem_->evaluate(judged, defects_.data(), scratch_);
+    double charge = 0.0;
+    const int N = problem_->intervals(), width = problem_->capacity().states;
+    const auto charge_bounds = [&](const double* values, const double* lower, const double* upper, const double* price,
+                                   int count) {
+      for (int j = 0; j < count; ++j) {
+        const double violation = violation_of(values[j], lower[j], upper[j]);
+        verdict.violation = std::max(verdict.violation, violation);
+        charge += std::abs(price[j]) * violation;
+      }
+    };
+    for (int i = 0; i <= N; ++i) {
+      const bool is_given = i == 0 && problem_->initial_state();
+      if (!is_given)
+        charge_bounds(judged.state(i), problem_->state_lower(i), problem_->state_upper(i), prices.state_bound(i),
+                      problem_->state_count(i));
+      if (i == N) break;
+      charge_bounds(judged.control(i), problem_->control_lower(i), problem_->control_upper(i), prices.control_bound(i),
+                    problem_->control_count(i));
+      const double* defect = defects_.data() + static_cast<std::ptrdiff_t>(i) * width;
+      for (int j = 0; j < problem_->state_count(i + 1); ++j) {
+        verdict.defect = std::max(verdict.defect, std::abs(defect[j]));
+        charge += std::abs(prices.costate(i + 1)[j] * defect[j]);
+      }
+    }
+    verdict.charged = verdict.objective + charge;
+    return verdict;
+  }
+
+  double distance(const Iterate& a, const Iterate& b) {
+    const ModelDescription& about = problem_->model().description();
+    double largest = 0.0;
+    const auto compare = [&](const std::vector<Variable>& variables, const double* one, const double* other) {
+      for (std::size_t j = 0; j < variables.size(); ++j) {
+        const double difference = variables[j].is_angle ? angle_difference(one[j], other[j]) : one[j] - other[j];
+        largest = std::max(largest, std::abs(difference) / variables[j].scale);
+      }
+    };
+    const std::size_t nx = about.states.size();
+    row_.resize(std::max({nx, about.inputs.size(), about.parameters.size()}));
+    other_row_.resize(row_.size());
+    for (int i = 0; i <= problem_->intervals(); ++i) {
+      compare(about.states, problem_->vehicle_state(a, i), problem_->vehicle_state(b, i));
+      if (i == problem_->intervals()) break;
+      problem_->inputs_on(a, i, row_.data());
+      problem_->inputs_on(b, i, other_row_.data());
+      compare(about.inputs, row_.data(), other_row_.data());
+      problem_->parameters_on(a, i, row_.data());
+      problem_->parameters_on(b, i, other_row_.data());
+      compare(about.parameters, row_.data(), other_row_.data());
+    }
+    // An estimator's window may have no interval yet; its parameters then stand in the first stage state.
+    if (problem_->intervals() == 0) compare(about.parameters, a.state(0) + nx, b.state(0) + nx);
+    return largest;
+  }
+
+ private:
+  const HorizonProblem* problem_ = nullptr;
+  StageQp qp_;
+  std::vector<double> scratch_, defects_, row_, other_row_;
+};
+
+// ---- equal accuracy
+
+bool has_option(const Host& host, const std::string& solver, std::string_view name) {
+  const std::vector<OptionRow> rows = host.options(PluginKind::solver, solver);
+  return std::any_of(rows.begin(), rows.end(), [&](const OptionRow& row) { return row.name == name; });
+}
+
+/// The 99th percentile of the KKT residual over all problems that are taken.
+double p99_of(const Host& host, const Backend& backend, const Settings& options, const std::vector<Recorded>& records) {
+  Bench bench(host, backend, options);
+  Judge judge;
+  Iterate point;
+  std::vector<double> residuals;
+  for (const Recorded& record : records) {
+    if (!bench.why_not(record).empty()) continue;
+    Answer answer = bench.solve(record, point);
+    judge.begin(*record.problem);
+    const double kkt = judge.kkt_of(point, answer);
+    residuals.push_back(std::isfinite(kkt) ? kkt : infinity);
+  }
+  return residuals.empty() ? 0.0 : spread_of(std::move(residuals)).p99;
+}
+
+/// Tightens `tolerance` until the residual is small enough; returns the options to go on with.
+Settings tighten(const Host& host, const Backend& backend, double accuracy, const std::vector<Recorded>& records,
+                 BackendAnswers& result) {
+  Settings options = backend.options.is_null() ? Settings::map() : backend.options;
+  if (has_option(host, backend.solver, "mode")) {
+    Settings converging = options;
+    converging.set("mode", Settings::scalar("converge"));
+    try {
+      host.make_solver(backend.solver, converging);
+      options = converging;
+    } catch (const Error&) {
+      // Its `mode` means something else.
+    }
+  }
+  double least = infinity;
+  Settings best = options;
+  if (!has_option(host, backend.solver, "tolerance")) {
+    least = p99_of(host, backend, options, records);
+    result.accuracy_reached = least <= accuracy;
+    result.tuning =
+        fmt::format("has no option 'tolerance'; KKT residual at the 99th percentile as it is: {:.1e}", least);
+    return options;
+  }
+  for (int exponent = loosest_exponent; exponent >= tightest_exponent && !(least <= accuracy); --exponent) {
+    Settings tightened = options;
+    tightened.set("tolerance", Settings::scalar(fmt::format("1e{}", exponent)));
+    try {
+      host.make_solver(backend.solver, tightened);
+    } catch (const Error&) {
+      continue;  // a value that this plugin does not allow; all options were fine before
+    }
+    const double residual = p99_of(host, backend, tightened, records);
+    if (!result.tolerance || residual < least) {
+      least = residual;
+      best = tightened;
+      result.tolerance = tightened.find("tolerance")->as_number();
+    }
+  }
+  result.accuracy_reached = least <= accuracy;
+  const Settings* mode = best.find("mode");
+  const std::string setting = fmt::format("{}tolerance {:.0e}", mode ? fmt::format("mode {}, ", mode->text()) : "",
+                                          result.tolerance.value_or(0.0));
+  if (!result.tolerance) {
+    result.tuning = "no value of its option 'tolerance' from 1e-2 to 1e-12 is allowed";
+  } else if (result.accuracy_reached) {
+    result.tuning = fmt::format("{}: KKT residual {:.1e} at the 99th percentile", setting, least);
+  } else {
+    result.tuning =
+        fmt::format("never reached down to tolerance 1e{}; least with {}: KKT residual {:.1e} at the 99th percentile",
+                    tightest_exponent, setting, least);
+  }
+  return best;
+}
+
+// ---- the two parts
+
+/// Options that each backend was left with, by kind.
+using Tuned = std::map<OcpKind, std::vector<Settings>>;
+
+SameProblems solve_same_problems(Task& task, OcpKind kind, const std::vector<Recorded>& records,
+                                 const std::vector<Settings>& options, SameProblems result) {
+  const std::vector<Backend>& backends = task.options.backends;
+  const std::size_t count = backends.size();
+  std::vector<Bench> benches;
+  for (std::size_t b = 0; b < count; ++b) benches.emplace_back(task.host, backends[b], options[b]);
+  Judge judge;
+  std::vector<Iterate> points(count + 1);  // the reference's is the last
+  std::vector<Answer> answers(count + 1);
+  std::vector<std::uint8_t> has_point(count + 1);
+  for (std::size_t p = 0; p < records.size(); ++p) {
+    const Recorded& record = records[p];
+    judge.begin(*record.problem);
+    std::fill(has_point.begin(), has_point.end(), 0);
+    std::vector<std::uint8_t> taken(count);
+    // Who is first changes from problem to problem, so that nobody always comes after the same load.
+    for (std::size_t turn = 0; turn < count; ++turn) {
+      const std::size_t b = (p + turn) % count;
+      BackendAnswers& mine = result.backends[b];
+      if (const std::string reason = benches[b].why_not(record); !reason.empty()) {
+        if (mine.refused++ == 0) mine.refusal = reason;
+        continue;
+      }
+      judge.warm_up(record.guess);
+      answers[b] = benches[b].solve(record, points[b]);
+      taken[b] = 1;
+      has_point[b] = answers[b].usable;
+    }
+    points[count] = record.reference;
+    answers[count] = {};
+    has_point[count] = record.reference_is_usable && is_finite(*record.problem, record.reference);
+
+    std::size_t most_accurate = count + 1;
+    for (std::size_t b = 0; b <= count; ++b) {
+      if (b < count && !taken[b]) continue;
+      answers[b].kkt = judge.kkt_of(points[b], answers[b]);
+      if (has_point[b] && (most_accurate > count || answers[b].kkt < answers[most_accurate].kkt)) most_accurate = b;
+    }
+    std::size_t best = count + 1;
+    std::vector<Judge::Verdict> verdicts(count + 1);
+    if (most_accurate <= count) {
+      const Iterate prices = points[most_accurate];
+      for (std::size_t b = 0; b <= count; ++b) {
+        if (!has_point[b]) continue;
+        judge.make_judged(points[b]);
+        verdicts[b] = judge.verdict_on(points[b], prices);
+        if (verdicts[b].is_feasible() && (best > count || verdicts[b].charged < verdicts[best].charged)) best = b;
+      }
+    }
+    if (best > count) ++result.without_best;
+    for (std::size_t b = 0; b < count; ++b) {
+      if (!taken[b]) continue;
+      Answer& answer = answers[b];
+      if (has_point[b]) {
+        answer.objective = verdicts[b].objective;
+        answer.violation = verdicts[b].violation;
+        if (best <= count) {
+          answer.gap = (verdicts[b].charged - verdicts[best].charged) / std::max(1.0, std::abs(verdicts[best].charged));
+          answer.distance = judge.distance(points[b], points[best]);
+        }
+      } else {
+        answer.objective = std::numeric_limits<double>::quiet_NaN();
+      }
+      ++result.backends[b].statuses[name_of(answer.status)];
+      result.backends[b].answers.push_back(answer);
+      result.backends[b].taken.push_back(p);
+    }
+    task.show(static_cast<double>(p + 1) / static_cast<double>(records.size()));
+  }
+  result.kind = kind;
+  for (const Recorded& record : records) result.problems.push_back(record.place);
+  return result;
+}
+
+BackendRuns drive(Task& task, std::size_t index, const Comparison& comparison, const Tuned& tuned) {
+  const Backend& backend = task.options.backends[index];
+  BackendRuns result;
+  for (const SameProblems& same : comparison.problems) {
+    if (const BackendAnswers& answers = same.backends[index]; answers.refused > 0)
+      result.refusal =
+          fmt::format("{} problems: {}", same.kind == OcpKind::rhe ? "estimation" : "control", answers.refusal);
+  }
+  const auto options_for = [&](OcpKind kind) {
+    const auto at = tuned.find(kind);
+    return at == tuned.end() ? backend.options : at->second[index];
+  };
+  for (const std::int64_t seed : task.seeds) {
+    if (result.refusal.empty()) {
+      const Scenario scenario =
+          scenario_with(task.host, task.scenario, seed, backend, options_for(OcpKind::rhe), options_for(OcpKind::rhc));
+      LoopHooks hooks;
+      hooks.progress = [&](double share) { task.show(share); };
+      result.runs.push_back(summarise(run_closed_loop(scenario, hooks), scenario));
+    }
+    task.end_piece();
+  }
+  return result;
+}
+
+}  // namespace
+
+bool Comparison::all_usable() const {
+  const auto completed = [](const RunSummary& run) { return run.completed; };
+  const auto answered = [](const BackendAnswers& backend) {
+    return backend.refused == 0 && std::all_of(backend.answers.begin(), backend.answers.end(),
+                                               [](const Answer& answer) { return answer.usable; });
+  };
+  const auto all_answered = [&](const SameProblems& same) {
+    return std::all_of(same.backends.begin(), same.backends.end(), answered);
+  };
+  const auto all_completed = [&](const BackendRuns& backend) {
+    return backend.refusal.empty() && std::all_of(backend.runs.begin(), backend.runs.end(), completed);
+  };
+  return std::all_of(reference_runs.begin(), reference_runs.end(), completed) &&
+         std::all_of(problems.begin(), problems.end(), all_answered) &&
+         std::all_of(loops.begin(), loops.end(), all_completed);
+}
+
+Spread spread_of(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return std::isnan(value); });
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double share) {
+    const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
+    return values[std::max<std::size_t>(rank, 1) - 1];
+  };
+  return {at(0.5), at(0.99), values.back()};
+}
+
+Spread spread_of(const std::vector<Answer>& answers, double Answer::*number) {
+  std::vector<double> values;
+  values.reserve(answers.size());
+  for (const Answer& answer : answers) values.push_back(answer.*number);
+  return spread_of(std::move(values));
+}
+
+Spread spread_of(const std::vector<Answer>& answers, int Answer::*number) {
+  std::vector<double> values;
+  values.reserve(answers.size());
+  for (const Answer& answer : answers) values.push_back(answer.*number);
+  return spread_of(std::move(values));
+}
+
+Mean paired_mean(const std::vector<RunSummary>& runs, const std::vector<RunSummary>& others,
+                 const std::function<double(const RunSummary&)>& number) {
+  Mean result;
+  const auto count = static_cast<double>(runs.size());
+  for (const RunSummary& run : runs) result.mean += number(run) / count;
+  result.difference = result.standard_error = std::numeric_limits<double>::quiet_NaN();
+  if (runs.size() != others.size()) return result;
+  result.difference = 0.0;
+  for (std::size_t r = 0; r < runs.size(); ++r) result.difference += (number(runs[r]) - number(others[r])) / count;
+  double squares = 0.0;
+  for (std::size_t r = 0; r < runs.size(); ++r)
+    squares += std::pow(number(runs[r]) - number(others[r]) - result.difference, 2);
+  result.standard_error = std::sqrt(squares / (count - 1.0) / count);
+  return result;
+}
+
+Comparison compare(const Host& host, const Settings& scenario, const ComparisonOptions& options) {
+  if (options.backends.empty()) throw Error("compare: no backend given; expected at least one");
+  Comparison result;
+  Task task{host, scenario, options, {}};
+  {
+    const Backend& reference = options.reference;
+    const Scenario first(host, scenario);
+    result.scenario = first.options().name;
+    for (int s = 0; s < options.seeds; ++s) task.seeds.push_back(std::int64_t{first.options().seed} + s);
+    if (task.seeds.back() > std::numeric_limits<int>::max())
+      throw Error(fmt::format("compare: seed {} is too large; the scenario's seed and --seeds must give seeds up to {}",
+                              task.seeds.back(), std::numeric_limits<int>::max()));
+    host.make_solver(reference.solver, reference.options);  // a mistake in it is told before anything runs
+    for (const Backend& backend : options.backends) host.make_solver(backend.solver, backend.options);
+  }
+  const auto seeds = static_cast<double>(task.seeds.size()), count = static_cast<double>(options.backends.size());
+  // Drives; then of each kind tightening and solving; then drives again.
+  task.work = seeds + 2.0 * ((options.accuracy ? count : 0.0) + 1.0) + (options.closed_loop ? count * seeds : 0.0);
+
+  Records records;
+  result.every = std::max(1, options.every);
+  for (const std::int64_t seed : task.seeds) {
+    result.reference_runs.push_back(record(task, seed, result.every, records));
+    if (options.every < 1 && seed == task.seeds.front()) {
+      result.every = std::max(1, thinning_for(records, task.seeds.size()));
+      for (auto& [kind, recorded] : records)
+        std::erase_if(recorded, [&](const Recorded& each) { return each.place.step % result.every != 0; });
+    }
+    task.end_piece();
+  }
+
+  Tuned tuned;
+  for (const auto& [kind, recorded] : records) {
+    SameProblems same;
+    same.backends.resize(options.backends.size());
+    std::vector<Settings>& settings = tuned[kind];
+    for (std::size_t b = 0; b < options.backends.size(); ++b) {
+      const Backend& backend = options.backends[b];
+      settings.push_back(backend.options);
+      if (!options.accuracy) continue;
+      settings.back() = tighten(host, backend, *options.accuracy, recorded, same.backends[b]);
+      task.end_piece();
+    }
+    result.problems.push_back(solve_same_problems(task, kind, recorded, settings, std::move(same)));
+    task.end_piece();
+  }
+  result.seeds = task.seeds;
+  result.accuracy = options.accuracy;
+  result.reference = options.reference;
+  result.backends = options.backends;
+  if (options.closed_loop)
+    for (std::size_t b = 0; b < options.backends.size(); ++b) result.loops.push_back(drive(task, b, result, tuned));
+  task.done = task.work;
+  task.show(0.0);
+  return result;
+}
+
+}  // namespace rhec::sim

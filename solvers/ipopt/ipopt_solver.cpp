@@ -1,0 +1,347 @@
+#include "ipopt_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+
+#include <IpoptConfig.h>
+
+#include "native_options.hpp"
+#include "rhec/core/point.hpp"
+#include "rhec/plugins/sdk.hpp"
+
+namespace rhec::ipopt {
+namespace {
+
+/// Ipopt's own tolerance, as a part of ours. It bounds how small the barrier may become, not when to stop.
+constexpr double inner_tolerance = 1e-3;
+constexpr double smallest_inner_tolerance = 1e-14;
+/// What the barrier may still add to the objective, relative to it, for each unit of the tolerance.
+constexpr double negligible_gap = 1.0;
+constexpr int most_spare_iterations = 6;
+/// A residual below which Newton's method finishes what is left.
+constexpr double near_solution = 1e-4;
+constexpr int most_polishes = 2;
+/// A violation of the dynamics that no rounding explains.
+constexpr double clear_violation = 1e-6;
+/// Where the barrier of a warm start begins, as a part of the guess' residual, and its limits.
+constexpr double warm_barrier_share = 1e-4;
+constexpr double smallest_warm_barrier = 1e-8;
+constexpr double largest_warm_barrier = 1e-2;
+constexpr double polish_barrier = 1e-10;
+/// Gradients that L-BFGS learns from. Ipopt's default of 6 takes half as many iterations again.
+constexpr int limited_memory_history = 50;
+
+/// Ipopt counts tags of its objects in a global variable and MUMPS has global state: whatever touches either, down to
+/// the last destructor, holds this.
+std::timed_mutex& backend_lock() {
+  static std::timed_mutex lock;
+  return lock;
+}
+
+double microseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
+
+/// (x - 1)^2 with 0 <= x: a problem to find out whether Ipopt can start with the options that it was given.
+class Trial final : public Ipopt::TNLP {
+ public:
+  bool get_nlp_info(Ipopt::Index& n, Ipopt::Index& m, Ipopt::Index& jacobian_entries, Ipopt::Index& hessian_entries,
+                    IndexStyleEnum& style) override {
+    n = hessian_entries = 1;
+    m = jacobian_entries = 0;
+    style = C_STYLE;
+    return true;
+  }
+  bool get_bounds_info(Ipopt::Index, double* lower, double* upper, Ipopt::Index, double*, double*) override {
+    lower[0] = 0.0;
+    upper[0] = 2e19;
+    return true;
+  }
+  bool get_starting_point(Ipopt::Index, bool, double* x, bool, double*, double*, Ipopt::Index, bool, double*) override {
+    x[0] = 2.0;
+    return true;
+  }
+  bool eval_f(Ipopt::Index, const double* x, bool, double& value) override {
+    value = (x[0] - 1.0) * (x[0] - 1.0);
+    return true;
+  }
+  bool eval_grad_f(Ipopt::Index, const double* x, bool, double* gradient) override {
+    gradient[0] = 2.0 * (x[0] - 1.0);
+    return true;
+  }
+  bool eval_g(Ipopt::Index, const double*, bool, Ipopt::Index, double*) override { return true; }
+  bool eval_jac_g(Ipopt::Index, const double*, bool, Ipopt::Index, Ipopt::Index, Ipopt::Index*, Ipopt::Index*,
+                  double*) override {
+    return true;
+  }
+  bool eval_h(Ipopt::Index, const double*, bool, double factor, Ipopt::Index, const double*, bool, Ipopt::Index,
+              Ipopt::Index* row, Ipopt::Index* column, double* value) override {
+    if (value) {
+      value[0] = 2.0 * factor;
+    } else {
+      row[0] = column[0] = 0;
+    }
+    return true;
+  }
+  void finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double*, const double*, const double*, Ipopt::Index,
+                         const double*, const double*, double, const Ipopt::IpoptData*,
+                         Ipopt::IpoptCalculatedQuantities*) override {}
+};
+
+/// Whether Ipopt can begin to solve anything with the options that it was given.
+bool starts(Ipopt::IpoptApplication& application) {
+  const Ipopt::SmartPtr<Ipopt::TNLP> trial = new Trial;
+  const auto outcome = application.OptimizeTNLP(trial);
+  return outcome != Ipopt::Invalid_Option && outcome > Ipopt::Unrecoverable_Exception;
+}
+
+}  // namespace
+
+const OptionTable<IpoptOptions>& IpoptOptions::table() {
+  static const auto options =
+      OptionTable<IpoptOptions>()
+          .choice("hessian", &IpoptOptions::hessian,
+                  {{"exact", Curvature::exact},
+                   {"gauss_newton", Curvature::gauss_newton},
+                   {"limited_memory", Curvature::limited_memory}},
+                  "curvature: of the Lagrangian, of the squared residuals only, or learnt from gradients (L-BFGS)")
+          .integer("max_iterations", &IpoptOptions::max_iterations, "limit of interior-point iterations",
+                   between(1, 100000))
+          .number("tolerance", &IpoptOptions::tolerance, "KKT residual at which it is content", greater_than(0.0))
+          .flag("warm_start", &IpoptOptions::warm_start, "begin at the guess' multipliers, with a small barrier")
+          .subtree("native", &IpoptOptions::native, "options of Ipopt's own, by their names; they win over ours");
+  return options;
+}
+
+IpoptSolver::IpoptSolver(const Options& options) : options_(options) {
+  const std::lock_guard hold(backend_lock());
+  // Without a console it prints nothing; never told to initialise itself, it does not look for a file of options.
+  application_ = new Ipopt::IpoptApplication(false);
+  native_ = set_native_options(options_.native, *application_);
+  if (native_.empty() || starts(*application_)) return;
+  for (const auto& [name, value] : options_.native.members()) {
+    const Ipopt::SmartPtr<Ipopt::IpoptApplication> alone = new Ipopt::IpoptApplication(false);
+    Settings one;
+    one.add(name, value);
+    set_native_options(one, *alone);
+    if (!starts(*alone))
+      throw value.error("solver 'ipopt': Ipopt cannot start with '" + name + ": " + value.text() +
+                        "'; what it asks for may not be installed");
+  }
+  throw options_.native.error("solver 'ipopt': Ipopt cannot start with these options together");
+}
+
+IpoptSolver::~IpoptSolver() {
+  const std::lock_guard hold(backend_lock());
+  nlp_ = nullptr;
+  application_ = nullptr;
+}
+
+std::string IpoptSolver::why_not(const Ocp& ocp) const {
+  if (options_.hessian == Curvature::exact && !ocp.has_second_derivatives())
+    return "the model has no second derivatives; set hessian: gauss_newton or limited_memory";
+  return {};
+}
+
+void IpoptSolver::setup(const Ocp& ocp) {
+  if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'ipopt': " + reason);
+  capacity_ = ocp.capacity();
+  scratch_.assign(ocp.scratch_size(), 0.0);
+  judge_ = StageQp(capacity_);
+  best_ = seen_ = Iterate(capacity_);
+  const std::lock_guard hold(backend_lock());
+  nlp_ = new OcpNlp(ocp, options_.hessian);
+}
+
+void IpoptSolver::set(const char* name, double value) {
+  if (!native_.contains(name)) application_->Options()->SetNumericValue(name, value);
+}
+void IpoptSolver::set(const char* name, int value) {
+  if (!native_.contains(name)) application_->Options()->SetIntegerValue(name, value);
+}
+void IpoptSolver::set(const char* name, const char* value) {
+  if (!native_.contains(name)) application_->Options()->SetStringValue(name, value);
+}
+
+void IpoptSolver::set_run_options(Start start, double barrier) {
+  const double tolerance = std::max(inner_tolerance * options_.tolerance, smallest_inner_tolerance);
+  set("tol", tolerance);
+  // Of scaled and unscaled quantities alike; the core's residual is what stops a run.
+  set("dual_inf_tol", tolerance);
+  set("constr_viol_tol", tolerance);
+  set("compl_inf_tol", tolerance);
+  set("acceptable_iter", 0);
+  set("max_iter", std::max(options_.max_iterations - iterations_, 0));
+  set("hessian_approximation", options_.hessian == Curvature::limited_memory ? "limited-memory" : "exact");
+  set("limited_memory_max_history", limited_memory_history);
+  set("nlp_scaling_method", "none");
+  set("bound_relax_factor", 0.0);
+  set("mu_strategy", start == Start::adaptive ? "adaptive" : "monotone");
+  set("warm_start_init_point", barrier > 0.0 ? "yes" : "no");
+  set("mu_init", barrier > 0.0 ? barrier : 0.1);
+  // The start is on the central path already and is left there.
+  for (const char* push : {"warm_start_bound_push", "warm_start_bound_frac", "warm_start_slack_bound_push",
+                           "warm_start_slack_bound_frac", "warm_start_mult_bound_push"})
+    set(push, 1e-16);
+}
+
+/// The best iterate is that of the least residual; among those within the tolerance, the last, whose barrier is least.
+void IpoptSolver::keep_if_better(const PrimalDual& iterate) noexcept {
+  seen_kkt_ = nlp_->write_and_judge(iterate, seen_);
+  const double residual = seen_kkt_.largest();
+  if (!(residual <= options_.tolerance || residual < best_kkt_.largest())) return;
+  best_kkt_ = seen_kkt_;
+  std::swap(best_, seen_);
+}
+
+bool IpoptSolver::see(int iteration, const PrimalDual* iterate) noexcept {
+  if (iteration > 0) ++iterations_;
+  if (iterate) {
+    keep_if_better(*iterate);
+    if (seen_kkt_.largest() <= options_.tolerance) {
+      const double gap = nlp_->complementarity_gap(best_);
+      if (gap <= negligible_gap * options_.tolerance * std::abs(nlp_->objective(best_))) return false;
+      if (--spare_iterations_ <= 0) return false;
+    }
+  }
+  stopped_late_ = is_late();
+  return !stopped_late_;
+}
+
+void IpoptSolver::see_last(const PrimalDual& iterate) noexcept {
+  if (best_kkt_.largest() > options_.tolerance) keep_if_better(iterate);
+}
+
+IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
+  double barrier = 0.0;
+  if (start == Start::warm)
+    barrier = std::clamp(warm_barrier_share * best_kkt_.largest(), smallest_warm_barrier, largest_warm_barrier);
+  if (start == Start::polish) barrier = polish_barrier;
+  set_run_options(start, barrier);
+  spare_iterations_ = most_spare_iterations;
+  nlp_->set_start(from, barrier);
+  const Ipopt::SmartPtr<Ipopt::TNLP> nlp = Ipopt::GetRawPtr(nlp_);
+  const auto outcome = application_->OptimizeTNLP(nlp);
+  if (best_kkt_.largest() <= options_.tolerance) return Ending::converged;
+  if (stopped_late_ || outcome == Ipopt::Maximum_CpuTime_Exceeded) return Ending::out_of_time;
+  if (outcome == Ipopt::Maximum_Iterations_Exceeded || iterations_ >= options_.max_iterations)
+    return Ending::out_of_iterations;
+  if ((outcome == Ipopt::Infeasible_Problem_Detected || outcome == Ipopt::Restoration_Failed) &&
+      seen_kkt_.defect > clear_violation)
+    return Ending::infeasible;
+  return best_kkt_.largest() <= near_solution ? Ending::near : Ending::lost;
+}
+
+void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
+  nlp_->take(ocp);
+  if (!nlp_->has_sound_bounds()) return;
+  // The guess is the first candidate, with the initial state that is given.
+  best_ = point;
+  if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), best_.state(0));
+  if (!is_sound_start(ocp, best_, scratch_)) return;
+  const Iterate guess = best_;
+  best_kkt_ = nlp_->judge(best_);
+  if (nlp_->has_empty_bounds()) {
+    report.status = Status::infeasible;
+    return;
+  }
+  const bool warm =
+      options_.warm_start && (largest_costate(ocp, guess) > 0.0 || largest_bound_multiplier(ocp, guess) > 0.0);
+  Ending ending = best_kkt_.largest() <= options_.tolerance ? Ending::converged : Ending::lost;
+  if (nlp_->variables() == 0 || ending == Ending::converged) {
+    // Nothing to vary, or nothing to improve.
+    ending = best_kkt_.largest() <= options_.tolerance ? Ending::converged : Ending::lost;
+  } else {
+    int polishes = 0;
+    bool claimed_infeasible = false;
+    for (Start start = warm ? Start::warm : Start::cold;;) {
+      ending = run(start, start == Start::polish ? Iterate(best_) : guess);
+      claimed_infeasible |= ending == Ending::infeasible && start != Start::warm;
+      if (ending == Ending::near && polishes++ < most_polishes) {
+        start = Start::polish;
+        continue;
+      }
+      if (ending != Ending::near && ending != Ending::lost && ending != Ending::infeasible) break;
+      report.fallback_used = true;
+      if (start == Start::warm) {
+        start = Start::cold;
+      } else if (start == Start::cold) {
+        start = Start::adaptive;
+      } else {
+        if (claimed_infeasible && best_kkt_.defect > clear_violation) ending = Ending::infeasible;
+        break;
+      }
+    }
+  }
+  switch (ending) {
+    case Ending::converged:
+      report.status = Status::solved;
+      break;
+    case Ending::out_of_time:
+      report.status = Status::deadline;
+      break;
+    case Ending::out_of_iterations:
+      report.status = Status::iteration_limit;
+      break;
+    case Ending::infeasible:
+      report.status = Status::infeasible;
+      return;
+    case Ending::near:
+    case Ending::lost:
+      report.status = Status::stalled;
+      break;
+  }
+  if (is_finite(ocp, best_)) std::swap(point, best_);
+}
+
+Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+  const auto start = Clock::now();
+  Report report;
+  if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_)) {
+    report.feedback_us = microseconds_since(start);
+    return report;
+  }
+  deadline_ = deadline;
+  iterations_ = 0;
+  stopped_late_ = false;
+  try {
+    std::unique_lock hold(backend_lock(), std::defer_lock);
+    if (deadline == Clock::time_point::max()) {
+      hold.lock();
+    } else if (is_late() || !hold.try_lock_until(deadline)) {
+      report.status = Status::deadline;
+    }
+    if (hold.owns_lock()) {
+      nlp_->set_spectator(this);
+      improve(ocp, point, report);
+      nlp_->release();
+    }
+  } catch (const std::exception&) {
+    // Memory that ran out: the point is the guess still.
+    report.status = Status::stalled;
+  } catch (...) {
+    // Ipopt's exceptions have no base class of the standard's.
+    report.status = Status::stalled;
+  }
+  report.iterations = iterations_;
+  if (report.status != Status::bad_input) {
+    report.objective = ocp.evaluate(point, nullptr, scratch_);
+    report.kkt = kkt_residual(ocp, point, judge_, scratch_);
+  }
+  report.feedback_us = microseconds_since(start);
+  return report;
+}
+
+}  // namespace rhec::ipopt
+
+RHEC_PLUGIN(rhec::PluginKind::solver, rhec::ipopt::IpoptSolver,
+            {.name = "ipopt",
+             .version = "0.1.0",
+             .licence = "BSD-2-Clause AND EPL-1.0 AND CECILL-C",
+             .source = "Multiple shooting with the interior-point filter method of Waechter and Biegler (2006)",
+             .backend = "Ipopt with MUMPS",
+             .backend_version = IPOPT_VERSION,
+             .capabilities = "rhe, rhc, bounds on states, inputs and parameters, exact and approximate curvature; "
+                             "allocates while solving; solves of one process wait for each other"});

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <mutex>
+#include <set>
+#include <string>
+
+#include <IpIpoptApplication.hpp>
+
+#include "ocp_nlp.hpp"
+#include "rhec/core/options.hpp"
+#include "rhec/core/solver.hpp"
+
+namespace rhec::ipopt {
+
+struct IpoptOptions {
+  Curvature hessian = Curvature::exact;
+  int max_iterations = 500;
+  double tolerance = 1e-8;
+  bool warm_start = true;
+  Settings native;
+
+  static const OptionTable<IpoptOptions>& table();
+};
+
+/// Multiple shooting: all states and controls are variables of one sparse nonlinear program, solved by Ipopt's filter
+/// interior-point method.
+///
+/// Ipopt runs until the core's own residual is within the tolerance and what the barrier adds to the objective is
+/// negligible; it never decides itself that it is done. A guess with multipliers is a warm start: its multipliers say
+/// which bounds are close, and its residual how small the barrier may begin.
+///
+/// Ipopt 3.11 counts with a global variable and MUMPS keeps global state, so solves wait for each other, process-wide;
+/// the time they wait counts for their deadline. Every solve builds Ipopt's algorithm anew, so nothing is remembered
+/// from one to the next but the guess.
+class IpoptSolver final : public Solver, private Spectator {
+ public:
+  using Options = IpoptOptions;
+  static const OptionTable<Options>& table() { return Options::table(); }
+  /// Throws Error where a native option is unknown or refused.
+  explicit IpoptSolver(const Options& options);
+  ~IpoptSolver() override;
+  IpoptSolver(const IpoptSolver&) = delete;
+  IpoptSolver& operator=(const IpoptSolver&) = delete;
+
+  std::string why_not(const Ocp& ocp) const override;
+  void setup(const Ocp& ocp) override;
+  void prepare(const Ocp&, const Iterate&) noexcept override {}
+  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
+  void reset() noexcept override {}
+
+ private:
+  /// How a run of Ipopt begins.
+  enum class Start {
+    warm,      ///< from the guess and its multipliers
+    cold,      ///< from the guess alone
+    adaptive,  ///< the same with the other strategy for the barrier
+    polish     ///< from the best iterate so far, near the solution
+  };
+  enum class Ending { converged, out_of_time, out_of_iterations, infeasible, near, lost };
+
+  void improve(const Ocp& ocp, Iterate& point, Report& report);
+  Ending run(Start start, const Iterate& from);
+  void set_run_options(Start start, double barrier);
+  bool see(int iteration, const PrimalDual* iterate) noexcept override;
+  void see_last(const PrimalDual& iterate) noexcept override;
+  void keep_if_better(const PrimalDual& iterate) noexcept;
+  bool is_late() const noexcept { return deadline_ != Clock::time_point::max() && Clock::now() > deadline_; }
+
+  // Ours unless the user set the native option of that name.
+  void set(const char* name, double value);
+  void set(const char* name, int value);
+  void set(const char* name, const char* value);
+
+  Options options_;
+  std::set<std::string> native_;
+  Ipopt::SmartPtr<Ipopt::IpoptApplication> application_;  ///< touched under the lock only
+  Ipopt::SmartPtr<OcpNlp> nlp_;
+  Capacity capacity_;
+  StageQp judge_;
+  std::vector<double> scratch_;
+
+  // Of the solve under way.
+  Clock::time_point deadline_;
+  Iterate best_, seen_;
+  KktResidual best_kkt_, seen_kkt_;
+  bool stopped_late_ = false;
+  int iterations_ = 0;
+  int spare_iterations_ = 0;  ///< left for the barrier to become negligible once the residual is within the tolerance
+};
+
+}  // namespace rhec::ipopt

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <set>
+#include <string>
+
+#include <IpIpoptApplication.hpp>
+
+#include "rhec/core/settings.hpp"
+
+namespace rhec::ipopt {
+
+/// Sets every key of a map as an option of Ipopt's own, as the type that Ipopt registered for it, and returns the keys.
+/// Throws Error with the place and the key where Ipopt knows no such option or refuses the value, and where the option
+/// would print, read a file, or contradict an option of this plugin.
+std::set<std::string> set_native_options(const Settings& native, Ipopt::IpoptApplication& application);
+
+}  // namespace rhec::ipopt

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <IpTNLP.hpp>
+
+#include "rhec/core/kkt.hpp"
+#include "rhec/core/ocp.hpp"
+#include "rhec/core/sparse_nlp.hpp"
+
+namespace rhec::ipopt {
+
+enum class Curvature { exact, gauss_newton, limited_memory };
+
+/// An iterate of Ipopt in the problem's own units.
+struct PrimalDual {
+  const double* z;
+  const double* multipliers;
+  const double* lower_multipliers;  ///< of lower bounds; not negative
+  const double* upper_multipliers;  ///< of upper bounds; not negative
+};
+
+/// Is shown the iterates of Ipopt.
+class Spectator {
+ public:
+  virtual ~Spectator() = default;
+  /// Iteration `iteration` begins; false stops Ipopt. Null: an iterate of the restoration phase, which is no candidate
+  /// for a solution.
+  virtual bool see(int iteration, const PrimalDual* iterate) noexcept = 0;
+  /// Where Ipopt ended.
+  virtual void see_last(const PrimalDual& iterate) noexcept = 0;
+};
+
+/// An Ocp as the sparse nonlinear program that Ipopt solves. Every point is evaluated once, whoever asks: objective and
+/// constraints together, then gradient and Jacobian from one linearisation, which also judges the iterate.
+class OcpNlp final : public Ipopt::TNLP {
+ public:
+  OcpNlp(const Ocp& ocp, Curvature curvature);
+
+  /// Takes over a problem of the capacity at construction, with its present structure and data.
+  void take(const Ocp& ocp);
+  /// Forgets the problem that was taken, and all that was evaluated.
+  void release() noexcept { ocp_ = nullptr; }
+
+  int variables() const noexcept { return nlp_.variables(); }
+  int constraints() const noexcept { return nlp_.constraints(); }
+  bool has_empty_bounds() const noexcept;
+  bool has_sound_bounds() const noexcept;
+
+  /// Where Ipopt starts. With a barrier parameter above zero the point's multipliers count too: each variable and the
+  /// multiplier of its bound are moved until their product is that parameter or more, as little as that takes.
+  void set_start(const Iterate& point, double barrier) noexcept;
+  /// For the length of a solve.
+  void set_spectator(Spectator* spectator) noexcept { spectator_ = spectator; }
+
+  /// Writes a primal-dual point into an Iterate, with its states and controls clipped to their bounds, and judges it.
+  /// Multipliers of variables that have one value only follow from stationarity: Ipopt does not see such variables.
+  KktResidual write_and_judge(const PrimalDual& from, Iterate& point) noexcept;
+  /// Sum of |bound multiplier| x distance from the bound: what the barrier still adds to the objective.
+  double complementarity_gap(const Iterate& point) noexcept;
+  double objective(const Iterate& point) noexcept { return ocp_->evaluate(point, nullptr, scratch_); }
+  KktResidual judge(const Iterate& point) noexcept { return kkt_residual(*ocp_, point, exact_, scratch_); }
+
+  // Ipopt::TNLP. Arrays are Ipopt's.
+  bool get_nlp_info(Ipopt::Index& n, Ipopt::Index& m, Ipopt::Index& jacobian_entries, Ipopt::Index& hessian_entries,
+                    IndexStyleEnum& index_style) override;
+  bool get_bounds_info(Ipopt::Index n, double* lower, double* upper, Ipopt::Index m, double* constraint_lower,
+                       double* constraint_upper) override;
+  bool get_starting_point(Ipopt::Index n, bool init_z, double* z, bool init_bounds, double* lower_multipliers,
+                          double* upper_multipliers, Ipopt::Index m, bool init_multipliers,
+                          double* multipliers) override;
+  bool eval_f(Ipopt::Index n, const double* z, bool new_z, double& objective) override;
+  bool eval_grad_f(Ipopt::Index n, const double* z, bool new_z, double* gradient) override;
+  bool eval_g(Ipopt::Index n, const double* z, bool new_z, Ipopt::Index m, double* constraints) override;
+  bool eval_jac_g(Ipopt::Index n, const double* z, bool new_z, Ipopt::Index m, Ipopt::Index entries, Ipopt::Index* rows,
+                  Ipopt::Index* columns, double* values) override;
+  bool eval_h(Ipopt::Index n, const double* z, bool new_z, double objective_factor, Ipopt::Index m,
+              const double* multipliers, bool new_multipliers, Ipopt::Index entries, Ipopt::Index* rows,
+              Ipopt::Index* columns, double* values) override;
+  void finalize_solution(Ipopt::SolverReturn status, Ipopt::Index n, const double* z, const double* lower_multipliers,
+                         const double* upper_multipliers, Ipopt::Index m, const double* constraints,
+                         const double* multipliers, double objective, const Ipopt::IpoptData* data,
+                         Ipopt::IpoptCalculatedQuantities* quantities) override;
+  bool intermediate_callback(Ipopt::AlgorithmMode mode, Ipopt::Index iteration, double objective, double infeasibility,
+                             double dual_infeasibility, double barrier, double step, double regularisation,
+                             double dual_length, double primal_length, Ipopt::Index trials,
+                             const Ipopt::IpoptData* data, Ipopt::IpoptCalculatedQuantities* quantities) override;
+
+ private:
+  bool evaluate_at(const double* z) noexcept;
+  bool linearise_at(const double* z) noexcept;
+  /// The Hessian of the Lagrangian with unit weight of the objective; multipliers null: of the objective alone.
+  void exact_hessian(const double* z, const double* multipliers, double factor, double* values) noexcept;
+
+  const Ocp* ocp_ = nullptr;
+  Curvature curvature_;
+  Spectator* spectator_ = nullptr;
+  SparseNlp nlp_;
+  std::vector<double> lower_, upper_;
+  std::vector<double> start_, start_multipliers_, start_lower_, start_upper_;
+  std::vector<double> seen_, seen_multipliers_, seen_lower_, seen_upper_;  ///< an iterate in the problem's units
+
+  std::vector<double> scratch_, defects_;
+  Iterate work_;
+  StageQp linear_, exact_;
+  std::vector<double> evaluated_z_, linear_z_, constraints_, gradient_, jacobian_;
+  bool is_evaluated_ = false, is_linear_ = false;              ///< what is held belongs to the z beside it
+  bool is_evaluated_sound_ = false, is_linear_sound_ = false;  ///< and is finite
+  double objective_ = 0.0;
+  std::vector<double> weighted_, clipped_, bound_multipliers_, hessian_part_;
+};
+
+}  // namespace rhec::ipopt

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rhec/core/kkt.hpp"
+#include "rhec/core/ocp.hpp"
+
+namespace rhec::nlopt {
+
+/// An Ocp with its states eliminated by simulation:
+///
+///     minimise f(x)  subject to  lower <= x <= upper,  row_lower <= c(x) <= row_upper
+///
+/// x = [s_0 where it is free; w_0; ...; w_{N-1}] without what its bounds fix, c the bounded states of nodes 1 .. N. All
+/// that is asked at one x shares one simulation and one linearisation.
+class CondensedProblem {
+ public:
+  using Vector = Eigen::VectorXd;
+  using Matrix = Eigen::MatrixXd;
+
+  CondensedProblem() = default;
+  explicit CondensedProblem(const Ocp& ocp);  ///< for the capacity of this one
+
+  /// Takes over the Ocp's present structure and bounds; false where lower bounds are above upper ones. The Ocp must
+  /// outlive the use of this object until the next call.
+  bool take(const Ocp& ocp);
+
+  int variables() const noexcept { return static_cast<int>(variables_.size()); }
+  int rows() const noexcept { return static_cast<int>(rows_.size()); }
+  const Vector& lower() const noexcept { return lower_; }
+  const Vector& upper() const noexcept { return upper_; }
+  const Vector& row_lower() const noexcept { return row_lower_; }
+  const Vector& row_upper() const noexcept { return row_upper_; }
+
+  /// x of a point, within the bounds.
+  Vector read(const Iterate& point) const;
+  /// Simulates, unless x is where the last call led. False where that leads to numbers that are not finite.
+  bool move_to(const Vector& x);
+  const Vector& x() const noexcept { return x_; }
+  double objective() const noexcept { return objective_; }
+  /// c at the present x.
+  double row_value(int row) const noexcept {
+    return point_.state(rows_[static_cast<std::size_t>(row)].stage)[rows_[static_cast<std::size_t>(row)].component];
+  }
+  /// The largest violation of all bounds at the present x.
+  double violation() const noexcept;
+
+  // Derivatives at the present x, which must be finite; computed when first asked for.
+  const Vector& gradient();  ///< of f, by the adjoint sweep
+  const Matrix& jacobian();  ///< of c, by forward sensitivities
+  /// Of the Lagrangian with the multipliers last set, or of Gauss-Newton; full and symmetric.
+  const Matrix& hessian(Hessian kind);
+
+  /// Multipliers of the bounds of x and then of the rows, positive at upper bounds, in units of the objective. Sets the
+  /// point's bound multipliers and costates, those of fixed variables too.
+  void set_multipliers(const Vector& multipliers);
+  /// The core's judgement of the present x with the multipliers last set.
+  KktResidual residual();
+  const Iterate& point() const noexcept { return point_; }
+
+  long simulations() const noexcept { return simulations_; }
+  long linearisations() const noexcept { return linearisations_; }
+
+ private:
+  /// A component of s_stage or w_stage.
+  struct Entry {
+    bool is_state = false;
+    int stage = 0, component = 0;
+  };
+  bool add(const Entry& entry, double lower, double upper);
+  int& column_of(int interval, int control) noexcept {
+    const auto width = static_cast<std::size_t>(ocp_->capacity().controls);
+    return control_columns_[static_cast<std::size_t>(interval) * width + static_cast<std::size_t>(control)];
+  }
+  void linearise();
+  void compute_sensitivities();
+  /// The reduced gradient in one entry of s_0 or w, with the point's present costates.
+  double reduced_gradient(const Entry& entry) const noexcept;
+
+  const Ocp* ocp_ = nullptr;
+  std::vector<Entry> variables_, fixed_, rows_;
+  std::vector<double> fixed_values_, lower_list_, upper_list_, row_lower_list_, row_upper_list_;
+  std::vector<int> control_columns_;  ///< of each control in x, or -1; rows of the capacity's controls
+  std::vector<int> columns_before_;   ///< number of variables that node i depends on
+  Vector lower_, upper_, row_lower_, row_upper_, x_, gradient_;
+  Matrix jacobian_, hessian_;
+  std::vector<Matrix> sensitivities_;  ///< ds_i/dx, its columns_before_[i] columns
+  bool is_simulated_ = false, is_finite_ = false, is_linearised_ = false, has_gradient_ = false,
+       has_sensitivities_ = false;
+  double objective_ = 0.0;
+  long simulations_ = 0, linearisations_ = 0;
+  Iterate point_, adjoint_;
+  StageQp qp_;
+  std::vector<double> scratch_;
+};
+
+}  // namespace rhec::nlopt

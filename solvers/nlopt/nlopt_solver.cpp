@@ -1,0 +1,398 @@
+#include "nlopt_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "active_set.hpp"
+#include "rhec/core/point.hpp"
+#include "rhec/plugins/sdk.hpp"
+
+namespace rhec::nlopt {
+namespace {
+
+using Vector = Eigen::VectorXd;
+using Matrix = Eigen::MatrixXd;
+
+// A violation that is more than what a run leaves by its own tolerance.
+constexpr double infeasible_beyond = 1e-6;
+// The KKT residual from which Newton steps are tried.
+constexpr double near_solution = 0.1;
+constexpr int most_newton_steps = 30;
+// An iteration of SLSQP takes far longer than scaling anew does where variables are many, and no longer where they are
+// few; the curvature of a new scaling is worth more than that of quasi-Newton updates.
+constexpr int many_variables = 100;
+constexpr long iterations_of_many_variables = 3;
+constexpr long iterations_of_few_variables = 15;
+// How near a bound is at which a multiplier may be: the smallest residual decides.
+constexpr double distances[] = {1e-9, 1e-6, 1e-4};
+// Curvature below this part of the largest is taken as if it were that.
+constexpr double least_curvature = 1e-10;
+
+double microseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
+
+/// Makes a symmetric matrix positive definite by reflecting its negative eigenvalues.
+Matrix reflected(const Matrix& symmetric) {
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(symmetric);
+  Vector values = eigen.eigenvalues().cwiseAbs();
+  values = values.cwiseMax(std::max(least_curvature * values.maxCoeff(), 1e-300));
+  return eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+}  // namespace
+
+NloptSolver::NloptSolver(const Options& options) : options_(options), traits_(traits_of(options.algorithm)) {
+  native_parameters(options.native);
+  if (options.scaling == Scaling::full && !traits_.inequalities)
+    throw Error("solver 'nlopt': scaling: full turns bounds into general constraints, and " +
+                name_of(options.algorithm) + " takes none; use scaling: diagonal");
+  if (traits_.local_optimiser && traits_of(options.local_algorithm).local_optimiser)
+    throw Error("solver 'nlopt': local_algorithm: " + name_of(options.local_algorithm) +
+                " needs a local algorithm itself; use one that does not, e.g. LD_SLSQP");
+}
+
+bool NloptSolver::scales_fully() const noexcept {
+  return options_.scaling == Scaling::full ||
+         (options_.scaling == Scaling::automatic && options_.algorithm == NLOPT_LD_SLSQP);
+}
+
+std::string NloptSolver::why_not(const Ocp& ocp) const {
+  const std::string name = "NLopt's " + name_of(options_.algorithm);
+  int variables = 0;
+  bool bounded = false, unbounded = false, inequalities = false, equalities = false;
+  const auto count = [&](const double* lower, const double* upper, int n) {
+    for (int j = 0; j < n; ++j) {
+      if (lower[j] == upper[j]) continue;
+      ++variables;
+      const bool below = std::isfinite(lower[j]), above = std::isfinite(upper[j]);
+      bounded = bounded || below || above;
+      unbounded = unbounded || !below || !above;
+    }
+  };
+  if (!ocp.initial_state()) count(ocp.state_lower(0), ocp.state_upper(0), ocp.state_count(0));
+  for (int i = 0; i < ocp.intervals(); ++i) {
+    count(ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
+    for (int j = 0; j < ocp.state_count(i + 1); ++j) {
+      const double lower = ocp.state_lower(i + 1)[j], upper = ocp.state_upper(i + 1)[j];
+      if (lower == upper) {
+        equalities = true;
+      } else {
+        inequalities = inequalities || std::isfinite(lower) || std::isfinite(upper);
+      }
+    }
+  }
+  if (variables > options_.max_variables)
+    return "single shooting makes a dense problem of " + std::to_string(variables) +
+           " decision variables, more than max_variables: " + std::to_string(options_.max_variables) +
+           "; the time of an iteration grows with their cube, so use a sparse solver, or raise max_variables";
+  if (variables > 0 && variables < traits_.fewest_variables)
+    return name + " needs at least " + std::to_string(traits_.fewest_variables) + " variables";
+  if (equalities && !traits_.equalities)
+    return name + " takes no equality constraints, and this problem fixes states beyond node 0 (their bounds are " +
+           "equal); choose one of " + names_of_those_with(inequalities, true);
+  if (inequalities && !traits_.inequalities)
+    return name + " takes no inequality constraints, and this problem bounds states beyond node 0; choose one of " +
+           names_of_those_with(true, equalities);
+  if (inequalities && traits_.local_optimiser && name_of(options_.algorithm).find("_EQ") != std::string::npos &&
+      !traits_of(options_.local_algorithm).inequalities)
+    return name + " leaves inequality constraints to its local_algorithm, and " + name_of(options_.local_algorithm) +
+           " takes none; choose e.g. LD_SLSQP or LD_MMA there";
+  if (bounded && !traits_.bounds) return name + " takes no bounds, and this problem has some on its decisions";
+  if (traits_.local_optimiser && bounded && !traits_of(options_.local_algorithm).bounds)
+    return name + " leaves bounds to its local_algorithm, and " + name_of(options_.local_algorithm) + " takes none";
+  if (unbounded && traits_.finite_bounds)
+    return name + " searches the whole box of its variables, and this problem leaves some decisions unbounded; " +
+           "give every input, parameter and (in estimation) initial state finite bounds, or choose a local algorithm";
+  return {};
+}
+
+void NloptSolver::setup(const Ocp& ocp) {
+  if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'nlopt': " + reason);
+  capacity_ = ocp.capacity();
+  problem_ = CondensedProblem(ocp);
+  qp_ = StageQp(capacity_);
+  scratch_.assign(ocp.scratch_size(), 0.0);
+}
+
+void NloptSolver::prepare(const Ocp&, const Iterate&) noexcept {}
+
+// Nothing is learnt from one problem for the next.
+void NloptSolver::reset() noexcept {}
+
+Report NloptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+  const auto start = Clock::now();
+  Report report;
+  if (ocp.capacity() == capacity_ && is_sound_start(ocp, point, scratch_)) {
+    factorisations_ = 0;
+    iterations_ = 0;
+    try {
+      report = optimise(ocp, point, deadline);
+    } catch (const std::exception&) {  // memory ran out; `point` is written last
+      report.status = Status::stalled;
+      report.objective = ocp.evaluate(point, nullptr, scratch_);
+      report.kkt = kkt_residual(ocp, point, qp_, scratch_);
+    }
+    report.factorisations = factorisations_;
+  }
+  report.feedback_us = microseconds_since(start);
+  return report;
+}
+
+Report NloptSolver::optimise(const Ocp& ocp, Iterate& point, Clock::time_point deadline) {
+  Report report;
+  const auto leave_as_it_was = [&](Status status) {
+    report.status = status;
+    report.objective = ocp.evaluate(point, nullptr, scratch_);
+    report.kkt = kkt_residual(ocp, point, qp_, scratch_);
+    return report;
+  };
+  if (!problem_.take(ocp)) return leave_as_it_was(Status::infeasible);
+  if (Clock::now() > deadline) return leave_as_it_was(Status::deadline);
+  // The structure may have changed since setup.
+  if (!why_not(ocp).empty() || !find_start(ocp, point)) return leave_as_it_was(Status::stalled);
+
+  Answer answer = judge(problem_.x());
+  const Status status = improve(ocp, answer, deadline);
+  report.iterations = static_cast<int>(iterations_);
+  if (status == Status::infeasible) return leave_as_it_was(status);
+  problem_.move_to(answer.x);
+  problem_.set_multipliers(answer.multipliers);
+  report.status = status;
+  report.objective = problem_.objective();
+  report.kkt = problem_.residual();
+  point = problem_.point();
+  return report;
+}
+
+/// The guess, simulated. Where that leaves the numbers, controls closer to zero are tried.
+bool NloptSolver::find_start(const Ocp& ocp, const Iterate& point) {
+  if (problem_.move_to(problem_.read(point))) return true;
+  Iterate smaller = point;
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    for (int i = 0; i < ocp.intervals(); ++i)
+      for (int j = 0; j < ocp.control_count(i); ++j) smaller.control(i)[j] *= attempt < 7 ? 0.5 : 0.0;
+    if (problem_.move_to(problem_.read(smaller))) return true;
+  }
+  return false;
+}
+
+namespace {
+
+CondensedQp qp_at(CondensedProblem& problem) {
+  const Eigen::Index n = problem.variables(), m = problem.rows();
+  CondensedQp qp{problem.gradient(), problem.jacobian(), Vector(n + m), Vector(n + m)};
+  qp.lower.head(n) = problem.lower() - problem.x();
+  qp.upper.head(n) = problem.upper() - problem.x();
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const double value = problem.row_value(static_cast<int>(k));
+    qp.lower[n + k] = problem.row_lower()[k] - value;
+    qp.upper[n + k] = problem.row_upper()[k] - value;
+  }
+  return qp;
+}
+
+}  // namespace
+
+NloptSolver::Answer NloptSolver::answer_with(const Vector& multipliers) {
+  problem_.set_multipliers(multipliers);
+  Answer answer{problem_.x(), multipliers, problem_.objective(), problem_.violation(), problem_.residual()};
+  answer.merit = answer.objective;
+  const auto add = [&](double multiplier, double value, double lower, double upper) {
+    answer.merit += std::abs(multiplier) * std::max({0.0, lower - value, value - upper});
+  };
+  const int n = problem_.variables();
+  for (int k = 0; k < n; ++k) add(multipliers[k], problem_.x()[k], problem_.lower()[k], problem_.upper()[k]);
+  for (int k = 0; k < problem_.rows(); ++k)
+    add(multipliers[n + k], problem_.row_value(k), problem_.row_lower()[k], problem_.row_upper()[k]);
+  return answer;
+}
+
+Vector NloptSolver::within_bounds(const Vector& x) const {
+  return x.cwiseMax(problem_.lower()).cwiseMin(problem_.upper());
+}
+
+NloptSolver::Answer NloptSolver::judge(const Vector& x) {
+  problem_.move_to(x);
+  const CondensedQp qp = qp_at(problem_);
+  const Vector scale = problem_.hessian(Hessian::gauss_newton).diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
+  std::optional<Answer> best;
+  for (const double distance : distances) {
+    const Vector multipliers = recover_multipliers(qp, scale, distance);
+    if (best && multipliers == best->multipliers) continue;
+    Answer answer = answer_with(multipliers);
+    if (!best || answer.kkt.largest() < best->kkt.largest()) best = std::move(answer);
+  }
+  problem_.set_multipliers(best->multipliers);
+  return *std::move(best);
+}
+
+bool NloptSolver::is_better(const Answer& one, const Answer& other) const noexcept {
+  const double allowed = options_.tolerance;
+  if (one.violation > allowed || other.violation > allowed) {
+    if (one.violation != other.violation) return one.violation < other.violation;
+  }
+  const double rounding = 1e-9 * (1.0 + std::abs(other.merit));
+  if (std::abs(one.merit - other.merit) > rounding) return one.merit < other.merit;
+  return one.kkt.largest() < other.kkt.largest();
+}
+
+long NloptSolver::iterations_per_run() const noexcept {
+  if (options_.iterations_per_run) return *options_.iterations_per_run;
+  return problem_.variables() > many_variables ? iterations_of_many_variables : iterations_of_few_variables;
+}
+
+Transformation NloptSolver::transformation_at(const Ocp& ocp, const Answer& answer) {
+  const Eigen::Index n = problem_.variables();
+  Transformation t;
+  t.centre = answer.x;
+  t.diagonal = Vector::Ones(n);
+  if (options_.scaling == Scaling::none) return t;
+  problem_.move_to(answer.x);
+  problem_.set_multipliers(answer.multipliers);
+  Eigen::LLT<Matrix> factor;
+  // Far from a solution the exact curvature may be indefinite; Gauss-Newton's then leads better than a bent one.
+  const auto usable = [&](const Matrix& hessian) {
+    ++factorisations_;
+    factor.compute(hessian);
+    return factor.info() == Eigen::Success && factor.rcond() > least_curvature;
+  };
+  const bool exact = ocp.has_second_derivatives() && usable(problem_.hessian(Hessian::exact));
+  const bool positive = exact || usable(problem_.hessian(Hessian::gauss_newton));
+  const Matrix& hessian = problem_.hessian(exact ? Hessian::exact : Hessian::gauss_newton);
+  if (!scales_fully()) {
+    const double largest = hessian.diagonal().cwiseAbs().maxCoeff();
+    t.diagonal = hessian.diagonal().cwiseAbs().cwiseMax(std::max(least_curvature * largest, 1e-300)).cwiseSqrt();
+    t.diagonal = t.diagonal.cwiseInverse();
+    return t;
+  }
+  if (!positive) factor.compute(reflected(hessian));
+  if (factor.info() != Eigen::Success) return t;
+  t.full = Matrix(factor.matrixU()).triangularView<Eigen::Upper>().solve(Matrix::Identity(n, n));
+  if (!t.full.allFinite()) t.full.resize(0, 0);
+  return t;
+}
+
+bool NloptSolver::polish(const Ocp& ocp, Answer& answer, Clock::time_point deadline) {
+  bool any = false;
+  for (int round = 0; round < most_newton_steps && answer.kkt.largest() > options_.tolerance; ++round) {
+    if (Clock::now() > deadline || iterations_left() <= 0) break;
+    ++iterations_;
+    problem_.move_to(answer.x);
+    problem_.set_multipliers(answer.multipliers);
+    const CondensedQp qp = qp_at(problem_);
+    Vector step, multipliers;
+    bool accepted = false;
+    for (const Hessian kind : {Hessian::exact, Hessian::gauss_newton}) {
+      if (kind == Hessian::exact && !ocp.has_second_derivatives()) continue;
+      problem_.move_to(answer.x);
+      problem_.set_multipliers(answer.multipliers);
+      multipliers = answer.multipliers;
+      const Matrix hessian = problem_.hessian(kind);
+      ++factorisations_;
+      if (!solve_active_set(qp, hessian, step, multipliers)) continue;
+      const Vector x = within_bounds(answer.x + step);
+      if (!problem_.move_to(x)) continue;
+      Answer next = answer_with(multipliers);
+      // Newton's method also finds maxima; a step that raises the objective may only repair a violation.
+      const double rise = next.merit - answer.merit;
+      const double allowed = 1e-7 * (1.0 + std::abs(answer.merit));
+      if (!(next.kkt.largest() < 0.9 * answer.kkt.largest()) ||
+          (rise > allowed && answer.violation <= options_.tolerance))
+        continue;
+      answer = std::move(next);
+      accepted = any = true;
+      break;
+    }
+    if (!accepted) break;
+  }
+  return any;
+}
+
+Status NloptSolver::restore_feasibility(const Ocp& ocp, Answer& answer, Clock::time_point deadline) {
+  double last = HUGE_VAL;
+  while (answer.violation > infeasible_beyond) {
+    if (answer.violation > 0.9 * last) return Status::infeasible;
+    last = answer.violation;
+    const Transformation transformation = transformation_at(ocp, answer);
+    Run run(problem_, options_, NLOPT_LD_SLSQP, Run::Goal::violation, transformation,
+            {deadline, iterations_left(), 0, 1e-4});
+    const Run::Outcome outcome = run.optimise();
+    iterations_ += run.iterations();
+    answer = judge(run.x());
+    if (outcome == Run::Outcome::deadline) return Status::deadline;
+    if (outcome == Run::Outcome::iteration_limit) return Status::iteration_limit;
+    if (outcome == Run::Outcome::failed) return Status::stalled;
+  }
+  return Status::solved;
+}
+
+Status NloptSolver::improve(const Ocp& ocp, Answer& answer, Clock::time_point deadline) {
+  if (problem_.variables() == 0) {
+    if (answer.kkt.largest() <= options_.tolerance) return Status::solved;
+    return answer.violation > options_.tolerance ? Status::infeasible : Status::stalled;
+  }
+  // With the curvature known at the start, a fresh start soon serves better than quasi-Newton updates do.
+  const long quota = scales_fully() && traits_.gradients ? iterations_per_run() : 0;
+  bool restored = false;
+  double least_residual = answer.kkt.largest();
+  int idle = 0;
+  double strictness = 1.0;
+  for (int round = 0;; ++round) {
+    if (answer.kkt.largest() <= options_.tolerance) return Status::solved;
+    if (round > (traits_.from_start ? options_.restarts : 0)) return Status::stalled;
+    const Transformation transformation = transformation_at(ocp, answer);
+    Run run(problem_, options_, options_.algorithm, Run::Goal::objective, transformation,
+            {deadline, iterations_left(), quota, strictness});
+    const Run::Outcome outcome = run.optimise();
+    iterations_ += run.iterations();
+    Answer next = judge(run.x());
+    // From far off, the rounding errors of a large step leave it slightly infeasible, and yet next to a solution. NLopt
+    // then ends for rounding, and with the start, which was feasible.
+    const double wanted = 0.1 * std::min(next.kkt.largest(), least_residual);
+    if (run.last_x() != run.x() && problem_.move_to(within_bounds(run.last_x())) && problem_.violation() < wanted) {
+      Answer last = judge(problem_.x());
+      if (last.kkt.largest() < wanted) next = std::move(last);
+    }
+    const bool stopped = outcome == Run::Outcome::deadline || outcome == Run::Outcome::iteration_limit;
+    if (!stopped && options_.polish && next.kkt.largest() < near_solution) polish(ocp, next, deadline);
+    // Each time the least residual falls, so this cannot go round in circles with what is better otherwise.
+    const bool is_nearer = next.kkt.largest() < 0.1 * least_residual;
+    least_residual = std::min(least_residual, next.kkt.largest());
+    const bool progress =
+        is_nearer || (is_better(next, answer) && (next.violation < 0.5 * answer.violation ||
+                                                  next.merit < answer.merit - 1e-10 * (1.0 + std::abs(answer.merit)) ||
+                                                  next.kkt.largest() < 0.5 * answer.kkt.largest()));
+    if (next.kkt.largest() <= options_.tolerance || is_nearer || is_better(next, answer)) answer = std::move(next);
+    if (answer.kkt.largest() <= options_.tolerance) return Status::solved;
+    if (outcome == Run::Outcome::deadline) return Status::deadline;
+    if (outcome == Run::Outcome::iteration_limit) return Status::iteration_limit;
+    if (answer.violation > infeasible_beyond && !restored) {
+      const Status status = restore_feasibility(ocp, answer, deadline);
+      if (status != Status::solved) return status;
+      restored = true;
+      continue;
+    }
+    // A run that ended early for its own criteria gets another chance, down to rounding.
+    idle = progress ? 0 : idle + 1;
+    if (idle > 1) return Status::stalled;
+    strictness = idle == 1 ? 0.0 : 0.01 * strictness;
+  }
+}
+
+}  // namespace rhec::nlopt
+
+RHEC_PLUGIN(rhec::PluginKind::solver, rhec::nlopt::NloptSolver,
+            {.name = "nlopt",
+             .version = "0.1.0",
+             .licence = "BSD-2-Clause AND MIT AND BSD-3-Clause AND LGPL-2.1-or-later",
+             .source = "Single shooting on S. G. Johnson's NLopt (https://nlopt.readthedocs.io). Licences: ours "
+                       "BSD-2-Clause; NLopt MIT, its SLSQP BSD-3-Clause, its LBFGS, VAR and TNEWTON LGPL-2.1-or-later",
+             .backend = "NLopt",
+             .backend_version = RHEC_NLOPT_VERSION,
+             .capabilities = "rhe, rhc, bounds on states, inputs and parameters, choice of algorithm; dense, allocates "
+                             "while solving"});

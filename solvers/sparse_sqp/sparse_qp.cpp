@@ -1,0 +1,415 @@
+#include "sparse_qp.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rhec::sparse_sqp {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr int active_set_rounds = 10;
+constexpr int polishing_rounds = 6;
+constexpr int most_interior_iterations = 80;
+// A bound counts as violated, or a multiplier as of the wrong sign, beyond this part of the sizes involved.
+constexpr double active_set_tolerance = 1e-11;
+// What refinement must reach for the solution of a system to be believed.
+constexpr double believable = 1e-8;
+constexpr double accurate = 1e-11;
+// Interior point: residuals relative to the program's sizes.
+constexpr double interior_tolerance = 1e-10;
+constexpr double good_enough_interior = 1e-6;
+constexpr double to_the_boundary = 0.995;
+
+double max_abs(const double* v, int n) {
+  double largest = 0.0;
+  for (int k = 0; k < n; ++k) largest = std::max(largest, std::abs(v[k]));
+  return largest;
+}
+
+}  // namespace
+
+void SparseQp::take_structure(const SparseNlp& nlp) {
+  factor_.take_structure(nlp);
+  nlp_ = &nlp;
+  n_ = nlp.variables();
+  m_ = nlp.constraints();
+  active_.assign(n_, 0);
+  fixed_.assign(n_, 0);
+  for (auto* v : {&d_, &mu_, &primal_, &work_n_, &dual_residual_}) v->assign(n_, 0.0);
+  for (auto* v : {&lambda_, &dual_, &work_m_, &primal_residual_}) v->assign(m_, 0.0);
+  pairs_.reserve(2 * (static_cast<std::size_t>(n_) + m_));
+  for (auto* v : {&rhs_, &solution_, &other_solution_}) v->assign(static_cast<std::size_t>(n_) + m_, 0.0);
+}
+
+void SparseQp::forget() noexcept {
+  factor_.forget();
+  nlp_ = nullptr;
+}
+
+void SparseQp::multiply_hessian(const Program& program, const double* x, double* y) const noexcept {
+  const auto& H = nlp_->hessian();
+  std::fill_n(y, n_, 0.0);
+  for (int c = 0; c < n_; ++c) {
+    double sum = 0.0;
+    for (int k = H.starts[c]; k < H.starts[c + 1]; ++k) {
+      const int r = H.row_indices[k];
+      sum += program.hessian[k] * x[r];
+      if (r != c) y[r] += program.hessian[k] * x[c];
+    }
+    y[c] += sum;
+  }
+}
+
+void SparseQp::multiply_jacobian(const Program& program, const double* x, double* y) const noexcept {
+  const auto& J = nlp_->jacobian();
+  std::fill_n(y, m_, 0.0);
+  for (int c = 0; c < n_; ++c)
+    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) y[J.row_indices[k]] += program.jacobian[k] * x[c];
+}
+
+void SparseQp::add_jacobian_transposed(const Program& program, const double* y, double* x) const noexcept {
+  const auto& J = nlp_->jacobian();
+  for (int c = 0; c < n_; ++c)
+    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) x[c] += program.jacobian[k] * y[J.row_indices[k]];
+}
+
+void SparseQp::guess_active(const Program& program, const double* bound_multipliers) {
+  for (int k = 0; k < n_; ++k) {
+    active_[k] = 0;
+    if (program.lower[k] == program.upper[k]) {
+      active_[k] = 2;
+    } else if (bound_multipliers[k] < 0.0 && std::isfinite(program.lower[k])) {
+      active_[k] = -1;
+    } else if (bound_multipliers[k] > 0.0 && std::isfinite(program.upper[k])) {
+      active_[k] = 1;
+    }
+  }
+}
+
+/// Factors with `primal_`, `dual_` and the active set; false where the inertia is wrong. Of a semidefinite Hessian that
+/// can only be rounding, against which a larger regularisation helps; refinement takes care of the rest.
+bool SparseQp::factor_with(const Program& program) {
+  for (int k = 0; k < n_; ++k) fixed_[k] = active_[k] != 0;
+  KktFactor::Numbers numbers;
+  numbers.hessian = program.hessian;
+  numbers.jacobian = program.jacobian;
+  numbers.primal = primal_.data();
+  numbers.dual = dual_.data();
+  numbers.fixed = fixed_.data();
+  numbers.regularisation = regularisation_;
+  numbers_ = numbers;
+  for (;;) {
+    ++factorisations_;
+    if (factor_.factor(numbers_)) return true;
+    if (!program.is_convex || numbers_.regularisation >= largest_regularisation) return false;
+    numbers_.regularisation *= 10.0;
+  }
+}
+
+/// `solution_` = K^-1 `rhs_`; returns the remaining relative residual. Where refinement does not get far, as with
+/// weights of very different sizes, the regularisation was too large beside what it regularises: try smaller ones.
+double SparseQp::solve_system() {
+  double residual = factor_.solve(rhs_.data(), solution_.data());
+  while (residual > accurate && numbers_.regularisation > least_regularisation) {
+    std::swap(solution_, other_solution_);
+    const double last = numbers_.regularisation;
+    numbers_.regularisation *= 1e-2;
+    ++factorisations_;
+    const bool factored = factor_.factor(numbers_);
+    const double next = factored ? factor_.solve(rhs_.data(), solution_.data()) : infinity;
+    if (!(next < 0.1 * residual)) {
+      if (!(next < residual)) std::swap(solution_, other_solution_);
+      numbers_.regularisation = last;
+      ++factorisations_;
+      factor_.factor(numbers_);
+      return std::min(residual, next);
+    }
+    residual = next;
+    regularisation_ = numbers_.regularisation;
+  }
+  return residual;
+}
+
+/// Rounds of the primal-dual active set method from `active_`. True where the optimality conditions hold; the solution
+/// is in `d_`, `lambda_`, `mu_`.
+bool SparseQp::solve_active(const Program& program, int rounds) {
+  std::fill(primal_.begin(), primal_.end(), 0.0);
+  std::fill(dual_.begin(), dual_.end(), 0.0);
+  for (int round = 0; round < rounds; ++round) {
+    if (!factor_with(program)) return false;
+    const auto value_at = [&](int k) { return active_[k] == 1 ? program.upper[k] : program.lower[k]; };
+    // What the fixed steps contribute to the rows of the others.
+    for (int k = 0; k < n_; ++k) d_[k] = active_[k] != 0 ? value_at(k) : 0.0;
+    multiply_hessian(program, d_.data(), mu_.data());
+    multiply_jacobian(program, d_.data(), work_m_.data());
+    for (int k = 0; k < n_; ++k) rhs_[k] = active_[k] != 0 ? d_[k] : -program.gradient[k] - mu_[k];
+    for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -program.constraints[r] - work_m_[r];
+    if (solve_system() > believable) return false;
+    std::copy_n(solution_.data(), n_, d_.data());
+    std::copy_n(solution_.data() + n_, m_, lambda_.data());
+    // Equations that contradict the active bounds give a solution that is only small beside huge multipliers.
+    multiply_jacobian(program, d_.data(), work_m_.data());
+    double unmet = 0.0;
+    for (int r = 0; r < m_; ++r) unmet = std::max(unmet, std::abs(work_m_[r] + program.constraints[r]));
+    if (!(unmet <= believable * (1.0 + max_abs(program.constraints, m_)))) return false;
+    multiply_hessian(program, d_.data(), mu_.data());
+    for (int k = 0; k < n_; ++k) mu_[k] += program.gradient[k];
+    const double gradient_size = 1.0 + max_abs(mu_.data(), n_);
+    add_jacobian_transposed(program, lambda_.data(), mu_.data());
+    const double step_size = 1.0 + max_abs(d_.data(), n_);
+    bool settled = true;
+    for (int k = 0; k < n_; ++k) {
+      mu_[k] = active_[k] != 0 ? -mu_[k] : 0.0;
+      if (active_[k] == 2) continue;
+      std::int8_t next = active_[k];
+      if (active_[k] == 0) {
+        if (d_[k] < program.lower[k] - active_set_tolerance * step_size) next = -1;
+        if (d_[k] > program.upper[k] + active_set_tolerance * step_size) next = 1;
+      } else if (mu_[k] * active_[k] < -active_set_tolerance * gradient_size) {
+        next = 0;
+      }
+      settled = settled && next == active_[k];
+      active_[k] = next;
+    }
+    if (settled) {
+      factor_is_final_ = true;
+      for (int k = 0; k < n_; ++k) {
+        d_[k] = std::clamp(d_[k], program.lower[k], program.upper[k]);
+        if (active_[k] == 1 || active_[k] == -1) mu_[k] = active_[k] * std::max(0.0, mu_[k] * active_[k]);
+      }
+      return true;
+    }
+  }
+  return false;
+}
+
+SparseQp::Outcome SparseQp::solve(const Program& program, double* step, double* multipliers, double* bound_multipliers,
+                                  Clock::time_point deadline) {
+  factorisations_ = 0;
+  regularisation_ = first_regularisation;
+  used_interior_point_ = false;
+  factor_is_final_ = false;
+  guess_active(program, bound_multipliers);
+  Outcome outcome = Outcome::solved;
+  if (!solve_active(program, active_set_rounds)) {
+    outcome = interior_point(program, 0.0, deadline);
+    if (outcome != Outcome::solved) return outcome;
+  }
+  std::copy_n(d_.data(), n_, step);
+  std::copy_n(lambda_.data(), m_, multipliers);
+  std::copy_n(mu_.data(), n_, bound_multipliers);
+  return outcome;
+}
+
+SparseQp::Outcome SparseQp::solve_relaxed(const Program& program, double penalty, double* step, double* multipliers,
+                                          double* bound_multipliers, Clock::time_point deadline) {
+  factor_is_final_ = false;
+  const Outcome outcome = interior_point(program, penalty, deadline);
+  if (outcome != Outcome::solved) return outcome;
+  std::copy_n(d_.data(), n_, step);
+  std::copy_n(lambda_.data(), m_, multipliers);
+  std::copy_n(mu_.data(), n_, bound_multipliers);
+  return Outcome::relaxed;
+}
+
+/// Mehrotra's predictor-corrector. With a penalty the equations are J d + c = p - q with p, q > 0 and the cost
+/// penalty * sum(p + q); the multipliers of p and q are penalty - lambda and penalty + lambda.
+SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalty, Clock::time_point deadline) {
+  used_interior_point_ = true;
+  for (int k = 0; k < n_; ++k) active_[k] = program.lower[k] == program.upper[k] ? 2 : 0;
+  // The reduced Hessian must be positive definite without any bound's help.
+  std::fill(primal_.begin(), primal_.end(), 0.0);
+  std::fill(dual_.begin(), dual_.end(), 0.0);
+  if (!factor_with(program)) return program.is_convex ? Outcome::failed : Outcome::indefinite;
+
+  const double gradient_size = 1.0 + max_abs(program.gradient, n_);
+  start_interior(program, penalty, std::clamp(0.1 * gradient_size, 1e-2, 1e4));
+  const double constraint_size = 1.0 + max_abs(program.constraints, m_);
+  double best_residual = infinity;
+  int no_progress = 0;
+  for (int iteration = 0;; ++iteration) {
+    if (Clock::now() > deadline) return Outcome::deadline;
+    multiply_hessian(program, d_.data(), dual_residual_.data());
+    for (int k = 0; k < n_; ++k) dual_residual_[k] += program.gradient[k];
+    const double terms = std::max(gradient_size, max_abs(dual_residual_.data(), n_)) + max_abs(lambda_.data(), m_);
+    add_jacobian_transposed(program, lambda_.data(), dual_residual_.data());
+    multiply_jacobian(program, d_.data(), primal_residual_.data());
+    for (int r = 0; r < m_; ++r) primal_residual_[r] += program.constraints[r];
+    double mu = 0.0, dual_error = 0.0;
+    std::copy(dual_residual_.begin(), dual_residual_.end(), mu_.begin());
+    for (const Pair& pair : pairs_) {
+      mu += pair.s * pair.z;
+      switch (pair.kind) {
+        case Pair::Kind::lower:
+          mu_[pair.index] -= pair.z;
+          break;
+        case Pair::Kind::upper:
+          mu_[pair.index] += pair.z;
+          break;
+        case Pair::Kind::excess:
+          primal_residual_[pair.index] -= pair.s;
+          break;
+        case Pair::Kind::lack:
+          primal_residual_[pair.index] += pair.s;
+          break;
+      }
+    }
+    for (int k = 0; k < n_; ++k)
+      if (active_[k] == 0) dual_error = std::max(dual_error, std::abs(mu_[k]));
+    if (!pairs_.empty()) mu /= static_cast<double>(pairs_.size());
+    const double residual =
+        std::max({max_abs(primal_residual_.data(), m_) / constraint_size, dual_error / terms, mu / terms});
+    if (!std::isfinite(residual)) return Outcome::failed;
+    if (residual < interior_tolerance) break;
+    no_progress = residual < 0.9 * best_residual ? 0 : no_progress + 1;
+    best_residual = std::min(best_residual, residual);
+    if (no_progress > 15 || iteration == most_interior_iterations) {
+      if (residual < good_enough_interior) break;
+      return Outcome::failed;
+    }
+
+    std::fill(primal_.begin(), primal_.end(), 0.0);
+    std::fill(dual_.begin(), dual_.end(), 0.0);
+    for (const Pair& pair : pairs_) {
+      if (pair.is_bound()) {
+        primal_[pair.index] += pair.z / pair.s;
+      } else {
+        dual_[pair.index] += pair.s / pair.z;
+      }
+    }
+    if (!factor_with(program)) return Outcome::failed;
+    double target = 0.0;
+    if (!pairs_.empty()) {
+      interior_direction(0.0);
+      const double length = interior_length(1.0);
+      double affine_mu = 0.0;
+      for (Pair& pair : pairs_) {
+        affine_mu += (pair.s + length * pair.ds) * (pair.z + length * pair.dz);
+        pair.correction = pair.ds * pair.dz;
+      }
+      affine_mu /= static_cast<double>(pairs_.size());
+      const double ratio = std::clamp(affine_mu / mu, 0.0, 1.0);
+      target = ratio * ratio * ratio * mu;
+    }
+    interior_direction(target);
+    // With curvature in the cost one length for all keeps the residuals falling together.
+    const double length = interior_length(to_the_boundary);
+    for (int k = 0; k < n_; ++k) d_[k] += length * solution_[k];
+    for (int r = 0; r < m_; ++r) lambda_[r] += length * solution_[n_ + r];
+    for (Pair& pair : pairs_) {
+      pair.s += length * pair.ds;
+      pair.z += length * pair.dz;
+      pair.correction = 0.0;
+    }
+  }
+  finish_interior(program, penalty > 0.0);
+  return Outcome::solved;
+}
+
+void SparseQp::start_interior(const Program& program, double penalty, double multiplier) {
+  pairs_.clear();
+  for (int k = 0; k < n_; ++k) {
+    if (active_[k] == 2) {
+      d_[k] = program.lower[k];
+      continue;
+    }
+    // A start well inside, as near to no step as that allows.
+    const double margin = std::min(0.1, 0.25 * (program.upper[k] - program.lower[k]));
+    d_[k] = std::min(std::max(0.0, program.lower[k] + margin), program.upper[k] - margin);
+    if (std::isfinite(program.lower[k])) pairs_.push_back({Pair::Kind::lower, k, d_[k] - program.lower[k], multiplier});
+    if (std::isfinite(program.upper[k])) pairs_.push_back({Pair::Kind::upper, k, program.upper[k] - d_[k], multiplier});
+  }
+  std::fill(lambda_.begin(), lambda_.end(), 0.0);
+  if (penalty == 0.0) return;
+  multiply_jacobian(program, d_.data(), primal_residual_.data());
+  for (int r = 0; r < m_; ++r) {
+    const double value = primal_residual_[r] + program.constraints[r], excess = std::max(value, 0.0) + 0.1;
+    pairs_.push_back({Pair::Kind::excess, r, excess, penalty});
+    pairs_.push_back({Pair::Kind::lack, r, excess - value, penalty});
+  }
+}
+
+/// Newton's direction towards s z = target (less the pair's second-order correction) for every pair; `solution_` gets
+/// those of d and lambda.
+void SparseQp::interior_direction(double target) {
+  for (int k = 0; k < n_; ++k) rhs_[k] = active_[k] == 2 ? 0.0 : -dual_residual_[k];
+  for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -primal_residual_[r];
+  for (const Pair& pair : pairs_) {
+    const double wanted = target - pair.correction;
+    switch (pair.kind) {
+      case Pair::Kind::lower:
+        rhs_[pair.index] += wanted / pair.s;
+        break;
+      case Pair::Kind::upper:
+        rhs_[pair.index] -= wanted / pair.s;
+        break;
+      case Pair::Kind::excess:
+        rhs_[n_ + pair.index] += wanted / pair.z - pair.s;
+        break;
+      case Pair::Kind::lack:
+        rhs_[n_ + pair.index] -= wanted / pair.z - pair.s;
+        break;
+    }
+  }
+  solve_system();
+  for (Pair& pair : pairs_) {
+    const double wanted = target - pair.correction;
+    if (pair.is_bound()) {
+      pair.ds = pair.kind == Pair::Kind::lower ? solution_[pair.index] : -solution_[pair.index];
+      pair.dz = (wanted - pair.z * pair.ds) / pair.s - pair.z;
+    } else {
+      pair.dz = pair.kind == Pair::Kind::lack ? solution_[n_ + pair.index] : -solution_[n_ + pair.index];
+      pair.ds = (wanted - pair.s * pair.dz) / pair.z - pair.s;
+    }
+  }
+}
+
+/// The longest step, up to one, that goes at most `share` of the way to where a slack or multiplier vanishes.
+double SparseQp::interior_length(double share) const noexcept {
+  double length = 1.0;
+  for (const Pair& pair : pairs_) {
+    if (pair.ds < 0.0) length = std::min(length, -share * pair.s / pair.ds);
+    if (pair.dz < 0.0) length = std::min(length, -share * pair.z / pair.dz);
+  }
+  return length;
+}
+
+/// Turns the interior solution into one with bounds that are active or not: exactly, where solving with them settles.
+void SparseQp::finish_interior(const Program& program, bool relaxed) {
+  const auto set_multipliers = [&] {
+    std::fill(mu_.begin(), mu_.end(), 0.0);
+    for (const Pair& pair : pairs_) {
+      if (!pair.is_bound() || pair.s > pair.z) continue;
+      mu_[pair.index] = pair.kind == Pair::Kind::lower ? -pair.z : pair.z;
+    }
+    // Of what is fixed, the interior point had no multiplier: it is what stationarity lacks.
+    for (int k = 0; k < n_; ++k)
+      if (program.lower[k] == program.upper[k]) mu_[k] = -dual_residual_[k];
+  };
+  if (!relaxed) {
+    const auto d = d_, lambda = lambda_;
+    for (const Pair& pair : pairs_)
+      if (pair.z > pair.s) active_[pair.index] = pair.kind == Pair::Kind::lower ? -1 : 1;
+    if (solve_active(program, polishing_rounds)) return;
+    d_ = d;
+    lambda_ = lambda;
+  }
+  set_multipliers();
+}
+
+bool SparseQp::correct(const Program& program, const double* constraints, double* step) {
+  if (!factor_is_final_) {
+    std::fill(primal_.begin(), primal_.end(), 0.0);
+    std::fill(dual_.begin(), dual_.end(), 0.0);
+    if (!factor_with(program)) return false;
+    factor_is_final_ = true;
+  }
+  std::fill_n(rhs_.data(), n_, 0.0);
+  for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -constraints[r];
+  if (solve_system() > believable) return false;
+  std::copy_n(solution_.data(), n_, step);
+  return true;
+}
+
+}  // namespace rhec::sparse_sqp

@@ -1,0 +1,373 @@
+#include "sparse_sqp.hpp"
+
+#include <cholmod.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <utility>
+
+#include "rhec/core/point.hpp"
+#include "rhec/plugins/sdk.hpp"
+#include "stage_covariances.hpp"
+
+namespace rhec::sparse_sqp {
+namespace {
+
+constexpr double sufficient_decrease = 1e-4;
+constexpr double shortest_step = 1e-10;
+// A KKT residual below which Newton's method is trusted more than the merit function.
+constexpr double near_solution = 1e-3;
+// A KKT residual below which steps that gain little are due to the curvature, not to the distance.
+constexpr double near_enough = 1e-1;
+// Differences of the merit below this part of it are rounding.
+constexpr double merit_rounding = 1e-13;
+// What is left of |c|_1 by the linearised, relaxed equations: more than this part of it is no progress.
+constexpr double stuck = 1.0 - 1e-6;
+constexpr double largest_penalty = 1e10;
+constexpr int corrections = 4;
+constexpr int most_penalty_cuts = 20;
+
+double norm1(const std::vector<double>& v) {
+  double sum = 0.0;
+  for (const double value : v) sum += std::abs(value);
+  return sum;
+}
+
+bool is_step(SparseQp::Outcome outcome) {
+  return outcome == SparseQp::Outcome::solved || outcome == SparseQp::Outcome::relaxed;
+}
+
+double max_abs(const std::vector<double>& v) {
+  double largest = 0.0;
+  for (const double value : v) largest = std::max(largest, std::abs(value));
+  return largest;
+}
+
+}  // namespace
+
+const OptionTable<SparseSqpOptions>& SparseSqpOptions::table() {
+  static const auto options =
+      OptionTable<SparseSqpOptions>()
+          .choice(
+              "hessian", &SparseSqpOptions::hessian,
+              {{"gauss_newton", Curvature::gauss_newton}, {"exact", Curvature::exact}, {"auto", Curvature::automatic}},
+              "curvature of the quadratic programs; auto: Gauss-Newton for estimation, exact for control")
+          .integer("max_iterations", &SparseSqpOptions::max_iterations, "limit of the iterations", between(1, 100000))
+          .number("tolerance", &SparseSqpOptions::tolerance, "KKT residual at which it is content", greater_than(0.0));
+  return options;
+}
+
+std::string SparseSqp::why_not(const Ocp& ocp) const {
+  if (options_.hessian == Curvature::exact && !ocp.has_second_derivatives())
+    return "the model has no second derivatives; set hessian: gauss_newton";
+  return {};
+}
+
+void SparseSqp::setup(const Ocp& ocp) {
+  if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'sparse_sqp': " + reason);
+  capacity_ = ocp.capacity();
+  stages_ = StageQp(capacity_);
+  other_stages_ = StageQp(capacity_);
+  for (Iterate* point : {&current_, &trial_, &other_trial_}) *point = Iterate(capacity_);
+  scratch_.assign(ocp.scratch_size(), 0.0);
+  defects_.assign(static_cast<std::size_t>(capacity_.intervals) * capacity_.states, 0.0);
+  reset();
+}
+
+void SparseSqp::reset() noexcept {
+  qp_.forget();
+  nlp_ = SparseNlp();
+}
+
+void SparseSqp::take_structure(const Ocp& ocp) {
+  if (!nlp_.take_structure(ocp)) return;
+  qp_.take_structure(nlp_);
+  const auto n = static_cast<std::size_t>(nlp_.variables()), m = static_cast<std::size_t>(nlp_.constraints());
+  for (auto* v : {&gradient_, &lower_, &upper_, &lower_z_, &upper_z_, &z_, &bound_multipliers_, &step_,
+                  &step_bound_multipliers_, &correction_, &trial_z_, &trial_bound_multipliers_})
+    v->assign(n, 0.0);
+  for (auto* v : {&constraints_, &multipliers_, &step_multipliers_, &trial_multipliers_, &trial_constraints_})
+    v->assign(m, 0.0);
+  hessian_.assign(nlp_.hessian().entries(), 0.0);
+  jacobian_.assign(nlp_.jacobian().entries(), 0.0);
+}
+
+SparseQp::Program SparseSqp::program() const noexcept {
+  return {hessian_.data(), jacobian_.data(), gradient_.data(),  constraints_.data(),
+          lower_.data(),   upper_.data(),    hessian_is_convex_};
+}
+
+void SparseSqp::linearise(const Ocp& ocp, Hessian hessian) {
+  ocp.linearise(all_stages(ocp), current_, hessian, stages_, scratch_);
+  hessian_is_convex_ = hessian == Hessian::gauss_newton;
+  nlp_.hessian(stages_, hessian_.data());
+  nlp_.jacobian(stages_, jacobian_.data());
+  nlp_.gradient(stages_, gradient_.data());
+  nlp_.constraints(stages_, constraints_.data());
+  for (std::size_t k = 0; k < z_.size(); ++k) {
+    lower_[k] = lower_z_[k] - z_[k];
+    upper_[k] = upper_z_[k] - z_[k];
+  }
+}
+
+double SparseSqp::merit(const Ocp& ocp, const Iterate& point) noexcept {
+  const double objective = ocp.evaluate(point, defects_.data(), scratch_);
+  nlp_.constraints(ocp, defects_.data(), trial_constraints_.data());
+  return objective + penalty_ * norm1(trial_constraints_);
+}
+
+/// `trial_` = `current_` and that length of the step.
+void SparseSqp::move(const Ocp& ocp, double length) {
+  for (std::size_t k = 0; k < z_.size(); ++k) {
+    trial_z_[k] = std::clamp(z_[k] + length * step_[k], lower_z_[k], upper_z_[k]);
+    trial_bound_multipliers_[k] = bound_multipliers_[k] + length * (step_bound_multipliers_[k] - bound_multipliers_[k]);
+  }
+  for (std::size_t r = 0; r < multipliers_.size(); ++r)
+    trial_multipliers_[r] = multipliers_[r] + length * (step_multipliers_[r] - multipliers_[r]);
+  nlp_.write(ocp, trial_z_.data(), trial_multipliers_.data(), trial_bound_multipliers_.data(), trial_);
+}
+
+/// Reflects the negative eigenvalues of each stage's block of the Hessian: where the curvature is fine it stays,
+/// whatever it is elsewhere on the horizon.
+void SparseSqp::convexify() {
+  const auto& H = nlp_.hessian();
+  int column = 0;
+  while (column < H.columns) {
+    const int size = H.starts[column + 1] - H.starts[column];  // a block's first column holds all of its rows
+    block_.resize(size, size);
+    for (int c = 0; c < size; ++c)
+      for (int r = c; r < size; ++r) block_(r, c) = hessian_[H.starts[column + c] + r - c];
+    eigen_.compute(block_);
+    if (eigen_.eigenvalues()[0] < 0.0) {
+      block_ = eigen_.eigenvectors() * eigen_.eigenvalues().cwiseAbs().asDiagonal() * eigen_.eigenvectors().transpose();
+      for (int c = 0; c < size; ++c)
+        for (int r = c; r < size; ++r) hessian_[H.starts[column + c] + r - c] = block_(r, c);
+    }
+    column += size;
+  }
+  hessian_is_convex_ = true;
+}
+
+/// Finds the step of the quadratic program, with relaxed equations where there is no other.
+SparseQp::Outcome SparseSqp::find_step(Report& report, Clock::time_point deadline) {
+  auto outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
+  report.factorisations += qp_.factorisations();
+  was_bent_ = outcome == SparseQp::Outcome::indefinite;
+  if (was_bent_) {
+    convexify();
+    outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
+    report.factorisations += qp_.factorisations();
+  }
+  predicted_defect_ = 0.0;
+  if (outcome != SparseQp::Outcome::failed) {
+    report.fallback_used |= qp_.used_interior_point();
+    return outcome;
+  }
+  report.fallback_used = true;
+  const double defect = norm1(constraints_);
+  double penalty = std::max(penalty_, 1e2 * (1.0 + max_abs(gradient_)));
+  outcome = solve_relaxed(penalty, deadline, report);
+  // A penalty is high enough when most of the defect goes, or when a higher one could not do much better.
+  while (outcome == SparseQp::Outcome::relaxed && predicted_defect_ > 0.1 * defect && penalty < largest_penalty) {
+    penalty *= 100.0;
+    const double last = predicted_defect_;
+    relaxed_step_ = step_;
+    relaxed_multipliers_ = step_multipliers_;
+    relaxed_bound_multipliers_ = step_bound_multipliers_;
+    const auto next = solve_relaxed(penalty, deadline, report);
+    if (next == SparseQp::Outcome::deadline) return next;
+    if (next == SparseQp::Outcome::relaxed && predicted_defect_ < 0.9 * last) continue;
+    step_ = relaxed_step_;
+    step_multipliers_ = relaxed_multipliers_;
+    step_bound_multipliers_ = relaxed_bound_multipliers_;
+    predicted_defect_ = last;
+    break;
+  }
+  return outcome;
+}
+
+/// The step with relaxed equations; `predicted_defect_` gets what it leaves of them.
+SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point deadline, Report& report) {
+  const auto outcome = qp_.solve_relaxed(program(), penalty, step_.data(), step_multipliers_.data(),
+                                         step_bound_multipliers_.data(), deadline);
+  report.factorisations += qp_.factorisations();
+  if (outcome != SparseQp::Outcome::relaxed) return outcome;
+  const auto& J = nlp_.jacobian();
+  trial_constraints_ = constraints_;
+  for (int c = 0; c < J.columns; ++c)
+    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) trial_constraints_[J.row_indices[k]] += jacobian_[k] * step_[c];
+  predicted_defect_ = norm1(trial_constraints_);
+  return outcome;
+}
+
+/// Searches along the step; the accepted point goes to `trial_`, its merit to `after`. False where no length will do.
+bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
+  const double defect = norm1(constraints_);
+  const double least_penalty = 1.5 * max_abs(step_multipliers_);
+  if (penalty_ < least_penalty) {
+    penalty_ = least_penalty;
+  } else if (penalty_ > 4.0 * least_penalty && penalty_cuts_left_ > 0 && predicted_defect_ == 0.0) {
+    // Multipliers of a far start can be huge; a penalty that remembers them makes every later step short.
+    penalty_ = 2.0 * least_penalty;
+    --penalty_cuts_left_;
+  }
+  const double before = merit(ocp, current_);
+  double slope = penalty_ * (predicted_defect_ - defect);
+  for (std::size_t k = 0; k < z_.size(); ++k) slope += gradient_[k] * step_[k];
+  const auto acceptable = [&](double length) {
+    after = merit(ocp, trial_);
+    return std::isfinite(after) && after <= before + sufficient_decrease * length * std::min(slope, 0.0) +
+                                                merit_rounding * (1.0 + std::abs(before));
+  };
+  for (double length = 1.0; length >= shortest_step; length *= 0.5) {
+    move(ocp, length);
+    length_ = length;
+    if (acceptable(length)) return true;
+    // Near the solution the merit may refuse a step that Newton's method is right about.
+    if (length == 1.0 && residual < near_solution && std::isfinite(after)) {
+      ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_stages_, scratch_);
+      if (kkt_residual(other_stages_, trial_).largest() < 0.5 * residual) return true;
+    }
+    // The merit refuses it for what the equations bend: correct that, with the same matrix.
+    if (!std::isfinite(after) || predicted_defect_ > 0.0) continue;
+    double remaining = norm1(trial_constraints_);
+    for (int round = 0; round < corrections; ++round) {
+      if (!qp_.correct(program(), trial_constraints_.data(), correction_.data())) break;
+      for (std::size_t k = 0; k < z_.size(); ++k)
+        trial_z_[k] = std::clamp(trial_z_[k] + correction_[k], lower_z_[k], upper_z_[k]);
+      nlp_.write(ocp, trial_z_.data(), nullptr, nullptr, trial_);
+      if (acceptable(length)) return true;
+      const double last = std::exchange(remaining, norm1(trial_constraints_));
+      if (!(remaining < 0.5 * last)) break;
+    }
+  }
+  return false;
+}
+
+Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point deadline) {
+  bool use_exact =
+      options_.hessian == Curvature::exact || (options_.hessian == Curvature::automatic && ocp.kind() == OcpKind::rhc);
+  double last_residual = std::numeric_limits<double>::infinity();
+  int slow = 0;
+  bool took_full_step = false;
+  bool has_costates = max_abs(multipliers_) > 0.0;
+  // The first program's active set is guessed from the point's multipliers, each later one's from the program before.
+  step_bound_multipliers_ = bound_multipliers_;
+  for (;; ++report.iterations) {
+    if (use_exact && !has_costates) {
+      // Exact curvature needs costates: those that fit the start.
+      ocp.linearise(all_stages(ocp), current_, Hessian::gauss_newton, stages_, scratch_);
+      set_costates(stages_, current_);
+      nlp_.read(ocp, current_, nullptr, multipliers_.data(), nullptr);
+      has_costates = true;
+    }
+    linearise(ocp, use_exact ? Hessian::exact : Hessian::gauss_newton);
+    SparseNlp::set_costate_0(stages_, current_);
+    report.kkt = kkt_residual(stages_, current_);
+    const double residual = report.kkt.largest();
+    if (residual <= options_.tolerance) return Status::solved;
+    if (report.iterations == options_.max_iterations) return Status::iteration_limit;
+    if (Clock::now() > deadline) return Status::deadline;
+    // Gauss-Newton whose full steps gain little has met large residuals: there the exact Hessian serves better.
+    if (options_.hessian == Curvature::automatic && !use_exact && ocp.has_second_derivatives()) {
+      slow = (took_full_step || residual < near_enough) && residual > 0.3 * last_residual ? slow + 1 : 0;
+      if (slow >= 4) {
+        use_exact = true;
+        linearise(ocp, Hessian::exact);
+      }
+    }
+    last_residual = residual;
+    auto outcome = find_step(report, deadline);
+    if (outcome == SparseQp::Outcome::deadline) return Status::deadline;
+    double after = 0.0;
+    bool accepted = is_step(outcome) && search(ocp, residual, after);
+    took_full_step = accepted && length_ == 1.0;
+    // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own. Near the solution
+    // merits differ by rounding only, and the exact curvature is what converges.
+    if (use_exact && (!accepted || (was_bent_ && residual > near_solution))) {
+      const bool exact_accepted = accepted;
+      std::swap(trial_, other_trial_);
+      linearise(ocp, Hessian::gauss_newton);
+      const auto other = find_step(report, deadline);
+      if (other == SparseQp::Outcome::deadline) return Status::deadline;
+      accepted = is_step(other) && search(ocp, residual, after);
+      // Both by the same penalty, which the second search may have raised.
+      if (exact_accepted && (!accepted || merit(ocp, other_trial_) < after)) {
+        std::swap(trial_, other_trial_);
+        accepted = true;
+      } else {
+        outcome = other;
+      }
+    }
+    if (outcome == SparseQp::Outcome::relaxed && report.kkt.defect > options_.tolerance &&
+        predicted_defect_ >= stuck * norm1(constraints_))
+      return Status::infeasible;
+    if (!accepted) return Status::stalled;
+    std::swap(current_, trial_);
+    nlp_.read(ocp, current_, z_.data(), multipliers_.data(), bound_multipliers_.data());
+  }
+}
+
+Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+  const auto start = Clock::now();
+  Report report;
+  if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_)) return report;
+  try {
+    take_structure(ocp);
+    penalty_ = 0.0;
+    penalty_cuts_left_ = most_penalty_cuts;
+    nlp_.bounds(ocp, lower_z_.data(), upper_z_.data());
+    bool bounds_cross = false;
+    for (std::size_t k = 0; k < z_.size(); ++k) bounds_cross = bounds_cross || lower_z_[k] > upper_z_[k];
+    if (bounds_cross) {
+      report.status = Status::infeasible;
+      judge(ocp, point, report, start);
+      return report;
+    }
+    nlp_.read(ocp, point, z_.data(), multipliers_.data(), bound_multipliers_.data());
+    for (std::size_t k = 0; k < z_.size(); ++k) z_[k] = std::clamp(z_[k], lower_z_[k], upper_z_[k]);
+    current_ = point;
+    nlp_.write(ocp, z_.data(), nullptr, nullptr, current_);
+    report.status = iterate(ocp, report, deadline);
+  } catch (const std::bad_alloc&) {
+    reset();  // what was made for the structure may be incomplete
+    report.status = Status::stalled;
+  }
+  if (report.status != Status::infeasible && is_sound_start(ocp, current_, scratch_)) std::swap(point, current_);
+  judge(ocp, point, report, start);
+  return report;
+}
+
+void SparseSqp::judge(const Ocp& ocp, const Iterate& point, Report& report, Clock::time_point start) noexcept {
+  report.objective = ocp.evaluate(point, nullptr, scratch_);
+  report.kkt = kkt_residual(ocp, point, stages_, scratch_);
+  report.feedback_us = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
+
+bool SparseSqp::covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept {
+  const auto stride = static_cast<std::size_t>(capacity_.states);
+  if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_) ||
+      blocks.size() < (static_cast<std::size_t>(ocp.intervals()) + 1) * stride * stride)
+    return false;
+  try {
+    ocp.linearise(all_stages(ocp), point, Hessian::gauss_newton, stages_, scratch_);
+    return stage_covariances(stages_, blocks);
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+}
+
+}  // namespace rhec::sparse_sqp
+
+RHEC_PLUGIN(rhec::PluginKind::solver, rhec::sparse_sqp::SparseSqp,
+            {.name = "sparse_sqp",
+             .version = "0.1.0",
+             .licence = "BSD-2-Clause AND LGPL-2.1-or-later",
+             .source = "Sequential quadratic programming with sparse quasi-definite factors, for long horizons",
+             .backend = "CHOLMOD",
+             .backend_version = RHEC_TEXT_OF(CHOLMOD_MAIN_VERSION) "." RHEC_TEXT_OF(
+                 CHOLMOD_SUB_VERSION) "." RHEC_TEXT_OF(CHOLMOD_SUBSUB_VERSION),
+             .capabilities = "rhe, rhc, bounds on states, inputs and parameters, long horizons, covariances; allocates "
+                             "for structures not seen before"});

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+
+#include "rhec/core/options.hpp"
+#include "sparse_qp.hpp"
+
+namespace rhec::sparse_sqp {
+
+enum class Curvature {
+  gauss_newton,
+  exact,
+  automatic  ///< Gauss-Newton for estimation, exact for control
+};
+
+struct SparseSqpOptions {
+  Curvature hessian = Curvature::automatic;
+  int max_iterations = 200;
+  double tolerance = 1e-8;
+
+  static const OptionTable<SparseSqpOptions>& table();
+};
+
+/// Sequential quadratic programming on the sparse view of an Ocp, for horizons of thousands of intervals and for
+/// vehicles with many states: every step costs a number of operations that is linear in the horizon.
+///
+/// Bounds hold at every iterate. Steps are those of a sparse quadratic program (SparseQp), searched along by the l1
+/// merit f + penalty * |c|_1 with a second-order correction; where linearised equations contradict the bounds, they are
+/// relaxed (Fletcher's Sl1QP), and a point at which nothing reduces |c|_1 is reported as infeasible.
+class SparseSqp final : public Solver {
+ public:
+  using Options = SparseSqpOptions;
+  explicit SparseSqp(const Options& options) : options_(options) {}
+
+  std::string why_not(const Ocp& ocp) const override;
+  void setup(const Ocp& ocp) override;
+  void prepare(const Ocp&, const Iterate&) noexcept override {}
+  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
+  bool covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept override;
+  void reset() noexcept override;
+
+ private:
+  void take_structure(const Ocp& ocp);
+  void linearise(const Ocp& ocp, Hessian hessian);
+  void convexify();
+  void judge(const Ocp& ocp, const Iterate& point, Report& report, Clock::time_point start) noexcept;
+  double merit(const Ocp& ocp, const Iterate& point) noexcept;
+  void move(const Ocp& ocp, double length);
+  bool search(const Ocp& ocp, double residual, double& after);
+  Status iterate(const Ocp& ocp, Report& report, Clock::time_point deadline);
+  SparseQp::Outcome find_step(Report& report, Clock::time_point deadline);
+  SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline, Report& report);
+  SparseQp::Program program() const noexcept;
+
+  Options options_;
+  Capacity capacity_;
+  SparseNlp nlp_;
+  SparseQp qp_;
+  StageQp stages_, other_stages_;
+  Iterate current_, trial_, other_trial_;
+  std::vector<double> scratch_, defects_;
+  std::vector<double> hessian_, jacobian_, gradient_, constraints_, lower_, upper_;
+  std::vector<double> z_, multipliers_, bound_multipliers_;               ///< of `current_`
+  std::vector<double> step_, step_multipliers_, step_bound_multipliers_;  ///< what the quadratic program said
+  std::vector<double> correction_, trial_z_, trial_multipliers_, trial_bound_multipliers_, trial_constraints_;
+  std::vector<double> lower_z_, upper_z_;
+  std::vector<double> relaxed_step_, relaxed_multipliers_, relaxed_bound_multipliers_;
+  bool hessian_is_convex_ = false, was_bent_ = false;
+  Eigen::MatrixXd block_;
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen_;
+  double length_ = 0.0;  ///< of the last step that was accepted
+  double penalty_ = 0.0;
+  int penalty_cuts_left_ = 0;
+  double predicted_defect_ = 0.0;  ///< |J step + c|_1
+};
+
+}  // namespace rhec::sparse_sqp

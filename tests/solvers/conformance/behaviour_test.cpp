@@ -1,0 +1,503 @@
+// How every solver that is found behaves: after failures, when reset, on threads, at deadlines, from good guesses,
+// while blocks move, and what its tolerance means.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <ostream>
+#include <thread>
+#include <utility>
+
+#include "../../core/random_problem.hpp"
+#include "families.hpp"
+#include "found.hpp"
+#include "judge.hpp"
+#include "rhec/core/shift.hpp"
+
+namespace rhec::conformance {
+namespace {
+
+using testing::RandomProblem;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// What a call that has to return promptly may last, on a machine that is busy with other things.
+constexpr std::chrono::seconds promptly{10};
+
+struct Pair {
+  std::string solver, model;
+};
+
+std::ostream& operator<<(std::ostream& out, const Pair& of) { return out << of.solver << " on " << of.model; }
+
+std::vector<Pair> all_pairs() {
+  std::vector<Pair> pairs;
+  for (const std::string& solver : host().names(PluginKind::solver)) {
+    for (const std::string& model : host().names(PluginKind::model)) pairs.push_back({solver, model});
+    pairs.push_back({solver, "integrator"});
+  }
+  return pairs;
+}
+
+class Behaviour : public ::testing::TestWithParam<Pair> {
+ protected:
+  std::shared_ptr<Solver> make(const Settings& options = {}) const { return make_solver(GetParam().solver, options); }
+
+  Problem problem(const std::string& name, unsigned seed = 1) const { return family(name).make(model_, seed); }
+
+  Judged solve(Solver& solver, const Problem& of) const {
+    return solve_and_judge(solver, *of.ocp, of.guess, tolerance_);
+  }
+
+  /// What a new instance makes of a problem.
+  Judged by_new_instance(const Problem& of) const {
+    const auto solver = make();
+    solver->setup(*of.ocp);
+    return solve(*solver, of);
+  }
+
+  void expect_solved(const Judged& judged, const std::string& when) const {
+    EXPECT_EQ(judged.report.status, Status::solved) << when << ": " << name_of(judged.report.status);
+    EXPECT_LE(judged.kkt.largest(), tolerance_) << when;
+    for (const std::string& complaint : judged.complaints) ADD_FAILURE() << when << ": " << complaint;
+  }
+
+  /// Solved as a new instance solves it.
+  void expect_right(Solver& solver, const Problem& of, const std::string& when) const {
+    const Judged judged = solve(solver, of), fresh = by_new_instance(of);
+    expect_solved(judged, when);
+    EXPECT_NEAR(judged.objective, fresh.objective, 1e-7 * (1e-3 + std::abs(fresh.objective))) << when;
+  }
+
+  bool applies(const std::string& name) const {
+    return conformance::applies(family(name), GetParam().model, *model_) && make()->why_not(*problem(name).ocp).empty();
+  }
+
+  std::shared_ptr<const Model> model_ = make_model(GetParam().model);
+  double tolerance_ = tolerance_of(GetParam().solver);
+};
+
+// --- after a failure ------------------------------------------------------------------------------------------------
+
+TEST_P(Behaviour, SaysBadInputAndChangesNothingWhereTheGuessIsNotFinite) {
+  const Problem good = problem("rhe_blocks");
+  const auto solver = make();
+  solver->setup(*good.ocp);
+  using Row = double* (Iterate::*)(int) noexcept;
+  const std::vector<std::pair<const char*, Row>> rows = {{"state", &Iterate::state},
+                                                         {"control", &Iterate::control},
+                                                         {"costate", &Iterate::costate},
+                                                         {"state_bound", &Iterate::state_bound},
+                                                         {"control_bound", &Iterate::control_bound}};
+  for (const auto& [name, row] : rows) {
+    for (const double value : {nan, infinity, -infinity}) {
+      const std::string when = fmt::format("{} in a {}", value, name);
+      Iterate poisoned = good.guess;
+      (poisoned.*row)(2)[0] = value;
+      const Iterate before = poisoned;
+      solver->prepare(*good.ocp, poisoned);
+      const Report report = solver->solve(*good.ocp, poisoned);
+      EXPECT_EQ(report.status, Status::bad_input) << when << ": " << name_of(report.status);
+      EXPECT_TRUE(same_bits(*good.ocp, poisoned, before)) << when;
+    }
+  }
+  expect_right(*solver, good, "after a poisoned guess");
+}
+
+TEST_P(Behaviour, SaysBadInputWhereTheProblemIsNotFinite) {
+  const auto solver = make();
+  Problem good = problem("rhe_blocks");
+  solver->setup(*good.ocp);
+  auto& rhe = dynamic_cast<RheProblem&>(*good.ocp);
+  const auto expect_bad_input = [&](const char* when) {
+    Iterate point = good.guess;
+    solver->prepare(*good.ocp, point);
+    const Report report = solver->solve(*good.ocp, point);
+    EXPECT_EQ(report.status, Status::bad_input) << when << ": " << name_of(report.status);
+    EXPECT_TRUE(same_bits(*good.ocp, point, good.guess)) << when;
+  };
+  for (const double value : {nan, infinity}) {
+    const double mean = std::exchange(rhe.arrival_mean[0], value);
+    expect_bad_input("arrival mean");
+    rhe.arrival_mean[0] = mean;
+    expect_right(*solver, good, "after a poisoned arrival mean");
+    const double information = std::exchange(rhe.arrival_information(0, 0), value);
+    expect_bad_input("arrival information");
+    rhe.arrival_information(0, 0) = information;
+    expect_right(*solver, good, "after poisoned arrival information");
+  }
+  const double measured = std::exchange(rhe.output(3)[0], infinity);
+  expect_bad_input("infinite measurement");
+  // A measurement that is not a number is one that is missing.
+  rhe.output(3)[0] = nan;
+  expect_solved(solve(*solver, good), "missing measurement");
+  rhe.output(3)[0] = measured;
+  expect_right(*solver, good, "after measurements that were infinite or missing");
+
+  // An interval whose length is not a number makes defects that are none.
+  const double seconds = rhe.duration(4);
+  rhe.set_duration(4, nan);
+  Iterate point = good.guess;
+  solver->prepare(*good.ocp, point);
+  const Report report = solver->solve(*good.ocp, point);
+  EXPECT_NE(report.status, Status::solved) << "duration";
+  EXPECT_NE(report.status, Status::step_taken) << "duration";
+  EXPECT_TRUE(same_bits(*good.ocp, point, good.guess)) << "duration";
+  rhe.set_duration(4, seconds);
+  expect_right(*solver, good, "after a poisoned duration");
+}
+
+TEST_P(Behaviour, SaysBadInputWhereABoundIsNotANumber) {
+  Problem good = problem("rhc_near");
+  const auto solver = make();
+  solver->setup(*good.ocp);
+  auto& rhc = dynamic_cast<RhcProblem&>(*good.ocp);
+  std::vector<double> scratch(rhc.scratch_size());
+  const double lower = std::exchange(rhc.input_lower(2, 0), nan);
+  rhc.finish(scratch);
+  Iterate point = good.guess;
+  solver->prepare(*good.ocp, point);
+  const Report report = solver->solve(*good.ocp, point);
+  EXPECT_EQ(report.status, Status::bad_input) << name_of(report.status);
+  EXPECT_TRUE(same_bits(*good.ocp, point, good.guess));
+  rhc.input_lower(2, 0) = lower;
+  rhc.finish(scratch);
+  expect_right(*solver, good, "after a bound that was no number");
+}
+
+TEST_P(Behaviour, SaysBadInputOfAnotherCapacity) {
+  const Problem good = problem("rhe_blocks"), other = problem("rhe_part_of_the_room");
+  const auto solver = make();
+  solver->setup(*good.ocp);
+  Iterate point = other.guess;
+  solver->prepare(*other.ocp, point);
+  EXPECT_EQ(solver->solve(*other.ocp, point).status, Status::bad_input);
+  EXPECT_TRUE(same_bits(*other.ocp, point, other.guess));
+  expect_right(*solver, good, "after another capacity");
+}
+
+TEST_P(Behaviour, IsRightAfterAnInfeasibleProblem) {
+  const Problem impossible = problem("rhc_infeasible"), possible = problem("rhc_inputs_at_bounds");
+  const auto solver = make();
+  solver->setup(*impossible.ocp);
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    const Judged judged = solve(*solver, impossible);
+    EXPECT_EQ(judged.report.status, Status::infeasible) << name_of(judged.report.status);
+    EXPECT_TRUE(same_bits(*impossible.ocp, judged.point, impossible.guess));
+    expect_right(*solver, possible, "after an infeasible problem");
+  }
+}
+
+class SolverAlone : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(SolverAlone, SaysInfeasibleOfAVehicleThatCannotStayWhereItMust) {
+  const auto cold = [](std::unique_ptr<HorizonProblem> ocp) {
+    Iterate guess = RandomProblem::cold_start(*ocp);
+    return Problem{std::move(ocp), std::move(guess)};
+  };
+  const Problem impossible = cold(integrator_in_a_box(2.0, 3.0)), possible = cold(integrator_in_a_box(-1.0, 3.0));
+  const double tolerance = tolerance_of(GetParam());
+  const auto solver = make_solver(GetParam());
+  solver->setup(*impossible.ocp);
+  const Judged refused = solve_and_judge(*solver, *impossible.ocp, impossible.guess, tolerance);
+  EXPECT_EQ(refused.report.status, Status::infeasible) << name_of(refused.report.status);
+  EXPECT_TRUE(same_bits(*impossible.ocp, refused.point, impossible.guess));
+  const Judged judged = solve_and_judge(*solver, *possible.ocp, possible.guess, tolerance);
+  EXPECT_EQ(judged.report.status, Status::solved) << name_of(judged.report.status);
+  for (const std::string& complaint : judged.complaints) ADD_FAILURE() << complaint;
+}
+
+// --- instances ------------------------------------------------------------------------------------------------------
+
+TEST_P(Behaviour, ResetGivesTheBitsOfANewInstance) {
+  const Problem wanted = problem("rhe_blocks", 2);
+  Iterate expected = wanted.guess;
+  const auto fresh = make();
+  fresh->setup(*wanted.ocp);
+  const Report report = fresh->solve(*wanted.ocp, expected);
+
+  const auto solver = make();
+  solver->setup(*wanted.ocp);
+  const auto expect_same = [&](const char* after) {
+    solver->reset();
+    Iterate point = wanted.guess;
+    const Report again = solver->solve(*wanted.ocp, point);
+    EXPECT_TRUE(same_bits(*wanted.ocp, point, expected)) << after;
+    EXPECT_EQ(again.status, report.status) << after;
+    EXPECT_EQ(again.iterations, report.iterations) << after;
+  };
+  expect_same("setup alone");
+  expect_same("the same problem");
+  const Problem other = problem("rhe_blocks", 3);
+  Iterate point = other.guess;
+  solver->solve(*other.ocp, point);
+  expect_same("another problem");
+  point = other.guess;
+  solver->prepare(*other.ocp, point);
+  expect_same("a preparation without a solve");
+  const Problem blocks = problem("rhe_unblocked");
+  point = blocks.guess;
+  solver->solve(*blocks.ocp, point);
+  expect_same("another structure");
+  const Problem impossible = problem("rhe_infeasible");
+  if (impossible.ocp->capacity() == wanted.ocp->capacity()) {
+    point = impossible.guess;
+    solver->solve(*impossible.ocp, point);
+    expect_same("an infeasible problem");
+  }
+  point = other.guess;
+  point.state(1)[0] = nan;
+  solver->solve(*other.ocp, point);
+  expect_same("a poisoned guess");
+  point = other.guess;
+  solver->solve(*other.ocp, point, Clock::now() - std::chrono::seconds(1));
+  expect_same("a deadline");
+}
+
+TEST_P(Behaviour, TwoInstancesOnTwoThreadsDoNotDisturbEachOther) {
+  constexpr int repeats = 12;
+  const std::array<std::string, 2> names = {"rhc_near", "rhe_blocks"};
+  std::array<std::vector<Problem>, 2> problems;
+  std::array<std::vector<Iterate>, 2> expected;
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (unsigned seed = 1; seed <= 2; ++seed) {
+      problems[k].push_back(problem(names[k], seed));
+      expected[k].push_back(by_new_instance(problems[k].back()).point);
+    }
+  }
+  std::array<int, 2> wrong = {0, 0};
+  const auto work = [&](std::size_t k) {
+    const auto solver = make();
+    solver->setup(*problems[k].front().ocp);
+    for (int repeat = 0; repeat < repeats; ++repeat) {
+      const std::size_t which = repeat % 2;
+      Iterate point = problems[k][which].guess;
+      solver->reset();
+      solver->prepare(*problems[k][which].ocp, point);
+      solver->solve(*problems[k][which].ocp, point);
+      wrong[k] += !same_bits(*problems[k][which].ocp, point, expected[k][which]);
+    }
+  };
+  std::thread one(work, 0), other(work, 1);
+  one.join();
+  other.join();
+  EXPECT_EQ(wrong[0], 0) << "of " << repeats << " " << names[0];
+  EXPECT_EQ(wrong[1], 0) << "of " << repeats << " " << names[1];
+}
+
+TEST_P(Behaviour, ServesTwoCapacitiesOneAfterTheOther) {
+  const Problem small = problem("rhe_two_intervals"), large = problem("rhe_part_of_the_room"),
+                control = problem("rhc_blocked_input");
+  const auto solver = make();
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    for (const Problem* each : {&small, &large, &control}) {
+      solver->setup(*each->ocp);
+      EXPECT_TRUE(same_bits(*each->ocp, solve(*solver, *each).point, by_new_instance(*each).point))
+          << "setup is a new beginning";
+    }
+  }
+}
+
+// A setup serves problems up to its own size; estimation needs more scratch than control.
+TEST_P(Behaviour, ServesBothKindsOfOneCapacity) {
+  const Problem control = problem("rhc_near"), estimation = problem("rhe_blocks");
+  ASSERT_EQ(control.ocp->capacity(), estimation.ocp->capacity());
+  ASSERT_LE(control.ocp->scratch_size(), estimation.ocp->scratch_size());
+  const auto solver = make();
+  solver->setup(*estimation.ocp);
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    expect_right(*solver, control, "control");
+    expect_right(*solver, estimation, "estimation");
+  }
+}
+
+// --- deadlines ------------------------------------------------------------------------------------------------------
+
+TEST_P(Behaviour, StopsAtADeadlineThatHasPassed) {
+  for (const char* name : {"rhe_blocks", "rhc_near"}) {
+    const Problem of = problem(name);
+    const auto solver = make();
+    solver->setup(*of.ocp);
+    const auto start = Clock::now();
+    const Judged judged =
+        solve_and_judge(*solver, *of.ocp, of.guess, tolerance_, Clock::now() - std::chrono::seconds(1));
+    EXPECT_LT(Clock::now() - start, promptly) << name;
+    EXPECT_EQ(judged.report.status, Status::deadline) << name << ": " << name_of(judged.report.status);
+    for (const std::string& complaint : judged.complaints) ADD_FAILURE() << name << ": " << complaint;
+    expect_right(*solver, of, "after a deadline");
+  }
+}
+
+TEST_P(Behaviour, ReturnsTheBestPointAtADeadlineAhead) {
+  for (const char* name : {"rhe_200_intervals", "rhc_200_intervals"}) {
+    if (!applies(name)) continue;
+    const Problem of = problem(name);
+    const auto solver = make();
+    solver->setup(*of.ocp);
+    const double before = residual_at(*of.ocp, of.guess).largest();
+    for (const int microseconds : {100, 1000, 5000, 20000}) {
+      const std::string when = fmt::format("{}, {} us", name, microseconds);
+      const auto start = Clock::now();
+      solver->reset();
+      Judged judged = solve_and_judge(*solver, *of.ocp, of.guess, tolerance_,
+                                      Clock::now() + std::chrono::microseconds(microseconds));
+      EXPECT_LT(Clock::now() - start, promptly) << when;
+      const Status status = judged.report.status;
+      EXPECT_TRUE(status == Status::deadline || status == Status::solved) << when << ": " << name_of(status);
+      // Methods differ in what they trade on the way; none may return a point that has run away.
+      EXPECT_LE(judged.kkt.largest(), 10.0 * (1.0 + before)) << when;
+      for (const std::string& complaint : judged.complaints) ADD_FAILURE() << when << ": " << complaint;
+    }
+  }
+}
+
+// --- good guesses ---------------------------------------------------------------------------------------------------
+
+TEST_P(Behaviour, RecognisesItsOwnSolution) {
+  for (const char* name : {"rhe_full_horizon", "rhe_blocks", "rhe_all_at_bounds", "rhe_ramps", "rhc_near",
+                           "rhc_inputs_at_bounds", "rhc_states_at_bounds", "rhc_blocked_input"}) {
+    if (!applies(name)) continue;
+    Problem of = problem(name);
+    const Judged cold = by_new_instance(of);
+    expect_solved(cold, name);
+    of.guess = cold.point;
+    const Judged warm = by_new_instance(of);
+    expect_solved(warm, std::string(name) + " from its solution");
+    EXPECT_LE(warm.report.iterations, 2) << name;
+    EXPECT_NEAR(warm.objective, cold.objective, 1e-9 * (1e-3 + std::abs(cold.objective))) << name;
+  }
+}
+
+TEST_P(Behaviour, FollowsAHorizonThatMoves) {
+  constexpr int samples = 6, length = 12, period = 5;
+  RandomProblem random(model_, 77);
+  RandomProblem::RheSpec spec;
+  spec.intervals = length + samples;
+  const auto whole = random.rhe(spec);
+  spec.intervals = length;
+  RandomProblem again(model_, 77);
+  const auto window = again.rhe(spec);
+  window->arrival_mean = whole->arrival_mean;
+  const int np = model_->parameter_count();
+  // Borders of blocks stand still in time, and so move through the window.
+  const auto fill = [&](int first) {
+    for (int i = 0; i <= length; ++i) {
+      std::copy_n(whole->output(first + i), model_->output_count(), window->output(i));
+      if (i == length) break;
+      std::copy_n(whole->measured_input(first + i), model_->input_count(), window->measured_input(i));
+      window->set_duration(i, whole->duration(first + i));
+    }
+    for (int j = 0; j < np; ++j) {
+      std::array<std::uint8_t, length> begins{};
+      for (int i = 0; i < length; ++i) begins[i] = i == 0 || (first + i) % period == 0;
+      window->set_blocks(j, begins.data(), Transition::step);
+      for (int i = 1; i < length; ++i)
+        if (begins[i]) window->link(i, j, 0.01);
+    }
+    window->finish();
+  };
+  const auto solver = make();
+  solver->setup(*window);
+  GuessShifter shifter(*window);
+  Iterate guess;
+  for (int sample = 0; sample <= samples; ++sample) {
+    SCOPED_TRACE("sample " + std::to_string(sample));
+    fill(sample);
+    // A weak prior that need not move along: what is tested is the solver.
+    window->arrival_information.diagonal() *= 0.5;
+    Iterate cold = RandomProblem::cold_start(*window);
+    if (sample == 0) {
+      guess = cold;
+    } else {
+      ASSERT_TRUE(shifter.apply(1, *window, guess));
+    }
+    const auto fresh = make();
+    fresh->setup(*window);
+    const Judged expected = solve_and_judge(*fresh, *window, guess, tolerance_);
+    const Judged judged = solve_and_judge(*solver, *window, guess, tolerance_);
+    expect_solved(expected, "by a new instance");
+    expect_solved(judged, "by one that has a history");
+    EXPECT_NEAR(judged.objective, expected.objective, 1e-9 * (1e-3 + std::abs(expected.objective)));
+    EXPECT_LT(distance(scaled_primal(*window, judged.point), scaled_primal(*window, expected.point)), 1e-5);
+    shifter.take(*window, judged.point);
+    guess = judged.point;
+  }
+}
+
+TEST_P(Behaviour, KeepsUpWithBlocksThatMoveFromSampleToSample) {
+  if (model_->parameter_count() == 0) GTEST_SKIP() << "the model has no parameter";
+  const auto solver = make();
+  Problem of = problem("rhe_blocks");
+  auto& rhe = dynamic_cast<RheProblem&>(*of.ocp);
+  solver->setup(rhe);
+  for (int sample = 0; sample < 12; ++sample) {
+    SCOPED_TRACE("sample " + std::to_string(sample));
+    for (int j = 0; j < model_->parameter_count(); ++j) {
+      std::vector<std::uint8_t> begins(rhe.intervals(), 0);
+      // One parameter's blocks move, the others' grow.
+      for (int i = 0; i < rhe.intervals(); ++i)
+        begins[i] = i == 0 || (j == 0 ? (i + sample) % 4 == 0 : i % (1 + sample % 6) == 0);
+      rhe.set_blocks(j, begins.data(), sample % 5 == 4 ? Transition::ramp : Transition::step);
+      for (int i = 0; i < rhe.intervals(); ++i)
+        if (begins[i]) rhe.link(i, j, 0.01);
+    }
+    rhe.finish();
+    of.guess = RandomProblem::cold_start(rhe);
+    const Judged judged = solve(*solver, of), fresh = by_new_instance(of);
+    expect_solved(judged, "with a history");
+    EXPECT_NEAR(judged.objective, fresh.objective, 1e-8 * (1e-3 + std::abs(fresh.objective)));
+    EXPECT_LT(distance(scaled_primal(rhe, judged.point), scaled_primal(rhe, fresh.point)), 1e-5);
+  }
+}
+
+// --- what options mean ----------------------------------------------------------------------------------------------
+
+TEST_P(Behaviour, MeansTheCoresResidualByItsTolerance) {
+  if (!has_option(GetParam().solver, "tolerance")) GTEST_SKIP() << "it has no option `tolerance`";
+  for (const char* name :
+       {"rhe_full_horizon", "rhe_blocks", "rhe_robust", "rhe_all_at_bounds", "rhc_near", "rhc_inputs_at_bounds"}) {
+    if (!applies(name)) continue;
+    const Problem of = problem(name);
+    for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+      const std::string when = fmt::format("{} at {}", name, tolerance);
+      Settings options = Settings::map();
+      options.set("tolerance", Settings::scalar(fmt::format("{}", tolerance)));
+      const auto solver = make(options);
+      solver->setup(*of.ocp);
+      const Judged judged = solve_and_judge(*solver, *of.ocp, of.guess, tolerance);
+      EXPECT_EQ(judged.report.status, Status::solved) << when << ": " << name_of(judged.report.status);
+      EXPECT_LE(judged.kkt.largest(), tolerance) << when;
+      for (const std::string& complaint : judged.complaints) ADD_FAILURE() << when << ": " << complaint;
+    }
+  }
+}
+
+TEST_P(Behaviour, SaysWhenItStoppedAtItsLimitOfIterations) {
+  if (!has_option(GetParam().solver, "max_iterations")) GTEST_SKIP() << "it has no option `max_iterations`";
+  for (const char* name : {"rhe_far_guess", "rhc_far_guess"}) {
+    const Problem of = problem(name);
+    Settings options = Settings::map();
+    options.set("max_iterations", Settings::scalar("1"));
+    const auto solver = make(options);
+    solver->setup(*of.ocp);
+    const Judged judged = solve_and_judge(*solver, *of.ocp, of.guess, tolerance_);
+    // A problem that is linear may be solved by one step.
+    const bool linear = GetParam().model == "integrator";
+    EXPECT_TRUE(judged.report.status == Status::iteration_limit || (linear && judged.report.status == Status::solved))
+        << name << ": " << name_of(judged.report.status);
+    EXPECT_LE(judged.report.iterations, 1) << name;
+    for (const std::string& complaint : judged.complaints) ADD_FAILURE() << name << ": " << complaint;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, Behaviour, ::testing::ValuesIn(all_pairs()),
+                         [](const auto& of) { return of.param.solver + "_on_" + of.param.model; });
+INSTANTIATE_TEST_SUITE_P(Every, SolverAlone, ::testing::ValuesIn(host().names(PluginKind::solver)),
+                         [](const auto& of) { return of.param; });
+
+}  // namespace
+}  // namespace rhec::conformance

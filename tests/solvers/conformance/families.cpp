@@ -1,0 +1,613 @@
+#include "families.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+
+#include "../../core/random_problem.hpp"
+#include "found.hpp"
+#include "rhec/core/formula_model.hpp"
+
+namespace rhec::conformance {
+namespace {
+
+using testing::RandomProblem;
+using Drive = RandomProblem::Drive;
+using RheSpec = RandomProblem::RheSpec;
+using RhcSpec = RandomProblem::RhcSpec;
+using ModelPointer = std::shared_ptr<const Model>;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+bool has_parameters(const Model& model) { return model.parameter_count() > 0; }
+
+// --- models of the suite --------------------------------------------------------------------------------------------
+
+struct Integrator {
+  static constexpr int state_count = 1, input_count = 1, parameter_count = 0, output_count = 1;
+  template <class Scalar>
+  void dynamics(const Scalar*, const Scalar* u, const Scalar*, Scalar* dxdt) const {
+    dxdt[0] = u[0];
+  }
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    y[0] = x[0];
+  }
+};
+
+/// Carts in a row, each drawn by the one before; the first one is pushed. The rate at which they follow is unknown.
+struct WideChain {
+  static constexpr int state_count = 40, input_count = 1, parameter_count = 1, output_count = 40;
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    dxdt[0] = u[0] - p[0] * x[0];
+    for (int j = 1; j < state_count; ++j) dxdt[j] = p[0] * (x[j - 1] - x[j]);
+  }
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    for (int j = 0; j < output_count; ++j) y[j] = x[j];
+  }
+};
+
+ModelDescription about_integrator() {
+  ModelDescription about;
+  about.name = "integrator";
+  about.states = {{.name = "x", .unit = "m", .meaning = "position"}};
+  about.inputs = {{.name = "u", .unit = "m/s", .meaning = "speed"}};
+  about.outputs = {{.name = "y", .unit = "m", .meaning = "position"}};
+  return about;
+}
+
+ModelDescription about_wide_chain() {
+  ModelDescription about;
+  about.name = "wide_chain";
+  for (int j = 0; j < WideChain::state_count; ++j) {
+    const std::string number = std::to_string(j);
+    about.states.push_back({.name = "x" + number, .unit = "m", .meaning = "place of cart " + number});
+    about.outputs.push_back({.name = "y" + number, .unit = "m", .meaning = "place of cart " + number});
+  }
+  about.inputs = {{.name = "u", .unit = "m/s", .meaning = "push"}};
+  about.parameters = {{.name = "rate", .unit = "1/s", .meaning = "of following", .lower = 0.0, .upper = 2.0}};
+  return about;
+}
+
+/// Another model without its second derivatives.
+class WithoutSecondDerivatives final : public Model {
+ public:
+  explicit WithoutSecondDerivatives(ModelPointer model) : model_(std::move(model)) {}
+  const ModelDescription& description() const noexcept override { return model_->description(); }
+  void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
+  void observe(const Nodes& request) const noexcept override { model_->observe(request); }
+  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
+    model_->rates(x, u, p, dxdt);
+  }
+  bool has_second_derivatives() const noexcept override { return false; }
+
+ private:
+  ModelPointer model_;
+};
+
+// --- how families are made ------------------------------------------------------------------------------------------
+
+Problem cold(std::unique_ptr<HorizonProblem> ocp) {
+  Iterate guess = RandomProblem::cold_start(*ocp);
+  return {std::move(ocp), std::move(guess)};
+}
+
+using Make = std::function<Problem(ModelPointer, unsigned)>;
+/// Problems that differ in their specification alone. Seeds start where those of other tests do not.
+template <class Spec>
+Make random(Spec spec) {
+  return [spec](const ModelPointer& model, unsigned seed) {
+    RandomProblem problems(model, 1000 + seed);
+    if constexpr (std::is_same_v<Spec, RheSpec>)
+      return cold(problems.rhe(spec));
+    else
+      return cold(problems.rhc(spec));
+  };
+}
+/// Estimation problems that are changed after they are made.
+using ChangeRhe = std::function<void(RheProblem&, RandomProblem&)>;
+Make changed(RheSpec spec, ChangeRhe change) {
+  return [spec = std::move(spec), change = std::move(change)](const ModelPointer& model, unsigned seed) {
+    RandomProblem problems(model, 2000 + seed);
+    auto problem = problems.rhe(spec);
+    change(*problem, problems);
+    return cold(std::move(problem));
+  };
+}
+using ChangeRhc = std::function<void(RhcProblem&, RandomProblem&)>;
+Make changed(RhcSpec spec, ChangeRhc change) {
+  return [spec = std::move(spec), change = std::move(change)](const ModelPointer& model, unsigned seed) {
+    RandomProblem problems(model, 3000 + seed);
+    auto problem = problems.rhc(spec);
+    change(*problem, problems);
+    std::vector<double> scratch(problem->scratch_size());
+    problem->finish(scratch);
+    return cold(std::move(problem));
+  };
+}
+
+template <class Spec>
+Spec with(const std::function<void(Spec&)>& set) {
+  Spec spec;
+  set(spec);
+  return spec;
+}
+RheSpec rhe(const std::function<void(RheSpec&)>& set) { return with<RheSpec>(set); }
+RhcSpec rhc(const std::function<void(RhcSpec&)>& set) { return with<RhcSpec>(set); }
+
+/// Every parameter gets blocks that start where `starts(interval, parameter)` says.
+void set_blocks(RheProblem& problem, Transition transition, double variance,
+                const std::function<bool(int, int)>& starts) {
+  for (int j = 0; j < problem.model().parameter_count(); ++j) {
+    std::vector<std::uint8_t> begins(problem.intervals(), 0);
+    for (int i = 0; i < problem.intervals(); ++i) begins[i] = i == 0 || starts(i, j);
+    problem.set_blocks(j, begins.data(), transition);
+    for (int i = 0; i < problem.intervals(); ++i)
+      if (begins[i]) problem.link(i, j, variance);
+  }
+  problem.finish();
+}
+
+/// Smallest and largest value of each of `width` columns, with a margin of `share` of the variables' scales beyond.
+std::pair<std::vector<double>, std::vector<double>> hull(const std::vector<double>& rows,
+                                                         const std::vector<Variable>& variables, double share) {
+  const std::size_t width = variables.size();
+  std::vector<double> lower(width, infinity), upper(width, -infinity);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    lower[k % width] = std::min(lower[k % width], rows[k]);
+    upper[k % width] = std::max(upper[k % width], rows[k]);
+  }
+  for (std::size_t j = 0; j < width; ++j) {
+    lower[j] -= share * variables[j].scale;
+    upper[j] += share * variables[j].scale;
+  }
+  return {lower, upper};
+}
+
+/// A drive from the same start with inputs and parameters that are `share` of the given one's; bounds that hold it cut
+/// off parts of the given one, and are known to leave a point.
+Drive gentler(const Model& model, const Drive& d, double share) {
+  Drive other = d;
+  for (double& u : other.inputs) u *= share;
+  const auto& parameters = model.description().parameters;
+  for (std::size_t k = 0; k < other.parameters.size(); ++k) {
+    const Variable& v = parameters[k % parameters.size()];
+    other.parameters[k] = std::min(std::max(share * other.parameters[k], v.lower), v.upper);
+  }
+  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count();
+  for (std::size_t i = 0; i < d.durations.size(); ++i) {
+    Model::Intervals request;
+    request.count = 1;
+    request.states = other.states.data() + i * nx;
+    request.inputs = other.inputs.data() + i * nu;
+    request.parameters = other.parameters.data() + i * np;
+    request.durations = other.durations.data() + i;
+    request.next_states = other.states.data() + (i + 1) * nx;
+    model.integrate(request);
+  }
+  return other;
+}
+
+enum Bounded : unsigned { states = 1, inputs = 2, parameters = 4 };
+/// Estimation whose truth lies beyond bounds, so that they are active.
+Make beyond_bounds(unsigned which, bool unlinked_blocks) {
+  return [=](const ModelPointer& model, unsigned seed) {
+    RheSpec spec;
+    spec.block = unlinked_blocks ? 5 : 0;
+    spec.linked = !unlinked_blocks;
+    const auto& about = model->description();
+    spec.adjust = [&](RheProblem::Setup& setup, const Drive& d) {
+      const Drive inner = gentler(*model, d, 0.8);
+      if (which & states) std::tie(setup.state_lower, setup.state_upper) = hull(inner.states, about.states, 0.01);
+      if (which & inputs) std::tie(setup.input_lower, setup.input_upper) = hull(inner.inputs, about.inputs, 0.01);
+      if (which & parameters)
+        std::tie(setup.parameter_lower, setup.parameter_upper) = hull(inner.parameters, about.parameters, 0.01);
+    };
+    RandomProblem problems(model, 4000 + seed);
+    return cold(problems.rhe(spec));
+  };
+}
+
+/// Standing still, measured with noise: no input says anything about how it is scaled.
+void stand_still(RheProblem& problem, RandomProblem& random) {
+  const Model& model = problem.model();
+  const auto& about = model.description();
+  std::vector<double> here(model.output_count());
+  Model::Nodes request;
+  request.count = 1;
+  request.states = problem.arrival_mean.data();
+  request.outputs = here.data();
+  model.observe(request);
+  for (int i = 0; i <= problem.intervals(); ++i) {
+    for (int j = 0; j < model.output_count(); ++j)
+      problem.output(i)[j] = here[j] + 0.01 * about.outputs[j].scale * random.normal();
+    if (i < problem.intervals()) std::fill_n(problem.measured_input(i), model.input_count(), 0.0);
+  }
+}
+
+/// Information matrix with correlations: the diagonal one is kept on its scale.
+void correlate(RheProblem& problem, RandomProblem& random, int rank) {
+  const Eigen::VectorXd scale = problem.arrival_information.diagonal().cwiseSqrt();
+  const auto n = scale.size();
+  Eigen::MatrixXd factor(std::min<Eigen::Index>(rank, n), n);
+  for (Eigen::Index k = 0; k < factor.size(); ++k) factor.data()[k] = random.normal();
+  factor = factor * scale.asDiagonal();
+  problem.arrival_information = factor.transpose() * factor;
+}
+
+/// Moves a guess far off, and clips what is clipped by bounds: each state by up to `share` of its scale, each input
+/// too; parameters anywhere in their bounds. It is no trajectory any more.
+void scatter(const HorizonProblem& problem, RandomProblem& random, double share, Iterate& guess) {
+  const auto& about = problem.model().description();
+  const int nx = problem.model().state_count(), nu = problem.model().input_count(),
+            np = problem.model().parameter_count();
+  std::vector<double> u(static_cast<std::size_t>(problem.intervals()) * nu), p(problem.intervals() * np);
+  for (int i = 0; i < problem.intervals(); ++i) {
+    problem.inputs_on(guess, i, u.data() + i * nu);
+    problem.parameters_on(guess, i, p.data() + i * np);
+    for (int j = 0; j < nu; ++j) u[i * nu + j] += random.uniform(-share, share) * about.inputs[j].scale;
+    if (problem.kind() == OcpKind::rhe)
+      for (int j = 0; j < np; ++j) p[i * np + j] = random.typical(about.parameters[j]);
+  }
+  problem.set_decisions(guess, u.data(), p.data());
+  for (int i = 0; i <= problem.intervals(); ++i)
+    for (int j = 0; j < nx; ++j) guess.state(i)[j] += random.uniform(-share, share) * about.states[j].scale;
+}
+
+template <class Spec>
+Make scattered(Spec spec, double share) {
+  return [=, make = random(spec)](const ModelPointer& model, unsigned seed) {
+    Problem problem = make(model, seed);
+    RandomProblem noise(model, 5000 + seed);
+    scatter(*problem.ocp, noise, share, problem.guess);
+    return problem;
+  };
+}
+
+/// All states in a box around the start, a twentieth as wide as the vehicle moves on the first interval, and inputs
+/// and parameters that are all but those of the drive: it has to move, and may not.
+Problem no_room_to_move(const ModelPointer& model, unsigned seed) {
+  RheSpec spec;
+  spec.intervals = 5;
+  const auto& about = model->description();
+  spec.adjust = [&](RheProblem::Setup& setup, const Drive& d) {
+    const std::size_t nx = about.states.size();
+    double moved = 0.0;
+    for (std::size_t j = 0; j < nx; ++j)
+      moved = std::max(moved, std::abs(d.states[nx + j] - d.states[j]) / about.states[j].scale);
+    std::tie(setup.state_lower, setup.state_upper) =
+        hull({d.states.begin(), d.states.begin() + static_cast<std::ptrdiff_t>(nx)}, about.states, 0.025 * moved);
+    std::tie(setup.input_lower, setup.input_upper) = hull(
+        {d.inputs.begin(), d.inputs.begin() + static_cast<std::ptrdiff_t>(about.inputs.size())}, about.inputs, 1e-4);
+    std::tie(setup.parameter_lower, setup.parameter_upper) =
+        hull({d.parameters.begin(), d.parameters.begin() + static_cast<std::ptrdiff_t>(about.parameters.size())},
+             about.parameters, 1e-4);
+  };
+  RandomProblem problems(model, 6000 + seed);
+  return cold(problems.rhe(spec));
+}
+
+/// Whether nothing moves without input.
+bool can_stand_still(const Model& model) {
+  const auto& about = model.description();
+  std::vector<double> x, u(about.inputs.size(), 0.0), p, rates(about.states.size());
+  for (const Variable& v : about.states) x.push_back(std::min(std::max(0.5 * v.scale, v.lower), v.upper));
+  for (const Variable& v : about.parameters) p.push_back(std::min(std::max(0.5 * v.scale, v.lower), v.upper));
+  model.rates(x.data(), u.data(), p.data(), rates.data());
+  return std::all_of(rates.begin(), rates.end(), [](double rate) { return rate == 0.0; });
+}
+
+Problem fixed_state(const ModelPointer& model, unsigned seed) {
+  RhcSpec spec;
+  spec.off = 0.0;
+  spec.adjust = [&](RhcProblem::Setup& setup, const Drive& d) {
+    for (const Variable& v : model->description().states) {
+      setup.state_lower.push_back(v.lower);
+      setup.state_upper.push_back(v.upper);
+    }
+    setup.state_lower.back() = setup.state_upper.back() = d.states[setup.state_lower.size() - 1];
+  };
+  RandomProblem problems(model, 7000 + seed);
+  return cold(problems.rhc(spec));
+}
+
+Make without_second_derivatives(Make make) {
+  return [make = std::move(make)](ModelPointer model, unsigned seed) {
+    return make(std::make_shared<WithoutSecondDerivatives>(std::move(model)), seed);
+  };
+}
+
+double uneven_variance(RandomProblem& random, const Variable& v) {
+  return std::pow(v.scale * std::pow(10.0, random.uniform(-4.0, 1.0)), 2);
+}
+
+std::vector<Family> make_families() {
+  std::vector<Family> all;
+  const auto add = [&](std::string name, std::string meaning, Make make) -> Family& {
+    Family f;
+    f.name = std::move(name);
+    f.meaning = std::move(meaning);
+    f.make = std::move(make);
+    all.push_back(std::move(f));
+    return all.back();
+  };
+
+  // Estimation: block structures.
+  add("rhe_full_horizon", "one value of each parameter", random(RheSpec{})).problems = 5;
+  add("rhe_blocks", "blocks of four intervals, linked", random(rhe([](RheSpec& s) { s.block = 4; }))).problems = 5;
+  add("rhe_blocks_unlinked", "blocks of five intervals without links", random(rhe([](RheSpec& s) {
+        s.block = 5;
+        s.linked = false;
+      })))
+      .applies = has_parameters;
+  add("rhe_unblocked", "a value on every interval, linked", random(rhe([](RheSpec& s) { s.block = 1; })));
+  add("rhe_ramps", "linked ramps between blocks", random(rhe([](RheSpec& s) {
+        s.block = 4;
+        s.transition = Transition::ramp;
+      })))
+      .applies = has_parameters;
+  add("rhe_mixed_blocks", "each parameter with irregular blocks of its own",
+      changed(RheSpec{},
+              [](RheProblem& problem, RandomProblem& random) {
+                set_blocks(problem, Transition::step, 0.01,
+                           [&](int, int parameter) { return parameter > 0 && random.uniform(0.0, 1.0) < 0.3; });
+              }))
+      .applies = has_parameters;
+  add("rhe_uneven_links", "links of variances from very tight to very loose",
+      changed(rhe([](RheSpec& s) { s.block = 2; }),
+              [](RheProblem& problem, RandomProblem& random) {
+                for (int j = 0; j < problem.model().parameter_count(); ++j)
+                  for (int i = 1; i < problem.intervals(); ++i)
+                    if (problem.begins(i, j))
+                      problem.link(i, j, uneven_variance(random, problem.model().description().parameters[j]));
+              }))
+      .applies = has_parameters;
+
+  // Estimation: measurements.
+  add("rhe_robust", "pseudo-Huber loss, one fix in five far off",
+      changed(rhe([](RheSpec& s) {
+                s.block = 4;
+                s.robust = true;
+              }),
+              [](RheProblem& problem, RandomProblem& random) {
+                for (int i = 1; i <= problem.intervals(); ++i)
+                  if (random.uniform(0.0, 1.0) < 0.2)
+                    problem.output(i)[0] += 0.3 * random.normal() * problem.model().description().outputs[0].scale;
+              }))
+      .several_optima = true;
+  add("rhe_missing_outputs", "three outputs in ten are missing", random(rhe([](RheSpec& s) {
+        s.missing = 0.3;
+        s.block = 4;
+      })));
+  add("rhe_no_outputs", "all outputs are missing", random(rhe([](RheSpec& s) { s.missing = 1.1; })));
+  add("rhe_missing_inputs", "one measured input in five is missing",
+      random(rhe([](RheSpec& s) { s.missing_inputs = 0.2; })));
+  add("rhe_exact_measurements", "measurements without noise: the objective is all but zero",
+      changed(rhe([](RheSpec& s) { s.noise = 1e-6; }), [](RheProblem&, RandomProblem&) {}));
+  add("rhe_standing_still", "no input determines any parameter",
+      changed(rhe([](RheSpec& s) { s.block = 3; }), stand_still));
+  add("rhe_uneven_weights", "weights that are twelve orders of magnitude apart", random(rhe([](RheSpec& s) {
+        s.block = 4;
+        s.adjust = [](RheProblem::Setup& setup, const Drive&) {
+          setup.output_weights.front() *= 1e4;
+          setup.output_weights.back() *= 1e-4;
+          setup.input_weights.front() *= 1e-4;
+        };
+      })))
+      .several_optima = true;  // an interior point may leave a guess that one coordinate alone pins down
+
+  // Estimation: bounds.
+  add("rhe_states_at_bounds", "the truth leaves the bounds of states", beyond_bounds(states, false)).several_optima =
+      true;
+  add("rhe_inputs_at_bounds", "the truth leaves the bounds of inputs", beyond_bounds(inputs, false));
+  add("rhe_parameters_at_bounds", "the truth leaves the bounds of parameters", beyond_bounds(parameters, true))
+      .applies = has_parameters;
+  add("rhe_all_at_bounds", "the truth leaves bounds of every kind", beyond_bounds(states | inputs | parameters, true))
+      .several_optima = true;
+  add("rhe_fixed", "an input and the parameters are fixed: lower bound = upper bound", random(rhe([](RheSpec& s) {
+        s.block = 4;
+        s.adjust = [](RheProblem::Setup& setup, const Drive& d) {
+          setup.input_lower.assign(setup.input_weights.size(), -infinity);
+          setup.input_upper.assign(setup.input_weights.size(), infinity);
+          setup.input_lower[0] = setup.input_upper[0] = d.inputs[0];
+          const std::size_t np = d.parameters.size() / d.durations.size();
+          setup.parameter_lower.assign(d.parameters.begin(), d.parameters.begin() + static_cast<std::ptrdiff_t>(np));
+          setup.parameter_upper = setup.parameter_lower;
+        };
+      })));
+
+  // Estimation: the past.
+  add("rhe_dense_prior", "an information matrix full of correlations",
+      changed(rhe([](RheSpec& s) { s.block = 4; }), [](RheProblem& p, RandomProblem& r) { correlate(p, r, 1000); }));
+  add("rhe_singular_prior", "an information matrix of rank two",
+      changed(RheSpec{}, [](RheProblem& p, RandomProblem& r) { correlate(p, r, 2); }));
+  add("rhe_no_prior", "no arrival cost",
+      changed(RheSpec{}, [](RheProblem& p, RandomProblem&) { p.arrival_information.setZero(); }));
+  add("rhe_prior_far_off", "the arrival mean is ten standard deviations off",
+      changed(rhe([](RheSpec& s) { s.block = 4; }),
+              [](RheProblem& p, RandomProblem& random) {
+                for (int j = 0; j < p.model().state_count(); ++j)
+                  p.arrival_mean[j] +=
+                      (random.uniform(0.0, 1.0) < 0.5 ? -10.0 : 10.0) / std::sqrt(p.arrival_information(j, j));
+              }))
+      .several_optima = true;
+
+  // Estimation: horizons.
+  add("rhe_no_interval", "a horizon of one node", random(rhe([](RheSpec& s) { s.intervals = 0; })));
+  add("rhe_one_interval", "a horizon of one interval", random(rhe([](RheSpec& s) { s.intervals = 1; })));
+  add("rhe_two_intervals", "a horizon of two intervals, each a block", random(rhe([](RheSpec& s) {
+        s.intervals = 2;
+        s.block = 1;
+      })));
+  add("rhe_part_of_the_room", "a horizon shorter than the capacity", random(rhe([](RheSpec& s) {
+        s.intervals = 7;
+        s.room = 23;
+        s.block = 3;
+      })));
+  add("rhe_durations", "intervals from 0.01 s to 1 s", random(rhe([](RheSpec& s) {
+        s.dt = 0.01;
+        s.longest = 1.0;
+        s.block = 4;
+      })));
+  add("rhe_200_intervals", "200 intervals, blocks of ten", random(rhe([](RheSpec& s) {
+        s.intervals = 200;
+        s.block = 10;
+      })))
+      .problems = 1;
+  all.back().several_optima = true;  // a guess that has drifted for 40 s is far
+  add("rhe_200_intervals_unblocked", "200 intervals, a value of each parameter on every one",
+      random(rhe([](RheSpec& s) {
+        s.intervals = 200;
+        s.block = 1;
+      })))
+      .problems = 1;
+  all.back().several_optima = true;  // a guess that has drifted for 40 s is far
+
+  // Estimation: starts, models, and what cannot be.
+  add("rhe_far_guess", "a guess that is no trajectory", scattered(rhe([](RheSpec& s) { s.block = 4; }), 0.5))
+      .several_optima = true;
+  add("rhe_without_second_derivatives", "a model without second derivatives",
+      without_second_derivatives(random(rhe([](RheSpec& s) { s.block = 4; }))));
+  add("rhe_infeasible", "the vehicle has to move and has no room", no_room_to_move).answer = Family::Answer::infeasible;
+
+  // Control.
+  add("rhc_near", "the vehicle starts near the path", random(rhc([](RhcSpec& s) { s.off = 0.05; }))).problems = 5;
+  add("rhc_off", "the vehicle starts far from the path", random(rhc([](RhcSpec& s) { s.off = 0.3; }))).several_optima =
+      true;
+  all.back().problems = 5;
+  add("rhc_one_interval", "a horizon of one interval", random(rhc([](RhcSpec& s) { s.intervals = 1; })));
+  add("rhc_two_intervals", "a horizon of two intervals", random(rhc([](RhcSpec& s) { s.intervals = 2; })));
+  add("rhc_part_of_the_room", "a horizon shorter than the capacity", random(rhc([](RhcSpec& s) {
+        s.intervals = 7;
+        s.room = 23;
+      })));
+  add("rhc_200_intervals", "200 intervals", random(rhc([](RhcSpec& s) {
+        s.intervals = 200;
+        s.off = 0.05;
+      })))
+      .problems = 1;
+  all.back().several_optima = true;
+  add("rhc_durations", "intervals from 0.05 s to 0.5 s", random(rhc([](RhcSpec& s) {
+        s.dt = 0.05;
+        s.longest = 0.5;
+      })));
+  add("rhc_blocked_input", "the first input in blocks of three",
+      random(rhc([](RhcSpec& s) { s.blocked_inputs = {0}; })));
+  add("rhc_all_inputs_blocked", "every input in blocks of three", [](const ModelPointer& model, unsigned seed) {
+    RhcSpec spec;
+    for (int j = 0; j < model->input_count(); ++j) spec.blocked_inputs.push_back(j);
+    return random(spec)(model, seed);
+  });
+  add("rhc_states_at_bounds", "the path leaves the bounds of states", [](const ModelPointer& model, unsigned seed) {
+    RhcSpec spec;
+    spec.off = 0.0;
+    spec.adjust = [&](RhcProblem::Setup& setup, const Drive& d) {
+      std::tie(setup.state_lower, setup.state_upper) =
+          hull(gentler(*model, d, 0.8).states, model->description().states, 0.01);
+    };
+    RandomProblem problems(model, 4000 + seed);
+    return cold(problems.rhc(spec));
+  }).several_optima = true;
+  add("rhc_inputs_at_bounds", "bounds of inputs that the path needs more than, other ones on each interval",
+      changed(RhcSpec{}, [](RhcProblem& problem, RandomProblem& random) {
+        for (int i = 0; i < problem.intervals(); ++i) {
+          for (int j = 0; j < problem.model().input_count(); ++j) {
+            const double wanted = problem.input_reference(i)[j];
+            const double room = random.uniform(0.01, 0.2) * problem.model().description().inputs[j].scale;
+            problem.input_lower(i, j) = 0.8 * wanted - room;
+            problem.input_upper(i, j) = 0.8 * wanted + room;
+          }
+        }
+      }));
+  add("rhc_fixed_inputs", "inputs are fixed on the first intervals: lower bound = upper bound",
+      changed(RhcSpec{}, [](RhcProblem& problem, RandomProblem&) {
+        for (int i = 0; i < 5; ++i)
+          for (int j = 0; j < problem.model().input_count(); ++j)
+            problem.input_lower(i, j) = problem.input_upper(i, j) = 0.9 * problem.input_reference(i)[j];
+      }));
+  add("rhc_fixed_state", "the last state has to stay as it is at the start", fixed_state).applies = can_stand_still;
+  add("rhc_far_guess", "a guess that is no trajectory", scattered(rhc([](RhcSpec& s) { s.off = 0.05; }), 0.5))
+      .several_optima = true;
+  add("rhc_without_second_derivatives", "a model without second derivatives",
+      without_second_derivatives(random(rhc([](RhcSpec& s) { s.off = 0.05; }))))
+      .several_optima = true;
+  add("rhc_infeasible", "the lower bound of an input is above its upper bound",
+      changed(RhcSpec{},
+              [](RhcProblem& problem, RandomProblem&) {
+                problem.input_lower(3, 0) = problem.input_reference(3)[0] + 0.2;
+                problem.input_upper(3, 0) = problem.input_reference(3)[0] - 0.2;
+              }))
+      .answer = Family::Answer::infeasible;
+  return all;
+}
+
+}  // namespace
+
+const std::vector<Family>& families() {
+  static const std::vector<Family> all = make_families();
+  return all;
+}
+
+int problem_count(const Family& family) {
+  const char* wanted = std::getenv("RHEC_CONFORMANCE_PROBLEMS");
+  return wanted ? std::max(family.problems, std::atoi(wanted)) : family.problems;
+}
+
+const Family& family(const std::string& name) {
+  for (const Family& each : families())
+    if (each.name == name) return each;
+  throw std::out_of_range("no family of problems is called " + name);
+}
+
+const std::vector<std::string>& models_of_the_suite() {
+  static const std::vector<std::string> names = {"integrator", "wide_chain"};
+  return names;
+}
+
+std::vector<std::string> model_names() {
+  std::vector<std::string> names = host().names(PluginKind::model);
+  names.insert(names.end(), models_of_the_suite().begin(), models_of_the_suite().end());
+  return names;
+}
+
+std::shared_ptr<const Model> make_model(const std::string& name) {
+  if (name == "integrator") return std::make_shared<FormulaModel<Integrator>>(Integrator{}, about_integrator());
+  if (name == "wide_chain") return std::make_shared<FormulaModel<WideChain>>(WideChain{}, about_wide_chain());
+  return host().make_model(name);
+}
+
+bool applies(const Family& family, const std::string& model_name, const Model& model) {
+  if (model_name == "wide_chain") return family.name == "rhe_blocks" || family.name == "rhc_near";
+  return family.applies(model);
+}
+
+std::unique_ptr<HorizonProblem> integrator_in_a_box(double lower_input, double upper_input) {
+  RheProblem::Setup setup;
+  setup.max_intervals = 10;
+  setup.output_weights = {1.0};
+  setup.input_weights = {1.0};
+  setup.state_lower = {0.0};
+  setup.state_upper = {1.0};
+  setup.input_lower = {lower_input};
+  setup.input_upper = {upper_input};
+  auto problem = std::make_unique<RheProblem>(make_model("integrator"), setup);
+  problem->set_intervals(10);
+  problem->finish();
+  problem->arrival_information(0, 0) = 1.0;
+  for (int i = 0; i <= 10; ++i) {
+    problem->output(i)[0] = 0.5;
+    if (i == 10) break;
+    problem->measured_input(i)[0] = 1.0;
+    problem->set_duration(i, 1.0);
+  }
+  return problem;
+}
+
+}  // namespace rhec::conformance

@@ -1,0 +1,96 @@
+// The judge itself: it must see through a solver whose report or point is wrong.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <utility>
+
+#include "families.hpp"
+#include "found.hpp"
+#include "judge.hpp"
+
+namespace rhec::conformance {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+using Lie = std::function<void(const Ocp&, Iterate&, Report&)>;
+
+/// An honest solver whose answers are changed afterwards.
+class Liar final : public Solver {
+ public:
+  explicit Liar(Lie lie) : honest_(make_solver(host().names(PluginKind::solver).front())), lie_(std::move(lie)) {}
+  std::string why_not(const Ocp& ocp) const override { return honest_->why_not(ocp); }
+  void setup(const Ocp& ocp) override { honest_->setup(ocp); }
+  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override { honest_->prepare(ocp, guess); }
+  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override {
+    Report report = honest_->solve(ocp, point, deadline);
+    lie_(ocp, point, report);
+    return report;
+  }
+  void reset() noexcept override { honest_->reset(); }
+
+ private:
+  std::shared_ptr<Solver> honest_;
+  Lie lie_;
+};
+
+std::vector<std::string> complaints_about(const std::string& family_name, Lie lie) {
+  const Problem problem = family(family_name).make(make_model(host().names(PluginKind::model).front()), 1);
+  Liar solver(std::move(lie));
+  solver.setup(*problem.ocp);
+  return solve_and_judge(solver, *problem.ocp, problem.guess, 1e-8).complaints;
+}
+
+TEST(Judge, HasNothingToSayAboutAnHonestSolver) {
+  for (const char* name : {"rhe_all_at_bounds", "rhc_inputs_at_bounds", "rhe_infeasible"})
+    EXPECT_THAT(complaints_about(name, [](const Ocp&, Iterate&, Report&) {}), IsEmpty()) << name;
+}
+
+TEST(Judge, SeesAStatusThatIsNotTrue) {
+  EXPECT_THAT(complaints_about("rhe_blocks", [](const Ocp&, Iterate& point, Report&) { point.control(3)[0] += 1e-3; }),
+              Contains(HasSubstr("it says solved with a KKT residual")));
+  EXPECT_THAT(
+      complaints_about("rhe_blocks", [](const Ocp&, Iterate&, Report& report) { report.status = Status::stalled; }),
+      Contains(HasSubstr("it says stalled of a point with a KKT residual")));
+  EXPECT_THAT(complaints_about("rhe_infeasible", [](const Ocp&, Iterate& point, Report&) { point.state(1)[0] += 1.0; }),
+              Contains("it says infeasible and has changed the point"));
+}
+
+TEST(Judge, SeesAReportThatIsNotThePoints) {
+  EXPECT_THAT(complaints_about("rhc_near", [](const Ocp&, Iterate&, Report& report) { report.objective += 1e-6; }),
+              Contains(HasSubstr("it reports an objective")));
+  EXPECT_THAT(complaints_about("rhc_near", [](const Ocp&, Iterate&, Report& report) { report.kkt.defect = 1e-3; }),
+              Contains(HasSubstr("it reports a KKT residual")));
+  EXPECT_THAT(
+      complaints_about("rhc_near", [](const Ocp&, Iterate& point,
+                                      Report&) { point.costate(2)[0] = std::numeric_limits<double>::quiet_NaN(); }),
+      Contains("the point is not finite"));
+}
+
+// These are seen without the core's residual.
+TEST(Judge, SeesASolutionThatIsNone) {
+  const auto all_costates = [](const Ocp& ocp, Iterate& point, double factor) {
+    for (int i = 0; i <= ocp.intervals(); ++i)
+      for (int j = 0; j < ocp.state_count(i); ++j) point.costate(i)[j] *= factor;
+  };
+  EXPECT_THAT(
+      complaints_about("rhc_off", [&](const Ocp& ocp, Iterate& point, Report&) { all_costates(ocp, point, -1.0); }),
+      Contains(HasSubstr("the Lagrangian is not stationary")));
+  EXPECT_THAT(complaints_about("rhe_blocks", [](const Ocp&, Iterate& point, Report&) { point.state(4)[0] += 1e-4; }),
+              Contains(HasSubstr("its defect is")));
+  EXPECT_THAT(
+      complaints_about("rhc_inputs_at_bounds", [](const Ocp& ocp, Iterate& point,
+                                                  Report&) { point.control(2)[0] = ocp.control_upper(2)[0] + 1e-4; }),
+      Contains(HasSubstr("it violates a bound")));
+  EXPECT_THAT(
+      complaints_about("rhc_near", [](const Ocp&, Iterate& point, Report&) { point.control_bound(2)[0] = 1.0; }),
+      Contains(HasSubstr("a multiplier is not at its bound")));
+}
+
+}  // namespace
+}  // namespace rhec::conformance
