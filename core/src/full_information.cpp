@@ -64,7 +64,7 @@ FullInformationEstimation::FullInformationEstimation(std::shared_ptr<const Model
                                                      Setup setup)
     : model_(std::move(model)), solver_(std::move(solver)), setup_(std::move(setup)) {
   const auto np = static_cast<std::size_t>(model_->parameter_count());
-  const auto n = static_cast<Eigen::Index>(model_->state_count() + model_->parameter_count());
+  const auto n = Eigen::Index{model_->state_count()} + model_->parameter_count();
   if (setup_.blockings.size() != np || setup_.walks.size() != np)
     throw Error(fmt::format("smoother: {} blockings and {} parameter walks given; expected {} of each, one a parameter",
                             setup_.blockings.size(), setup_.walks.size(), np));
@@ -229,7 +229,7 @@ SmoothedRun FullInformationEstimation::estimate(const NodeLog& log, Clock::time_
       run.start_parameters.push_back(ramp ? point.state(node)[nx + j] : run.parameters[i * np + j]);
     }
   }
-  const auto n = static_cast<std::size_t>(nx + np);
+  const std::size_t n = static_cast<std::size_t>(nx) + static_cast<std::size_t>(np);
   run.covariances.resize((static_cast<std::size_t>(N) + 1) * n * n);
   if (!solver_->covariances(problem, point, run.covariances)) run.covariances.clear();
   return run;

@@ -168,7 +168,7 @@ void SparseNlp::jacobian(const StageQp& qp, double* values) const noexcept {
   int entry = 0;
   const auto scatter = [&](const double* matrix, int column_start, int columns) {
     for (const int end = jacobian_.starts[column_start + columns]; entry < end; ++entry)
-      values[entry] = jacobian_sources_[entry] < 0 ? -1.0 : matrix[jacobian_sources_[entry]];
+      values[entry] = jacobian_sources_[entry] >= 0 && matrix ? matrix[jacobian_sources_[entry]] : -1.0;
   };
   for (int i = 0; i <= qp.intervals(); ++i) {
     if (state_starts_[i] >= 0) scatter(i < qp.intervals() ? qp.A(i) : nullptr, state_starts_[i], state_counts_[i]);

@@ -51,7 +51,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
 
   const Model& model = *robot.model();
   const int nx = model.state_count(), np = model.parameter_count();
-  const auto n = static_cast<std::ptrdiff_t>(nx + np);
+  const std::ptrdiff_t n = std::ptrdiff_t{nx} + np;
   std::vector<double> outputs(model.output_count());
   int x_output = -1, y_output = -1;
   for (int j = 0; j < model.output_count(); ++j) {

@@ -75,7 +75,7 @@ struct KktFactor::Symbolic {
 
     // Sort the entries into columns, and by rows within them: two stable counting passes.
     const std::size_t entries = rows.size();
-    const auto size = static_cast<std::size_t>(n + m);
+    const std::size_t size = static_cast<std::size_t>(n) + static_cast<std::size_t>(m);
     std::vector<int> order(entries), next(entries), starts(size + 1, 0);
     for (std::size_t k = 0; k < entries; ++k) order[k] = static_cast<int>(k);
     for (const std::vector<int>* key : {&rows, &columns}) {
@@ -126,7 +126,7 @@ void KktFactor::take_structure(const SparseNlp& nlp) {
   nlp_ = &nlp;
   n_ = nlp.variables();
   m_ = nlp.constraints();
-  const auto size = static_cast<std::size_t>(n_ + m_);
+  const std::size_t size = static_cast<std::size_t>(n_) + static_cast<std::size_t>(m_);
   for (auto* vector : {&scale_, &norm_, &right_, &residual_, &correction_, &terms_}) vector->assign(size, 0.0);
   const auto& signature = nlp.signature();
   if (const auto at = known_.find(signature); at != known_.end()) {
