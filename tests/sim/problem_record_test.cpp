@@ -372,7 +372,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "{blocking: {kappa: {name: unblocked, neighbour_sigma: 0.04}}}",
                       "{controller: {blocking: {u1: {name: pattern, lengths: [1, 2, 4, 8]}}}}",
                       "{estimator: {heading_starts: 4, initial: {sigma: {beta: 3}}}}",
-                      "{estimator: {robust: {outputs: [x_gps, y_gps]}, solver: {mode: converge}}}", impossible));
+                      "{estimator: {robust: {outputs: [x_gps, y_gps]}, solver: {mode: converge}}}",
+                      "{estimator: {robust: {outputs: [x_gps, y_gps]}}}", impossible));
 
 TEST_P(Replayed, GivesTheSameBits) {
   Settings settings = parse_yaml("{speed: 10, path: {laps: 1, radius: 12}}", "scenario");
