@@ -36,7 +36,8 @@ bool bounds_are_numbers(const Ocp& ocp) noexcept {
 }  // namespace
 
 bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept {
-  return is_finite(ocp, point) && bounds_are_numbers(ocp) && std::isfinite(ocp.evaluate(point, nullptr, scratch));
+  return point.capacity() == ocp.capacity() && is_finite(ocp, point) && bounds_are_numbers(ocp) &&
+         std::isfinite(ocp.evaluate(point, nullptr, scratch));
 }
 
 double largest_costate(const Ocp& ocp, const Iterate& point) noexcept {

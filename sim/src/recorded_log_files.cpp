@@ -111,7 +111,7 @@ std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogSc
   picture.subtitle = replay.name;
   if (summary.all.count > 0)
     picture.subtitle +=
-        fmt::format("; {} withheld fixes predicted to {:.3f} m in the median", summary.all.count, summary.all.median);
+        fmt::format("; {} withheld fixes met to {:.3f} m in the median", summary.all.count, summary.all.median);
   for (const Fix& fix : log.fixes) picture.fixes.push_back({fix.x, fix.y});
   for (const LoggedEstimate& entry : replay.estimates)
     if (!entry.held_out)

@@ -107,7 +107,7 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
   const auto start = Clock::now();
   prepared_ = false;
   use_exact_ = false;
-  if (!(ocp.capacity() == capacity_) || !is_finite(ocp, guess)) return;
+  if (!(ocp.capacity() == capacity_) || !(guess.capacity() == capacity_) || !is_finite(ocp, guess)) return;
   prepared_point_ = guess;
   linearise(ocp, prepared_point_);
   qp_solver_.guess_from(qp_, prepared_point_);

@@ -186,7 +186,6 @@ bool SparseQp::solve_active(const Program& program, int rounds) {
 
 SparseQp::Outcome SparseQp::solve(const Program& program, double* step, double* multipliers, double* bound_multipliers,
                                   Clock::time_point deadline) {
-  factorisations_ = 0;
   regularisation_ = first_regularisation;
   used_interior_point_ = false;
   factor_is_final_ = false;
@@ -218,10 +217,12 @@ SparseQp::Outcome SparseQp::solve_relaxed(const Program& program, double penalty
 SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalty, Clock::time_point deadline) {
   used_interior_point_ = true;
   for (int k = 0; k < n_; ++k) active_[k] = program.lower[k] == program.upper[k] ? 2 : 0;
-  // The reduced Hessian must be positive definite without any bound's help.
-  std::fill(primal_.begin(), primal_.end(), 0.0);
-  std::fill(dual_.begin(), dual_.end(), 0.0);
-  if (!factor_with(program)) return program.is_convex ? Outcome::failed : Outcome::indefinite;
+  if (!program.is_convex) {
+    // The reduced Hessian must be positive definite without any bound's help.
+    std::fill(primal_.begin(), primal_.end(), 0.0);
+    std::fill(dual_.begin(), dual_.end(), 0.0);
+    if (!factor_with(program)) return Outcome::indefinite;
+  }
 
   const double gradient_size = 1.0 + max_abs(program.gradient, n_);
   start_interior(program, penalty, std::clamp(0.1 * gradient_size, 1e-2, 1e4));
@@ -377,16 +378,6 @@ double SparseQp::interior_length(double share) const noexcept {
 
 /// Turns the interior solution into one with bounds that are active or not: exactly, where solving with them settles.
 void SparseQp::finish_interior(const Program& program, bool relaxed) {
-  const auto set_multipliers = [&] {
-    std::fill(mu_.begin(), mu_.end(), 0.0);
-    for (const Pair& pair : pairs_) {
-      if (!pair.is_bound() || pair.s > pair.z) continue;
-      mu_[pair.index] = pair.kind == Pair::Kind::lower ? -pair.z : pair.z;
-    }
-    // Of what is fixed, the interior point had no multiplier: it is what stationarity lacks.
-    for (int k = 0; k < n_; ++k)
-      if (program.lower[k] == program.upper[k]) mu_[k] = -dual_residual_[k];
-  };
   if (!relaxed) {
     const auto d = d_, lambda = lambda_;
     for (const Pair& pair : pairs_)
@@ -395,7 +386,14 @@ void SparseQp::finish_interior(const Program& program, bool relaxed) {
     d_ = d;
     lambda_ = lambda;
   }
-  set_multipliers();
+  std::fill(mu_.begin(), mu_.end(), 0.0);
+  for (const Pair& pair : pairs_) {
+    if (!pair.is_bound() || pair.s > pair.z) continue;
+    mu_[pair.index] = pair.kind == Pair::Kind::lower ? -pair.z : pair.z;
+  }
+  // Of what is fixed, the interior point had no multiplier: it is what stationarity lacks.
+  for (int k = 0; k < n_; ++k)
+    if (program.lower[k] == program.upper[k]) mu_[k] = -dual_residual_[k];
 }
 
 bool SparseQp::correct(const Program& program, const double* constraints, double* step) {

@@ -51,7 +51,7 @@ class SparseQp {
   /// zero for other constraint values: the second-order correction.
   bool correct(const Program& program, const double* constraints, double* step);
 
-  int factorisations() const noexcept { return factorisations_; }
+  int factorisations() const noexcept { return factorisations_; }  ///< so far
   bool used_interior_point() const noexcept { return used_interior_point_; }
   KktFactor& factor() noexcept { return factor_; }
 

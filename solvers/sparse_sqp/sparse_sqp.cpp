@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <limits>
+#include <new>
 #include <utility>
 
 #include "rhec/core/point.hpp"
@@ -153,12 +153,10 @@ void SparseSqp::convexify() {
 /// Finds the step of the quadratic program, with relaxed equations where there is no other.
 SparseQp::Outcome SparseSqp::find_step(Report& report, Clock::time_point deadline) {
   auto outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
-  report.factorisations += qp_.factorisations();
   was_bent_ = outcome == SparseQp::Outcome::indefinite;
   if (was_bent_) {
     convexify();
     outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
-    report.factorisations += qp_.factorisations();
   }
   predicted_defect_ = 0.0;
   if (outcome != SparseQp::Outcome::failed) {
@@ -168,7 +166,7 @@ SparseQp::Outcome SparseSqp::find_step(Report& report, Clock::time_point deadlin
   report.fallback_used = true;
   const double defect = norm1(constraints_);
   double penalty = std::max(penalty_, 1e2 * (1.0 + max_abs(gradient_)));
-  outcome = solve_relaxed(penalty, deadline, report);
+  outcome = solve_relaxed(penalty, deadline);
   // A penalty is high enough when most of the defect goes, or when a higher one could not do much better.
   while (outcome == SparseQp::Outcome::relaxed && predicted_defect_ > 0.1 * defect && penalty < largest_penalty) {
     penalty *= 100.0;
@@ -176,7 +174,7 @@ SparseQp::Outcome SparseSqp::find_step(Report& report, Clock::time_point deadlin
     relaxed_step_ = step_;
     relaxed_multipliers_ = step_multipliers_;
     relaxed_bound_multipliers_ = step_bound_multipliers_;
-    const auto next = solve_relaxed(penalty, deadline, report);
+    const auto next = solve_relaxed(penalty, deadline);
     if (next == SparseQp::Outcome::deadline) return next;
     if (next == SparseQp::Outcome::relaxed && predicted_defect_ < 0.9 * last) continue;
     step_ = relaxed_step_;
@@ -189,10 +187,9 @@ SparseQp::Outcome SparseSqp::find_step(Report& report, Clock::time_point deadlin
 }
 
 /// The step with relaxed equations; `predicted_defect_` gets what it leaves of them.
-SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point deadline, Report& report) {
+SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point deadline) {
   const auto outcome = qp_.solve_relaxed(program(), penalty, step_.data(), step_multipliers_.data(),
                                          step_bound_multipliers_.data(), deadline);
-  report.factorisations += qp_.factorisations();
   if (outcome != SparseQp::Outcome::relaxed) return outcome;
   const auto& J = nlp_.jacobian();
   trial_constraints_ = constraints_;
@@ -247,8 +244,8 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
 }
 
 Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point deadline) {
-  bool use_exact =
-      options_.hessian == Curvature::exact || (options_.hessian == Curvature::automatic && ocp.kind() == OcpKind::rhc);
+  bool use_exact = options_.hessian == Curvature::exact || (options_.hessian == Curvature::automatic &&
+                                                            ocp.kind() == OcpKind::rhc && ocp.has_second_derivatives());
   double last_residual = std::numeric_limits<double>::infinity();
   int slow = 0;
   bool took_full_step = false;
@@ -288,6 +285,7 @@ Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point dead
     // merits differ by rounding only, and the exact curvature is what converges.
     if (use_exact && (!accepted || (was_bent_ && residual > near_solution))) {
       const bool exact_accepted = accepted;
+      const double exact_predicted_defect = predicted_defect_;
       std::swap(trial_, other_trial_);
       linearise(ocp, Hessian::gauss_newton);
       const auto other = find_step(report, deadline);
@@ -296,6 +294,7 @@ Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point dead
       // Both by the same penalty, which the second search may have raised.
       if (exact_accepted && (!accepted || merit(ocp, other_trial_) < after)) {
         std::swap(trial_, other_trial_);
+        predicted_defect_ = exact_predicted_defect;
         accepted = true;
       } else {
         outcome = other;
@@ -314,6 +313,8 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
   const auto start = Clock::now();
   Report report;
   if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_)) return report;
+  current_ = point;
+  const int factorisations_before = qp_.factorisations();
   try {
     take_structure(ocp);
     penalty_ = 0.0;
@@ -328,13 +329,13 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
     }
     nlp_.read(ocp, point, z_.data(), multipliers_.data(), bound_multipliers_.data());
     for (std::size_t k = 0; k < z_.size(); ++k) z_[k] = std::clamp(z_[k], lower_z_[k], upper_z_[k]);
-    current_ = point;
     nlp_.write(ocp, z_.data(), nullptr, nullptr, current_);
     report.status = iterate(ocp, report, deadline);
   } catch (const std::bad_alloc&) {
     reset();  // what was made for the structure may be incomplete
     report.status = Status::stalled;
   }
+  report.factorisations = qp_.factorisations() - factorisations_before;
   if (report.status != Status::infeasible && is_sound_start(ocp, current_, scratch_)) std::swap(point, current_);
   judge(ocp, point, report, start);
   return report;

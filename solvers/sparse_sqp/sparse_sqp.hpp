@@ -51,7 +51,7 @@ class SparseSqp final : public Solver {
   bool search(const Ocp& ocp, double residual, double& after);
   Status iterate(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome find_step(Report& report, Clock::time_point deadline);
-  SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline, Report& report);
+  SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);
   SparseQp::Program program() const noexcept;
 
   Options options_;

@@ -10,8 +10,8 @@ namespace rhec {
 
 /// Every state, control and multiplier is finite.
 RHEC_EXPORT bool is_finite(const Ocp& ocp, const Iterate& point) noexcept;
-/// A solver can start here: the point and its objective are finite, and no bound is NaN. `scratch` is of the Ocp's
-/// `scratch_size()`.
+/// A solver can start here: point and objective are finite, the capacities are the same, and no bound is NaN. `scratch`
+/// is of the Ocp's `scratch_size()`.
 RHEC_EXPORT bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept;
 /// max |costate| of nodes 1 .. N; zero means that the point has no history.
 RHEC_EXPORT double largest_costate(const Ocp& ocp, const Iterate& point) noexcept;
