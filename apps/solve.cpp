@@ -142,13 +142,13 @@ class Bench {
     const auto start = Clock::now();
     solver_->prepare(*problem_, point);
     const Report report = solver_->solve(*problem_, point);
-    const std::chrono::duration<double, std::micro> time = Clock::now() - start;
+    const double time = microseconds_since(start);
     Outcome outcome;
     outcome.solver = name_;
     outcome.status = report.status;
     outcome.iterations = report.iterations;
     outcome.kkt_residual = kkt_residual(*problem_, point, qp_, scratch_).largest();
-    outcome.solve_time_us = time.count();
+    outcome.solve_time_us = time;
     return outcome;
   }
 

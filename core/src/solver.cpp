@@ -44,6 +44,15 @@ const char* advice_for(Status status) noexcept {
 
 bool is_usable(Status status) noexcept { return status != Status::infeasible && status != Status::bad_input; }
 
+void judge(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch, Report& report) noexcept {
+  report.objective = ocp.evaluate(point, nullptr, scratch);
+  report.kkt = kkt_residual(ocp, point, qp, scratch);
+}
+
+double microseconds_since(Clock::time_point start) noexcept {
+  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
+
 bool Solver::covariances(const Ocp&, const Iterate&, std::span<double>) noexcept { return false; }
 
 }  // namespace rhec

@@ -141,12 +141,12 @@ class Bench {
     const auto start = Clock::now();
     solver_->prepare(*record.problem, point);
     const Report report = solver_->solve(*record.problem, point);
-    const std::chrono::duration<double, std::micro> time = Clock::now() - start;
+    const double time = microseconds_since(start);
     Answer answer;
     answer.status = report.status;
     answer.usable = rhec::is_usable(report.status) && is_finite(*record.problem, point);
     answer.iterations = report.iterations;
-    answer.time_us = time.count();
+    answer.time_us = time;
     return answer;
   }
 

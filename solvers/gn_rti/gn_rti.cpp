@@ -16,10 +16,6 @@ constexpr double near_solution = 1e-3;
 // Differences of the merit below this part of it are rounding.
 constexpr double merit_rounding = 1e-13;
 
-double microseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
-}
-
 /// Visits every pair of corresponding rows of two iterates: function(kind-agnostic destination, source, length).
 template <class Function>
 void for_each_primal_row(const Ocp& ocp, Iterate& to, const Iterate& from, const Function& function) {
@@ -167,11 +163,6 @@ double GnRti::merit(const Ocp& ocp, const Iterate& point) noexcept {
   return objective + defect_penalty_ * defect + bound_penalty_ * total_violation(ocp, point);
 }
 
-void GnRti::judge(const Ocp& ocp, const Iterate& point, Report& report) noexcept {
-  report.objective = ocp.evaluate(point, nullptr, scratch_);
-  report.kkt = kkt_residual(ocp, point, qp_, scratch_);
-}
-
 Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
   const auto start = Clock::now();
   Report report;
@@ -224,7 +215,7 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
       report.status = Status::iteration_limit;
     std::swap(point, best_);
   }
-  judge(ocp, point, report);
+  judge(ocp, point, qp_, scratch_, report);
   return report;
 }
 
@@ -336,7 +327,7 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
   }
   const double objective = ocp.evaluate(best_, nullptr, scratch_);
   if (report.status != Status::infeasible && is_finite(ocp, best_) && std::isfinite(objective)) std::swap(point, best_);
-  judge(ocp, point, report);
+  judge(ocp, point, qp_, scratch_, report);
   return report;
 }
 

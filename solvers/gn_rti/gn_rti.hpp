@@ -56,7 +56,6 @@ class GnRti final : public Solver {
   void roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept;
   double merit(const Ocp& ocp, const Iterate& point) noexcept;
   bool search_along_step(const Ocp& ocp, double residual, double& merit_after) noexcept;
-  void judge(const Ocp& ocp, const Iterate& point, Report& report) noexcept;
 
   Options options_;
   Capacity capacity_;

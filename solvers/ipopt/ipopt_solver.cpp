@@ -40,10 +40,6 @@ std::timed_mutex& backend_lock() {
   return lock;
 }
 
-double microseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
-}
-
 /// (x - 1)^2 with 0 <= x: a problem to find out whether Ipopt can start with the options that it was given.
 class Trial final : public Ipopt::TNLP {
  public:
@@ -326,10 +322,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     report.status = Status::stalled;
   }
   report.iterations = iterations_;
-  if (report.status != Status::bad_input) {
-    report.objective = ocp.evaluate(point, nullptr, scratch_);
-    report.kkt = kkt_residual(ocp, point, judge_, scratch_);
-  }
+  if (report.status != Status::bad_input) judge(ocp, point, judge_, scratch_, report);
   report.feedback_us = microseconds_since(start);
   return report;
 }

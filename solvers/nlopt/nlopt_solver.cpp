@@ -32,10 +32,6 @@ constexpr double distances[] = {1e-9, 1e-6, 1e-4};
 // Curvature below this part of the largest is taken as if it were that.
 constexpr double least_curvature = 1e-10;
 
-double microseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
-}
-
 /// Makes a symmetric matrix positive definite by reflecting its negative eigenvalues.
 Matrix reflected(const Matrix& symmetric) {
   const Eigen::SelfAdjointEigenSolver<Matrix> eigen(symmetric);
@@ -134,8 +130,7 @@ Report NloptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
       report = optimise(ocp, point, deadline);
     } catch (const std::exception&) {  // memory ran out; `point` is written last
       report.status = Status::stalled;
-      report.objective = ocp.evaluate(point, nullptr, scratch_);
-      report.kkt = kkt_residual(ocp, point, qp_, scratch_);
+      rhec::judge(ocp, point, qp_, scratch_, report);
     }
     report.factorisations = factorisations_;
   }
@@ -147,8 +142,7 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& point, Clock::time_point d
   Report report;
   const auto leave_as_it_was = [&](Status status) {
     report.status = status;
-    report.objective = ocp.evaluate(point, nullptr, scratch_);
-    report.kkt = kkt_residual(ocp, point, qp_, scratch_);
+    rhec::judge(ocp, point, qp_, scratch_, report);
     return report;
   };
   if (!problem_.take(ocp)) return leave_as_it_was(Status::infeasible);

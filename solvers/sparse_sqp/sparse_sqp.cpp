@@ -324,7 +324,8 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
     for (std::size_t k = 0; k < z_.size(); ++k) bounds_cross = bounds_cross || lower_z_[k] > upper_z_[k];
     if (bounds_cross) {
       report.status = Status::infeasible;
-      judge(ocp, point, report, start);
+      judge(ocp, point, stages_, scratch_, report);
+      report.feedback_us = microseconds_since(start);
       return report;
     }
     nlp_.read(ocp, point, z_.data(), multipliers_.data(), bound_multipliers_.data());
@@ -337,14 +338,9 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
   }
   report.factorisations = qp_.factorisations() - factorisations_before;
   if (report.status != Status::infeasible && is_sound_start(ocp, current_, scratch_)) std::swap(point, current_);
-  judge(ocp, point, report, start);
+  judge(ocp, point, stages_, scratch_, report);
+  report.feedback_us = microseconds_since(start);
   return report;
-}
-
-void SparseSqp::judge(const Ocp& ocp, const Iterate& point, Report& report, Clock::time_point start) noexcept {
-  report.objective = ocp.evaluate(point, nullptr, scratch_);
-  report.kkt = kkt_residual(ocp, point, stages_, scratch_);
-  report.feedback_us = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
 }
 
 bool SparseSqp::covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept {

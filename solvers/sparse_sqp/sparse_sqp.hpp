@@ -45,7 +45,6 @@ class SparseSqp final : public Solver {
   void take_structure(const Ocp& ocp);
   void linearise(const Ocp& ocp, Hessian hessian);
   void convexify();
-  void judge(const Ocp& ocp, const Iterate& point, Report& report, Clock::time_point start) noexcept;
   double merit(const Ocp& ocp, const Iterate& point) noexcept;
   void move(const Ocp& ocp, double length);
   bool search(const Ocp& ocp, double residual, double& after);

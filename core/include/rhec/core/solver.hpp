@@ -38,6 +38,13 @@ struct Report {
   double feedback_us = 0.0;     ///< time spent in solve [us]
 };
 
+/// Writes what the core says of a point that a solver returns: its objective and its KKT residual. `qp` and `scratch`
+/// (of the Ocp's `scratch_size()`) are workspace.
+RHEC_EXPORT void judge(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch,
+                       Report& report) noexcept;
+/// Wall-clock time since a start [us].
+RHEC_EXPORT double microseconds_since(Clock::time_point start) noexcept;
+
 /// Solves an Ocp from a guess. One instance serves one caller at a time; two instances never disturb each other.
 ///
 /// Per sample: optionally `prepare` (what can be done before the newest data arrive), then `solve` with the same

@@ -34,16 +34,11 @@ class RHEC_EXPORT SparseNlp {
 
   int variables() const noexcept { return hessian_.columns; }
   int constraints() const noexcept { return jacobian_.rows; }
-  int intervals() const noexcept { return static_cast<int>(control_starts_.size()); }
   const Pattern& jacobian() const noexcept { return jacobian_; }
   /// The lower triangle. The block of each stage [s_i; w_i] is full, and there is nothing outside of these blocks.
   const Pattern& hessian() const noexcept { return hessian_; }
-  /// Where in z the states of a node (-1: given), or the controls of an interval, begin.
+  /// Where in z the states of a node begin; -1: they are given.
   int state_start(int node) const noexcept { return state_starts_[node]; }
-  int control_start(int interval) const noexcept { return control_starts_[interval]; }
-  int state_count(int node) const noexcept { return state_counts_[node]; }
-  /// The first row of c that interval i contributes.
-  int constraint_start(int interval) const noexcept { return constraint_starts_[interval]; }
 
   // Between points and vectors. Multipliers and bound multipliers may be null.
   void read(const Ocp& ocp, const Iterate& point, double* z, double* multipliers,
