@@ -8,6 +8,7 @@
 
 #include "block_structure.hpp"
 #include "rhec/core/error.hpp"
+#include "track_alignment.hpp"
 
 namespace rhec {
 
@@ -100,69 +101,6 @@ void fill_data(const NodeLog& log, RheProblem& problem) {
   }
 }
 
-/// Closes the gaps that dead reckoning left: where an estimate jumped when a position was measured again, the track
-/// since the last measured position is turned and stretched about its start so that it ends where the vehicle was
-/// found. A wrong heading at the start of a gap is what mostly opens it, and no linearisation at the open track closes
-/// it well.
-void close_gaps(const RheProblem& problem, std::vector<double>& states, std::vector<double>& inputs,
-                const std::vector<double>& parameters) {
-  const Model& model = problem.model();
-  const Roles& roles = model.description().roles;
-  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(), N = problem.intervals();
-  if (roles.position_x < 0 || roles.position_y < 0 || roles.heading < 0) return;
-  constexpr double least_jump = 1.0;                         // below, linearisation is good enough [m]
-  constexpr double least_stretch = 0.5, most_stretch = 2.0;  // beyond, it was not the heading alone
-  // Which outputs tell of the position: those that a small shift of it changes.
-  std::vector<double> jacobian(static_cast<std::size_t>(model.output_count()) * nx);
-  const auto state = [&](int node) { return states.data() + static_cast<std::ptrdiff_t>(node) * nx; };
-  const auto is_fixed = [&](int node) {
-    Model::Nodes request;
-    request.count = 1;
-    request.states = state(node);
-    request.jacobians = jacobian.data();
-    model.observe(request);
-    bool x = false, y = false;
-    for (int j = 0; j < model.output_count(); ++j) {
-      if (std::isnan(problem.output(node)[j])) continue;
-      x = x || jacobian[static_cast<std::ptrdiff_t>(roles.position_x) * model.output_count() + j] != 0.0;
-      y = y || jacobian[static_cast<std::ptrdiff_t>(roles.position_y) * model.output_count() + j] != 0.0;
-    }
-    return x && y;
-  };
-  std::vector<double> predicted(nx);
-  int last_fixed = -1;
-  for (int k = 0; k <= N; ++k) {
-    if (!is_fixed(k)) continue;
-    const int start = std::exchange(last_fixed, k);
-    if (start < 0) continue;
-    const double duration = problem.duration(k - 1);
-    Model::Intervals request;
-    request.count = 1;
-    request.states = state(k - 1);
-    request.inputs = inputs.data() + static_cast<std::ptrdiff_t>(k - 1) * nu;
-    request.parameters = parameters.data() + static_cast<std::ptrdiff_t>(k - 1) * np;
-    request.durations = &duration;
-    request.substeps = problem.substeps();
-    request.next_states = predicted.data();
-    model.integrate(request);
-    const double from_x = state(start)[roles.position_x], from_y = state(start)[roles.position_y];
-    const double was_x = predicted[roles.position_x] - from_x, was_y = predicted[roles.position_y] - from_y;
-    const double is_x = state(k)[roles.position_x] - from_x, is_y = state(k)[roles.position_y] - from_y;
-    const double jump = std::hypot(is_x - was_x, is_y - was_y),
-                 stretch = std::hypot(is_x, is_y) / std::hypot(was_x, was_y);
-    if (!(jump > least_jump) || !(stretch > least_stretch && stretch < most_stretch)) continue;
-    const double turn = angle_difference(std::atan2(is_y, is_x), std::atan2(was_y, was_x));
-    const double c = stretch * std::cos(turn), s = stretch * std::sin(turn);
-    for (int i = start; i < k; ++i) {
-      const double x = state(i)[roles.position_x] - from_x, y = state(i)[roles.position_y] - from_y;
-      state(i)[roles.position_x] = from_x + c * x - s * y;
-      state(i)[roles.position_y] = from_y + s * x + c * y;
-      state(i)[roles.heading] += turn;
-      if (roles.speed >= 0) inputs[static_cast<std::ptrdiff_t>(i) * nu + roles.speed] *= stretch;
-    }
-  }
-}
-
 /// The log's own estimates as a point; the value of a block is that of its last interval, which had seen most of it.
 Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
   const int nx = problem.model().state_count(), np = problem.model().parameter_count(), N = log.intervals();
@@ -183,7 +121,7 @@ Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
       parameters[static_cast<std::ptrdiff_t>(i) * np + j] = std::clamp(value, lower, upper);
     }
   }
-  close_gaps(problem, states, inputs, parameters);
+  align_track(problem, states, inputs, parameters);
   problem.set_decisions(guess, inputs.data(), parameters.data());
   for (std::ptrdiff_t i = 0; i <= N; ++i) std::copy_n(states.data() + i * nx, nx, guess.state(static_cast<int>(i)));
   return guess;

@@ -153,7 +153,8 @@ struct Rows {
 
 }  // namespace
 
-double HorizonProblem::evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept {
+double HorizonProblem::evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
+                                       std::span<double> scratch) const noexcept {
   if (defects) {
     const Rows rows(scratch, intervals_, nx_, nu_, np_);
     gather(point, {0, intervals_ - 1}, rows.x, rows.u, rows.p, rows.p_end);
@@ -177,7 +178,8 @@ double HorizonProblem::evaluate(const Iterate& point, double* defects, std::span
       }
     }
   }
-  return cost(point, scratch);
+  if (stage_costs) std::fill_n(stage_costs, intervals_ + 1, 0.0);
+  return cost(point, stage_costs, scratch);
 }
 
 void HorizonProblem::simulate_interval(int i, Iterate& point, std::span<double> scratch) const noexcept {

@@ -150,22 +150,26 @@ double RhcProblem::state_error(const Iterate& point, int node, int state) const 
   return model().description().states[state].is_angle ? angle_difference(value, wanted) : value - wanted;
 }
 
-double RhcProblem::cost(const Iterate& point, std::span<double>) const noexcept {
+double RhcProblem::cost(const Iterate& point, double* stage_costs, std::span<double>) const noexcept {
   double total = 0.0;
+  const auto add = [&](int stage, double part) {
+    total += part;
+    if (stage_costs) stage_costs[stage] += part;
+  };
   std::vector<double>::size_type input = 0;
   for (int i = 0; i <= intervals(); ++i) {
     const auto& weights = i == intervals() ? setup_.terminal_weights : setup_.state_weights;
     for (int j = 0; j < nx(); ++j) {
       if (weights[j] == 0.0) continue;
       const double error = state_error(point, i, j);
-      total += weights[j] * error * error;
+      add(i, weights[j] * error * error);
     }
     if (i == intervals()) break;
     for (int j = 0; j < nu(); ++j, ++input) {
       const int control = control_of_input(i, j);
       const double value = control >= 0 ? point.control(i)[control] : point.state(i)[nx() + channel_of_input(j)];
       const double error = value - input_reference_[input];
-      total += setup_.input_weights[j] * error * error;
+      add(i, setup_.input_weights[j] * error * error);
     }
   }
   return total;

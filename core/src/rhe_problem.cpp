@@ -129,7 +129,7 @@ double RheProblem::losses(const double* difference, double* weight, double* curv
   return total;
 }
 
-double RheProblem::cost(const Iterate& point, std::span<double> scratch) const noexcept {
+double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept {
   const int count = intervals() + 1;
   double* states = scratch.data();
   double* predicted = states + count * nx();
@@ -143,27 +143,30 @@ double RheProblem::cost(const Iterate& point, std::span<double> scratch) const n
   model().observe(request);
 
   double total = 0.0;
+  const auto add = [&](int stage, double part) {
+    total += part;
+    if (stage_costs) stage_costs[stage] += part;
+  };
   const int n = nx() + np();
   for (int r = 0; r < n; ++r)
     for (int c = 0; c < n; ++c)
-      total +=
-          (point.state(0)[r] - arrival_mean[r]) * arrival_information(r, c) * (point.state(0)[c] - arrival_mean[c]);
+      add(0, (point.state(0)[r] - arrival_mean[r]) * arrival_information(r, c) * (point.state(0)[c] - arrival_mean[c]));
   for (int i = 0; i < count; ++i) {
     residual(i, predicted + i * ny_, difference);
-    total += losses(difference, weight, nullptr);
+    add(i, losses(difference, weight, nullptr));
   }
   for (int i = 0; i < intervals(); ++i) {
     for (int j = 0; j < nu(); ++j) {
       const double measured = measured_input(i)[j];
       if (std::isnan(measured)) continue;
       const double error = point.control(i)[j] - measured;
-      total += setup_.input_weights[j] * error * error;
+      add(i, setup_.input_weights[j] * error * error);
     }
     for (int j = 0; j < np(); ++j) {
       const int control = control_of_channel(i, j);
       if (control < 0) continue;
       const double jump = point.control(i)[control] - point.state(i)[nx() + j];
-      total += link_information_[i * np() + j] * jump * jump;
+      add(i, link_information_[i * np() + j] * jump * jump);
     }
   }
   return total;

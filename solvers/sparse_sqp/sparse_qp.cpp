@@ -10,6 +10,8 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int active_set_rounds = 10;
 constexpr int polishing_rounds = 6;
+// So many bounds let go in a round, and no fewer than half as many as in the one before, are no end in sight.
+constexpr int many = 16;
 constexpr int most_interior_iterations = 80;
 // A bound counts as violated, or a multiplier as of the wrong sign, beyond this part of the sizes involved.
 constexpr double active_set_tolerance = 1e-11;
@@ -131,13 +133,14 @@ double SparseQp::solve_system() {
   return residual;
 }
 
-/// Rounds of the primal-dual active set method from `active_`. True where the optimality conditions hold; the solution
-/// is in `d_`, `lambda_`, `mu_`.
-bool SparseQp::solve_active(const Program& program, int rounds) {
+/// Rounds of the primal-dual active set method from `active_`. Unless it is unknown or indefinite, what was found is in
+/// `d_`, `lambda_`, `mu_`.
+SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
   std::fill(primal_.begin(), primal_.end(), 0.0);
   std::fill(dual_.begin(), dual_.end(), 0.0);
+  int released_before = 0;
   for (int round = 0; round < rounds; ++round) {
-    if (!factor_with(program)) return false;
+    if (!factor_with(program)) return program.is_convex ? ActiveSet::unknown : ActiveSet::indefinite;
     const auto value_at = [&](int k) { return active_[k] == 1 ? program.upper[k] : program.lower[k]; };
     // What the fixed steps contribute to the rows of the others.
     for (int k = 0; k < n_; ++k) d_[k] = active_[k] != 0 ? value_at(k) : 0.0;
@@ -145,20 +148,21 @@ bool SparseQp::solve_active(const Program& program, int rounds) {
     multiply_jacobian(program, d_.data(), work_m_.data());
     for (int k = 0; k < n_; ++k) rhs_[k] = active_[k] != 0 ? d_[k] : -program.gradient[k] - mu_[k];
     for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -program.constraints[r] - work_m_[r];
-    if (solve_system() > believable) return false;
+    if (solve_system() > believable) return ActiveSet::unknown;
     std::copy_n(solution_.data(), n_, d_.data());
     std::copy_n(solution_.data() + n_, m_, lambda_.data());
     // Equations that contradict the active bounds give a solution that is only small beside huge multipliers.
     multiply_jacobian(program, d_.data(), work_m_.data());
     double unmet = 0.0;
     for (int r = 0; r < m_; ++r) unmet = std::max(unmet, std::abs(work_m_[r] + program.constraints[r]));
-    if (!(unmet <= believable * (1.0 + max_abs(program.constraints, m_)))) return false;
+    if (!(unmet <= believable * (1.0 + max_abs(program.constraints, m_)))) return ActiveSet::unknown;
     multiply_hessian(program, d_.data(), mu_.data());
     for (int k = 0; k < n_; ++k) mu_[k] += program.gradient[k];
     const double gradient_size = 1.0 + max_abs(mu_.data(), n_);
     add_jacobian_transposed(program, lambda_.data(), mu_.data());
     const double step_size = 1.0 + max_abs(d_.data(), n_);
     bool settled = true;
+    int added = 0, released = 0;
     for (int k = 0; k < n_; ++k) {
       mu_[k] = active_[k] != 0 ? -mu_[k] : 0.0;
       if (active_[k] == 2) continue;
@@ -169,19 +173,23 @@ bool SparseQp::solve_active(const Program& program, int rounds) {
       } else if (mu_[k] * active_[k] < -active_set_tolerance * gradient_size) {
         next = 0;
       }
+      if (next != active_[k]) ++(next == 0 ? released : added);
       settled = settled && next == active_[k];
       active_[k] = next;
     }
-    if (settled) {
-      factor_is_final_ = true;
+    // Long stretches at a bound that should be shorter are peeled off from their ends, node by node.
+    const bool is_peeling = added == 0 && (round == rounds - 1 || (released >= many && 2 * released > released_before));
+    released_before = released;
+    if (settled || is_peeling) {
+      factor_is_final_ = settled;
       for (int k = 0; k < n_; ++k) {
         d_[k] = std::clamp(d_[k], program.lower[k], program.upper[k]);
-        if (active_[k] == 1 || active_[k] == -1) mu_[k] = active_[k] * std::max(0.0, mu_[k] * active_[k]);
+        if (active_[k] != 2) mu_[k] = active_[k] * std::max(0.0, mu_[k] * active_[k]);
       }
-      return true;
+      return settled ? ActiveSet::optimal : ActiveSet::feasible;
     }
   }
-  return false;
+  return ActiveSet::unknown;
 }
 
 SparseQp::Outcome SparseQp::solve(const Program& program, double* step, double* multipliers, double* bound_multipliers,
@@ -191,9 +199,19 @@ SparseQp::Outcome SparseQp::solve(const Program& program, double* step, double* 
   factor_is_final_ = false;
   guess_active(program, bound_multipliers);
   Outcome outcome = Outcome::solved;
-  if (!solve_active(program, active_set_rounds)) {
-    outcome = interior_point(program, 0.0, deadline);
-    if (outcome != Outcome::solved) return outcome;
+  switch (solve_active(program, active_set_rounds)) {
+    case ActiveSet::optimal:
+      break;
+    case ActiveSet::feasible:
+      outcome = Outcome::feasible;
+      break;
+    case ActiveSet::indefinite:
+      // Where a reduced Hessian is not positive definite, those with fewer bounds are not, either.
+      for (int k = 0; k < n_; ++k) bound_multipliers[k] = active_[k] == 2 ? 0.0 : active_[k];
+      return Outcome::indefinite;
+    case ActiveSet::unknown:
+      outcome = interior_point(program, 0.0, deadline);
+      if (outcome != Outcome::solved) return outcome;
   }
   std::copy_n(d_.data(), n_, step);
   std::copy_n(lambda_.data(), m_, multipliers);
@@ -217,13 +235,6 @@ SparseQp::Outcome SparseQp::solve_relaxed(const Program& program, double penalty
 SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalty, Clock::time_point deadline) {
   used_interior_point_ = true;
   for (int k = 0; k < n_; ++k) active_[k] = program.lower[k] == program.upper[k] ? 2 : 0;
-  if (!program.is_convex) {
-    // The reduced Hessian must be positive definite without any bound's help.
-    std::fill(primal_.begin(), primal_.end(), 0.0);
-    std::fill(dual_.begin(), dual_.end(), 0.0);
-    if (!factor_with(program)) return Outcome::indefinite;
-  }
-
   const double gradient_size = 1.0 + max_abs(program.gradient, n_);
   start_interior(program, penalty, std::clamp(0.1 * gradient_size, 1e-2, 1e4));
   const double constraint_size = 1.0 + max_abs(program.constraints, m_);
@@ -279,7 +290,8 @@ SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalt
         dual_[pair.index] += pair.s / pair.z;
       }
     }
-    if (!factor_with(program)) return Outcome::failed;
+    // Of bounds that hold back a negative curvature, the barrier has enough of a positive one.
+    if (!factor_with(program)) return program.is_convex ? Outcome::failed : Outcome::indefinite;
     double target = 0.0;
     if (!pairs_.empty()) {
       interior_direction(0.0);
@@ -382,7 +394,8 @@ void SparseQp::finish_interior(const Program& program, bool relaxed) {
     const auto d = d_, lambda = lambda_;
     for (const Pair& pair : pairs_)
       if (pair.z > pair.s) active_[pair.index] = pair.kind == Pair::Kind::lower ? -1 : 1;
-    if (solve_active(program, polishing_rounds)) return;
+    const ActiveSet found = solve_active(program, polishing_rounds);
+    if (found == ActiveSet::optimal || found == ActiveSet::feasible) return;
     d_ = d;
     lambda_ = lambda;
   }

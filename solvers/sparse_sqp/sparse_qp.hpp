@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "kkt_factor.hpp"
@@ -15,7 +16,8 @@ namespace rhec::sparse_sqp {
 /// where lower <= 0 <= upper, so that only the equations can make it infeasible:
 ///
 /// 1. The active set that the caller guesses is tried and mended for some rounds (primal-dual active set method): near
-///    the solution of the nonlinear program that is one factorisation.
+///    the solution of the nonlinear program that is one factorisation. Where all that is left is to let go many bounds,
+///    one after another, a nonlinear program is better served by what there is, now, than by the best step much later.
 /// 2. Otherwise a primal-dual interior-point method (Mehrotra 1992) finds the active set, which is then polished to the
 ///    exact solution.
 /// 3. Where no step satisfies the equations, they are relaxed: minimise also penalty * |J d + c|_1 (Fletcher's
@@ -26,6 +28,8 @@ class SparseQp {
  public:
   enum class Outcome {
     solved,
+    feasible,    ///< satisfies equations and bounds and is best but for bounds that should be let go: many, one after
+                 ///< another
     relaxed,     ///< solved with relaxed equations
     indefinite,  ///< the Hessian is not positive definite where it would have to be: convexify it and ask again
     failed,      ///< nothing came out that could be used
@@ -53,6 +57,8 @@ class SparseQp {
 
   int factorisations() const noexcept { return factorisations_; }  ///< so far
   bool used_interior_point() const noexcept { return used_interior_point_; }
+  /// Flags of the variables that the last factor had fixed.
+  std::span<const std::uint8_t> fixed() const noexcept { return fixed_; }
   KktFactor& factor() noexcept { return factor_; }
 
  private:
@@ -68,7 +74,8 @@ class SparseQp {
   };
   bool factor_with(const Program& program);
   double solve_system();
-  bool solve_active(const Program& program, int rounds);
+  enum class ActiveSet { optimal, feasible, unknown, indefinite };
+  ActiveSet solve_active(const Program& program, int rounds);
   Outcome interior_point(const Program& program, double penalty, Clock::time_point deadline);
   void start_interior(const Program& program, double penalty, double multiplier);
   void interior_direction(double target);

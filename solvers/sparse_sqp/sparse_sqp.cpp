@@ -10,6 +10,7 @@
 
 #include "rhec/core/point.hpp"
 #include "rhec/plugins/sdk.hpp"
+#include "stage_convexity.hpp"
 #include "stage_covariances.hpp"
 
 namespace rhec::sparse_sqp {
@@ -19,7 +20,7 @@ constexpr double sufficient_decrease = 1e-4;
 constexpr double shortest_step = 1e-10;
 // A KKT residual below which Newton's method is trusted more than the merit function.
 constexpr double near_solution = 1e-3;
-// A KKT residual below which steps that gain little are due to the curvature, not to the distance.
+// A defect below which steps that gain little are due to the curvature, not to the distance.
 constexpr double near_enough = 1e-1;
 // Differences of the merit below this part of it are rounding.
 constexpr double merit_rounding = 1e-13;
@@ -27,6 +28,13 @@ constexpr double merit_rounding = 1e-13;
 constexpr double stuck = 1.0 - 1e-6;
 constexpr double largest_penalty = 1e10;
 constexpr int corrections = 4;
+constexpr int convexifications = 6;
+// Lengths by stage: how often they are halved, how many stages to each side count as a stage's surroundings, what part
+// of all changes of the merit is a rise there, and by how much lengths of neighbouring stages may differ.
+constexpr int local_halvings = 10;
+constexpr int neighbourhood = 20;
+constexpr double least_rise = 1e-6;
+constexpr double steepest_passage = 0.05;
 constexpr int most_penalty_cuts = 20;
 
 double norm1(const std::vector<double>& v) {
@@ -36,7 +44,8 @@ double norm1(const std::vector<double>& v) {
 }
 
 bool is_step(SparseQp::Outcome outcome) {
-  return outcome == SparseQp::Outcome::solved || outcome == SparseQp::Outcome::relaxed;
+  return outcome == SparseQp::Outcome::solved || outcome == SparseQp::Outcome::feasible ||
+         outcome == SparseQp::Outcome::relaxed;
 }
 
 double max_abs(const std::vector<double>& v) {
@@ -70,7 +79,7 @@ void SparseSqp::setup(const Ocp& ocp) {
   capacity_ = ocp.capacity();
   stages_ = StageQp(capacity_);
   other_stages_ = StageQp(capacity_);
-  for (Iterate* point : {&current_, &trial_, &other_trial_}) *point = Iterate(capacity_);
+  for (Iterate* point : {&current_, &trial_}) *point = Iterate(capacity_);
   scratch_.assign(ocp.scratch_size(), 0.0);
   defects_.assign(static_cast<std::size_t>(capacity_.intervals) * capacity_.states, 0.0);
   reset();
@@ -91,6 +100,16 @@ void SparseSqp::take_structure(const Ocp& ocp) {
   for (auto* v : {&constraints_, &multipliers_, &step_multipliers_, &trial_multipliers_, &trial_constraints_})
     v->assign(m, 0.0);
   hessian_.assign(nlp_.hessian().entries(), 0.0);
+  const int N = ocp.intervals();
+  stage_of_variable_.clear();
+  stage_of_row_.clear();
+  for (int i = 0; i <= N; ++i) {
+    const int count = (nlp_.state_start(i) >= 0 ? ocp.state_count(i) : 0) + (i < N ? ocp.control_count(i) : 0);
+    stage_of_variable_.insert(stage_of_variable_.end(), count, i);
+    if (i < N) stage_of_row_.insert(stage_of_row_.end(), ocp.state_count(i + 1), i);
+  }
+  for (auto* v : {&stage_merits_, &merits_before_, &lengths_}) v->assign(static_cast<std::size_t>(N) + 1, 0.0);
+  merit_sums_.assign(static_cast<std::size_t>(N) + 2, 0.0);
   jacobian_.assign(nlp_.jacobian().entries(), 0.0);
 }
 
@@ -113,49 +132,40 @@ void SparseSqp::linearise(const Ocp& ocp, Hessian hessian) {
 }
 
 double SparseSqp::merit(const Ocp& ocp, const Iterate& point) noexcept {
-  const double objective = ocp.evaluate(point, defects_.data(), scratch_);
+  const double objective = ocp.evaluate_stages(point, defects_.data(), stage_merits_.data(), scratch_);
   nlp_.constraints(ocp, defects_.data(), trial_constraints_.data());
+  for (std::size_t r = 0; r < trial_constraints_.size(); ++r)
+    stage_merits_[stage_of_row_[r]] += penalty_ * std::abs(trial_constraints_[r]);
   return objective + penalty_ * norm1(trial_constraints_);
 }
 
 /// `trial_` = `current_` and that length of the step.
-void SparseSqp::move(const Ocp& ocp, double length) {
+void SparseSqp::move(const Ocp& ocp) {
   for (std::size_t k = 0; k < z_.size(); ++k) {
+    const double length = lengths_[stage_of_variable_[k]];
     trial_z_[k] = std::clamp(z_[k] + length * step_[k], lower_z_[k], upper_z_[k]);
     trial_bound_multipliers_[k] = bound_multipliers_[k] + length * (step_bound_multipliers_[k] - bound_multipliers_[k]);
   }
   for (std::size_t r = 0; r < multipliers_.size(); ++r)
-    trial_multipliers_[r] = multipliers_[r] + length * (step_multipliers_[r] - multipliers_[r]);
+    trial_multipliers_[r] = multipliers_[r] + lengths_[stage_of_row_[r]] * (step_multipliers_[r] - multipliers_[r]);
   nlp_.write(ocp, trial_z_.data(), trial_multipliers_.data(), trial_bound_multipliers_.data(), trial_);
 }
 
-/// Reflects the negative eigenvalues of each stage's block of the Hessian: where the curvature is fine it stays,
-/// whatever it is elsewhere on the horizon.
-void SparseSqp::convexify() {
-  const auto& H = nlp_.hessian();
-  int column = 0;
-  while (column < H.columns) {
-    const int size = H.starts[column + 1] - H.starts[column];  // a block's first column holds all of its rows
-    block_.resize(size, size);
-    for (int c = 0; c < size; ++c)
-      for (int r = c; r < size; ++r) block_(r, c) = hessian_[H.starts[column + c] + r - c];
-    eigen_.compute(block_);
-    if (eigen_.eigenvalues()[0] < 0.0) {
-      block_ = eigen_.eigenvectors() * eigen_.eigenvalues().cwiseAbs().asDiagonal() * eigen_.eigenvectors().transpose();
-      for (int c = 0; c < size; ++c)
-        for (int r = c; r < size; ++r) hessian_[H.starts[column + c] + r - c] = block_(r, c);
-    }
-    column += size;
-  }
-  hessian_is_convex_ = true;
+/// Makes the program's reduced Hessian positive definite on the active set that showed that it is not; in the last
+/// round, whatever is active.
+void SparseSqp::convexify(const Ocp& ocp, int round) {
+  const bool for_all = round == convexifications;
+  if (round == 1) ocp.linearise(all_stages(ocp), current_, Hessian::gauss_newton, other_stages_, scratch_);
+  convexify_by_stages(stages_, other_stages_, for_all ? std::span<const std::uint8_t>() : qp_.fixed());
+  nlp_.hessian(stages_, hessian_.data());
+  hessian_is_convex_ = for_all;
 }
 
 /// Finds the step of the quadratic program, with relaxed equations where there is no other.
-SparseQp::Outcome SparseSqp::find_step(Report& report, Clock::time_point deadline) {
+SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::time_point deadline) {
   auto outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
-  was_bent_ = outcome == SparseQp::Outcome::indefinite;
-  if (was_bent_) {
-    convexify();
+  for (int round = 1; outcome == SparseQp::Outcome::indefinite && round <= convexifications; ++round) {
+    convexify(ocp, round);
     outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
   }
   predicted_defect_ = 0.0;
@@ -202,7 +212,8 @@ SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point dea
 /// Searches along the step; the accepted point goes to `trial_`, its merit to `after`. False where no length will do.
 bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
   const double defect = norm1(constraints_);
-  const double least_penalty = 1.5 * max_abs(step_multipliers_);
+  // Multipliers of relaxed equations are as large as the penalty that relaxed them, which was enough.
+  const double least_penalty = (predicted_defect_ > 0.0 ? 1.0 : 1.5) * max_abs(step_multipliers_);
   if (penalty_ < least_penalty) {
     penalty_ = least_penalty;
   } else if (penalty_ > 4.0 * least_penalty && penalty_cuts_left_ > 0 && predicted_defect_ == 0.0) {
@@ -218,17 +229,10 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     return std::isfinite(after) && after <= before + sufficient_decrease * length * std::min(slope, 0.0) +
                                                 merit_rounding * (1.0 + std::abs(before));
   };
-  for (double length = 1.0; length >= shortest_step; length *= 0.5) {
-    move(ocp, length);
-    length_ = length;
-    if (acceptable(length)) return true;
-    // Near the solution the merit may refuse a step that Newton's method is right about.
-    if (length == 1.0 && residual < near_solution && std::isfinite(after)) {
-      ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_stages_, scratch_);
-      if (kkt_residual(other_stages_, trial_).largest() < 0.5 * residual) return true;
-    }
-    // The merit refuses it for what the equations bend: correct that, with the same matrix.
-    if (!std::isfinite(after) || predicted_defect_ > 0.0) continue;
+  merits_before_ = stage_merits_;
+  // The merit refuses what the equations bend: correct that, with the same matrix.
+  const auto correct = [&](double length) {
+    if (!std::isfinite(after) || predicted_defect_ > 0.0) return false;
     double remaining = norm1(trial_constraints_);
     for (int round = 0; round < corrections; ++round) {
       if (!qp_.correct(program(), trial_constraints_.data(), correction_.data())) break;
@@ -239,8 +243,53 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
       const double last = std::exchange(remaining, norm1(trial_constraints_));
       if (!(remaining < 0.5 * last)) break;
     }
+    return false;
+  };
+  std::fill(lengths_.begin(), lengths_.end(), 1.0);
+  // Lengths of their own for the places that refuse the full step.
+  for (int round = 0; round < local_halvings; ++round) {
+    move(ocp);
+    length_ = *std::min_element(lengths_.begin(), lengths_.end());
+    if (acceptable(length_)) return true;
+    // Near the solution the merit may refuse a step that Newton's method is right about.
+    if (round == 0 && residual < near_solution && std::isfinite(after)) {
+      ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_stages_, scratch_);
+      if (kkt_residual(other_stages_, trial_).largest() < 0.5 * residual) return true;
+    }
+    if (!std::isfinite(after)) break;
+    if (correct(length_)) return true;
+    if (!shorten_locally()) break;
+  }
+  for (double length = 0.5; length >= shortest_step; length *= 0.5) {
+    std::fill(lengths_.begin(), lengths_.end(), length);
+    move(ocp);
+    length_ = length;
+    if (acceptable(length) || correct(length)) return true;
   }
   return false;
+}
+
+/// Halves the lengths around stages where the merit went up, with gradual passages to where it did not. False where it
+/// went up nowhere.
+bool SparseSqp::shorten_locally() {
+  const int stages = static_cast<int>(lengths_.size());
+  double size = 0.0;
+  merit_sums_[0] = 0.0;
+  for (int i = 0; i < stages; ++i) {
+    const double change = stage_merits_[i] - merits_before_[i];
+    merit_sums_[i + 1] = merit_sums_[i] + change;
+    size += std::abs(change);
+  }
+  bool is_shorter = false;
+  for (int i = 0; i < stages; ++i) {
+    const int from = std::max(0, i - neighbourhood), to = std::min(stages, i + neighbourhood + 1);
+    if (!(merit_sums_[to] - merit_sums_[from] > least_rise * size)) continue;
+    lengths_[i] *= 0.5;
+    is_shorter = true;
+  }
+  for (int i = 1; i < stages; ++i) lengths_[i] = std::min(lengths_[i], lengths_[i - 1] + steepest_passage);
+  for (int i = stages - 2; i >= 0; --i) lengths_[i] = std::min(lengths_[i], lengths_[i + 1] + steepest_passage);
+  return is_shorter;
 }
 
 Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point deadline) {
@@ -248,7 +297,6 @@ Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point dead
                                                             ocp.kind() == OcpKind::rhc && ocp.has_second_derivatives());
   double last_residual = std::numeric_limits<double>::infinity();
   int slow = 0;
-  bool took_full_step = false;
   bool has_costates = max_abs(multipliers_) > 0.0;
   // The first program's active set is guessed from the point's multipliers, each later one's from the program before.
   step_bound_multipliers_ = bound_multipliers_;
@@ -269,36 +317,27 @@ Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point dead
     if (Clock::now() > deadline) return Status::deadline;
     // Gauss-Newton whose full steps gain little has met large residuals: there the exact Hessian serves better.
     if (options_.hessian == Curvature::automatic && !use_exact && ocp.has_second_derivatives()) {
-      slow = (took_full_step || residual < near_enough) && residual > 0.3 * last_residual ? slow + 1 : 0;
+      slow = report.kkt.defect < near_enough && residual > 0.3 * last_residual ? slow + 1 : 0;
       if (slow >= 4) {
         use_exact = true;
         linearise(ocp, Hessian::exact);
       }
     }
     last_residual = residual;
-    auto outcome = find_step(report, deadline);
+    auto outcome = find_step(ocp, report, deadline);
+    if (use_exact && outcome == SparseQp::Outcome::relaxed) {
+      // With multipliers like that, the curvature of the equations would be all that counts.
+      linearise(ocp, Hessian::gauss_newton);
+      outcome = find_step(ocp, report, deadline);
+    }
     if (outcome == SparseQp::Outcome::deadline) return Status::deadline;
     double after = 0.0;
     bool accepted = is_step(outcome) && search(ocp, residual, after);
-    took_full_step = accepted && length_ == 1.0;
-    // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own. Near the solution
-    // merits differ by rounding only, and the exact curvature is what converges.
-    if (use_exact && (!accepted || (was_bent_ && residual > near_solution))) {
-      const bool exact_accepted = accepted;
-      const double exact_predicted_defect = predicted_defect_;
-      std::swap(trial_, other_trial_);
+    if (use_exact && !accepted) {
       linearise(ocp, Hessian::gauss_newton);
-      const auto other = find_step(report, deadline);
-      if (other == SparseQp::Outcome::deadline) return Status::deadline;
-      accepted = is_step(other) && search(ocp, residual, after);
-      // Both by the same penalty, which the second search may have raised.
-      if (exact_accepted && (!accepted || merit(ocp, other_trial_) < after)) {
-        std::swap(trial_, other_trial_);
-        predicted_defect_ = exact_predicted_defect;
-        accepted = true;
-      } else {
-        outcome = other;
-      }
+      outcome = find_step(ocp, report, deadline);
+      if (outcome == SparseQp::Outcome::deadline) return Status::deadline;
+      accepted = is_step(outcome) && search(ocp, residual, after);
     }
     if (outcome == SparseQp::Outcome::relaxed && report.kkt.defect > options_.tolerance &&
         predicted_defect_ >= stuck * norm1(constraints_))

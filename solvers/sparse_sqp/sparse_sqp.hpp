@@ -1,8 +1,7 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
-
-#include <Eigen/Eigenvalues>
 
 #include "rhec/core/options.hpp"
 #include "sparse_qp.hpp"
@@ -26,9 +25,11 @@ struct SparseSqpOptions {
 /// Sequential quadratic programming on the sparse view of an Ocp, for horizons of thousands of intervals and for
 /// vehicles with many states: every step costs a number of operations that is linear in the horizon.
 ///
-/// Bounds hold at every iterate. Steps are those of a sparse quadratic program (SparseQp), searched along by the l1
-/// merit f + penalty * |c|_1 with a second-order correction; where linearised equations contradict the bounds, they are
-/// relaxed (Fletcher's Sl1QP), and a point at which nothing reduces |c|_1 is reported as infeasible.
+/// Bounds hold at every iterate. Steps are those of a sparse quadratic program (SparseQp), judged by the l1 merit
+/// f + penalty * |c|_1: taken with lengths that are shorter around stages where the merit would rise, with second-order
+/// corrections of what equations bend. Curvature that is not convex enough is given up at the stages that it fails at
+/// (convexify_by_stages). Where linearised equations contradict the bounds, they are relaxed (Fletcher's Sl1QP), and a
+/// point at which nothing reduces |c|_1 is reported as infeasible.
 class SparseSqp final : public Solver {
  public:
   using Options = SparseSqpOptions;
@@ -44,12 +45,13 @@ class SparseSqp final : public Solver {
  private:
   void take_structure(const Ocp& ocp);
   void linearise(const Ocp& ocp, Hessian hessian);
-  void convexify();
+  void convexify(const Ocp& ocp, int round);
   double merit(const Ocp& ocp, const Iterate& point) noexcept;
-  void move(const Ocp& ocp, double length);
+  void move(const Ocp& ocp);
+  bool shorten_locally();
   bool search(const Ocp& ocp, double residual, double& after);
   Status iterate(const Ocp& ocp, Report& report, Clock::time_point deadline);
-  SparseQp::Outcome find_step(Report& report, Clock::time_point deadline);
+  SparseQp::Outcome find_step(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);
   SparseQp::Program program() const noexcept;
 
@@ -58,7 +60,7 @@ class SparseSqp final : public Solver {
   SparseNlp nlp_;
   SparseQp qp_;
   StageQp stages_, other_stages_;
-  Iterate current_, trial_, other_trial_;
+  Iterate current_, trial_;
   std::vector<double> scratch_, defects_;
   std::vector<double> hessian_, jacobian_, gradient_, constraints_, lower_, upper_;
   std::vector<double> z_, multipliers_, bound_multipliers_;               ///< of `current_`
@@ -66,10 +68,11 @@ class SparseSqp final : public Solver {
   std::vector<double> correction_, trial_z_, trial_multipliers_, trial_bound_multipliers_, trial_constraints_;
   std::vector<double> lower_z_, upper_z_;
   std::vector<double> relaxed_step_, relaxed_multipliers_, relaxed_bound_multipliers_;
-  bool hessian_is_convex_ = false, was_bent_ = false;
-  Eigen::MatrixXd block_;
-  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen_;
-  double length_ = 0.0;  ///< of the last step that was accepted
+  bool hessian_is_convex_ = false;
+  std::vector<int> stage_of_variable_, stage_of_row_;
+  std::vector<double> stage_merits_, merits_before_, merit_sums_;
+  std::vector<double> lengths_;  ///< of the step, by stage
+  double length_ = 0.0;          ///< of the last step that was accepted
   double penalty_ = 0.0;
   int penalty_cuts_left_ = 0;
   double predicted_defect_ = 0.0;  ///< |J step + c|_1

@@ -35,6 +35,11 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
   const int ns = ocp.capacity().states, nw = ocp.capacity().controls, N = ocp.intervals();
   for (int i = 0; i < N; ++i)
     for (int j = 0; j < ns; ++j) ASSERT_NEAR(qp.b(i)[j], defects[i * ns + j], 1e-12);
+  // The objective is the sum of its stages' costs, each of which its own state and control change alone.
+  std::vector<double> costs(N + 1), moved_costs(N + 1);
+  const double objective = ocp.evaluate_stages(point, nullptr, costs.data(), scratch);
+  ASSERT_EQ(objective, ocp.evaluate(point, nullptr, scratch));
+  ASSERT_NEAR(objective, std::accumulate(costs.begin(), costs.end(), 0.0), 1e-12 * (1.0 + std::abs(objective)));
 
   const auto gradient = [&](const StageQp& of, int i, Eigen::VectorXd& by_state, Eigen::VectorXd& by_control) {
     by_state = of.q_of(i);
@@ -57,6 +62,9 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
       (is_state ? down.state(i) : down.control(i))[j] -= h;
       const double f_up = ocp.evaluate(up, plus.data(), scratch), f_down = ocp.evaluate(down, minus.data(), scratch);
       const double slope = is_state ? qp.q(i)[j] : qp.r(i)[j];
+      ocp.evaluate_stages(up, nullptr, moved_costs.data(), scratch);
+      for (int k = 0; k <= N; ++k)
+        ASSERT_TRUE(k == i || moved_costs[k] == costs[k]) << "stage " << k << " moved by " << i;
       ASSERT_NEAR((f_up - f_down) / (2.0 * h), slope, tolerance * (1.0 + std::abs(slope))) << "gradient at stage " << i;
       if (i < N) {
         for (int r = 0; r < ns; ++r) {

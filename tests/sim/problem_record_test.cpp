@@ -305,8 +305,9 @@ class Disguised final : public Ocp {
   const double* control_upper(int i) const noexcept override { return of_.control_upper(i); }
   bool has_second_derivatives() const noexcept override { return of_.has_second_derivatives(); }
   std::size_t scratch_size() const noexcept override { return of_.scratch_size(); }
-  double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept override {
-    return of_.evaluate(point, defects, scratch);
+  double evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
+                         std::span<double> scratch) const noexcept override {
+    return of_.evaluate_stages(point, defects, stage_costs, scratch);
   }
   void simulate_interval(int i, Iterate& point, std::span<double> scratch) const noexcept override {
     of_.simulate_interval(i, point, scratch);

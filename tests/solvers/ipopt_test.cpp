@@ -72,9 +72,13 @@ class Scaled final : public Ocp {
   void mark_dynamics(int i, std::uint8_t* states, std::uint8_t* controls) const noexcept override {
     of_.mark_dynamics(i, states, controls);
   }
-  double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept override {
+  double evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
+                         std::span<double> scratch) const noexcept override {
     ++evaluations;
-    return factor_ * of_.evaluate(point, defects, scratch);
+    const double cost = of_.evaluate_stages(point, defects, stage_costs, scratch);
+    if (stage_costs)
+      for (int i = 0; i <= intervals(); ++i) stage_costs[i] *= factor_;
+    return factor_ * cost;
   }
   void simulate_interval(int i, Iterate& point, std::span<double> scratch) const noexcept override {
     of_.simulate_interval(i, point, scratch);

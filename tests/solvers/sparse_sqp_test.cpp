@@ -14,6 +14,7 @@
 
 #include <Eigen/Dense>
 
+#include "../../solvers/sparse_sqp/stage_convexity.hpp"
 #include "../../solvers/sparse_sqp/stage_covariances.hpp"
 #include "../core/random_problem.hpp"
 #include "../core/random_qp.hpp"
@@ -61,7 +62,7 @@ class Shape final : public Ocp {
   const double* control_upper(int interval) const noexcept override { return qp_.control_upper(interval); }
   bool has_second_derivatives() const noexcept override { return true; }
   std::size_t scratch_size() const noexcept override { return 0; }
-  double evaluate(const Iterate&, double*, std::span<double>) const noexcept override { return 0.0; }
+  double evaluate_stages(const Iterate&, double*, double*, std::span<double>) const noexcept override { return 0.0; }
   void simulate_interval(int, Iterate&, std::span<double>) const noexcept override {}
   void linearise(StageRange, const Iterate&, Hessian, StageQp&, std::span<double>) const noexcept override {}
   void refresh(const Iterate&, StageQp&, std::span<double>) const noexcept override {}
@@ -351,6 +352,77 @@ void bound(StageQp& qp, RandomQp& random, double controls, double states) {
     }
     for (int j = 0; i < qp.intervals() && j < qp.states(i + 1); ++j) qp.b(i)[j] *= 0.3;
   }
+}
+
+/// The least eigenvalue of the reduced Hessian where some variables do not move.
+double least_reduced_eigenvalue(const Program& program, const std::vector<std::uint8_t>& fixed) {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(program.m + std::count(fixed.begin(), fixed.end(), 1), program.n);
+  rows.topRows(program.m) = program.J;
+  Eigen::Index row = program.m;
+  for (int k = 0; k < program.n; ++k)
+    if (fixed[k] != 0) rows(row++, k) = 1.0;
+  const Eigen::FullPivLU<Eigen::MatrixXd> lu(rows);
+  EXPECT_EQ(lu.rank(), rows.rows()) << "what is fixed contradicts the equations";
+  if (lu.dimensionOfKernel() == 0) return infinity;
+  const Eigen::MatrixXd Z = lu.kernel();
+  const Eigen::MatrixXd Q =
+      Eigen::HouseholderQR<Eigen::MatrixXd>(Z).householderQ() * Eigen::MatrixXd::Identity(Z.rows(), Z.cols());
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Q.transpose() * program.H * Q).eigenvalues()[0];
+}
+
+TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
+  RandomQp random(21);
+  int bent = 0, untouched = 0, stages_seen = 0, stages_taken = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const StageQp gauss_newton = random_stages(random);
+    const int N = gauss_newton.intervals(), ns = gauss_newton.capacity().states, nw = gauss_newton.capacity().controls;
+    StageQp exact = gauss_newton;
+    const int from = random.integer(0, N), to = std::min(N, from + random.integer(0, 1));
+    const double shift = random.uniform(0.0, 3.0);
+    for (int i = from; i <= to; ++i) {
+      for (int j = 0; j < exact.states(i); ++j) exact.Q(i)[j * ns + j] -= shift;
+      for (int j = 0; j < exact.controls(i); ++j) exact.R(i)[j * nw + j] -= shift;
+    }
+    const Program before(exact);
+    std::vector<std::uint8_t> fixed(before.n, 0);
+    // Controls, or states in place of them: of a node as many as there are controls that lead to it.
+    std::ptrdiff_t variable = exact.initial_state_is_given ? 0 : exact.states(0);
+    for (int i = 0; trial % 2 == 1 && i < N; ++i) {
+      const bool is_state = random.uniform(0.0, 1.0) < 0.5;
+      for (int j = 0; j < exact.controls(i); ++j)
+        if (random.uniform(0.0, 1.0) < 0.4 && (!is_state || j < exact.states(i + 1)))
+          fixed[variable + j + (is_state ? exact.controls(i) : 0)] = 1;
+      variable += exact.controls(i) + exact.states(i + 1);
+    }
+    const double least = least_reduced_eigenvalue(before, fixed);
+    if (std::abs(least) < 1e-4) continue;
+    StageQp convex = exact;
+    const int taken = convexify_by_stages(convex, gauss_newton, fixed);
+    if (least > 0.0) {
+      EXPECT_EQ(taken, 0) << trial;
+      ++untouched;
+    } else {
+      EXPECT_GT(taken, 0) << trial;
+      EXPECT_GT(least_reduced_eigenvalue(Program(convex), fixed), 0.0) << trial;
+      ++bent;
+      stages_seen += N + 1;
+      stages_taken += taken;
+    }
+    int differ = 0;
+    for (int i = 0; i <= N; ++i) {
+      const bool is_exact = exact.Q_of(i) == convex.Q_of(i) &&
+                            (i == N || (exact.S_of(i) == convex.S_of(i) && exact.R_of(i) == convex.R_of(i)));
+      const bool is_gauss_newton =
+          gauss_newton.Q_of(i) == convex.Q_of(i) &&
+          (i == N || (gauss_newton.S_of(i) == convex.S_of(i) && gauss_newton.R_of(i) == convex.R_of(i)));
+      EXPECT_TRUE(is_exact || is_gauss_newton) << trial << ", stage " << i;
+      differ += is_exact ? 0 : 1;
+    }
+    EXPECT_LE(differ, taken);
+  }
+  EXPECT_GT(bent, 30);
+  EXPECT_GT(untouched, 30);
+  EXPECT_LT(2 * stages_taken, stages_seen) << "curvature was given up where there was no need";
 }
 
 TEST(SparseQp, SolvesRandomProgramsToTheirOptimalityConditions) {

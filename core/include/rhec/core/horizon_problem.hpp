@@ -35,7 +35,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   std::size_t scratch_size() const noexcept override;
   void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
 
-  double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept override;
+  double evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
+                         std::span<double> scratch) const noexcept override;
   void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept override;
   void linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                  std::span<double> scratch) const noexcept override;
@@ -90,7 +91,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   std::vector<double> state_lower_, state_upper_, control_lower_, control_upper_;
 
   // The cost, which makes the kind. Each adds to what is there.
-  virtual double cost(const Iterate& point, std::span<double> scratch) const noexcept = 0;
+  virtual double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept = 0;
   virtual void add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                         std::span<double> scratch) const noexcept = 0;
   virtual void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept = 0;

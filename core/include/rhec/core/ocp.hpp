@@ -55,8 +55,13 @@ class RHEC_EXPORT Ocp {
   /// `state_flags` for dF_r/ds_c, of `control_flags` for dF_r/dw_c. By default all can.
   virtual void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept;
 
-  /// The objective at a point; `defects` (N rows of capacity().states, or null) gets F_i(s_i, w_i) - s_{i+1}.
-  virtual double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept = 0;
+  /// The objective at a point; `defects` (N rows of capacity().states, or null) gets F_i(s_i, w_i) - s_{i+1},
+  /// `stage_costs` (N + 1, or null) gets the l_i.
+  virtual double evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
+                                 std::span<double> scratch) const noexcept = 0;
+  double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept {
+    return evaluate_stages(point, defects, nullptr, scratch);
+  }
 
   /// Overwrites the state of node `interval` + 1 by simulation of one interval.
   virtual void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept = 0;

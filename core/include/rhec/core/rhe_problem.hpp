@@ -73,7 +73,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   const double* initial_state() const noexcept override { return nullptr; }
 
  private:
-  double cost(const Iterate& point, std::span<double> scratch) const noexcept override;
+  double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept override;
   void add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                 std::span<double> scratch) const noexcept override;
   void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;

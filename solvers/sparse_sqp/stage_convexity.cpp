@@ -1,0 +1,120 @@
+#include "stage_convexity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+namespace rhec::sparse_sqp {
+namespace {
+
+// This part of the terms that a pivot is made of counts as zero, which a pivot may be in a Gauss-Newton program.
+constexpr double rounding = 1e-13;
+// What holds a state at a bound, beside the largest cost of a state.
+constexpr double stiff = 1e8;
+
+class Recursion {
+ public:
+  Recursion(StageQp& qp, const StageQp& gauss_newton, std::span<const std::uint8_t> fixed)
+      : qp_(qp),
+        gauss_newton_(gauss_newton),
+        fixed_(fixed),
+        given_up_(static_cast<std::size_t>(qp.intervals()) + 1, 0),
+        costs_to_go_(static_cast<std::size_t>(qp.intervals()) + 1) {
+    std::ptrdiff_t variable = qp.initial_state_is_given ? 0 : qp.states(0);
+    for (int i = 0; i < qp.intervals(); ++i) {
+      control_starts_.push_back(variable);
+      variable += qp.controls(i) + qp.states(i + 1);
+    }
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int j = 0; j < qp.states(i); ++j) largest_cost_ = std::max(largest_cost_, std::abs(qp.Q_of(i)(j, j)));
+  }
+
+  int run() {
+    const int stages = qp_.intervals() + 1;
+    int start = stages - 1, reach = 1, last_failure = -1;
+    for (int failure = recurse_from(start); failure >= 0; failure = recurse_from(start)) {
+      if (failure == last_failure && reach >= stages - failure)
+        break;  // not even Gauss-Newton has a positive pivot here
+      reach = failure == last_failure ? 2 * reach : 1;
+      last_failure = failure;
+      start = std::min(failure + reach, stages) - 1;
+      for (int i = failure; i <= start; ++i) give_up(i);
+    }
+    return static_cast<int>(std::count(given_up_.begin(), given_up_.end(), 1));
+  }
+
+ private:
+  void give_up(int i) {
+    given_up_[i] = 1;
+    const std::ptrdiff_t ns = qp_.capacity().states, nw = qp_.capacity().controls;
+    std::copy_n(gauss_newton_.Q(i), ns * ns, qp_.Q(i));
+    if (i == qp_.intervals()) return;
+    std::copy_n(gauss_newton_.S(i), nw * ns, qp_.S(i));
+    std::copy_n(gauss_newton_.R(i), nw * nw, qp_.R(i));
+  }
+
+  /// From a stage whose successors' costs-to-go stand. Returns the stage whose pivot is not positive, or -1.
+  int recurse_from(int start) {
+    for (int i = start; i >= 0; --i) {
+      Eigen::MatrixXd next = qp_.Q_of(i);
+      if (i < qp_.intervals()) {
+        const Eigen::MatrixXd& P = costs_to_go_[i + 1];
+        const Eigen::MatrixXd A = qp_.A_of(i), PA = P * A;
+        next.noalias() += A.transpose() * PA;
+        free_.clear();
+        for (int j = 0; j < qp_.controls(i); ++j)
+          if (fixed_.empty() || fixed_[control_starts_[i] + j] == 0) free_.push_back(j);
+        if (!free_.empty()) {
+          const Eigen::MatrixXd B = qp_.B_of(i)(Eigen::all, free_), BPB = B.transpose() * P * B;
+          const Eigen::MatrixXd R = qp_.R_of(i)(free_, free_);
+          if (!factor(R + BPB, R.diagonal().cwiseAbs() + BPB.diagonal().cwiseAbs())) return i;
+          Eigen::MatrixXd W = qp_.S_of(i)(free_, Eigen::all);
+          W.noalias() += B.transpose() * PA;
+          factor_.matrixL().solveInPlace(W);
+          next.noalias() -= W.transpose() * W;
+        }
+      }
+      costs_to_go_[i] = 0.5 * (next + next.transpose());
+      if (i > 0 && !fixed_.empty()) hold(costs_to_go_[i], control_starts_[i - 1] + qp_.controls(i - 1));
+    }
+    if (qp_.initial_state_is_given || qp_.states(0) == 0) return -1;
+    const Eigen::MatrixXd& P = costs_to_go_[0];
+    return factor(P, P.diagonal().cwiseAbs() + qp_.Q_of(0).diagonal().cwiseAbs()) ? -1 : 0;
+  }
+
+  bool factor(const Eigen::MatrixXd& pivot, const Eigen::VectorXd& sizes) {
+    const double least = std::max(rounding * rounding * sizes.maxCoeff(), std::numeric_limits<double>::min());
+    const Eigen::VectorXd zero = (rounding * sizes).cwiseMax(least);
+    factor_.compute(pivot + Eigen::MatrixXd(zero.asDiagonal()));
+    return factor_.info() == Eigen::Success;
+  }
+
+  /// Adds to a cost-to-go what holds those of its states that are fixed.
+  void hold(Eigen::MatrixXd& P, std::ptrdiff_t start) const {
+    for (Eigen::Index j = 0; j < P.rows(); ++j)
+      if (fixed_[start + j] != 0) P(j, j) += stiff * largest_cost_;
+  }
+
+  StageQp& qp_;
+  const StageQp& gauss_newton_;
+  std::span<const std::uint8_t> fixed_;
+  std::vector<std::uint8_t> given_up_;
+  std::vector<Eigen::MatrixXd> costs_to_go_;
+  std::vector<std::ptrdiff_t> control_starts_;
+  std::vector<int> free_;
+  double largest_cost_ = 1.0;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+};
+
+}  // namespace
+
+int convexify_by_stages(StageQp& qp, const StageQp& gauss_newton, std::span<const std::uint8_t> fixed) {
+  return Recursion(qp, gauss_newton, fixed).run();
+}
+
+}  // namespace rhec::sparse_sqp
