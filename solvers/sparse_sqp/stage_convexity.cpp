@@ -14,6 +14,8 @@ namespace {
 
 // This part of the terms that a pivot is made of counts as zero, which a pivot may be in a Gauss-Newton program.
 constexpr double rounding = 1e-13;
+// Where stages have been recursed over this often on average, all of them take Gauss-Newton's.
+constexpr int most_work = 8;
 // What holds a state at a bound, beside the largest cost of a state.
 constexpr double stiff = 1e8;
 
@@ -42,8 +44,10 @@ class Recursion {
         break;  // not even Gauss-Newton has a positive pivot here
       reach = failure == last_failure ? 2 * reach : 1;
       last_failure = failure;
-      start = std::min(failure + reach, stages) - 1;
-      for (int i = failure; i <= start; ++i) give_up(i);
+      const bool is_hopeless = work_ > most_work * stages;
+      start = is_hopeless ? stages - 1 : std::min(failure + reach, stages) - 1;
+      if (is_hopeless) reach = stages;
+      for (int i = is_hopeless ? 0 : failure; i <= start; ++i) give_up(i);
     }
     return static_cast<int>(std::count(given_up_.begin(), given_up_.end(), 1));
   }
@@ -61,6 +65,7 @@ class Recursion {
   /// From a stage whose successors' costs-to-go stand. Returns the stage whose pivot is not positive, or -1.
   int recurse_from(int start) {
     for (int i = start; i >= 0; --i) {
+      ++work_;
       Eigen::MatrixXd next = qp_.Q_of(i);
       if (i < qp_.intervals()) {
         const Eigen::MatrixXd& P = costs_to_go_[i + 1];
@@ -108,6 +113,7 @@ class Recursion {
   std::vector<std::ptrdiff_t> control_starts_;
   std::vector<int> free_;
   double largest_cost_ = 1.0;
+  std::int64_t work_ = 0;  ///< stages recursed over, again and again
   Eigen::LLT<Eigen::MatrixXd> factor_;
 };
 

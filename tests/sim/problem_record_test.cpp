@@ -2,8 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <string>
@@ -34,7 +35,8 @@ const Host& host() {
 /// The first difference in bits, none for NaN and NaN.
 ::testing::AssertionResult same_bits(const char* what, int stage, const double* a, const double* b, int count) {
   for (int j = 0; j < count; ++j)
-    if (std::memcmp(a + j, b + j, sizeof(double)) != 0 && !(std::isnan(a[j]) && std::isnan(b[j])))
+    if (std::bit_cast<std::uint64_t>(a[j]) != std::bit_cast<std::uint64_t>(b[j]) &&
+        !(std::isnan(a[j]) && std::isnan(b[j])))
       return ::testing::AssertionFailure() << fmt::format("{} {}[{}]: {} is not {}", what, stage, j, a[j], b[j]);
   return ::testing::AssertionSuccess();
 }
