@@ -12,14 +12,17 @@ constexpr int active_set_rounds = 10;
 constexpr int polishing_rounds = 6;
 // So many bounds let go in a round, and no fewer than half as many as in the one before, are no end in sight.
 constexpr int many = 16;
+// Nor are so many rounds in a row that only let go some.
+constexpr int enough = 4;
 constexpr int most_interior_iterations = 80;
 // A bound counts as violated, or a multiplier as of the wrong sign, beyond this part of the sizes involved.
 constexpr double active_set_tolerance = 1e-11;
 // What refinement must reach for the solution of a system to be believed.
 constexpr double believable = 1e-8;
 constexpr double accurate = 1e-11;
+constexpr double longest_step = 1e10;
 // Interior point: residuals relative to the program's sizes.
-constexpr double interior_tolerance = 1e-10;
+constexpr double interior_tolerance = 1e-12;
 constexpr double good_enough_interior = 1e-6;
 constexpr double to_the_boundary = 0.995;
 
@@ -138,7 +141,7 @@ double SparseQp::solve_system() {
 SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
   std::fill(primal_.begin(), primal_.end(), 0.0);
   std::fill(dual_.begin(), dual_.end(), 0.0);
-  int released_before = 0;
+  int released_before = 0, peeled = 0;  // the latter: rounds in a row that only let go
   for (int round = 0; round < rounds; ++round) {
     if (!factor_with(program)) return program.is_convex ? ActiveSet::unknown : ActiveSet::indefinite;
     const auto value_at = [&](int k) { return active_[k] == 1 ? program.upper[k] : program.lower[k]; };
@@ -178,7 +181,9 @@ SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
       active_[k] = next;
     }
     // Long stretches at a bound that should be shorter are peeled off from their ends, node by node.
-    const bool is_peeling = added == 0 && (round == rounds - 1 || (released >= many && 2 * released > released_before));
+    peeled = added == 0 ? peeled + 1 : 0;
+    const bool is_peeling =
+        (peeled >= enough && round == rounds - 1) || (peeled > 0 && released >= many && 2 * released > released_before);
     released_before = released;
     if (settled || is_peeling) {
       factor_is_final_ = settled;
@@ -186,6 +191,8 @@ SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
         d_[k] = std::clamp(d_[k], program.lower[k], program.upper[k]);
         if (active_[k] != 2) mu_[k] = active_[k] * std::max(0.0, mu_[k] * active_[k]);
       }
+      // A direction that nothing determines, neither cost nor equations nor bounds.
+      if (!(max_abs(d_.data(), n_) <= longest_step)) return ActiveSet::unknown;
       return settled ? ActiveSet::optimal : ActiveSet::feasible;
     }
   }
@@ -275,10 +282,22 @@ SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalt
     if (!std::isfinite(residual)) return Outcome::failed;
     if (residual < interior_tolerance) break;
     no_progress = residual < 0.9 * best_residual ? 0 : no_progress + 1;
+    if (residual < best_residual && residual < good_enough_interior) {
+      best_d_ = d_;
+      best_lambda_ = lambda_;
+      best_pairs_ = pairs_;
+      best_dual_residual_ = dual_residual_;
+    }
     best_residual = std::min(best_residual, residual);
-    if (no_progress > 15 || iteration == most_interior_iterations) {
-      if (residual < good_enough_interior) break;
-      return Outcome::failed;
+    const bool is_good_enough = best_residual < good_enough_interior;
+    // Beyond a certain accuracy the barrier's terms are too large for the numbers, and it gets worse again.
+    if (no_progress > (is_good_enough ? 2 : 15) || iteration == most_interior_iterations) {
+      if (!is_good_enough) return Outcome::failed;
+      std::swap(d_, best_d_);
+      std::swap(lambda_, best_lambda_);
+      std::swap(pairs_, best_pairs_);
+      std::swap(dual_residual_, best_dual_residual_);
+      break;
     }
 
     std::fill(primal_.begin(), primal_.end(), 0.0);

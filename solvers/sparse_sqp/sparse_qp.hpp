@@ -97,7 +97,8 @@ class SparseQp {
   std::vector<std::int8_t> active_;      ///< -1 at the lower bound, +1 at the upper, 2 fixed by both, 0 free
   std::vector<std::uint8_t> fixed_;      ///< flags of the active ones
   std::vector<double> d_, lambda_, mu_;  ///< the solution: step, multipliers, bound multipliers
-  std::vector<Pair> pairs_;
+  std::vector<Pair> pairs_, best_pairs_;
+  std::vector<double> best_d_, best_lambda_, best_dual_residual_;  ///< with `best_pairs_`: the interior point's best
   std::vector<double> primal_, dual_, rhs_, solution_, other_solution_, dual_residual_, primal_residual_, work_n_,
       work_m_;
 };

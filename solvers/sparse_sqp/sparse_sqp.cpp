@@ -17,7 +17,7 @@ namespace rhec::sparse_sqp {
 namespace {
 
 constexpr double sufficient_decrease = 1e-4;
-constexpr double shortest_step = 1e-10;
+constexpr double shortest_step = 1e-10, longest_step = 1e6;
 // A KKT residual below which Newton's method is trusted more than the merit function.
 constexpr double near_solution = 1e-3;
 // A defect below which steps that gain little are due to the curvature, not to the distance.
@@ -211,6 +211,8 @@ SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point dea
 
 /// Searches along the step; the accepted point goes to `trial_`, its merit to `after`. False where no length will do.
 bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
+  // A direction that nothing determines: no length of it is worth trying.
+  if (!(max_abs(step_) <= longest_step * (1.0 + max_abs(z_)))) return false;
   const double defect = norm1(constraints_);
   // Multipliers of relaxed equations are as large as the penalty that relaxed them, which was enough.
   const double least_penalty = (predicted_defect_ > 0.0 ? 1.0 : 1.5) * max_abs(step_multipliers_);
@@ -236,6 +238,9 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     double remaining = norm1(trial_constraints_);
     for (int round = 0; round < corrections; ++round) {
       if (!qp_.correct(program(), trial_constraints_.data(), correction_.data())) break;
+      // What is longer than the step itself corrects nothing, as where equations and active bounds depend on each
+      // other.
+      if (!(max_abs(correction_) <= max_abs(step_))) break;
       for (std::size_t k = 0; k < z_.size(); ++k)
         trial_z_[k] = std::clamp(trial_z_[k] + correction_[k], lower_z_[k], upper_z_[k]);
       nlp_.write(ocp, trial_z_.data(), nullptr, nullptr, trial_);
