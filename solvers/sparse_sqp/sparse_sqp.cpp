@@ -139,7 +139,7 @@ double SparseSqp::merit(const Ocp& ocp, const Iterate& point) noexcept {
   return objective + penalty_ * norm1(trial_constraints_);
 }
 
-/// `trial_` = `current_` and that length of the step.
+/// `trial_` = `current_` and the step, in its lengths.
 void SparseSqp::move(const Ocp& ocp) {
   for (std::size_t k = 0; k < z_.size(); ++k) {
     const double length = lengths_[stage_of_variable_[k]];
@@ -254,21 +254,20 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
   // Lengths of their own for the places that refuse the full step.
   for (int round = 0; round < local_halvings; ++round) {
     move(ocp);
-    length_ = *std::min_element(lengths_.begin(), lengths_.end());
-    if (acceptable(length_)) return true;
+    const double shortest = *std::min_element(lengths_.begin(), lengths_.end());
+    if (acceptable(shortest)) return true;
     // Near the solution the merit may refuse a step that Newton's method is right about.
     if (round == 0 && residual < near_solution && std::isfinite(after)) {
       ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_stages_, scratch_);
       if (kkt_residual(other_stages_, trial_).largest() < 0.5 * residual) return true;
     }
     if (!std::isfinite(after)) break;
-    if (correct(length_)) return true;
+    if (correct(shortest)) return true;
     if (!shorten_locally()) break;
   }
   for (double length = 0.5; length >= shortest_step; length *= 0.5) {
     std::fill(lengths_.begin(), lengths_.end(), length);
     move(ocp);
-    length_ = length;
     if (acceptable(length) || correct(length)) return true;
   }
   return false;

@@ -69,10 +69,10 @@ class SparseSqp final : public Solver {
   std::vector<double> lower_z_, upper_z_;
   std::vector<double> relaxed_step_, relaxed_multipliers_, relaxed_bound_multipliers_;
   bool hessian_is_convex_ = false;
-  std::vector<int> stage_of_variable_, stage_of_row_;
-  std::vector<double> stage_merits_, merits_before_, merit_sums_;
-  std::vector<double> lengths_;  ///< of the step, by stage
-  double length_ = 0.0;          ///< of the last step that was accepted
+  std::vector<int> stage_of_variable_, stage_of_row_;  ///< a defect belongs to the stage that its interval starts at
+  std::vector<double> stage_merits_, merits_before_;   ///< of the point looked at last, and of `current_`
+  std::vector<double> merit_sums_;                     ///< of their differences, over the first stages
+  std::vector<double> lengths_;                        ///< of the step, by stage
   double penalty_ = 0.0;
   int penalty_cuts_left_ = 0;
   double predicted_defect_ = 0.0;  ///< |J step + c|_1
