@@ -13,10 +13,12 @@
 #include "rhec/core/solver.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
+#include "test_models.hpp"
 
 namespace rhec {
 namespace {
 
+using testing::Integrator;
 using testing::RandomProblem;
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
@@ -63,19 +65,6 @@ int bounds_held(const Ocp& ocp, const Iterate& point) {
   }
   return held;
 }
-
-/// x' = u, where nothing is curved and every optimum is known.
-struct Integrator {
-  static constexpr int state_count = 1, input_count = 1, parameter_count = 0, output_count = 1;
-  template <class Scalar>
-  void dynamics(const Scalar*, const Scalar* u, const Scalar*, Scalar* dxdt) const {
-    dxdt[0] = u[0];
-  }
-  template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
-    y[0] = x[0];
-  }
-};
 
 /// x' = x^3 + u, which leaves the numbers within seconds where u is large.
 struct Runaway : Integrator {

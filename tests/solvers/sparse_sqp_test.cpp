@@ -22,12 +22,14 @@
 #include "rhec/core/riccati.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
+#include "test_models.hpp"
 
 namespace rhec::sparse_sqp {
 namespace {
 
 using rhec::testing::RandomProblem;
 using rhec::testing::RandomQp;
+using rhec::testing::WithoutSecondDerivatives;
 using Drive = RandomProblem::Drive;
 using RheSpec = RandomProblem::RheSpec;
 using RhcSpec = RandomProblem::RhcSpec;
@@ -781,23 +783,8 @@ TEST(SparseSqp, EveryHessianLeadsToTheSameOptimum) {
   }
 }
 
-/// A bicycle that hides its second derivatives.
-class FirstOrderBicycle final : public Model {
- public:
-  const ModelDescription& description() const noexcept override { return model_->description(); }
-  void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
-  void observe(const Nodes& request) const noexcept override { model_->observe(request); }
-  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
-    model_->rates(x, u, p, dxdt);
-  }
-  bool has_second_derivatives() const noexcept override { return false; }
-
- private:
-  std::shared_ptr<const Model> model_ = bicycle();
-};
-
 TEST(SparseSqp, RefusesAHessianThatTheModelHasNot) {
-  RandomProblem random(std::make_shared<FirstOrderBicycle>(), 12);
+  RandomProblem random(std::make_shared<WithoutSecondDerivatives>(bicycle()), 12);
   const auto rhe = random.rhe({});
   const auto rhc = random.rhc({});
   EXPECT_EQ(plugin()->why_not(*rhe), "");

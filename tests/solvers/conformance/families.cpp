@@ -9,13 +9,16 @@
 #include <utility>
 
 #include "../../core/random_problem.hpp"
+#include "../test_models.hpp"
 #include "found.hpp"
 #include "rhec/core/formula_model.hpp"
 
 namespace rhec::conformance {
 namespace {
 
+using testing::Integrator;
 using testing::RandomProblem;
+using testing::WithoutSecondDerivatives;
 using Drive = RandomProblem::Drive;
 using RheSpec = RandomProblem::RheSpec;
 using RhcSpec = RandomProblem::RhcSpec;
@@ -27,18 +30,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 bool has_parameters(const Model& model) { return model.parameter_count() > 0; }
 
 // --- models of the suite --------------------------------------------------------------------------------------------
-
-struct Integrator {
-  static constexpr int state_count = 1, input_count = 1, parameter_count = 0, output_count = 1;
-  template <class Scalar>
-  void dynamics(const Scalar*, const Scalar* u, const Scalar*, Scalar* dxdt) const {
-    dxdt[0] = u[0];
-  }
-  template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
-    y[0] = x[0];
-  }
-};
 
 /// Carts in a row, each drawn by the one before; the first one is pushed. The rate at which they follow is unknown.
 struct WideChain {
@@ -75,22 +66,6 @@ ModelDescription about_wide_chain() {
   about.parameters = {{.name = "rate", .unit = "1/s", .meaning = "of following", .lower = 0.0, .upper = 2.0}};
   return about;
 }
-
-/// Another model without its second derivatives.
-class WithoutSecondDerivatives final : public Model {
- public:
-  explicit WithoutSecondDerivatives(ModelPointer model) : model_(std::move(model)) {}
-  const ModelDescription& description() const noexcept override { return model_->description(); }
-  void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
-  void observe(const Nodes& request) const noexcept override { model_->observe(request); }
-  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
-    model_->rates(x, u, p, dxdt);
-  }
-  bool has_second_derivatives() const noexcept override { return false; }
-
- private:
-  ModelPointer model_;
-};
 
 // --- how families are made ------------------------------------------------------------------------------------------
 
