@@ -35,7 +35,7 @@ void print_table(const sim::RunSummary& summary, const std::filesystem::path& fo
   fmt::print("{:<12} {:>8.4f} rad {:>8.4f} rad\n", "heading", summary.mae.heading, summary.rmse.heading);
   fmt::print("{:<12} {:>10.3f} m {:>10.3f} m\n\n", "tracking", summary.mae.tracking, summary.rmse.tracking);
   fmt::print("{:<12} {:>12} {:>12} {:>12}\n", "SOLVE [us]", "MEDIAN", "P99", "MAX");
-  const auto times = [](const char* name, const sim::TimeSummary& t) {
+  const auto times = [](const char* name, const sim::Spread& t) {
     fmt::print("{:<12} {:>12.1f} {:>12.1f} {:>12.1f}\n", name, t.median, t.p99, t.max);
   };
   if (!summary.estimator_statuses.empty()) times("rhe", summary.estimator_us);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <iterator>
@@ -26,6 +25,7 @@
 #include "rhec/sim/csv.hpp"
 #include "rhec/sim/output_folder.hpp"
 #include "rhec/sim/problem_file.hpp"
+#include "rhec/sim/spread.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -225,12 +225,6 @@ class Destination {
   std::string name_;
 };
 
-double quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  const auto index = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
-  return values[std::clamp<std::size_t>(index, 1, values.size()) - 1];
-}
-
 void print_summary(const std::map<std::string, Group>& groups) {
   std::size_t width = 8;
   for (const auto& [prefix, group] : groups) width = std::max(width, prefix.size());
@@ -240,10 +234,9 @@ void print_summary(const std::map<std::string, Group>& groups) {
     std::string statuses;
     for (const auto& [status, count] : group.statuses)
       statuses += fmt::format("{}{} {}", statuses.empty() ? "" : ", ", count, status);
-    const std::string iterations =
-        fmt::format("{:g}/{:g}", quantile(group.iterations, 0.5), quantile(group.iterations, 1.0));
+    const sim::Spread iterations = sim::spread_of(group.iterations), times = sim::spread_of(group.times);
     fmt::print(stderr, "{:<{}}  {:>8}  {:>14}  {:>14.1f}  {:>14.1f}  {}\n", prefix, width, group.times.size(),
-               iterations, quantile(group.times, 0.5), quantile(group.times, 0.99), statuses);
+               fmt::format("{:g}/{:g}", iterations.median, iterations.max), times.median, times.p99, statuses);
   }
 }
 

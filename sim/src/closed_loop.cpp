@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -66,14 +67,8 @@ class Errors {
   std::int64_t count_ = 0;
 };
 
-TimeSummary summarise_times(std::vector<double> times) {
-  if (times.empty()) return {};
-  std::sort(times.begin(), times.end());
-  const auto at = [&](double share) {
-    return times[std::min(times.size() - 1,
-                          static_cast<std::size_t>(std::ceil(share * static_cast<double>(times.size())) - 1))];
-  };
-  return {at(0.5), at(0.99), times.back()};
+Spread spread_of_times(std::vector<double> times) {
+  return times.empty() ? Spread{0.0, 0.0, 0.0} : spread_of(std::move(times));
 }
 
 }  // namespace
@@ -204,8 +199,8 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
   summary.rmse = all.root_mean_square();
   summary.mae_after_start = after_start.absolute();
   summary.nees = with_nees > 0 ? nees / static_cast<double>(with_nees) : std::numeric_limits<double>::quiet_NaN();
-  summary.estimator_us = summarise_times(std::move(estimator_us));
-  summary.controller_us = summarise_times(std::move(controller_us));
+  summary.estimator_us = spread_of_times(std::move(estimator_us));
+  summary.controller_us = spread_of_times(std::move(controller_us));
   return summary;
 }
 

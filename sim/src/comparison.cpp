@@ -458,17 +458,6 @@ bool Comparison::all_usable() const {
          std::all_of(loops.begin(), loops.end(), all_completed);
 }
 
-Spread spread_of(std::vector<double> values) {
-  std::erase_if(values, [](double value) { return std::isnan(value); });
-  if (values.empty()) return {};
-  std::sort(values.begin(), values.end());
-  const auto at = [&](double share) {
-    const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
-    return values[std::max<std::size_t>(rank, 1) - 1];
-  };
-  return {at(0.5), at(0.99), values.back()};
-}
-
 Spread spread_of(const std::vector<Answer>& answers, double Answer::*number) {
   std::vector<double> values;
   values.reserve(answers.size());

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "rhec/sim/recorded_log.hpp"
 #include "rhec/sim/run_picture.hpp"
+#include "rhec/sim/spread.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -27,12 +27,6 @@ Json json_of(const HeldOutSummary& held_out) {
   return json;
 }
 
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
-
 Json json_of(const Replay& replay, const RecordedLog& log) {
   Json json;
   json["held_out"] = json_of(summarise(replay, log));
@@ -42,9 +36,8 @@ Json json_of(const Replay& replay, const RecordedLog& log) {
   json["fallbacks"] = replay.counts.fallbacks;
   json["dropped"] = replay.counts.dropped;
   json["seconds"] = replay.seconds;
-  json["solve_time_us"] = {{"median", quantile(replay.solve_us, 0.5)},
-                           {"p99", quantile(replay.solve_us, 0.99)},
-                           {"max", quantile(replay.solve_us, 1.0)}};
+  const Spread times = replay.solve_us.empty() ? Spread{0.0, 0.0, 0.0} : spread_of(replay.solve_us);
+  json["solve_time_us"] = {{"median", times.median}, {"p99", times.p99}, {"max", times.max}};
   return json;
 }
 

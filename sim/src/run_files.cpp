@@ -21,7 +21,7 @@ Json json_of(const ErrorSummary& errors) {
   return json;
 }
 
-Json json_of(const TimeSummary& times) { return {{"median", times.median}, {"p99", times.p99}, {"max", times.max}}; }
+Json json_of(const Spread& times) { return {{"median", times.median}, {"p99", times.p99}, {"max", times.max}}; }
 
 template <class Variables, class Function>
 Curve curve_of(const RunLog& log, std::string label, CurveRole role, const Variables&, const Function& value_of) {

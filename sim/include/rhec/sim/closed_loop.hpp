@@ -7,6 +7,7 @@
 
 #include "rhec/sim/recording_solver.hpp"
 #include "rhec/sim/scenario.hpp"
+#include "rhec/sim/spread.hpp"
 
 namespace rhec::sim {
 
@@ -42,17 +43,14 @@ struct ErrorSummary {
   double heading = 0.0;                      ///< [rad]
   double tracking = 0.0;                     ///< distance of the true position from the path [m]
 };
-struct TimeSummary {
-  double median = 0.0, p99 = 0.0, max = 0.0;
-};
 struct RunSummary {
   std::int64_t steps = 0;
   bool completed = false;
   std::string ended;
   ErrorSummary mae, rmse;
-  ErrorSummary mae_after_start;  ///< without the first N_e samples
-  double nees = 0.0;             ///< mean; its expected value is the number of states and parameters
-  TimeSummary estimator_us, controller_us;
+  ErrorSummary mae_after_start;        ///< without the first N_e samples
+  double nees = 0.0;                   ///< mean; its expected value is the number of states and parameters
+  Spread estimator_us, controller_us;  ///< zeros where there was no solve
   std::map<std::string, std::int64_t> estimator_statuses, controller_statuses;
   std::int64_t fallbacks = 0;  ///< solves whose result could not be used
   std::int64_t solves = 0;

@@ -12,6 +12,7 @@
 #include "rhec/core/solver.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/spread.hpp"
 
 namespace rhec::sim {
 
@@ -102,13 +103,7 @@ struct Comparison {
 /// error.
 RHEC_EXPORT Comparison compare(const Host& host, const Settings& scenario, const ComparisonOptions& options);
 
-struct Spread {
-  double median = std::numeric_limits<double>::quiet_NaN(), p99 = median, max = median;
-};
-/// Of the values that are not NaN; NaN where there is none. A quantile is the least value that is at least as large as
-/// that share of all.
-RHEC_EXPORT Spread spread_of(std::vector<double> values);
-/// The same of one number of all answers.
+/// Of one number of all answers.
 RHEC_EXPORT Spread spread_of(const std::vector<Answer>& answers, double Answer::*number);
 RHEC_EXPORT Spread spread_of(const std::vector<Answer>& answers, int Answer::*number);
 
