@@ -44,6 +44,7 @@ struct KktFactor::Workspace {
 /// K's ordering and pattern for one structure: its upper triangle in the order of elimination, and where the numbers of
 /// H, J and the diagonals go.
 struct KktFactor::Symbolic {
+  std::vector<std::int32_t> signature;  ///< of the structure
   cholmod_common* common = nullptr;
   cholmod_sparse* matrix = nullptr;
   cholmod_factor* factor = nullptr;
@@ -111,7 +112,6 @@ KktFactor::~KktFactor() {
 void KktFactor::forget() noexcept {
   symbolic_.reset();
   known_.clear();
-  order_of_use_.clear();
   nlp_ = nullptr;
 }
 
@@ -129,13 +129,15 @@ void KktFactor::take_structure(const SparseNlp& nlp) {
   const std::size_t size = static_cast<std::size_t>(n_) + static_cast<std::size_t>(m_);
   for (auto* vector : {&scale_, &norm_, &right_, &residual_, &correction_, &terms_}) vector->assign(size, 0.0);
   const auto& signature = nlp.signature();
-  if (const auto at = known_.find(signature); at != known_.end()) {
-    const auto old = std::find(order_of_use_.begin(), order_of_use_.end(), signature);
-    std::rotate(old, old + 1, order_of_use_.end());
-    symbolic_ = at->second;
+  const auto at =
+      std::find_if(known_.begin(), known_.end(), [&](const auto& one) { return one->signature == signature; });
+  if (at != known_.end()) {
+    std::rotate(at, at + 1, known_.end());
+    symbolic_ = known_.back();
     return;
   }
   auto made = std::make_shared<Symbolic>(&workspace_->common);
+  made->signature = signature;
   made->place.resize(size);
   for (std::size_t k = 0; k < size; ++k) made->place[k] = static_cast<int>(k);
   made->make_matrix(nlp);
@@ -155,12 +157,8 @@ void KktFactor::take_structure(const SparseNlp& nlp) {
   common.postorder = 1;
   if (!made->factor) throw std::bad_alloc();
   ++analyses_;
-  order_of_use_.push_back(signature);
-  if (known_.size() >= static_cast<std::size_t>(most_structures)) {
-    known_.erase(order_of_use_.front());
-    order_of_use_.erase(order_of_use_.begin());
-  }
-  known_.emplace(signature, made);
+  if (known_.size() >= static_cast<std::size_t>(most_structures)) known_.erase(known_.begin());
+  known_.push_back(made);
   symbolic_ = std::move(made);
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <vector>
 
@@ -60,8 +59,7 @@ class KktFactor {
   void equilibrate() noexcept;
 
   std::unique_ptr<Workspace> workspace_;
-  std::map<std::vector<std::int32_t>, std::shared_ptr<Symbolic>> known_;
-  std::vector<std::vector<std::int32_t>> order_of_use_;  ///< signatures, the newest last
+  std::vector<std::shared_ptr<Symbolic>> known_;  ///< in the order of use, the newest last
   std::shared_ptr<Symbolic> symbolic_;
   const SparseNlp* nlp_ = nullptr;
   int n_ = 0, m_ = 0, analyses_ = 0;

@@ -279,7 +279,6 @@ SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalt
     if (!pairs_.empty()) mu /= static_cast<double>(pairs_.size());
     const double residual =
         std::max({max_abs(primal_residual_.data(), m_) / constraint_size, dual_error / terms, mu / terms});
-    if (!std::isfinite(residual)) return Outcome::failed;
     if (residual < interior_tolerance) break;
     no_progress = residual < 0.9 * best_residual ? 0 : no_progress + 1;
     if (residual < best_residual && residual < good_enough_interior) {
@@ -291,7 +290,7 @@ SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalt
     best_residual = std::min(best_residual, residual);
     const bool is_good_enough = best_residual < good_enough_interior;
     // Beyond a certain accuracy the barrier's terms are too large for the numbers, and it gets worse again.
-    if (no_progress > (is_good_enough ? 2 : 15) || iteration == most_interior_iterations) {
+    if (!std::isfinite(residual) || no_progress > (is_good_enough ? 2 : 15) || iteration == most_interior_iterations) {
       if (!is_good_enough) return Outcome::failed;
       std::swap(d_, best_d_);
       std::swap(lambda_, best_lambda_);

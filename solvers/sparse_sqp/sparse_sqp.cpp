@@ -165,6 +165,7 @@ void SparseSqp::convexify(const Ocp& ocp, int round) {
 SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::time_point deadline) {
   auto outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
   for (int round = 1; outcome == SparseQp::Outcome::indefinite && round <= convexifications; ++round) {
+    if (Clock::now() > deadline) return SparseQp::Outcome::deadline;
     convexify(ocp, round);
     outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
   }
