@@ -11,14 +11,13 @@
 namespace rhec {
 namespace {
 
-RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Setup& setup, const Path& path) {
+RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Setup& setup) {
   const Roles& roles = model->description().roles;
-  if (roles.position_x < 0 || roles.position_y < 0 || roles.speed < 0)
-    throw Error(fmt::format("controller: the model '{}' names no position or no speed input to follow a path with",
-                            model->description().name));
-  if (path.input_count() != model->input_count())
-    throw Error(fmt::format("controller: the path has {} reference inputs; expected the model's {}", path.input_count(),
-                            model->input_count()));
+  if (roles.position_x < 0 || roles.position_y < 0)
+    throw Error(
+        fmt::format("controller: the model '{}' does not say which states are its position; it cannot follow a "
+                    "path",
+                    model->description().name));
   if (setup.blockings.size() != setup.problem.blocked_inputs.size())
     throw Error("controller: expected one blocking for each blocked input");
   for (const auto& blocking : setup.blockings)
@@ -35,7 +34,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
     : setup_(std::move(setup)),
       path_(std::move(path)),
       follower_(path_, setup_.search),
-      problem_(make_problem(std::move(model), setup_, path_)),
+      problem_(make_problem(std::move(model), setup_)),
       solver_(std::move(solver)),
       shifter_(problem_),
       point_(problem_.capacity()) {
@@ -53,9 +52,19 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
     throw Error("controller: the solver cannot take this problem: " + reason);
   solver_->setup(problem_);
-  command_.inputs.assign(problem_.model().input_count(), 0.0);
-  reference_inputs_.assign(problem_.model().input_count(), 0.0);
-  reference_parameters_.assign(problem_.model().parameter_count(), 1.0);
+  const Model& vehicle = problem_.model();
+  command_.inputs.assign(vehicle.input_count(), 0.0);
+  straight_inputs_.assign(vehicle.input_count(), 0.0);
+  slipless_inputs_.assign(vehicle.input_count(), 0.0);
+  largest_inputs_.assign(vehicle.input_count(), 0.0);
+  nominal_parameters_ = nominal_values(vehicle.description().parameters);
+  reference_parameters_ = nominal_parameters_;
+  vehicle.straight_inputs(1.0, nominal_parameters_.data(), slipless_inputs_.data());
+  if (std::all_of(slipless_inputs_.begin(), slipless_inputs_.end(), [](double input) { return input == 0.0; }))
+    throw Error(
+        fmt::format("controller: the model '{}' does not say which inputs drive it straight ahead; it cannot "
+                    "follow a path",
+                    vehicle.description().name));
 }
 
 void Controller::reset() noexcept {
@@ -66,33 +75,44 @@ void Controller::reset() noexcept {
   fallbacks_ = 0;
 }
 
+/// The inputs that go straight on at a speed over ground, on ground that slips like the estimate, as far as that is
+/// trusted.
+void Controller::choose_straight_inputs(double ground_speed, const double* parameters) noexcept {
+  const Model& vehicle = problem_.model();
+  vehicle.straight_inputs(ground_speed, nominal_parameters_.data(), slipless_inputs_.data());
+  straight_inputs_ = slipless_inputs_;
+  if (setup_.reference_speed == ReferenceSpeed::literal) return;
+  vehicle.straight_inputs(ground_speed, parameters, straight_inputs_.data());
+  for (std::size_t j = 0; j < straight_inputs_.size(); ++j) {
+    const double most = slipless_inputs_[j] / setup_.least_speed_factor;
+    const bool trusted = straight_inputs_[j] * most >= 0.0 && std::abs(straight_inputs_[j]) <= std::abs(most);
+    if (!trusted) straight_inputs_[j] = most;  // also where it is not a number
+  }
+}
+
 /// References and bounds of the horizon that starts at an arc length of the path.
 void Controller::set_reference(double arc_length, const double* parameters) noexcept {
-  const Roles& roles = problem_.model().description().roles;
-  const int N = problem_.intervals(), nu = problem_.model().input_count();
-  command_.reference = path_.point_at(arc_length, reference_inputs_.data());
-  const double ground_speed = reference_inputs_[roles.speed];
-  command_.reference_speed = ground_speed;
-  double factor = 1.0;
-  if (setup_.reference_speed == ReferenceSpeed::ground && roles.speed_factor >= 0)
-    factor = std::max(parameters[roles.speed_factor], setup_.least_speed_factor);
-  const double bound = setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset;
+  const Model& vehicle = problem_.model();
+  const Roles& roles = vehicle.description().roles;
+  const int N = problem_.intervals(), nu = vehicle.input_count();
+  command_.reference = path_.point_at(arc_length);
+  const double ground_speed = command_.reference.speed, distance = setup_.interval * std::abs(ground_speed);
+  choose_straight_inputs(ground_speed, parameters);
+  const double most = setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset;
+  if (std::isfinite(most)) vehicle.straight_inputs(most, nominal_parameters_.data(), largest_inputs_.data());
   for (int i = 0; i <= N; ++i) {
-    double* x = problem_.state_reference(i);
-    const PathPoint target = path_.point_at(arc_length + i * setup_.interval * std::abs(ground_speed));
-    x[roles.position_x] = target.x;
-    x[roles.position_y] = target.y;
-    if (roles.heading >= 0) x[roles.heading] = target.heading;
+    const PathPoint target = path_.point_at(arc_length + i * distance);
+    roles.place(target.x, target.y, target.heading, problem_.state_reference(i));
     if (i == N) break;
     double* u = problem_.input_reference(i);
-    std::copy_n(reference_inputs_.data(), nu, u);
-    u[roles.speed] = ground_speed / factor;
-    if (std::isfinite(bound)) {
-      problem_.input_lower(i, roles.speed) = 0.0;
-      problem_.input_upper(i, roles.speed) = bound;
+    for (int j = 0; j < nu; ++j) {
+      double &lower = problem_.input_lower(i, j), &upper = problem_.input_upper(i, j);
+      if (std::isfinite(most) && largest_inputs_[j] != 0.0) {
+        lower = std::min(0.0, largest_inputs_[j]);
+        upper = std::max(0.0, largest_inputs_[j]);
+      }
+      u[j] = std::min(std::max(straight_inputs_[j], lower), upper);
     }
-    for (int j = 0; j < nu; ++j)
-      u[j] = std::min(std::max(u[j], problem_.input_lower(i, j)), problem_.input_upper(i, j));
   }
 }
 
@@ -145,10 +165,8 @@ void Controller::prepare() noexcept {
   std::copy_n(point_.state(1), nx, problem_.given_state());
   std::copy_n(problem_.given_parameters(), np, reference_parameters_.data());
   const PathPoint reference = command_.reference;
-  const double speed = command_.reference_speed;
-  set_reference(follower_.arc_length() + setup_.interval * std::abs(speed), reference_parameters_.data());
+  set_reference(follower_.arc_length() + setup_.interval * std::abs(reference.speed), reference_parameters_.data());
   command_.reference = reference;
-  command_.reference_speed = speed;
   problem_.finish(scratch_);
   if (!shifter_.apply(1, problem_, point_)) return;
   solver_->prepare(problem_, point_);

@@ -25,7 +25,7 @@ FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Se
   const Eigen::Index n = Eigen::Index{model->state_count()} + model->parameter_count();
   if (setup_.initial_mean.size() != n || setup_.initial_covariance.rows() != n || setup_.initial_covariance.cols() != n)
     throw Error(fmt::format("filter: the initial mean and covariance must have the size {} of [x; p]", n));
-  const int count = setup_.heading_state >= 0 ? std::max(1, setup_.heading_starts) : 1;
+  const int count = model->description().roles.heading >= 0 ? std::max(1, setup_.heading_starts) : 1;
   for (int i = 0; i < count; ++i) bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps), 0.0});
   no_input_.assign(model->input_count(), 0.0);
   predicted_.assign(model->output_count(), 0.0);
@@ -45,9 +45,10 @@ void FilterEstimation::reset() noexcept {
     filter.covariance = setup_.initial_covariance;
     if (bank_.size() == 1) continue;
     // Each start covers its part of the circle.
-    const int h = setup_.heading_state;
+    const Roles& roles = model().description().roles;
+    const int h = roles.heading;
     const double part = 2.0 * std::numbers::pi / static_cast<double>(bank_.size());
-    filter.mean[h] += part * static_cast<double>(i);
+    roles.turn(part * static_cast<double>(i), filter.mean.data());
     filter.covariance.row(h).setZero();
     filter.covariance.col(h).setZero();
     filter.covariance(h, h) = std::min(setup_.initial_covariance(h, h), 0.25 * part * part);
@@ -89,7 +90,7 @@ void FilterEstimation::take(const double* outputs) noexcept {
   best_ = 0;
   for (std::size_t i = 1; i < alive_; ++i)
     if (bank_[i].log_likelihood > bank_[best_].log_likelihood) best_ = i;
-  const int h = setup_.heading_state;
+  const int h = model().description().roles.heading;
   for (std::size_t i = 0; i < alive_; ++i) {
     const bool agrees = std::abs(angle_difference(bank_[i].filter.mean[h], bank_[best_].filter.mean[h])) < 0.2;
     if (!agrees && bank_[i].log_likelihood > bank_[best_].log_likelihood - decisive) return;

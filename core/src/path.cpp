@@ -14,30 +14,18 @@ namespace {
 // Waypoints closer than this are one point: a segment so short has no heading worth following.
 constexpr double smallest_segment = 1e-9;  // [m]
 
-void check(const Waypoint& waypoint, std::size_t number, int input_count) {
-  bool finite = std::isfinite(waypoint.x) && std::isfinite(waypoint.y);
-  for (double input : waypoint.inputs) finite = finite && std::isfinite(input);
-  if (!finite) {
-    throw Error(
-        fmt::format("path: waypoint {} holds a value that is not finite; every coordinate and reference input "
-                    "must be a number",
-                    number));
-  }
-  if (static_cast<int>(waypoint.inputs.size()) > input_count) {
-    throw Error(
-        fmt::format("path: waypoint {} has {} reference inputs, but the model has {}; give at most one value per "
-                    "input of the model",
-                    number, waypoint.inputs.size(), input_count));
-  }
+void check(const Waypoint& waypoint, std::size_t number) {
+  if (std::isfinite(waypoint.x) && std::isfinite(waypoint.y) && std::isfinite(waypoint.speed)) return;
+  throw Error(
+      fmt::format("path: waypoint {} holds a value that is not finite; x, y and speed must be numbers", number));
 }
 
 }  // namespace
 
-Path::Path(const std::vector<Waypoint>& waypoints, int input_count) : input_count_(input_count) {
-  if (input_count < 0) throw Error(fmt::format("path: the number of inputs is {}; expected 0 or more", input_count));
+Path::Path(const std::vector<Waypoint>& waypoints) {
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     const Waypoint& waypoint = waypoints[i];
-    check(waypoint, i + 1, input_count);
+    check(waypoint, i + 1);
     double arc_length = 0.0;
     if (!x_.empty()) {
       const double dx = waypoint.x - x_.back(), dy = waypoint.y - y_.back();
@@ -49,9 +37,8 @@ Path::Path(const std::vector<Waypoint>& waypoints, int input_count) : input_coun
     }
     x_.push_back(waypoint.x);
     y_.push_back(waypoint.y);
+    speeds_.push_back(waypoint.speed);
     arc_lengths_.push_back(arc_length);
-    inputs_.insert(inputs_.end(), waypoint.inputs.begin(), waypoint.inputs.end());
-    inputs_.resize(x_.size() * static_cast<std::size_t>(input_count), 0.0);
   }
   if (x_.size() < 2) {
     throw Error(fmt::format("path: {} distinct waypoint(s) among the {} given; a path needs at least 2", x_.size(),
@@ -65,18 +52,14 @@ int Path::segment_at(double arc_length) const noexcept {
   return static_cast<int>(after - arc_lengths_.begin()) - 1;
 }
 
-PathPoint Path::point_at(double arc_length, double* inputs) const noexcept {
+PathPoint Path::point_at(double arc_length) const noexcept {
   const int i = segment_at(arc_length);
   const double along = arc_length - arc_lengths_[i];
-  if (inputs) {
-    const double fraction = std::clamp(along / (arc_lengths_[i + 1] - arc_lengths_[i]), 0.0, 1.0);
-    const double* start = inputs_.data() + static_cast<std::ptrdiff_t>(i) * input_count_;
-    const double* end = start + input_count_;
-    for (int j = 0; j < input_count_; ++j) inputs[j] = (1.0 - fraction) * start[j] + fraction * end[j];
-  }
+  const double fraction = std::clamp(along / (arc_lengths_[i + 1] - arc_lengths_[i]), 0.0, 1.0);
   return {.x = x_[i] + along * direction_x_[i],
           .y = y_[i] + along * direction_y_[i],
-          .heading = std::atan2(direction_y_[i], direction_x_[i])};
+          .heading = std::atan2(direction_y_[i], direction_x_[i]),
+          .speed = (1.0 - fraction) * speeds_[i] + fraction * speeds_[i + 1]};
 }
 
 PathProjection Path::closest(double x, double y, double from, double to) const noexcept {

@@ -76,7 +76,7 @@ void RecedingHorizonEstimation::reset() noexcept {
   std::fill(first_starts_.begin(), first_starts_.end(), 0);
   last_state_ = setup_.initial_mean;
   started_ = solved_ = prepared_ = false;
-  searching_ = setup_.heading_state >= 0 && setup_.heading_starts > 1;
+  searching_ = roles().heading >= 0 && setup_.heading_starts > 1;
 }
 
 void RecedingHorizonEstimation::start(const double* outputs) noexcept {
@@ -158,8 +158,8 @@ void RecedingHorizonEstimation::slide_arrival() noexcept {
     if (!std::isfinite(border.ramp_variance))
       border.ramp_variance = setup_.walks[j].restart_sigma * setup_.walks[j].restart_sigma;
   }
-  const bool lost = setup_.heading_state >= 0 && arrival_.covariance()(setup_.heading_state, setup_.heading_state) >
-                                                     uncertain_angle * uncertain_angle;
+  const int heading = roles().heading;
+  const bool lost = heading >= 0 && arrival_.covariance()(heading, heading) > uncertain_angle * uncertain_angle;
   arrival_.slide(problem_, point_, borders_, lost);
 }
 
@@ -265,7 +265,7 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
     if (start < setup_.heading_starts) {
       trial_.clear_multipliers();
       for (int j = 0; j < problem_.model().state_count(); ++j) trial_.state(0)[j] = problem_.arrival_mean[j];
-      trial_.state(0)[setup_.heading_state] += 2.0 * std::numbers::pi * start / setup_.heading_starts;
+      roles().turn(2.0 * std::numbers::pi * start / setup_.heading_starts, trial_.state(0));
       problem_.simulate(trial_, scratch_);
     }
     Report report;
@@ -282,7 +282,7 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
 
 void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count(), N = window_.intervals;
-  const int heading = setup_.heading_state;
+  const int heading = roles().heading;
   result.state.resize(nx);
   result.parameters.resize(np);
   result.covariance.resize(nx + np, nx + np);

@@ -73,7 +73,7 @@ class Track {
   void write(int node, const Pose& pose) {
     state(node)[roles_.position_x] = pose.position.real();
     state(node)[roles_.position_y] = pose.position.imag();
-    state(node)[roles_.heading] = pose.heading;
+    roles_.turn(pose.heading - state(node)[roles_.heading], state(node));
   }
 
   /// The outputs that move one to one with the position's x and y.
@@ -107,7 +107,7 @@ class Track {
       std::vector<double> moved(state(node), state(node) + nx);
       moved[roles_.position_x] = chain_[k].position.real();
       moved[roles_.position_y] = chain_[k].position.imag();
-      moved[roles_.heading] = chain_[k].heading;
+      roles_.turn(chain_[k].heading - moved[roles_.heading], moved.data());
       Model::Nodes observation;
       observation.count = 1;
       observation.states = moved.data();

@@ -8,10 +8,10 @@ int main(int, char** words) try {
   const rhec::Host host;  // the plugins: those of RHEC_PLUGIN_PATH, then those that are installed
   const rhec::Robot robot = rhec::Robot::from_file(host, words[1]);
   const rhec::Model& model = *robot.model();
-  std::vector<rhec::Waypoint> line;  // x, y [m], reference inputs: 2 m/s
-  for (int i = 0; i <= 40; ++i) line.push_back({0.5 * i, std::sin(0.25 * i), {2.0}});
+  std::vector<rhec::Waypoint> line;  // x, y [m], 2 m/s
+  for (int i = 0; i <= 40; ++i) line.push_back({0.5 * i, std::sin(0.25 * i), 2.0});
   const auto estimator = robot.make_estimator();
-  const auto controller = robot.make_controller(rhec::Path(line, model.input_count()));
+  const auto controller = robot.make_controller(rhec::Path(line));
 
   std::vector<double> state(4, 0.0), next(4), outputs(3), slip{0.7, 0.9};
   const double step = robot.step();

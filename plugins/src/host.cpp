@@ -10,6 +10,7 @@
 #include <mutex>
 
 #include "library.hpp"
+#include "rhec/core/chosen_outputs.hpp"
 #include "rhec/core/options.hpp"
 
 namespace rhec {
@@ -124,6 +125,30 @@ std::string indented(const std::string& text, std::size_t indent) {
 Error plugin_error(const Settings& settings, const std::string& text) {
   const Settings* name = settings.find("name");
   return name != nullptr ? name->error(text) : Error(text);
+}
+
+/// The model with the outputs that its section names; the usual ones where it names none.
+std::shared_ptr<Model> choose_outputs(std::shared_ptr<Model> model, const Settings& section) {
+  const ModelDescription& about = model->description();
+  const Settings* wanted = section.find("outputs");
+  if (!wanted) {
+    const std::vector<int> usual = usual_outputs(about);
+    return with_outputs(std::move(model), usual);
+  }
+  if (wanted->kind() == Settings::Kind::scalar && wanted->text() == "all") return model;
+  const std::vector<std::string> known = names_of(about.outputs);
+  if (wanted->kind() != Settings::Kind::list || wanted->items().empty())
+    throw wanted->mismatch(fmt::format("'all' or a list of outputs: {}", fmt::join(known, ", ")));
+  std::vector<int> chosen;
+  for (const Settings& item : wanted->items()) {
+    const auto found = std::find(known.begin(), known.end(), item.as_text());
+    if (found == known.end())
+      throw item.mismatch(fmt::format("an output of the model '{}': {}", about.name, fmt::join(known, ", ")));
+    const auto output = static_cast<int>(found - known.begin());
+    if (std::find(chosen.begin(), chosen.end(), output) != chosen.end()) throw item.error("this output is named twice");
+    chosen.push_back(output);
+  }
+  return with_outputs(std::move(model), chosen);
 }
 
 /// Room for what a plugin's function says when it fails.
@@ -247,11 +272,13 @@ std::vector<OptionRow> Host::options(PluginKind kind, std::string_view name) con
   if (!library.manifest->schema(&rows, error.data(), error.size())) {
     throw Error(fmt::format("the options of {} '{}' cannot be told: {}", word_of(kind), name, said(error)));
   }
+  if (kind == PluginKind::model)
+    rows.push_back({"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"});
   return rows;
 }
 
 std::shared_ptr<Model> Host::make_model(std::string_view name, const Settings& settings) const {
-  return search_->make<Model>(PluginKind::model, name, settings, *this);
+  return choose_outputs(search_->make<Model>(PluginKind::model, name, settings, *this), settings);
 }
 
 std::shared_ptr<Blocking> Host::make_blocking(std::string_view name, const Settings& settings) const {

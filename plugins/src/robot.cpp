@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -112,6 +113,16 @@ std::vector<double> numbers_by_name(const Settings& map, const std::vector<Varia
   return defaults;
 }
 
+std::pair<double, double> bounds_in(const Settings& pair) {
+  if (pair.kind() != Settings::Kind::list || pair.items().size() != 2)
+    throw pair.mismatch("a list [lower, upper]; null for no bound");
+  const Settings &first = pair.items()[0], &second = pair.items()[1];
+  const double low = first.is_null() ? -infinity : first.as_number();
+  const double high = second.is_null() ? infinity : second.as_number();
+  if (!(low <= high)) throw pair.error(fmt::format("found [{}, {}], expected lower <= upper", low, high));
+  return {low, high};
+}
+
 const OptionTable<RobotOptions>& RobotOptions::table() {
   static const auto rows = [] {
     OptionTable<RobotOptions> table;
@@ -196,7 +207,8 @@ std::vector<OptionSection> robot_sections() {
       {"block_sigma.PARAMETER", "number", number(ParameterWalk{}.block_sigma), greater_than(0.0).text(),
        "standard deviation of an unlinked block inside the window about the block before; .inf: none, as in the paper"},
       {"initial.state.STATE", "number", "0; in a simulation the true start", "", "mean at the start"},
-      {"initial.parameters.PARAMETER", "number", "the middle of its bounds, else 0", "", "mean at the start"},
+      {"initial.parameters.PARAMETER", "number", "the middle of its bounds, else where nothing slips", "",
+       "mean at the start"},
       {"initial.sigma.STATE", "number", number(initial_share) + " x its typical magnitude", greater_than(0.0).text(),
        "standard deviation at the start"},
       {"initial.sigma.PARAMETER", "number", number(parameter_share) + " x its typical magnitude",
@@ -229,7 +241,8 @@ std::vector<OptionSection> robot_sections() {
   return {
       {"model",
        "The vehicle.",
-       {{"name", "text", default_model, "a model plugin", "its options stand beside the name"}}},
+       {{"name", "text", default_model, "a model plugin", "its options stand beside the name"},
+        {"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"}}},
       {"noise",
        "Standard deviations of what is measured, in the variable's unit; a simulation draws its noise from them too.",
        {{"outputs.OUTPUT", "number", noise_default, greater_than(0.0).text(), "of a measured output"},
@@ -309,14 +322,7 @@ void Robot::read_bounds() {
                         std::vector<double>& upper) {
     for (const Variable& variable : variables) {
       double low = variable.lower, high = variable.upper;
-      if (const Settings* pair = options_.bounds.find(variable.name)) {
-        if (pair->kind() != Settings::Kind::list || pair->items().size() != 2)
-          throw pair->mismatch("a list [lower, upper]; null for no bound");
-        const Settings &first = pair->items()[0], &second = pair->items()[1];
-        low = first.is_null() ? -infinity : first.as_number();
-        high = second.is_null() ? infinity : second.as_number();
-        if (!(low <= high)) throw pair->error(fmt::format("found [{}, {}], expected lower <= upper", low, high));
-      }
+      if (const Settings* pair = options_.bounds.find(variable.name)) std::tie(low, high) = bounds_in(*pair);
       lower.push_back(low);
       upper.push_back(high);
     }
@@ -334,7 +340,7 @@ void Robot::read_initial(const std::optional<Eigen::VectorXd>& initial_state, Ei
   std::vector<double> state(nx, 0.0), parameters(np, 0.0);
   for (int j = 0; j < np; ++j) {
     const double middle = 0.5 * (parameter_lower_[j] + parameter_upper_[j]);
-    parameters[j] = std::isfinite(middle) ? middle : 0.0;
+    parameters[j] = std::isfinite(middle) ? middle : about.parameters[j].nominal;
   }
   state = numbers_by_name(member_or_null(estimator_.initial, "state"), about.states, state, any(), "initial state");
   parameters = numbers_by_name(member_or_null(estimator_.initial, "parameters"), about.parameters, parameters, any(),
@@ -442,7 +448,6 @@ std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::Vect
   setup.initial_mean = mean;
   setup.initial_covariance = covariance;
   setup.heading_starts = estimator_.heading_starts;
-  setup.heading_state = about.roles.heading;
   auto solver = make_solver(OcpKind::rhe);
   return std::make_unique<RecedingHorizonEstimation>(model_, std::move(solver), std::move(setup));
 }
@@ -485,7 +490,6 @@ std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::Vect
       setup.initial_covariance = covariance;
       setup.substeps = estimator_.substeps;
       setup.heading_starts = estimator_.heading_starts;
-      setup.heading_state = model_->description().roles.heading;
       method = std::make_unique<FilterEstimation>(model_, std::move(setup));
       break;
     }

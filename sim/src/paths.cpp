@@ -21,18 +21,11 @@ void require_at_least(const char* path, const char* key, int value, int least) {
   if (value < least) throw Error(fmt::format("{}: {} is {}; expected {} or more", path, key, value, least));
 }
 
-std::vector<double> reference_inputs(double speed, int speed_input) {
-  std::vector<double> inputs(static_cast<std::size_t>(speed_input) + 1, 0.0);
-  inputs.back() = speed;
-  return inputs;
-}
-
 // Lays waypoints along straights and arcs from a pose onwards.
 class Pen {
  public:
-  Pen(double x, double y, double spacing, std::vector<double> inputs)
-      : x_(x), y_(y), spacing_(spacing), inputs_(std::move(inputs)) {
-    waypoints_.push_back({x_, y_, inputs_});
+  Pen(double x, double y, double spacing, double speed) : x_(x), y_(y), spacing_(spacing), speed_(speed) {
+    waypoints_.push_back({x_, y_, speed_});
   }
 
   void straight(double length) {
@@ -63,11 +56,10 @@ class Pen {
   void put(double x, double y) {
     x_ = x;
     y_ = y;
-    waypoints_.push_back({x, y, inputs_});
+    waypoints_.push_back({x, y, speed_});
   }
 
-  double x_, y_, heading_ = 0.0, spacing_;
-  std::vector<double> inputs_;
+  double x_, y_, heading_ = 0.0, spacing_, speed_;
   std::vector<Waypoint> waypoints_;
 };
 
@@ -79,8 +71,7 @@ std::vector<Waypoint> figure_eight(const FigureEight& options) {
   require_at_least(path, "laps", options.laps, 1);
   require_positive(path, "radius", options.radius);
   require_positive(path, "spacing", options.spacing);
-  require_at_least(path, "speed_input", options.speed_input, 0);
-  Pen pen(0.0, 0.0, options.spacing, reference_inputs(options.speed, options.speed_input));
+  Pen pen(0.0, 0.0, options.spacing, options.speed);
   for (int lap = 0; lap < options.laps; ++lap) {
     pen.arc(options.radius, 2.0 * std::numbers::pi);
     pen.arc(options.radius, -2.0 * std::numbers::pi);
@@ -95,8 +86,7 @@ std::vector<Waypoint> zig_zag(const ZigZag& options) {
   require_positive(path, "leg_length", options.leg_length);
   require_positive(path, "radius", options.radius);
   require_positive(path, "spacing", options.spacing);
-  require_at_least(path, "speed_input", options.speed_input, 0);
-  Pen pen(0.0, -20.0, options.spacing, reference_inputs(options.speed, options.speed_input));
+  Pen pen(0.0, -20.0, options.spacing, options.speed);
   for (int leg = 0; leg < options.legs; ++leg) {
     if (leg > 0) pen.arc(options.radius, leg % 2 == 1 ? std::numbers::pi : -std::numbers::pi);
     pen.straight(options.leg_length);
@@ -106,7 +96,6 @@ std::vector<Waypoint> zig_zag(const ZigZag& options) {
 
 std::vector<Waypoint> load_waypoints(const std::filesystem::path& file, const WaypointFile& options) {
   require_positive("waypoint file", "speed", options.speed);
-  require_at_least("waypoint file", "speed_input", options.speed_input, 0);
   const CsvTable table = read_csv(file, {.header = CsvHeader::optional});
   if (table.columns() != 2 && table.columns() != 3) {
     throw Error(fmt::format("{}: {} column(s); expected x,y or x,y,speed", table.name, table.columns()));
@@ -118,7 +107,7 @@ std::vector<Waypoint> load_waypoints(const std::filesystem::path& file, const Wa
   waypoints.reserve(static_cast<std::size_t>(table.rows()));
   for (std::int64_t row = 0; row < table.rows(); ++row) {
     const double speed = table.columns() == 3 ? table.at(row, 2) : options.speed;
-    const Waypoint waypoint{table.at(row, 0), table.at(row, 1), reference_inputs(speed, options.speed_input)};
+    const Waypoint waypoint{table.at(row, 0), table.at(row, 1), speed};
     if (std::isnan(waypoint.x) || std::isnan(waypoint.y)) {
       throw Error(fmt::format("{}:{}: a coordinate is missing; give both x and y, or leave the row out", table.name,
                               table.line_of(row)));

@@ -1,7 +1,9 @@
 #include "rhec/sim/scenario.hpp"
 
+#include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -26,7 +28,7 @@ struct TerrainOptions {
   Name name = Name::gaussian;
   double correlation_length = 10.0, period = 500.0, patch_size = 10.0;
   double lower = 0.5, upper = 1.0;
-  Settings values;
+  Settings ranges, values;
   std::vector<std::string> files;
   RasterField::Interpolation interpolation = RasterField::Interpolation::bilinear;
 };
@@ -62,7 +64,8 @@ const OptionTable<TerrainOptions>& terrain_table() {
           .number("patch_size", &T::patch_size, "of patches [m]", greater_than(0.0))
           .number("lower", &T::lower, "least value of gaussian and patches")
           .number("upper", &T::upper, "largest value of gaussian and patches")
-          .subtree("values", &T::values, "of constant: by parameter (1)")
+          .subtree("ranges", &T::ranges, "of gaussian and patches: [lower, upper] by parameter, in place of these")
+          .subtree("values", &T::values, "of constant: by parameter (where nothing slips)")
           .names("files", &T::files, "of raster: one a parameter")
           .choice(
               "interpolation", &T::interpolation,
@@ -106,23 +109,35 @@ void require_few_waypoints(const Settings& section, double length, double spacin
                          length, spacing, most_waypoints));
 }
 
-std::vector<Waypoint> make_waypoints(const ScenarioOptions& options, int speed_input) {
+std::vector<Waypoint> make_waypoints(const ScenarioOptions& options) {
   const PathOptions path = path_table().parse(options.path, "path");
   switch (path.name) {
     case PathOptions::Name::figure8:
       require_few_waypoints(options.path, path.laps * 4.0 * std::numbers::pi * path.radius, path.spacing);
-      return figure_eight({options.speed, path.laps, path.radius, path.spacing, speed_input});
+      return figure_eight({options.speed, path.laps, path.radius, path.spacing});
     case PathOptions::Name::zigzag:
       require_few_waypoints(options.path, path.legs * (path.leg_length + std::numbers::pi * path.turn_radius),
                             path.spacing);
-      return zig_zag({options.speed, path.legs, path.leg_length, path.turn_radius, path.spacing, speed_input});
+      return zig_zag({options.speed, path.legs, path.leg_length, path.turn_radius, path.spacing});
     case PathOptions::Name::file:
       if (path.file.empty())
         throw key_or_section(options.path, "name")
             .error("found 'file', but no path.file; expected there a CSV file of waypoints x, y (, speed)");
-      return load_waypoints(file_at(*options.path.find("file")), {options.speed, speed_input});
+      return load_waypoints(file_at(*options.path.find("file")), {options.speed});
   }
   return {};
+}
+
+std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDescription& about) {
+  require_known_keys(terrain.ranges, names_of(about.parameters), "terrain ranges");
+  std::vector<SlipRange> ranges(about.parameters.size(), SlipRange{terrain.lower, terrain.upper});
+  for (std::size_t j = 0; j < ranges.size(); ++j) {
+    const Settings* pair = terrain.ranges.find(about.parameters[j].name);
+    if (pair) std::tie(ranges[j].lower, ranges[j].upper) = bounds_in(*pair);
+    if (pair && !(std::isfinite(ranges[j].lower) && std::isfinite(ranges[j].upper)))
+      throw pair->mismatch("two finite numbers [lower, upper]");
+  }
+  return ranges;
 }
 
 std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, const ModelDescription& about) {
@@ -130,9 +145,9 @@ std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, co
   if (!(terrain.lower <= terrain.upper))
     throw key_or_section(options.terrain, "lower")
         .error(fmt::format("lower is {} and upper is {}; expected lower <= upper", terrain.lower, terrain.upper));
-  const std::vector<double> constant = numbers_by_name(
-      terrain.values, about.parameters, std::vector<double>(about.parameters.size(), 1.0), any(), "terrain values");
-  const std::vector<SlipRange> ranges(about.parameters.size(), SlipRange{terrain.lower, terrain.upper});
+  const std::vector<double> constant =
+      numbers_by_name(terrain.values, about.parameters, nominal_values(about.parameters), any(), "terrain values");
+  const std::vector<SlipRange> ranges = slip_ranges(terrain, about);
   const auto seed = static_cast<std::uint64_t>(options.seed);
   switch (terrain.name) {
     case TerrainOptions::Name::gaussian:
@@ -155,13 +170,6 @@ std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, co
     }
   }
   return nullptr;
-}
-
-int speed_input_of(const Robot& robot) {
-  const ModelDescription& about = robot.model()->description();
-  if (about.roles.speed < 0 || about.roles.position_x < 0 || about.roles.position_y < 0)
-    throw Error(fmt::format("model '{}' has no speed input or no position; it cannot follow a path", about.name));
-  return about.roles.speed;
 }
 
 }  // namespace
@@ -188,9 +196,12 @@ std::vector<OptionSection> scenario_sections() {
       {"terrain", "The ground: the true parameters of the model as a function of position.", terrain_table().schema()},
       {"vehicle", "The vehicle as it really moves.", vehicle_table().schema()},
   };
-  OptionRow values{"values.PARAMETER", "number", "1", "", "of constant"};
-  for (OptionRow& row : sections[2].rows)
-    if (row.name == "values") row = values;
+  for (OptionRow& row : sections[2].rows) {
+    if (row.name == "ranges")
+      row = {"ranges.PARAMETER", "[lower, upper]", "", "", "of gaussian and patches, in place of lower and upper"};
+    if (row.name == "values")
+      row = {"values.PARAMETER", "number", "", "", "of constant; where nothing slips (1, or 0 of an angle)"};
+  }
   for (OptionSection& section : robot_sections()) sections.push_back(std::move(section));
   sections.push_back({"log", "For `rhec estimate`: how a drive was recorded, and what its columns mean to the model.",
                       LogOptions::table().schema()});
@@ -204,7 +215,7 @@ std::vector<OptionSection> scenario_sections() {
 Scenario::Scenario(const Host& host, const Settings& settings)
     : options_(ScenarioOptions::table().parse(settings, "scenario")),
       robot_(host, options_),
-      path_(make_waypoints(options_, speed_input_of(robot_)), robot_.model()->input_count()),
+      path_(make_waypoints(options_)),
       terrain_(make_terrain(options_, robot_.model()->description())) {
   vehicle_ = vehicle_table().parse(options_.vehicle, "vehicle");
   const double samples = path_.length() / (options_.speed * options_.step);
@@ -212,12 +223,9 @@ Scenario::Scenario(const Host& host, const Settings& settings)
     throw key_or_section(settings, "step")
         .error(fmt::format("a path of {:.4g} m at {} m/s has {:.4g} steps of {} s; expected between 1 and {:g}",
                            path_.length(), options_.speed, samples, options_.step, most_samples));
-  const Roles& roles = robot_.model()->description().roles;
   const PathPoint start = path_.point_at(0.0);
   initial_state_ = Eigen::VectorXd::Zero(robot_.model()->state_count());
-  initial_state_[roles.position_x] = start.x;
-  initial_state_[roles.position_y] = start.y;
-  if (roles.heading >= 0) initial_state_[roles.heading] = start.heading;
+  robot_.model()->description().roles.place(start.x, start.y, start.heading, initial_state_.data());
 }
 
 }  // namespace rhec::sim

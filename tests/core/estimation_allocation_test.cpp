@@ -68,7 +68,6 @@ std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& mode
   setup.initial_mean.tail(2).setConstant(0.5);
   setup.initial_covariance = Eigen::MatrixXd::Identity(6, 6);
   if (options.heading_starts > 1) {
-    setup.heading_state = 2;
     setup.heading_starts = options.heading_starts;
     setup.initial_covariance(2, 2) = 10.0;
   }
@@ -83,7 +82,6 @@ std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& mode
   own.walk = {0.03, 0.03};
   own.initial_mean = setup.initial_mean;
   own.initial_covariance = setup.initial_covariance;
-  own.heading_state = setup.heading_state;
   own.heading_starts = setup.heading_starts;
   return std::make_unique<FilterEstimation>(model, own);
 }
@@ -98,7 +96,7 @@ long allocations_in_the_loop(const Options& options) {
   setup.problem.terminal_weights = {10.0, 10.0, 0.0, 0.0};
   sim::FigureEight path;
   path.speed = 4.0;
-  Controller controller(model, host().make_solver("gn_rti"), Path(sim::figure_eight(path), 2), setup);
+  Controller controller(model, host().make_solver("gn_rti"), Path(sim::figure_eight(path)), setup);
   const auto field = sim::gaussian_random_field({});
   sim::TruthVehicle vehicle(*model, *field, Eigen::Vector4d::Zero());
   sim::Sensors sensors(*model, {.outputs = {0.03, 0.03, 0.01745}, .inputs = {0.1, 0.1}}, 1);

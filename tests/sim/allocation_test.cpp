@@ -37,7 +37,7 @@ TEST(Allocation, IsCounted) {
 
 TEST(Allocation, NoneInALoopOfTruthSensorsFieldsAndFollower) {
   const Bicycle model;
-  const Path path(figure_eight(), model.input_count());
+  const Path path(figure_eight());
   std::vector<std::unique_ptr<const SlipField>> fields;
   fields.push_back(gaussian_random_field({}));
   fields.push_back(patch_field({}));
@@ -50,7 +50,7 @@ TEST(Allocation, NoneInALoopOfTruthSensorsFieldsAndFollower) {
     std::array<double, 3> outputs{};
     const long before = allocations;
     for (int i = 0; i < 20; ++i) {
-      path.point_at(follower.advance(vehicle.state()[0], vehicle.state()[1]), inputs.data());
+      inputs[0] = path.point_at(follower.advance(vehicle.state()[0], vehicle.state()[1])).speed;
       vehicle.advance(inputs.data(), 0.2);
       sensors.observe(vehicle.state().data(), outputs.data());
       sensors.measure_inputs(inputs.data(), inputs.data());

@@ -43,7 +43,7 @@ double largest_curvature(const Path& path) {
 }
 
 TEST(FigureEight, IsTwoLapsOfTwoTangentCircles) {
-  const Path path(figure_eight({.speed = 8.0}), 2);
+  const Path path(figure_eight({.speed = 8.0}));
   EXPECT_NEAR(path.length(), 2 * 275.2, 0.1);
   std::array<double, 2> inputs{};
   const PathPoint start = path.point_at(0.0, inputs.data());
@@ -60,7 +60,7 @@ TEST(FigureEight, IsTwoLapsOfTwoTangentCircles) {
 }
 
 TEST(FigureEight, NoisyVehicleStaysOnItsBranchAtTheOrigin) {
-  const Path path(figure_eight({.laps = 2}), 2);
+  const Path path(figure_eight({.laps = 2}));
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     RandomStream random(seed, "lateral");
     PathFollower follower(path);
@@ -75,7 +75,7 @@ TEST(FigureEight, NoisyVehicleStaysOnItsBranchAtTheOrigin) {
 }
 
 TEST(ZigZag, HasTheDocumentedGeometry) {
-  const Path path(zig_zag({.speed = 3.0}), 2);
+  const Path path(zig_zag({.speed = 3.0}));
   EXPECT_NEAR(path.length(), 6 * 68.0 + 5 * std::numbers::pi * 9.0, 0.02);
   EXPECT_NEAR(path.length(), 550.0, 2.0);
   const PathPoint start = path.point_at(0.0), end = path.point_at(path.length());
@@ -95,25 +95,21 @@ TEST(GeneratedPaths, RefuseNonsense) {
   EXPECT_THROW(figure_eight({.radius = -1.0}), Error);
   EXPECT_THROW(zig_zag({.spacing = 0.0}), Error);
   EXPECT_THROW(zig_zag({.legs = 0}), Error);
-  EXPECT_THROW(zig_zag({.speed_input = -1}), Error);
 }
 
-TEST(GeneratedPaths, PutTheSpeedWhereTheModelHasIt) {
-  const Path path(zig_zag({.speed = 3.0, .speed_input = 2}), 3);
-  std::array<double, 3> inputs{};
-  path.point_at(10.0, inputs.data());
-  EXPECT_EQ(inputs[0], 0.0);
-  EXPECT_EQ(inputs[2], 3.0);
+TEST(GeneratedPaths, HaveTheirSpeedEverywhere) {
+  const Path path(zig_zag({.speed = 3.0}));
+  for (const double at : {0.0, 10.0, 200.0}) EXPECT_EQ(path.point_at(at).speed, 3.0);
 }
 
 TEST(LoadWaypoints, ReadsWithAndWithoutHeaderAndSpeed) {
   const auto plain = load_waypoints(file_with("0,0\n1,2\n"), {.speed = 4.0});
   ASSERT_EQ(plain.size(), 2u);
   EXPECT_EQ(plain[1].y, 2.0);
-  EXPECT_EQ(plain[1].inputs.at(0), 4.0);
+  EXPECT_EQ(plain[1].speed, 4.0);
   const auto named = load_waypoints(file_with("x,y,speed\r\n0,0,1.5\r\n1,2,2.5\r\n"));
   ASSERT_EQ(named.size(), 2u);
-  EXPECT_EQ(named[1].inputs.at(0), 2.5);
+  EXPECT_EQ(named[1].speed, 2.5);
 }
 
 TEST(LoadWaypoints, NamesTheRowOfAMistake) {

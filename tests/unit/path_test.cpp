@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -18,7 +17,7 @@ namespace {
 constexpr double pi = std::numbers::pi;
 
 // An L: 3 m along +x, then 4 m along +y.
-Path corner() { return Path({{0, 0, {1.0, 0.1}}, {3, 0, {2.0}}, {3, 4, {4.0, 0.5}}}, 2); }
+Path corner() { return Path({{0, 0, 1.0}, {3, 0, 2.0}, {3, 4, 4.0}}); }
 
 std::string message_of(const std::function<void()>& call) {
   try {
@@ -32,50 +31,44 @@ std::string message_of(const std::function<void()>& call) {
 TEST(Path, IsAddressedByArcLength) {
   const Path path = corner();
   EXPECT_DOUBLE_EQ(path.length(), 7.0);
-  std::array<double, 2> inputs{};
-  const PathPoint point = path.point_at(5.0, inputs.data());
+  const PathPoint point = path.point_at(5.0);
   EXPECT_DOUBLE_EQ(point.x, 3.0);
   EXPECT_DOUBLE_EQ(point.y, 2.0);
   EXPECT_DOUBLE_EQ(point.heading, pi / 2);
-  EXPECT_DOUBLE_EQ(inputs[0], 3.0);
-  EXPECT_DOUBLE_EQ(inputs[1], 0.25);
+  EXPECT_DOUBLE_EQ(point.speed, 3.0);
   EXPECT_DOUBLE_EQ(path.point_at(3.0).heading, pi / 2) << "at a waypoint the segment that follows counts";
   EXPECT_DOUBLE_EQ(path.point_at(2.999).heading, 0.0);
 }
 
 TEST(Path, GoesStraightOnBeyondItsEnds) {
   const Path path = corner();
-  std::array<double, 2> inputs{};
-  const PathPoint beyond = path.point_at(10.0, inputs.data());
+  const PathPoint beyond = path.point_at(10.0);
   EXPECT_DOUBLE_EQ(beyond.x, 3.0);
   EXPECT_DOUBLE_EQ(beyond.y, 7.0);
-  EXPECT_DOUBLE_EQ(inputs[0], 4.0) << "inputs are held, not extrapolated";
-  const PathPoint before = path.point_at(-2.0, inputs.data());
+  EXPECT_DOUBLE_EQ(beyond.speed, 4.0) << "the speed is held, not extrapolated";
+  const PathPoint before = path.point_at(-2.0);
   EXPECT_DOUBLE_EQ(before.x, -2.0);
   EXPECT_DOUBLE_EQ(before.y, 0.0);
-  EXPECT_DOUBLE_EQ(inputs[0], 1.0);
-  EXPECT_DOUBLE_EQ(inputs[1], 0.1);
+  EXPECT_DOUBLE_EQ(before.speed, 1.0);
 }
 
 TEST(Path, DropsRepeatedWaypoints) {
-  const Path path({{0, 0, {}}, {0, 0, {}}, {1, 0, {}}, {1, 0, {}}, {1, 0, {}}, {2, 0, {}}, {2, 0, {}}}, 1);
+  const Path path({{0, 0, 2}, {0, 0, 9}, {1, 0, 3}, {1, 0, 9}, {1, 0, 9}, {2, 0, 4}, {2, 0, 9}});
   EXPECT_EQ(path.size(), 3);
   EXPECT_DOUBLE_EQ(path.length(), 2.0);
-  double input = -1.0;
-  const PathPoint point = path.point_at(1.0, &input);
+  const PathPoint point = path.point_at(1.0);
   EXPECT_DOUBLE_EQ(point.x, 1.0);
-  EXPECT_DOUBLE_EQ(input, 0.0) << "inputs left out are 0";
+  EXPECT_DOUBLE_EQ(point.speed, 3.0);
 }
 
 TEST(Path, RefusesWhatIsNoPath) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
-  EXPECT_THROW(Path({}, 1), Error);
-  EXPECT_THROW(Path({{1, 2, {}}}, 1), Error);
-  EXPECT_THROW(Path({{1, 2, {}}, {1, 2, {}}}, 1), Error);
-  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {nan, 0, {}}}, 1); }).find("waypoint 2"), std::string::npos);
-  EXPECT_NE(message_of([&] { Path({{0, infinity, {}}, {1, 0, {}}}, 1); }).find("waypoint 1"), std::string::npos);
-  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {1, 0, {nan}}}, 1); }).find("waypoint 2"), std::string::npos);
-  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {1, 0, {1, 2}}}, 1); }).find("2 reference inputs"), std::string::npos);
+  EXPECT_THROW(Path(std::vector<Waypoint>{}), Error);
+  EXPECT_THROW(Path(std::vector<Waypoint>{{1, 2, {}}}), Error);
+  EXPECT_THROW(Path({{1, 2, {}}, {1, 2, {}}}), Error);
+  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {nan, 0, {}}}); }).find("waypoint 2"), std::string::npos);
+  EXPECT_NE(message_of([&] { Path({{0, infinity, {}}, {1, 0, {}}}); }).find("waypoint 1"), std::string::npos);
+  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {1, 0, nan}}); }).find("waypoint 2"), std::string::npos);
 }
 
 TEST(Path, ClosestPointIsWhatAFineSearchFinds) {
@@ -83,7 +76,7 @@ TEST(Path, ClosestPointIsWhatAFineSearchFinds) {
   std::uniform_real_distribution<double> place(-10.0, 10.0);
   std::vector<Waypoint> waypoints;
   for (int i = 0; i < 12; ++i) waypoints.push_back({place(random), place(random), {}});
-  const Path path(waypoints, 0);
+  const Path path(waypoints);
   for (int trial = 0; trial < 50; ++trial) {
     const double x = place(random), y = place(random);
     double from = path.length() * (place(random) + 10.0) / 20.0, to = path.length() * (place(random) + 10.0) / 20.0;
@@ -152,7 +145,7 @@ Path crossing_eight() {
     const double t = pi / 2 + 4.0 * pi * i / 4000.0;
     waypoints.push_back({40.0 * std::sin(t), 40.0 * std::sin(t) * std::cos(t), {}});
   }
-  return Path(waypoints, 0);
+  return Path(waypoints);
 }
 
 TEST(PathFollower, NeverJumpsBranchesAtACrossing) {
@@ -182,7 +175,7 @@ TEST(PathFollower, ResultDoesNotDependOnResolution) {
   // A straight line given coarsely and finely; the window cuts the coarse segments.
   std::vector<Waypoint> fine;
   for (int i = 0; i <= 10000; ++i) fine.push_back({0.01 * i, 0.0, {}});
-  const Path coarse_path({{0, 0, {}}, {100, 0, {}}}, 0), fine_path(fine, 0);
+  const Path coarse_path({{0, 0, {}}, {100, 0, {}}}), fine_path(fine);
   PathFollower coarse(coarse_path), finely(fine_path);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> step(-1.5, 3.0), side(-2.0, 2.0);

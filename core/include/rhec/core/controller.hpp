@@ -13,7 +13,7 @@
 namespace rhec {
 
 enum class ReferenceSpeed {
-  ground,  ///< the path's speed is meant over ground: the wheels turn faster by the estimated slip
+  ground,  ///< the path's speed is meant over ground: the wheels turn as much faster as they slip by the estimate
   literal  ///< the path's speed is the wheels' (the paper's; under slip the vehicle lags and cuts corners)
 };
 
@@ -28,8 +28,10 @@ class RHEC_EXPORT Controller {
     RhcProblem::Setup problem;
     double interval = 0.2;  ///< dt [s]
     ReferenceSpeed reference_speed = ReferenceSpeed::ground;
-    double least_speed_factor = 0.3;  ///< the estimated factor is not trusted below this
-    /// The wheel speed is bounded to [0, factor * u1ref + offset]; an infinite factor leaves the model's bounds.
+    /// An estimate by which the wheels keep less than this of their speed is not trusted.
+    double least_speed_factor = 0.3;
+    /// The inputs that drive straight ahead are bounded between 0 and what they would be at a speed of
+    /// factor * speed + offset without slip; an infinite factor leaves the model's bounds.
     double speed_bound_factor = 2.5, speed_bound_offset = 1.0;
     std::vector<std::shared_ptr<const Blocking>> blockings;  ///< one for each of problem.blocked_inputs
     PathFollower::Window search;
@@ -42,7 +44,6 @@ class RHEC_EXPORT Controller {
   struct Command {
     std::vector<double> inputs;  ///< u_k, n_u: to be applied until the next call
     PathPoint reference;         ///< the closest point of the path
-    double reference_speed = 0.0;
     Report report;
     bool fallback = false;  ///< the solver failed: this is the last plan's
     bool softened = false;  ///< a state bound was out of the estimate's reach and was moved
@@ -62,6 +63,7 @@ class RHEC_EXPORT Controller {
   std::int64_t fallbacks() const noexcept { return fallbacks_; }
 
  private:
+  void choose_straight_inputs(double ground_speed, const double* parameters) noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
   void start_cold() noexcept;
 
@@ -75,7 +77,8 @@ class RHEC_EXPORT Controller {
   Command command_;
   bool has_plan_ = false, prepared_ = false;
   std::int64_t fallbacks_ = 0;
-  std::vector<double> scratch_, reference_inputs_, reference_parameters_;
+  std::vector<double> scratch_, straight_inputs_, slipless_inputs_, largest_inputs_;
+  std::vector<double> nominal_parameters_, reference_parameters_;
   std::vector<std::uint8_t> begins_;
 };
 

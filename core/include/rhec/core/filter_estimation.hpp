@@ -19,7 +19,6 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
     Eigen::MatrixXd initial_covariance;
     int substeps = 1;
     int heading_starts = 1;
-    int heading_state = -1;
   };
   FilterEstimation(const std::shared_ptr<const Model>& model, Setup setup);
 

@@ -17,18 +17,29 @@ struct Variable {
   double upper = std::numeric_limits<double>::infinity();   ///< default bound
   double scale = 1.0;     ///< a typical magnitude, for finite differences and random tests
   bool is_angle = false;  ///< compared on the circle
+  double nominal = 1.0;   ///< of a parameter: its value where nothing slips
+  bool usual = true;      ///< of an output: measured unless the configuration chooses others
 };
 
 /// The names of variables, in their order.
 RHEC_EXPORT std::vector<std::string> names_of(const std::vector<Variable>& variables);
+/// The values of parameters where nothing slips.
+RHEC_EXPORT std::vector<double> nominal_values(const std::vector<Variable>& parameters);
 
-/// Which variables a path follower needs to know; -1 where the model has none.
-struct Roles {
-  int position_x = -1;    ///< state: x of the point that shall follow the path [m]
-  int position_y = -1;    ///< state: y of that point [m]
-  int heading = -1;       ///< state: direction of travel at that point [rad]
-  int speed = -1;         ///< input: speed of the wheels [m/s]
-  int speed_factor = -1;  ///< parameter: ground speed / wheel speed [1]
+/// Which variables say where the vehicle is and how fast it goes; -1 where the model has none. A vehicle that is
+/// shifted and turned as a whole moves as before: its dynamics know neither its position nor the sum of its headings.
+struct RHEC_EXPORT Roles {
+  int position_x = -1;                   ///< state: x of the point that shall follow the path [m]
+  int position_y = -1;                   ///< state: y of that point [m]
+  int heading = -1;                      ///< state: direction of travel at that point [rad]
+  int speed = -1;                        ///< input: speed of the wheels [m/s]
+  int speed_factor = -1;                 ///< parameter: ground speed / wheel speed [1]
+  std::vector<int> other_headings = {};  ///< states: of further bodies, e.g. of the tractor before its trailer [rad]
+
+  /// Puts the point that follows the path at a place, with all bodies in line.
+  void place(double x, double y, double direction, double* state) const noexcept;
+  /// Turns all bodies by an angle [rad] about the point that follows the path.
+  void turn(double angle, double* state) const noexcept;
 };
 
 struct ModelDescription {
@@ -94,6 +105,11 @@ class RHEC_EXPORT Model {
 
   /// dx/dt at one point, for integrators of one's own (the truth vehicle of a simulation).
   virtual void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept = 0;
+
+  /// Writes inputs (n_u) that let the vehicle go straight ahead at a ground speed [m/s] where it slips like p: those of
+  /// the path's reference. As it is, `roles.speed` becomes ground_speed / p[roles.speed_factor] and all else 0; a model
+  /// whose speed is not one input in m/s (the wheels of each side, say) says it itself.
+  virtual void straight_inputs(double ground_speed, const double* p, double* inputs) const noexcept;
 
   /// False where `hessians` cannot be asked for; such a model can be used with Gauss-Newton only.
   virtual bool has_second_derivatives() const noexcept = 0;

@@ -6,19 +6,19 @@
 
 namespace rhec {
 
-/// A point that the vehicle shall pass, and the inputs that it shall pass it with.
+/// A point that the vehicle shall pass, and how fast.
 struct Waypoint {
-  double x = 0.0;              ///< [m]
-  double y = 0.0;              ///< [m]
-  std::vector<double> inputs;  ///< reference inputs in the model's order and units; those left out at the end are 0
+  double x = 0.0;      ///< [m]
+  double y = 0.0;      ///< [m]
+  double speed = 0.0;  ///< reference speed over ground [m/s]
 };
 
-/// Where a stretch of path is, and which way it leads.
+/// Where a stretch of path is, which way it leads, and how fast it shall be gone.
 struct PathPoint {
-  double x = 0.0;  ///< [m]
-  double y = 0.0;  ///< [m]
-  double heading =
-      0.0;  ///< direction of the segment [rad], in (-pi, pi]; at a waypoint that of the segment that follows
+  double x = 0.0;        ///< [m]
+  double y = 0.0;        ///< [m]
+  double heading = 0.0;  ///< of the segment [rad], in (-pi, pi]; at a waypoint that of the segment that follows
+  double speed = 0.0;    ///< reference speed over ground [m/s]
 };
 
 /// The point of a path that is closest to some position.
@@ -27,25 +27,22 @@ struct PathProjection {
   double lateral = 0.0;     ///< distance to it [m]; positive: the position lies to the left of the path
 };
 
-/// Straight segments through waypoints, addressed by arc length, with reference inputs that run linearly along each.
-/// Before its first and beyond its last waypoint a path goes straight on for ever (with the inputs of that waypoint),
-/// so that a horizon can look past the end. Const calls are thread-safe, do not allocate and do not throw.
+/// Straight segments through waypoints, addressed by arc length, with a reference speed that runs linearly along each.
+/// Before its first and beyond its last waypoint a path goes straight on for ever (at the speed of that waypoint), so
+/// that a horizon can look past the end. Const calls are thread-safe, do not allocate and do not throw.
 class RHEC_EXPORT Path {
  public:
-  /// `input_count` is the number of the model's inputs. A waypoint at the place of the one before it is dropped.
-  /// Throws Error, naming the waypoint (counted from 1), for values that are not finite, for more inputs than
-  /// `input_count`, and for fewer than two distinct points.
-  Path(const std::vector<Waypoint>& waypoints, int input_count);
+  /// A waypoint at the place of the one before it is dropped. Throws Error, naming the waypoint (counted from 1), for
+  /// values that are not finite, and for fewer than two distinct points.
+  explicit Path(const std::vector<Waypoint>& waypoints);
 
-  int input_count() const noexcept { return input_count_; }
   /// Number of distinct waypoints, at least 2.
   int size() const noexcept { return static_cast<int>(x_.size()); }
   /// Arc length from the first waypoint to the last [m].
   double length() const noexcept { return arc_lengths_.back(); }
 
-  /// The point at an arc length [m], by a binary search. `inputs`, where given, receives `input_count()` reference
-  /// inputs.
-  PathPoint point_at(double arc_length, double* inputs = nullptr) const noexcept;
+  /// The point at an arc length [m], by a binary search.
+  PathPoint point_at(double arc_length) const noexcept;
 
   /// The closest point to (x, y) among those with an arc length in [from, to] [m], with from <= to: an exact projection
   /// on segments, at a cost that grows with the number of waypoints in that stretch only. Of equally close points the
@@ -55,10 +52,8 @@ class RHEC_EXPORT Path {
  private:
   int segment_at(double arc_length) const noexcept;
 
-  int input_count_;
-  std::vector<double> x_, y_, arc_lengths_;        // one per waypoint
-  std::vector<double> inputs_;                     // waypoint-major
-  std::vector<double> direction_x_, direction_y_;  // unit vectors, one per segment
+  std::vector<double> x_, y_, speeds_, arc_lengths_;  // one per waypoint
+  std::vector<double> direction_x_, direction_y_;     // unit vectors, one per segment
 };
 
 /// Goes along a path with a vehicle: each time the closest point is searched for only near the last one, so that a path

@@ -28,10 +28,9 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
     std::vector<ParameterWalk> walks;                        ///< one a parameter
     Eigen::VectorXd initial_mean;                            ///< of [x; p] at the first node
     Eigen::MatrixXd initial_covariance;
-    /// Angle-valued states whose start is unknown: while the window still grows, that many starts around the circle are
+    /// Where the heading is unknown at the start: while the window still grows, that many starts around the circle are
     /// tried and the best is kept.
     int heading_starts = 1;
-    int heading_state = -1;
   };
   /// Throws Error where sizes do not fit or a blocking cannot take the horizon.
   RecedingHorizonEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Setup setup);
@@ -52,6 +51,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   const ArrivalCost& arrival() const noexcept { return arrival_; }
 
  private:
+  const Roles& roles() const noexcept { return model().description().roles; }
   void advance_window(double duration, const double* inputs, const double* outputs) noexcept;
   void slide_arrival() noexcept;
   void search_heading(Clock::time_point deadline) noexcept;

@@ -83,6 +83,8 @@ RHEC_EXPORT std::vector<OptionSection> robot_sections();
 RHEC_EXPORT std::vector<double> numbers_by_name(const Settings& map, const std::vector<Variable>& variables,
                                                 std::vector<double> defaults, const Range& range,
                                                 const std::string& owner, bool may_be_infinite = false);
+/// [lower, upper] as it is written in a configuration; null stands for no bound. Throws Error.
+RHEC_EXPORT std::pair<double, double> bounds_in(const Settings& pair);
 /// Throws Error unless every key of a map (or null) is known; the nearest known one is suggested.
 RHEC_EXPORT void require_known_keys(const Settings& map, const std::vector<std::string>& known,
                                     const std::string& owner);

@@ -89,7 +89,10 @@ struct PluginFunctions {
   static void* create(const Settings* settings, char* error, std::size_t error_size) noexcept {
     void* made = nullptr;
     guarded(error, error_size, [&] {
-      const Options options = Options::table().parse(*settings, title(), {"name"});
+      // "outputs" is the host's: it chooses among those of any model.
+      const Options options = kind == PluginKind::model
+                                  ? Options::table().parse(*settings, title(), {"name", "outputs"})
+                                  : Options::table().parse(*settings, title(), {"name"});
       made = static_cast<Interface*>(std::make_unique<Product>(options).release());
     });
     return made;

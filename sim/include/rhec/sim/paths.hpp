@@ -15,7 +15,6 @@ struct FigureEight {
   int laps = 2;          ///< a lap is both circles
   double radius = 21.9;  ///< [m]
   double spacing = 0.1;  ///< largest distance between waypoints [m]
-  int speed_input = 0;   ///< which of the model's inputs the speed is
 };
 RHEC_EXPORT std::vector<Waypoint> figure_eight(const FigureEight& options = {});
 
@@ -33,7 +32,6 @@ struct ZigZag {
   double leg_length = 68.0;  ///< [m]
   double radius = 9.0;       ///< of the half circles [m]
   double spacing = 0.1;      ///< largest distance between waypoints [m]
-  int speed_input = 0;       ///< which of the model's inputs the speed is
 };
 RHEC_EXPORT std::vector<Waypoint> zig_zag(const ZigZag& options = {});
 
@@ -41,8 +39,7 @@ RHEC_EXPORT std::vector<Waypoint> zig_zag(const ZigZag& options = {});
 /// names is allowed. Without that column the speed is `speed`. Throws Error, naming file and row, for rows that are
 /// ragged or not numeric, for missing values, for speeds that are not positive, and for fewer than two rows.
 struct WaypointFile {
-  double speed = 2.0;   ///< where the file has none [m/s]
-  int speed_input = 0;  ///< which of the model's inputs the speed is
+  double speed = 2.0;  ///< where the file has none [m/s]
 };
 RHEC_EXPORT std::vector<Waypoint> load_waypoints(const std::filesystem::path& file, const WaypointFile& options = {});
 
