@@ -15,6 +15,8 @@ constexpr double shortest_step = 1e-6;
 constexpr double near_solution = 1e-3;
 // Differences of the merit below this part of it are rounding.
 constexpr double merit_rounding = 1e-13;
+// A step that cannot even remove so much of the defects and violations shows a problem that has no solution nearby.
+constexpr double least_asked_share = 0.1;
 
 /// Visits every pair of corresponding rows of two iterates: function(kind-agnostic destination, source, length).
 template <class Function>
@@ -195,10 +197,7 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
       qp_solver_.guess_from(qp_, best_);
     }
     ready = false;
-    const auto outcome = qp_solver_.solve(qp_, step_);
-    report.factorisations += qp_solver_.factorisations();
-    report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
-    if (outcome == StageQpSolver::Outcome::infeasible) {
+    if (solve_program(report) == StageQpSolver::Outcome::infeasible) {
       report.status = Status::infeasible;
       break;
     }
@@ -232,7 +231,7 @@ bool GnRti::search_along_step(const Ocp& ocp, double residual, double& merit_aft
     for (int j = 0; j < ocp.state_count(i + 1); ++j) defect += std::abs(qp_.b(i)[j]);
     for (int j = 0; j < ocp.control_count(i); ++j) slope += qp_.r(i)[j] * step_.control(i)[j];
   }
-  slope -= defect_penalty_ * defect + bound_penalty_ * total_violation(ocp, best_);
+  slope -= defect_penalty_ * defect + bound_penalty_ * asked_share_ * total_violation(ocp, best_);
   const auto acceptable = [&](double length) {
     merit_after = merit(ocp, trial_);
     const double allowed =
@@ -259,6 +258,31 @@ bool GnRti::search_along_step(const Ocp& ocp, double residual, double& merit_aft
     if (acceptable(length)) return true;
   }
   return false;
+}
+
+StageQpSolver::Outcome GnRti::solve_program(Report& report) noexcept {
+  const auto outcome = qp_solver_.solve(qp_, step_);
+  report.factorisations += qp_solver_.factorisations();
+  report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
+  return outcome;
+}
+
+/// Powell's relaxation: of all defects and violated bounds, the step is asked to remove only a share of what it was
+/// asked before. Where that share is 0, the program has a solution: no step.
+void GnRti::ask_for_less(double share) noexcept {
+  asked_share_ *= share;
+  const auto relax = [share](double* lower, double* upper, int count) {
+    for (int j = 0; j < count; ++j) {
+      if (lower[j] > 0.0) lower[j] *= share;
+      if (upper[j] < 0.0) upper[j] *= share;
+    }
+  };
+  for (int i = 0; i <= qp_.intervals(); ++i) {
+    relax(qp_.state_lower(i), qp_.state_upper(i), qp_.states(i));
+    if (i == qp_.intervals()) break;
+    relax(qp_.control_lower(i), qp_.control_upper(i), qp_.controls(i));
+    for (int j = 0; j < qp_.states(i + 1); ++j) qp_.b(i)[j] *= share;
+  }
 }
 
 Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
@@ -298,9 +322,12 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
     bool feasible = false, accepted = false;
     const auto try_step = [&] {
       qp_solver_.guess_from(qp_, best_);
-      const auto outcome = qp_solver_.solve(qp_, step_);
-      report.factorisations += qp_solver_.factorisations();
-      report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
+      auto outcome = solve_program(report);
+      // Linearised equations can contradict bounds that the true ones do not: then less is asked of a single step.
+      for (asked_share_ = 1.0; outcome == StageQpSolver::Outcome::infeasible && asked_share_ > least_asked_share;) {
+        ask_for_less(0.5);
+        outcome = solve_program(report);
+      }
       if (outcome == StageQpSolver::Outcome::infeasible || !is_finite(ocp, step_)) return false;
       feasible = true;
       return search_along_step(ocp, residual, merit_after);

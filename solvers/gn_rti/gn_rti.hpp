@@ -55,6 +55,8 @@ class GnRti final : public Solver {
   void add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept;
   void roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept;
   double merit(const Ocp& ocp, const Iterate& point) noexcept;
+  StageQpSolver::Outcome solve_program(Report& report) noexcept;
+  void ask_for_less(double share) noexcept;
   bool search_along_step(const Ocp& ocp, double residual, double& merit_after) noexcept;
 
   Options options_;
@@ -67,6 +69,7 @@ class GnRti final : public Solver {
   bool use_exact_ = false;
   double preparation_us_ = 0.0;
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
+  double asked_share_ = 1.0;  ///< of the defects and violations that the step is asked to remove
 };
 
 }  // namespace rhec::gn_rti

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace rhec::sparse_sqp {
 namespace {
@@ -15,6 +16,7 @@ constexpr int many = 16;
 // Nor are so many rounds in a row that only let go some.
 constexpr int enough = 4;
 constexpr int most_interior_iterations = 80;
+constexpr int equation_refinements = 6;
 // A bound counts as violated, or a multiplier as of the wrong sign, beyond this part of the sizes involved.
 constexpr double active_set_tolerance = 1e-11;
 // What refinement must reach for the solution of a system to be believed.
@@ -136,6 +138,35 @@ double SparseQp::solve_system() {
   return residual;
 }
 
+/// Refines `d_` and `lambda_` until the equations are met: beside weights that are large, what the solution of the
+/// whole system leaves of them can be small and yet more than the next iterate should start from. False where they stay
+/// unmet: equations that contradict the active bounds give a solution that is only small beside huge multipliers.
+bool SparseQp::meet_equations(const Program& program) {
+  const auto unmet = [&] {
+    multiply_jacobian(program, d_.data(), work_m_.data());
+    double largest = 0.0;
+    for (int r = 0; r < m_; ++r) largest = std::max(largest, std::abs(work_m_[r] + program.constraints[r]));
+    return largest;
+  };
+  const double enough_met = believable * (1.0 + max_abs(program.constraints, m_));
+  double remaining = unmet();
+  for (int round = 0; round < equation_refinements && !(remaining <= enough_met); ++round) {
+    std::fill_n(rhs_.data(), n_, 0.0);
+    for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -program.constraints[r] - work_m_[r];
+    if (solve_system() > believable) return false;
+    for (int k = 0; k < n_; ++k) d_[k] += solution_[k];
+    for (int r = 0; r < m_; ++r) lambda_[r] += solution_[n_ + r];
+    const double last = std::exchange(remaining, unmet());
+    if (remaining < 0.1 * last) continue;
+    if (numbers_.regularisation <= least_regularisation) break;
+    numbers_.regularisation *= 1e-2;
+    ++factorisations_;
+    if (!factor_.factor(numbers_)) return false;
+    regularisation_ = numbers_.regularisation;
+  }
+  return remaining <= enough_met;
+}
+
 /// Rounds of the primal-dual active set method from `active_`. Unless it is unknown or indefinite, what was found is in
 /// `d_`, `lambda_`, `mu_`.
 SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
@@ -154,11 +185,7 @@ SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
     if (solve_system() > believable) return ActiveSet::unknown;
     std::copy_n(solution_.data(), n_, d_.data());
     std::copy_n(solution_.data() + n_, m_, lambda_.data());
-    // Equations that contradict the active bounds give a solution that is only small beside huge multipliers.
-    multiply_jacobian(program, d_.data(), work_m_.data());
-    double unmet = 0.0;
-    for (int r = 0; r < m_; ++r) unmet = std::max(unmet, std::abs(work_m_[r] + program.constraints[r]));
-    if (!(unmet <= believable * (1.0 + max_abs(program.constraints, m_)))) return ActiveSet::unknown;
+    if (!meet_equations(program)) return ActiveSet::unknown;
     multiply_hessian(program, d_.data(), mu_.data());
     for (int k = 0; k < n_; ++k) mu_[k] += program.gradient[k];
     const double gradient_size = 1.0 + max_abs(mu_.data(), n_);

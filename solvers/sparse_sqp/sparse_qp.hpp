@@ -75,6 +75,7 @@ class SparseQp {
   bool factor_with(const Program& program);
   double solve_system();
   enum class ActiveSet { optimal, feasible, unknown, indefinite };
+  bool meet_equations(const Program& program);
   ActiveSet solve_active(const Program& program, int rounds);
   Outcome interior_point(const Program& program, double penalty, Clock::time_point deadline);
   void start_interior(const Program& program, double penalty, double multiplier);
