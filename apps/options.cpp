@@ -8,7 +8,6 @@
 
 #include "commands.hpp"
 #include "rhec/core/error.hpp"
-#include "rhec/core/model.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/sim/scenario.hpp"
 
@@ -57,28 +56,11 @@ std::string section_text(const OptionSection& section) {
                                             table_of(section.rows, section.name + "."));
 }
 
-std::string variables_of(const ModelDescription& about) {
-  std::vector<Row> rows;
-  const auto add = [&](const char* kind, const std::vector<Variable>& variables) {
-    for (const Variable& variable : variables)
-      rows.push_back({fmt::format("`{}`", variable.name), kind, variable.unit,
-                      fmt::format("[{:.4g}, {:.4g}]", variable.lower, variable.upper),
-                      fmt::format("{:g}", variable.scale), variable.meaning});
-  };
-  add("state", about.states);
-  add("input", about.inputs);
-  add("parameter", about.parameters);
-  add("output", about.outputs);
-  return table_of({"name", "kind", "unit", "bounds", "typical magnitude", "meaning"}, rows);
-}
-
 std::string plugin_text(const Host& host, const PluginRecord& plugin) {
   std::string text = fmt::format("## {} `{}`\n\n", word_of(plugin.kind), plugin.name);
   if (!plugin.capabilities.empty()) text += fmt::format("{}.\n\n", plugin.capabilities);
   const std::vector<OptionRow> options = host.options(plugin.kind, plugin.name);
   text += options.empty() ? "It has no options.\n" : table_of(options, "");
-  if (plugin.kind == PluginKind::model)
-    text += "\nIts variables:\n\n" + variables_of(host.make_model(plugin.name)->description());
   return text;
 }
 
@@ -91,9 +73,9 @@ are those of a simulation (`rhec run`); `log` and `variants` are those of a reco
 robot (`rhec::Robot::from_file`). Unknown keys are errors.
 
 Words in capitals stand for names: STATE, INPUT, PARAMETER and OUTPUT for each variable of the model of that kind. Where a key
-names a plugin, the plugin's own options stand beside that name; they are listed behind the sections. Solvers that are
-backed by another program are not, since not every installation has them: `rhec plugins` lists all, and
-`rhec plugins NAME` the options of one.
+names a plugin, the plugin's own options stand beside that name; they are listed behind the sections. Models are not, nor
+solvers that are backed by another program, since not every installation has the same: `rhec plugins` lists all, and
+`rhec plugins NAME` the options of one, with the variables of a model.
 )";
 
 int show(const OptionsArguments& arguments) {
@@ -113,7 +95,9 @@ int show(const OptionsArguments& arguments) {
   std::string text = introduction;
   for (const OptionSection& section : sections) text += "\n" + section_text(section);
   std::vector<PluginRecord> plugins = host.discover();
-  std::erase_if(plugins, [](const PluginRecord& plugin) { return !plugin.accepted() || !plugin.backend.empty(); });
+  std::erase_if(plugins, [](const PluginRecord& plugin) {
+    return !plugin.accepted() || plugin.kind == PluginKind::model || !plugin.backend.empty();
+  });
   std::sort(plugins.begin(), plugins.end(), [](const PluginRecord& a, const PluginRecord& b) {
     return a.kind != b.kind ? a.kind < b.kind : a.name < b.name;
   });

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <iterator>
 #include <memory>
@@ -14,6 +15,7 @@
 
 #include "commands.hpp"
 #include "rhec/core/error.hpp"
+#include "rhec/core/model.hpp"
 #include "rhec/core/option_values.hpp"
 
 namespace rhec::apps {
@@ -71,6 +73,60 @@ void list(const Host& host) {
   print_table(refused, "  ");
 }
 
+struct VariableKind {
+  const char* name;
+  std::vector<Variable> ModelDescription::*variables;
+};
+constexpr VariableKind variable_kinds[] = {{"states", &ModelDescription::states},
+                                           {"inputs", &ModelDescription::inputs},
+                                           {"parameters", &ModelDescription::parameters},
+                                           {"outputs", &ModelDescription::outputs}};
+
+/// A model as it is without any options, with all the outputs that it could have.
+std::shared_ptr<Model> model_with_all_outputs(const Host& host, const std::string& name) {
+  Settings options;
+  options.set("outputs", Settings::scalar("all"));
+  return host.make_model(name, options);
+}
+
+/// What a configuration of the model names.
+void print_variables(const ModelDescription& about) {
+  Table table{{"VARIABLE", "UNIT", "BOUNDS", "MEANING"}};
+  for (const VariableKind& kind : variable_kinds) {
+    table.push_back({kind.name});
+    for (const Variable& variable : about.*kind.variables) {
+      const bool bounded = std::isfinite(variable.lower) || std::isfinite(variable.upper);
+      std::string meaning = variable.meaning;
+      if (kind.variables == &ModelDescription::parameters)
+        meaning += fmt::format(" ({:g}: nothing slips)", variable.nominal);
+      if (kind.variables == &ModelDescription::outputs && !variable.usual) meaning += " (if chosen)";
+      table.push_back({"  " + variable.name, variable.unit,
+                       bounded ? fmt::format("[{:.4g}, {:.4g}]", variable.lower, variable.upper) : "-", meaning});
+    }
+  }
+  fmt::print("\n");
+  print_table(table, "");
+}
+
+nlohmann::ordered_json as_json(const Variable& variable) {
+  nlohmann::ordered_json all{{"name", variable.name}, {"unit", variable.unit}, {"meaning", variable.meaning}};
+  all["lower"] = variable.lower;  // null where there is none
+  all["upper"] = variable.upper;
+  all["scale"] = variable.scale;
+  return all;
+}
+
+void add_variables(const ModelDescription& about, nlohmann::ordered_json& all) {
+  for (const VariableKind& kind : variable_kinds) {
+    auto& list = all[kind.name] = nlohmann::ordered_json::array();
+    for (const Variable& variable : about.*kind.variables) {
+      list.push_back(as_json(variable));
+      if (kind.variables == &ModelDescription::parameters) list.back()["nominal"] = variable.nominal;
+      if (kind.variables == &ModelDescription::outputs) list.back()["usual"] = variable.usual;
+    }
+  }
+}
+
 void describe(const Host& host, const PluginRecord& plugin) {
   Table about{{"kind", std::string(word_of(plugin.kind))},
               {"name", plugin.name},
@@ -81,6 +137,7 @@ void describe(const Host& host, const PluginRecord& plugin) {
               {"can", or_dash(plugin.capabilities)},
               {"path", plugin.path.string()}};
   print_table(about, "");
+  if (plugin.kind == PluginKind::model) print_variables(model_with_all_outputs(host, plugin.name)->description());
   const std::vector<OptionRow> options = host.options(plugin.kind, plugin.name);
   if (options.empty()) {
     fmt::print("\nIt has no options.\n");
@@ -113,6 +170,7 @@ nlohmann::ordered_json as_json(const Host& host, const PluginRecord& plugin) {
                               {"default", option.default_value},
                               {"constraint", option.constraint},
                               {"meaning", option.meaning}});
+  if (plugin.kind == PluginKind::model) add_variables(model_with_all_outputs(host, plugin.name)->description(), all);
   return all;
 }
 
@@ -163,7 +221,8 @@ void add_plugins(CLI::App& program, Action& chosen) {
       "  rhec plugins\n"
       "  rhec plugins gn_rti\n"
       "  rhec plugins --json --plugin-path my/plugins");
-  command->add_option("name", arguments->name, "show this plugin and its options")->type_name("NAME");
+  command->add_option("name", arguments->name, "show this plugin, its options, and what a model has")
+      ->type_name("NAME");
   command->add_flag("--json", arguments->json, "print JSON, options included");
   add_plugin_path(*command, arguments->plugin_path);
   command->callback([=, &chosen] { chosen = [=] { return show(*arguments); }; });

@@ -60,15 +60,13 @@ ModelDescription describe() {
       {.name = "x_gps", .unit = "m", .meaning = "GPS antenna, x", .scale = 10.0},
       {.name = "y_gps", .unit = "m", .meaning = "GPS antenna, y", .scale = 10.0},
       {.name = "delta", .unit = "rad", .meaning = "measured steering angle", .scale = 0.3, .is_angle = true},
+      {.name = "heading", .unit = "rad", .meaning = "measured heading", .is_angle = true, .usual = false},
   };
   model.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0, .speed_factor = 0};
   return model;
 }
 
-struct BicycleSlipOptions {
-  double wheelbase = BicycleSlip{}.wheelbase;
-  double gps_offset = BicycleSlip{}.gps_offset;
-
+struct BicycleSlipOptions : BicycleSlip {
   static const OptionTable<BicycleSlipOptions>& table() {
     static const auto options =
         OptionTable<BicycleSlipOptions>()
@@ -83,8 +81,7 @@ class BicycleSlipModel : public FormulaModel<BicycleSlip> {
  public:
   using Options = BicycleSlipOptions;
   explicit BicycleSlipModel(const Options& options)
-      : FormulaModel({.wheelbase = options.wheelbase, .gps_offset = options.gps_offset}, describe(),
-                     bicycle_slip_wide_kernels()) {}
+      : FormulaModel(static_cast<const BicycleSlip&>(options), describe(), bicycle_slip_wide_kernels()) {}
 };
 
 }  // namespace

@@ -8,11 +8,11 @@ namespace rhec {
 ///
 ///     x_pos' = kappa u1 cos(beta)      beta'  = kappa u1 / l tan(mu delta)
 ///     y_pos' = kappa u1 sin(beta)      delta' = u2
-///     h(x)   = [x_pos - d cos(beta), y_pos - d sin(beta), delta]
+///     h(x)   = [x_pos - d cos(beta), y_pos - d sin(beta), delta, beta]
 ///
 /// with x = [x_pos, y_pos, beta, delta], u = [u1, u2], p = [kappa, mu].
 struct BicycleSlip {
-  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 3;
+  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 4;
 
   double wheelbase = 1.4;   ///< l [m]
   double gps_offset = 0.4;  ///< d: how far the GPS antenna is behind the rear axle [m]
@@ -35,6 +35,7 @@ struct BicycleSlip {
     y[0] = x[0] - gps_offset * cos(beta);
     y[1] = x[1] - gps_offset * sin(beta);
     y[2] = x[3];
+    y[3] = beta;
   }
 };
 

@@ -1,5 +1,9 @@
+#include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
+#include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -22,6 +26,19 @@ Json json_of(const ErrorSummary& errors) {
 }
 
 Json json_of(const Spread& times) { return {{"median", times.median}, {"p99", times.p99}, {"max", times.max}}; }
+
+/// The least and the largest value of a parameter that the vehicle met, a little apart where it met one alone.
+std::pair<double, double> true_range(const RunLog& log, Eigen::Index parameter) {
+  double lower = std::numeric_limits<double>::infinity(), upper = -lower;
+  for (const Sample& sample : log.samples) {
+    lower = std::min(lower, sample.true_parameters[parameter]);
+    upper = std::max(upper, sample.true_parameters[parameter]);
+  }
+  const double least_width = 0.05 * std::max(std::abs(lower), std::abs(upper)) + 1e-3;
+  if (upper - lower >= least_width) return {lower, upper};
+  const double middle = 0.5 * (lower + upper);
+  return {middle - 0.5 * least_width, middle + 0.5 * least_width};
+}
 
 template <class Variables, class Function>
 Curve curve_of(const RunLog& log, std::string label, CurveRole role, const Variables&, const Function& value_of) {
@@ -121,8 +138,7 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
     const int shown = std::max(0, roles.speed_factor);
     BaseMap base;
     base.title = "true " + about.parameters[shown].name;
-    base.lower = std::isfinite(about.parameters[shown].lower) ? 0.5 : 0.0;
-    base.upper = 1.0;
+    std::tie(base.lower, base.upper) = true_range(log, shown);
     base.value = [&scenario, shown, values = std::vector<double>(about.parameters.size())](double x, double y) mutable {
       scenario.terrain().sample(x, y, values.data());
       return values[shown];
@@ -144,8 +160,10 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
     for (const Sample& sample : log.samples)
       if (sample.sigma.size() > 0) estimate.sigmas.push_back(sample.sigma[states + index]);
     panel.curves.push_back(std::move(estimate));
-    panel.lower = 0.0;
-    panel.upper = 1.2;
+    // As far as the ground goes and half as much again: what the estimate did not know at the start would dwarf it.
+    const auto [lower, upper] = true_range(log, index);
+    panel.lower = lower - 0.5 * (upper - lower);
+    panel.upper = upper + 0.5 * (upper - lower);
     picture.panels.push_back(std::move(panel));
   }
   Panel tracking;

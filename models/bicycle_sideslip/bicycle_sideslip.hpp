@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cmath>
+
+namespace rhec {
+
+/// Kinematic bicycle with additive side-slip angles (Lenain et al. 2006), in earth coordinates:
+///
+///     x' = v cos(psi + beta_rear)      psi'   = v cos(beta_rear) (tan(delta + beta_front) - tan(beta_rear)) / L
+///     y' = v sin(psi + beta_rear)      delta' = delta_rate
+///
+/// with state [x, y, psi, delta], u = [v, delta_rate], p = [beta_front, beta_rear]: v is the speed of the rear axle's
+/// centre, and the axles' velocities point beta_rear and beta_front to the left of their wheels. The source writes the
+/// same in coordinates of the path that is followed. Outputs: an antenna with a lever arm (a_x, a_y), delta, psi.
+struct BicycleSideslip {
+  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 4;
+
+  double wheelbase = 2.8;  ///< L [m]
+  double antenna_x = 0.0;  ///< a_x: how far the GPS antenna is before the rear axle [m]
+  double antenna_y = 0.0;  ///< a_y: how far it is to the left [m]
+
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::cos, std::sin, std::tan;
+    const Scalar &psi = x[2], &delta = x[3], &v = u[0], &front = p[0], &rear = p[1];
+    dxdt[0] = v * cos(psi + rear);
+    dxdt[1] = v * sin(psi + rear);
+    dxdt[2] = v * cos(rear) * (tan(delta + front) - tan(rear)) / wheelbase;
+    dxdt[3] = u[1];
+  }
+
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    using std::cos, std::sin;
+    const Scalar cosine = cos(x[2]), sine = sin(x[2]);
+    y[0] = x[0] + antenna_x * cosine - antenna_y * sine;
+    y[1] = x[1] + antenna_x * sine + antenna_y * cosine;
+    y[2] = x[3];
+    y[3] = x[2];
+  }
+};
+
+}  // namespace rhec

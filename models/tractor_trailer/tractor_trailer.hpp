@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cmath>
+
+namespace rhec {
+
+/// A tractor with a passive trailer and three slip factors (Kayacan et al. 2014). The hitch is l behind the tractor's
+/// rear axle (ahead of it where l is negative); beta = psi_t - psi_i is the articulation:
+///
+///     psi_t' = mu v tan(kappa delta) / L_t
+///     psi_i' = mu v / L_i (sin(eta beta) - l / L_t tan(kappa delta) cos(eta beta))
+///     delta' = delta_rate
+///
+/// The tractor's rear axle moves by mu v along psi_t. The position that is followed is that of the trailer's axle,
+///
+///     x_i = x_t - l cos(psi_t) - L_i cos(psi_i),      y_i = y_t - l sin(psi_t) - L_i sin(psi_i)
+///
+/// and since these are the states, their rates are the derivative of that geometry. Without slip the axle then rolls
+/// along psi_i exactly; with slip it drifts as the factors say. The published form moves it along psi_i at the
+/// tractor's speed, which holds for small beta only.
+///
+/// With state [x_i, y_i, psi_i, psi_t, delta], u = [v, delta_rate], p = [mu, kappa, eta]. Outputs: antennas on the
+/// trailer and on the tractor (each with a lever arm from its axle), delta, beta, and both headings.
+struct TractorTrailer {
+  static constexpr int state_count = 5, input_count = 2, parameter_count = 3, output_count = 8;
+
+  double wheelbase = 1.4;          ///< L_t [m]
+  double trailer_length = 1.3;     ///< L_i: from the hitch to the trailer's axle [m]
+  double hitch = 1.1;              ///< l: how far the hitch is behind the tractor's rear axle [m]
+  double tractor_antenna_x = 0.0;  ///< how far the antenna is before the tractor's rear axle [m]
+  double tractor_antenna_y = 0.0;  ///< how far it is to the left [m]
+  double trailer_antenna_x = 0.0;  ///< how far the antenna is before the trailer's axle [m]
+  double trailer_antenna_y = 0.0;  ///< how far it is to the left [m]
+
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::cos, std::sin, std::tan;
+    const Scalar &psi_i = x[2], &psi_t = x[3], &delta = x[4], &mu = p[0], &kappa = p[1], &eta = p[2];
+    const Scalar speed = mu * u[0], slipping = eta * (psi_t - psi_i);
+    const Scalar rate_t = speed * tan(kappa * delta) / wheelbase;
+    const Scalar rate_i = (speed * sin(slipping) - hitch * rate_t * cos(slipping)) / trailer_length;
+    const Scalar sine_t = sin(psi_t), cosine_t = cos(psi_t);
+    dxdt[0] = speed * cosine_t + hitch * rate_t * sine_t + trailer_length * rate_i * sin(psi_i);
+    dxdt[1] = speed * sine_t - hitch * rate_t * cosine_t - trailer_length * rate_i * cos(psi_i);
+    dxdt[2] = rate_i;
+    dxdt[3] = rate_t;
+    dxdt[4] = u[1];
+  }
+
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    using std::cos, std::sin;
+    const Scalar &psi_i = x[2], &psi_t = x[3];
+    const Scalar sine_i = sin(psi_i), cosine_i = cos(psi_i), sine_t = sin(psi_t), cosine_t = cos(psi_t);
+    const double tractor_x = hitch + tractor_antenna_x;
+    y[0] = x[0] + trailer_antenna_x * cosine_i - trailer_antenna_y * sine_i;
+    y[1] = x[1] + trailer_antenna_x * sine_i + trailer_antenna_y * cosine_i;
+    y[2] = x[0] + trailer_length * cosine_i + tractor_x * cosine_t - tractor_antenna_y * sine_t;
+    y[3] = x[1] + trailer_length * sine_i + tractor_x * sine_t + tractor_antenna_y * cosine_t;
+    y[4] = x[4];
+    y[5] = psi_t - psi_i;
+    y[6] = psi_i;
+    y[7] = psi_t;
+  }
+};
+
+}  // namespace rhec

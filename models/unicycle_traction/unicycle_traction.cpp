@@ -1,0 +1,81 @@
+// The unicycle with traction coefficients as a plugin: names, units and bounds of what is in its formula.
+#include "unicycle_traction.hpp"
+
+#include "rhec/core/formula_model.hpp"
+#include "rhec/plugins/sdk.hpp"
+
+namespace rhec {
+
+WideKernels unicycle_traction_wide_kernels();  // defined by rhec_add_model
+
+namespace {
+
+constexpr const char* kSource =
+    "Kayacan, Young, Peschel, Chowdhary, High-precision control of tracked field robots in the presence of unknown "
+    "traction coefficients, Journal of Field Robotics 35(7), 2018";
+
+ModelDescription describe() {
+  ModelDescription model;
+  model.name = "unicycle_traction";
+  model.source = kSource;
+  model.states = {
+      {.name = "x", .unit = "m", .meaning = "centre, x", .scale = 2.0},
+      {.name = "y", .unit = "m", .meaning = "centre, y", .scale = 2.0},
+      {.name = "psi", .unit = "rad", .meaning = "heading", .is_angle = true},
+  };
+  model.inputs = {
+      {.name = "v", .unit = "m/s", .meaning = "speed of the tracks", .scale = 0.5},
+      {.name = "omega", .unit = "rad/s", .meaning = "yaw rate by the tracks", .lower = -1.5, .upper = 1.5},
+  };
+  model.parameters = {
+      {.name = "mu",
+       .unit = "1",
+       .meaning = "traction: ground speed / speed of the tracks",
+       .lower = 0.0,
+       .upper = 1.0,
+       .scale = 0.5},
+      {.name = "kappa",
+       .unit = "1",
+       .meaning = "traction: yaw rate / that of the tracks",
+       .lower = 0.0,
+       .upper = 1.0,
+       .scale = 0.5},
+  };
+  model.outputs = {
+      {.name = "x_gps", .unit = "m", .meaning = "GPS antenna, x", .scale = 2.0},
+      {.name = "y_gps", .unit = "m", .meaning = "GPS antenna, y", .scale = 2.0},
+      {.name = "heading", .unit = "rad", .meaning = "measured heading", .is_angle = true, .usual = false},
+  };
+  model.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0, .speed_factor = 0};
+  return model;
+}
+
+struct UnicycleTractionOptions : UnicycleTraction {
+  static const OptionTable<UnicycleTractionOptions>& table() {
+    using Options = UnicycleTractionOptions;
+    static const auto options =
+        OptionTable<Options>()
+            .number("antenna_x", &Options::antenna_x,
+                    "how far the GPS antenna is before the centre [m]; negative: behind it")
+            .number("antenna_y", &Options::antenna_y, "how far it is to the left [m]; negative: to the right");
+    return options;
+  }
+};
+
+class UnicycleTractionModel : public FormulaModel<UnicycleTraction> {
+ public:
+  using Options = UnicycleTractionOptions;
+  explicit UnicycleTractionModel(const Options& options)
+      : FormulaModel(static_cast<const UnicycleTraction&>(options), describe(), unicycle_traction_wide_kernels()) {}
+};
+
+}  // namespace
+}  // namespace rhec
+
+RHEC_PLUGIN(rhec::PluginKind::model, rhec::UnicycleTractionModel,
+            {.name = "unicycle_traction",
+             .version = "1.0.0",
+             .licence = "BSD-2-Clause",
+             .source = rhec::kSource,
+             .capabilities = "tracked robot with traction coefficients of speed and yaw rate; first and second "
+                             "derivatives"});
