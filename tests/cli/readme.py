@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """What the documentation shows is what is there: readme.py <rhec>
 
-A block of README.md below a line `<!-- file: examples/... -->` is that file, word for word. Commands of the README and of
-docs/ that begin with `rhec run`, `rhec compare`, `rhec options` or `rhec plugins` work (with shorter paths). Links lead to
+A block of README.md below a line `<!-- file: examples/... -->` is that file, word for word. Commands of the README, of
+docs/ and of the pages of models that begin with `rhec run`, `rhec compare`, `rhec options` or `rhec plugins` work (with shorter paths). Links lead to
 files.
 """
 import pathlib
@@ -34,12 +34,13 @@ def main():
     findings.expect(len(shown) >= 4, "README.md", f"shows {len(shown)} files")
     for name, text in shown:
         findings.expect((cli.ROOT / name).read_text() == text, "README.md", f"what it shows of {name} is not what is there")
-    pages = [cli.ROOT / "README.md", cli.ROOT / "CHANGELOG.md", *sorted((cli.ROOT / "docs").rglob("*.md"))]
+    pages = [cli.ROOT / "README.md", cli.ROOT / "CHANGELOG.md", *sorted((cli.ROOT / "docs").rglob("*.md")),
+             *sorted((cli.ROOT / "models").rglob("*.md"))]
     with tempfile.TemporaryDirectory(prefix="rhec-readme-") as work:
         for page in pages:
             text = page.read_text()
             for link in LINK.findall(text):
-                findings.expect((page.parent / link).exists(), page.name, f"leads to {link}, which is not there")
+                findings.expect((page.parent / link).exists(), str(page.relative_to(cli.ROOT)), f"leads to {link}, which is not there")
             for command in commands(text):
                 words = shlex.split(command, comments=True)
                 if words[:1] != ["rhec"] or words[1:2] not in COMMANDS or "--plugin-path" in words:
@@ -51,7 +52,7 @@ def main():
                     if "--out" not in words:
                         words += ["--out", str(pathlib.Path(work) / "out")]
                 result = rhec(*words[1:], cwd=cli.ROOT)
-                findings.expect(result.returncode == FINE, f"{page.name}: {command}", f"{result.returncode}: {result.stderr}")
+                findings.expect(result.returncode == FINE, f"{page.relative_to(cli.ROOT)}: {command}", f"{result.returncode}: {result.stderr}")
     findings.tell()
 
 
