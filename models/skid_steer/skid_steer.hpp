@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cmath>
+
+namespace rhec {
+
+/// A skid-steered vehicle (Yi et al. 2009): the wheels of each side turn together, each side slips lengthwise by a
+/// ratio of its own, and to turn the vehicle has to slide sideways, about a centre of rotation s before its own centre:
+///
+///     v_l  = r omega_l (1 - lambda_l)      v   = (v_l + v_r) / 2           x' = v cos(psi) + s psi' sin(psi)
+///     v_r  = r omega_r (1 - lambda_r)      psi' = (v_r - v_l) / W          y' = v sin(psi) - s psi' cos(psi)
+///
+/// with state [x, y, psi], u = [omega_l, omega_r], p = [lambda_l, lambda_r, s]. Outputs: an antenna with a lever arm
+/// (a_x, a_y) from the centre, and psi.
+struct SkidSteer {
+  static constexpr int state_count = 3, input_count = 2, parameter_count = 3, output_count = 3;
+
+  double wheel_radius = 0.14;  ///< r [m]
+  double track_width = 0.6;    ///< W: between the wheels of both sides [m]
+  double antenna_x = 0.0;      ///< a_x: how far the GPS antenna is before the centre [m]
+  double antenna_y = 0.0;      ///< a_y: how far it is to the left [m]
+
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::cos, std::sin;
+    const Scalar left = wheel_radius * u[0] * (1.0 - p[0]), right = wheel_radius * u[1] * (1.0 - p[1]);
+    const Scalar speed = 0.5 * (left + right), yaw_rate = (right - left) / track_width;
+    const Scalar slide = p[2] * yaw_rate;
+    const Scalar cosine = cos(x[2]), sine = sin(x[2]);
+    dxdt[0] = speed * cosine + slide * sine;
+    dxdt[1] = speed * sine - slide * cosine;
+    dxdt[2] = yaw_rate;
+  }
+
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    using std::cos, std::sin;
+    const Scalar cosine = cos(x[2]), sine = sin(x[2]);
+    y[0] = x[0] + antenna_x * cosine - antenna_y * sine;
+    y[1] = x[1] + antenna_x * sine + antenna_y * cosine;
+    y[2] = x[2];
+  }
+};
+
+}  // namespace rhec
