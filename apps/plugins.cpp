@@ -59,7 +59,7 @@ void list(const Host& host) {
       table.push_back({std::string(word_of(plugin.kind)), plugin.name, plugin.version, or_dash(plugin.licence),
                        backend_of(plugin), plugin.path.string()});
     } else {
-      refused.push_back({plugin.path.string() + ":", plugin.refusal});
+      refused.push_back({plugin.path.string() + ":", plugin.explanation()});
     }
   }
   std::sort(table.begin() + 1, table.end());
@@ -153,7 +153,7 @@ void describe(const Host& host, const PluginRecord& plugin) {
 
 nlohmann::ordered_json as_json(const Host& host, const PluginRecord& plugin) {
   nlohmann::ordered_json all;
-  if (!plugin.accepted()) return {{"path", plugin.path.string()}, {"refusal", plugin.refusal}};
+  if (!plugin.accepted()) return {{"path", plugin.path.string()}, {"refusal", plugin.explanation()}};
   all["kind"] = std::string(word_of(plugin.kind));
   all["name"] = plugin.name;
   all["version"] = plugin.version;

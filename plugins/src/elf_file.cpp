@@ -4,9 +4,14 @@
 #include <fmt/format.h>
 #include <link.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <optional>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace rhec {
@@ -16,23 +21,32 @@ using Header = ElfW(Ehdr);
 using Segment = ElfW(Phdr);
 using Section = ElfW(Shdr);
 using Symbol = ElfW(Sym);
+using Dynamic = ElfW(Dyn);
+
+namespace fs = std::filesystem;
+
+constexpr const char* kCopyAgain = "copy or build it again";
 
 /// Reads at offsets that the file itself gives, and so may be anything.
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& file) : stream_(file, std::ios::binary) {
-    std::error_code problem;
-    size_ = std::filesystem::file_size(file, problem);
-    if (problem) size_ = 0;
+  explicit Reader(const fs::path& file) {
+    errno = 0;
+    stream_.open(file, std::ios::binary);
+    if (!stream_.is_open()) problem_ = std::error_code(errno, std::generic_category());
+    if (!problem_) size_ = fs::file_size(file, problem_);
   }
 
-  bool is_open() const { return stream_.is_open(); }
-  bool holds(std::uint64_t offset, std::uint64_t bytes) const { return offset <= size_ && bytes <= size_ - offset; }
+  /// Why nothing can be read; none if it can.
+  const std::error_code& problem() const { return problem_; }
+  std::uint64_t size() const { return size_; }
 
   /// `count` records; none where the file ends before.
   template <class Record>
   std::optional<std::vector<Record>> read(std::uint64_t offset, std::uint64_t count) {
-    if (count > size_ / sizeof(Record) || !holds(offset, count * sizeof(Record))) return std::nullopt;
+    if (count > size_ / sizeof(Record) || offset > size_ || count * sizeof(Record) > size_ - offset) {
+      return std::nullopt;
+    }
     std::vector<Record> records(count);
     stream_.clear();
     stream_.seekg(static_cast<std::streamoff>(offset));
@@ -43,22 +57,96 @@ class Reader {
 
  private:
   std::ifstream stream_;
+  std::error_code problem_;
   std::uint64_t size_ = 0;
 };
 
-constexpr unsigned char kNativeClass = sizeof(void*) == 8 ? ELFCLASS64 : ELFCLASS32;
-constexpr unsigned char kNativeOrder = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? ELFDATA2LSB : ELFDATA2MSB;
-#if defined(__x86_64__)
-constexpr int kNativeMachine = EM_X86_64;
-#elif defined(__aarch64__)
-constexpr int kNativeMachine = EM_AARCH64;
-#else
-constexpr int kNativeMachine = EM_NONE;  // not known: left to the loader
-#endif
+/// Where a part of the file ends; the largest number where that is no number.
+std::uint64_t end_of(std::uint64_t offset, std::uint64_t bytes) {
+  constexpr auto largest = std::numeric_limits<std::uint64_t>::max();
+  return bytes > largest - offset ? largest : offset + bytes;
+}
 
-bool is_for_this_machine(const Header& header) {
-  return header.e_ident[EI_CLASS] == kNativeClass && header.e_ident[EI_DATA] == kNativeOrder &&
-         (kNativeMachine == EM_NONE || header.e_machine == kNativeMachine);
+Refusal truncated(const Reader& file, std::uint64_t expected) {
+  return {fmt::format("the file is truncated: it has {} bytes, expected {} at least", file.size(), expected),
+          kCopyAgain};
+}
+
+Refusal damaged(const char* what, std::size_t found, std::size_t expected) {
+  return {fmt::format("its ELF header is damaged: {} of {} bytes, expected {}", what, found, expected), kCopyAgain};
+}
+
+struct Platform {
+  unsigned char bits, order;
+  int machine;
+
+  bool operator==(const Platform&) const = default;
+};
+
+constexpr Platform kNative {
+  sizeof(void*) == 8 ? ELFCLASS64 : ELFCLASS32, __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? ELFDATA2LSB : ELFDATA2MSB,
+#if defined(__x86_64__)
+      EM_X86_64
+#elif defined(__aarch64__)
+      EM_AARCH64
+#else
+      EM_NONE  // not known: left to the loader
+#endif
+};
+
+Platform platform_of(const Header& header) {
+  return {header.e_ident[EI_CLASS], header.e_ident[EI_DATA], kNative.machine == EM_NONE ? EM_NONE : header.e_machine};
+}
+
+std::string text_of(const Platform& platform) {
+  const auto machine = [&]() -> std::string {
+    switch (platform.machine) {
+      case EM_X86_64:
+        return "x86-64";
+      case EM_AARCH64:
+        return "AArch64";
+      case EM_386:
+        return "x86";
+      case EM_ARM:
+        return "ARM";
+      case EM_RISCV:
+        return "RISC-V";
+      default:
+        return fmt::format("ELF machine {}", platform.machine);
+    }
+  };
+  return fmt::format("{}, {} bits, {}-endian", machine(), platform.bits == ELFCLASS64 ? 64 : 32,
+                     platform.order == ELFDATA2LSB ? "little" : "big");
+}
+
+/// Why what has this name is no file to read; empty if it is one. Opening a pipe would wait for who writes to it.
+Refusal why_no_file(const fs::path& path) {
+  std::error_code problem;
+  const fs::file_status status = fs::status(path, problem);
+  if (fs::is_regular_file(status)) return {};
+  if (fs::is_directory(status)) {
+    return {"it is a directory, not a library", "search in it by naming it on its own, or give it another name"};
+  }
+  if (status.type() == fs::file_type::not_found) {
+    std::error_code ignored;
+    return {fmt::format("it is a symbolic link to {}, where nothing is", fs::read_symlink(path, ignored).string()),
+            "link it to the plugin, or remove it"};
+  }
+  if (problem) return {fmt::format("it cannot be looked at: {}", problem.message()), "mend that, or remove it"};
+  return {"it is a pipe, a socket or a device, not a file", "remove it"};
+}
+
+/// True for a program whose code may lie anywhere, which has the type of a shared library.
+bool is_program(Reader& file, const std::vector<Segment>& segments) {
+  for (const Segment& segment : segments) {
+    if (segment.p_type != PT_DYNAMIC) continue;
+    const auto entries = file.read<Dynamic>(segment.p_offset, segment.p_filesz / sizeof(Dynamic));
+    if (!entries) continue;
+    for (const Dynamic& entry : *entries) {
+      if (entry.d_tag == DT_FLAGS_1 && (entry.d_un.d_val & DF_1_PIE) != 0) return true;
+    }
+  }
+  return false;
 }
 
 /// The definition of a data symbol in the table of symbols that a library shows; none where it is not there.
@@ -80,37 +168,70 @@ std::optional<Symbol> find_symbol(Reader& file, const std::vector<Section>& sect
 
 }  // namespace
 
-std::string why_not_loadable(const std::filesystem::path& path, const std::string& symbol, std::size_t symbol_size) {
-  constexpr const char* truncated = "the file is truncated; copy or build it again";
+Refusal why_not_loadable(const fs::path& path, const std::string& symbol, std::size_t symbol_size) {
+  if (Refusal refusal = why_no_file(path); !refusal.empty()) return refusal;
   Reader file(path);
-  if (!file.is_open()) return "the file cannot be read; check its permissions";
-  if (!file.holds(0, 1)) return "the file is empty; copy or build it again";
-  const auto start = file.read<char>(0, SELFMAG);
-  if (!start || std::memcmp(start->data(), ELFMAG, SELFMAG) != 0) return "not an ELF file, so no shared library";
+  if (file.problem()) {
+    return {fmt::format("the file cannot be read: {}", file.problem().message()),
+            "let the user who runs this read it (chmod +r), and enter its directory"};
+  }
+  if (file.size() == 0) return {"the file is empty", kCopyAgain};
+  const auto start = file.read<char>(0, std::min<std::uint64_t>(file.size(), SELFMAG));
+  if (!start || std::memcmp(start->data(), ELFMAG, start->size()) != 0) {
+    return {"it is not an ELF file, so no shared library", "put the library that was meant in its place, or remove it"};
+  }
   const auto headers = file.read<Header>(0, 1);
-  if (!headers) return truncated;
+  if (!headers) return truncated(file, sizeof(Header));
   const Header& header = headers->front();
-  if (!is_for_this_machine(header)) return "a library for another kind of machine";
-  if (header.e_type != ET_DYN) return "an ELF file, but not a shared library";
+  const Platform platform = platform_of(header);
+  if (platform != kNative) {
+    return {fmt::format("it is for another kind of machine ({}), expected {}", text_of(platform), text_of(kNative)),
+            "build it for this one"};
+  }
+  constexpr const char* link_as_module = "link it as a shared library (rhec_add_plugin does)";
+  if (header.e_type != ET_DYN) {
+    const char* type = header.e_type == ET_EXEC  ? "a program"
+                       : header.e_type == ET_REL ? "an object file that is not linked yet"
+                                                 : "an ELF file of another type";
+    return {fmt::format("it is {}, not a shared library", type), link_as_module};
+  }
 
-  if (header.e_phentsize != sizeof(Segment)) return "not a well-formed ELF file";
+  // A library without a table of sections can be loaded still, and is asked afterwards.
+  const bool has_sections = header.e_shoff != 0;
+  if (header.e_phentsize != sizeof(Segment)) return damaged("segments", header.e_phentsize, sizeof(Segment));
+  if (has_sections && header.e_shentsize != sizeof(Section)) {
+    return damaged("sections", header.e_shentsize, sizeof(Section));
+  }
+  // A linker puts the table of sections last, so this is the size of the whole file as a rule.
+  std::uint64_t expected = end_of(header.e_phoff, header.e_phnum * sizeof(Segment));
+  if (has_sections) expected = std::max(expected, end_of(header.e_shoff, header.e_shnum * sizeof(Section)));
   const auto segments = file.read<Segment>(header.e_phoff, header.e_phnum);
-  if (!segments) return truncated;
+  const auto sections = file.read<Section>(header.e_shoff, has_sections ? header.e_shnum : 0);
+  if (!segments || !sections) return truncated(file, expected);
   for (const Segment& segment : *segments) {
-    if (segment.p_type == PT_LOAD && !file.holds(segment.p_offset, segment.p_filesz)) return truncated;
+    if (segment.p_type == PT_LOAD) expected = std::max(expected, end_of(segment.p_offset, segment.p_filesz));
   }
+  for (const Section& section : *sections) {
+    const bool takes_room = section.sh_type != SHT_NULL && section.sh_type != SHT_NOBITS;
+    if (takes_room) expected = std::max(expected, end_of(section.sh_offset, section.sh_size));
+  }
+  if (file.size() < expected) return truncated(file, expected);
 
-  // A linker puts the table of sections last; a library without one can be loaded still, and is asked afterwards.
-  if (header.e_shoff == 0) return {};
-  if (header.e_shentsize != sizeof(Section)) return "not a well-formed ELF file";
-  const auto sections = file.read<Section>(header.e_shoff, header.e_shnum);
-  if (!sections) return truncated;
+  if (is_program(file, *segments)) return {"it is a program, not a shared library", link_as_module};
+  if (!has_sections) return {};
   const auto found = find_symbol(file, *sections, symbol);
-  if (!found) {
-    return fmt::format("not a plugin of rhec: it exports no data symbol {}; one is made by RHEC_PLUGIN", symbol);
+  if (!found) return no_manifest(symbol);
+  if (found->st_size < symbol_size) {
+    return {fmt::format("its symbol {} has {} bytes, expected {} at least, so it is no manifest", symbol,
+                        found->st_size, symbol_size),
+            "make it by RHEC_PLUGIN"};
   }
-  if (found->st_size < symbol_size) return fmt::format("its symbol {} is too small to be a manifest", symbol);
   return {};
+}
+
+Refusal no_manifest(const std::string& symbol) {
+  return {fmt::format("it is a library, but no plugin of rhec: it exports no data symbol {}", symbol),
+          "make a plugin of it by RHEC_PLUGIN, or put it elsewhere"};
 }
 
 }  // namespace rhec

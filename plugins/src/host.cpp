@@ -32,7 +32,9 @@ class PlaceList {
   void add(const fs::path& directory, const std::string& origin) {
     std::error_code problem;
     const fs::path canonical = fs::canonical(directory, problem);
-    if (problem || !fs::is_directory(canonical, problem)) return skip(directory, origin, "no such directory");
+    if (problem == std::errc::no_such_file_or_directory) return skip(directory, origin, "no such directory");
+    if (problem) return skip(directory, origin, problem.message());
+    if (!fs::is_directory(canonical, problem)) return skip(canonical, origin, "a file, not a directory");
     const fs::directory_iterator readable(canonical, problem);
     if (problem) return skip(canonical, origin, problem.message());
     const bool seen = std::any_of(places_.begin(), places_.end(), [&](const PluginPlace& place) {
@@ -87,28 +89,10 @@ std::vector<fs::path> libraries_in(const fs::path& directory) {
   std::vector<fs::path> files;
   std::error_code problem;
   for (fs::directory_iterator entry(directory, problem), end; !problem && entry != end; entry.increment(problem)) {
-    std::error_code ignored;
-    if (entry->path().extension() == ".so" && !entry->is_directory(ignored)) files.push_back(entry->path());
+    if (entry->path().extension() == ".so") files.push_back(entry->path());
   }
   std::sort(files.begin(), files.end());  // a directory has no order of its own
   return files;
-}
-
-PluginRecord record_of(const fs::path& file, const Library& library) {
-  PluginRecord record;
-  record.path = file;
-  record.refusal = library.refusal;
-  if (const Manifest* manifest = library.manifest) {
-    record.kind = manifest->kind;
-    record.name = manifest->name;
-    record.version = manifest->version;
-    record.licence = manifest->licence;
-    record.source = manifest->source;
-    record.backend = manifest->backend;
-    record.backend_version = manifest->backend_version;
-    record.capabilities = manifest->capabilities;
-  }
-  return record;
 }
 
 /// All lines after the first one moved to the right.
@@ -149,6 +133,19 @@ std::shared_ptr<Model> choose_outputs(std::shared_ptr<Model> model, const Settin
     chosen.push_back(output);
   }
   return with_outputs(std::move(model), chosen);
+}
+
+/// True if an option has no default, and `error` names it as a key.
+bool is_told_as_missing(const OptionRow& option, std::string_view error) {
+  if (!option.default_value.empty() && option.default_value != "[]") return false;
+  const std::string key = option.name + ": ";
+  const std::size_t place = error.find(key);
+  return place == 0 || (place != std::string_view::npos && error[place - 1] == ' ');
+}
+
+std::string numbers_of_variables(const Model& model) {
+  return fmt::format("{} states, {} inputs, {} parameters, {} outputs", model.state_count(), model.input_count(),
+                     model.parameter_count(), model.output_count());
 }
 
 /// Room for what a plugin's function says when it fails.
@@ -205,9 +202,10 @@ struct Host::Search {
     for (const PluginPlace& place : places) {
       if (!place.skipped.empty()) continue;
       for (const fs::path& file : libraries_in(place.directory)) {
-        libraries_.push_back(load_library(file));
-        PluginRecord record = record_of(file, libraries_.back());
+        Library library = load_library(file);
+        PluginRecord record = std::move(library.record);
         shadow(record);
+        libraries_.push_back(std::move(library));
         records_.push_back(std::move(record));
       }
     }
@@ -216,11 +214,15 @@ struct Host::Search {
   void shadow(PluginRecord& record) const {
     if (!record.accepted()) return;
     for (const PluginRecord& before : records_) {
-      if (before.accepted() && before.kind == record.kind && before.name == record.name) {
-        record.refusal = fmt::format("shadowed: {} is {} '{}' too and was found first", before.path.string(),
-                                     word_of(record.kind), record.name);
-        return;
-      }
+      if (!before.accepted() || before.kind != record.kind || before.name != record.name) continue;
+      const bool together = before.path.parent_path() == record.path.parent_path();
+      record.used_instead = before.path;
+      record.refusal =
+          fmt::format("shadowed: {} is {} too and was found first, since {}", before.path.string(), before.title(),
+                      together ? "its file name sorts before" : "its directory is searched before");
+      record.remedy = fmt::format("remove one of the two files, or give one of the plugins another name{}",
+                                  together ? "" : ", or have the other directory searched first (--plugin-path)");
+      return;
     }
   }
 
@@ -229,6 +231,13 @@ struct Host::Search {
   std::vector<Library> libraries_;  ///< one a record
 };
 
+std::string PluginRecord::explanation() const { return remedy.empty() ? refusal : refusal + "; " + remedy; }
+
+std::string PluginRecord::title() const {
+  if (name.empty()) return "the plugin";
+  return fmt::format("{} '{}'{}{}", word_of(kind), name, version.empty() ? "" : " ", version);
+}
+
 Host::Host(const std::vector<fs::path>& given) : search_(std::make_shared<Search>()) {
   search_->places = places_of(given);
 }
@@ -236,6 +245,15 @@ Host::Host(const std::vector<fs::path>& given) : search_(std::make_shared<Search
 const std::vector<PluginPlace>& Host::places() const { return search_->places; }
 
 const std::vector<PluginRecord>& Host::discover() const { return search_->records(); }
+
+std::vector<PluginRecord> Host::found_in(const PluginPlace& place) const {
+  std::vector<PluginRecord> found;
+  if (!place.skipped.empty()) return found;
+  for (const PluginRecord& record : discover()) {
+    if (record.path.parent_path() == place.directory) found.push_back(record);
+  }
+  return found;
+}
 
 std::vector<std::string> Host::names(PluginKind kind) const {
   std::vector<std::string> all;
@@ -251,16 +269,14 @@ std::string Host::diagnosis() const {
     text += fmt::format("{} ({}){}\n", place.directory.empty() ? "''" : place.directory.string(), place.origin,
                         place.skipped.empty() ? "" : ": " + place.skipped);
     if (!place.skipped.empty()) continue;
-    bool is_empty = true;
-    for (const PluginRecord& record : discover()) {
-      if (record.path.parent_path() != place.directory) continue;
-      is_empty = false;
+    const std::vector<PluginRecord> found = found_in(place);
+    for (const PluginRecord& record : found) {
       const std::string file = record.path.filename().string();
       text += record.accepted()
                   ? fmt::format("  {}: {} '{}' {}\n", file, word_of(record.kind), record.name, record.version)
-                  : fmt::format("  {}: refused: {}\n", file, indented(record.refusal, 4));
+                  : fmt::format("  {}: refused: {}\n", file, indented(record.explanation(), 4));
     }
-    if (is_empty) text += "  no file that ends in .so\n";
+    if (found.empty()) text += "  no file that ends in .so\n";
   }
   return text;
 }
@@ -275,6 +291,29 @@ std::vector<OptionRow> Host::options(PluginKind kind, std::string_view name) con
   if (kind == PluginKind::model)
     rows.push_back({"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"});
   return rows;
+}
+
+PluginTrial Host::try_out(const PluginRecord& plugin) const {
+  if (!plugin.accepted()) throw Error(fmt::format("{}: {}", plugin.path.string(), plugin.explanation()));
+  std::vector<OptionRow> rows;
+  try {
+    rows = options(plugin.kind, plugin.name);
+    switch (plugin.kind) {
+      case PluginKind::model:
+        return {PluginTrial::Outcome::made, numbers_of_variables(*make_model(plugin.name))};
+      case PluginKind::blocking:
+        make_blocking(plugin.name);
+        break;
+      case PluginKind::solver:
+        make_solver(plugin.name);
+        break;
+    }
+  } catch (const Error& error) {
+    const bool needs = std::any_of(rows.begin(), rows.end(),
+                                   [&](const OptionRow& row) { return is_told_as_missing(row, error.what()); });
+    return {needs ? PluginTrial::Outcome::needs_options : PluginTrial::Outcome::failed, error.what()};
+  }
+  return {};
 }
 
 std::shared_ptr<Model> Host::make_model(std::string_view name, const Settings& settings) const {

@@ -1,13 +1,17 @@
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/manifest.hpp"
 
+#include <elf.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <array>
 #include <cstdlib>
 #include <fstream>
+#include <system_error>
 #include <thread>
+#include <tuple>
 
 #include "rhec/core/blocking.hpp"
 #include "rhec/core/model.hpp"
@@ -168,10 +172,24 @@ TEST(Host, OfTwoWithOneNameTheFirstIsTaken) {
     ASSERT_EQ(records.size(), 2u);
     EXPECT_TRUE(records[0].accepted());
     EXPECT_EQ(records[0].version, other_way ? "2.0" : "1.0");
-    EXPECT_THAT(records[1].refusal, AllOf(HasSubstr("shadowed"), HasSubstr(records[0].path.string())));
+    EXPECT_THAT(records[1].refusal, AllOf(HasSubstr("shadowed"), HasSubstr(records[0].path.string()),
+                                          HasSubstr("its directory is searched before")));
+    EXPECT_EQ(records[1].used_instead, records[0].path);
     EXPECT_EQ(records[1].version, other_way ? "1.0" : "2.0");
     EXPECT_NE(host.make_blocking("toy"), nullptr);
   }
+}
+
+TEST(Host, OfTwoWithOneNameInOneDirectoryTheFirstByFileNameIsTaken) {
+  TemporaryFolder folder;
+  fs::copy_file(fixture("good_too") / "also_toy.so", folder.path() / "a.so");
+  fs::copy_file(fixture("good") / "toy.so", folder.path() / "b.so");
+  const auto records = records_in(folder.path());
+  ASSERT_EQ(records.size(), 2u);
+  EXPECT_EQ(records[0].version, "2.0");
+  EXPECT_TRUE(records[0].accepted());
+  EXPECT_THAT(records[1].refusal, HasSubstr("its file name sorts before"));
+  EXPECT_EQ(records[1].used_instead, records[0].path);
 }
 
 TEST(Host, ThePathIsSearchedInOrder) {
@@ -191,6 +209,19 @@ TEST(Host, OnePlaceIsSearchedOnce) {
   EXPECT_THAT(host.diagnosis(), Not(HasSubstr("shadowed")));
 }
 
+TEST(Host, PlacesThatCannotBeSearchedAreToldWithTheReason) {
+  TemporaryFolder folder;
+  const fs::path file = folder.path() / "file", loop = folder.path() / "loop";
+  std::ofstream(file) << "no directory";
+  fs::create_symlink("loop", loop);
+  const Host host({file, folder.path() / "none", loop, file / "below"});
+  EXPECT_EQ(host.places()[0].skipped, "a file, not a directory");
+  EXPECT_EQ(host.places()[1].skipped, "no such directory");
+  EXPECT_EQ(host.places()[2].skipped, std::make_error_code(std::errc::too_many_symbolic_link_levels).message());
+  EXPECT_EQ(host.places()[3].skipped, std::make_error_code(std::errc::not_a_directory).message());
+  EXPECT_THAT(host.found_in(host.places()[0]), testing::IsEmpty());
+}
+
 TEST(Host, TheWorkingDirectoryIsNotSearched) {
   const fs::path before = fs::current_path();
   fs::current_path(fixture("good"));
@@ -204,6 +235,7 @@ TEST(Host, SeveralThreadsMayAsk) {
   const Host host({fixture("good"), fixture("old_abi")});
   std::array<std::shared_ptr<Blocking>, 4> made;
   std::vector<std::thread> threads;
+  threads.reserve(made.size());
   for (auto& each : made) threads.emplace_back([&] { each = host.make_blocking("toy"); });
   for (std::thread& thread : threads) thread.join();
   for (const auto& each : made) EXPECT_NE(each, nullptr);
@@ -219,9 +251,25 @@ TEST(BadPlugin, ManifestsOfAnotherTimeAreRefused) {
   EXPECT_THAT(refusal_of("old_abi"), HasSubstr("has ABI 0, this rhec reads 1: the plugin is older"));
   EXPECT_THAT(refusal_of("new_abi"), HasSubstr("has ABI 99, this rhec reads 1: the plugin is newer"));
   EXPECT_THAT(refusal_of("ends_after_head"), HasSubstr("has 16 bytes, expected"));
-  EXPECT_THAT(refusal_of("ends_before_head"), HasSubstr("too small"));
+  EXPECT_THAT(refusal_of("ends_before_head"), HasSubstr("has 4 bytes, expected 16 at least"));
   EXPECT_THAT(refusal_of("other_revision"),
-              HasSubstr("revision 77 of the interfaces, this rhec has " + std::to_string(kInterfaceRevision)));
+              HasSubstr("blocking 'wrong' implements revision 77 of the interfaces, this rhec has " +
+                        std::to_string(kInterfaceRevision)));
+}
+
+TEST(BadPlugin, AnotherAlignmentOfEigenIsToldWithThePluginAndBothValues) {
+  const std::string own =
+      std::string(RHEC_BUILD_FINGERPRINT).substr(std::string(RHEC_BUILD_FINGERPRINT).rfind(", ") + 2);
+  for (const auto& [name, plugin, values] :
+       {std::tuple("other_alignment", "blocking 'toy' 3.0", "alignment 32 (static "),
+        std::tuple("other_static_alignment", "blocking 'toy' 4.0", "(static 0)")}) {
+    const auto records = records_in(fixture(name));
+    ASSERT_EQ(records.size(), 1u) << name;
+    EXPECT_THAT(records[0].refusal, AllOf(HasSubstr(plugin), HasSubstr(values), HasSubstr("rhec with " + own)));
+    EXPECT_THAT(records[0].refusal, Not(HasSubstr("gcc"))) << "what is alike is not told";
+    EXPECT_THAT(records[0].remedy, HasSubstr("-march"));
+    EXPECT_EQ(records[0].name, "toy");
+  }
 }
 
 TEST(BadPlugin, AnotherBuildIsRefusedWithBothFingerprints) {
@@ -236,8 +284,27 @@ TEST(BadPlugin, IncompleteManifestsAreRefused) {
 }
 
 TEST(BadPlugin, AMissingDependencyIsNamed) {
-  EXPECT_THAT(refusal_of("missing_dependency"), AllOf(HasSubstr("librhec_test_gone.so: cannot open shared object file"),
-                                                      HasSubstr("install that library")));
+  const auto records = records_in(fixture("missing_dependency"));
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_THAT(records[0].refusal,
+              AllOf(HasSubstr("needs the library librhec_test_gone.so, which the loader cannot open"),
+                    HasSubstr("librhec_test_gone.so: cannot open shared object file")));
+  EXPECT_THAT(records[0].remedy, HasSubstr("install the package that provides librhec_test_gone.so"));
+}
+
+TEST(BadPlugin, AMissingSymbolIsNamed) {
+  const auto records = records_in(fixture("undefined_symbol"));
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_THAT(records[0].refusal,
+              HasSubstr("undefined symbol: no library that it is linked to defines rhec_test_gone"));
+  EXPECT_EQ(records[0].remedy, "link it to the library that does");
+}
+
+TEST(BadPlugin, ASymbolOfAnotherRhecIsToldWithHowThisOneWasBuilt) {
+  const auto records = records_in(fixture("other_strings"));
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_THAT(records[0].refusal, HasSubstr("defines rhec::"));
+  EXPECT_THAT(records[0].remedy, AllOf(HasSubstr("build it again"), HasSubstr(RHEC_BUILD_FINGERPRINT)));
 }
 
 TEST(BadPlugin, FilesThatAreNoLibraryAreRefused) {
@@ -247,28 +314,63 @@ TEST(BadPlugin, FilesThatAreNoLibraryAreRefused) {
   fs::copy_file("/proc/self/exe", folder.path() / "c_program.so");
   fs::create_symlink("nowhere", folder.path() / "d_dangling.so");
   fs::create_directory(folder.path() / "e_folder.so");
-  std::ofstream(folder.path() / "f_notes.txt") << "not looked at";
+  ASSERT_EQ(mkfifo((folder.path() / "f_pipe.so").c_str(), 0600), 0);
+  fs::create_symlink("g_loop.so", folder.path() / "g_loop.so");
+  std::ofstream(folder.path() / "h_notes.txt") << "not looked at";
   const auto records = records_in(folder.path());
-  ASSERT_EQ(records.size(), 4u);
+  ASSERT_EQ(records.size(), 7u);
   EXPECT_THAT(records[0].refusal, HasSubstr("empty"));
   EXPECT_THAT(records[1].refusal, HasSubstr("not an ELF file"));
-  EXPECT_FALSE(records[2].accepted());
-  EXPECT_THAT(records[3].refusal, HasSubstr("cannot be read"));
+  EXPECT_THAT(records[2].refusal, HasSubstr("a program, not a shared library"));
+  EXPECT_THAT(records[3].refusal, HasSubstr("a symbolic link to nowhere, where nothing is"));
+  EXPECT_THAT(records[4].refusal, HasSubstr("a directory, not a library"));
+  EXPECT_THAT(records[5].refusal, HasSubstr("a pipe"));
+  EXPECT_THAT(records[6].refusal, HasSubstr("cannot be looked at"));
+  for (const PluginRecord& record : records) EXPECT_NE(record.remedy, "") << record.path;
+}
+
+/// A copy of the good plugin with other bytes in the head of the file.
+std::string refusal_with_bytes(std::streamoff offset, const std::string& bytes) {
+  TemporaryFolder folder;
+  const fs::path copy = folder.path() / "toy.so";
+  fs::copy_file(fixture("good") / "toy.so", copy);
+  std::fstream(copy, std::ios::in | std::ios::out | std::ios::binary).seekp(offset) << bytes;
+  const auto records = records_in(folder.path());
+  return records.size() == 1 ? records[0].refusal : "not one file";
+}
+
+TEST(BadPlugin, ALibraryForAnotherMachineIsToldWithBoth) {
+  const std::string other = refusal_with_bytes(offsetof(Elf64_Ehdr, e_machine), {'\x16', '\x00'});  // of S/390
+  EXPECT_THAT(other, AllOf(HasSubstr("for another kind of machine (ELF machine 22, "), HasSubstr("expected ")));
+  EXPECT_THAT(refusal_with_bytes(EI_CLASS, {sizeof(void*) == 8 ? ELFCLASS32 : ELFCLASS64}),
+              HasSubstr(sizeof(void*) == 8 ? ", 32 bits" : ", 64 bits"));
+}
+
+TEST(BadPlugin, OtherElfFilesAreToldByTheirType) {
+  const auto offset = static_cast<std::streamoff>(offsetof(Elf64_Ehdr, e_type));
+  EXPECT_THAT(refusal_with_bytes(offset, {ET_EXEC, 0}), HasSubstr("a program, not a shared library"));
+  EXPECT_THAT(refusal_with_bytes(offset, {ET_REL, 0}), HasSubstr("an object file that is not linked yet"));
+  EXPECT_THAT(refusal_with_bytes(offset, {ET_CORE, 0}), HasSubstr("an ELF file of another type"));
 }
 
 TEST(BadPlugin, ATruncatedCopyIsRefusedWhereverItEnds) {
   TemporaryFolder folder;
   const fs::path good = fixture("good") / "toy.so", copy = folder.path() / "toy.so";
   const auto size = fs::file_size(good);
-  for (const auto kept :
-       {std::uintmax_t{2}, std::uintmax_t{20}, std::uintmax_t{64}, std::uintmax_t{300}, size / 4, size / 2, size - 1}) {
+  Elf64_Ehdr header;
+  ASSERT_TRUE(std::ifstream(good, std::ios::binary).read(reinterpret_cast<char*>(&header), sizeof header));
+  const auto within_sections = header.e_shoff + header.e_shentsize / 2;
+  ASSERT_LT(within_sections, size);
+  for (const std::uintmax_t kept : {std::uintmax_t{2}, std::uintmax_t{20}, std::uintmax_t{64}, std::uintmax_t{300},
+                                    size / 4, size / 2, std::uintmax_t{within_sections}, size - 1}) {
     fs::copy_file(good, copy, fs::copy_options::overwrite_existing);
     fs::resize_file(copy, kept);
     const auto records = records_in(folder.path());
     ASSERT_EQ(records.size(), 1u);
-    EXPECT_FALSE(records[0].accepted()) << kept << " of " << size;
+    const auto expected = kept < sizeof header ? sizeof header : size;
+    EXPECT_EQ(records[0].refusal, "the file is truncated: it has " + std::to_string(kept) + " bytes, expected " +
+                                      std::to_string(expected) + " at least");
   }
-  EXPECT_THAT(records_in(folder.path())[0].refusal, HasSubstr("truncated"));
 }
 
 TEST(BadPlugin, BytesThatAreWrongDoNotHarmTheReader) {
@@ -293,6 +395,45 @@ TEST(BadPlugin, FailuresOfAFactoryBecomeWords) {
   EXPECT_THAT(failure("returns_null"), HasSubstr("blocking 'failing' could not be made: it gave no reason"));
   EXPECT_THAT(message([] { Host({fixture("returns_null")}).options(PluginKind::blocking, "failing"); }),
               HasSubstr("cannot be told"));
+}
+
+/// What trying the first plugin in a directory says.
+PluginTrial trial_of(const std::string& name) {
+  const Host host({fixture(name)});
+  return host.try_out(host.found_in(host.places().front()).at(0));
+}
+
+TEST(Trial, AGoodPluginIsMade) {
+  EXPECT_EQ(trial_of("good").outcome, PluginTrial::Outcome::made);
+  EXPECT_EQ(trial_of("good").text, "");
+}
+
+TEST(Trial, AFailureIsToldInThePluginsWords) {
+  EXPECT_EQ(trial_of("throws_exception").outcome, PluginTrial::Outcome::failed);
+  EXPECT_EQ(trial_of("throws_exception").text, "blocking 'failing' failed: out of tea");
+  EXPECT_EQ(trial_of("throws_int").outcome, PluginTrial::Outcome::failed);
+  EXPECT_EQ(trial_of("returns_null").outcome, PluginTrial::Outcome::failed);
+  EXPECT_THAT(trial_of("returns_null").text, HasSubstr("options of blocking 'failing' cannot be told"));
+}
+
+TEST(Trial, NothingOfARefusedPluginIsCalled) {
+  EXPECT_THAT(message([] { trial_of("other_revision"); }), HasSubstr("revision 77"));
+  EXPECT_THAT(message([] { trial_of("other_alignment"); }), HasSubstr("alignment 32"));
+}
+
+TEST(Trial, PluginsOfTheHouseAreMadeOrSayWhatTheyNeed) {
+  const Host host;
+  std::vector<std::string> needing;
+  for (const PluginRecord& plugin : host.found_in(host.places().back())) {
+    if (!plugin.accepted()) continue;
+    const PluginTrial trial = host.try_out(plugin);
+    EXPECT_NE(trial.outcome, PluginTrial::Outcome::failed) << plugin.name << ": " << trial.text;
+    if (plugin.name == "bicycle_slip") {
+      EXPECT_EQ(trial.text, "4 states, 2 inputs, 2 parameters, 3 outputs");
+    }
+    if (trial.outcome == PluginTrial::Outcome::needs_options) needing.push_back(plugin.name);
+  }
+  EXPECT_THAT(needing, Contains("pattern"));
 }
 
 }  // namespace

@@ -6,8 +6,9 @@
 /// What two libraries must have in common before they may hand each other C++ objects, as one constant text. It is put
 /// together where it is compiled, so that a plugin carries its own and the host compares.
 ///
-/// Eigen's alignment follows the compiler's flags (-march, -mavx): compile the file with the plugin's manifest with the
-/// same ones as rhec, and put kernels for wider registers into files of their own.
+/// Eigen's alignment, of memory that it takes and of objects of fixed size ("static"), follows the compiler's flags
+/// (-march, -mavx) and Eigen's macros (EIGEN_DONT_ALIGN, EIGEN_MAX_STATIC_ALIGN_BYTES): compile the file with the
+/// plugin's manifest with the same ones as rhec, and put kernels for wider registers into files of their own.
 
 #define RHEC_TEXT_OF_TOKEN(token) #token
 #define RHEC_TEXT_OF(macro) RHEC_TEXT_OF_TOKEN(macro)
@@ -35,10 +36,14 @@
 #define RHEC_LIBRARY_TEXT "libc++ " RHEC_TEXT_OF(_LIBCPP_ABI_VERSION)
 #endif
 
-#define RHEC_EIGEN_TEXT                                                                              \
-  "Eigen " RHEC_TEXT_OF(EIGEN_WORLD_VERSION) "." RHEC_TEXT_OF(EIGEN_MAJOR_VERSION) "." RHEC_TEXT_OF( \
-      EIGEN_MINOR_VERSION) " aligned " RHEC_TEXT_OF(EIGEN_MAX_ALIGN_BYTES)
+#define RHEC_EIGEN_TEXT \
+  "Eigen " RHEC_TEXT_OF(EIGEN_WORLD_VERSION) "." RHEC_TEXT_OF(EIGEN_MAJOR_VERSION) "." RHEC_TEXT_OF(EIGEN_MINOR_VERSION)
 
-/// e.g. "rhec 0.1.0, gcc 12, libstdc++ cxx11-abi 1, Eigen 3.4.0 aligned 16"
-#define RHEC_BUILD_FINGERPRINT \
-  "rhec " RHEC_VERSION_TEXT ", " RHEC_COMPILER_TEXT ", " RHEC_LIBRARY_TEXT ", " RHEC_EIGEN_TEXT
+#define RHEC_ALIGNMENT_TEXT \
+  "Eigen alignment " RHEC_TEXT_OF(EIGEN_MAX_ALIGN_BYTES) " (static " RHEC_TEXT_OF(EIGEN_MAX_STATIC_ALIGN_BYTES) ")"
+
+/// e.g. "rhec 0.1.0, gcc 12, libstdc++ cxx11-abi 1, Eigen 3.4.0, Eigen alignment 16 (static 16)"
+#define RHEC_BUILD_FINGERPRINT                                                                  \
+  "rhec " RHEC_VERSION_TEXT ", " RHEC_COMPILER_TEXT ", " RHEC_LIBRARY_TEXT ", " RHEC_EIGEN_TEXT \
+  ","                                                                                           \
+  " " RHEC_ALIGNMENT_TEXT
