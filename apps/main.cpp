@@ -24,8 +24,10 @@ void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& dire
             // The search passes over what is not there; who names a directory here means it.
             for (const std::string& directory : given)
               if (!std::filesystem::is_directory(directory))
-                throw Error(fmt::format("--plugin-path {}: found no such directory; give one that holds plugins",
-                                        directory.empty() ? "''" : directory));
+                throw Error(
+                    fmt::format("--plugin-path {}: found {}; give a directory that holds plugins",
+                                directory.empty() ? "''" : directory,
+                                std::filesystem::exists(directory) ? "a file, not a directory" : "no such directory"));
             directories.assign(given.begin(), given.end());
           },
           "look for plugins there first; may be given several times")

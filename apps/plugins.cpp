@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "doctor.hpp"
 #include "rhec/core/error.hpp"
 #include "rhec/core/model.hpp"
 #include "rhec/core/option_values.hpp"
@@ -24,6 +25,7 @@ namespace {
 struct PluginsArguments {
   std::string name;
   bool json = false;
+  bool doctor = false;
   std::vector<std::filesystem::path> plugin_path;
 };
 
@@ -194,6 +196,7 @@ std::vector<PluginRecord> named(const Host& host, const std::string& name) {
 
 int show(const PluginsArguments& arguments) {
   const Host host(arguments.plugin_path);
+  if (arguments.doctor) return examine_plugins(host, arguments.name, arguments.json);
   const std::vector<PluginRecord> wanted = arguments.name.empty() ? host.discover() : named(host, arguments.name);
   if (arguments.json) {
     auto all = nlohmann::ordered_json::array();
@@ -220,10 +223,17 @@ void add_plugins(CLI::App& program, Action& chosen) {
       "Examples:\n"
       "  rhec plugins\n"
       "  rhec plugins gn_rti\n"
+      "  rhec plugins --doctor              why each file was or was not accepted\n"
       "  rhec plugins --json --plugin-path my/plugins");
-  command->add_option("name", arguments->name, "show this plugin, its options, and what a model has")
+  command
+      ->add_option("name", arguments->name,
+                   "show this plugin, its options, and what a model has; a plugin or a file with --doctor")
       ->type_name("NAME");
   command->add_flag("--json", arguments->json, "print JSON, options included");
+  command->add_flag(
+      "--doctor", arguments->doctor,
+      "say of every file that could be a plugin if it is accepted, or why not and what to do, and try the "
+      "accepted ones; the exit code is 3 if one is refused, not used, or fails");
   add_plugin_path(*command, arguments->plugin_path);
   command->callback([=, &chosen] { chosen = [=] { return show(*arguments); }; });
 }

@@ -1,0 +1,200 @@
+#include "doctor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string_view>
+#include <vector>
+
+#include "commands.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/core/option_values.hpp"
+
+namespace rhec::apps {
+namespace {
+
+struct Finding {
+  PluginRecord plugin;
+  PluginTrial trial;  ///< of an accepted plugin
+
+  bool shadowed() const { return !plugin.used_instead.empty(); }
+  bool failed() const { return plugin.accepted() && trial.outcome == PluginTrial::Outcome::failed; }
+};
+
+struct PlaceFindings {
+  PluginPlace place;
+  std::vector<Finding> findings;
+};
+
+struct Counts {
+  int accepted = 0, not_used = 0, refused = 0, failed = 0;
+};
+
+bool is_called(const PluginRecord& plugin, const std::string& name) {
+  return plugin.name == name || plugin.path.filename() == name || plugin.path.stem() == name;
+}
+
+std::vector<PlaceFindings> examine(const Host& host, const std::string& name) {
+  std::vector<PlaceFindings> all;
+  for (const PluginPlace& place : host.places()) {
+    all.push_back({place, {}});
+    for (PluginRecord& plugin : host.found_in(place)) {
+      if (!name.empty() && !is_called(plugin, name)) continue;
+      const PluginTrial trial = plugin.accepted() ? host.try_out(plugin) : PluginTrial();
+      all.back().findings.push_back({std::move(plugin), trial});
+    }
+  }
+  return all;
+}
+
+Counts count(const std::vector<PlaceFindings>& places) {
+  Counts counts;
+  for (const PlaceFindings& place : places) {
+    for (const Finding& finding : place.findings) {
+      ++(finding.plugin.accepted() ? counts.accepted : finding.shadowed() ? counts.not_used : counts.refused);
+      if (finding.failed()) ++counts.failed;
+    }
+  }
+  return counts;
+}
+
+[[noreturn]] void nothing_called(const std::string& name, const Host& host) {
+  std::vector<std::string> known;
+  for (const PluginRecord& plugin : host.discover()) {
+    known.push_back(plugin.path.stem().string());
+    if (!plugin.name.empty()) known.push_back(plugin.name);
+  }
+  const std::string near = nearest(name, known);
+  std::string diagnosis = host.diagnosis();
+  diagnosis.erase(diagnosis.find_last_not_of('\n') + 1);
+  throw Error(fmt::format("no plugin and no file is called '{}'{}\n{}", name,
+                          near.empty() ? std::string() : fmt::format("; did you mean '{}'?", near), diagnosis));
+}
+
+std::string origin_of(const PluginPlace& place) {
+  if (place.origin == "given") return "--plugin-path";
+  return place.origin == "installed" ? "beside the library" : place.origin;
+}
+
+std::string verdict_of(const Finding& finding) {
+  return finding.plugin.accepted() ? "accepted" : finding.shadowed() ? "not used" : "refused";
+}
+
+std::string_view word_of(PluginTrial::Outcome outcome) {
+  switch (outcome) {
+    case PluginTrial::Outcome::made:
+      return "made";
+    case PluginTrial::Outcome::needs_options:
+      return "needs options";
+    case PluginTrial::Outcome::failed:
+      return "failed";
+  }
+  return "";
+}
+
+/// Kind, name, version, licence and backend, as far as they are known.
+std::string title_of(const PluginRecord& plugin) {
+  std::string text = plugin.title();
+  if (!plugin.licence.empty()) text += ", " + plugin.licence;
+  if (!plugin.backend.empty()) text += ", by " + plugin.backend;
+  if (!plugin.backend_version.empty()) text += " " + plugin.backend_version;
+  return text;
+}
+
+/// A line below that of a file; its own line breaks keep the margin.
+void print_below(const std::string& text) {
+  constexpr std::string_view margin = "            ";
+  std::string line(margin);
+  for (const char c : text) line += c == '\n' ? fmt::format("\n{}", margin) : std::string(1, c);
+  fmt::print("{}\n", line);
+}
+
+void print(const Finding& finding) {
+  const PluginRecord& plugin = finding.plugin;
+  fmt::print("  {:<8}  {}{}\n", verdict_of(finding), plugin.path.filename().string(),
+             plugin.name.empty() ? "" : ": " + title_of(plugin));
+  if (!plugin.accepted()) {
+    print_below(plugin.refusal);
+    print_below("what to do: " + plugin.remedy);
+  } else if (finding.trial.outcome == PluginTrial::Outcome::needs_options) {
+    print_below("needs an option that has no default: " + finding.trial.text);
+  } else if (finding.failed()) {
+    print_below("but it fails: " + finding.trial.text);
+  } else if (!finding.trial.text.empty()) {
+    print_below(finding.trial.text);
+  }
+}
+
+void print(const std::vector<PlaceFindings>& places, const std::string& name) {
+  for (const PlaceFindings& each : places) {
+    fmt::print("{} ({}){}\n", each.place.directory.empty() ? "''" : each.place.directory.string(),
+               origin_of(each.place), each.place.skipped.empty() ? "" : ": not searched: " + each.place.skipped);
+    for (const Finding& finding : each.findings) print(finding);
+    if (each.findings.empty() && each.place.skipped.empty())
+      fmt::print("  no file {}\n", name.empty() ? "that ends in .so" : fmt::format("or plugin called '{}'", name));
+  }
+  const Counts counts = count(places);
+  std::string summary =
+      fmt::format("{} accepted, {} not used, {} refused", counts.accepted, counts.not_used, counts.refused);
+  if (counts.failed == 1) summary += "; 1 accepted plugin fails";
+  if (counts.failed > 1) summary += fmt::format("; {} accepted plugins fail", counts.failed);
+  fmt::print("\n{}\n", summary);
+}
+
+nlohmann::ordered_json as_json(const Finding& finding) {
+  const PluginRecord& plugin = finding.plugin;
+  nlohmann::ordered_json json{{"file", plugin.path.filename().string()}, {"verdict", verdict_of(finding)}};
+  if (!plugin.name.empty()) {
+    json["kind"] = std::string(word_of(plugin.kind));
+    json["name"] = plugin.name;
+    json["version"] = plugin.version;
+    json["licence"] = plugin.licence;
+    json["backend"] = plugin.backend;
+    json["backend_version"] = plugin.backend_version;
+  }
+  if (plugin.accepted()) {
+    json["trial"] = {{"outcome", std::string(word_of(finding.trial.outcome))}, {"text", finding.trial.text}};
+  } else {
+    json["reason"] = plugin.refusal;
+    json["remedy"] = plugin.remedy;
+  }
+  if (finding.shadowed()) json["used_instead"] = plugin.used_instead.string();
+  return json;
+}
+
+void print_json(const std::vector<PlaceFindings>& places) {
+  nlohmann::ordered_json json{{"places", nlohmann::ordered_json::array()}};
+  for (const PlaceFindings& each : places) {
+    auto candidates = nlohmann::ordered_json::array();
+    for (const Finding& finding : each.findings) candidates.push_back(as_json(finding));
+    json["places"].push_back({{"directory", each.place.directory.string()},
+                              {"origin", origin_of(each.place)},
+                              {"searched", each.place.skipped.empty()},
+                              {"why_not_searched", each.place.skipped},
+                              {"candidates", candidates}});
+  }
+  const Counts counts = count(places);
+  json["accepted"] = counts.accepted;
+  json["not_used"] = counts.not_used;
+  json["refused"] = counts.refused;
+  json["failed"] = counts.failed;
+  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+}  // namespace
+
+int examine_plugins(const Host& host, const std::string& name, bool json) {
+  const std::vector<PlaceFindings> places = examine(host, name);
+  const bool found = std::any_of(places.begin(), places.end(), [](const auto& each) { return !each.findings.empty(); });
+  if (!name.empty() && !found) nothing_called(name, host);
+  if (json) {
+    print_json(places);
+  } else {
+    print(places, name);
+  }
+  const Counts counts = count(places);
+  return counts.not_used + counts.refused + counts.failed > 0 ? exit_not_solved : exit_fine;
+}
+
+}  // namespace rhec::apps
