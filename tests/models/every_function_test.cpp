@@ -2,6 +2,7 @@
 #include "every_function.hpp"
 
 #include "model_checks.hpp"
+#include "rhec/core/error.hpp"
 #include "rhec/core/formula_model.hpp"
 
 namespace rhec {
@@ -17,15 +18,49 @@ std::vector<Variable> variables(const std::vector<std::string>& names, double sc
   return all;
 }
 
-FormulaModel<EveryFunction> make_model() {
+ModelDescription describe() {
   ModelDescription description;
+  description.name = "every_function";
   description.states = variables({"a", "b", "c"});
   description.inputs = variables({"u"});
   description.parameters = variables({"p", "q"});
   description.outputs =
       variables({"sqrt", "exp", "log", "sin", "cos", "tan", "tanh", "asin", "acos", "atan", "atan2"},
                 100.0);  // derivatives of the fifth order are large, and the error of differences with them
-  return FormulaModel<EveryFunction>({}, description, every_function_wide_kernels());
+  return description;
+}
+
+FormulaModel<EveryFunction> make_model() {
+  return FormulaModel<EveryFunction>({}, describe(), every_function_wide_kernels());
+}
+
+std::string why_refused(const ModelDescription& description) {
+  try {
+    const FormulaModel<EveryFunction> model({}, description);
+    return "it is not refused";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+TEST(EveryFunction, IsRefusedWithADescriptionThatDoesNotFit) {
+  ModelDescription one_too_few = describe();
+  one_too_few.outputs.pop_back();
+  EXPECT_EQ(why_refused(one_too_few),
+            "model 'every_function': its formula has 11 outputs and its description 10; describe each of them, in the "
+            "formula's order");
+  ModelDescription no_such_input = describe();
+  no_such_input.roles.speed = 1;
+  EXPECT_EQ(
+      why_refused(no_such_input),
+      "model 'every_function': the role speed names number 1 of its 1 inputs; expected an index from 0, or -1 for "
+      "none");
+  for (auto kind : {&ModelDescription::states, &ModelDescription::inputs, &ModelDescription::parameters}) {
+    ModelDescription one_too_many = describe();
+    (one_too_many.*kind).push_back((one_too_many.*kind).front());
+    EXPECT_NE(why_refused(one_too_many).find("its formula has"), std::string::npos) << why_refused(one_too_many);
+  }
+  EXPECT_EQ(why_refused(describe()), "it is not refused");
 }
 
 TEST(EveryFunction, HasTheDerivativesOfItsValues) {

@@ -15,6 +15,13 @@ struct WideKernels {
   const ModelKernels* avx512 = nullptr;
 };
 
+/// How many variables of each kind a formula has.
+struct FormulaCounts {
+  int states, inputs, parameters, outputs;
+};
+/// Throws Error where a description has others, or gives a role to a variable that is not there.
+RHEC_EXPORT void check_description(const ModelDescription& description, const FormulaCounts& counts);
+
 /// Makes a Model out of one formula. All else (integration, first and second derivatives, evaluation of several stages
 /// at once) is derived. `Formula` is
 ///
@@ -30,8 +37,13 @@ struct WideKernels {
 template <class Formula>
 class FormulaModel : public Model {
  public:
+  /// Throws Error where the description has other numbers of variables than the formula.
   explicit FormulaModel(Formula formula, ModelDescription description, WideKernels wide = {})
       : formula_(std::move(formula)), description_(std::move(description)) {
+    check_description(description_, {.states = Formula::state_count,
+                                     .inputs = Formula::input_count,
+                                     .parameters = Formula::parameter_count,
+                                     .outputs = Formula::output_count});
     static constexpr ModelKernels generic = make_model_kernels<Formula, double>();
     add("generic", &generic);
 #if defined(__x86_64__)
