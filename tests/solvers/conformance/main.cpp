@@ -3,7 +3,8 @@
 // conformance_test --forget           forgets the verdicts of earlier runs
 // conformance_test --table            compares and prints the verdicts that are kept
 //
-// RHEC_CONFORMANCE_PROBLEMS=50 makes at least fifty problems of every family.
+// RHEC_CONFORMANCE_PROBLEMS=50 makes at least fifty problems of every family. RHEC_CONFORMANCE_FOLDER says where
+// verdicts are kept, for runs that must not meet.
 
 #include <gtest/gtest.h>
 

@@ -26,7 +26,8 @@ struct Verdict {
   std::vector<double> solution;                                 ///< scaled_primal
 };
 
-/// The folder of this run's verdicts, beside the test's executable.
+/// The folder of this run's verdicts: what RHEC_CONFORMANCE_FOLDER of the environment says, else beside the test's
+/// executable.
 std::filesystem::path verdict_folder();
 
 void forget_verdicts();
