@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """What the documentation shows is what is there: readme.py <rhec>
 
-A block of README.md below a line `<!-- file: examples/... -->` is that file, word for word. Commands of the README, of
-docs/ and of the pages of models that begin with `rhec run`, `rhec compare`, `rhec options` or `rhec plugins` work (with shorter paths). Links lead to
-files.
+A block of README.md below a line `<!-- file: ... -->` is that file, word for word. Commands of the README, of docs/ and of
+the pages of models that begin with `rhec run`, `rhec compare`, `rhec options` or `rhec plugins` work (with shorter paths);
+those below a line `<!-- run: <test> -->` are that test's to run. Links lead to files.
 """
 import pathlib
 import re
@@ -16,13 +16,13 @@ from cli import FINE, Program, assignments
 
 COMMANDS = (["run"], ["compare"], ["options"], ["plugins"])
 SHOWN = re.compile(r"<!-- file: (\S+) -->\n```\w*\n(.*?)```\n", re.DOTALL)
-BLOCK = re.compile(r"```(\w*)\n(.*?)```\n", re.DOTALL)
+BLOCK = re.compile(r"(<!-- run: \S+ -->\n)?```(\w*)\n(.*?)```\n", re.DOTALL)
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)\)")
 
 
 def commands(text):
-    for language, block in BLOCK.findall(text):
-        if language in ("sh", "bash"):
+    for run_elsewhere, language, block in BLOCK.findall(text):
+        if language in ("sh", "bash") and not run_elsewhere:
             for line in block.replace("\\\n", " ").splitlines():
                 yield line.split("  #")[0].strip()
 
@@ -43,7 +43,7 @@ def main():
                 findings.expect((page.parent / link).exists(), str(page.relative_to(cli.ROOT)), f"leads to {link}, which is not there")
             for command in commands(text):
                 words = shlex.split(command, comments=True)
-                if words[:1] != ["rhec"] or words[1:2] not in COMMANDS or "--plugin-path" in words:
+                if words[:1] != ["rhec"] or words[1:2] not in COMMANDS:
                     continue
                 if words[1] in ("run", "compare"):
                     words[3:3] = assignments("path.laps=1", "path.legs=2")

@@ -8,6 +8,7 @@ import json
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,9 @@ import tempfile
 # No variable of the developer's shell may be what makes the moved tree work.
 CLEAN = {name: value for name, value in os.environ.items()
          if name not in ("LD_LIBRARY_PATH", "RHEC_PLUGIN_PATH", "CMAKE_PREFIX_PATH", "rhec_DIR", "rhec_ROOT")}
+
+# A block of README.md that this test runs.
+RUN_BLOCK = re.compile(r"<!-- run: tests/house/install_test\.py -->\n```sh\n(.*?)```\n", re.DOTALL)
 
 CONSUMER_CMAKE = """\
 cmake_minimum_required(VERSION 3.25)
@@ -117,25 +121,47 @@ def check_consumer(prefix, work, arguments):
     return len(headers)
 
 
-def check_examples(prefix, work, arguments):
-    """What the README shows, built as a reader would: a program with a robot in it, and a model as a plugin."""
+def check_robot(prefix, work, arguments):
+    """The program of the README with a robot in it, built as a reader would."""
     settings = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={arguments.cxxflags}", "-DCMAKE_BUILD_TYPE=Debug"]
     if arguments.cxx:
         settings.append(f"-DCMAKE_CXX_COMPILER={arguments.cxx}")
-    for name in ("robot", "model"):
-        source, build = work / "examples" / name, work / f"build-{name}"
-        shutil.copytree(arguments.source / "examples" / name, source)
-        run(arguments.cmake, "-S", source, "-B", build, *settings)
-        run(arguments.cmake, "--build", build)
-    robot, model = work / "examples" / "robot", work / "examples" / "model"
-    lines = run(work / "build-robot" / "robot", robot / "robot.yaml", cwd="/").splitlines()
+    source, build = work / "robot", work / "build-robot"
+    shutil.copytree(arguments.source / "examples" / "robot", source)
+    run(arguments.cmake, "-S", source, "-B", build, *settings)
+    run(arguments.cmake, "--build", build)
+    lines = run(build / "robot", source / "robot.yaml", cwd="/").splitlines()
     expect(len(lines) > 20 and "kappa 0.7" in lines[-1], "the robot did not learn its slip:\n" + "\n".join(lines))
-    rhec, out = prefix / "bin" / "rhec", work / "out"
-    run(rhec, "run", model / "field.yaml", "--plugin-path", work / "build-model", "--out", out, cwd="/")
-    summary = json.loads((out / "summary.json").read_text())
-    expect(summary["completed"] and summary["mae"]["kappa"] < 0.05, f"the model outside does not drive: {summary['mae']}")
-    run(arguments.cmake, "--install", work / "build-model")
-    expect("skid_steer" in run(rhec, "plugins", cwd="/"), "the model outside is not found once it is installed")
+
+
+def check_template(home, arguments):
+    """What the README says of a plugin from outside, command by command, as someone whose rhec lies in ~/rhec.
+
+    Where the page names a build of rhec itself, it is the one under test.
+    """
+    blocks = RUN_BLOCK.findall((arguments.source / "README.md").read_text())
+    expect(len(blocks) == 4, f"README.md has {len(blocks)} blocks of commands that are run here, and not 4")
+    environment = CLEAN | {"HOME": str(home), "CXXFLAGS": arguments.cxxflags,
+                           "PATH": f"{pathlib.Path(arguments.cmake).parent}:{CLEAN['PATH']}",
+                           "RHEC_CONFORMANCE_FOLDER": str(home / "verdicts")}
+    if arguments.cxx:
+        environment["CXX"] = arguments.cxx
+    script = "set -euo pipefail\n" + "".join(blocks).replace("build/release", shlex.quote(str(arguments.build.resolve())))
+    result = subprocess.run(["bash", "-c", script], cwd=home, env=environment, text=True,
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    expect(result.returncode == 0, f"the README's page on plugins from outside ends with {result.returncode}:\n{result.stdout}")
+    expect(not arguments.source.resolve().joinpath("my_robot").exists(), "the page wrote into the source tree")
+    for name in ("articulated", "geometric", "plain_sqp"):
+        expect(re.search(rf"^\w+ +{name} .*my_robot/build/{name}\.so$", result.stdout, re.MULTILINE),
+               f"'rhec plugins' did not list {name} from where it was built:\n{result.stdout}")
+    for out in ("field", "installed", "my_vehicle"):
+        summary = json.loads((home / "out" / out / "summary.json").read_text())
+        statuses = summary["statuses"]
+        expect(summary["completed"] and summary["mae"]["kappa"] < 0.05 and summary["mae"]["tracking"] < 0.2 and
+               all(list(each) == ["solved"] for each in statuses.values()),
+               f"out/{out}: the loader from outside does not drive: {summary['mae']}, {statuses}")
+    told = run(home / "rhec" / "bin" / "rhec", "plugins", "articulated", cwd="/")
+    expect(str(home / "rhec") in told, f"the installed model is not the one that is found by name:\n{told}")
 
 
 def main():
@@ -148,14 +174,17 @@ def main():
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="rhec-install-") as directory:
         work = pathlib.Path(directory).resolve()
-        first, moved = work / "first", work / "moved"
+        home = work / "home"
+        home.mkdir()
+        first, moved = work / "first", home / "rhec"
         run(arguments.cmake, "--install", arguments.build, "--prefix", first)
         first.rename(moved)
         check_relocatable(moved, [str(place.resolve()) for place in (arguments.build, arguments.source, first)])
         plugins = check_plugins(moved)
         headers = check_consumer(moved, work, arguments)
-        check_examples(moved, work, arguments)
-    print(f"install: moved, {plugins} plugins seen, {headers} headers included from outside, examples run")
+        check_robot(moved, work, arguments)
+        check_template(home, arguments)
+    print(f"install: moved, {plugins} plugins seen, {headers} headers included from outside, the README's examples run")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,73 @@
+// A model: what the variables of the formula in articulated.hpp are called, their units, bounds and scales, the options
+// of the vehicle, and the line that makes a plugin of it. Try it with: rhec plugins articulated
+#include "articulated.hpp"
+
+#include "rhec/core/formula_model.hpp"
+#include "rhec/plugins/sdk.hpp"
+
+namespace rhec {
+WideKernels articulated_wide_kernels();  // rhec_add_model(articulated ...) in CMakeLists.txt defines it
+}
+
+namespace {
+
+// One entry for each number of the formula, in its order. `scale` is a typical magnitude; `lower` and `upper` are
+// bounds that a configuration can change; `is_angle`: compared on the circle. The names are keys of the configuration.
+rhec::ModelDescription describe() {
+  rhec::ModelDescription model;
+  model.name = "articulated";
+  model.source = "Corke & Ridley, Steering kinematics for a center-articulated mobile robot, 2001";
+  model.states = {
+      {.name = "x", .unit = "m", .meaning = "front axle, x", .scale = 10.0},
+      {.name = "y", .unit = "m", .meaning = "front axle, y", .scale = 10.0},
+      {.name = "theta", .unit = "rad", .meaning = "heading of the front unit", .is_angle = true},
+      {.name = "gamma", .unit = "rad", .meaning = "articulation angle", .lower = -0.7, .upper = 0.7, .scale = 0.3}};
+  model.inputs = {
+      {.name = "v", .unit = "m/s", .meaning = "wheel speed", .scale = 2.0},
+      {.name = "w", .unit = "rad/s", .meaning = "articulation rate", .lower = -0.4, .upper = 0.4, .scale = 0.2}};
+  model.parameters = {
+      {.name = "kappa", .unit = "1", .meaning = "ground speed / wheel speed", .lower = 0.0, .upper = 1.2},
+      {.name = "mu", .unit = "1", .meaning = "effective / actual articulation angle", .lower = 0.0, .upper = 1.2},
+      {.name = "nu", .unit = "1", .meaning = "turning by articulation / without slip", .lower = 0.0, .upper = 1.2}};
+  model.outputs = {
+      {.name = "x_gps", .unit = "m", .meaning = "GPS antenna, x", .scale = 10.0},
+      {.name = "y_gps", .unit = "m", .meaning = "GPS antenna, y", .scale = 10.0},
+      {.name = "gamma", .unit = "rad", .meaning = "measured articulation angle", .scale = 0.3, .is_angle = true}};
+  // What a path follower needs to know: indices of states (the first three), of an input, and of a parameter.
+  model.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0, .speed_factor = 0};
+  return model;
+}
+
+// What differs from vehicle to vehicle is an option: `model: {name: articulated, front: 1.5}`.
+struct ArticulatedOptions {
+  double front = Articulated{}.front;
+  double rear = Articulated{}.rear;
+  double antenna = Articulated{}.antenna;
+
+  static const rhec::OptionTable<ArticulatedOptions>& table() {
+    static const auto rows =
+        rhec::OptionTable<ArticulatedOptions>()
+            .number("front", &ArticulatedOptions::front, "from the hinge to the front axle [m]",
+                    rhec::greater_than(0.0))
+            .number("rear", &ArticulatedOptions::rear, "from the hinge to the rear axle [m]", rhec::greater_than(0.0))
+            .number("antenna", &ArticulatedOptions::antenna, "how far the GPS antenna is before the front axle [m]");
+    return rows;
+  }
+};
+
+class ArticulatedModel : public rhec::FormulaModel<Articulated> {
+ public:
+  using Options = ArticulatedOptions;
+  explicit ArticulatedModel(const Options& options)
+      : FormulaModel({.front = options.front, .rear = options.rear, .antenna = options.antenna}, describe(),
+                     rhec::articulated_wide_kernels()) {}
+};
+
+}  // namespace
+
+RHEC_PLUGIN(rhec::PluginKind::model, ArticulatedModel,
+            {.name = "articulated",
+             .version = "1.0.0",
+             .licence = "BSD-2-Clause",
+             .source = "Corke & Ridley 2001",
+             .capabilities = "centre-articulated vehicle with three slips"});

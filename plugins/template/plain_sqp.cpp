@@ -1,0 +1,71 @@
+// A solver: sequential quadratic programming with a line search; the method is in newton.hpp. To write one of your own,
+// replace that, and change the options and the names in RHEC_PLUGIN. What a solver owes its caller is in
+// rhec/core/solver.hpp.
+//
+// What this one does not do: prepare before the newest data come, remember more from solve to solve than the point
+// does, give covariances, take stages wider than the Riccati recursion does, or solve everything: from far guesses over
+// long horizons, and where many bounds are active, it may end with iteration_limit or stalled, and says so.
+#include "newton.hpp"
+#include "rhec/plugins/sdk.hpp"
+
+namespace {
+
+struct PlainSqpOptions {
+  double tolerance = 1e-8;
+  int max_iterations = 200;
+
+  static const rhec::OptionTable<PlainSqpOptions>& table() {
+    static const auto rows =
+        rhec::OptionTable<PlainSqpOptions>()
+            .number("tolerance", &PlainSqpOptions::tolerance, "KKT residual of a solution", rhec::greater_than(0.0))
+            .integer("max_iterations", &PlainSqpOptions::max_iterations, "limit of steps", rhec::between(1, 100000));
+    return rows;
+  }
+};
+
+class PlainSqp : public rhec::Solver {
+ public:
+  using Options = PlainSqpOptions;
+  explicit PlainSqp(const Options& options) : options_(options) {}
+
+  /// Solvers may refuse: empty, or the reason. Whoever asked tells it to the user.
+  std::string why_not(const rhec::Ocp& ocp) const override {
+    if (std::max(ocp.capacity().states, ocp.capacity().controls) <= rhec::Riccati::max_width) return {};
+    return "a stage has more than " + std::to_string(rhec::Riccati::max_width) + " states or controls";
+  }
+
+  /// All memory is set aside here, for every problem of this capacity.
+  void setup(const rhec::Ocp& ocp) override {
+    if (const std::string reason = why_not(ocp); !reason.empty()) throw rhec::Error("solver 'plain_sqp': " + reason);
+    newton_ = Newton(ocp);
+  }
+
+  void prepare(const rhec::Ocp&, const rhec::Iterate&) noexcept override {}
+  void reset() noexcept override {}
+
+  rhec::Report solve(const rhec::Ocp& ocp, rhec::Iterate& point, rhec::Clock::time_point deadline) noexcept override {
+    const auto start = rhec::Clock::now();
+    rhec::Report report;  // of status bad_input
+    if (ocp.capacity() == newton_.qp.capacity() && is_sound_start(ocp, point, newton_.merit.scratch)) {
+      newton_.best = point;
+      if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), newton_.best.state(0));
+      report.status = newton_.minimise(ocp, options_.tolerance, options_.max_iterations, deadline, report);
+      if (report.status != rhec::Status::infeasible) point = newton_.best;
+      judge(ocp, point, newton_.qp, newton_.merit.scratch, report);  // the core says what the point is worth
+    }
+    report.feedback_us = rhec::microseconds_since(start);
+    return report;
+  }
+
+ private:
+  Options options_;
+  Newton newton_;
+};
+
+}  // namespace
+
+RHEC_PLUGIN(rhec::PluginKind::solver, PlainSqp,
+            {.name = "plain_sqp",
+             .version = "1.0.0",
+             .licence = "BSD-2-Clause",
+             .capabilities = "Newton's method with a line search, to the tolerance"});
