@@ -39,11 +39,7 @@ rhec::ModelDescription describe() {
 }
 
 // What differs from vehicle to vehicle is an option: `model: {name: articulated, front: 1.5}`.
-struct ArticulatedOptions {
-  double front = Articulated{}.front;
-  double rear = Articulated{}.rear;
-  double antenna = Articulated{}.antenna;
-
+struct ArticulatedOptions : Articulated {
   static const rhec::OptionTable<ArticulatedOptions>& table() {
     static const auto rows =
         rhec::OptionTable<ArticulatedOptions>()
@@ -59,8 +55,7 @@ class ArticulatedModel : public rhec::FormulaModel<Articulated> {
  public:
   using Options = ArticulatedOptions;
   explicit ArticulatedModel(const Options& options)
-      : FormulaModel({.front = options.front, .rear = options.rear, .antenna = options.antenna}, describe(),
-                     rhec::articulated_wide_kernels()) {}
+      : FormulaModel(static_cast<const Articulated&>(options), describe(), rhec::articulated_wide_kernels()) {}
 };
 
 }  // namespace
