@@ -123,6 +123,13 @@ std::pair<double, double> bounds_in(const Settings& pair) {
   return {low, high};
 }
 
+std::vector<double> default_sigmas(const std::vector<Variable>& variables) {
+  std::vector<double> sigmas;
+  sigmas.reserve(variables.size());
+  for (const Variable& variable : variables) sigmas.push_back(noise_share * variable.scale);
+  return sigmas;
+}
+
 const OptionTable<RobotOptions>& RobotOptions::table() {
   static const auto rows = [] {
     OptionTable<RobotOptions> table;
@@ -276,15 +283,9 @@ Robot::Robot(const Host& host, const RobotOptions& options)
   });
   const ModelDescription& about = model_->description();
   require_known_keys(options.noise, {"outputs", "inputs"}, "noise");
-  const auto scales = [](const std::vector<Variable>& variables) {
-    std::vector<double> values;
-    values.reserve(variables.size());
-    for (const Variable& variable : variables) values.push_back(noise_share * variable.scale);
-    return values;
-  };
-  output_sigmas_ = numbers_by_name(member_or_null(options.noise, "outputs"), about.outputs, scales(about.outputs),
-                                   greater_than(0.0), "noise of outputs");
-  input_sigmas_ = numbers_by_name(member_or_null(options.noise, "inputs"), about.inputs, scales(about.inputs),
+  output_sigmas_ = numbers_by_name(member_or_null(options.noise, "outputs"), about.outputs,
+                                   default_sigmas(about.outputs), greater_than(0.0), "noise of outputs");
+  input_sigmas_ = numbers_by_name(member_or_null(options.noise, "inputs"), about.inputs, default_sigmas(about.inputs),
                                   greater_than(0.0), "noise of inputs");
   read_bounds();
   require_known_keys(options.blocking, names_of(about.parameters), "blocking");
@@ -330,6 +331,28 @@ void Robot::read_bounds() {
   read(about.states, state_lower_, state_upper_);
   read(about.inputs, input_lower_, input_upper_);
   read(about.parameters, parameter_lower_, parameter_upper_);
+}
+
+ModelDescription Robot::bounded_description() const {
+  ModelDescription about = model_->description();
+  const auto bound = [](std::vector<Variable>& variables, const std::vector<double>& lower,
+                        const std::vector<double>& upper) {
+    for (std::size_t j = 0; j < variables.size(); ++j) {
+      variables[j].lower = lower[j];
+      variables[j].upper = upper[j];
+    }
+  };
+  bound(about.states, state_lower_, state_upper_);
+  bound(about.inputs, input_lower_, input_upper_);
+  bound(about.parameters, parameter_lower_, parameter_upper_);
+  return about;
+}
+
+std::vector<std::shared_ptr<const Blocking>> Robot::make_blockings() const {
+  std::vector<std::shared_ptr<const Blocking>> blockings;
+  for (const Variable& parameter : model_->description().parameters)
+    blockings.push_back(blocking_of(host_, member_or_null(options_.blocking, parameter.name), default_blocking));
+  return blockings;
 }
 
 void Robot::read_initial(const std::optional<Eigen::VectorXd>& initial_state, Eigen::VectorXd& mean,

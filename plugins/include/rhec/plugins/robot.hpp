@@ -89,6 +89,9 @@ RHEC_EXPORT std::pair<double, double> bounds_in(const Settings& pair);
 RHEC_EXPORT void require_known_keys(const Settings& map, const std::vector<std::string>& known,
                                     const std::string& owner);
 
+/// Standard deviations of measured variables where a configuration gives none: a share of their typical magnitudes.
+RHEC_EXPORT std::vector<double> default_sigmas(const std::vector<Variable>& variables);
+
 /// A plugin as a configuration names it.
 struct PluginChoice {
   std::string name;
@@ -111,6 +114,10 @@ class RHEC_EXPORT Robot {
   const SmootherOptions& smoother_options() const noexcept { return smoother_; }
   const std::vector<double>& output_sigmas() const noexcept { return output_sigmas_; }
   const std::vector<double>& input_sigmas() const noexcept { return input_sigmas_; }
+  /// What the model says of itself, with the bounds of this configuration.
+  ModelDescription bounded_description() const;
+  /// Of the section `blocking`, by parameter.
+  std::vector<std::shared_ptr<const Blocking>> make_blockings() const;
 
   /// Is given the solver of each estimator (rhe) and controller (rhc) made from now on, and returns the one to use in
   /// its place, never null: to watch what it is asked, say. Goes round what wraps them already; copies of the robot
