@@ -26,6 +26,7 @@ using Action = std::function<int()>;
 
 // One function a command: adds it to the program, and puts what it does into `chosen` when it is the one that was
 // called.
+void add_check(CLI::App& program, Action& chosen);
 void add_compare(CLI::App& program, Action& chosen);
 void add_estimate(CLI::App& program, Action& chosen);
 void add_run(CLI::App& program, Action& chosen);

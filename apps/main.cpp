@@ -62,6 +62,7 @@ constexpr const char* examples =
     "  rhec options                       every key of a scenario\n"
     "  rhec plugins                       what is installed\n"
     "  rhec plugins gn_rti                the options of one plugin\n"
+    "  rhec check bicycle_slip            a model before its first run\n"
     "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
     "  rhec solve problems.jsonl --solver gn_rti --sequence > solutions.jsonl\n"
     "  rhec compare scenarios/figure8.yaml --solvers gn_rti,sparse_sqp\n\n"
@@ -99,6 +100,7 @@ int run(int count, char** words) {
   add_smooth(program, chosen);
   add_solve(program, chosen);
   add_compare(program, chosen);
+  add_check(program, chosen);
   add_options(program, chosen);
   add_plugins(program, chosen);
 

@@ -2,7 +2,7 @@
 """What the documentation shows is what is there: readme.py <rhec>
 
 A block of README.md below a line `<!-- file: ... -->` is that file, word for word. Commands of the README, of docs/ and of
-the pages of models that begin with `rhec run`, `rhec compare`, `rhec options` or `rhec plugins` work (with shorter paths);
+the pages of models that begin with `rhec run`, `rhec check`, `rhec compare`, `rhec options` or `rhec plugins` work (with shorter paths);
 those below a line `<!-- run: <test> -->` are that test's to run. Links lead to files.
 """
 import pathlib
@@ -14,7 +14,7 @@ import tempfile
 import cli
 from cli import FINE, Program, assignments
 
-COMMANDS = (["run"], ["compare"], ["options"], ["plugins"])
+COMMANDS = (["run"], ["check"], ["compare"], ["options"], ["plugins"])
 SHOWN = re.compile(r"<!-- file: (\S+) -->\n```\w*\n(.*?)```\n", re.DOTALL)
 BLOCK = re.compile(r"(<!-- run: \S+ -->\n)?```(\w*)\n(.*?)```\n", re.DOTALL)
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)\)")

@@ -1,4 +1,4 @@
-// Every model plugin that is found: derivatives, instruction sets, and no allocation in evaluation.
+// Every model plugin that is found: `rhec check`, instruction sets, and no allocation in evaluation.
 #include <gmock/gmock.h>
 
 #include <atomic>
@@ -8,6 +8,7 @@
 
 #include "model_checks.hpp"
 #include "rhec/plugins/host.hpp"
+#include "rhec/sim/model_check.hpp"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -45,39 +46,24 @@ TEST(Models, TheBicycleIsFound) {
   EXPECT_THAT(Host().names(PluginKind::model), testing::Contains("bicycle_slip")) << Host().diagnosis();
 }
 
-TEST_P(EveryModel, DescribesItself) {
-  const ModelDescription& d = model_->description();
-  EXPECT_FALSE(d.source.empty());
-  for (const auto* kind : {&d.states, &d.inputs, &d.parameters, &d.outputs}) {
-    for (const Variable& v : *kind) {
-      EXPECT_FALSE(v.name.empty() || v.unit.empty() || v.meaning.empty()) << v.name;
-      EXPECT_LT(v.lower, v.upper) << v.name;
-      EXPECT_GT(v.scale, 0.0) << v.name;
-    }
-  }
-  const auto expect_in = [](int role, const std::vector<Variable>& variables) {
-    EXPECT_GE(role, -1);
-    EXPECT_LT(role, static_cast<int>(variables.size()));
-  };
-  for (const int role : {d.roles.position_x, d.roles.position_y, d.roles.heading}) expect_in(role, d.states);
-  expect_in(d.roles.speed, d.inputs);
-  expect_in(d.roles.speed_factor, d.parameters);
+TEST_P(EveryModel, PassesItsCheck) {
+  const sim::ModelCheck found = sim::check_model(*model_);
+  for (const sim::Finding& finding : found.findings)
+    EXPECT_NE(finding.verdict, sim::Verdict::fail) << finding.check << ": " << finding.where << ": " << finding.found;
 }
 
 TEST_P(EveryModel, IntegratesByRungeKutta) {
   for_each_instruction_set([&] {
     for (const int substeps : {1, 2, 5})
-      for (const bool ramp : {false, true}) checks::integrate_is_runge_kutta(*model_, ramp, substeps);
+      for (const bool ramp : {false, true}) checks::expect_runge_kutta(*model_, ramp, substeps);
   });
 }
 
 TEST_P(EveryModel, DerivativesAreThoseOfTheValues) {
   for_each_instruction_set([&] {
-    for (const unsigned seed : {1u, 2u, 3u}) {
+    for (const unsigned seed : {1u, 2u, 3u})
       for (const int substeps : {1, 3})
-        for (const bool ramp : {false, true}) checks::derivatives_of_integrate(*model_, ramp, substeps, seed);
-      checks::derivatives_of_observe(*model_, seed);
-    }
+        for (const bool ramp : {false, true}) checks::expect_derivatives(*model_, ramp, substeps, seed);
   });
 }
 
@@ -89,7 +75,7 @@ TEST_P(EveryModel, AllInstructionSetsAgreeAndWriteWhatIsAskedFor) {
 
 TEST_P(EveryModel, RefusesAnUnknownInstructionSetAndKeepsItsOwn) {
   EXPECT_FALSE(model_->use_instruction_set("mmx"));
-  checks::integrate_is_runge_kutta(*model_, false, 1);
+  checks::expect_runge_kutta(*model_, false, 1);
 }
 
 TEST_P(EveryModel, EvaluatesWithoutAllocation) {

@@ -5,14 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "rhec/core/model.hpp"
+#include "rhec/sim/derivative_check.hpp"
+#include "rhec/sim/random.hpp"
 
-// What holds for every model: its derivatives are those of its values, all instruction sets agree, all that is asked
-// for is written and nothing else.
+// What holds for every model beside what `rhec check` looks at: all instruction sets agree, all that is asked for is
+// written and nothing else.
 
 namespace rhec::checks {
 
@@ -75,170 +77,39 @@ struct Stages {
   }
 };
 
-/// Stages with values inside the bounds; every third stage has no input, and every fifth no state (zero steering).
+/// Stages inside the bounds, with weights for second derivatives.
 inline Stages random_stages(const Model& model, int count, bool ramp, unsigned seed) {
-  std::mt19937 engine(seed);
-  std::uniform_real_distribution<double> uniform(0.02, 0.98);
   Stages stages(model, count, ramp);
-  const auto draw = [&](const std::vector<Variable>& variables, bool zero, std::vector<double>& into) {
-    for (const Variable& v : variables) {
-      const double lower = std::max(v.lower, std::min(v.upper, v.scale) - 2 * v.scale);
-      const double upper = std::min(v.upper, std::max(v.lower, -v.scale) + 2 * v.scale);
-      const double value = lower + (upper - lower) * uniform(engine);
-      into.push_back(zero ? std::clamp(0.0, v.lower, v.upper) : value);
-    }
-  };
-  const ModelDescription& d = model.description();
-  for (int i = 0; i < count; ++i) {
-    draw(d.states, i % 5 == 4, stages.x);
-    draw(d.inputs, i % 3 == 2, stages.u);
-    draw(d.parameters, false, stages.p);
-    draw(d.parameters, false, stages.p_end);
-    stages.durations[i] = 0.05 + 0.2 * uniform(engine);
-  }
-  for (double& weight : stages.weights) weight = 2.0 * uniform(engine) - 1.0;
-  for (double& weight : stages.output_weights) weight = 2.0 * uniform(engine) - 1.0;
+  sim::StagePoints points = sim::random_stages(model.description(), count, seed);
+  stages.x = std::move(points.states);
+  stages.u = std::move(points.inputs);
+  stages.p = std::move(points.parameters);
+  stages.p_end = std::move(points.parameters_end);
+  stages.durations = std::move(points.durations);
+  sim::RandomStream random(seed, "weights");
+  for (double& weight : stages.weights) weight = random.uniform(-1.0, 1.0);
+  for (double& weight : stages.output_weights) weight = random.uniform(-1.0, 1.0);
   return stages;
 }
 
-inline std::vector<double> scales(const std::vector<Variable>& variables) {
-  std::vector<double> all;
-  all.reserve(variables.size());
-  for (const Variable& v : variables) all.push_back(v.scale);
-  return all;
+inline constexpr double tolerance = 2e-8;  ///< of derivatives against differences
+
+/// All derivatives are those of the values, and F is made of Runge-Kutta steps.
+inline void expect_derivatives(const Model& model, bool ramp, int substeps, unsigned seed) {
+  const ModelDescription& about = model.description();
+  const sim::StagePoints stages = sim::random_stages(about, 15, seed);
+  const sim::DerivativeErrors errors = sim::derivative_errors(model, about, stages, ramp, substeps);
+  EXPECT_EQ(errors.skipped, 0);
+  EXPECT_GT(errors.compared, 0);
+  for (const sim::WorstEntry* worst : {&errors.first, &errors.second, &errors.output_first, &errors.output_second})
+    EXPECT_LE(worst->error, tolerance) << worst->where << ": " << worst->given << ", differences " << worst->expected;
 }
 
-inline std::vector<double> joined(std::vector<double> a, const std::vector<double>& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
-
-/// Where entry j of z = [x; u; p; p_end] of stage i stands.
-inline double& entry(Stages& s, int i, int j) {
-  if (j < s.nx) return s.x[i * s.nx + j];
-  if ((j -= s.nx) < s.nu) return s.u[i * s.nu + j];
-  if ((j -= s.nu) < s.np) return s.p[i * s.np + j];
-  return s.p_end[i * s.np + j - s.np];
-}
-
-/// Of all stages at once, the derivative of what `evaluate` gives (an array with `size` entries a stage) by entry j of
-/// z, from five points of a line; their distance is h.
-template <class Evaluate>
-std::vector<double> difference(const Stages& stages, int j, double h, int size, Evaluate evaluate) {
-  std::vector<double> slope(stages.count * size, 0.0);
-  for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
-    Stages moved = stages;
-    for (int i = 0; i < stages.count; ++i) entry(moved, i, j) += steps * h;
-    const std::vector<double> values = evaluate(moved);
-    for (std::size_t k = 0; k < slope.size(); ++k) slope[k] += weight * values[k] / (12.0 * h);
-  }
-  return slope;
-}
-
-inline constexpr double step = 2e-3;       ///< of the differences, as a part of a variable's scale
-inline constexpr double tolerance = 2e-8;  ///< of derivatives against differences, in units of the scales
-
-/// Compares column j of Jacobians (rows x n, column-major) with differences.
-inline void expect_column(const std::vector<double>& jacobians, const std::vector<double>& slope, int count, int rows,
-                          int n, int j, const std::vector<double>& row_scales, double scale) {
-  for (int i = 0; i < count; ++i)
-    for (int r = 0; r < rows; ++r)
-      EXPECT_NEAR(jacobians[i * rows * n + j * rows + r] * scale / row_scales[r],
-                  slope[i * rows + r] * scale / row_scales[r], tolerance)
-          << "stage " << i << ", row " << r << ", column " << j;
-}
-
-inline std::vector<double> scales_of_z(const Model& model, bool ramp) {
-  const ModelDescription& d = model.description();
-  auto all = joined(joined(scales(d.states), scales(d.inputs)), scales(d.parameters));
-  return ramp ? joined(all, scales(d.parameters)) : all;
-}
-
-/// First and second derivatives of F against differences of values and of Jacobians.
-inline void derivatives_of_integrate(const Model& model, bool ramp, int substeps, unsigned seed) {
-  Stages stages = random_stages(model, 15, ramp, seed);
-  stages.substeps = substeps;
-  const bool second = model.has_second_derivatives();
-  model.integrate(stages.intervals(true, true, second));
-  const int nx = stages.nx, nz = stages.nz;
-  const std::vector<double> scale = scales_of_z(model, ramp), row_scale = scales(model.description().states);
-  for (int j = 0; j < nz; ++j) {
-    const auto slope = difference(stages, j, step * scale[j], nx, [&](Stages& s) {
-      model.integrate(s.intervals(true, false, false));
-      return s.next;
-    });
-    expect_column(stages.jacobians, slope, stages.count, nx, nz, j, row_scale, scale[j]);
-    if (!second) continue;
-    const auto curvature = difference(stages, j, step * scale[j], nz, [&](Stages& s) {
-      model.integrate(s.intervals(false, true, false));
-      std::vector<double> gradients(s.count * nz, 0.0);  // of multipliers' F
-      for (int i = 0; i < s.count; ++i)
-        for (int m = 0; m < nz; ++m)
-          for (int r = 0; r < nx; ++r)
-            gradients[i * nz + m] += s.weights[i * nx + r] * s.jacobians[i * nx * nz + m * nx + r];
-      return gradients;
-    });
-    expect_column(stages.hessians, curvature, stages.count, nz, nz, j, std::vector<double>(nz, 1.0), scale[j]);
-  }
-}
-
-/// The same of h.
-inline void derivatives_of_observe(const Model& model, unsigned seed) {
-  Stages stages = random_stages(model, 15, false, seed);
-  const bool second = model.has_second_derivatives();
-  model.observe(stages.nodes(true, true, second));
-  const int nx = stages.nx, ny = stages.ny;
-  const std::vector<double> scale = scales(model.description().states), row_scale = scales(model.description().outputs);
-  for (int j = 0; j < nx; ++j) {
-    const auto slope = difference(stages, j, step * scale[j], ny, [&](Stages& s) {
-      model.observe(s.nodes(true, false, false));
-      return s.outputs;
-    });
-    expect_column(stages.output_jacobians, slope, stages.count, ny, nx, j, row_scale, scale[j]);
-    if (!second) continue;
-    const auto curvature = difference(stages, j, step * scale[j], nx, [&](Stages& s) {
-      model.observe(s.nodes(false, true, false));
-      std::vector<double> gradients(s.count * nx, 0.0);
-      for (int i = 0; i < s.count; ++i)
-        for (int m = 0; m < nx; ++m)
-          for (int r = 0; r < ny; ++r)
-            gradients[i * nx + m] += s.output_weights[i * ny + r] * s.output_jacobians[i * ny * nx + m * ny + r];
-      return gradients;
-    });
-    expect_column(stages.output_hessians, curvature, stages.count, nx, nx, j, std::vector<double>(nx, 1.0), scale[j]);
-  }
-}
-
-/// F against Runge-Kutta steps written down once more, with `rates` alone.
-inline void integrate_is_runge_kutta(const Model& model, bool ramp, int substeps) {
-  Stages s = random_stages(model, 9, ramp, 11);
-  s.substeps = substeps;
-  model.integrate(s.intervals(true, false, false));
-  const int nx = s.nx;
-  for (int i = 0; i < s.count; ++i) {
-    const double h = s.durations[i] / substeps;
-    const auto rate = [&](const std::vector<double>& x, double steps_done) {
-      std::vector<double> p(s.np), dxdt(nx);
-      for (int j = 0; j < s.np; ++j) {
-        const double from = s.p[i * s.np + j], to = ramp ? s.p_end[i * s.np + j] : from;
-        p[j] = from + (to - from) * steps_done / substeps;
-      }
-      model.rates(x.data(), s.u.data() + i * s.nu, p.data(), dxdt.data());
-      return dxdt;
-    };
-    const auto moved = [&](std::vector<double> x, const std::vector<double>& dxdt, double time) {
-      for (int j = 0; j < nx; ++j) x[j] += dxdt[j] * time;
-      return x;
-    };
-    std::vector<double> x(s.x.begin() + i * nx, s.x.begin() + (i + 1) * nx);
-    for (int n = 0; n < substeps; ++n) {
-      const auto k1 = rate(x, n), k2 = rate(moved(x, k1, h / 2), n + 0.5), k3 = rate(moved(x, k2, h / 2), n + 0.5),
-                 k4 = rate(moved(x, k3, h), n + 1);
-      for (int j = 0; j < nx; ++j) x[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
-    }
-    for (int j = 0; j < nx; ++j)
-      EXPECT_NEAR(s.next[i * nx + j], x[j], 1e-13 * (1.0 + std::abs(x[j]))) << i << ", " << j;
-  }
+inline void expect_runge_kutta(const Model& model, bool ramp, int substeps) {
+  const ModelDescription& about = model.description();
+  const sim::WorstEntry worst = sim::integration_error(model, about, sim::random_stages(about, 9, 11), ramp, substeps);
+  EXPECT_FALSE(worst.where.empty()) << "nothing was compared";
+  EXPECT_LE(worst.error, 1e-13) << worst.where << ": " << worst.given << ", steps of rates " << worst.expected;
 }
 
 /// All entries written and none behind them, and the same as in `expected` to 1e-13 of the largest entry of their

@@ -18,7 +18,7 @@ struct ScenarioOptions : RobotOptions {
   double speed = 8.0;  ///< reference ground speed [m/s]
   int seed = 1;
   Settings path, terrain, vehicle;
-  static const OptionTable<ScenarioOptions>& table();
+  RHEC_EXPORT static const OptionTable<ScenarioOptions>& table();
 };
 
 /// The sections of a scenario, its first one without a name (the root), its last ones those of a recorded drive.

@@ -1,0 +1,170 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/model_check.hpp"
+#include "rhec/sim/scenario.hpp"
+
+namespace rhec::apps {
+namespace {
+
+using sim::Verdict;
+
+struct CheckArguments {
+  std::string model;
+  std::vector<std::string> assignments;
+  std::vector<std::filesystem::path> plugin_path;
+  int seed = 1;
+  std::optional<double> speed;
+  bool json = false;
+};
+
+bool is_file(const std::string& name) {
+  return name.ends_with(".yaml") || name.ends_with(".yml") || name.find('/') != std::string::npos;
+}
+
+/// A robot with nothing but its model configured.
+RobotOptions robot_of_model(const CheckArguments& arguments) {
+  Settings model;
+  apply_assignments(model, arguments.assignments);
+  if (model.find("name"))
+    throw model.find("name")->error("the model is named as the command's argument; expected its options");
+  model.set("name", Settings::scalar(arguments.model, {arguments.model, 0}));
+  RobotOptions options;
+  options.model = std::move(model);
+  return options;
+}
+
+/// What a scenario says of its robot, and its speed.
+RobotOptions robot_of_scenario(const CheckArguments& arguments, std::optional<double>& speed) {
+  Settings settings = load_yaml(arguments.model);
+  apply_assignments(settings, arguments.assignments);
+  const Settings* given = settings.find("speed");
+  Settings robot = Settings::map(settings.origin());
+  for (const auto& [key, value] : settings.members())
+    if (key != "log" && key != "variants") robot.add(key, value);  // of recorded drives
+  auto options = sim::ScenarioOptions::table().parse(settings.is_null() ? settings : robot, "scenario");
+  if (given && !speed) speed = options.speed;
+  return options;
+}
+
+void print_findings(const sim::ModelCheck& check) {
+  std::size_t name = 5;
+  for (const sim::Finding& finding : check.findings) name = std::max(name, finding.check.size());
+  fmt::print("{:<{}}  VERDICT  FOUND\n", "CHECK", name);
+  for (const sim::Finding& finding : check.findings) {
+    fmt::print("{:<{}}  {:<7}  {}{}\n", finding.check, name, word_of(finding.verdict),
+               finding.where.empty() ? "" : finding.where + ": ", finding.found);
+    if (!finding.advice.empty()) fmt::print("{:<{}}           -> {}\n", "", name, finding.advice);
+  }
+}
+
+std::string sigma_text(double sigma) { return std::isfinite(sigma) ? fmt::format("{:.3g}", sigma) : "-"; }
+
+/// The first few of a list, and how many more there are.
+std::string some_of(const std::vector<std::string>& texts) {
+  constexpr std::size_t few = 6;
+  if (texts.empty()) return "-";
+  const std::size_t shown = std::min(few, texts.size());
+  const auto text =
+      fmt::format("{}", fmt::join(texts.begin(), texts.begin() + static_cast<std::ptrdiff_t>(shown), "; "));
+  return shown == texts.size() ? text : fmt::format("{}; and {} more", text, texts.size() - shown);
+}
+
+void print_drives(const sim::ModelCheck& check) {
+  if (check.drives.empty()) return;
+  fmt::print("\n{:<10} {:>9} {:>10}", "DRIVE", "RANK", "CONDITION");
+  std::vector<std::size_t> widths;
+  for (const std::string& parameter : check.parameters) {
+    const std::string head = "sigma " + parameter;
+    widths.push_back(std::max<std::size_t>(head.size(), 12));
+    fmt::print(" {:>{}}", head, widths.back());
+  }
+  fmt::print("  NOT DETERMINED (in scales)\n");
+  for (const sim::DriveInformation& drive : check.drives) {
+    if (!drive.unusable.empty()) {
+      fmt::print("{:<10} {}\n", drive.name, drive.unusable);
+      continue;
+    }
+    fmt::print("{:<10} {:>9} {:>10.2g}", drive.name, fmt::format("{}/{}", drive.rank, drive.unknowns), drive.condition);
+    for (std::size_t j = 0; j < widths.size(); ++j)
+      fmt::print(" {:>{}}", sigma_text(drive.parameter_sigma[j]), widths[j]);
+    fmt::print("  {}\n", some_of(drive.undetermined));
+  }
+}
+
+void print_times(const sim::ModelCheck& check) {
+  if (check.times.empty()) return;
+  fmt::print("\n{:<10} {:>14} {:>14} {:>14} {:>14}   median/p99 of one stage [ns]\n", "TIME", "VALUES", "JACOBIANS",
+             "HESSIANS", "OUTPUTS");
+  const auto text = [](const sim::Spread& spread) {
+    return std::isfinite(spread.median) ? fmt::format("{:.0f}/{:.0f}", spread.median, spread.p99) : "-";
+  };
+  for (const sim::EvaluationTimes& times : check.times)
+    fmt::print("{:<10} {:>14} {:>14} {:>14} {:>14}\n", times.instruction_set, text(times.values), text(times.jacobians),
+               text(times.hessians), text(times.outputs));
+}
+
+int check(const CheckArguments& arguments) {
+  const Host host(arguments.plugin_path);
+  sim::ModelCheckOptions options;
+  options.seed = static_cast<std::uint64_t>(arguments.seed);
+  options.speed = arguments.speed;
+  const RobotOptions robot =
+      is_file(arguments.model) ? robot_of_scenario(arguments, options.speed) : robot_of_model(arguments);
+  const sim::ModelCheck found = sim::check_model(host, Robot(host, robot), options);
+  if (arguments.json) {
+    fmt::print("{}\n", sim::check_json(found));
+  } else {
+    print_findings(found);
+    print_drives(found);
+    print_times(found);
+    fmt::print("\n{}: {} failed, {} warnings\n", found.model, found.count(Verdict::fail), found.count(Verdict::warn));
+  }
+  return found.verdict() == Verdict::fail ? exit_not_solved : exit_fine;
+}
+
+}  // namespace
+
+void add_check(CLI::App& program, Action& chosen) {
+  auto arguments = std::make_shared<CheckArguments>();
+  CLI::App* command = program.add_subcommand(
+      "check", "Looks at a model before its first run: derivatives, scales, NaN, what can be estimated, time.");
+  command->footer(
+      "The exit code is 3 where a check fails; warnings are no failure. docs/check.md explains each check.\n\n"
+      "Examples:\n"
+      "  rhec check bicycle_slip\n"
+      "  rhec check bicycle_slip --set wheelbase=2.8 --set gps_offset=0\n"
+      "  rhec check scenarios/figure8.yaml --set bounds.delta='[-1.5, 1.5]'\n"
+      "  rhec check my_model --plugin-path build/my_model --json");
+  command
+      ->add_option("model", arguments->model,
+                   "a model plugin, or a scenario (*.yaml), whose model is looked at with its noise, bounds, step, "
+                   "horizon and blocking")
+      ->type_name("MODEL")
+      ->required();
+  add_assignments(*command, arguments->assignments, "an option of the model, or a key of the scenario");
+  command->add_option("--seed", arguments->seed, "of random points")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--speed", arguments->speed,
+                   "ground speed of the drives [m/s]; else the scenario's, or what the inputs' scales make")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--json", arguments->json, "print JSON");
+  add_plugin_path(*command, arguments->plugin_path);
+  command->callback([&chosen, arguments] { chosen = [arguments] { return check(*arguments); }; });
+}
+
+}  // namespace rhec::apps

@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""rhec check: its exit codes, its table and its JSON, on every model that is found, on a scenario, and on bad input.
+
+    check.py <rhec>
+"""
+import json
+import re
+import sys
+
+import cli
+from cli import ERROR, FIGURE8, FINE, NOT_SOLVED, USAGE, Program, assignments
+
+CHECKS = ["description", "symmetry", "straight_inputs", "derivatives", "numbers", "scaling", "observability", "time"]
+DRIVES = ["straight", "turn", "slalom", "standing"]
+# Words, exit code, and what the one line of the error must say.
+BAD = [
+    (["check"], USAGE, "model is required"),
+    (["check", "bicycle_slip", "--speed", "-1"], USAGE, "--speed"),
+    (["check", "bicycle_slip", "--seed", "-1"], USAGE, "--seed"),
+    (["check", "bicycle_slpi"], ERROR, "bicycle_slip"),
+    (["check", "gn_rti"], ERROR, "gn_rti"),
+    (["check", "bicycle_slip", *assignments("wheelbse=1")], ERROR, "did you mean 'wheelbase'"),
+    (["check", "bicycle_slip", *assignments("wheelbase=0")], ERROR, "greater than 0"),
+    (["check", "bicycle_slip", *assignments("name=bicycle_slip")], ERROR, "--set name=bicycle_slip"),
+    (["check", "bicycle_slip", *assignments("outputs=[x_gsp]")], ERROR, "x_gps"),
+    (["check", "none.yaml"], ERROR, "none.yaml: no such file"),
+    (["check", FIGURE8, *assignments("bounds.kapa=[0, 1]")], ERROR, "did you mean 'kappa'"),
+    (["check", FIGURE8, *assignments("spede=4")], ERROR, "did you mean 'speed'"),
+    (["check", "bicycle_slip", "--plugin-path", "nowhere"], ERROR, "nowhere"),
+]
+
+
+class Test(cli.Findings):
+    def __init__(self, rhec):
+        super().__init__("check")
+        self.rhec = rhec
+
+    def check(self, name, *words, code=FINE):
+        """What --json says, once the table has been seen to say the same."""
+        result, table = self.rhec("check", *words, "--json"), self.rhec("check", *words)
+        for each in (result, table):
+            self.expect(each.returncode == code and not each.stderr, name, f"exit code {each.returncode}: {each.stderr}")
+        try:
+            found = json.loads(result.stdout)
+        except json.JSONDecodeError as problem:
+            self.expect(False, name, f"--json: {problem}")
+            return None
+        rows = [finding for finding in found["findings"] if finding["check"] != "time"]
+        for finding in rows:
+            row = re.compile(rf"^{finding['check']}\s+{finding['verdict']}\s+{re.escape(finding['where'])}.*"
+                             rf"{re.escape(finding['found'])}$", re.MULTILINE)
+            self.expect(row.search(table.stdout), name, f"the table does not say: {finding}\n{table.stdout}")
+        counts = [sum(finding["verdict"] == verdict for finding in found["findings"]) for verdict in ("fail", "warn")]
+        self.expect(f"{found['model']}: {counts[0]} failed, {counts[1]} warnings" in table.stdout, name, table.stdout[-80:])
+        worst = "fail" if counts[0] else "warn" if counts[1] else "pass"
+        self.expect(found["verdict"] == worst, name, f"verdict {found['verdict']} of {counts}")
+        self.expect(list(dict.fromkeys(finding["check"] for finding in found["findings"])) == CHECKS, name, "checks")
+        return found
+
+    def every_model(self):
+        plugins = json.loads(self.rhec("plugins", "--json").stdout)
+        models = [plugin["name"] for plugin in plugins if plugin.get("kind") == "model"]
+        self.expect("bicycle_slip" in models, "models", f"{models}")
+        for model in models:
+            found = self.check(model, model)
+            self.expect(found["model"] == model, model, f"checks {found['model']}")
+            self.expect([drive["name"] for drive in found["drives"]] == DRIVES, model, f"{found['drives']}")
+            self.expect(all(times["values"]["median"] > 0 for times in found["time_ns"]), model, f"{found['time_ns']}")
+
+    def scenario(self):
+        found = self.check("figure8", FIGURE8)
+        self.expect(found["verdict"] == "pass", "figure8", f"{found['findings']}")
+        self.expect("at 8 m/s" in found["drives"][0]["meaning"], "figure8", f"speed: {found['drives'][0]['meaning']}")
+        # kappa in blocks of 2 with an overlap: more than one unknown of it; half the horizon: fewer.
+        unknowns = found["drives"][0]["unknowns"]
+        self.expect(unknowns > 4 + 2, "figure8", f"{unknowns} unknowns")
+        shorter = self.check("shorter", FIGURE8, *assignments("estimator.horizon=7"))
+        self.expect(shorter["drives"][0]["unknowns"] < unknowns, "estimator.horizon", f"{shorter['drives'][0]}")
+        one = self.check("one block", FIGURE8, *assignments("blocking.kappa={name: full_horizon}"))
+        self.expect(one["drives"][0]["unknowns"] == 4 + 2, "blocking", f"{one['drives'][0]}")
+        sigma = [drive["parameter_sigma"]["kappa"] for drive in one["drives"]]
+        noisy = self.check("noise", FIGURE8, *assignments("blocking.kappa={name: full_horizon}", "noise.outputs.x_gps=0.3",
+                                                          "noise.outputs.y_gps=0.3"))
+        louder = [drive["parameter_sigma"]["kappa"] for drive in noisy["drives"]]
+        self.expect(louder[0] > 1.5 * sigma[0] and sigma[3] is None, "noise", f"{sigma} -> {louder}")
+        self.check("a recorded drive's", cli.ROOT / "scenarios" / "victoria_park.yaml")
+
+    def faults(self):
+        found = self.check("bounds over a pole", FIGURE8, *assignments("bounds.delta=[-3, 3]"))
+        warned = [finding for finding in found["findings"] if finding["verdict"] == "warn"]
+        self.expect([finding["check"] for finding in warned] == ["numbers"] and "delta in [" in warned[0]["where"],
+                    "bounds over a pole", f"{warned}")
+        # The steering angle is not enough to find a vehicle by.
+        found = self.check("nothing tells the slip", "bicycle_slip", *assignments("outputs=[delta]"), code=NOT_SOLVED)
+        failed = [finding["where"] for finding in found["findings"] if finding["verdict"] == "fail"]
+        self.expect(failed == ["parameter kappa", "parameter mu"], "nothing tells the slip", f"{failed}")
+
+    def bad_input(self):
+        for words, code, text in BAD:
+            result = self.rhec(*words)
+            name = " ".join(map(str, words))
+            self.expect(result.returncode == code, name, f"exit code {result.returncode}: {result.stderr}")
+            self.expect(not result.stdout and text in result.stderr, name, f"{result.stdout}{result.stderr}")
+
+    def others(self):
+        one, other = (self.check("seed", "bicycle_slip", "--seed", seed) for seed in (1, 2))
+        derivatives = [found["findings"][CHECKS.index("derivatives")]["numbers"] for found in (one, other)]
+        self.expect(derivatives[0] != derivatives[1], "--seed", f"{derivatives}")
+        slow = self.check("speed", "bicycle_slip", "--speed", "0.5")
+        self.expect("0.5 m/s" in slow["drives"][0]["meaning"], "--speed", slow["drives"][0]["meaning"])
+        result = self.rhec("check", "--help")
+        self.expect(result.returncode == FINE and "exit code is 3" in result.stdout, "--help", result.stdout)
+
+
+def main():
+    test = Test(Program(sys.argv[1]))
+    for part in (test.every_model, test.scenario, test.faults, test.bad_input, test.others):
+        part()
+    test.tell()
+
+
+if __name__ == "__main__":
+    main()
