@@ -60,7 +60,7 @@ ModelDescription describe() {
       {.name = "x_gps", .unit = "m", .meaning = "GPS antenna, x", .scale = 10.0},
       {.name = "y_gps", .unit = "m", .meaning = "GPS antenna, y", .scale = 10.0},
       {.name = "delta", .unit = "rad", .meaning = "measured steering angle", .scale = 0.3, .is_angle = true},
-      {.name = "heading", .unit = "rad", .meaning = "measured heading", .is_angle = true, .usual = false},
+      {.name = "heading", .unit = "rad", .meaning = "measured heading", .is_angle = true},
   };
   model.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0};
   return model;

@@ -27,6 +27,8 @@ constexpr double merit_rounding = 1e-13;
 // What is left of |c|_1 by the linearised, relaxed equations: more than this part of it is no progress.
 constexpr double stuck = 1.0 - 1e-6;
 constexpr double largest_penalty = 1e10;
+// What defects may make up of the objective of a solution.
+constexpr double negligible_share = 1e-9;
 constexpr int corrections = 4;
 constexpr int convexifications = 6;
 // Lengths by stage: how often they are halved, how many stages to each side count as a stage's surroundings, what part
@@ -297,6 +299,23 @@ bool SparseSqp::shorten_locally() {
   return is_shorter;
 }
 
+/// What is left of the equations may be within the tolerance and yet, at the price of large multipliers, make up more
+/// of the objective than a solution should be off by: then one more step, which is kept where it leaves less.
+void SparseSqp::polish(const Ocp& ocp, Report& report, Clock::time_point deadline) {
+  const double price = report.kkt.defect * max_abs(multipliers_);
+  if (price <= negligible_share * std::abs(ocp.evaluate(current_, nullptr, scratch_))) return;
+  if (report.iterations == options_.max_iterations || Clock::now() > deadline) return;
+  const auto outcome = find_step(ocp, report, deadline);
+  if (outcome != SparseQp::Outcome::solved && outcome != SparseQp::Outcome::feasible) return;
+  ++report.iterations;
+  std::fill(lengths_.begin(), lengths_.end(), 1.0);
+  move(ocp);
+  ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_stages_, scratch_);
+  SparseNlp::set_costate_0(other_stages_, trial_);
+  const KktResidual after = kkt_residual(other_stages_, trial_);
+  if (after.largest() <= options_.tolerance && after.defect < report.kkt.defect) std::swap(current_, trial_);
+}
+
 Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point deadline) {
   bool use_exact = options_.hessian == Curvature::exact || (options_.hessian == Curvature::automatic &&
                                                             ocp.kind() == OcpKind::rhc && ocp.has_second_derivatives());
@@ -317,7 +336,10 @@ Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point dead
     SparseNlp::set_costate_0(stages_, current_);
     report.kkt = kkt_residual(stages_, current_);
     const double residual = report.kkt.largest();
-    if (residual <= options_.tolerance) return Status::solved;
+    if (residual <= options_.tolerance) {
+      polish(ocp, report, deadline);
+      return Status::solved;
+    }
     if (report.iterations == options_.max_iterations) return Status::iteration_limit;
     if (Clock::now() > deadline) return Status::deadline;
     // Gauss-Newton whose full steps gain little has met large residuals: there the exact Hessian serves better.

@@ -50,6 +50,7 @@ class SparseSqp final : public Solver {
   void move(const Ocp& ocp);
   bool shorten_locally();
   bool search(const Ocp& ocp, double residual, double& after);
+  void polish(const Ocp& ocp, Report& report, Clock::time_point deadline);
   Status iterate(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome find_step(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);

@@ -141,11 +141,23 @@ ModelDescription unicycle_description() {
   return about;
 }
 
+/// A model that is described by somebody else: a formula's own would be refused where roles point nowhere.
+template <class Formula>
+class Described : public FormulaModel<Formula> {
+ public:
+  explicit Described(ModelDescription about)
+      : FormulaModel<Formula>({}, unicycle_description()), about_(std::move(about)) {}
+  const ModelDescription& description() const noexcept override { return about_; }
+
+ private:
+  ModelDescription about_;
+};
+
 template <class Formula = Unicycle>
 ModelCheck check(const std::function<void(ModelDescription&)>& spoil = {}, const ModelCheckOptions& options = {}) {
   ModelDescription about = unicycle_description();
   if (spoil) spoil(about);
-  FormulaModel<Formula> model({}, about);
+  Described<Formula> model(std::move(about));
   return check_model(model, options);
 }
 

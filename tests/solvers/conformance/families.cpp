@@ -362,8 +362,17 @@ std::vector<Family> make_families() {
         s.block = 4;
       })));
   add("rhe_no_outputs", "all outputs are missing", random(rhe([](RheSpec& s) { s.missing = 1.1; })));
-  add("rhe_missing_inputs", "one measured input in five is missing",
-      random(rhe([](RheSpec& s) { s.missing_inputs = 0.2; })));
+  // Without bounds, an input that nobody measured may turn a vehicle round and round between two fixes.
+  add("rhe_missing_inputs", "one measured input in five is missing, and none is far from what is usual",
+      [](const ModelPointer& model, unsigned seed) {
+        const RheSpec spec = rhe([&](RheSpec& s) {
+          s.missing_inputs = 0.2;
+          s.adjust = [&](RheProblem::Setup& setup, const Drive& d) {
+            std::tie(setup.input_lower, setup.input_upper) = hull(d.inputs, model->description().inputs, 0.5);
+          };
+        });
+        return random(spec)(model, seed);
+      });
   add("rhe_exact_measurements", "measurements without noise: the objective is all but zero",
       changed(rhe([](RheSpec& s) { s.noise = 1e-6; }), [](RheProblem&, RandomProblem&) {}));
   add("rhe_standing_still", "no input determines any parameter",

@@ -21,7 +21,7 @@ struct RobotOptions {
   double step = 0.2;  ///< dt: longest interval of the estimator, interval of the controller [s]
   Settings model, noise, bounds, blocking, estimator, controller, smoother;
 
-  static const OptionTable<RobotOptions>& table();
+  RHEC_EXPORT static const OptionTable<RobotOptions>& table();
   /// The same rows for a struct that has more keys beside them.
   template <class Derived>
   static OptionTable<Derived>& add_to(OptionTable<Derived>& rows) {
