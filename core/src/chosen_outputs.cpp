@@ -34,8 +34,8 @@ class ChosenOutputs final : public Model {
   void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
     model_->rates(x, u, p, dxdt);
   }
-  void straight_inputs(double ground_speed, const double* p, double* inputs) const noexcept override {
-    model_->straight_inputs(ground_speed, p, inputs);
+  void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept override {
+    model_->straight_motion(ground_speed, p, state, inputs);
   }
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   std::vector<std::string> instruction_sets() const override { return model_->instruction_sets(); }

@@ -54,16 +54,14 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   solver_->setup(problem_);
   const Model& vehicle = problem_.model();
   command_.inputs.assign(vehicle.input_count(), 0.0);
-  straight_inputs_.assign(vehicle.input_count(), 0.0);
-  slipless_inputs_.assign(vehicle.input_count(), 0.0);
-  largest_inputs_.assign(vehicle.input_count(), 0.0);
+  const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count());
+  for (std::vector<double>* motion : {&straight_, &slipless_, &largest_}) motion->assign(nx + nu, 0.0);
   nominal_parameters_ = nominal_values(vehicle.description().parameters);
   reference_parameters_ = nominal_parameters_;
-  vehicle.straight_inputs(1.0, nominal_parameters_.data(), slipless_inputs_.data());
-  if (std::all_of(slipless_inputs_.begin(), slipless_inputs_.end(), [](double input) { return input == 0.0; }))
+  go_straight(1.0, nominal_parameters_.data(), slipless_);
+  if (std::all_of(slipless_.begin(), slipless_.end(), [](double value) { return value == 0.0; }))
     throw Error(
-        fmt::format("controller: the model '{}' does not say which inputs drive it straight ahead; it cannot "
-                    "follow a path",
+        fmt::format("controller: the model '{}' does not say what drives it straight ahead; it cannot follow a path",
                     vehicle.description().name));
 }
 
@@ -75,18 +73,23 @@ void Controller::reset() noexcept {
   fallbacks_ = 0;
 }
 
-/// The inputs that go straight on at a speed over ground, on ground that slips like the estimate, as far as that is
-/// trusted.
-void Controller::choose_straight_inputs(double ground_speed, const double* parameters) noexcept {
+/// Speeds among the states, then inputs.
+void Controller::go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept {
   const Model& vehicle = problem_.model();
-  vehicle.straight_inputs(ground_speed, nominal_parameters_.data(), slipless_inputs_.data());
-  straight_inputs_ = slipless_inputs_;
+  std::fill(motion.begin(), motion.end(), 0.0);
+  vehicle.straight_motion(ground_speed, parameters, motion.data(), motion.data() + vehicle.state_count());
+}
+
+/// What goes straight on at a speed over ground, on ground that slips like the estimate, as far as that is trusted.
+void Controller::choose_straight_motion(double ground_speed, const double* parameters) noexcept {
+  go_straight(ground_speed, nominal_parameters_.data(), slipless_);
+  straight_ = slipless_;
   if (setup_.reference_speed == ReferenceSpeed::literal) return;
-  vehicle.straight_inputs(ground_speed, parameters, straight_inputs_.data());
-  for (std::size_t j = 0; j < straight_inputs_.size(); ++j) {
-    const double most = slipless_inputs_[j] / setup_.least_speed_factor;
-    const bool trusted = straight_inputs_[j] * most >= 0.0 && std::abs(straight_inputs_[j]) <= std::abs(most);
-    if (!trusted) straight_inputs_[j] = most;  // also where it is not a number
+  go_straight(ground_speed, parameters, straight_);
+  for (std::size_t j = 0; j < straight_.size(); ++j) {
+    const double most = slipless_[j] / setup_.least_speed_factor;
+    const bool trusted = straight_[j] * most >= 0.0 && std::abs(straight_[j]) <= std::abs(most);
+    if (!trusted) straight_[j] = most;  // also where it is not a number
   }
 }
 
@@ -94,24 +97,27 @@ void Controller::choose_straight_inputs(double ground_speed, const double* param
 void Controller::set_reference(double arc_length, const double* parameters) noexcept {
   const Model& vehicle = problem_.model();
   const Roles& roles = vehicle.description().roles;
-  const int N = problem_.intervals(), nu = vehicle.input_count();
+  const int N = problem_.intervals(), nx = vehicle.state_count(), nu = vehicle.input_count();
   command_.reference = path_.point_at(arc_length);
   const double ground_speed = command_.reference.speed, distance = setup_.interval * std::abs(ground_speed);
-  choose_straight_inputs(ground_speed, parameters);
+  choose_straight_motion(ground_speed, parameters);
   const double most = setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset;
-  if (std::isfinite(most)) vehicle.straight_inputs(most, nominal_parameters_.data(), largest_inputs_.data());
+  if (std::isfinite(most)) go_straight(most, nominal_parameters_.data(), largest_);
   for (int i = 0; i <= N; ++i) {
     const PathPoint target = path_.point_at(arc_length + i * distance);
-    roles.place(target.x, target.y, target.heading, problem_.state_reference(i));
+    double* x = problem_.state_reference(i);
+    std::copy_n(straight_.data(), nx, x);
+    roles.place(target.x, target.y, target.heading, x);
     if (i == N) break;
     double* u = problem_.input_reference(i);
     for (int j = 0; j < nu; ++j) {
       double &lower = problem_.input_lower(i, j), &upper = problem_.input_upper(i, j);
-      if (std::isfinite(most) && largest_inputs_[j] != 0.0) {
-        lower = std::min(0.0, largest_inputs_[j]);
-        upper = std::max(0.0, largest_inputs_[j]);
+      const double largest = largest_[nx + j];
+      if (std::isfinite(most) && largest != 0.0) {
+        lower = std::min(0.0, largest);
+        upper = std::max(0.0, largest);
       }
-      u[j] = std::min(std::max(straight_inputs_[j], lower), upper);
+      u[j] = std::min(std::max(straight_[nx + j], lower), upper);
     }
   }
 }

@@ -31,6 +31,7 @@ void check_description(const ModelDescription& description, const FormulaCounts&
   check_role("heading", description.roles.heading, "states", counts.states);
   for (const int body : description.roles.other_headings) check_role("other_headings", body, "states", counts.states);
   check_role("speed", description.roles.speed, "inputs", counts.inputs);
+  check_role("speed_state", description.roles.speed_state, "states", counts.states);
   check_role("speed_factor", description.roles.speed_factor, "parameters", counts.parameters);
 }
 

@@ -30,11 +30,12 @@ void Roles::turn(double angle, double* state) const noexcept {
   for (const int body : other_headings) state[body] += angle;
 }
 
-void Model::straight_inputs(double ground_speed, const double* p, double* inputs) const noexcept {
+void Model::straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept {
   const Roles& roles = description().roles;
+  const double wheel_speed = roles.speed_factor >= 0 ? ground_speed / p[roles.speed_factor] : ground_speed;
   std::fill_n(inputs, input_count(), 0.0);
-  if (roles.speed < 0) return;
-  inputs[roles.speed] = roles.speed_factor >= 0 ? ground_speed / p[roles.speed_factor] : ground_speed;
+  if (roles.speed >= 0) inputs[roles.speed] = wheel_speed;
+  if (roles.speed_state >= 0) state[roles.speed_state] = wheel_speed;
 }
 
 }  // namespace rhec

@@ -74,7 +74,7 @@ class SkidSteerModel : public FormulaModel<SkidSteer> {
         wheel_radius_(options.wheel_radius) {}
 
   // No single input is the speed: each side has its own, and slips by its own share.
-  void straight_inputs(double ground_speed, const double* p, double* inputs) const noexcept override {
+  void straight_motion(double ground_speed, const double* p, double*, double* inputs) const noexcept override {
     for (int side = 0; side < 2; ++side) inputs[side] = ground_speed / (wheel_radius_ * (1.0 - p[side]));
   }
 

@@ -227,8 +227,9 @@ std::vector<OptionSection> robot_sections() {
   };
   estimator.insert(estimator.end(), by_name.begin(), by_name.end());
   const std::vector<OptionRow> controller = {
-      {"weights.stage.STATE", "number", fmt::format("{} for the position, else 0", position_weight),
-       at_least(0.0).text(), "of the squared distance from the reference at a node"},
+      {"weights.stage.STATE", "number",
+       fmt::format("{} for the position, {} for a speed, else 0", position_weight, input_weight), at_least(0.0).text(),
+       "of the squared distance from the reference at a node"},
       {"weights.stage.INPUT", "number", number(input_weight), at_least(0.0).text(),
        "of the squared distance from the reference on an interval"},
       {"weights.terminal.STATE", "number", fmt::format("{} for the position, else 0", terminal_weight),
@@ -537,6 +538,7 @@ std::unique_ptr<Controller> Robot::make_controller(const Path& path) const {
     position[j] = position_weight;
     terminal[j] = terminal_weight;
   }
+  if (about.roles.speed_state >= 0) position[about.roles.speed_state] = input_weight;
   require_known_keys(controller_.weights, {"stage", "terminal"}, "controller: weights");
   std::vector<Variable> both = about.states;
   both.insert(both.end(), about.inputs.begin(), about.inputs.end());

@@ -230,7 +230,7 @@ ModelCheck check_model(Model& model, const ModelDescription& within, const Model
   add(check_description(within, can_go_on));
   if (!can_go_on) {
     for (const char* skipped :
-         {"symmetry", "straight_inputs", "derivatives", "numbers", "scaling", "observability", "time"}) {
+         {"symmetry", "straight_motion", "derivatives", "numbers", "scaling", "observability", "time"}) {
       FindingList findings(skipped);
       findings.skip("the description has to be mended first");
       add(findings.take());
@@ -240,7 +240,7 @@ ModelCheck check_model(Model& model, const ModelDescription& within, const Model
   const CheckedModel checked{model, within, options, sigmas_or_default(options.output_sigmas, within.outputs, "output"),
                              sigmas_or_default(options.input_sigmas, within.inputs, "input")};
   add(check_symmetry(checked));
-  add(check_straight_inputs(checked));
+  add(check_straight_motion(checked));
   add(check_derivatives(checked));
   add(check_numbers(checked));
   add(check_drives(checked, check.drives));

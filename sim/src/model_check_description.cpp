@@ -110,12 +110,14 @@ class Description {
                              {"position_y", roles.position_y, kinds_[0], "m", false},
                              {"heading", roles.heading, kinds_[0], "rad", true},
                              {"speed", roles.speed, kinds_[1], "m/s", false},
+                             {"speed_state", roles.speed_state, kinds_[0], "m/s", false},
                              {"speed_factor", roles.speed_factor, kinds_[2], "1", false}};
+    const std::size_t single_roles = all.size();
     for (const int body : roles.other_headings) all.push_back({"other_headings", body, kinds_[0], "rad", true});
     std::map<int, const char*> state_roles;
     for (const Role& role : all) {
       const std::string where = fmt::format("roles.{}", role.name);
-      const bool in_a_list = &role - all.data() >= 5;
+      const bool in_a_list = &role >= all.data() + single_roles;
       if (role.index == -1 && !in_a_list) continue;
       if (role.index < 0 || role.index >= static_cast<int>(role.kind.variables.size())) {
         stop(where, fmt::format("there is no {} {}", role.kind.word, role.index),
@@ -252,42 +254,45 @@ std::vector<Finding> check_symmetry(const CheckedModel& checked) {
 
 std::optional<double> typical_speed(const CheckedModel& checked) {
   const std::vector<double> nominal = nominal_values(checked.about.parameters);
-  std::vector<double> inputs(checked.about.inputs.size());
-  checked.model.straight_inputs(1.0, nominal.data(), inputs.data());
+  std::vector<double> state(checked.about.states.size(), 0.0), inputs(checked.about.inputs.size(), 0.0);
+  checked.model.straight_motion(1.0, nominal.data(), state.data(), inputs.data());
   double largest = 0.0;
+  for (std::size_t j = 0; j < state.size(); ++j)
+    largest = std::max(largest, std::abs(state[j]) / checked.about.states[j].scale);
   for (std::size_t j = 0; j < inputs.size(); ++j)
     largest = std::max(largest, std::abs(inputs[j]) / checked.about.inputs[j].scale);
   if (!(largest > 0.0 && std::isfinite(largest))) return std::nullopt;
   return 1.0 / largest;
 }
 
-std::vector<Finding> check_straight_inputs(const CheckedModel& checked) {
+std::vector<Finding> check_straight_motion(const CheckedModel& checked) {
   constexpr int points = 200;
   constexpr double exact = 1e-6, rough = 0.01;
   const ModelDescription& about = checked.about;
   const Roles& roles = about.roles;
-  FindingList findings("straight_inputs");
+  FindingList findings("straight_motion");
   if (roles.position_x < 0 || roles.position_y < 0 || roles.heading < 0 || about.inputs.empty()) {
     findings.skip("no position, heading or input: nothing that could go straight");
     return findings.take();
   }
   const double speed = checked.options.speed.value_or(typical_speed(checked).value_or(1.0));
-  RandomStream random(checked.options.seed, "straight inputs of a model");
+  RandomStream random(checked.options.seed, "straight motion of a model");
   std::vector<double> inputs(about.inputs.size()), rates(about.states.size());
   struct Motion {
     double ahead, sideways;
   };
   const auto motion = [&](const std::vector<double>& p, double direction) {
     std::fill(inputs.begin(), inputs.end(), std::nan(""));
-    checked.model.straight_inputs(speed, p.data(), inputs.data());
-    checked.model.rates(state_in_line(checked, direction).data(), inputs.data(), p.data(), rates.data());
+    std::vector<double> state = state_in_line(checked, direction);
+    checked.model.straight_motion(speed, p.data(), state.data(), inputs.data());
+    checked.model.rates(state.data(), inputs.data(), p.data(), rates.data());
     const double vx = rates[roles.position_x], vy = rates[roles.position_y];
     return Motion{std::cos(direction) * vx + std::sin(direction) * vy,
                   std::cos(direction) * vy - std::sin(direction) * vx};
   };
   constexpr double direction = 0.7;  // nothing special
   constexpr const char* advice =
-      "override Model::straight_inputs, or mend roles.speed, speed_factor and nominal values";
+      "override Model::straight_motion, or mend roles.speed, speed_factor and nominal values";
   const Motion nominal = motion(nominal_values(about.parameters), direction);
   if (!(std::hypot(nominal.ahead - speed, nominal.sideways) <= exact * speed))
     findings.fail("at nominal parameters",
@@ -320,7 +325,7 @@ std::vector<Finding> check_straight_inputs(const CheckedModel& checked) {
     findings.warn(
         "at other parameters",
         fmt::format("asked for {:.4g} m/s, it moves at {:.4g} m/s over ground at{}", speed, worst_found, where),
-        "let straight_inputs use the parameters that it is given, e.g. by roles.speed_factor",
+        "let straight_motion use the parameters that it is given, e.g. by roles.speed_factor",
         {{"asked", speed}, {"found", worst_found}});
   if (findings.empty())
     findings.pass(fmt::format("asked for {:.4g} m/s it goes straight at that speed; relative error at other parameters "

@@ -114,9 +114,11 @@ class Drives {
 
   double clamped(const Variable& v, double value) const { return std::clamp(value, v.lower, v.upper); }
 
-  Vector base_inputs(Course course) const {
+  /// The inputs of going straight on or standing; the speeds among the states go to `state`.
+  Vector base_inputs(Course course, Vector& state) const {
     Vector inputs = Vector::Zero(nu_);
-    checked_.model.straight_inputs(course == Course::standing ? 0.0 : speed_, parameters_.data(), inputs.data());
+    const double speed = course == Course::standing ? 0.0 : speed_;
+    checked_.model.straight_motion(speed, parameters_.data(), state.data(), inputs.data());
     for (int j = 0; j < nu_; ++j)
       if (std::isfinite(inputs[j])) inputs[j] = clamped(about_.inputs[j], inputs[j]);
     return inputs;
@@ -185,14 +187,14 @@ class Drives {
     made.name = named.name;
     const bool moves = makes_speed_ && named.course != Course::standing;
     made.meaning = fmt::format("{}{}", named.meaning, moves ? fmt::format(" at {:.3g} m/s", speed_) : "");
-    const Vector base = base_inputs(named.course);
-    if (!base.allFinite()) {
-      made.unusable = "straight_inputs are not finite";
+    const std::vector<double> start = state_in_line(checked_, heading);
+    Vector x = Eigen::Map<const Vector>(start.data(), nx_);
+    const Vector base = base_inputs(named.course, x);
+    if (!base.allFinite() || !x.allFinite()) {
+      made.unusable = "straight_motion is not finite";
       return made;
     }
     const Vector change = excitation(base);
-    const std::vector<double> start = state_in_line(checked_, heading);
-    Vector x = Eigen::Map<const Vector>(start.data(), nx_);
     // A turn is steady once it has gone on for a while.
     if (named.course == Course::turn)
       for (int k = 0; k < intervals_; ++k) x = moved(x, inputs_at(named.course, k, x, base, change));

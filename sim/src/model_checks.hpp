@@ -48,7 +48,7 @@ class FindingList {
 /// `can_go_on`: whether there is enough to try the model with.
 std::vector<Finding> check_description(const ModelDescription& about, bool& can_go_on);
 std::vector<Finding> check_symmetry(const CheckedModel& checked);
-std::vector<Finding> check_straight_inputs(const CheckedModel& checked);
+std::vector<Finding> check_straight_motion(const CheckedModel& checked);
 std::vector<Finding> check_derivatives(const CheckedModel& checked);
 std::vector<Finding> check_numbers(const CheckedModel& checked);
 /// Checks "scaling" and "observability", which look at the same drives.

@@ -113,8 +113,8 @@ TEST(ChosenOutputs, LeaveTheVehicleAsItIs) {
   some->integrate(request);
   EXPECT_EQ(first, second);
   std::vector<double> straight(2), same(2);
-  all->straight_inputs(3.0, p.data(), straight.data());
-  some->straight_inputs(3.0, p.data(), same.data());
+  all->straight_motion(3.0, p.data(), first.data(), straight.data());
+  some->straight_motion(3.0, p.data(), second.data(), same.data());
   EXPECT_EQ(straight, same);
   EXPECT_EQ(all->instruction_sets(), some->instruction_sets());
   EXPECT_EQ(all->has_second_derivatives(), some->has_second_derivatives());

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "rhec/core/formula_model.hpp"
 #include "rhec/plugins/robot.hpp"
 #include "rhec/plugins/yaml.hpp"
 
@@ -71,6 +72,69 @@ TEST(ControllerReference, KnowsVehiclesWhoseSpeedIsNotOneInput) {
     EXPECT_EQ(problem.input_lower(0, side), 0.0);
     EXPECT_DOUBLE_EQ(problem.input_upper(0, side), 4.0 * 2.0 / 0.2);
   }
+}
+
+/// x' = kappa s cos(psi), y' = kappa s sin(psi), psi' = omega, s' = a.
+struct Accelerated {
+  static constexpr int state_count = 4, input_count = 2, parameter_count = 1, output_count = 2;
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::cos, std::sin;
+    dxdt[0] = p[0] * x[3] * cos(x[2]);
+    dxdt[1] = p[0] * x[3] * sin(x[2]);
+    dxdt[2] = u[1];
+    dxdt[3] = u[0];
+  }
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    y[0] = x[0];
+    y[1] = x[1];
+  }
+};
+
+TEST(ControllerReference, KnowsVehiclesWhoseInputIsAnAcceleration) {
+  ModelDescription about;
+  about.name = "accelerated";
+  about.states = {{.name = "x", .unit = "m", .meaning = "x"},
+                  {.name = "y", .unit = "m", .meaning = "y"},
+                  {.name = "psi", .unit = "rad", .meaning = "heading", .is_angle = true},
+                  {.name = "speed", .unit = "m/s", .meaning = "speed of the wheels"}};
+  about.inputs = {{.name = "a", .unit = "m/s2", .meaning = "acceleration", .lower = -1.0, .upper = 1.0},
+                  {.name = "omega", .unit = "rad/s", .meaning = "yaw rate"}};
+  about.parameters = {{.name = "kappa", .unit = "1", .meaning = "slip", .lower = 0.0, .upper = 1.0}};
+  about.outputs = {{.name = "x_gps", .unit = "m", .meaning = "x"}, {.name = "y_gps", .unit = "m", .meaning = "y"}};
+  about.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed_state = 3, .speed_factor = 0};
+  const auto model = std::make_shared<FormulaModel<Accelerated>>(Accelerated{}, about);
+  Controller::Setup setup;
+  setup.problem.state_weights = {1.0, 1.0, 0.0, 1.0};
+  setup.problem.terminal_weights = {1.0, 1.0, 0.0, 0.0};
+  setup.problem.input_weights = {0.1, 0.1};
+  Controller controller(model, host().make_solver("gn_rti"), Path({{0.0, 0.0, speed}, {50.0, 50.0, speed}}), setup);
+  EXPECT_THAT(reference(controller, {0.5}), ElementsAre(0.0, 0.0));
+  EXPECT_DOUBLE_EQ(controller.problem().state_reference(3)[3], speed / 0.5);
+  EXPECT_EQ(controller.problem().input_upper(3, 0), 1.0);
+  // And it drives: from a standstill to its end at the speed that was asked for over ground.
+  Estimate now;
+  now.state = Eigen::VectorXd::Zero(4);
+  now.state[2] = 0.25 * std::numbers::pi;
+  now.parameters = Eigen::VectorXd::Constant(1, 0.5);
+  controller.reset();
+  const double step = setup.interval;
+  double reached = 0.0;
+  for (int k = 0; k < 400 && !controller.finished(); ++k) {
+    const std::vector<double> inputs = controller.control(now).inputs;
+    Eigen::VectorXd next(4);
+    model->integrate({.count = 1,
+                      .states = now.state.data(),
+                      .inputs = inputs.data(),
+                      .parameters = now.parameters.data(),
+                      .durations = &step,
+                      .next_states = next.data()});
+    now.state = next;
+    if (k == 100) reached = 0.5 * now.state[3];
+  }
+  EXPECT_TRUE(controller.finished());
+  EXPECT_NEAR(reached, speed, 0.05);
 }
 
 TEST(ControllerReference, BoundsTheInputsThatDriveAndNoOthers) {

@@ -209,7 +209,7 @@ TEST(ModelCheck, FindsNothingWrongWithAGoodModel) {
   std::set<std::string> checks;
   for (const Finding& finding : found.findings) checks.insert(finding.check);
   EXPECT_THAT(checks, ElementsAre("derivatives", "description", "numbers", "observability", "scaling",
-                                  "straight_inputs", "symmetry", "time"));
+                                  "straight_motion", "symmetry", "time"));
   EXPECT_EQ(found.drives.size(), 4u);
   EXPECT_EQ(found.times.size(), FormulaModel<Unicycle>({}, unicycle_description()).instruction_sets().size());
 }
@@ -362,7 +362,7 @@ TEST(ModelCheck, DoesNotTryAModelThatHasNoScale) {
 TEST(ModelCheck, FindsARoleThatPointsAtAnotherVariable) {
   const ModelCheck found = check([](ModelDescription& about) { about.roles.speed = 1; });
   EXPECT_THAT(faults(found), Contains("fail description: roles.speed"));
-  EXPECT_THAT(faults(found), Contains("fail straight_inputs: at nominal parameters"));
+  EXPECT_THAT(faults(found), Contains("fail straight_motion: at nominal parameters"));
 }
 
 TEST(ModelCheck, FindsDynamicsThatKnowWhereTheyAre) {
@@ -375,10 +375,10 @@ TEST(ModelCheck, FindsDynamicsThatKnowWhereTheyAre) {
 }
 
 TEST(ModelCheck, FindsThatStraightIsNotStraight) {
-  EXPECT_THAT(faults(check<PullsAside>()), ElementsAre("fail straight_inputs: d psi / dt"));
+  EXPECT_THAT(faults(check<PullsAside>()), ElementsAre("fail straight_motion: d psi / dt"));
   // The speed factor is not said: at other parameters the vehicle is slower than it should be.
   EXPECT_THAT(faults(check([](ModelDescription& about) { about.roles.speed_factor = -1; })),
-              ElementsAre("warn straight_inputs: at other parameters"));
+              ElementsAre("warn straight_motion: at other parameters"));
 }
 
 TEST(ModelCheck, FindsAParameterThatNothingSees) {
@@ -492,7 +492,7 @@ TEST(ModelCheck, TakesModelsThatLackThings) {
   const ModelCheck found = check_model(model);
   EXPECT_THAT(faults(found), ElementsAre("warn description: roles"));
   EXPECT_EQ(finding_of(found, "symmetry").verdict, Verdict::skip);
-  EXPECT_EQ(finding_of(found, "straight_inputs").verdict, Verdict::skip);
+  EXPECT_EQ(finding_of(found, "straight_motion").verdict, Verdict::skip);
 
   Spoilt first_only;
   first_only.second = false;

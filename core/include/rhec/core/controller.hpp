@@ -63,7 +63,8 @@ class RHEC_EXPORT Controller {
   std::int64_t fallbacks() const noexcept { return fallbacks_; }
 
  private:
-  void choose_straight_inputs(double ground_speed, const double* parameters) noexcept;
+  void go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept;
+  void choose_straight_motion(double ground_speed, const double* parameters) noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
   void start_cold() noexcept;
 
@@ -77,7 +78,7 @@ class RHEC_EXPORT Controller {
   Command command_;
   bool has_plan_ = false, prepared_ = false;
   std::int64_t fallbacks_ = 0;
-  std::vector<double> scratch_, straight_inputs_, slipless_inputs_, largest_inputs_;
+  std::vector<double> scratch_, straight_, slipless_, largest_;
   std::vector<double> nominal_parameters_, reference_parameters_;
   std::vector<std::uint8_t> begins_;
 };

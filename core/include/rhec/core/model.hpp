@@ -33,6 +33,7 @@ struct RHEC_EXPORT Roles {
   int position_y = -1;                   ///< state: y of that point [m]
   int heading = -1;                      ///< state: direction of travel at that point [rad]
   int speed = -1;                        ///< input: speed of the wheels [m/s]
+  int speed_state = -1;                  ///< state: the same, of a vehicle whose input is an acceleration [m/s]
   int speed_factor = -1;                 ///< parameter: ground speed / wheel speed [1]
   std::vector<int> other_headings = {};  ///< states: of further bodies, e.g. of the tractor before its trailer [rad]
 
@@ -106,10 +107,11 @@ class RHEC_EXPORT Model {
   /// dx/dt at one point, for integrators of one's own (the truth vehicle of a simulation).
   virtual void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept = 0;
 
-  /// Writes inputs (n_u) that let the vehicle go straight ahead at a ground speed [m/s] where it slips like p: those of
-  /// the path's reference. As it is, `roles.speed` becomes ground_speed / p[roles.speed_factor] and all else 0; a model
-  /// whose speed is not one input in m/s (the wheels of each side, say) says it itself.
-  virtual void straight_inputs(double ground_speed, const double* p, double* inputs) const noexcept;
+  /// Going straight ahead at a ground speed [m/s] where the vehicle slips like p, as the path's reference asks for:
+  /// writes all inputs (n_u), and of the state those entries that are speeds. As it is, the wheel speed (`roles.speed`
+  /// or `roles.speed_state`) becomes ground_speed / p[roles.speed_factor] and all other inputs 0; a model whose speed
+  /// is not one variable in m/s (the wheels of each side, say) says it itself.
+  virtual void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept;
 
   /// False where `hessians` cannot be asked for; such a model can be used with Gauss-Newton only.
   virtual bool has_second_derivatives() const noexcept = 0;

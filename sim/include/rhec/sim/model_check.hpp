@@ -22,7 +22,7 @@ enum class Verdict { pass, skip, warn, fail };
 RHEC_EXPORT std::string_view word_of(Verdict verdict);
 
 struct Finding {
-  std::string check;  ///< "description", "symmetry", "straight_inputs", "derivatives", "numbers", "scaling",
+  std::string check;  ///< "description", "symmetry", "straight_motion", "derivatives", "numbers", "scaling",
                       ///< "observability" or "time"
   Verdict verdict = Verdict::pass;
   std::string where;                                    ///< which variable or entry; empty: the whole model
