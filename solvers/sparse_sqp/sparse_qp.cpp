@@ -17,7 +17,8 @@ constexpr int many = 16;
 constexpr int enough = 4;
 constexpr int most_interior_iterations = 80;
 constexpr int equation_refinements = 6;
-constexpr double well_met = 1e-12;
+// Of the defects a step leaves no more than this part, or what rounding makes of them.
+constexpr double least_reduction = 1e-3, rounding_of_equations = 1e-12;
 // A bound counts as violated, or a multiplier as of the wrong sign, beyond this part of the sizes involved.
 constexpr double active_set_tolerance = 1e-11;
 // What refinement must reach for the solution of a system to be believed.
@@ -149,9 +150,9 @@ bool SparseQp::meet_equations(const Program& program) {
     for (int r = 0; r < m_; ++r) largest = std::max(largest, std::abs(work_m_[r] + program.constraints[r]));
     return largest;
   };
-  const double size = 1.0 + max_abs(program.constraints, m_);
+  const double size = max_abs(program.constraints, m_), well_met = least_reduction * size + rounding_of_equations;
   double remaining = unmet();
-  for (int round = 0; round < equation_refinements && !(remaining <= well_met * size); ++round) {
+  for (int round = 0; round < equation_refinements && !(remaining <= well_met); ++round) {
     std::fill_n(rhs_.data(), n_, 0.0);
     for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -program.constraints[r] - work_m_[r];
     if (solve_system() > believable) return false;
@@ -159,13 +160,14 @@ bool SparseQp::meet_equations(const Program& program) {
     for (int r = 0; r < m_; ++r) lambda_[r] += solution_[n_ + r];
     const double last = std::exchange(remaining, unmet());
     if (remaining < 0.1 * last) continue;
-    if (remaining <= believable * size || numbers_.regularisation <= least_regularisation) break;
+    // The regularisation holds back what the equations ask for.
+    if (numbers_.regularisation <= least_regularisation) break;
     numbers_.regularisation *= 1e-2;
     ++factorisations_;
     if (!factor_.factor(numbers_)) return false;
     regularisation_ = numbers_.regularisation;
   }
-  return remaining <= believable * size;
+  return remaining <= believable * (1.0 + size);
 }
 
 /// Rounds of the primal-dual active set method from `active_`. Unless it is unknown or indefinite, what was found is in
