@@ -162,11 +162,15 @@ bool SparseQp::meet_equations(const Program& program) {
     if (remaining < 0.1 * last) continue;
     // The regularisation holds back what the equations ask for.
     if (numbers_.regularisation <= least_regularisation) break;
-    numbers_.regularisation *= 1e-2;
+    const double before = std::exchange(numbers_.regularisation, 1e-2 * numbers_.regularisation);
     ++factorisations_;
-    if (!factor_.factor(numbers_)) return false;
-    regularisation_ = numbers_.regularisation;
+    if (factor_.factor(numbers_)) continue;
+    numbers_.regularisation = before;
+    ++factorisations_;
+    factor_.factor(numbers_);
+    break;
   }
+  if (remaining <= well_met) regularisation_ = numbers_.regularisation;
   return remaining <= believable * (1.0 + size);
 }
 
