@@ -15,7 +15,7 @@ namespace rhec::sim {
 namespace {
 
 std::filesystem::path file_with(const std::string& content) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "rhec_waypoints.csv";
+  auto file = std::filesystem::path(testing::TempDir()) / "rhec_waypoints.csv";
   std::ofstream(file) << content;
   return file;
 }

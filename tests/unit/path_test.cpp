@@ -75,6 +75,7 @@ TEST(Path, ClosestPointIsWhatAFineSearchFinds) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> place(-10.0, 10.0);
   std::vector<Waypoint> waypoints;
+  waypoints.reserve(12);
   for (int i = 0; i < 12; ++i) waypoints.push_back({place(random), place(random), {}});
   const Path path(waypoints);
   for (int trial = 0; trial < 50; ++trial) {
