@@ -3,8 +3,22 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <string>
+#include <string_view>
 
 namespace rhec::apps {
+namespace {
+
+/// As it is written in a shell: quoted where it has to be.
+std::string as_shell_word(const std::string& text) {
+  constexpr std::string_view plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./-+=:,@%";
+  if (!text.empty() && text.find_first_not_of(plain) == std::string::npos) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+}  // namespace
 
 void add_dump(CLI::App& command, DumpArguments& arguments) {
   auto* folder =
@@ -31,12 +45,14 @@ void Dump::commit() {
   if (dump_) dump_->commit();
 }
 
-void Dump::tell() const {
+void Dump::tell(const std::vector<std::filesystem::path>& plugin_path) const {
   if (!dump_) return;
+  std::string places;
+  for (const auto& place : plugin_path) places += fmt::format(" --plugin-path {}", as_shell_word(place.string()));
   for (const sim::ProblemDump::File& file : dump_->files()) {
     fmt::print("problems: {} ({})\n", file.path.string(), file.problems);
     for (const std::string& solver : file.solvers)
-      fmt::print("  again as they were: rhec solve {} {}\n", file.path.string(), solver);
+      fmt::print("  again as they were: rhec solve {} {}{}\n", as_shell_word(file.path.string()), solver, places);
   }
 }
 

@@ -27,8 +27,8 @@ class Dump {
 
   decltype(sim::LoopHooks::solved) watch(const std::string& run, const Robot& robot);
   void commit();
-  /// Prints what was saved, and how it is replayed.
-  void tell() const;
+  /// Prints what was saved, and how it is replayed with the plugins of the same places.
+  void tell(const std::vector<std::filesystem::path>& plugin_path) const;
 
  private:
   std::optional<sim::ProblemDump> dump_;

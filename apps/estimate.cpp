@@ -68,7 +68,7 @@ int estimate(const EstimateArguments& arguments) {
   folder.commit();
   dump.commit();
   print_table(log, replays, hold_out, folder.path());
-  dump.tell();
+  dump.tell(arguments.plugin_path);
   return all_usable ? exit_fine : exit_not_solved;
 }
 

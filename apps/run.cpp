@@ -64,7 +64,7 @@ int run(const RunArguments& arguments) {
   folder.commit();
   dump.commit();
   print_table(summary, folder.path());
-  dump.tell();
+  dump.tell(arguments.plugin_path);
   return log.completed ? exit_fine : exit_not_solved;
 }
 

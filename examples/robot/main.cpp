@@ -4,7 +4,8 @@
 
 #include "rhec/plugins/robot.hpp"
 
-int main(int, char** words) try {
+int main(int count, char** words) try {
+  if (count != 2) throw rhec::Error("expected one argument, a file such as robot.yaml");
   const rhec::Host host;  // the plugins: those of RHEC_PLUGIN_PATH, then those that are installed
   const rhec::Robot robot = rhec::Robot::from_file(host, words[1]);
   const rhec::Model& model = *robot.model();

@@ -188,7 +188,8 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
           .number("least_speed_factor", &ControllerOptions::least_speed_factor,
                   "the estimated speed factor is not trusted below this", greater_than(0.0))
           .number("speed_bound_factor", &ControllerOptions::speed_bound_factor,
-                  "the wheel speed is at most this times the reference plus speed_bound_offset", at_least(0.0))
+                  "a wheel speed that is an input is at most this times the reference plus speed_bound_offset",
+                  at_least(0.0))
           .number("speed_bound_offset", &ControllerOptions::speed_bound_offset, "[m/s]", at_least(0.0))
           .subtree("weights", &ControllerOptions::weights, "stage and terminal: weights by the variable's name")
           .subtree("blocking", &ControllerOptions::blocking, "by input: name and options of a blocking plugin")

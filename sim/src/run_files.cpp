@@ -160,10 +160,19 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
     for (const Sample& sample : log.samples)
       if (sample.sigma.size() > 0) estimate.sigmas.push_back(sample.sigma[states + index]);
     panel.curves.push_back(std::move(estimate));
-    // As far as the ground goes and half as much again: what the estimate did not know at the start would dwarf it.
-    const auto [lower, upper] = true_range(log, index);
-    panel.lower = lower - 0.5 * (upper - lower);
-    panel.upper = upper + 0.5 * (upper - lower);
+    // As far as the ground and nearly all estimates go: the first few, which know nothing yet, would dwarf the rest.
+    auto [lower, upper] = true_range(log, index);
+    std::vector<double> estimates;
+    for (const Sample& sample : log.samples)
+      if (std::isfinite(sample.parameters[index])) estimates.push_back(sample.parameters[index]);
+    std::sort(estimates.begin(), estimates.end());
+    const std::size_t few = estimates.size() / 50;
+    if (!estimates.empty()) {
+      lower = std::min(lower, estimates[few]);
+      upper = std::max(upper, estimates[estimates.size() - 1 - few]);
+    }
+    panel.lower = lower - 0.3 * (upper - lower);
+    panel.upper = upper + 0.3 * (upper - lower);
     picture.panels.push_back(std::move(panel));
   }
   Panel tracking;

@@ -203,7 +203,7 @@ void draw_colour_bar(Svg& svg, const Frame& frame, const BaseMap& base) {
 
 std::vector<LegendEntry> map_legend(const RunPicture& picture) {
   std::vector<LegendEntry> legend;
-  if (!picture.path.empty()) legend.push_back({"path", R"(stroke="#a3a8ae" stroke-width="5")"});
+  if (!picture.path.empty()) legend.push_back({"path (white)", R"(stroke="#a3a8ae" stroke-width="5")"});
   if (!picture.driven.empty())
     legend.push_back({"driven", fmt::format("stroke=\"{}\" stroke-width=\"2.4\"", truth_colour)});
   if (!picture.estimated.empty()) {

@@ -62,8 +62,8 @@ const OptionTable<TerrainOptions>& terrain_table() {
           .number("correlation_length", &T::correlation_length, "L of the gaussian field [m]", greater_than(0.0))
           .number("period", &T::period, "after which the gaussian field repeats itself [m]", greater_than(0.0))
           .number("patch_size", &T::patch_size, "of patches [m]", greater_than(0.0))
-          .number("lower", &T::lower, "least value of gaussian and patches")
-          .number("upper", &T::upper, "largest value of gaussian and patches")
+          .number("lower", &T::lower, "least value of gaussian and patches, of ratios (1 where nothing slips)")
+          .number("upper", &T::upper, "largest value of gaussian and patches, of ratios")
           .subtree("ranges", &T::ranges, "of gaussian and patches: [lower, upper] by parameter, in place of these")
           .subtree("values", &T::values, "of constant: by parameter (where nothing slips)")
           .names("files", &T::files, "of raster: one a parameter")
@@ -128,11 +128,23 @@ std::vector<Waypoint> make_waypoints(const ScenarioOptions& options) {
   return {};
 }
 
-std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDescription& about) {
+std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDescription& about,
+                                   const Settings& section) {
   require_known_keys(terrain.ranges, names_of(about.parameters), "terrain ranges");
   std::vector<SlipRange> ranges(about.parameters.size(), SlipRange{terrain.lower, terrain.upper});
+  const bool varies = terrain.name == TerrainOptions::Name::gaussian || terrain.name == TerrainOptions::Name::patches;
   for (std::size_t j = 0; j < ranges.size(); ++j) {
-    const Settings* pair = terrain.ranges.find(about.parameters[j].name);
+    const Variable& parameter = about.parameters[j];
+    const Settings* pair = terrain.ranges.find(parameter.name);
+    if (!pair && parameter.nominal != 1.0) {
+      // No ratio: a share of what it may be. Angles of 0.5 to 1 rad would be another vehicle's.
+      ranges[j] = {0.5 * (parameter.nominal + parameter.lower), 0.5 * (parameter.nominal + parameter.upper)};
+      if (varies && !(std::isfinite(ranges[j].lower) && std::isfinite(ranges[j].upper)))
+        throw key_or_section(section, "ranges")
+            .error(fmt::format("how far '{}' varies is not known, since the model gives it no bounds; expected [lower, "
+                               "upper] under ranges.{}",
+                               parameter.name, parameter.name));
+    }
     if (pair) std::tie(ranges[j].lower, ranges[j].upper) = bounds_in(*pair);
     if (pair && !(std::isfinite(ranges[j].lower) && std::isfinite(ranges[j].upper)))
       throw pair->mismatch("two finite numbers [lower, upper]");
@@ -147,7 +159,7 @@ std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, co
         .error(fmt::format("lower is {} and upper is {}; expected lower <= upper", terrain.lower, terrain.upper));
   const std::vector<double> constant =
       numbers_by_name(terrain.values, about.parameters, nominal_values(about.parameters), any(), "terrain values");
-  const std::vector<SlipRange> ranges = slip_ranges(terrain, about);
+  const std::vector<SlipRange> ranges = slip_ranges(terrain, about, options.terrain);
   const auto seed = static_cast<std::uint64_t>(options.seed);
   switch (terrain.name) {
     case TerrainOptions::Name::gaussian:

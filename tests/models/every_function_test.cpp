@@ -61,6 +61,51 @@ TEST(EveryFunction, IsRefusedWithADescriptionThatDoesNotFit) {
   EXPECT_EQ(why_refused(describe()), "it is not refused");
 }
 
+/// In a function that the compiler does not look into, lest it sees what is wrong with the formula.
+template <class Scalar>
+[[gnu::noipa]] void write(const Scalar& value, int count, Scalar* results) {
+  for (int j = 0; j < count; ++j) results[j] = value * 1.0;
+}
+
+/// A formula that writes other results than it says that it has.
+struct Forgetful {
+  static constexpr int state_count = 2, input_count = 0, parameter_count = 0, output_count = 1;
+  int rates = 2, measured = 1;
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar*, const Scalar*, Scalar* dxdt) const {
+    write(x[0], rates, dxdt);
+  }
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    write(x[0], measured, y);
+  }
+};
+
+std::string why_refused(const Forgetful& formula) {
+  ModelDescription description;
+  description.name = "forgetful";
+  description.states = variables({"a", "b"});
+  description.outputs = variables({"y"});
+  try {
+    const FormulaModel<Forgetful> model(formula, description);
+    return "it is not refused";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+TEST(FormulaModel, RefusesAFormulaThatForgetsAResultOrWritesOneTooMany) {
+  EXPECT_EQ(why_refused(Forgetful{}), "it is not refused");
+  EXPECT_EQ(why_refused(Forgetful{.rates = 1}),
+            "model 'forgetful': the formula's dynamics leaves out number 1, 'b'; let it write all 2, from 0 on");
+  EXPECT_EQ(why_refused(Forgetful{.measured = 0}),
+            "model 'forgetful': the formula's outputs leaves out number 0, 'y'; let it write all 1, from 0 on");
+  EXPECT_EQ(
+      why_refused(Forgetful{.measured = 2}),
+      "model 'forgetful': the formula's outputs writes number 1, and it has but 1, counted from 0; mend its counts "
+      "and the description");
+}
+
 TEST(EveryFunction, HasTheDerivativesOfItsValues) {
   auto model = make_model();
   for (const std::string& set : model.instruction_sets()) {

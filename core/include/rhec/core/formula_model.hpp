@@ -22,6 +22,14 @@ struct FormulaCounts {
 /// Throws Error where a description has others, or gives a role to a variable that is not there.
 RHEC_EXPORT void check_description(const ModelDescription& description, const FormulaCounts& counts);
 
+/// A number that no formula computes: what results hold before they are written.
+RHEC_EXPORT double unwritten_result() noexcept;
+/// Throws Error where of the results of a function of a formula ("dynamics" or "outputs"), which all were unwritten and
+/// are followed by `result_guard` more, some still are, or one behind the last is not.
+inline constexpr int result_guard = 8;
+RHEC_EXPORT void check_results(const ModelDescription& description, const char* function,
+                               const std::vector<Variable>& variables, const std::vector<double>& results);
+
 /// Makes a Model out of one formula. All else (integration, first and second derivatives, evaluation of several stages
 /// at once) is derived. `Formula` is
 ///
@@ -44,6 +52,7 @@ class FormulaModel : public Model {
                                      .inputs = Formula::input_count,
                                      .parameters = Formula::parameter_count,
                                      .outputs = Formula::output_count});
+    check_written();
     static constexpr ModelKernels generic = make_model_kernels<Formula, double>();
     add("generic", &generic);
 #if defined(__x86_64__)
@@ -82,6 +91,17 @@ class FormulaModel : public Model {
   }
 
  private:
+  /// Calls the formula once to see what it writes: a result that it forgets would be whatever was in memory.
+  void check_written() const {
+    const auto room = [](int count) { return std::vector<double>(count + result_guard, unwritten_result()); };
+    const std::vector<double> x(Formula::state_count, 0.1), u(Formula::input_count, 0.1);
+    std::vector<double> p = nominal_values(description_.parameters), rates = room(Formula::state_count),
+                        outputs = room(Formula::output_count);
+    formula_.dynamics(x.data(), u.data(), p.data(), rates.data());
+    check_results(description_, "dynamics", description_.states, rates);
+    formula_.outputs(x.data(), outputs.data());
+    check_results(description_, "outputs", description_.outputs, outputs);
+  }
   void add(std::string name, const ModelKernels* kernels) {
     available_.emplace_back(std::move(name), kernels);
     kernels_ = kernels;
