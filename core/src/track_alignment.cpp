@@ -37,7 +37,18 @@ class Track {
         states_(states),
         inputs_(inputs),
         parameters_(parameters),
-        count_(problem.intervals() + 1) {}
+        count_(problem.intervals() + 1) {
+    // What drives, among states and inputs, is what going straight on sets.
+    const std::vector<double> nominal = nominal_values(model_.description().parameters);
+    std::vector<double> state(model_.state_count(), 0.0), input(model_.input_count(), 0.0);
+    model_.straight_motion(1.0, nominal.data(), state.data(), input.data());
+    const auto find = [](const std::vector<double>& motion, std::vector<int>& driving) {
+      for (std::size_t j = 0; j < motion.size(); ++j)
+        if (motion[j] != 0.0) driving.push_back(static_cast<int>(j));
+    };
+    find(state, driving_states_);
+    find(input, driving_inputs_);
+  }
 
   void align() {
     if (roles_.position_x < 0 || roles_.position_y < 0 || roles_.heading < 0 || !find_outputs()) return;
@@ -194,8 +205,9 @@ class Track {
     for (int i = start; i < end; ++i) {
       poses[i].position = from + factor * (poses[i].position - from);
       poses[i].heading += std::arg(factor);
-      if (roles_.speed >= 0)
-        inputs_[static_cast<std::ptrdiff_t>(i) * model_.input_count() + roles_.speed] *= std::abs(factor);
+      for (const int j : driving_inputs_)
+        inputs_[static_cast<std::ptrdiff_t>(i) * model_.input_count() + j] *= std::abs(factor);
+      for (const int j : driving_states_) state(i)[j] *= std::abs(factor);
     }
   }
 
@@ -206,6 +218,7 @@ class Track {
   std::vector<double>& inputs_;
   const std::vector<double>& parameters_;
   int count_;
+  std::vector<int> driving_states_, driving_inputs_;
   int x_output_ = -1, y_output_ = -1;
   std::vector<Pose> motions_, chain_;  ///< of each interval in its start's frame; all chained from the origin
   std::vector<Point> observed_;        ///< position outputs along the chain

@@ -17,8 +17,9 @@ namespace rhec {
 /// positions come again: its track is turned and stretched about its start, since a wrong heading there is what mostly
 /// opens it.
 ///
-/// Writes the poses (`states`, N + 1 rows) and, where a gap was stretched, the speeds (`inputs`, N rows). `parameters`
-/// are those of the intervals. Nothing changes where the model has no pose, or no output that is a position.
+/// Writes the poses (`states`, N + 1 rows) and, where a gap was stretched, the speeds (among `inputs`, N rows, or
+/// states). `parameters` are those of the intervals. Nothing changes where the model has no pose, or no output that is
+/// a position.
 void align_track(const RheProblem& problem, std::vector<double>& states, std::vector<double>& inputs,
                  const std::vector<double>& parameters);
 

@@ -17,10 +17,17 @@ namespace {
 
 constexpr int nodes = 401, gap_start = 200, gap_end = 230;
 
+/// A vehicle, what it is driven with, and how it slips.
+struct Vehicle {
+  const char* model = "bicycle_slip";
+  std::vector<double> (*inputs)(int) = [](int k) { return std::vector<double>{3.0, 0.15 * std::cos(0.15 * k)}; };
+  std::vector<double> slip = {0.95, 0.9}, believed = {1.0, 1.0};
+};
+
 /// A vehicle that winds its way for 80 s, with a position at every second node, some of them 50 m off, and a gap.
 class TrackAlignment : public ::testing::Test {
  protected:
-  TrackAlignment() {
+  explicit TrackAlignment(const Vehicle& vehicle = {}) : model_(Host().make_model(vehicle.model)) {
     const Roles& roles = model_->description().roles;
     x_ = roles.position_x;
     y_ = roles.position_y;
@@ -48,21 +55,27 @@ class TrackAlignment : public ::testing::Test {
         problem_->output(k)[1] = outputs[1] + 0.05 * normal();
       }
       if (k == nodes - 1) break;
-      const double inputs[] = {3.0, 0.15 * std::cos(0.15 * k)}, parameters[] = {0.95, 0.9}, duration = 0.2;
+      const std::vector<double> inputs = vehicle.inputs(k);
+      const double duration = 0.2;
       problem_->set_duration(k, duration);
       Model::Intervals request;
       request.count = 1;
       request.states = state.data();
-      request.inputs = inputs;
-      request.parameters = parameters;
+      request.inputs = inputs.data();
+      request.parameters = vehicle.slip.data();
       request.durations = &duration;
       request.next_states = next.data();
       model_->integrate(request);
       state = next;
-      inputs_.insert(inputs_.end(), {inputs[0], inputs[1]});
-      parameters_.insert(parameters_.end(), {1.0, 1.0});  // slip is not known
+      inputs_.insert(inputs_.end(), inputs.begin(), inputs.end());
+      parameters_.insert(parameters_.end(), vehicle.believed.begin(), vehicle.believed.end());  // slip is not known
     }
     states_ = truth_;
+  }
+  /// Of so long a stretch that no piece of track reaches across.
+  void lose_positions() {
+    for (int k = 80; k < nodes - 80; ++k)
+      for (int j = 0; j < model_->output_count(); ++j) problem_->output(k)[j] = std::nan("");
   }
   double normal() { return std::normal_distribution<double>()(random_); }
   double& of(std::vector<double>& states, int node, int j) const {
@@ -84,7 +97,7 @@ class TrackAlignment : public ::testing::Test {
   }
 
   std::mt19937 random_{5};
-  std::shared_ptr<const Model> model_ = Host().make_model("bicycle_slip");
+  std::shared_ptr<const Model> model_;
   int x_ = 0, y_ = 0, heading_ = 0;
   std::unique_ptr<RheProblem> problem_;
   std::vector<double> truth_, states_, inputs_, parameters_;
@@ -133,6 +146,41 @@ TEST_F(TrackAlignment, KeepsAStandingVehicleWhereItIs) {
   states_ = truth_;
   align_track(*problem_, states_, inputs_, parameters_);
   EXPECT_EQ(states_, truth_) << "no heading can be told from positions that do not move";
+}
+
+TEST_F(TrackAlignment, StretchesTheSpeedOfALongGapAlone) {
+  lose_positions();
+  for (int k = 0; k < nodes - 1; ++k) inputs_[2 * static_cast<std::size_t>(k)] *= 0.75;  // a wheel that is not known
+  const std::vector<double> before = inputs_;
+  align_track(*problem_, states_, inputs_, parameters_);
+  const auto middle = 2 * static_cast<std::size_t>(nodes / 2);
+  EXPECT_NEAR(inputs_[middle] / before[middle], 0.95 / 0.75, 0.1);
+  for (std::size_t k = 0; k + 1 < nodes; ++k)
+    EXPECT_EQ(inputs_[2 * k + 1], before[2 * k + 1]) << "the steering rate is no speed; node " << k;
+}
+
+/// Neither input is the speed: each side has its own.
+class SkidSteeredTrack : public TrackAlignment {
+ protected:
+  static std::vector<double> inputs(int k) {
+    const double turn = 0.2 * std::cos(0.15 * k);
+    return {21.0 - turn, 21.0 + turn};
+  }
+  SkidSteeredTrack()
+      : TrackAlignment({.model = "skid_steer",
+                        .inputs = &SkidSteeredTrack::inputs,
+                        .slip = {0.05, 0.05, 0.0},
+                        .believed = {0.0, 0.0, 0.0}}) {}
+};
+
+TEST_F(SkidSteeredTrack, StretchesTheSpeedsOfBothSidesInALongGap) {
+  lose_positions();
+  for (double& wheel : inputs_) wheel *= 0.75;
+  const std::vector<double> before = inputs_;
+  align_track(*problem_, states_, inputs_, parameters_);
+  const auto middle = 2 * static_cast<std::size_t>(nodes / 2);
+  EXPECT_NEAR(inputs_[middle] / before[middle], 0.95 / 0.75, 0.1);
+  EXPECT_DOUBLE_EQ(inputs_[middle + 1] / before[middle + 1], inputs_[middle] / before[middle]);
 }
 
 }  // namespace
