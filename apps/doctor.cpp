@@ -65,11 +65,7 @@ Counts count(const std::vector<PlaceFindings>& places) {
     known.push_back(plugin.path.stem().string());
     if (!plugin.name.empty()) known.push_back(plugin.name);
   }
-  const std::string near = nearest(name, known);
-  std::string diagnosis = host.diagnosis();
-  diagnosis.erase(diagnosis.find_last_not_of('\n') + 1);
-  throw Error(fmt::format("no plugin and no file is called '{}'{}\n{}", name,
-                          near.empty() ? std::string() : fmt::format("; did you mean '{}'?", near), diagnosis));
+  throw unknown_plugin("no plugin and no file is called", name, known, host);
 }
 
 std::string origin_of(const PluginPlace& place) {
@@ -183,6 +179,15 @@ void print_json(const std::vector<PlaceFindings>& places) {
 }
 
 }  // namespace
+
+Error unknown_plugin(const std::string& what, const std::string& name, const std::vector<std::string>& known,
+                     const Host& host) {
+  const std::string near = nearest(name, known);
+  std::string diagnosis = host.diagnosis();
+  diagnosis.erase(diagnosis.find_last_not_of('\n') + 1);
+  return Error(fmt::format("{} '{}'{}\n{}", what, name,
+                           near.empty() ? std::string() : fmt::format("; did you mean '{}'?", near), diagnosis));
+}
 
 int examine_plugins(const Host& host, const std::string& name, bool json) {
   const std::vector<PlaceFindings> places = examine(host, name);

@@ -187,11 +187,7 @@ std::vector<PluginRecord> named(const Host& host, const std::string& name) {
     if (plugin.name == name && std::none_of(found.begin(), found.end(), same)) found.push_back(plugin);
   }
   if (!found.empty()) return found;
-  const std::string near = nearest(name, known);
-  std::string diagnosis = host.diagnosis();
-  diagnosis.erase(diagnosis.find_last_not_of('\n') + 1);
-  throw Error(fmt::format("there is no plugin '{}'{}\n{}", name,
-                          near.empty() ? std::string() : fmt::format("; did you mean '{}'?", near), diagnosis));
+  throw unknown_plugin("there is no plugin", name, known, host);
 }
 
 int show(const PluginsArguments& arguments) {
