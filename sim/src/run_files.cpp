@@ -40,8 +40,8 @@ std::pair<double, double> true_range(const RunLog& log, Eigen::Index parameter) 
   return {middle - 0.5 * least_width, middle + 0.5 * least_width};
 }
 
-template <class Variables, class Function>
-Curve curve_of(const RunLog& log, std::string label, CurveRole role, const Variables&, const Function& value_of) {
+template <class Function>
+Curve curve_of(const RunLog& log, std::string label, CurveRole role, const Function& value_of) {
   Curve curve;
   curve.label = std::move(label);
   curve.role = role;
@@ -154,9 +154,9 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
     panel.unit = about.parameters[j].unit;
     const auto index = static_cast<Eigen::Index>(j);
     panel.curves.push_back(
-        curve_of(log, "true", CurveRole::truth, about, [=](const Sample& s) { return s.true_parameters[index]; }));
+        curve_of(log, "true", CurveRole::truth, [=](const Sample& s) { return s.true_parameters[index]; }));
     Curve estimate =
-        curve_of(log, "estimated", CurveRole::estimate, about, [=](const Sample& s) { return s.parameters[index]; });
+        curve_of(log, "estimated", CurveRole::estimate, [=](const Sample& s) { return s.parameters[index]; });
     for (const Sample& sample : log.samples)
       if (sample.sigma.size() > 0) estimate.sigmas.push_back(sample.sigma[states + index]);
     panel.curves.push_back(std::move(estimate));
@@ -179,7 +179,7 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
   tracking.title = "Distance from the path";
   tracking.unit = "m";
   tracking.curves.push_back(
-      curve_of(log, "tracking error", CurveRole::other, about, [](const Sample& s) { return s.tracking; }));
+      curve_of(log, "tracking error", CurveRole::other, [](const Sample& s) { return s.tracking; }));
   picture.panels.push_back(std::move(tracking));
   return draw_run(picture);
 }
