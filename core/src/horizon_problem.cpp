@@ -203,7 +203,7 @@ void HorizonProblem::simulate_interval(int i, Iterate& point, std::span<double> 
 
 void HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                                std::span<double> scratch) const noexcept {
-  const int ns = capacity_.states, nw = capacity_.controls;
+  const int ns = capacity_.states, nw = capacity_.controls, stride = qp.stride();
   const StageRange steps{range.first, std::min(range.last, intervals_ - 1)};
   const int count = steps.last - steps.first + 1;
   const Rows rows(scratch, std::max(count, 0), nx_, nu_, np_);
@@ -216,13 +216,8 @@ void HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian h
   for (int i = range.first; i <= range.last; ++i) {
     const int controls = i < intervals_ ? control_counts_[i] : 0;
     qp.set_sizes(i, ns, controls);
-    std::fill_n(qp.Q(i), ns * ns, 0.0);
-    std::fill_n(qp.q(i), ns, 0.0);
-    if (i < intervals_) {
-      std::fill_n(qp.S(i), nw * ns, 0.0);
-      std::fill_n(qp.R(i), nw * nw, 0.0);
-      std::fill_n(qp.r(i), nw, 0.0);
-    }
+    std::fill_n(qp.H(i), (ns + nw) * stride, 0.0);
+    std::fill_n(qp.h(i), stride, 0.0);
   }
 
   if (count > 0) {
@@ -248,36 +243,26 @@ void HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian h
 
   for (int i = steps.first; i <= steps.last; ++i) {
     const double* jacobian = rows.jacobians + (i - steps.first) * nx_ * nz;
-    double *A = qp.A(i), *B = qp.B(i), *b = qp.b(i);
-    std::fill_n(A, ns * ns, 0.0);
-    std::fill_n(B, ns * nw, 0.0);
-    // Column of the model's z = [x; u; p (; p_end)] -> where it goes in [s; w]: a state column or a control column.
-    const auto column_of = [&](int z) -> std::pair<bool, int> {
-      if (z < nx_) return {true, z};
+    double *F = qp.F(i), *b = qp.b(i);
+    std::fill_n(F, ns * stride, 0.0);
+    // Column of the model's z = [x; u; p (; p_end)] -> where it goes in [s; w].
+    const auto column_of = [&](int z) {
+      if (z < nx_) return z;
       if (z < nx_ + nu_) {
         const int control = control_of_input(i, z - nx_);
-        if (control >= 0) return {false, control};
-        return {true, nx_ + input_channel_[z - nx_]};
+        return control >= 0 ? ns + control : nx_ + input_channel_[z - nx_];
       }
       const bool end = z >= nx_ + nu_ + np_;
       const int parameter = z - nx_ - nu_ - (end ? np_ : 0);
       const int control = control_of_channel(i, parameter);
       // A jump is seen by the whole interval; of a ramp, only the end is new.
-      if (control >= 0 && (end || !ramp_[parameter])) return {false, control};
-      return {true, nx_ + parameter};
+      return control >= 0 && (end || !ramp_[parameter]) ? ns + control : nx_ + parameter;
     };
-    for (int z = 0; z < nz; ++z) {
-      const auto [is_state, column] = column_of(z);
-      double* target = (is_state ? A : B) + column * ns;
-      for (int r = 0; r < nx_; ++r) target[r] += jacobian[z * nx_ + r];
-    }
+    for (int z = 0; z < nz; ++z)
+      for (int r = 0; r < nx_; ++r) F[r * stride + column_of(z)] += jacobian[z * nx_ + r];
     for (int c = 0; c < channels_; ++c) {
       const int control = control_of_channel(i, c);
-      if (control >= 0) {
-        B[control * ns + nx_ + c] = 1.0;
-      } else {
-        A[(nx_ + c) * ns + nx_ + c] = 1.0;
-      }
+      F[(nx_ + c) * stride + (control >= 0 ? ns + control : nx_ + c)] = 1.0;
     }
     const double* s_next = point.state(i + 1);
     for (int r = 0; r < nx_; ++r) b[r] = rows.next[(i - steps.first) * nx_ + r] - s_next[r];
@@ -287,17 +272,8 @@ void HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian h
     }
     if (exact) {
       const double* h = rows.hessians + (i - steps.first) * nz * nz;
-      double *Q = qp.Q(i), *S = qp.S(i), *R = qp.R(i);
-      for (int z1 = 0; z1 < nz; ++z1) {
-        const auto [state1, column1] = column_of(z1);
-        for (int z2 = 0; z2 < nz; ++z2) {
-          const auto [state2, column2] = column_of(z2);
-          const double value = h[z2 * nz + z1];
-          if (state1 && state2) Q[column2 * ns + column1] += value;
-          if (!state1 && !state2) R[column2 * nw + column1] += value;
-          if (!state1 && state2) S[column2 * nw + column1] += value;
-        }
-      }
+      for (int z1 = 0; z1 < nz; ++z1)
+        for (int z2 = 0; z2 < nz; ++z2) qp.H(i)[column_of(z2) * stride + column_of(z1)] += h[z2 * nz + z1];
     }
   }
   fill_bounds(point, range, qp);

@@ -11,10 +11,11 @@ double KktResidual::largest() const noexcept {
 
 namespace {
 
-/// Column `c` of a column-major matrix with leading dimension `ld`, times v.
-double column_product(const double* M, int ld, int c, int rows, const double* v) noexcept {
+/// Column `c` of stage i's F, times the next node's costate.
+double pull_of(const StageQp& qp, int i, int c, const double* costate) noexcept {
+  const double* F = qp.F(i) + c;
   double sum = 0.0;
-  for (int r = 0; r < rows; ++r) sum += M[c * ld + r] * v[r];
+  for (int r = 0; r < qp.states(i + 1); ++r) sum += F[r * qp.stride()] * costate[r];
   return sum;
 }
 
@@ -48,7 +49,7 @@ KktResidual kkt_residual(const StageQp& qp, const Iterate& point) noexcept {
     largest_term = max_abs(bound, n, max_abs(costate, n, max_abs(qp.q(i), n, largest_term)));
     for (int j = 0; j < n; ++j) {
       double sum = qp.q(i)[j] + bound[j] - costate[j];
-      if (i < N) sum += column_product(qp.A(i), ns, j, n_next, point.costate(i + 1));
+      if (i < N) sum += pull_of(qp, i, j, point.costate(i + 1));
       kkt.stationarity = std::max(kkt.stationarity, std::abs(sum));
     }
     check_bounds(qp.state_lower(i), qp.state_upper(i), bound, n, kkt);
@@ -57,7 +58,7 @@ KktResidual kkt_residual(const StageQp& qp, const Iterate& point) noexcept {
     for (int j = 0; j < m; ++j)
       kkt.stationarity =
           std::max(kkt.stationarity, std::abs(qp.r(i)[j] + point.control_bound(i)[j] +
-                                              column_product(qp.B(i), ns, j, n_next, point.costate(i + 1))));
+                                              pull_of(qp, i, ns + j, point.costate(i + 1))));
     check_bounds(qp.control_lower(i), qp.control_upper(i), point.control_bound(i), m, kkt);
     kkt.defect = max_abs(qp.b(i), n_next, kkt.defect);
   }
@@ -74,12 +75,12 @@ KktResidual kkt_residual(const Ocp& ocp, const Iterate& point, StageQp& qp, std:
 }
 
 void set_costates(const StageQp& qp, Iterate& point) noexcept {
-  const int N = qp.intervals(), ns = qp.capacity().states;
+  const int N = qp.intervals();
   for (int i = N; i >= 0; --i) {
     double* costate = point.costate(i);
     for (int j = 0; j < qp.states(i); ++j) {
       costate[j] = qp.q(i)[j] + point.state_bound(i)[j];
-      if (i < N) costate[j] += column_product(qp.A(i), ns, j, qp.states(i + 1), point.costate(i + 1));
+      if (i < N) costate[j] += pull_of(qp, i, j, point.costate(i + 1));
     }
   }
   if (!qp.initial_state_is_given) std::fill_n(point.costate(0), qp.states(0), 0.0);

@@ -185,14 +185,14 @@ void RhcProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<doubl
 }
 
 void RhcProblem::add(StageRange range, const Iterate& point, bool matrices, StageQp& qp) const noexcept {
-  const int ns = capacity().states, nw = capacity().controls;
+  const int ns = capacity().states, stride = qp.stride();
   for (int i = range.first; i <= range.last; ++i) {
     const auto& weights = i == intervals() ? setup_.terminal_weights : setup_.state_weights;
     for (int j = 0; j < nx(); ++j) {
       const double w = 2.0 * weights[j];
       if (w == 0.0) continue;
       qp.q(i)[j] += w * state_error(point, i, j);
-      if (matrices) qp.Q(i)[j * ns + j] += w;
+      if (matrices) qp.H(i)[j * stride + j] += w;
     }
     if (i == intervals()) break;
     for (int j = 0; j < nu(); ++j) {
@@ -202,10 +202,10 @@ void RhcProblem::add(StageRange range, const Iterate& point, bool matrices, Stag
       const double pull = w * (value - input_reference(i)[j]);
       if (control >= 0) {
         qp.r(i)[control] += pull;
-        if (matrices) qp.R(i)[control * nw + control] += w;
+        if (matrices) qp.H(i)[(ns + control) * stride + ns + control] += w;
       } else {
         qp.q(i)[state] += pull;
-        if (matrices) qp.Q(i)[state * ns + state] += w;
+        if (matrices) qp.H(i)[state * stride + state] += w;
       }
     }
   }

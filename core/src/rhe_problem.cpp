@@ -186,20 +186,20 @@ void RheProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<doubl
 }
 
 void RheProblem::add_arrival(const Iterate& point, bool matrices, StageQp& qp) const noexcept {
-  const int n = nx() + np(), ns = capacity().states;
+  const int n = nx() + np();
   for (int c = 0; c < n; ++c) {
     const double error = point.state(0)[c] - arrival_mean[c];
     for (int r = 0; r < n; ++r) {
       const double information = arrival_information(r, c);
       qp.q(0)[r] += 2.0 * information * error;
-      if (matrices) qp.Q(0)[c * ns + r] += 2.0 * information;
+      if (matrices) qp.H(0)[c * qp.stride() + r] += 2.0 * information;
     }
   }
 }
 
 void RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hessian, bool matrices, StageQp& qp,
                              std::span<double> scratch) const noexcept {
-  const int count = range.last - range.first + 1, n = nx(), ns = capacity().states;
+  const int count = range.last - range.first + 1, n = nx(), stride = qp.stride();
   double* states = scratch.data();
   double* predicted = states + count * n;
   double* jacobians = predicted + count * ny_;
@@ -222,7 +222,7 @@ void RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hes
     losses(difference, weight, curvature);
     const double* y = output(node);
     const double* J = jacobians + i * ny_ * n;
-    double *Q = qp.Q(node), *q = qp.q(node);
+    double *H = qp.H(node), *q = qp.q(node);
     for (int j = 0; j < ny_; ++j) {
       const double w = std::isnan(y[j]) ? 0.0 : 2.0 * weight[j] * setup_.output_weights[j];
       multipliers[i * ny_ + j] = w * difference[j];
@@ -231,7 +231,7 @@ void RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hes
         const double wJ = w * J[c * ny_ + j];
         q[c] += wJ * difference[j];
         if (matrices && wJ != 0.0)
-          for (int r = 0; r < n; ++r) Q[c * ns + r] += J[r * ny_ + j] * wJ;
+          for (int r = 0; r < n; ++r) H[c * stride + r] += J[r * ny_ + j] * wJ;
       }
     }
     if (!exact) continue;
@@ -244,7 +244,7 @@ void RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hes
             left += J[r * ny_ + j] * setup_.output_weights[j] * difference[j];
             right += J[c * ny_ + j] * setup_.output_weights[j] * difference[j];
           }
-          Q[c * ns + r] += 4.0 * curvature[loss.outputs.front()] * left * right;
+          H[c * stride + r] += 4.0 * curvature[loss.outputs.front()] * left * right;
         }
       }
     }
@@ -257,19 +257,19 @@ void RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hes
   model().observe(request);
   for (int i = 0; i < count; ++i)
     for (int c = 0; c < n; ++c)
-      for (int r = 0; r < n; ++r) qp.Q(range.first + i)[c * ns + r] += hessians[(i * n + c) * n + r];
+      for (int r = 0; r < n; ++r) qp.H(range.first + i)[c * stride + r] += hessians[(i * n + c) * n + r];
 }
 
 void RheProblem::add_inputs_and_links(StageRange range, const Iterate& point, bool matrices,
                                       StageQp& qp) const noexcept {
-  const int ns = capacity().states, nw = capacity().controls;
+  const int ns = capacity().states, stride = qp.stride();
   for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i) {
     for (int j = 0; j < nu(); ++j) {
       const double measured = measured_input(i)[j];
       if (std::isnan(measured)) continue;
       const double w = 2.0 * setup_.input_weights[j];
       qp.r(i)[j] += w * (point.control(i)[j] - measured);
-      if (matrices) qp.R(i)[j * nw + j] += w;
+      if (matrices) qp.H(i)[(ns + j) * stride + ns + j] += w;
     }
     for (int j = 0; j < np(); ++j) {
       const int control = control_of_channel(i, j), state = nx() + j;
@@ -279,9 +279,11 @@ void RheProblem::add_inputs_and_links(StageRange range, const Iterate& point, bo
       qp.r(i)[control] += pull;
       qp.q(i)[state] -= pull;
       if (matrices) {
-        qp.R(i)[control * nw + control] += w;
-        qp.Q(i)[state * ns + state] += w;
-        qp.S(i)[state * nw + control] -= w;
+        double* H = qp.H(i);
+        H[(ns + control) * stride + ns + control] += w;
+        H[state * stride + state] += w;
+        H[state * stride + ns + control] -= w;
+        H[(ns + control) * stride + state] -= w;
       }
     }
   }

@@ -62,23 +62,23 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
     jacobian_.row_indices.push_back(to_row);
     jacobian_sources_.push_back(source);
   };
-  const int ns = capacity.states;
+  const int ns = capacity.states, stride = capacity.row();
   for (int i = 0; i <= N; ++i) {
     const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < N ? control_counts_[i] : 0;
     const int next = i < N ? state_counts_[i + 1] : 0;
     const int stage = n > 0 ? state_starts_[i] : (i < N ? control_starts_[i] : variable);
     if (i < N) ocp.mark_dynamics(i, state_flags_.data(), control_flags_.data());
-    const auto add_dynamics = [&](const std::uint8_t* flags, int column) {
+    const auto add_dynamics = [&](const std::uint8_t* flags, int column, int first) {
       for (int r = 0; r < next; ++r)
-        if (flags[column * next + r]) add(constraint_starts_[i] + r, column * ns + r);
+        if (flags[column * next + r]) add(constraint_starts_[i] + r, r * stride + first + column);
     };
     for (int c = 0; c < n; ++c) {
       if (i > 0) add(constraint_starts_[i - 1] + c, -1);
-      add_dynamics(state_flags_.data(), c);
+      add_dynamics(state_flags_.data(), c, 0);
       end_column(jacobian_);
     }
     for (int c = 0; c < m; ++c) {
-      add_dynamics(control_flags_.data(), c);
+      add_dynamics(control_flags_.data(), c, ns);
       end_column(jacobian_);
     }
     for (int c = 0; c < n + m; ++c) {
@@ -129,7 +129,7 @@ void SparseNlp::set_costate_0(const StageQp& qp, Iterate& point) noexcept {
     if (qp.initial_state_is_given) {
       costate = qp.q(0)[j] + point.state_bound(0)[j];
       if (qp.intervals() > 0)
-        for (int r = 0; r < qp.states(1); ++r) costate += qp.A(0)[j * qp.capacity().states + r] * point.costate(1)[r];
+        for (int r = 0; r < qp.states(1); ++r) costate += qp.F(0)[r * qp.stride() + j] * point.costate(1)[r];
     }
     point.costate(0)[j] = costate;
   }
@@ -171,20 +171,21 @@ void SparseNlp::jacobian(const StageQp& qp, double* values) const noexcept {
       values[entry] = jacobian_sources_[entry] >= 0 && matrix ? matrix[jacobian_sources_[entry]] : -1.0;
   };
   for (int i = 0; i <= qp.intervals(); ++i) {
-    if (state_starts_[i] >= 0) scatter(i < qp.intervals() ? qp.A(i) : nullptr, state_starts_[i], state_counts_[i]);
-    if (i < qp.intervals()) scatter(qp.B(i), control_starts_[i], control_counts_[i]);
+    if (state_starts_[i] >= 0) scatter(i < qp.intervals() ? qp.F(i) : nullptr, state_starts_[i], state_counts_[i]);
+    if (i < qp.intervals()) scatter(qp.F(i), control_starts_[i], control_counts_[i]);
   }
 }
 
 void SparseNlp::hessian(const StageQp& qp, double* values) const noexcept {
-  const int ns = qp.capacity().states, nw = qp.capacity().controls;
+  const int ns = qp.capacity().states;
   for (int i = 0; i <= qp.intervals(); ++i) {
     const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < qp.intervals() ? control_counts_[i] : 0;
+    const double* H = qp.H(i);
     for (int c = 0; c < n; ++c) {
-      values = std::copy_n(qp.Q(i) + c * ns + c, n - c, values);
-      values = std::copy_n(qp.S(i) + c * nw, m, values);
+      values = std::copy_n(H + c * qp.stride() + c, n - c, values);
+      values = std::copy_n(H + c * qp.stride() + ns, m, values);
     }
-    for (int c = 0; c < m; ++c) values = std::copy_n(qp.R(i) + c * nw + c, m - c, values);
+    for (int c = 0; c < m; ++c) values = std::copy_n(H + (ns + c) * qp.stride() + ns + c, m - c, values);
   }
 }
 

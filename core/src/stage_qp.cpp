@@ -1,17 +1,34 @@
 #include "rhec/core/stage_qp.hpp"
 
-namespace rhec {
+#include <algorithm>
+#include <limits>
 
-StageQp::StageQp(const Capacity& capacity) : capacity_(capacity), ns_(capacity.states), nw_(capacity.controls) {
+namespace rhec {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+StageQp::StageQp(const Capacity& capacity)
+    : capacity_(capacity), stride_(capacity.row()), wide_(capacity.states + capacity.controls) {
   const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1;
   state_counts_.assign(nodes, 0);
   control_counts_.assign(nodes, 0);
-  for (auto* v : {&A_, &Q_}) v->assign(nodes * ns_ * ns_, 0.0);
-  for (auto* v : {&B_, &S_}) v->assign(nodes * ns_ * nw_, 0.0);
-  R_.assign(nodes * nw_ * nw_, 0.0);
-  for (auto* v : {&b_, &q_, &state_lower_, &state_upper_}) v->assign(nodes * ns_, 0.0);
-  for (auto* v : {&r_, &control_lower_, &control_upper_}) v->assign(nodes * nw_, 0.0);
-  initial_step_.assign(ns_, 0.0);
+  F_.assign(nodes * capacity.states * stride_, 0.0);
+  H_.assign(nodes * wide_ * stride_, 0.0);
+  for (auto* v : {&h_, &b_}) v->assign(nodes * stride_, 0.0);
+  lower_.assign(nodes * stride_, -infinity);
+  upper_.assign(nodes * stride_, infinity);
+  initial_step_.assign(stride_, 0.0);
+}
+
+void StageQp::clear(int i) noexcept {
+  std::fill_n(F(i), capacity_.states * stride_, 0.0);
+  std::fill_n(H(i), wide_ * stride_, 0.0);
+  for (double* row : {h(i), b(i)}) std::fill_n(row, stride_, 0.0);
+  std::fill_n(lower(i), stride_, -infinity);
+  std::fill_n(upper(i), stride_, infinity);
 }
 
 }  // namespace rhec

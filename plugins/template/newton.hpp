@@ -90,8 +90,8 @@ class Newton {
       if (i == qp.intervals()) break;
       add_terms(qp.r(i), best.control_bound(i), terms_.control(i), terms_.control_bound(i), qp.controls(i));
     }
-    riccati_.factor(qp, none_active_, {.states = terms_.state_bound(0), .controls = terms_.control_bound(0)});
-    return riccati_.solve(qp, none_active_, step_, terms_.state(0), terms_.control(0)) ==
+    riccati_.factor(qp, none_active_, terms_.bound_row(0));
+    return riccati_.solve(qp, none_active_, step_, terms_.row(0)) ==
                rhec::Riccati::Outcome::done &&
            is_finite(ocp, step_);
   }

@@ -39,8 +39,7 @@ bool has_crossed_bounds(const StageQp& qp) noexcept {
 StageQpSolver::StageQpSolver(const Capacity& capacity) : capacity_(capacity), riccati_(capacity), active_(capacity) {
   const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1;
   bounded_.reserve(nodes * (capacity.states + capacity.controls));
-  for (auto* v : {&state_diagonal_, &q_}) v->assign(nodes * capacity.states, 0.0);
-  for (auto* v : {&control_diagonal_, &r_}) v->assign(nodes * capacity.controls, 0.0);
+  for (auto* v : {&diagonal_, &h_}) v->assign(nodes * capacity.row(), 0.0);
 }
 
 void StageQpSolver::reset() noexcept {
@@ -183,17 +182,13 @@ void StageQpSolver::collect_bounded(const StageQp& qp) noexcept {
 /// Barrier Hessian and gradient for the Newton system that aims at complementarity `target`, in terms of the new
 /// values.
 void StageQpSolver::barrier_terms(const StageQp& qp, double target) noexcept {
-  const int ns = capacity_.states, nw = capacity_.controls;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    std::fill_n(state_diagonal_.data() + i * ns, ns, 0.0);
-    std::fill_n(control_diagonal_.data() + i * nw, nw, 0.0);
-    std::copy_n(qp.q(i), ns, q_.data() + i * ns);
-    if (i < qp.intervals()) std::copy_n(qp.r(i), nw, r_.data() + i * nw);
-  }
+  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(qp.intervals() + 1) * qp.stride();
+  std::fill_n(diagonal_.data(), entries, 0.0);
+  std::copy_n(qp.h(0), entries, h_.data());
   for (const Bounded& v : bounded_) {
-    double& diagonal =
-        v.is_state ? state_diagonal_[v.stage * ns + v.component] : control_diagonal_[v.stage * nw + v.component];
-    double& gradient = v.is_state ? q_[v.stage * ns + v.component] : r_[v.stage * nw + v.component];
+    const std::ptrdiff_t entry = static_cast<std::ptrdiff_t>(v.stage) * qp.stride() + v.component +
+                                 (v.is_state ? 0 : capacity_.states);
+    double &diagonal = diagonal_[entry], &gradient = h_[entry];
     if (std::isfinite(v.lower)) {
       const Side& s = v.below;
       const double weight = s.multiplier / s.slack;
@@ -274,16 +269,16 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accur
     each_side([](const Bounded&, Side& s) { s.slack_step = s.multiplier_step = s.correction = 0.0; });
     const double complementarity = mean_complementarity(0.0);
     barrier_terms(qp, 0.0);
-    riccati_.factor(qp, active_, {state_diagonal_.data(), control_diagonal_.data()});
+    riccati_.factor(qp, active_, diagonal_.data());
     ++factorisations_;
-    if (riccati_.solve(qp, active_, step, q_.data(), r_.data()) != Riccati::Outcome::done) return false;
+    if (riccati_.solve(qp, active_, step, h_.data()) != Riccati::Outcome::done) return false;
     directions(0.0);
     const double affine = longest_step();
     const double ratio = mean_complementarity(affine) / complementarity;
     const double target = std::max(ratio * ratio * ratio * complementarity, 1e-3 * wanted.gap * scale);
     each_side([](const Bounded&, Side& s) { s.correction = s.slack_step * s.multiplier_step; });
     barrier_terms(qp, target);
-    if (riccati_.solve(qp, active_, step, q_.data(), r_.data()) != Riccati::Outcome::done) return false;
+    if (riccati_.solve(qp, active_, step, h_.data()) != Riccati::Outcome::done) return false;
     directions(target);
     const double length = std::min(1.0, 0.995 * longest_step());
     if (!std::isfinite(length) || !std::isfinite(target)) return false;

@@ -77,7 +77,7 @@ class StageQpSolver {
   int factorisations_ = 0;
   double gradient_scale_ = 1.0;  ///< of the last interior-point solution: what a slack of one weighs
   std::vector<Bounded> bounded_;
-  std::vector<double> state_diagonal_, control_diagonal_, q_, r_;
+  std::vector<double> diagonal_, h_;  ///< rows of the program's stride: barrier terms
 };
 
 }  // namespace rhec::gn_rti

@@ -116,9 +116,8 @@ double CondensedProblem::reduced_gradient(const Entry& e) const noexcept {
   const int i = e.stage, N = ocp_->intervals();
   double sum = e.is_state ? qp_.q(0)[e.component] : qp_.r(i)[e.component];
   if (i < N) {
-    const double* column =
-        (e.is_state ? qp_.A(0) : qp_.B(i)) + static_cast<std::ptrdiff_t>(e.component) * qp_.capacity().states;
-    for (int j = 0; j < qp_.states(i + 1); ++j) sum += column[j] * adjoint_.costate(i + 1)[j];
+    const double* column = qp_.F(i) + e.component + (e.is_state ? 0 : qp_.capacity().states);
+    for (int j = 0; j < qp_.states(i + 1); ++j) sum += column[j * qp_.stride()] * adjoint_.costate(i + 1)[j];
   }
   return sum;
 }

@@ -55,11 +55,8 @@ class Recursion {
  private:
   void give_up(int i) {
     given_up_[i] = 1;
-    const std::ptrdiff_t ns = qp_.capacity().states, nw = qp_.capacity().controls;
-    std::copy_n(gauss_newton_.Q(i), ns * ns, qp_.Q(i));
-    if (i == qp_.intervals()) return;
-    std::copy_n(gauss_newton_.S(i), nw * ns, qp_.S(i));
-    std::copy_n(gauss_newton_.R(i), nw * nw, qp_.R(i));
+    const std::ptrdiff_t rows = qp_.capacity().states + qp_.capacity().controls;
+    std::copy_n(gauss_newton_.H(i), rows * qp_.stride(), qp_.H(i));
   }
 
   /// From a stage whose successors' costs-to-go stand. Returns the stage whose pivot is not positive, or -1.

@@ -41,7 +41,8 @@ bool stage_covariances(const StageQp& qp, std::span<double> blocks) {
     covariance = 2.0 * factor.solve(Eigen::MatrixXd::Identity(P.rows(), P.cols()));
   }
   for (int i = 0; i <= N; ++i) {
-    StageQp::Matrix(all.data() + i * stride * stride, qp.states(i), qp.states(i), Eigen::OuterStride<>(stride)) =
+    Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>(all.data() + i * stride * stride, qp.states(i), qp.states(i),
+                                                         Eigen::OuterStride<>(stride)) =
         0.5 * (covariance + covariance.transpose());
     if (i == N) break;
     covariance = (closed[i] * covariance * closed[i].transpose()).eval();

@@ -32,7 +32,7 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
   ocp.linearise(all_stages(ocp), point, Hessian::gauss_newton, qp, scratch);
   ocp.linearise(all_stages(ocp), point, Hessian::exact, exact, scratch);
   ocp.evaluate(point, defects.data(), scratch);
-  const int ns = ocp.capacity().states, nw = ocp.capacity().controls, N = ocp.intervals();
+  const int ns = ocp.capacity().states, N = ocp.intervals();
   for (int i = 0; i < N; ++i)
     for (int j = 0; j < ns; ++j) ASSERT_NEAR(qp.b(i)[j], defects[i * ns + j], 1e-12);
   // The objective is the sum of its stages' costs, each of which its own state and control change alone.
@@ -68,7 +68,7 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
       ASSERT_NEAR((f_up - f_down) / (2.0 * h), slope, tolerance * (1.0 + std::abs(slope))) << "gradient at stage " << i;
       if (i < N) {
         for (int r = 0; r < ns; ++r) {
-          const double entry = is_state ? qp.A(i)[j * ns + r] : qp.B(i)[j * ns + r];
+          const double entry = is_state ? qp.A_of(i)(r, j) : qp.B_of(i)(r, j);
           ASSERT_NEAR((plus[i * ns + r] - minus[i * ns + r]) / (2.0 * h), entry, 1e-6 * (1.0 + std::abs(entry)))
               << "dynamics at stage " << i << ", " << (is_state ? "state " : "control ") << j;
         }
@@ -80,12 +80,12 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
       ocp.linearise(all_stages(ocp), down, Hessian::gauss_newton, moved, scratch);
       gradient(moved, i, s_down, w_down);
       for (int r = 0; r < ocp.state_count(i); ++r) {
-        const double entry = is_state ? exact.Q(i)[j * ns + r] : exact.S(i)[r * nw + j];
+        const double entry = is_state ? exact.Q_of(i)(r, j) : exact.S_of(i)(j, r);
         ASSERT_NEAR((s_up[r] - s_down[r]) / (2.0 * h), entry, tolerance * (1.0 + std::abs(entry)))
             << "Q, S at stage " << i;
       }
       for (int r = 0; r < controls; ++r) {
-        const double entry = is_state ? exact.S(i)[j * nw + r] : exact.R(i)[j * nw + r];
+        const double entry = is_state ? exact.S_of(i)(r, j) : exact.R_of(i)(r, j);
         ASSERT_NEAR((w_up[r] - w_down[r]) / (2.0 * h), entry, tolerance * (1.0 + std::abs(entry)))
             << "S, R at stage " << i;
       }

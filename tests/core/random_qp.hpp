@@ -28,22 +28,27 @@ class RandomQp {
       const int n = states + m;
       Eigen::MatrixXd root = Eigen::MatrixXd::NullaryExpr(n, n, [&] { return uniform(-1.0, 1.0); });
       const Eigen::MatrixXd H = root * root.transpose() + 0.1 * Eigen::MatrixXd::Identity(n, n);
+      qp.Q_of(i) = H.topLeftCorner(states, states);
+      qp.S_of(i) = H.bottomLeftCorner(m, states);
+      qp.S_transposed_of(i) = H.topRightCorner(states, m);
+      qp.R_of(i) = H.bottomRightCorner(m, m);
       for (int c = 0; c < states; ++c) {
-        for (int r = 0; r < states; ++r) qp.Q(i)[c * states + r] = H(r, c);
-        for (int r = 0; r < m; ++r) qp.S(i)[c * controls + r] = H(states + r, c);
         qp.q(i)[c] = uniform(-1.0, 1.0);
         qp.state_lower(i)[c] = -infinity;
         qp.state_upper(i)[c] = infinity;
       }
       for (int c = 0; c < m; ++c) {
-        for (int r = 0; r < m; ++r) qp.R(i)[c * controls + r] = H(states + r, states + c);
         qp.r(i)[c] = uniform(-1.0, 1.0);
         qp.control_lower(i)[c] = -infinity;
         qp.control_upper(i)[c] = infinity;
       }
       if (i == intervals) break;
-      for (int k = 0; k < states * states; ++k) qp.A(i)[k] = uniform(-0.6, 0.6);
-      for (int k = 0; k < states * m; ++k) qp.B(i)[k] = uniform(-1.0, 1.0);
+      // The next stage's size is not known yet, but all have as many states.
+      for (int r = 0; r < states; ++r) {
+        double* F = qp.F(i) + r * qp.stride();
+        for (int c = 0; c < states; ++c) F[c] = uniform(-0.6, 0.6);
+        for (int c = 0; c < m; ++c) F[states + c] = uniform(-1.0, 1.0);
+      }
       for (int k = 0; k < states; ++k) qp.b(i)[k] = uniform(-1.0, 1.0);
     }
     for (int k = 0; k < states; ++k) qp.initial_step()[k] = uniform(-1.0, 1.0);

@@ -90,7 +90,7 @@ TEST(Riccati, RefusesActiveBoundsThatContradictEachOther) {
   StageQp qp = random.make(2, 1, 1, true);
   for (int i = 0; i < 2; ++i) {
     qp.set_sizes(i, 1, 0);
-    qp.A(i)[0] = 1.0;
+    qp.F(i)[0] = 1.0;
     qp.b(i)[0] = 0.0;
   }
   ActiveSet active(qp.capacity());
@@ -130,7 +130,7 @@ TEST(Riccati, ConvexifiesWhatIsNotPositiveDefiniteAndCanWriteItBack) {
   for (int trial = 0; trial < 50; ++trial) {
     StageQp qp = random.make(5, 3, 2, true);
     for (int i = 0; i < 5; ++i)
-      for (int j = 0; j < qp.controls(i); ++j) qp.R(i)[j * 2 + j] -= 4.0;
+      for (int j = 0; j < qp.controls(i); ++j) qp.R_of(i)(j, j) -= 4.0;
     Riccati riccati(qp.capacity());
     const ActiveSet none(qp.capacity());
     Iterate step(qp.capacity()), again(qp.capacity());

@@ -61,12 +61,10 @@ class ToySolver : public rhec::Solver {
   /// Each node goes where its own cost is least: far below the optimum, but no vehicle drives so.
   void ignore_the_dynamics(const rhec::Ocp& ocp, rhec::Iterate& point) noexcept {
     ocp.linearise(rhec::all_stages(ocp), point, rhec::Hessian::gauss_newton, qp_, scratch_);
-    const int width = qp_.capacity().states;
     for (int i = ocp.initial_state() ? 1 : 0; i <= ocp.intervals(); ++i) {
       const int n = ocp.state_count(i);
-      const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> Q(qp_.Q(i), n, n, Eigen::OuterStride<>(width));
       const Eigen::Map<const Eigen::VectorXd> q(qp_.q(i), n);
-      const Eigen::MatrixXd symmetric = Q.selfadjointView<Eigen::Lower>();
+      const Eigen::MatrixXd symmetric = qp_.Q_of(i);
       const Eigen::VectorXd step = symmetric.completeOrthogonalDecomposition().solve(-q);
       for (int j = 0; j < n; ++j)
         point.state(i)[j] = std::clamp(point.state(i)[j] + step[j], ocp.state_lower(i)[j], ocp.state_upper(i)[j]);

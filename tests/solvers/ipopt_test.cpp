@@ -90,14 +90,10 @@ class Scaled final : public Ocp {
     for (int i = 0; i <= intervals(); ++i)
       for (int j = 0; j < state_count(i); ++j) weighted_.costate(i)[j] /= factor_;
     of_.linearise(range, weighted_, hessian, qp, scratch);
-    const int ns = capacity().states, nw = capacity().controls;
-    for (int i = range.first; i <= range.last; ++i) {
-      for (auto [values, count] : {std::pair{qp.Q(i), ns * ns}, {qp.q(i), ns}})
+    const int rows = capacity().states + capacity().controls;
+    for (int i = range.first; i <= range.last; ++i)
+      for (auto [values, count] : {std::pair{qp.H(i), rows * qp.stride()}, {qp.h(i), rows}})
         for (int k = 0; k < count; ++k) values[k] *= factor_;
-      if (i == intervals()) break;
-      for (auto [values, count] : {std::pair{qp.S(i), nw * ns}, {qp.R(i), nw * nw}, {qp.r(i), nw}})
-        for (int k = 0; k < count; ++k) values[k] *= factor_;
-    }
   }
   void refresh(const Iterate&, StageQp&, std::span<double>) const noexcept override {}
 

@@ -245,10 +245,10 @@ std::vector<std::unique_ptr<Program>> structures(int count) {
     StageQp qp = random.make(8, 2, 1, false);
     for (int i = 0; i < 8; ++i) {  // the number in binary: which intervals have a control
       qp.set_sizes(i, 2, (k >> i) & 1);
-      qp.R(i)[0] = 1.0;
-      qp.S(i)[0] = qp.S(i)[1] = 0.1;
-      qp.Q(i)[0] += 1.0;
-      qp.Q(i)[3] += 1.0;
+      qp.R_of(i).setOnes();
+      qp.S_of(i).setConstant(0.1);
+      qp.S_transposed_of(i).setConstant(0.1);
+      qp.Q_of(i).diagonal().array() += 1.0;
     }
     all.push_back(std::make_unique<Program>(qp));
   }
@@ -307,7 +307,7 @@ TEST(StageCovariances, AreThoseOfTheDenseInverse) {
 TEST(StageCovariances, ThereAreNoneWithoutAnInverse) {
   RandomQp random(5);
   StageQp qp = random.make(4, 2, 1, false);
-  for (int i = 0; i <= 4; ++i) qp.Q(i)[0] -= 10.0;
+  for (int i = 0; i <= 4; ++i) qp.Q_of(i)(0, 0) -= 10.0;
   std::vector<double> blocks(20, -7.0);
   EXPECT_FALSE(stage_covariances(qp, blocks));
   EXPECT_THAT(blocks, ::testing::Each(-7.0));
@@ -377,13 +377,13 @@ TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
   int bent = 0, untouched = 0, stages_seen = 0, stages_taken = 0;
   for (int trial = 0; trial < 200; ++trial) {
     const StageQp gauss_newton = random_stages(random);
-    const int N = gauss_newton.intervals(), ns = gauss_newton.capacity().states, nw = gauss_newton.capacity().controls;
+    const int N = gauss_newton.intervals();
     StageQp exact = gauss_newton;
     const int from = random.integer(0, N), to = std::min(N, from + random.integer(0, 1));
     const double shift = random.uniform(0.0, 3.0);
     for (int i = from; i <= to; ++i) {
-      for (int j = 0; j < exact.states(i); ++j) exact.Q(i)[j * ns + j] -= shift;
-      for (int j = 0; j < exact.controls(i); ++j) exact.R(i)[j * nw + j] -= shift;
+      exact.Q_of(i).diagonal().array() -= shift;
+      exact.R_of(i).diagonal().array() -= shift;
     }
     const Program before(exact);
     std::vector<std::uint8_t> fixed(before.n, 0);

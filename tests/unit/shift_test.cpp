@@ -327,7 +327,7 @@ TEST(Shift, CostatesOfCarriedParametersFitTheNewStructure) {
     for (int i = 0; i < problem.intervals(); ++i) {
       for (int j = 0; j < problem.control_count(i); ++j) {
         double sum = qp.r(i)[j];
-        for (int r = 0; r < 4; ++r) sum += qp.B(i)[j * problem.capacity().states + r] * point.costate(i + 1)[r];
+        for (int r = 0; r < 4; ++r) sum += qp.B_of(i)(r, j) * point.costate(i + 1)[r];
         point.control_bound(i)[j] = -sum;
       }
     }

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <vector>
+#include <cstddef>
 
+#include "rhec/core/aligned.hpp"
 #include "rhec/core/export.hpp"
 
 namespace rhec {
@@ -13,6 +14,13 @@ struct Capacity {
   int controls = 0;   ///< n_w, on any interval
 
   bool operator==(const Capacity&) const = default;
+
+  /// The length of a row z = [s; w] of one stage in memory: as long as registers of eight are wide. The state is at its
+  /// beginning, the control at `states`, whatever a stage uses of both.
+  int row() const noexcept {
+    const int used = states + controls;
+    return used > 32 ? (used + 63) / 64 * 64 : (used + 7) / 8 * 8;
+  }
 };
 
 /// A primal-dual point of an Ocp. Rows have the capacity's length, whatever a stage really uses. With the Lagrangian
@@ -29,25 +37,35 @@ class RHEC_EXPORT Iterate {
 
   const Capacity& capacity() const noexcept { return capacity_; }
 
-  double* state(int node) noexcept { return states_.data() + node * capacity_.states; }
-  double* control(int interval) noexcept { return controls_.data() + interval * capacity_.controls; }
-  double* costate(int node) noexcept { return costates_.data() + node * capacity_.states; }
-  double* state_bound(int node) noexcept { return state_bounds_.data() + node * capacity_.states; }
-  double* control_bound(int interval) noexcept { return control_bounds_.data() + interval * capacity_.controls; }
-  const double* state(int node) const noexcept { return states_.data() + node * capacity_.states; }
-  const double* control(int interval) const noexcept { return controls_.data() + interval * capacity_.controls; }
-  const double* costate(int node) const noexcept { return costates_.data() + node * capacity_.states; }
-  const double* state_bound(int node) const noexcept { return state_bounds_.data() + node * capacity_.states; }
-  const double* control_bound(int interval) const noexcept {
-    return control_bounds_.data() + interval * capacity_.controls;
-  }
+  double* state(int node) noexcept { return at(values_, node); }
+  double* control(int interval) noexcept { return at(values_, interval) + capacity_.states; }
+  double* costate(int node) noexcept { return at(costates_, node); }
+  double* state_bound(int node) noexcept { return at(bounds_, node); }
+  double* control_bound(int interval) noexcept { return at(bounds_, interval) + capacity_.states; }
+  const double* state(int node) const noexcept { return at(values_, node); }
+  const double* control(int interval) const noexcept { return at(values_, interval) + capacity_.states; }
+  const double* costate(int node) const noexcept { return at(costates_, node); }
+  const double* state_bound(int node) const noexcept { return at(bounds_, node); }
+  const double* control_bound(int interval) const noexcept { return at(bounds_, interval) + capacity_.states; }
+
+  /// Values and bound multipliers of a stage as one row [s; w], which begins at the state; rows follow each other.
+  double* row(int stage) noexcept { return at(values_, stage); }
+  double* bound_row(int stage) noexcept { return at(bounds_, stage); }
+  const double* row(int stage) const noexcept { return at(values_, stage); }
+  const double* bound_row(int stage) const noexcept { return at(bounds_, stage); }
 
   bool is_finite() const noexcept;
   void clear_multipliers() noexcept;
 
  private:
+  double* at(AlignedDoubles& v, int i) const noexcept { return v.data() + static_cast<std::ptrdiff_t>(i) * row_; }
+  const double* at(const AlignedDoubles& v, int i) const noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * row_;
+  }
+
   Capacity capacity_;
-  std::vector<double> states_, controls_, costates_, state_bounds_, control_bounds_;
+  int row_ = 0;
+  AlignedDoubles values_, costates_, bounds_;
 };
 
 }  // namespace rhec

@@ -7,24 +7,29 @@
 
 namespace rhec {
 
+struct RiccatiKernels;
+struct RiccatiView;
+
 /// Which bounds of a StageQp are held as equalities: -1 at the lower bound, +1 at the upper, 0 free.
 class RHEC_EXPORT ActiveSet {
  public:
   ActiveSet() = default;
   explicit ActiveSet(const Capacity& capacity);
 
-  std::int8_t* state(int node) noexcept { return states_.data() + node * capacity_.states; }
-  std::int8_t* control(int interval) noexcept { return controls_.data() + interval * capacity_.controls; }
-  const std::int8_t* state(int node) const noexcept { return states_.data() + node * capacity_.states; }
-  const std::int8_t* control(int interval) const noexcept { return controls_.data() + interval * capacity_.controls; }
+  std::int8_t* state(int node) noexcept { return row(node); }
+  std::int8_t* control(int interval) noexcept { return row(interval) + capacity_.states; }
+  const std::int8_t* state(int node) const noexcept { return row(node); }
+  const std::int8_t* control(int interval) const noexcept { return row(interval) + capacity_.states; }
+  /// A stage's states and controls as in a row of StageQp.
+  std::int8_t* row(int stage) noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
+  const std::int8_t* row(int stage) const noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
   void clear() noexcept;
-  bool operator==(const ActiveSet& other) const noexcept {
-    return states_ == other.states_ && controls_ == other.controls_;
-  }
+  bool operator==(const ActiveSet& other) const noexcept { return sides_ == other.sides_; }
 
  private:
   Capacity capacity_;
-  std::vector<std::int8_t> states_, controls_;
+  int row_ = 0;
+  std::vector<std::int8_t> sides_;
 };
 
 /// Solves a StageQp in which the bounds of an active set hold with equality and all others are ignored, by a backward
@@ -49,23 +54,19 @@ class RHEC_EXPORT Riccati {
   Riccati() = default;
   explicit Riccati(const Capacity& capacity);
 
-  /// Diagonals to be added to Q and R (barrier terms), or null; rows have the capacity's length.
-  struct Diagonals {
-    const double* states = nullptr;
-    const double* controls = nullptr;
-  };
-  void factor(const StageQp& qp, const ActiveSet& active, const Diagonals& extra) noexcept;
-  void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, {}); }
+  /// `diagonal`, if not null, is added to the diagonals of H (barrier terms): a row of the program's stride a stage.
+  void factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
+  void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, nullptr); }
   bool was_convexified() const noexcept { return convexified_; }
   /// After a `factor` without active bounds: puts what convexification changed into the program's R, whose reduced
   /// Hessian is positive definite from then on, whichever bounds become active.
   void write_convexified(StageQp& qp) noexcept;
 
   /// The minimiser as a step, with costates and the multipliers of the active bounds, for vectors that may be newer
-  /// than `factor`; q and r may be replaced by rows of the caller (null: those of the program).
-  Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* q, const double* r) noexcept;
+  /// than `factor`; the gradients h may be replaced by rows of the caller (null: those of the program).
+  Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* h) noexcept;
   Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept {
-    return solve(qp, active, step, nullptr, nullptr);
+    return solve(qp, active, step, nullptr);
   }
 
   /// The control of stage i as the last `solve` would choose it for any stage-state step: w = T v(s) + Y s + y0.
@@ -78,9 +79,11 @@ class RHEC_EXPORT Riccati {
 
   /// The largest number of controls, and of states, that one stage may have.
   static constexpr int max_width = 32;
+  /// A reduced Hessian with a pivot below this part of its diagonal entry is not positive definite enough.
+  static constexpr double definite_tolerance = 1e-11;
 
  private:
-  /// How one stage was reduced. Node 0 of a free initial state is a stage too, with s_0 in the place of w.
+  /// How a special stage was reduced. Node 0 of a free initial state is a stage too, with s_0 in the place of w.
   struct Reduction {
     int free = 0;       ///< directions left to decide
     int rows = 0;       ///< rows of C that were reduced here
@@ -89,32 +92,46 @@ class RHEC_EXPORT Riccati {
     bool plain = true;  ///< nothing is fixed and there are no rows: T is the identity
     bool overflow = false;
   };
-  /// Pointers to what is kept of one stage; see the members.
-  struct View {
-    double *P, *G, *L, *factor, *K, *T, *Y, *C, *eliminator;
+  /// Pointers to what is kept of one special stage; see the members.
+  struct Special {
+    double *G, *L, *factor, *K, *T, *Y, *C, *eliminator;
     int *pivot_row, *pivot_column, *left_row;
   };
-  View view(int i) noexcept;
-  void factor_stage(const StageQp& qp, const ActiveSet& active, const Diagonals& extra, int i) noexcept;
+  Special special(int i) noexcept;
+  RiccatiView view_of(const StageQp& qp, const ActiveSet& active) noexcept;
+  double* P(int node) noexcept { return P_.data() + static_cast<std::ptrdiff_t>(node) * ns_ * stride_; }
+  double* p(int node) noexcept { return p_.data() + static_cast<std::ptrdiff_t>(node) * stride_; }
+
+  void factor_special(const StageQp& qp, const ActiveSet& active, const RiccatiView& view, int i) noexcept;
   void factor_initial(const StageQp& qp, const ActiveSet& active) noexcept;
   int count_active(const StageQp& qp, const ActiveSet& active, int node) const noexcept;
   void write_active_rows(const StageQp& qp, const ActiveSet& active, int node) noexcept;
-  void eliminate(double* D, double* F, int rows, int width, const bool* fixed, Reduction& reduction, View& v) noexcept;
+  void write_active_bounds(const StageQp& qp, const ActiveSet& active, int node) noexcept;
+  void eliminate(double* D, double* F, int rows, int width, const bool* fixed, Reduction& reduction,
+                 Special& v) noexcept;
   void null_space(const double* D, const double* F, int width, const bool* fixed, const Reduction& reduction,
-                  View& v) noexcept;
+                  Special& v) noexcept;
   void factor_reduced(double* reduced, int n, double tolerance, double* factor) noexcept;
-  bool transform_rows(const double* right_hand_side, const Reduction& reduction, const View& v, double* transformed,
+  bool transform_rows(const double* right_hand_side, const Reduction& reduction, const Special& v, double* transformed,
                       double scale) const noexcept;
+  bool solve_special_backward(const StageQp& qp, const ActiveSet& active, const double* h, int i) noexcept;
+  bool solve_initial(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept;
+  void solve_special_forward(const StageQp& qp, const ActiveSet& active, Iterate& step, int i) noexcept;
+  void write_bound_multipliers(const StageQp& qp, const ActiveSet& active, Iterate& step, int node) noexcept;
 
   Capacity capacity_;
-  int ns_ = 0, nw_ = 0, width_ = 0, max_rows_ = 0;
+  int ns_ = 0, nw_ = 0, stride_ = 0, width_ = 0, max_rows_ = 0;
   bool convexified_ = false;
+  const RiccatiKernels* kernels_ = nullptr;
+  AlignedDoubles P_, U_, inverse_, drift_, g_, p_;  // see RiccatiView
+  std::vector<int> state_counts_, control_counts_;
+  std::vector<std::uint8_t> is_special_;            // N stages
   std::vector<Reduction> reductions_;       // N stages, then node 0
-  std::vector<double> P_, G_, L_, factor_;  // value functions; full G and L; Cholesky factor of the reduced G
+  std::vector<double> G_, L_, factor_;      // of special stages: full G and L; Cholesky factor of the reduced G
   std::vector<double> K_, T_, Y_;           // v = -K s - k, w = T v + Y s + y0
   std::vector<double> C_, eliminator_;      // rows at each node; row operations of the elimination at each stage
   std::vector<int> pivot_row_, pivot_column_, left_row_;
-  std::vector<double> p_, d_, g_, y0_, k_, row_multipliers_, work_;
+  std::vector<double> d_, special_g_, y0_, k_, row_multipliers_, work_;
 };
 
 }  // namespace rhec

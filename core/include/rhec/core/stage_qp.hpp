@@ -9,19 +9,23 @@
 
 namespace rhec {
 
-/// An Ocp linearised at a point, in the steps (ds_i, dw_i) from there:
+/// An Ocp linearised at a point, in the steps z_i = [ds_i; dw_i] from there:
 ///
-///     minimise    sum_{i=0}^{N} 1/2 [ds; dw]' [Q S'; S R] [ds; dw] + q' ds + r' dw        (no dw at node N)
-///     subject to  ds_{i+1} = A ds_i + B dw_i + b_i
-///                 state_lower_i <= ds_i <= state_upper_i,  control_lower_i <= dw_i <= control_upper_i
+///     minimise    sum_{i=0}^{N} 1/2 z_i' H_i z_i + h_i' z_i                           (no dw at node N)
+///     subject to  ds_{i+1} = F_i z_i + b_i,   lower_i <= z_i <= upper_i
 ///                 ds_0 = initial_step where the initial state is given
 ///
-/// Sizes are per stage and at run time; storage is column-major with the capacity's leading dimensions (n_s for A B Q,
-/// n_w for S R), so that it never moves. S is n_w x n_s.
+/// and with the blocks  F = [A B],  H = [Q S'; S R],  h = [q; r].
+///
+/// Sizes are per stage and at run time; storage never moves. All rows have the length `stride` = capacity().row():
+/// a stage's F is n_s such rows (row r: what next state r depends on), its H is symmetric and as many rows (or columns)
+/// as z has entries, both halves filled. What a stage does not use of a row is zero, and free of bounds.
 class RHEC_EXPORT StageQp {
  public:
-  using Matrix = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-  using ConstMatrix = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+  using Rows = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0,
+                          Eigen::OuterStride<>>;
+  using ConstRows = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0,
+                               Eigen::OuterStride<>>;
   using Vector = Eigen::Map<Eigen::VectorXd>;
   using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
@@ -29,67 +33,84 @@ class RHEC_EXPORT StageQp {
   explicit StageQp(const Capacity& capacity);
 
   const Capacity& capacity() const noexcept { return capacity_; }
+  int stride() const noexcept { return stride_; }
   int intervals() const noexcept { return intervals_; }
   int states(int node) const noexcept { return state_counts_[node]; }
   int controls(int interval) const noexcept { return interval < intervals_ ? control_counts_[interval] : 0; }
   void set_intervals(int intervals) noexcept { intervals_ = intervals; }
+  /// Clears what a stage that has become smaller does not use any more.
   void set_sizes(int node, int states, int controls) noexcept {
+    if (states < state_counts_[node] || controls < control_counts_[node]) clear(node);
     state_counts_[node] = states;
     control_counts_[node] = controls;
   }
   bool initial_state_is_given = false;
 
   // Raw access for kernels: pointers to stage i.
-  double* A(int i) noexcept { return at(A_, i, ns_ * ns_); }
-  double* B(int i) noexcept { return at(B_, i, ns_ * nw_); }
-  double* b(int i) noexcept { return at(b_, i, ns_); }
-  double* Q(int i) noexcept { return at(Q_, i, ns_ * ns_); }
-  double* S(int i) noexcept { return at(S_, i, nw_ * ns_); }
-  double* R(int i) noexcept { return at(R_, i, nw_ * nw_); }
-  double* q(int i) noexcept { return at(q_, i, ns_); }
-  double* r(int i) noexcept { return at(r_, i, nw_); }
-  double* state_lower(int i) noexcept { return at(state_lower_, i, ns_); }
-  double* state_upper(int i) noexcept { return at(state_upper_, i, ns_); }
-  double* control_lower(int i) noexcept { return at(control_lower_, i, nw_); }
-  double* control_upper(int i) noexcept { return at(control_upper_, i, nw_); }
+  double* F(int i) noexcept { return at(F_, i, capacity_.states); }
+  double* H(int i) noexcept { return at(H_, i, wide_); }
+  double* h(int i) noexcept { return at(h_, i, 1); }
+  double* b(int i) noexcept { return at(b_, i, 1); }
+  double* lower(int i) noexcept { return at(lower_, i, 1); }
+  double* upper(int i) noexcept { return at(upper_, i, 1); }
+  double* q(int i) noexcept { return h(i); }
+  double* r(int i) noexcept { return h(i) + capacity_.states; }
+  double* state_lower(int i) noexcept { return lower(i); }
+  double* state_upper(int i) noexcept { return upper(i); }
+  double* control_lower(int i) noexcept { return lower(i) + capacity_.states; }
+  double* control_upper(int i) noexcept { return upper(i) + capacity_.states; }
   double* initial_step() noexcept { return initial_step_.data(); }
-  const double* A(int i) const noexcept { return at(A_, i, ns_ * ns_); }
-  const double* B(int i) const noexcept { return at(B_, i, ns_ * nw_); }
-  const double* b(int i) const noexcept { return at(b_, i, ns_); }
-  const double* Q(int i) const noexcept { return at(Q_, i, ns_ * ns_); }
-  const double* S(int i) const noexcept { return at(S_, i, nw_ * ns_); }
-  const double* R(int i) const noexcept { return at(R_, i, nw_ * nw_); }
-  const double* q(int i) const noexcept { return at(q_, i, ns_); }
-  const double* r(int i) const noexcept { return at(r_, i, nw_); }
-  const double* state_lower(int i) const noexcept { return at(state_lower_, i, ns_); }
-  const double* state_upper(int i) const noexcept { return at(state_upper_, i, ns_); }
-  const double* control_lower(int i) const noexcept { return at(control_lower_, i, nw_); }
-  const double* control_upper(int i) const noexcept { return at(control_upper_, i, nw_); }
+  const double* F(int i) const noexcept { return at(F_, i, capacity_.states); }
+  const double* H(int i) const noexcept { return at(H_, i, wide_); }
+  const double* h(int i) const noexcept { return at(h_, i, 1); }
+  const double* b(int i) const noexcept { return at(b_, i, 1); }
+  const double* lower(int i) const noexcept { return at(lower_, i, 1); }
+  const double* upper(int i) const noexcept { return at(upper_, i, 1); }
+  const double* q(int i) const noexcept { return h(i); }
+  const double* r(int i) const noexcept { return h(i) + capacity_.states; }
+  const double* state_lower(int i) const noexcept { return lower(i); }
+  const double* state_upper(int i) const noexcept { return upper(i); }
+  const double* control_lower(int i) const noexcept { return lower(i) + capacity_.states; }
+  const double* control_upper(int i) const noexcept { return upper(i) + capacity_.states; }
   const double* initial_step() const noexcept { return initial_step_.data(); }
 
-  // The same as Eigen views of the stage's true size.
-  ConstMatrix A_of(int i) const { return {A(i), states(i + 1), states(i), Eigen::OuterStride<>(ns_)}; }
-  ConstMatrix B_of(int i) const { return {B(i), states(i + 1), controls(i), Eigen::OuterStride<>(ns_)}; }
+  // The same as Eigen views of the stage's true size. S is n_w x n_s; who writes it writes its transpose too.
+  Rows A_of(int i) { return rows(F(i), states(i + 1), states(i)); }
+  Rows B_of(int i) { return rows(F(i) + capacity_.states, states(i + 1), controls(i)); }
+  Rows Q_of(int i) { return rows(H(i), states(i), states(i)); }
+  Rows S_of(int i) { return rows(control_rows(i), controls(i), states(i)); }
+  Rows S_transposed_of(int i) { return rows(H(i) + capacity_.states, states(i), controls(i)); }
+  Rows R_of(int i) { return rows(control_rows(i) + capacity_.states, controls(i), controls(i)); }
+  ConstRows A_of(int i) const { return rows(F(i), states(i + 1), states(i)); }
+  ConstRows B_of(int i) const { return rows(F(i) + capacity_.states, states(i + 1), controls(i)); }
+  ConstRows Q_of(int i) const { return rows(H(i), states(i), states(i)); }
+  ConstRows S_of(int i) const { return rows(control_rows(i), controls(i), states(i)); }
+  ConstRows R_of(int i) const { return rows(control_rows(i) + capacity_.states, controls(i), controls(i)); }
   ConstVector b_of(int i) const { return {b(i), states(i + 1)}; }
-  ConstMatrix Q_of(int i) const { return {Q(i), states(i), states(i), Eigen::OuterStride<>(ns_)}; }
-  ConstMatrix S_of(int i) const { return {S(i), controls(i), states(i), Eigen::OuterStride<>(nw_)}; }
-  ConstMatrix R_of(int i) const { return {R(i), controls(i), controls(i), Eigen::OuterStride<>(nw_)}; }
   ConstVector q_of(int i) const { return {q(i), states(i)}; }
   ConstVector r_of(int i) const { return {r(i), controls(i)}; }
 
  private:
-  static double* at(std::vector<double>& v, int i, int size) noexcept {
-    return v.data() + static_cast<std::ptrdiff_t>(i) * size;
+  double* at(AlignedDoubles& v, int i, int rows) const noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * rows * stride_;
   }
-  static const double* at(const std::vector<double>& v, int i, int size) noexcept {
-    return v.data() + static_cast<std::ptrdiff_t>(i) * size;
+  const double* at(const AlignedDoubles& v, int i, int rows) const noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * rows * stride_;
   }
+  double* control_rows(int i) noexcept { return H(i) + static_cast<std::ptrdiff_t>(capacity_.states) * stride_; }
+  const double* control_rows(int i) const noexcept {
+    return H(i) + static_cast<std::ptrdiff_t>(capacity_.states) * stride_;
+  }
+  Rows rows(double* first, int count, int length) { return {first, count, length, Eigen::OuterStride<>(stride_)}; }
+  ConstRows rows(const double* first, int count, int length) const {
+    return {first, count, length, Eigen::OuterStride<>(stride_)};
+  }
+  void clear(int i) noexcept;
 
   Capacity capacity_;
-  int ns_ = 0, nw_ = 0, intervals_ = 0;
+  int stride_ = 0, wide_ = 0, intervals_ = 0;
   std::vector<int> state_counts_, control_counts_;
-  std::vector<double> A_, B_, b_, Q_, S_, R_, q_, r_;
-  std::vector<double> state_lower_, state_upper_, control_lower_, control_upper_, initial_step_;
+  AlignedDoubles F_, H_, h_, b_, lower_, upper_, initial_step_;
 };
 
 }  // namespace rhec

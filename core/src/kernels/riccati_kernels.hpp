@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+
+namespace rhec {
+
+/// What the kernels of the Riccati recursion work on: plain pointers, so that units for different instruction sets share
+/// nothing else. All rows have `stride` entries; see StageQp for the program and Riccati for the rest.
+struct RiccatiView {
+  int intervals = 0;
+  int states = 0;    ///< of the capacity: where the controls begin in a row
+  int controls = 0;  ///< of the capacity
+  int stride = 0;
+  const int* state_counts = nullptr;
+  const int* control_counts = nullptr;
+
+  const double *F = nullptr, *H = nullptr, *h = nullptr, *b = nullptr;
+  const double *lower = nullptr, *upper = nullptr;
+  const double* diagonal = nullptr;     ///< a row a stage, added to the diagonal of H; or null
+  const std::int8_t* sides = nullptr;   ///< a row a stage: which bounds hold
+  const std::uint8_t* special = nullptr;  ///< stages that are not for the kernels
+
+  double* P = nullptr;        ///< n_s rows a node
+  double* U = nullptr;        ///< n_w rows a stage: columns of the reduced Hessian, each as it is eliminated
+  double* inverse = nullptr;  ///< n_w a stage: 1 / pivot, 0 where a control is fixed
+  double* drift = nullptr;    ///< a row a stage: P_{i+1} b_i
+  double* g = nullptr;        ///< a row a stage: gradient by z before anything is eliminated
+  double* p = nullptr;        ///< a row a node: gradient of the value function; beside it, of each control at its turn
+
+  double *values = nullptr, *costates = nullptr, *bounds = nullptr;  ///< rows of the step, an Iterate
+};
+
+/// The recursion over stages at which no state bound holds that must be kept by their controls.
+struct RiccatiKernels {
+  /// Factorises stages first, first - 1, ..., 0; returns the one that it leaves to the caller (a special one, or one whose
+  /// pivot is not above `tolerance` times its diagonal entry), or -1.
+  int (*factor)(const RiccatiView& view, int first, double tolerance);
+  /// The same for gradients; only special stages are left to the caller.
+  int (*solve_backward)(const RiccatiView& view, int first);
+  /// Control, next state and costate of stages first, first + 1, ...; returns the special one, or N.
+  int (*solve_forward)(const RiccatiView& view, int first);
+  /// H + F'PF of one stage, as rows of `out`.
+  void (*form)(const RiccatiView& view, int stage, double* out);
+};
+
+}  // namespace rhec
