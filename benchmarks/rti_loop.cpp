@@ -1,0 +1,71 @@
+#include "rti_loop.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rhec/core/error.hpp"
+#include "rhec/core/rhc_problem.hpp"
+
+namespace rhec::bench {
+
+RtiLoop::RtiLoop(const Sequence& sequence, std::shared_ptr<Solver> solver)
+    : sequence_(&sequence),
+      solver_(std::move(solver)),
+      problem_(sequence.workspace.get()),
+      shifter_(*problem_),
+      point_(problem_->capacity()),
+      guess_(problem_->capacity()),
+      scratch_(problem_->scratch_size()) {
+  if (const std::string reason = solver_->why_not(*problem_); !reason.empty())
+    throw Error(sequence.name + ": the solver cannot take this problem: " + reason);
+  solver_->setup(*problem_);
+}
+
+void RtiLoop::restart() noexcept {
+  solver_->reset();
+  next_ = 0;
+}
+
+const Report& RtiLoop::step() noexcept {
+  const auto& [sample, steps] = sequence_->samples[next_];
+  times_.begin = Ticks::now();
+  if (next_ == 0) {
+    set_known(*sample, *problem_);
+    point_ = sequence_->start;
+    times_.prepared = Ticks::now();
+  } else {
+    shifter_.take(*problem_, point_);
+    set_known(*sample, *problem_);
+    shifter_.apply(steps, *problem_, point_);
+    solver_->prepare(*problem_, point_);
+    times_.prepared = Ticks::now();
+    if (keep_guess) guess_ = point_;
+  }
+  set_newest(*sample, *problem_, scratch_);
+  report_ = solver_->solve(*problem_, point_);
+  times_.end = Ticks::now();
+  ++next_;
+  return report_;
+}
+
+std::vector<double> excess_objectives(const Sequence& sequence, const std::shared_ptr<Solver>& solver,
+                                      const std::shared_ptr<Solver>& converging) {
+  RtiLoop loop(sequence, solver);
+  loop.restart();
+  converging->setup(*sequence.workspace);
+  std::vector<double> scratch(sequence.workspace->scratch_size()), excess;
+  for (std::size_t k = 0; k < sequence.samples.size(); ++k) {
+    loop.step();
+    Iterate stepped = loop.point(), optimum = loop.point();
+    if (sequence.kind == OcpKind::rhc) roll_out(loop.problem(), stepped, scratch);
+    const Report report = converging->solve(loop.problem(), optimum);
+    if (report.status != Status::solved)
+      throw Error(sequence.name + ": sample " + std::to_string(k) + " does not converge: " + name_of(report.status));
+    const double objective = loop.problem().evaluate(stepped, nullptr, scratch);
+    excess.push_back((objective - report.objective) / std::abs(report.objective));
+  }
+  return excess;
+}
+
+}  // namespace rhec::bench

@@ -1,0 +1,99 @@
+// One real-time iteration of gn_rti, over sequences of problems in their order, each sample once a pass: data setting,
+// shift, preparation, and the step with its judgement. Times are of single samples: the median over the passes of each,
+// and of these the median, 99th percentile and largest over the sequence.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "program.hpp"
+#include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/spread.hpp"
+#include "rti_loop.hpp"
+
+namespace rhec::bench {
+namespace {
+
+/// Over the passes, for each sample.
+class PassTimes {
+ public:
+  explicit PassTimes(std::size_t samples) : of_sample_(samples) {}
+  void add(std::size_t sample, double value) { of_sample_[sample].push_back(value); }
+  /// Leaves out the first sample, which has no solution before it.
+  sim::Spread spread() const {
+    std::vector<double> medians;
+    for (std::size_t k = 1; k < of_sample_.size(); ++k) medians.push_back(sim::spread_of(of_sample_[k]).median);
+    return sim::spread_of(medians);
+  }
+  double first() const { return sim::spread_of(of_sample_[0]).median; }
+  double worst() const {
+    double largest = 0.0;
+    for (std::size_t k = 1; k < of_sample_.size(); ++k)
+      largest = std::max(largest, *std::max_element(of_sample_[k].begin(), of_sample_[k].end()));
+    return largest;
+  }
+
+ private:
+  std::vector<std::vector<double>> of_sample_;
+};
+
+void run(benchmark::State& state, const Host& host, const Sequence& sequence) {
+  const auto make = [&](const char* options) { return host.make_solver("gn_rti", parse_yaml(options, "benchmark")); };
+  const std::size_t count = sequence.samples.size();
+  RtiLoop loop(sequence, make("{mode: rti}"));
+  PassTimes total(count), feedback(count);
+  int refactored = 0, fallbacks = 0;
+  for (auto _ : state) {
+    loop.restart();
+    refactored = fallbacks = 0;
+    double sum = 0.0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const Report& report = loop.step();
+      if (!is_usable(report.status)) throw Error(sequence.name + ": a step failed: " + name_of(report.status));
+      total.add(k, loop.times().total_us());
+      feedback.add(k, loop.times().feedback_us());
+      sum += loop.times().total_us();
+      if (k == 0) continue;
+      refactored += report.factorisations > 1;
+      fallbacks += report.fallback_used;
+    }
+    state.SetIterationTime(1e-6 * sum);
+  }
+  const auto excess = sim::spread_of(
+      excess_objectives(sequence, make("{mode: rti}"), make("{mode: converge, tolerance: 1e-9, max_iterations: 200}")));
+  auto& counters = state.counters;
+  counters["samples"] = static_cast<double>(count);
+  counters["median_us"] = total.spread().median;
+  counters["p99_us"] = total.spread().p99;
+  counters["max_us"] = total.spread().max;
+  counters["worst_us"] = total.worst();
+  counters["first_us"] = total.first();
+  counters["feedback_us"] = feedback.spread().median;
+  counters["feedback_p99_us"] = feedback.spread().p99;
+  counters["feedback_share"] = feedback.spread().median / total.spread().median;
+  counters["active_set_changed"] = refactored;
+  counters["fallbacks"] = fallbacks;
+  counters["excess_median"] = excess.median;
+  counters["excess_p99"] = excess.p99;
+  counters["excess_max"] = excess.max;
+}
+
+void register_all() {
+  const Host host;
+  const auto add = [&](std::vector<Sequence> sequences) {
+    for (Sequence& sequence : sequences) {
+      const auto kept = std::make_shared<Sequence>(std::move(sequence));
+      benchmark::RegisterBenchmark(("rti_step/" + kept->name).c_str(),
+                                   [host, kept](benchmark::State& state) { run(state, host, *kept); })
+          ->UseManualTime()
+          ->Unit(benchmark::kMicrosecond);
+    }
+  };
+  add(references_or_word(host));
+  for (const Drive& how : usual_drives()) add(drive(host, how));
+}
+
+}  // namespace
+}  // namespace rhec::bench
+
+int main(int count, char** words) { return rhec::bench::run_program(count, words, rhec::bench::register_all); }

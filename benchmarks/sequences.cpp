@@ -1,0 +1,179 @@
+#include "sequences.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "rhec/core/error.hpp"
+#include "rhec/core/rhc_problem.hpp"
+#include "rhec/core/rhe_problem.hpp"
+#include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/csv.hpp"
+
+namespace rhec::bench {
+namespace {
+
+using sim::ProblemRecord;
+constexpr int longest_horizon = 10000;
+
+/// Records by prefix, in the order in which the prefixes come.
+std::vector<std::vector<ProblemRecord>> by_prefix(std::vector<ProblemRecord> records) {
+  std::vector<std::vector<ProblemRecord>> groups;
+  std::map<std::string, std::size_t> place;
+  for (ProblemRecord& record : records) {
+    const auto [at, is_new] = place.try_emplace(record.prefix, groups.size());
+    if (is_new) groups.emplace_back();
+    groups[at->second].push_back(std::move(record));
+  }
+  return groups;
+}
+
+std::filesystem::path reference_folder() {
+  if (const char* given = std::getenv("RHEC_REFERENCE_PROBLEMS")) return given;
+  return RHEC_SOURCE_DIRECTORY "/../shared/data/problems";
+}
+
+void set_blocks(const RheProblem& from, RheProblem& to) noexcept {
+  std::array<std::uint8_t, longest_horizon> begins;
+  for (int j = 0; j < from.channel_count(); ++j) {
+    for (int i = 0; i < from.intervals(); ++i) begins[i] = from.begins(i, j);
+    to.set_blocks(j, begins.data(), from.is_ramp(j) ? Transition::ramp : Transition::step);
+    for (int i = 0; i < from.intervals(); ++i)
+      if (begins[i]) to.link(i, j, from.link_variance(i, j));
+  }
+}
+
+void set_known(const RheProblem& from, RheProblem& to) noexcept {
+  const int N = from.intervals(), ny = from.model().output_count(), nu = from.model().input_count();
+  to.set_intervals(N);
+  to.arrival_mean = from.arrival_mean;
+  to.arrival_information = from.arrival_information;
+  std::copy_n(from.output(0), N * ny, to.output(0));
+  std::copy_n(from.measured_input(0), N * nu, to.measured_input(0));
+  for (int i = 0; i < N; ++i) to.set_duration(i, from.duration(i));
+  set_blocks(from, to);
+  to.finish();
+  // What the newest node will say stays open; that it will say something is known.
+  for (int j = 0; j < ny; ++j)
+    to.output(N)[j] = std::isnan(from.output(N)[j]) ? std::numeric_limits<double>::quiet_NaN() : to.output(N - 1)[j];
+}
+
+void set_newest(const RhcProblem& from, RhcProblem& to, std::span<double> scratch) noexcept {
+  const int N = from.intervals(), nx = from.model().state_count(), nu = from.model().input_count();
+  std::copy_n(from.initial_state(), nx + from.model().parameter_count(), to.given_state());
+  std::copy_n(from.state_reference(0), (N + 1) * nx, to.state_reference(0));
+  std::copy_n(from.input_reference(0), N * nu, to.input_reference(0));
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < nu; ++j) {
+      to.input_lower(i, j) = from.input_lower(i, j);
+      to.input_upper(i, j) = from.input_upper(i, j);
+    }
+  }
+  to.finish(scratch);
+}
+
+}  // namespace
+
+void set_known(const HorizonProblem& from, HorizonProblem& to) noexcept {
+  if (from.kind() == OcpKind::rhe) {
+    set_known(static_cast<const RheProblem&>(from), static_cast<RheProblem&>(to));
+    return;
+  }
+  // A controller that looks ahead keeps its references until it knows where the vehicle is.
+  auto& control = static_cast<RhcProblem&>(to);
+  control.set_intervals(from.intervals());
+  for (int i = 0; i < from.intervals(); ++i) control.set_duration(i, from.duration(i));
+}
+
+void set_newest(const HorizonProblem& from, HorizonProblem& to, std::span<double> scratch) noexcept {
+  if (from.kind() == OcpKind::rhc) {
+    set_newest(static_cast<const RhcProblem&>(from), static_cast<RhcProblem&>(to), scratch);
+    return;
+  }
+  const int N = from.intervals();
+  std::copy_n(static_cast<const RheProblem&>(from).output(N), from.model().output_count(),
+              static_cast<RheProblem&>(to).output(N));
+}
+
+Sequence sequence_of(const std::vector<ProblemRecord>& records, const std::shared_ptr<const Model>& model) {
+  Sequence made;
+  made.name = records.front().prefix;
+  made.kind = records.front().kind;
+  made.model = model;
+  int longest = 0;
+  for (const ProblemRecord& record : records) longest = std::max(longest, record.intervals);
+  std::int64_t before = records.front().first_interval();
+  for (const ProblemRecord& record : records) {
+    const std::int64_t first = record.first_interval();
+    made.samples.push_back({sim::build(record, model, longest), static_cast<int>(first - before)});
+    before = first;
+  }
+  made.workspace = sim::build(records.front(), model, longest);
+  made.start = Iterate(made.workspace->capacity());
+  sim::start(records.front(), *made.workspace, made.start);
+  return made;
+}
+
+std::vector<Sequence> reference_sequences(const Host& host) {
+  std::vector<Sequence> made;
+  const std::filesystem::path folder = reference_folder();
+  for (const char* name : {"gentle-rhe", "tight-rhe", "lag-rhc", "tight-rhc"}) {
+    const std::filesystem::path file = folder / (std::string(name) + ".jsonl");
+    if (!std::filesystem::exists(file)) continue;
+    for (const auto& records : by_prefix(sim::read_problems(sim::read_text(file.string()), file.string())))
+      made.push_back(sequence_of(records, host.make_model(records[0].model, records[0].model_options)));
+  }
+  return made;
+}
+
+std::vector<Sequence> drive(const Host& host, const Drive& how) {
+  Settings settings = load_yaml(RHEC_SOURCE_DIRECTORY "/scenarios/" + how.scenario + ".yaml");
+  for (const std::string& assignment : how.assignments) apply_assignment(settings, assignment);
+  const sim::Scenario scenario(host, settings);
+  const PluginChoice model = scenario.robot().model_choice();
+
+  std::map<std::string, std::vector<ProblemRecord>> records;
+  std::optional<Error> failure;
+  sim::LoopHooks hooks;
+  hooks.solved = [&](std::int64_t step, const HorizonProblem& problem, const Iterate& guess, const Iterate&,
+                     const Report&) {
+    if (step < problem.capacity().intervals) return;
+    try {
+      const std::string kind = problem.kind() == OcpKind::rhe ? "rhe" : "rhc";
+      auto& kept = records[kind];
+      if (!kept.empty() && kept.back().step == step) kept.pop_back();  // of several solves the last one counts
+      const std::string id = how.name + "/" + kind + "/" + std::to_string(step);
+      kept.push_back(sim::record_of(problem, &guess, id, model.name, model.options));
+    } catch (const Error& mistake) {
+      failure = mistake;  // a solver must not throw
+    }
+  };
+  const sim::RunLog log = sim::run_closed_loop(scenario, hooks);
+  if (failure) throw Error(how.name + ": " + failure->what());
+  if (!log.completed) throw Error(how.name + ": the drive ended early: " + log.ended);
+
+  std::vector<Sequence> made;
+  for (const auto& [kind, kept] : records) made.push_back(sequence_of(kept, scenario.robot().model()));
+  return made;
+}
+
+const std::vector<Drive>& usual_drives() {
+  static const std::string full = "{name: full_horizon}", blocks = "{name: structured, size: 5, overlap: 3}";
+  static const std::vector<Drive> drives = {
+      {"figure8/fhb", "figure8", {"path.laps=1", "blocking.kappa=" + full}},
+      {"figure8/sbo_5_3", "figure8", {"path.laps=1", "blocking.kappa=" + blocks}},
+      {"figure8/sbo_5_3_both", "figure8", {"path.laps=1", "blocking.kappa=" + blocks, "blocking.mu=" + blocks}},
+      {"zigzag/fhb", "zigzag", {"path.legs=4", "path.turn_radius=3", "speed=4", "blocking.kappa=" + full}},
+      {"zigzag/sbo_2_4", "zigzag", {"path.legs=4", "path.turn_radius=3", "speed=4"}},
+  };
+  return drives;
+}
+
+}  // namespace rhec::bench
