@@ -134,7 +134,7 @@ std::vector<Sequence> reference_sequences(const Host& host) {
 }
 
 std::vector<Sequence> drive(const Host& host, const Drive& how) {
-  Settings settings = load_yaml(RHEC_SOURCE_DIRECTORY "/scenarios/" + how.scenario + ".yaml");
+  Settings settings = load_yaml(how.scenario);
   for (const std::string& assignment : how.assignments) apply_assignment(settings, assignment);
   const sim::Scenario scenario(host, settings);
   const PluginChoice model = scenario.robot().model_choice();
@@ -166,12 +166,14 @@ std::vector<Sequence> drive(const Host& host, const Drive& how) {
 
 const std::vector<Drive>& usual_drives() {
   static const std::string full = "{name: full_horizon}", blocks = "{name: structured, size: 5, overlap: 3}";
+  static const std::string figure8 = RHEC_SOURCE_DIRECTORY "/scenarios/figure8.yaml";
+  static const std::string zigzag = RHEC_SOURCE_DIRECTORY "/scenarios/zigzag.yaml";
   static const std::vector<Drive> drives = {
-      {"figure8/fhb", "figure8", {"path.laps=1", "blocking.kappa=" + full}},
-      {"figure8/sbo_5_3", "figure8", {"path.laps=1", "blocking.kappa=" + blocks}},
-      {"figure8/sbo_5_3_both", "figure8", {"path.laps=1", "blocking.kappa=" + blocks, "blocking.mu=" + blocks}},
-      {"zigzag/fhb", "zigzag", {"path.legs=4", "path.turn_radius=3", "speed=4", "blocking.kappa=" + full}},
-      {"zigzag/sbo_2_4", "zigzag", {"path.legs=4", "path.turn_radius=3", "speed=4"}},
+      {"figure8/fhb", figure8, {"path.laps=1", "blocking.kappa=" + full}},
+      {"figure8/sbo_5_3", figure8, {"path.laps=1", "blocking.kappa=" + blocks}},
+      {"figure8/sbo_5_3_both", figure8, {"path.laps=1", "blocking.kappa=" + blocks, "blocking.mu=" + blocks}},
+      {"zigzag/fhb", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4", "blocking.kappa=" + full}},
+      {"zigzag/sbo_2_4", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4"}},
   };
   return drives;
 }

@@ -20,9 +20,9 @@ struct Sequence {
     std::unique_ptr<const HorizonProblem> problem;
     int steps = 0;  ///< intervals that its window starts later than the one before
   };
-  std::vector<Sample> samples;
-  std::unique_ptr<HorizonProblem> workspace;  ///< with room for any of the samples
-  Iterate start;                              ///< guess for the first one
+  std::vector<Sample> samples = {};
+  std::unique_ptr<HorizonProblem> workspace = {};  ///< with room for any of the samples
+  Iterate start = {};                              ///< guess for the first one
 };
 
 /// The sequence of records of one prefix, in their order. Throws Error.

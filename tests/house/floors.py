@@ -4,7 +4,8 @@
     floors.py <source root> [--lib <directory of the libraries> --plugins <directory of the plugins>]
     floors.py --self-test
 
-A folder includes folders on lower floors, and itself; a plugin includes its own folder, core and plugins.
+A folder includes folders on lower floors, and itself; a plugin includes its own folder, core and plugins. Benchmarks look
+into plugins too, as "solvers/gn_rti/gn_rti.hpp".
 """
 import argparse
 import pathlib
@@ -24,6 +25,7 @@ MAY_USE = {
     "blocking": ("core", "plugins"),
     "sim": ("core", "plugins", "sim"),
     "apps": ("core", "plugins", "sim", "apps"),
+    "benchmarks": ("core", "plugins", "sim"),
 }
 PLUGIN_FOLDERS = ("solvers", "models", "blocking")
 CORE_THIRD_PARTY = ("Eigen", "unsupported/Eigen", "fmt", "xsimd")
@@ -45,6 +47,8 @@ def allowed_text(folder):
     names = ", ".join(f'"rhec/{name}/..."' for name in MAY_USE[folder])
     if folder == "core":
         return f"{names}, own files, the standard library, Eigen, fmt, xsimd"
+    if folder == "benchmarks":
+        return f"{names}, own files, those of plugins, third parties in <>"
     if folder in PLUGIN_FOLDERS:
         return f"{names}, files of the plugin's own folder, third parties in <>"
     return f"{names}, own files, third parties in <>"
@@ -68,6 +72,8 @@ def why_not_include(root, file, quote, name):
             return f"{folder}/ does not reach {parts[1]}/"
         return None
     if quote == '"':
+        if folder == "benchmarks" and name.startswith(tuple(f"{other}/" for other in PLUGIN_FOLDERS)) and ".." not in name:
+            return None if (root / name).is_file() else f'"{name}" is not a file of {root}'
         own = own_folder(root, file).resolve()
         places = [file.parent, own, own / "src"]
         targets = [(place / name).resolve() for place in places]
@@ -146,6 +152,9 @@ def self_test():
         "models/a/other.cpp": '#include "../b/b.hpp"',
         "solvers/s/sim.cpp": '#include "rhec/sim/world.hpp"',
         "sim/src/model.cpp": '#include "rhec/models/a.hpp"',
+        "benchmarks/app.cpp": '#include "rhec/apps/commands.hpp"',
+        "benchmarks/up.cpp": '#include "../apps/main.cpp"',
+        "benchmarks/gone.cpp": '#include "models/b/gone.hpp"',
     }
     right = {
         "core/src/good.cpp": '#include <vector>\n#include <Eigen/Core>\n#include <fmt/format.h>\n#include "rhec/core/model.hpp"',
@@ -155,6 +164,7 @@ def self_test():
         "models/b/b.hpp": '#include "rhec/plugins/sdk.hpp"',
         "models/b/b.cpp": '#include "b.hpp"',
         "sim/src/own.hpp": '#include "rhec/plugins/host.hpp"\n#include "rhec/sim/world.hpp"',
+        "benchmarks/all.cpp": '#include <benchmark/benchmark.h>\n#include "models/b/b.hpp"\n#include "rhec/sim/world.hpp"',
         "apps/main.cpp": '#include <CLI/CLI.hpp>\n#include "rhec/sim/world.hpp"',
     }
     failures = []

@@ -2,8 +2,8 @@
 import pathlib
 import sys
 
-FOLDERS = ("core", "plugins", "solvers", "models", "blocking", "sim", "apps")
-CODE_FOLDERS = FOLDERS + ("tests", "benchmarks", "examples")
+FOLDERS = ("core", "plugins", "solvers", "models", "blocking", "sim", "apps", "benchmarks")
+CODE_FOLDERS = FOLDERS + ("tests", "examples")
 ALL_FOLDERS = CODE_FOLDERS + ("cmake", "docs", "scenarios", "scripts", ".ci")
 CODE = {".hpp", ".cpp", ".h", ".cc", ".in"}
 TEXT = CODE | {".py", ".sh", ".cmake", ".txt", ".md", ".yaml", ".yml", ".json", ".toml", ""}

@@ -1,0 +1,68 @@
+// A step of gn_rti with every vehicle that ships, and with one from outside: the articulated loader of
+// plugins/template, built as its author would. Horizons are of 15 intervals; each drives its own scenario, with one
+// value of every parameter.
+#include <benchmark/benchmark.h>
+
+#include <memory>
+#include <utility>
+
+#include "program.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/sim/spread.hpp"
+#include "rti_loop.hpp"
+
+namespace rhec::bench {
+namespace {
+
+struct Vehicle {
+  const char* model;
+  const char* scenario;
+  std::vector<std::string> assignments = {};
+};
+const Vehicle vehicles[] = {
+    {"unicycle_traction", RHEC_SOURCE_DIRECTORY "/scenarios/unicycle_traction.yaml"},
+    {"bicycle_slip", RHEC_SOURCE_DIRECTORY "/scenarios/figure8.yaml", {"path.laps=1"}},
+    {"bicycle_sideslip", RHEC_SOURCE_DIRECTORY "/scenarios/bicycle_sideslip.yaml"},
+    {"skid_steer", RHEC_SOURCE_DIRECTORY "/scenarios/skid_steer.yaml"},
+    {"tractor_trailer", RHEC_SOURCE_DIRECTORY "/scenarios/tractor_trailer.yaml"},
+    {"articulated (outside)",
+     RHEC_SOURCE_DIRECTORY "/plugins/template/field.yaml",
+     {"estimator.solver=gn_rti", "controller.solver=gn_rti", "controller.blocking={}"}},
+};
+
+void add(const Host& host, const Vehicle& vehicle) {
+  Drive how{.name = vehicle.model, .scenario = vehicle.scenario, .assignments = vehicle.assignments};
+  for (const char* same : {"estimator.horizon=15", "controller.horizon=15", "blocking={}"})
+    how.assignments.emplace_back(same);
+  for (Sequence& sequence : drive(host, how)) {
+    const auto kept = std::make_shared<Sequence>(std::move(sequence));
+    const auto run = [host, kept](benchmark::State& state) {
+      RtiLoop loop(*kept, host.make_solver("gn_rti"));
+      std::vector<double> times;
+      for (auto _ : state) {
+        loop.restart();
+        double sum = 0.0;
+        for (std::size_t k = 0; k < kept->samples.size(); ++k) {
+          if (!is_usable(loop.step().status)) throw Error(kept->name + ": a step failed");
+          sum += loop.times().total_us();
+          if (k > 0) times.push_back(loop.times().total_us());
+        }
+        state.SetIterationTime(1e-6 * sum);
+      }
+      state.counters["median_us"] = sim::spread_of(times).median;
+      state.counters["stage_states"] = kept->workspace->capacity().states;
+      state.counters["stage_controls"] = kept->workspace->capacity().controls;
+    };
+    benchmark::RegisterBenchmark(("models/" + kept->name).c_str(), run)->UseManualTime()->Unit(benchmark::kMicrosecond);
+  }
+}
+
+void register_all() {
+  const Host host({RHEC_OUTSIDE_PLUGINS});
+  for (const Vehicle& vehicle : vehicles) add(host, vehicle);
+}
+
+}  // namespace
+}  // namespace rhec::bench
+
+int main(int count, char** words) { return rhec::bench::run_program(count, words, rhec::bench::register_all); }
