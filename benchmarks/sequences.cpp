@@ -133,7 +133,7 @@ std::vector<Sequence> reference_sequences(const Host& host) {
   return made;
 }
 
-std::vector<Sequence> drive(const Host& host, const Drive& how) {
+std::vector<std::vector<ProblemRecord>> record(const Host& host, const Drive& how) {
   Settings settings = load_yaml(how.scenario);
   for (const std::string& assignment : how.assignments) apply_assignment(settings, assignment);
   const sim::Scenario scenario(host, settings);
@@ -159,8 +159,15 @@ std::vector<Sequence> drive(const Host& host, const Drive& how) {
   if (failure) throw Error(how.name + ": " + failure->what());
   if (!log.completed) throw Error(how.name + ": the drive ended early: " + log.ended);
 
+  std::vector<std::vector<ProblemRecord>> made;
+  for (auto& [kind, kept] : records) made.push_back(std::move(kept));
+  return made;
+}
+
+std::vector<Sequence> drive(const Host& host, const Drive& how) {
   std::vector<Sequence> made;
-  for (const auto& [kind, kept] : records) made.push_back(sequence_of(kept, scenario.robot().model()));
+  for (const auto& records : record(host, how))
+    made.push_back(sequence_of(records, host.make_model(records[0].model, records[0].model_options)));
   return made;
 }
 

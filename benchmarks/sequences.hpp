@@ -39,7 +39,8 @@ struct Drive {
   std::vector<std::string> assignments = {};  ///< as after --set
 };
 /// The problems of a closed loop, estimator's and controller's, from when the estimator's window is full and its
-/// estimate has settled.
+/// estimate has settled. Throws Error, also where the drive does not reach its end.
+std::vector<std::vector<sim::ProblemRecord>> record(const Host& host, const Drive& how);
 std::vector<Sequence> drive(const Host& host, const Drive& how);
 
 /// Drives over varying ground, for every clone: full-horizon blocking, structured blocking of one and of both

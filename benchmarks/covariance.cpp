@@ -1,0 +1,108 @@
+// An estimator in its loop: what of a call to `estimate` is the solver's, and what is all else, which is the covariance
+// of the estimate and some copying; and what it costs to take a new node, the arrival cost's slide and the shift
+// included.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+#include <utility>
+
+#include "program.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/scenario.hpp"
+#include "rhec/sim/spread.hpp"
+#include "ticks.hpp"
+
+namespace rhec::bench {
+namespace {
+
+/// Of the calls to an estimator's method [us].
+struct Times {
+  std::vector<double> add_node, solve, rest_of_estimate;
+};
+
+class TimedMethod final : public EstimationMethod {
+ public:
+  TimedMethod(std::unique_ptr<EstimationMethod> method, std::shared_ptr<Times> times)
+      : method_(std::move(method)), times_(std::move(times)) {}
+  const Model& model() const noexcept override { return method_->model(); }
+  int substeps() const noexcept override { return method_->substeps(); }
+  void start(const double* outputs) noexcept override { method_->start(outputs); }
+  void add_node(double duration, const double* inputs, const double* outputs) noexcept override {
+    const auto begin = Ticks::now();
+    method_->add_node(duration, inputs, outputs);
+    times_->add_node.push_back(Ticks::microseconds(begin, Ticks::now()));
+  }
+  bool amend(int back, const double* outputs) noexcept override { return method_->amend(back, outputs); }
+  void estimate(Estimate& result, Clock::time_point deadline) noexcept override {
+    const auto begin = Ticks::now();
+    method_->estimate(result, deadline);
+    const double all = Ticks::microseconds(begin, Ticks::now());
+    times_->solve.push_back(result.report.feedback_us);
+    times_->rest_of_estimate.push_back(all - result.report.feedback_us);
+  }
+  void prepare() noexcept override { method_->prepare(); }
+  void reset() noexcept override { method_->reset(); }
+
+ private:
+  std::unique_ptr<EstimationMethod> method_;
+  std::shared_ptr<Times> times_;
+};
+
+/// Estimates along a drive that winds about.
+void run(benchmark::State& state, Robot robot) {
+  constexpr int settling = 30, steps = 200;
+  const auto times = std::make_shared<Times>();
+  robot.wrap_methods([times](std::unique_ptr<EstimationMethod> method) {
+    return std::make_unique<TimedMethod>(std::move(method), times);
+  });
+  const Model& model = *robot.model();
+  const double step = robot.step();
+  for (auto _ : state) {
+    std::mt19937 random(1);  // NOLINT(cert-msc32-c,cert-msc51-cpp): the same noise each time
+    std::normal_distribution<double> normal;
+    const auto estimator = robot.make_estimator();
+    double truth[4] = {0.0, 0.0, 0.1, 0.0}, next[4], outputs[3];
+    for (int k = 0; k < settling + steps; ++k) {
+      const double time = k * step;
+      const double inputs[2] = {8.0, 0.3 * std::cos(time)}, slip[2] = {0.7 + 0.1 * std::sin(0.5 * time), 0.9};
+      model.observe({.count = 1, .states = truth, .outputs = outputs});
+      for (int j = 0; j < 3; ++j) outputs[j] += robot.output_sigmas()[j] * normal(random);
+      estimator->push_measurement(time, outputs);
+      if (estimator->estimate(time).fallback) throw Error("an estimate failed");
+      estimator->push_input(time, inputs);
+      model.integrate(
+          {.count = 1, .states = truth, .inputs = inputs, .parameters = slip, .durations = &step, .next_states = next});
+      std::copy_n(next, 4, truth);
+    }
+    const auto forget_settling = [](std::vector<double>& of) {
+      of.erase(of.end() - settling - steps, of.end() - steps);
+    };
+    times->add_node.insert(times->add_node.end() - (settling + steps - 1), 0.0);  // the start is no call of it
+    for (auto* of : {&times->add_node, &times->solve, &times->rest_of_estimate}) forget_settling(*of);
+  }
+  state.counters["add_node_us"] = sim::spread_of(times->add_node).median;
+  state.counters["solve_us"] = sim::spread_of(times->solve).median;
+  state.counters["covariance_us"] = sim::spread_of(times->rest_of_estimate).median;
+  state.counters["covariance_p99_us"] = sim::spread_of(times->rest_of_estimate).p99;
+}
+
+void register_all() {
+  const Host host;
+  for (const Drive& how : usual_drives()) {
+    if (!how.name.starts_with("figure8/")) continue;
+    Settings settings = load_yaml(how.scenario);
+    for (const std::string& assignment : how.assignments) apply_assignment(settings, assignment);
+    const Robot robot = sim::Scenario(host, settings).robot();
+    benchmark::RegisterBenchmark(("covariance/" + how.name).c_str(), [robot](benchmark::State& state) {
+      run(state, robot);
+    })->Unit(benchmark::kMicrosecond);
+  }
+}
+
+}  // namespace
+}  // namespace rhec::bench
+
+int main(int count, char** words) { return rhec::bench::run_program(count, words, rhec::bench::register_all); }

@@ -1,0 +1,94 @@
+// gn_rti and bicycle_slip as plugins against the same sources linked into this program, pass by pass in turn.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <utility>
+
+#include "program.hpp"
+#include "rhec/core/chosen_outputs.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/plugins/manifest.hpp"
+#include "rhec/sim/spread.hpp"
+#include "rti_loop.hpp"
+
+// The manifests of the sources that are linked in, whose symbol CMakeLists.txt renames.
+extern "C" {
+extern const rhec::Manifest linked_gn_rti;
+extern const rhec::Manifest linked_bicycle_slip;
+}
+
+namespace rhec::bench {
+namespace {
+
+template <class Interface>
+std::shared_ptr<Interface> make(const Manifest& manifest, const Settings& settings) {
+  std::array<char, 1000> error{};
+  void* made = manifest.create(&settings, error.data(), error.size());
+  if (!made) throw Error(error.data());
+  return {static_cast<Interface*>(made), [&manifest](Interface* object) { manifest.destroy(object); }};
+}
+
+/// The host wraps a model whose outputs are chosen; so the same is done here.
+std::shared_ptr<Model> make_linked_model(const Settings& settings) {
+  const auto model = make<Model>(linked_bicycle_slip, settings);
+  return with_outputs(model, usual_outputs(model->description()));
+}
+
+/// Both sides, and of each pass the time of a median step.
+struct Side {
+  Sequence sequence;
+  RtiLoop loop;
+  Side(Sequence of, std::shared_ptr<Solver> solver) : sequence(std::move(of)), loop(sequence, std::move(solver)) {}
+
+  double pass() {
+    std::vector<double> times;
+    loop.restart();
+    for (std::size_t k = 0; k < sequence.samples.size(); ++k) {
+      if (!is_usable(loop.step().status)) throw Error(sequence.name + ": a step failed");
+      times.push_back(loop.times().total_us());
+    }
+    return sim::spread_of(times).median;
+  }
+};
+
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+void add(const Host& host, const std::vector<sim::ProblemRecord>& records) {
+  const Settings& options = records.front().model_options;
+  const auto plugin = std::make_shared<Side>(sequence_of(records, host.make_model("bicycle_slip", options)),
+                                             host.make_solver("gn_rti"));
+  const auto linked =
+      std::make_shared<Side>(sequence_of(records, make_linked_model(options)), make<Solver>(linked_gn_rti, {}));
+  const auto run = [plugin, linked](benchmark::State& state) {
+    std::vector<double> of_plugin, of_linked, ratios;
+    for (auto _ : state) {
+      const bool plugin_first = ratios.size() % 2 == 0;
+      if (plugin_first) of_plugin.push_back(plugin->pass());
+      of_linked.push_back(linked->pass());
+      if (!plugin_first) of_plugin.push_back(plugin->pass());
+      ratios.push_back(of_plugin.back() / of_linked.back());
+    }
+    state.counters["plugin_us"] = sim::spread_of(of_plugin).median;
+    state.counters["linked_us"] = sim::spread_of(of_linked).median;
+    state.counters["ratio"] = sim::spread_of(ratios).median;
+    state.counters["ratio_lower_quartile"] = quantile(ratios, 0.25);
+    state.counters["ratio_upper_quartile"] = quantile(ratios, 0.75);
+  };
+  benchmark::RegisterBenchmark(("plugin_boundary/" + plugin->sequence.name).c_str(), run)
+      ->Unit(benchmark::kMicrosecond);
+}
+
+void register_all() {
+  const Host host;
+  for (const auto& records : record(host, usual_drives().front())) add(host, records);
+}
+
+}  // namespace
+}  // namespace rhec::bench
+
+int main(int count, char** words) { return rhec::bench::run_program(count, words, rhec::bench::register_all); }
