@@ -131,8 +131,8 @@ Sequence long_control(const Host& host, int intervals, int samples) {
     problem->set_intervals(intervals);
     for (int j = 0; j < 4; ++j) problem->given_state()[j] = drive.states[first][j] + 0.01 * std::sin(1.0 + first + j);
     std::copy_n(drive.parameters[first].data(), 2, problem->given_parameters());
-    std::copy_n(drive.states[first].data(), 4 * (intervals + 1), problem->state_reference(0));
-    std::copy_n(drive.inputs[first].data(), 2 * intervals, problem->input_reference(0));
+    for (int i = 0; i <= intervals; ++i) std::copy_n(drive.states[first + i].data(), 4, problem->state_reference(i));
+    for (int i = 0; i < intervals; ++i) std::copy_n(drive.inputs[first + i].data(), 2, problem->input_reference(i));
     for (int i = 0; i < intervals; ++i) problem->set_duration(i, step);
     std::vector<double> scratch(problem->scratch_size());
     problem->finish(scratch);

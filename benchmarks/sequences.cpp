@@ -68,9 +68,9 @@ void set_known(const RheProblem& from, RheProblem& to) noexcept {
 void set_newest(const RhcProblem& from, RhcProblem& to, std::span<double> scratch) noexcept {
   const int N = from.intervals(), nx = from.model().state_count(), nu = from.model().input_count();
   std::copy_n(from.initial_state(), nx + from.model().parameter_count(), to.given_state());
-  std::copy_n(from.state_reference(0), (N + 1) * nx, to.state_reference(0));
-  std::copy_n(from.input_reference(0), N * nu, to.input_reference(0));
+  for (int i = 0; i <= N; ++i) std::copy_n(from.state_reference(i), nx, to.state_reference(i));
   for (int i = 0; i < N; ++i) {
+    std::copy_n(from.input_reference(i), nu, to.input_reference(i));
     for (int j = 0; j < nu; ++j) {
       to.input_lower(i, j) = from.input_lower(i, j);
       to.input_upper(i, j) = from.input_upper(i, j);

@@ -31,6 +31,19 @@ class ChosenOutputs final : public Model {
 
   const ModelDescription& description() const noexcept override { return description_; }
   void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
+  void integrate_rows(const IntervalRows& request) const noexcept override { model_->integrate_rows(request); }
+  void observe_rows(const NodeRows& request) const noexcept override {
+    NodeRows of_all = request;
+    std::array<int, room> chosen;
+    of_all.chosen = chosen_.data();
+    of_all.chosen_count = request.chosen ? request.chosen_count : output_count();
+    if (request.chosen) {
+      for (int j = 0; j < request.chosen_count; ++j) chosen[j] = chosen_[request.chosen[j]];
+      of_all.chosen = chosen.data();
+    }
+    model_->observe_rows(of_all);
+  }
+  std::size_t rows_scratch(int count) const noexcept override { return model_->rows_scratch(count); }
   void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
     model_->rates(x, u, p, dxdt);
   }

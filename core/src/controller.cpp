@@ -124,7 +124,10 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
 
 /// A first plan: the reference inputs, rolled out.
 void Controller::start_cold() noexcept {
-  problem_.set_decisions(point_, problem_.input_reference(0), problem_.given_parameters());
+  const int nu = problem_.model().input_count();
+  for (int i = 0; i < problem_.intervals(); ++i)
+    std::copy_n(problem_.input_reference(i), nu, scratch_.data() + static_cast<std::ptrdiff_t>(i) * nu);
+  problem_.set_decisions(point_, scratch_.data(), problem_.given_parameters());
   point_.clear_multipliers();
   roll_out(problem_, point_, scratch_);
 }

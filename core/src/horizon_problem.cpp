@@ -1,9 +1,12 @@
 #include "rhec/core/horizon_problem.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <utility>
 
+#include "kernels/kernels.hpp"
+#include "kernels/program_kernels.hpp"
 #include "rhec/core/error.hpp"
 
 namespace rhec {
@@ -34,10 +37,20 @@ HorizonProblem::HorizonProblem(std::shared_ptr<const Model> model, const Shape& 
   ramp_.assign(channels_, 0);
   control_index_.assign(nodes * channels_, -1);
   control_counts_.assign(nodes, 0);
-  state_lower_.assign(nodes * capacity_.states, -infinity);
-  state_upper_.assign(nodes * capacity_.states, infinity);
-  control_lower_.assign(nodes * capacity_.controls, -infinity);
-  control_upper_.assign(nodes * capacity_.controls, infinity);
+  stride_ = capacity_.row();
+  row_ = Capacity{0, nx_ + np_, nu_ + np_}.row();
+  lower_.assign(nodes * stride_, -infinity);
+  upper_.assign(nodes * stride_, infinity);
+}
+
+void HorizonProblem::clear_bounds() noexcept {
+  std::fill(lower_.begin(), lower_.end(), -infinity);
+  std::fill(upper_.begin(), upper_.end(), infinity);
+}
+
+int HorizonProblem::column_of_input(int interval, int input) const noexcept {
+  const int control = control_of_input(interval, input);
+  return control >= 0 ? capacity_.states + control : nx_ + input_channel_[input];
 }
 
 void HorizonProblem::set_ramp(int channel, bool ramp) noexcept {
@@ -59,9 +72,10 @@ int HorizonProblem::control_of_input(int interval, int input) const noexcept {
 }
 
 std::size_t HorizonProblem::scratch_size() const noexcept {
-  const std::size_t nz = static_cast<std::size_t>(nx_) + nu_ + 2 * np_;
-  const std::size_t per_interval = 3 * static_cast<std::size_t>(nx_) + nu_ + 2 * np_ + nx_ * nz + nz * nz;
-  return (capacity_.intervals + 1) * per_interval + cost_scratch_size();
+  const auto nodes = static_cast<std::size_t>(capacity_.intervals) + 1;
+  const std::size_t gathered = 2 * static_cast<std::size_t>(nx_) + nu_ + 2 * np_;
+  const std::size_t rows = row_ * (1 + static_cast<std::size_t>(nx_) + row_);
+  return nodes * (gathered + rows) + model_->rows_scratch(static_cast<int>(nodes)) + cost_scratch_size() + 8;
 }
 
 void HorizonProblem::mark_dynamics(int i, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept {
@@ -131,10 +145,8 @@ namespace {
 
 /// Dense rows for a range of intervals, cut out of the caller's scratch.
 struct Rows {
-  double *x, *u, *p, *p_end, *next, *multipliers, *jacobians, *hessians;
-  std::span<double> rest;
+  double *x, *u, *p, *p_end, *next;
   Rows(std::span<double> scratch, int count, int nx, int nu, int np) {
-    const int nz = nx + nu + 2 * np;
     double* position = scratch.data();
     const auto take = [&](int width) {
       return std::exchange(position, position + static_cast<std::ptrdiff_t>(count) * width);
@@ -144,10 +156,6 @@ struct Rows {
     p = take(np);
     p_end = take(np);
     next = take(nx);
-    multipliers = take(nx);
-    jacobians = take(nx * nz);
-    hessians = take(nz * nz);
-    rest = {position, static_cast<std::size_t>(scratch.data() + scratch.size() - position)};
   }
 };
 
@@ -201,14 +209,9 @@ void HorizonProblem::simulate_interval(int i, Iterate& point, std::span<double> 
   }
 }
 
-void HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                               std::span<double> scratch) const noexcept {
-  const int ns = capacity_.states, nw = capacity_.controls, stride = qp.stride();
-  const StageRange steps{range.first, std::min(range.last, intervals_ - 1)};
-  const int count = steps.last - steps.first + 1;
-  const Rows rows(scratch, std::max(count, 0), nx_, nu_, np_);
-  const int nz = nx_ + nu_ + (any_ramp_ ? 2 * np_ : np_);
-  const bool exact = hessian == Hessian::exact;
+double HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                                 std::span<double> scratch) const noexcept {
+  const int ns = capacity_.states;
   if (range.first == 0) {
     qp.set_intervals(intervals_);
     qp.initial_state_is_given = initial_state() != nullptr;
@@ -216,94 +219,140 @@ void HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian h
   for (int i = range.first; i <= range.last; ++i) {
     const int controls = i < intervals_ ? control_counts_[i] : 0;
     qp.set_sizes(i, ns, controls);
-    std::fill_n(qp.H(i), (ns + nw) * stride, 0.0);
-    std::fill_n(qp.h(i), stride, 0.0);
+    std::fill_n(qp.h(i), stride_, 0.0);
+    if (hessian != Hessian::none) std::fill_n(qp.H(i), (ns + controls) * stride_, 0.0);
   }
-
-  if (count > 0) {
-    gather(point, steps, rows.x, rows.u, rows.p, rows.p_end);
-    Model::Intervals request;
-    request.count = count;
-    request.states = rows.x;
-    request.inputs = rows.u;
-    request.parameters = rows.p;
-    request.parameters_end = any_ramp_ ? rows.p_end : nullptr;
-    request.durations = durations_.data() + steps.first;
-    request.substeps = substeps_;
-    request.next_states = rows.next;
-    request.jacobians = rows.jacobians;
-    if (exact) {
-      for (int i = steps.first; i <= steps.last; ++i)
-        std::copy_n(point.costate(i + 1), nx_, rows.multipliers + (i - steps.first) * nx_);
-      request.multipliers = rows.multipliers;
-      request.hessians = rows.hessians;
-    }
-    model_->integrate(request);
-  }
-
-  for (int i = steps.first; i <= steps.last; ++i) {
-    const double* jacobian = rows.jacobians + (i - steps.first) * nx_ * nz;
-    double *F = qp.F(i), *b = qp.b(i);
-    std::fill_n(F, ns * stride, 0.0);
-    // Column of the model's z = [x; u; p (; p_end)] -> where it goes in [s; w].
-    const auto column_of = [&](int z) {
-      if (z < nx_) return z;
-      if (z < nx_ + nu_) {
-        const int control = control_of_input(i, z - nx_);
-        return control >= 0 ? ns + control : nx_ + input_channel_[z - nx_];
-      }
-      const bool end = z >= nx_ + nu_ + np_;
-      const int parameter = z - nx_ - nu_ - (end ? np_ : 0);
-      const int control = control_of_channel(i, parameter);
-      // A jump is seen by the whole interval; of a ramp, only the end is new.
-      return control >= 0 && (end || !ramp_[parameter]) ? ns + control : nx_ + parameter;
-    };
-    for (int z = 0; z < nz; ++z)
-      for (int r = 0; r < nx_; ++r) F[r * stride + column_of(z)] += jacobian[z * nx_ + r];
-    for (int c = 0; c < channels_; ++c) {
-      const int control = control_of_channel(i, c);
-      F[(nx_ + c) * stride + (control >= 0 ? ns + control : nx_ + c)] = 1.0;
-    }
-    const double* s_next = point.state(i + 1);
-    for (int r = 0; r < nx_; ++r) b[r] = rows.next[(i - steps.first) * nx_ + r] - s_next[r];
-    for (int c = 0; c < channels_; ++c) {
-      const int control = control_of_channel(i, c);
-      b[nx_ + c] = (control >= 0 ? point.control(i)[control] : point.state(i)[nx_ + c]) - s_next[nx_ + c];
-    }
-    if (exact) {
-      const double* h = rows.hessians + (i - steps.first) * nz * nz;
-      for (int z1 = 0; z1 < nz; ++z1)
-        for (int z2 = 0; z2 < nz; ++z2) qp.H(i)[column_of(z2) * stride + column_of(z1)] += h[z2 * nz + z1];
-    }
-  }
+  const StageRange steps{range.first, std::min(range.last, intervals_ - 1)};
+  if (steps.last >= steps.first) linearise_dynamics(steps, point, hessian, qp, scratch);
   fill_bounds(point, range, qp);
-  add_cost(range, point, hessian, qp, scratch);
+  return add_cost(range, point, hessian, qp, scratch);
+}
+
+/// z = [x; p; u (; p_end)] of each interval, as `Model::integrate_rows` takes it.
+const double* HorizonProblem::gather_rows(const Iterate& point, StageRange range, double* rows) const noexcept {
+  double* z = rows;
+  for (int i = range.first; i <= range.last; ++i, z += row_) {
+    const double *s = point.state(i), *w = point.control(i);
+    for (int j = 0; j < nx_ + np_; ++j) z[j] = s[j];
+    if (is_direct()) {
+      for (int j = 0; j < nu_; ++j) z[nx_ + np_ + j] = w[j];
+    } else {
+      inputs_on(point, i, z + nx_ + np_);
+    }
+    for (int j = 0; j < np_; ++j) {
+      const int control = control_of_channel(i, j);
+      if (any_ramp_) z[nx_ + np_ + nu_ + j] = control >= 0 ? w[control] : z[nx_ + j];
+      if (control >= 0 && ramp_[j] == 0) z[nx_ + j] = w[control];
+    }
+  }
+  return rows;
+}
+
+void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, Hessian hessian, StageQp& qp,
+                                        std::span<double> scratch) const noexcept {
+  const int count = steps.last - steps.first + 1, ns = capacity_.states;
+  // Memory that begins where registers do.
+  auto* position = reinterpret_cast<double*>((reinterpret_cast<std::uintptr_t>(scratch.data()) + 63) / 64 * 64);
+  const auto take = [&](std::ptrdiff_t size) { return std::exchange(position, position + size * count); };
+  double *z = take(row_), *jacobians = take(nx_ * row_), *hessians = take(row_ * row_);
+  // Without carried inputs and ramps the model's rows are those of the program, but for channels that start.
+  const bool in_place = is_direct() && !any_ramp_;
+  IntervalRows request;
+  request.count = count;
+  request.z = gather_rows(point, steps, z);
+  request.z_step = row_;
+  request.ramp = any_ramp_;
+  request.durations = durations_.data() + steps.first;
+  request.substeps = substeps_;
+  request.next_states = qp.b(steps.first);
+  request.next_step = stride_;
+  request.jacobians = in_place ? qp.F(steps.first) : jacobians;
+  request.jacobian_row = in_place ? stride_ : row_;
+  request.jacobian_step = in_place ? ns * stride_ : nx_ * row_;
+  if (hessian == Hessian::exact) {
+    request.multipliers = point.costate(steps.first + 1);
+    request.multiplier_step = stride_;
+    request.hessians = in_place ? qp.H(steps.first) : hessians;
+    request.hessian_row = in_place ? stride_ : row_;
+    request.hessian_step = in_place ? (capacity_.states + capacity_.controls) * stride_ : row_ * row_;
+  }
+  request.scratch = position;
+  model_->integrate_rows(request);
+
+  const int written = (nx_ + np_ + nu_ + 7) / 8 * 8;
+  for (int i = steps.first; i <= steps.last; ++i) {
+    double *F = qp.F(i), *b = qp.b(i);
+    if (in_place) {
+      for (int r = 0; r < nx_; ++r) std::fill(F + r * stride_ + written, F + (r + 1) * stride_, 0.0);
+    } else {
+      std::fill_n(F, nx_ * stride_, 0.0);
+    }
+    std::fill_n(F + nx_ * stride_, channels_ * stride_, 0.0);
+    const double *s = point.state(i), *w = point.control(i), *s_next = point.state(i + 1);
+    for (int r = 0; r < nx_; ++r) b[r] -= s_next[r];
+    for (int c = 0; c < channels_; ++c) {
+      const int control = control_of_channel(i, c);
+      F[(nx_ + c) * stride_ + (control >= 0 ? ns + control : nx_ + c)] = 1.0;
+      b[nx_ + c] = (control >= 0 ? w[control] : s[nx_ + c]) - s_next[nx_ + c];
+    }
+    if (!in_place) {
+      scatter(i, jacobians + (i - steps.first) * nx_ * row_,
+              hessian == Hessian::exact ? hessians + (i - steps.first) * row_ * row_ : nullptr, qp);
+    } else if (control_counts_[i] > nu_) {
+      place_started_channels(i, hessian, qp);
+    }
+  }
+}
+
+/// What the model says of a parameter is that of its control where a block of it starts.
+void HorizonProblem::place_started_channels(int i, Hessian hessian, StageQp& qp) const noexcept {
+  const int ns = capacity_.states, width = ns + control_counts_[i];
+  const auto move = [](double& from, double& to) {
+    to = from;
+    from = 0.0;
+  };
+  for (int c = 0; c < channels_; ++c) {
+    const int control = control_of_channel(i, c);
+    if (control < 0) continue;
+    double *F = qp.F(i), *H = qp.H(i);
+    for (int r = 0; r < nx_; ++r) move(F[r * stride_ + nx_ + c], F[r * stride_ + ns + control]);
+    if (hessian != Hessian::exact) continue;
+    for (int r = 0; r < width; ++r) move(H[r * stride_ + nx_ + c], H[r * stride_ + ns + control]);
+    for (int k = 0; k < width; ++k) move(H[(nx_ + c) * stride_ + k], H[(ns + control) * stride_ + k]);
+  }
+}
+
+/// From the model's rows to the program's, whatever is carried.
+void HorizonProblem::scatter(int i, const double* jacobian, const double* hessian, StageQp& qp) const noexcept {
+  const int ns = capacity_.states, nz = nx_ + np_ + nu_ + (any_ramp_ ? np_ : 0);
+  const auto column_of = [&](int z) {
+    if (z < nx_) return z;
+    if (z >= nx_ + np_ && z < nx_ + np_ + nu_) return column_of_input(i, z - nx_ - np_);
+    const bool end = z >= nx_ + np_ + nu_;
+    const int parameter = z - nx_ - (end ? np_ + nu_ : 0), control = control_of_channel(i, parameter);
+    // A jump is seen by the whole interval; of a ramp, only the end is new.
+    return control >= 0 && (end || ramp_[parameter] == 0) ? ns + control : nx_ + parameter;
+  };
+  for (int r = 0; r < nx_; ++r)
+    for (int z = 0; z < nz; ++z) qp.F(i)[r * stride_ + column_of(z)] += jacobian[r * row_ + z];
+  if (!hessian) return;
+  for (int r = 0; r < nz; ++r)
+    for (int z = 0; z < nz; ++z) qp.H(i)[column_of(r) * stride_ + column_of(z)] += hessian[r * row_ + z];
 }
 
 void HorizonProblem::refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
-  for (int i = 0; i <= intervals_; ++i) {
-    std::fill_n(qp.q(i), capacity_.states, 0.0);
-    if (i < intervals_) std::fill_n(qp.r(i), capacity_.controls, 0.0);
-  }
+  std::fill_n(qp.h(0), static_cast<std::ptrdiff_t>(intervals_ + 1) * stride_, 0.0);
   fill_bounds(point, {0, intervals_}, qp);
   add_gradient(point, qp, scratch);
 }
 
 void HorizonProblem::fill_bounds(const Iterate& point, StageRange range, StageQp& qp) const noexcept {
-  const int ns = capacity_.states;
-  for (int i = range.first; i <= range.last; ++i) {
-    for (int j = 0; j < ns; ++j) {
-      qp.state_lower(i)[j] = state_lower(i)[j] - point.state(i)[j];
-      qp.state_upper(i)[j] = state_upper(i)[j] - point.state(i)[j];
-    }
-    if (i == intervals_) continue;
-    for (int j = 0; j < control_counts_[i]; ++j) {
-      qp.control_lower(i)[j] = control_lower(i)[j] - point.control(i)[j];
-      qp.control_upper(i)[j] = control_upper(i)[j] - point.control(i)[j];
-    }
-  }
+  const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(range.first) * stride_,
+                       count = static_cast<std::ptrdiff_t>(range.last - range.first + 1) * stride_;
+  program_kernels().subtract(lower_.data() + first, point.row(range.first), qp.lower(range.first), count);
+  program_kernels().subtract(upper_.data() + first, point.row(range.first), qp.upper(range.first), count);
   if (range.first == 0 && initial_state())
-    for (int j = 0; j < ns; ++j) qp.initial_step()[j] = initial_state()[j] - point.state(0)[j];
+    for (int j = 0; j < capacity_.states; ++j) qp.initial_step()[j] = initial_state()[j] - point.state(0)[j];
 }
 
 }  // namespace rhec

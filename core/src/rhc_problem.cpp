@@ -3,13 +3,21 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "checks.hpp"
+#include "kernels/kernels.hpp"
+#include "kernels/program_kernels.hpp"
 #include "rhec/core/error.hpp"
 #include "rhec/core/rhe_problem.hpp"
 
 namespace rhec {
+namespace {
+
+constexpr int longest_row = 64;
+
+}  // namespace
 
 RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup)
     : HorizonProblem(std::move(model), {setup.max_intervals, setup.substeps, setup.blocked_inputs}),
@@ -22,8 +30,14 @@ RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup)
   fill_default_bounds("input bounds", setup_.input_lower, setup_.input_upper, about.inputs, true);
   const auto nodes = static_cast<std::size_t>(setup_.max_intervals) + 1;
   initial_.assign(capacity().states, 0.0);
-  state_reference_.assign(nodes * nx(), 0.0);
-  input_reference_.assign(nodes * nu(), 0.0);
+  reference_.assign(nodes * stride(), 0.0);
+  for (auto* v : {&stage_weights_, &terminal_weights_, &turn_}) v->assign(stride(), 0.0);
+  std::copy(setup_.state_weights.begin(), setup_.state_weights.end(), stage_weights_.begin());
+  std::copy(setup_.terminal_weights.begin(), setup_.terminal_weights.end(), terminal_weights_.begin());
+  if (is_direct())
+    std::copy(setup_.input_weights.begin(), setup_.input_weights.end(), stage_weights_.begin() + capacity().states);
+  for (int j = 0; j < nx(); ++j)
+    if (about.states[j].is_angle) turn_[j] = 2.0 * std::numbers::pi;
   for (std::size_t i = 0; i < nodes; ++i) {
     input_lower_.insert(input_lower_.end(), setup_.input_lower.begin(), setup_.input_lower.end());
     input_upper_.insert(input_upper_.end(), setup_.input_upper.begin(), setup_.input_upper.end());
@@ -38,16 +52,12 @@ void RhcProblem::set_blocks(int input, const std::uint8_t* begins) noexcept {
 
 int RhcProblem::finish(std::span<double> scratch) noexcept {
   finish_structure();
-  const double infinity = std::numeric_limits<double>::infinity();
-  const int ns = capacity().states, nw = capacity().controls;
-  std::fill(state_lower_.begin(), state_lower_.end(), -infinity);
-  std::fill(state_upper_.begin(), state_upper_.end(), infinity);
+  const int ns = capacity().states;
+  clear_bounds();
   for (int i = 0; i <= intervals(); ++i) {
     if (i > 0) {
-      for (int j = 0; j < nx(); ++j) {
-        state_lower_[i * ns + j] = setup_.state_lower[j];
-        state_upper_[i * ns + j] = setup_.state_upper[j];
-      }
+      std::copy_n(setup_.state_lower.data(), nx(), lower_row(i));
+      std::copy_n(setup_.state_upper.data(), nx(), upper_row(i));
     }
     if (i == intervals()) break;
     for (int j = 0; j < nu(); ++j) {
@@ -59,8 +69,8 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
         lower = std::max(lower, input_lower_[later * nu() + j]);
         upper = std::min(upper, input_upper_[later * nu() + j]);
       }
-      control_lower_[i * nw + control] = lower;
-      control_upper_[i * nw + control] = upper;
+      lower_row(i)[ns + control] = lower;
+      upper_row(i)[ns + control] = upper;
     }
   }
   return soften_unreachable_bounds(scratch);
@@ -69,7 +79,7 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
 /// For each state that starts outside its bounds: drive it back as fast as the corners of the input box (and standing
 /// still) allow, block by block, and let the bound follow that trajectory until it is kept.
 int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
-  const int n = nx(), ns = capacity().states, inputs = nu();
+  const int n = nx(), inputs = nu();
   double* x = scratch.data();
   double *trial = x + n, *u = trial + n, *next = u + inputs;
   int candidates = 1;
@@ -134,7 +144,7 @@ int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
         if (violation(x) <= 0.0) continue;
         // A hair of slack keeps the feasible set from being a single point.
         const double slack = 1e-6 * (1.0 + std::abs(x[j]));
-        double &lower = state_lower_[(i + 1) * ns + j], &upper = state_upper_[(i + 1) * ns + j];
+        double &lower = lower_row(i + 1)[j], &upper = upper_row(i + 1)[j];
         lower = std::min(lower, x[j] - slack);
         upper = std::max(upper, x[j] + slack);
         ++moved;
@@ -145,70 +155,45 @@ int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
   return moved;
 }
 
-double RhcProblem::state_error(const Iterate& point, int node, int state) const noexcept {
-  const double value = point.state(node)[state], wanted = state_reference(node)[state];
-  return model().description().states[state].is_angle ? angle_difference(value, wanted) : value - wanted;
-}
-
-double RhcProblem::cost(const Iterate& point, double* stage_costs, std::span<double>) const noexcept {
+double RhcProblem::cost(const Iterate& point, double* stage_costs, std::span<double> /*scratch*/) const noexcept {
   double total = 0.0;
-  const auto add = [&](int stage, double part) {
-    total += part;
-    if (stage_costs) stage_costs[stage] += part;
-  };
-  std::vector<double>::size_type input = 0;
   for (int i = 0; i <= intervals(); ++i) {
-    const auto& weights = i == intervals() ? setup_.terminal_weights : setup_.state_weights;
-    for (int j = 0; j < nx(); ++j) {
-      if (weights[j] == 0.0) continue;
-      const double error = state_error(point, i, j);
-      add(i, weights[j] * error * error);
-    }
-    if (i == intervals()) break;
-    for (int j = 0; j < nu(); ++j, ++input) {
-      const int control = control_of_input(i, j);
-      const double value = control >= 0 ? point.control(i)[control] : point.state(i)[nx() + channel_of_input(j)];
-      const double error = value - input_reference_[input];
-      add(i, setup_.input_weights[j] * error * error);
-    }
+    double gradient[longest_row] = {};
+    const double part = add_stage(i, point, nullptr, gradient);
+    total += part;
+    if (stage_costs) stage_costs[i] += part;
   }
   return total;
 }
 
-void RhcProblem::add_cost(StageRange range, const Iterate& point, Hessian, StageQp& qp,
-                          std::span<double>) const noexcept {
-  add(range, point, true, qp);
+double RhcProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                            std::span<double> /*scratch*/) const noexcept {
+  double total = 0.0;
+  for (int i = range.first; i <= range.last; ++i)
+    total += add_stage(i, point, hessian == Hessian::none ? nullptr : qp.H(i), qp.h(i));
+  return total;
 }
 
-void RhcProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<double>) const noexcept {
-  add({0, intervals()}, point, false, qp);
+void RhcProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
+  add_cost({0, intervals()}, point, Hessian::none, qp, scratch);
 }
 
-void RhcProblem::add(StageRange range, const Iterate& point, bool matrices, StageQp& qp) const noexcept {
-  const int ns = capacity().states, stride = qp.stride();
-  for (int i = range.first; i <= range.last; ++i) {
-    const auto& weights = i == intervals() ? setup_.terminal_weights : setup_.state_weights;
-    for (int j = 0; j < nx(); ++j) {
-      const double w = 2.0 * weights[j];
-      if (w == 0.0) continue;
-      qp.q(i)[j] += w * state_error(point, i, j);
-      if (matrices) qp.H(i)[j * stride + j] += w;
-    }
-    if (i == intervals()) break;
-    for (int j = 0; j < nu(); ++j) {
-      const double w = 2.0 * setup_.input_weights[j];
-      const int control = control_of_input(i, j), state = nx() + channel_of_input(j);
-      const double value = control >= 0 ? point.control(i)[control] : point.state(i)[state];
-      const double pull = w * (value - input_reference(i)[j]);
-      if (control >= 0) {
-        qp.r(i)[control] += pull;
-        if (matrices) qp.H(i)[(ns + control) * stride + ns + control] += w;
-      } else {
-        qp.q(i)[state] += pull;
-        if (matrices) qp.H(i)[state * stride + state] += w;
-      }
-    }
+/// The cost of one stage; adds to H (if not null) and h.
+double RhcProblem::add_stage(int i, const Iterate& point, double* H, double* h) const noexcept {
+  const bool is_last = i == intervals();
+  const AlignedDoubles& weights = is_last ? terminal_weights_ : stage_weights_;
+  const int columns = capacity().states + (is_last ? 0 : nu());
+  double total = program_kernels().add_tracking(point.row(i), row(reference_, i, stride()), weights.data(), turn_.data(),
+                                                H, h, columns, stride());
+  if (is_last || is_direct()) return total;
+  for (int j = 0; j < nu(); ++j) {
+    const int column = column_of_input(i, j);
+    const double error = point.row(i)[column] - input_reference(i)[j], weight = setup_.input_weights[j];
+    total += weight * error * error;
+    h[column] += 2.0 * weight * error;
+    if (H) H[column * stride() + column] += 2.0 * weight;
   }
+  return total;
 }
 
 }  // namespace rhec

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -9,11 +10,16 @@
 #include <fmt/format.h>
 
 #include "checks.hpp"
+#include "kernels/kernels.hpp"
+#include "kernels/program_kernels.hpp"
 #include "rhec/core/error.hpp"
 
 namespace rhec {
 
-double angle_difference(double a, double b) noexcept { return std::remainder(a - b, 2.0 * std::numbers::pi); }
+double angle_difference(double a, double b) noexcept {
+  const double difference = a - b;
+  return std::abs(difference) <= std::numbers::pi ? difference : std::remainder(difference, 2.0 * std::numbers::pi);
+}
 
 RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
     : HorizonProblem(std::move(model), {setup.max_intervals, setup.substeps, {}}),
@@ -36,6 +42,14 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
       robust_group_[output] = static_cast<int>(g);
     }
   }
+  // Bounds of [x; p; u] that hold at every stage.
+  lower_pattern_.assign(stride(), -std::numeric_limits<double>::infinity());
+  upper_pattern_.assign(stride(), std::numeric_limits<double>::infinity());
+  std::copy(setup_.state_lower.begin(), setup_.state_lower.end(), lower_pattern_.begin());
+  std::copy(setup_.state_upper.begin(), setup_.state_upper.end(), upper_pattern_.begin());
+  std::copy(setup_.input_lower.begin(), setup_.input_lower.end(), lower_pattern_.begin() + capacity().states);
+  std::copy(setup_.input_upper.begin(), setup_.input_upper.end(), upper_pattern_.begin() + capacity().states);
+  for (const Variable& output : about.outputs) output_is_angle_.push_back(output.is_angle);
   const auto nodes = static_cast<std::size_t>(setup_.max_intervals) + 1;
   const double missing = std::numeric_limits<double>::quiet_NaN();
   outputs_.assign(nodes * ny_, missing);
@@ -59,27 +73,27 @@ void RheProblem::link(int interval, int parameter, double variance) noexcept {
 
 void RheProblem::finish() noexcept {
   finish_structure();
-  const int ns = capacity().states, nw = capacity().controls;
+  const int ns = capacity().states;
   for (int i = 0; i <= intervals(); ++i) {
-    for (int j = 0; j < nx(); ++j) {
-      state_lower_[i * ns + j] = setup_.state_lower[j];
-      state_upper_[i * ns + j] = setup_.state_upper[j];
-    }
+    double *lower = lower_row(i), *upper = upper_row(i);
+    std::copy_n(lower_pattern_.data(), stride(), lower);
+    std::copy_n(upper_pattern_.data(), stride(), upper);
     // A block is bounded once, where its value is decided: at node 0 or by the control that starts it.
-    for (int j = 0; j < np(); ++j) {
-      state_lower_[i * ns + nx() + j] = i == 0 ? setup_.parameter_lower[j] : -std::numeric_limits<double>::infinity();
-      state_upper_[i * ns + nx() + j] = i == 0 ? setup_.parameter_upper[j] : std::numeric_limits<double>::infinity();
+    if (i == 0) {
+      std::copy_n(setup_.parameter_lower.data(), np(), lower + nx());
+      std::copy_n(setup_.parameter_upper.data(), np(), upper + nx());
     }
-    if (i == intervals()) break;
-    for (int j = 0; j < nu(); ++j) {
-      control_lower_[i * nw + j] = setup_.input_lower[j];
-      control_upper_[i * nw + j] = setup_.input_upper[j];
+    if (i == intervals()) {
+      std::fill_n(lower + ns, capacity().controls, -std::numeric_limits<double>::infinity());
+      std::fill_n(upper + ns, capacity().controls, std::numeric_limits<double>::infinity());
+      break;
     }
+    if (control_count(i) == nu()) continue;
     for (int j = 0; j < np(); ++j) {
       const int control = control_of_channel(i, j);
       if (control < 0) continue;
-      control_lower_[i * nw + control] = setup_.parameter_lower[j];
-      control_upper_[i * nw + control] = setup_.parameter_upper[j];
+      lower[ns + control] = setup_.parameter_lower[j];
+      upper[ns + control] = setup_.parameter_upper[j];
     }
   }
 }
@@ -92,18 +106,18 @@ void RheProblem::drop_first_interval() noexcept {
 
 std::size_t RheProblem::cost_scratch_size() const noexcept {
   const std::size_t nodes = static_cast<std::size_t>(capacity().intervals) + 1;
-  // states, outputs, multipliers, jacobians, hessians of all nodes, and four rows of outputs
-  return nodes * (nx() + 2 * ny_ + ny_ * nx() + nx() * nx()) + 4 * static_cast<std::size_t>(ny_);
+  // states, outputs, multipliers, jacobians, hessians of all nodes, what the model needs, and four rows of outputs
+  return nodes * (nx() + 2 * ny_ + ny_ * padded_states() + nx() * nx()) +
+         model().rows_scratch(static_cast<int>(nodes)) + 4 * static_cast<std::size_t>(ny_) + 8;
 }
 
 void RheProblem::residual(int node, const double* predicted, double* difference) const noexcept {
   const double* y = output(node);
-  const auto& about = model().description().outputs;
   for (int j = 0; j < ny_; ++j) {
     if (std::isnan(y[j])) {
       difference[j] = 0.0;
     } else {
-      difference[j] = about[j].is_angle ? angle_difference(predicted[j], y[j]) : predicted[j] - y[j];
+      difference[j] = output_is_angle_[j] != 0 ? angle_difference(predicted[j], y[j]) : predicted[j] - y[j];
     }
   }
 }
@@ -131,109 +145,99 @@ double RheProblem::losses(const double* difference, double* weight, double* curv
 
 double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept {
   const int count = intervals() + 1;
-  double* states = scratch.data();
-  double* predicted = states + count * nx();
+  double* predicted = scratch.data();
   double* difference = predicted + count * ny_;
   double* weight = difference + ny_;
-  for (int i = 0; i < count; ++i) std::copy_n(point.state(i), nx(), states + i * nx());
-  Model::Nodes request;
+  NodeRows request;
   request.count = count;
-  request.states = states;
+  request.states = point.state(0);
+  request.state_step = stride();
   request.outputs = predicted;
-  model().observe(request);
+  request.scratch = weight + ny_;
+  model().observe_rows(request);
 
   double total = 0.0;
   const auto add = [&](int stage, double part) {
     total += part;
     if (stage_costs) stage_costs[stage] += part;
   };
-  const int n = nx() + np();
-  for (int r = 0; r < n; ++r)
-    for (int c = 0; c < n; ++c)
-      add(0, (point.state(0)[r] - arrival_mean[r]) * arrival_information(r, c) * (point.state(0)[c] - arrival_mean[c]));
+  add(0, arrival_term(point, nullptr));
   for (int i = 0; i < count; ++i) {
     residual(i, predicted + i * ny_, difference);
     add(i, losses(difference, weight, nullptr));
   }
-  for (int i = 0; i < intervals(); ++i) {
-    for (int j = 0; j < nu(); ++j) {
-      const double measured = measured_input(i)[j];
-      if (std::isnan(measured)) continue;
-      const double error = point.control(i)[j] - measured;
-      add(i, setup_.input_weights[j] * error * error);
-    }
-    for (int j = 0; j < np(); ++j) {
-      const int control = control_of_channel(i, j);
-      if (control < 0) continue;
-      const double jump = point.control(i)[control] - point.state(i)[nx() + j];
-      add(i, link_information_[i * np() + j] * jump * jump);
-    }
+  for (int i = 0; i < intervals(); ++i) add(i, inputs_and_links(i, point, nullptr, nullptr));
+  return total;
+}
+
+double RheProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                            std::span<double> scratch) const noexcept {
+  const bool matrices = hessian != Hessian::none;
+  double total = 0.0;
+  if (range.first == 0) {
+    total += arrival_term(point, qp.h(0));
+    const int n = nx() + np();
+    for (int c = 0; matrices && c < n; ++c)
+      for (int r = 0; r < n; ++r) qp.H(0)[c * stride() + r] += 2.0 * arrival_information(r, c);
+  }
+  total += add_outputs(range, point, hessian, qp, scratch);
+  for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
+    total += inputs_and_links(i, point, matrices ? qp.H(i) : nullptr, qp.h(i));
+  return total;
+}
+
+void RheProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
+  add_cost({0, intervals()}, point, Hessian::none, qp, scratch);
+}
+
+/// The arrival cost; adds its gradient to q, if not null.
+double RheProblem::arrival_term(const Iterate& point, double* q) const noexcept {
+  const int n = nx() + np();
+  double total = 0.0;
+  for (int c = 0; c < n; ++c) {
+    const double* information = arrival_information.data() + static_cast<std::ptrdiff_t>(c) * n;
+    double pull = 0.0;
+    for (int r = 0; r < n; ++r) pull += information[r] * (point.state(0)[r] - arrival_mean[r]);
+    total += pull * (point.state(0)[c] - arrival_mean[c]);
+    if (q) q[c] += 2.0 * pull;
   }
   return total;
 }
 
-void RheProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                          std::span<double> scratch) const noexcept {
-  if (range.first == 0) add_arrival(point, true, qp);
-  add_outputs(range, point, hessian, true, qp, scratch);
-  add_inputs_and_links(range, point, true, qp);
-}
-
-void RheProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
-  add_arrival(point, false, qp);
-  add_outputs({0, intervals()}, point, Hessian::gauss_newton, false, qp, scratch);
-  add_inputs_and_links({0, intervals()}, point, false, qp);
-}
-
-void RheProblem::add_arrival(const Iterate& point, bool matrices, StageQp& qp) const noexcept {
-  const int n = nx() + np();
-  for (int c = 0; c < n; ++c) {
-    const double error = point.state(0)[c] - arrival_mean[c];
-    for (int r = 0; r < n; ++r) {
-      const double information = arrival_information(r, c);
-      qp.q(0)[r] += 2.0 * information * error;
-      if (matrices) qp.H(0)[c * qp.stride() + r] += 2.0 * information;
-    }
-  }
-}
-
-void RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hessian, bool matrices, StageQp& qp,
-                             std::span<double> scratch) const noexcept {
-  const int count = range.last - range.first + 1, n = nx(), stride = qp.stride();
-  double* states = scratch.data();
-  double* predicted = states + count * n;
-  double* jacobians = predicted + count * ny_;
-  double* multipliers = jacobians + count * ny_ * n;
-  double* hessians = multipliers + count * ny_;
-  double* difference = hessians + count * n * n;
-  double *weight = difference + ny_, *curvature = weight + ny_;
-  for (int i = 0; i < count; ++i) std::copy_n(point.state(range.first + i), n, states + i * n);
-  Model::Nodes request;
+double RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                               std::span<double> scratch) const noexcept {
+  const int count = range.last - range.first + 1, n = nx(), width = padded_states();
+  auto* jacobians = reinterpret_cast<double*>((reinterpret_cast<std::uintptr_t>(scratch.data()) + 63) / 64 * 64);
+  double* predicted = jacobians + static_cast<std::ptrdiff_t>(count) * ny_ * width;
+  double* multipliers = predicted + count * ny_;
+  double* difference = multipliers + count * ny_;
+  double *weight = difference + ny_, *curvature = weight + ny_, *w = curvature + ny_;
+  double* rest = w + ny_;
+  NodeRows request;
   request.count = count;
-  request.states = states;
+  request.states = point.state(range.first);
+  request.state_step = stride();
   request.outputs = predicted;
   request.jacobians = jacobians;
-  model().observe(request);
+  request.jacobian_row = width;
+  request.scratch = rest;
+  model().observe_rows(request);
 
-  const bool exact = matrices && hessian == Hessian::exact;
+  const ProgramKernels& kernels = program_kernels();
+  const bool exact = hessian == Hessian::exact;
+  double total = 0.0;
   for (int i = 0; i < count; ++i) {
     const int node = range.first + i;
     residual(node, predicted + i * ny_, difference);
-    losses(difference, weight, curvature);
+    total += losses(difference, weight, curvature);
     const double* y = output(node);
-    const double* J = jacobians + i * ny_ * n;
-    double *H = qp.H(node), *q = qp.q(node);
+    const double* J = jacobians + static_cast<std::ptrdiff_t>(i) * ny_ * width;
+    double* H = qp.H(node);
     for (int j = 0; j < ny_; ++j) {
-      const double w = std::isnan(y[j]) ? 0.0 : 2.0 * weight[j] * setup_.output_weights[j];
-      multipliers[i * ny_ + j] = w * difference[j];
-      if (w == 0.0) continue;
-      for (int c = 0; c < n; ++c) {
-        const double wJ = w * J[c * ny_ + j];
-        q[c] += wJ * difference[j];
-        if (matrices && wJ != 0.0)
-          for (int r = 0; r < n; ++r) H[c * stride + r] += J[r * ny_ + j] * wJ;
-      }
+      w[j] = std::isnan(y[j]) ? 0.0 : weight[j] * setup_.output_weights[j];
+      multipliers[i * ny_ + j] = 2.0 * w[j] * difference[j];
     }
+    kernels.add_squares(J, w, difference, ny_, n, hessian == Hessian::none ? nullptr : H, qp.h(node), stride());
     if (!exact) continue;
     // The loss itself bends: 4 rho'' (J' W r)(J' W r)'.
     for (const RobustLoss& loss : setup_.robust) {
@@ -241,52 +245,59 @@ void RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hes
         for (int r = 0; r < n; ++r) {
           double left = 0.0, right = 0.0;
           for (const int j : loss.outputs) {
-            left += J[r * ny_ + j] * setup_.output_weights[j] * difference[j];
-            right += J[c * ny_ + j] * setup_.output_weights[j] * difference[j];
+            left += J[j * width + r] * setup_.output_weights[j] * difference[j];
+            right += J[j * width + c] * setup_.output_weights[j] * difference[j];
           }
-          H[c * stride + r] += 4.0 * curvature[loss.outputs.front()] * left * right;
+          H[c * stride() + r] += 4.0 * curvature[loss.outputs.front()] * left * right;
         }
       }
     }
   }
-  if (!exact) return;
-  request.outputs = nullptr;
-  request.jacobians = nullptr;
-  request.multipliers = multipliers;
-  request.hessians = hessians;
-  model().observe(request);
+  if (!exact) return total;
+  double *states = rest, *hessians = states + static_cast<std::ptrdiff_t>(count) * n;
+  for (int i = 0; i < count; ++i) std::copy_n(point.state(range.first + i), n, states + i * n);
+  Model::Nodes bent;
+  bent.count = count;
+  bent.states = states;
+  bent.multipliers = multipliers;
+  bent.hessians = hessians;
+  model().observe(bent);
   for (int i = 0; i < count; ++i)
     for (int c = 0; c < n; ++c)
-      for (int r = 0; r < n; ++r) qp.H(range.first + i)[c * stride + r] += hessians[(i * n + c) * n + r];
+      for (int r = 0; r < n; ++r) qp.H(range.first + i)[c * stride() + r] += hessians[(i * n + c) * n + r];
+  return total;
 }
 
-void RheProblem::add_inputs_and_links(StageRange range, const Iterate& point, bool matrices,
-                                      StageQp& qp) const noexcept {
-  const int ns = capacity().states, stride = qp.stride();
-  for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i) {
-    for (int j = 0; j < nu(); ++j) {
-      const double measured = measured_input(i)[j];
-      if (std::isnan(measured)) continue;
-      const double w = 2.0 * setup_.input_weights[j];
-      qp.r(i)[j] += w * (point.control(i)[j] - measured);
-      if (matrices) qp.H(i)[(ns + j) * stride + ns + j] += w;
-    }
-    for (int j = 0; j < np(); ++j) {
-      const int control = control_of_channel(i, j), state = nx() + j;
-      if (control < 0) continue;
-      const double w = 2.0 * link_information_[i * np() + j];
-      const double pull = w * (point.control(i)[control] - point.state(i)[state]);
-      qp.r(i)[control] += pull;
-      qp.q(i)[state] -= pull;
-      if (matrices) {
-        double* H = qp.H(i);
-        H[(ns + control) * stride + ns + control] += w;
-        H[state * stride + state] += w;
-        H[state * stride + ns + control] -= w;
-        H[(ns + control) * stride + state] -= w;
-      }
-    }
+/// The terms of measured inputs and linked blocks of one interval; adds to H and h, where they are not null.
+double RheProblem::inputs_and_links(int i, const Iterate& point, double* H, double* h) const noexcept {
+  const int ns = capacity().states;
+  const double *u = point.control(i), *measured = measured_input(i);
+  double total = 0.0;
+  for (int j = 0; j < nu(); ++j) {
+    if (std::isnan(measured[j])) continue;
+    const double error = u[j] - measured[j], pull = setup_.input_weights[j] * error;
+    total += pull * error;
+    if (h) h[ns + j] += 2.0 * pull;
+    if (H) H[(ns + j) * stride() + ns + j] += 2.0 * setup_.input_weights[j];
   }
+  if (control_count(i) == nu()) return total;
+  for (int j = 0; j < np(); ++j) {
+    const int control = control_of_channel(i, j), state = nx() + j;
+    if (control < 0) continue;
+    const double information = link_information_[i * np() + j], jump = u[control] - point.state(i)[state];
+    total += information * jump * jump;
+    const double pull = 2.0 * information * jump;
+    if (h) {
+      h[ns + control] += pull;
+      h[state] -= pull;
+    }
+    if (!H) continue;
+    H[(ns + control) * stride() + ns + control] += 2.0 * information;
+    H[state * stride() + state] += 2.0 * information;
+    H[state * stride() + ns + control] -= 2.0 * information;
+    H[(ns + control) * stride() + state] -= 2.0 * information;
+  }
+  return total;
 }
 
 void RheProblem::robust_weights(const Iterate& point, int node, double* weights,

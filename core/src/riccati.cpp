@@ -52,6 +52,14 @@ Riccati::Riccati(const Capacity& capacity)
   work_.assign(2 * (ns_ + nw_) * row + 2 * rows * (wide + ns_) + 7 * wide * wide + 8 * wide + 4 * rows, 0.0);
 }
 
+namespace {
+
+bool holds_any(const std::int8_t* sides, int count) noexcept {
+  return std::any_of(sides, sides + count, [](std::int8_t side) { return side != 0; });
+}
+
+}  // namespace
+
 RiccatiView Riccati::view_of(const StageQp& qp, const ActiveSet& active) noexcept {
   RiccatiView view;
   view.intervals = qp.intervals();
@@ -84,7 +92,7 @@ void Riccati::factor(const StageQp& qp, const ActiveSet& active, const double* d
     state_counts_[i] = qp.states(i);
     control_counts_[i] = qp.controls(i);
     // What its controls have to keep: bounds of the next state.
-    is_special_[i] = i < N && count_active(qp, active, i + 1) > 0;
+    is_special_[i] = i < N && holds_any(active.state(i + 1), ns_);
   }
   RiccatiView view = view_of(qp, active);
   view.diagonal = diagonal;
@@ -128,12 +136,12 @@ Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iter
     if (!solve_special_backward(qp, active, h, i)) return Outcome::inconsistent;
   }
   write_active_bounds(qp, active, 0);
+  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(N + 1) * stride_;
+  std::fill_n(step.row(0), entries, 0.0);
+  std::fill_n(step.bound_row(0), entries, 0.0);
   if (!solve_initial(qp, active, step)) return Outcome::inconsistent;
-  for (int i = 0; i < N; ++i) {
-    const int end = kernels_->solve_forward(view, i);
-    for (; i < end; ++i) std::fill_n(step.state_bound(i + 1), ns_, 0.0);
-    if (end < N) solve_special_forward(qp, active, step, i);
-  }
+  for (int i = kernels_->solve_forward(view, 0); i < N; i = kernels_->solve_forward(view, i + 1))
+    solve_special_forward(qp, active, step, i);
   return Outcome::done;
 }
 

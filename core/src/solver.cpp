@@ -45,8 +45,8 @@ const char* advice_for(Status status) noexcept {
 bool is_usable(Status status) noexcept { return status != Status::infeasible && status != Status::bad_input; }
 
 void judge(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch, Report& report) noexcept {
-  report.objective = ocp.evaluate(point, nullptr, scratch);
-  report.kkt = kkt_residual(ocp, point, qp, scratch);
+  report.objective = ocp.linearise(all_stages(ocp), point, Hessian::none, qp, scratch);
+  report.kkt = kkt_residual(qp, point);
 }
 
 double microseconds_since(Clock::time_point start) noexcept {

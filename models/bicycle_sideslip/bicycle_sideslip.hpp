@@ -20,7 +20,7 @@ struct BicycleSideslip {
   double antenna_y = 0.0;  ///< a_y: how far it is to the left [m]
 
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin, std::tan;
     const Scalar &psi = x[2], &delta = x[3], &v = u[0], &front = p[0], &rear = p[1];
     dxdt[0] = v * cos(psi + rear);
@@ -30,7 +30,7 @@ struct BicycleSideslip {
   }
 
   template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar cosine = cos(x[2]), sine = sin(x[2]);
     y[0] = x[0] + antenna_x * cosine - antenna_y * sine;

@@ -18,7 +18,7 @@ struct BicycleSlip {
   double gps_offset = 0.4;  ///< d: how far the GPS antenna is behind the rear axle [m]
 
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin, std::tan;
     const Scalar &beta = x[2], &delta = x[3], &kappa = p[0], &mu = p[1];
     const Scalar speed = kappa * u[0];
@@ -29,7 +29,7 @@ struct BicycleSlip {
   }
 
   template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar& beta = x[2];
     y[0] = x[0] - gps_offset * cos(beta);

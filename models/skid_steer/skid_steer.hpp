@@ -21,7 +21,7 @@ struct SkidSteer {
   double antenna_y = 0.0;      ///< a_y: how far it is to the left [m]
 
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin;
     const Scalar left = wheel_radius * u[0] * (1.0 - p[0]), right = wheel_radius * u[1] * (1.0 - p[1]);
     const Scalar speed = 0.5 * (left + right), yaw_rate = (right - left) / track_width;
@@ -33,7 +33,7 @@ struct SkidSteer {
   }
 
   template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar cosine = cos(x[2]), sine = sin(x[2]);
     y[0] = x[0] + antenna_x * cosine - antenna_y * sine;

@@ -33,7 +33,7 @@ struct TractorTrailer {
   double trailer_antenna_y = 0.0;  ///< how far it is to the left [m]
 
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin, std::tan;
     const Scalar &psi_i = x[2], &psi_t = x[3], &delta = x[4], &mu = p[0], &kappa = p[1], &eta = p[2];
     const Scalar speed = mu * u[0], slipping = eta * (psi_t - psi_i);
@@ -48,7 +48,7 @@ struct TractorTrailer {
   }
 
   template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar &psi_i = x[2], &psi_t = x[3];
     const Scalar sine_i = sin(psi_i), cosine_i = cos(psi_i), sine_t = sin(psi_t), cosine_t = cos(psi_t);

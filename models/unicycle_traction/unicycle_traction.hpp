@@ -17,7 +17,7 @@ struct UnicycleTraction {
   double antenna_y = 0.0;  ///< a_y: how far it is to the left [m]
 
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin;
     const Scalar &psi = x[2], &mu = p[0], &kappa = p[1];
     const Scalar speed = mu * u[0];
@@ -27,7 +27,7 @@ struct UnicycleTraction {
   }
 
   template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar cosine = cos(x[2]), sine = sin(x[2]);
     y[0] = x[0] + antenna_x * cosine - antenna_y * sine;

@@ -25,7 +25,7 @@ struct Articulated {
   double antenna = 0.3;  ///< how far the GPS antenna is before the front axle [m]
 
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin;
     const Scalar speed = p[0] * u[0], bend = p[1] * x[3];
     dxdt[0] = speed * cos(x[2]);
@@ -35,7 +35,7 @@ struct Articulated {
   }
 
   template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     y[0] = x[0] + antenna * cos(x[2]);
     y[1] = x[1] + antenna * sin(x[2]);

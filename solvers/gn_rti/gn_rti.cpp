@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "rhec/core/point.hpp"
+#include "rhec/core/stage_checks.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec::gn_rti {
@@ -33,6 +35,14 @@ void for_each_dual_row(const Ocp& ocp, Iterate& to, const Iterate& from, const F
     function(to.state_bound(i), from.state_bound(i), ocp.state_count(i));
     if (i < ocp.intervals()) function(to.control_bound(i), from.control_bound(i), ocp.control_count(i));
   }
+}
+
+/// Whether any costate is other than zero (which a number that is none is, too).
+bool has_costates(const Ocp& ocp, const Iterate& point) noexcept {
+  for (int i = 1; i <= ocp.intervals(); ++i)
+    for (int j = 0; j < ocp.state_count(i); ++j)
+      if (point.costate(i)[j] != 0.0) return true;
+  return false;
 }
 
 }  // namespace
@@ -94,7 +104,7 @@ Hessian GnRti::hessian_for(const Ocp& ocp) const noexcept {
 /// Linearises at the point; a point without costates gets those that fit it first, since the exact Hessian needs them.
 void GnRti::linearise(const Ocp& ocp, Iterate& point) noexcept {
   const Hessian hessian = hessian_for(ocp);
-  if (hessian == Hessian::exact && largest_costate(ocp, point) == 0.0) {
+  if (hessian == Hessian::exact && !has_costates(ocp, point)) {
     ocp.linearise(all_stages(ocp), point, Hessian::gauss_newton, qp_, scratch_);
     set_costates(qp_, point);
   }
@@ -105,7 +115,7 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
   const auto start = Clock::now();
   prepared_ = false;
   use_exact_ = false;
-  if (!(ocp.capacity() == capacity_) || !(guess.capacity() == capacity_) || !is_finite(ocp, guess)) return;
+  if (!(ocp.capacity() == capacity_) || !(guess.capacity() == capacity_)) return;
   prepared_point_ = guess;
   linearise(ocp, prepared_point_);
   qp_solver_.guess_from(qp_, prepared_point_);
@@ -115,17 +125,12 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
 }
 
 bool GnRti::is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept {
-  if (!prepared_ || qp_.intervals() != ocp.intervals()) return false;
-  bool same = true;
-  const auto compare = [&](const double* a, const double* b, int n) { same = same && std::equal(a, a + n, b); };
-  for (int i = 0; i <= ocp.intervals(); ++i) {
-    if (qp_.states(i) != ocp.state_count(i)) return false;
-    compare(prepared_point_.state(i), point.state(i), ocp.state_count(i));
-    if (i == ocp.intervals()) break;
-    if (qp_.controls(i) != ocp.control_count(i)) return false;
-    compare(prepared_point_.control(i), point.control(i), ocp.control_count(i));
-  }
-  return same;
+  const int N = ocp.intervals();
+  if (!prepared_ || qp_.intervals() != N) return false;
+  for (int i = 0; i <= N; ++i)
+    if (qp_.states(i) != ocp.state_count(i) || (i < N && qp_.controls(i) != ocp.control_count(i))) return false;
+  const std::size_t bytes = static_cast<std::size_t>(N + 1) * capacity_.row() * sizeof(double);
+  return std::memcmp(prepared_point_.row(0), point.row(0), bytes) == 0;
 }
 
 void GnRti::add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept {
@@ -169,10 +174,13 @@ Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) 
   const auto start = Clock::now();
   Report report;
   use_exact_ = false;
-  if (ocp.capacity() == capacity_ && is_sound_start(ocp, point, scratch_)) {
+  if (ocp.capacity() == capacity_ && point.capacity() == capacity_) {
     // A real-time iteration lives on the sample before; a point without costates has none.
-    const bool step = options_.mode == Mode::rti && largest_costate(ocp, point) > 0.0;
-    report = step ? real_time(ocp, point, deadline) : converge(ocp, point, deadline);
+    if (options_.mode == Mode::rti && has_costates(ocp, point)) {
+      report = real_time(ocp, point, deadline);
+    } else if (is_sound_start(ocp, point, scratch_)) {
+      report = converge(ocp, point, deadline);
+    }
   }
   report.preparation_us = prepared_ ? preparation_us_ : 0.0;
   prepared_ = false;
@@ -182,30 +190,35 @@ Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) 
 
 Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
   Report report;
-  best_ = point;
-  bool ready = is_prepared_for(ocp, point);
   report.status = Status::step_taken;
+  bool ready = is_prepared_for(ocp, point);
   for (int iteration = 0; iteration < options_.iterations; ++iteration) {
     if (iteration > 0 && Clock::now() > deadline) {
       report.status = Status::deadline;
       break;
     }
+    // The caller's point stays as it is until there is a better one.
+    Iterate& from = iteration == 0 ? point : best_;
     if (ready) {
-      ocp.refresh(best_, qp_, scratch_);
+      ocp.refresh(from, qp_, scratch_);
     } else {
-      linearise(ocp, best_);
-      qp_solver_.guess_from(qp_, best_);
+      linearise(ocp, from);
+      qp_solver_.guess_from(qp_, from);
     }
     ready = false;
     if (solve_program(report) == StageQpSolver::Outcome::infeasible) {
       report.status = Status::infeasible;
       break;
     }
-    add_step(ocp, best_, 1.0, trial_);
-    if (!is_sound_start(ocp, trial_, scratch_)) {
+    add_full_step(ocp.intervals(), from, step_, trial_);
+    const double objective = ocp.linearise(all_stages(ocp), trial_, Hessian::none, qp_, scratch_);
+    const KktResidual kkt = kkt_residual(qp_, trial_);
+    if (!std::isfinite(objective) || !std::isfinite(kkt.stationarity)) {
       report.status = Status::stalled;
       break;
     }
+    report.objective = objective;
+    report.kkt = kkt;
     std::swap(best_, trial_);
     ++report.iterations;
   }
@@ -213,8 +226,11 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
     if (report.status == Status::infeasible || report.status == Status::stalled)
       report.status = Status::iteration_limit;
     std::swap(point, best_);
+  } else {
+    // What is not a number is seen in the result first.
+    if (!is_sound_start(ocp, point, scratch_)) return {};
+    judge(ocp, point, qp_, scratch_, report);
   }
-  judge(ocp, point, qp_, scratch_, report);
   return report;
 }
 

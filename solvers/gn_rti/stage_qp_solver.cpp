@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rhec/core/stage_checks.hpp"
+
 namespace rhec::gn_rti {
 namespace {
 
@@ -21,23 +23,11 @@ bool is_equality(double lower, double upper) {
   return std::isfinite(lower) && upper - lower <= 1e-14 * (1.0 + std::abs(lower));
 }
 
-/// A lower bound above its upper bound, by more than rounding.
-bool has_crossed_bounds(const StageQp& qp) noexcept {
-  bool crossed = false;
-  const auto check = [&](const double* lower, const double* upper, int n) {
-    for (int j = 0; j < n; ++j) crossed = crossed || lower[j] - upper[j] > bound_tolerance * (1.0 + std::abs(lower[j]));
-  };
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    if (i > 0 || !qp.initial_state_is_given) check(qp.state_lower(i), qp.state_upper(i), qp.states(i));
-    check(qp.control_lower(i), qp.control_upper(i), qp.controls(i));
-  }
-  return crossed;
-}
-
 }  // namespace
 
 StageQpSolver::StageQpSolver(const Capacity& capacity) : capacity_(capacity), riccati_(capacity), active_(capacity) {
   const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1;
+  marks_.assign(nodes, 0);
   bounded_.reserve(nodes * (capacity.states + capacity.controls));
   for (auto* v : {&diagonal_, &h_}) v->assign(nodes * capacity.row(), 0.0);
 }
@@ -58,7 +48,11 @@ void StageQpSolver::guess_from(const StageQp& qp, const Iterate& point) noexcept
     if (multiplier < 0.0 && std::isfinite(lower)) return -1;
     return 0;
   };
+  mark_bounds(qp, point, bound_tolerance, marks_.data());
+  any_active_ = false;
   for (int i = 0; i <= qp.intervals(); ++i) {
+    if (marks_[i] == 0) continue;
+    any_active_ = true;
     if (i > 0 || !qp.initial_state_is_given)
       for (int j = 0; j < qp.states(i); ++j)
         active_.state(i)[j] = side(point.state_bound(i)[j], qp.state_lower(i)[j], qp.state_upper(i)[j]);
@@ -77,14 +71,11 @@ void StageQpSolver::prepare(const StageQp& qp) noexcept { factor(qp); }
 
 StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, const Iterate& step) noexcept {
   Violations found;
-  double scale = 0.0;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    for (int j = 0; j < qp.states(i); ++j) scale = std::max(scale, std::abs(step.costate(i)[j]));
-    for (int j = 0; j < qp.states(i); ++j) found.finite = found.finite && std::isfinite(step.state(i)[j]);
-    for (int j = 0; j < qp.controls(i); ++j) found.finite = found.finite && std::isfinite(step.control(i)[j]);
-  }
-  if (!found.finite) return found;
-  const double pull_tolerance = multiplier_tolerance * (1.0 + scale);
+  const StepCheck check = check_step(qp, step, bound_tolerance);
+  found.finite = check.is_finite;
+  if (!found.finite || (!check.violates && !any_active_)) return found;
+  any_active_ = true;
+  const double pull_tolerance = multiplier_tolerance * (1.0 + check.largest_costate);
   const auto correct = [&](std::int8_t& side, double value, double multiplier, double lower, double upper) {
     const std::int8_t before = side;
     if (side == 0) {
@@ -121,7 +112,7 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
 
 StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step) noexcept {
   // An active set takes one side of such bounds and does not see that the other is violated.
-  if (has_crossed_bounds(qp)) return Outcome::infeasible;
+  if (mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
   return try_active_sets(qp, step, warm_rounds) ? Outcome::active_set : solve_by_interior_point(qp, step);
 }
 
@@ -135,6 +126,7 @@ StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Itera
   }
   // The set on which the interior point has settled; kept only if it leads to the exact solution.
   active_.clear();
+  any_active_ = true;
   for (const Bounded& v : bounded_) {
     std::int8_t& side = v.is_state ? active_.state(v.stage)[v.component] : active_.control(v.stage)[v.component];
     const bool at_lower = std::isfinite(v.lower) && v.below.multiplier > gradient_scale_ * v.below.slack;

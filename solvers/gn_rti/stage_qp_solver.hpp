@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "rhec/core/riccati.hpp"
@@ -74,8 +75,10 @@ class StageQpSolver {
   Riccati riccati_;
   ActiveSet active_;
   bool factored_ = false, bent_ = false;
+  bool any_active_ = true;  ///< false: no bound is active, for certain
   int factorisations_ = 0;
   double gradient_scale_ = 1.0;  ///< of the last interior-point solution: what a slack of one weighs
+  std::vector<std::uint8_t> marks_;  ///< stages at which a bound may be active
   std::vector<Bounded> bounded_;
   std::vector<double> diagonal_, h_;  ///< rows of the program's stride: barrier terms
 };

@@ -310,9 +310,9 @@ class Disguised final : public Ocp {
   void simulate_interval(int i, Iterate& point, std::span<double> scratch) const noexcept override {
     of_.simulate_interval(i, point, scratch);
   }
-  void linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                  std::span<double> scratch) const noexcept override {
-    of_.linearise(range, point, hessian, qp, scratch);
+    return of_.linearise(range, point, hessian, qp, scratch);
   }
   void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override {
     of_.refresh(point, qp, scratch);

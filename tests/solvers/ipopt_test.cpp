@@ -83,17 +83,18 @@ class Scaled final : public Ocp {
   void simulate_interval(int i, Iterate& point, std::span<double> scratch) const noexcept override {
     of_.simulate_interval(i, point, scratch);
   }
-  void linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                  std::span<double> scratch) const noexcept override {
     ++linearisations;
     weighted_ = point;
     for (int i = 0; i <= intervals(); ++i)
       for (int j = 0; j < state_count(i); ++j) weighted_.costate(i)[j] /= factor_;
-    of_.linearise(range, weighted_, hessian, qp, scratch);
+    const double objective = of_.linearise(range, weighted_, hessian, qp, scratch);
     const int rows = capacity().states + capacity().controls;
     for (int i = range.first; i <= range.last; ++i)
       for (auto [values, count] : {std::pair{qp.H(i), rows * qp.stride()}, {qp.h(i), rows}})
         for (int k = 0; k < count; ++k) values[k] *= factor_;
+    return factor_ * objective;
   }
   void refresh(const Iterate&, StageQp&, std::span<double>) const noexcept override {}
 

@@ -66,7 +66,9 @@ class Shape final : public Ocp {
   std::size_t scratch_size() const noexcept override { return 0; }
   double evaluate_stages(const Iterate&, double*, double*, std::span<double>) const noexcept override { return 0.0; }
   void simulate_interval(int, Iterate&, std::span<double>) const noexcept override {}
-  void linearise(StageRange, const Iterate&, Hessian, StageQp&, std::span<double>) const noexcept override {}
+  double linearise(StageRange, const Iterate&, Hessian, StageQp&, std::span<double>) const noexcept override {
+    return 0.0;
+  }
   void refresh(const Iterate&, StageQp&, std::span<double>) const noexcept override {}
 
  private:

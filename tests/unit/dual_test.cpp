@@ -38,8 +38,8 @@ template <class Function>
 void expect_derivatives(const std::string& name, Function f, double x, double y) {
   SCOPED_TRACE(name + " at " + std::to_string(x) + ", " + std::to_string(y));
   const Expansion expected = differences(f, x, y);
-  const First first = f(First::variable(x, 0), First::variable(y, 1));
-  const Second second = f(Second::variable(x, 0), Second::variable(y, 1));
+  const First first = f(First::variable<0>(x), First::variable<1>(y));
+  const Second second = f(Second::variable<0>(x), Second::variable<1>(y));
   EXPECT_NEAR(first.value, expected.value, 1e-14 * (1 + std::abs(expected.value)));
   EXPECT_NEAR(second.value, expected.value, 1e-14 * (1 + std::abs(expected.value)));
   const auto near = [](double found, double wanted, double tolerance) {
@@ -93,11 +93,11 @@ TEST(Dual, AngleOfAVectorInEveryQuadrantAndOnTheAxes) {
     expect_derivatives("atan2", angle, 2 * std::sin(radians), 2 * std::cos(radians));
   }
   // On the cut the value jumps, the derivatives do not.
-  const First cut = angle(First::variable(0.0, 0), First::variable(-2.0, 1));
+  const First cut = angle(First::variable<0>(0.0), First::variable<1>(-2.0));
   EXPECT_EQ(cut.value, M_PI);
   EXPECT_DOUBLE_EQ(cut.d[0], -0.5);
   EXPECT_NEAR(cut.d[1], 0.0, 1e-15);
-  const First with_constant = atan2(First::variable(1.0, 0), 1.0), constant_first = atan2(1.0, First::variable(1.0, 0));
+  const First with_constant = atan2(First::variable<0>(1.0), 1.0), constant_first = atan2(1.0, First::variable<0>(1.0));
   EXPECT_DOUBLE_EQ(with_constant.d[0], 0.5);
   EXPECT_DOUBLE_EQ(constant_first.d[0], -0.5);
 }

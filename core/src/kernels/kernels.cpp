@@ -1,12 +1,17 @@
 #include "kernels.hpp"
 
+#include <initializer_list>
+
+#include "program_kernels.hpp"
 #include "riccati_kernels.hpp"
 
 namespace rhec {
 
 extern const RiccatiKernels riccati_kernels_generic;
+extern const ProgramKernels program_kernels_generic;
 #if defined(RHEC_WIDE_KERNELS)
 extern const RiccatiKernels riccati_kernels_avx2, riccati_kernels_avx512;
+extern const ProgramKernels program_kernels_avx2, program_kernels_avx512;
 #endif
 
 namespace {
@@ -27,17 +32,34 @@ InstructionSet widest() noexcept {
 
 }  // namespace
 
+namespace {
+
+/// The table of each instruction set, narrowest first.
+template <class Table>
+const Table& of_widest(std::initializer_list<const Table*> tables) noexcept {
+  return **(tables.begin() + static_cast<int>(widest()));
+}
+
+}  // namespace
+
 const RiccatiKernels& riccati_kernels() noexcept {
-  switch (widest()) {
 #if defined(RHEC_WIDE_KERNELS)
-    case InstructionSet::avx2:
-      return riccati_kernels_avx2;
-    case InstructionSet::avx512:
-      return riccati_kernels_avx512;
+  static const RiccatiKernels& table =
+      of_widest({&riccati_kernels_generic, &riccati_kernels_avx2, &riccati_kernels_avx512});
+  return table;
+#else
+  return riccati_kernels_generic;
 #endif
-    default:
-      return riccati_kernels_generic;
-  }
+}
+
+const ProgramKernels& program_kernels() noexcept {
+#if defined(RHEC_WIDE_KERNELS)
+  static const ProgramKernels& table =
+      of_widest({&program_kernels_generic, &program_kernels_avx2, &program_kernels_avx512});
+  return table;
+#else
+  return program_kernels_generic;
+#endif
 }
 
 }  // namespace rhec

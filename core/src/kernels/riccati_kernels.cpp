@@ -181,7 +181,6 @@ inline void solve_stage_forward(const RiccatiView& view, int i) {
   double* bounds = view.bounds + i * stride;
   bool any_fixed = false;
   for (int k = stage.offset; k < stage.columns(); ++k) {
-    bounds[k] = 0.0;
     if (sides[k] != 0) {
       z[k] = (sides[k] < 0 ? view.lower : view.upper)[i * stride + k];
       any_fixed = true;

@@ -1,8 +1,21 @@
 #pragma once
 
 #include <concepts>
+#include <utility>
+
+/// On functions and lambdas of which nothing may be left but their results.
+#define RHEC_INLINE __attribute__((always_inline))
 
 namespace rhec {
+
+/// function(0), ..., function(count - 1) one after the other, with indices that the compiler knows: no loop is left of
+/// it, so that what it knows of single entries (a derivative that is always 0 or 1) is not forgotten.
+template <int count, class Function>
+RHEC_INLINE constexpr void for_indices(const Function& function) {
+  [&]<int... index>(std::integer_sequence<int, index...>) RHEC_INLINE {
+    (function(std::integral_constant<int, index>()), ...);
+  }(std::make_integer_sequence<int, count>());
+}
 
 /// A number and its first derivatives along N directions:  a + sum_j d_j e_j,  e_i e_j = 0.
 /// T is double or a pack of doubles. Formulas use it only through ordinary arithmetic (dual_functions.hpp).
@@ -17,10 +30,11 @@ struct Dual {
   /// A constant is a number.
   template <std::convertible_to<T> Constant>
   Dual(const Constant& constant) : value(constant) {  // NOLINT(google-explicit-constructor)
-    for (int j = 0; j < N; ++j) d[j] = T(0.0);
+    for_indices<N>([&](auto j) { d[j] = T(0.0); });
   }
   /// The independent variable number `direction`.
-  static Dual variable(const T& value, int direction) {
+  template <int direction>
+  static Dual variable(const T& value) {
     Dual result(value);
     result.d[direction] = T(1.0);
     return result;
@@ -29,13 +43,13 @@ struct Dual {
   static Dual chain(const Dual& a, const T& g, const T& g1, const T& /*g2*/) {
     Dual result;
     result.value = g;
-    for (int j = 0; j < N; ++j) result.d[j] = g1 * a.d[j];
+    for_indices<N>([&](auto j) { result.d[j] = g1 * a.d[j]; });
     return result;
   }
   static Dual product(const Dual& a, const Dual& b) {
     Dual result;
     result.value = a.value * b.value;
-    for (int j = 0; j < N; ++j) result.d[j] = a.d[j] * b.value + a.value * b.d[j];
+    for_indices<N>([&](auto j) { result.d[j] = a.d[j] * b.value + a.value * b.d[j]; });
     return result;
   }
   /// What is linear acts alike on the value and on every derivative.
@@ -49,27 +63,29 @@ struct Dual {
   template <class Operation, class... Others>
   static void assign_linear(Dual& out, Operation operation, const Others&... a) {
     out.value = operation(a.value...);
-    for (int j = 0; j < N; ++j) out.d[j] = operation(a.d[j]...);
+    for_indices<N>([&](auto j) { out.d[j] = operation(a.d[j]...); });
   }
 };
 
-/// A number with its gradient and Hessian along N directions; the Hessian is kept as its lower triangle by rows.
-template <class T, int N>
+/// A number with its gradient along N directions and its Hessian along the first M of them, which is kept as its lower
+/// triangle by rows.
+template <class T, int N, int M = N>
 struct SecondOrder {
   using Value = T;
   static constexpr int directions = N;
-  static constexpr int hessian_size = N * (N + 1) / 2;
+  static constexpr int hessian_size = M * (M + 1) / 2;
   T value;
-  T d[N];
-  T dd[hessian_size];
+  T d[N > 0 ? N : 1];
+  T dd[hessian_size > 0 ? hessian_size : 1];
 
   SecondOrder() = default;
   template <std::convertible_to<T> Constant>
   SecondOrder(const Constant& constant) : value(constant) {  // NOLINT(google-explicit-constructor)
-    for (int j = 0; j < N; ++j) d[j] = T(0.0);
-    for (int k = 0; k < hessian_size; ++k) dd[k] = T(0.0);
+    for_indices<N>([&](auto j) { d[j] = T(0.0); });
+    for_indices<hessian_size>([&](auto k) { dd[k] = T(0.0); });
   }
-  static SecondOrder variable(const T& value, int direction) {
+  template <int direction>
+  static SecondOrder variable(const T& value) {
     SecondOrder result(value);
     result.d[direction] = T(1.0);
     return result;
@@ -77,20 +93,26 @@ struct SecondOrder {
   static SecondOrder chain(const SecondOrder& a, const T& g, const T& g1, const T& g2) {
     SecondOrder result;
     result.value = g;
-    for (int j = 0; j < N; ++j) result.d[j] = g1 * a.d[j];
-    for (int i = 0, k = 0; i < N; ++i) {
+    for_indices<N>([&](auto j) { result.d[j] = g1 * a.d[j]; });
+    for_indices<M>([&](auto i) {
       const T g2_di = g2 * a.d[i];
-      for (int j = 0; j <= i; ++j, ++k) result.dd[k] = g1 * a.dd[k] + g2_di * a.d[j];
-    }
+      for_indices<i + 1>([&](auto j) {
+        constexpr int k = i * (i + 1) / 2 + j;
+        result.dd[k] = g1 * a.dd[k] + g2_di * a.d[j];
+      });
+    });
     return result;
   }
   static SecondOrder product(const SecondOrder& a, const SecondOrder& b) {
     SecondOrder result;
     result.value = a.value * b.value;
-    for (int j = 0; j < N; ++j) result.d[j] = a.d[j] * b.value + a.value * b.d[j];
-    for (int i = 0, k = 0; i < N; ++i)
-      for (int j = 0; j <= i; ++j, ++k)
+    for_indices<N>([&](auto j) { result.d[j] = a.d[j] * b.value + a.value * b.d[j]; });
+    for_indices<M>([&](auto i) {
+      for_indices<i + 1>([&](auto j) {
+        constexpr int k = i * (i + 1) / 2 + j;
         result.dd[k] = a.dd[k] * b.value + a.value * b.dd[k] + (a.d[i] * b.d[j] + a.d[j] * b.d[i]);
+      });
+    });
     return result;
   }
   template <class Operation, class... Others>
@@ -103,8 +125,8 @@ struct SecondOrder {
   template <class Operation, class... Others>
   static void assign_linear(SecondOrder& out, Operation operation, const Others&... a) {
     out.value = operation(a.value...);
-    for (int j = 0; j < N; ++j) out.d[j] = operation(a.d[j]...);
-    for (int k = 0; k < hessian_size; ++k) out.dd[k] = operation(a.dd[k]...);
+    for_indices<N>([&](auto j) { out.d[j] = operation(a.d[j]...); });
+    for_indices<hessian_size>([&](auto k) { out.dd[k] = operation(a.dd[k]...); });
   }
 };
 

@@ -71,6 +71,11 @@ class FormulaModel : public Model {
   const ModelDescription& description() const noexcept override { return description_; }
   void integrate(const Intervals& request) const noexcept override { kernels_->integrate(&formula_, request); }
   void observe(const Nodes& request) const noexcept override { kernels_->observe(&formula_, request); }
+  void integrate_rows(const IntervalRows& request) const noexcept override {
+    if (request.substeps != 1 || request.ramp || !request.jacobians) return Model::integrate_rows(request);
+    kernels_->integrate_rows(&formula_, request);
+  }
+  void observe_rows(const NodeRows& request) const noexcept override { kernels_->observe_rows(&formula_, request); }
   void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
     formula_.dynamics(x, u, p, dxdt);
   }

@@ -27,10 +27,10 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   int intervals() const noexcept override { return intervals_; }
   int state_count(int) const noexcept override { return capacity_.states; }
   int control_count(int interval) const noexcept override { return control_counts_[interval]; }
-  const double* state_lower(int node) const noexcept override { return row(state_lower_, node, capacity_.states); }
-  const double* state_upper(int node) const noexcept override { return row(state_upper_, node, capacity_.states); }
-  const double* control_lower(int i) const noexcept override { return row(control_lower_, i, capacity_.controls); }
-  const double* control_upper(int i) const noexcept override { return row(control_upper_, i, capacity_.controls); }
+  const double* state_lower(int node) const noexcept override { return row(lower_, node, stride_); }
+  const double* state_upper(int node) const noexcept override { return row(upper_, node, stride_); }
+  const double* control_lower(int i) const noexcept override { return row(lower_, i, stride_) + capacity_.states; }
+  const double* control_upper(int i) const noexcept override { return row(upper_, i, stride_) + capacity_.states; }
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   std::size_t scratch_size() const noexcept override;
   void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
@@ -38,7 +38,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   double evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
                          std::span<double> scratch) const noexcept override;
   void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept override;
-  void linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                  std::span<double> scratch) const noexcept override;
   void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
 
@@ -72,8 +72,15 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   int nx() const noexcept { return nx_; }
   int nu() const noexcept { return nu_; }
   int np() const noexcept { return np_; }
-  static const double* row(const std::vector<double>& v, int i, int width) noexcept { return v.data() + i * width; }
-  static double* row(std::vector<double>& v, int i, int width) noexcept { return v.data() + i * width; }
+  int stride() const noexcept { return stride_; }
+  template <class Doubles>
+  static const double* row(const Doubles& v, int i, int width) noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * width;
+  }
+  template <class Doubles>
+  static double* row(Doubles& v, int i, int width) noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * width;
+  }
 
   void set_intervals(int intervals) noexcept { intervals_ = intervals; }
   void set_begins(int interval, int channel, bool begins) noexcept { begins_[interval * channels_ + channel] = begins; }
@@ -88,23 +95,37 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   }
   int control_of_input(int interval, int input) const noexcept;
 
-  std::vector<double> state_lower_, state_upper_, control_lower_, control_upper_;
+  /// Bounds of z = [s; w] at every stage, as the rows of StageQp.
+  double* lower_row(int stage) noexcept { return row(lower_, stage, stride_); }
+  double* upper_row(int stage) noexcept { return row(upper_, stage, stride_); }
+  /// Removes all bounds.
+  void clear_bounds() noexcept;
+  /// Where an input is found in z of an interval: free, or that of its channel.
+  int column_of_input(int interval, int input) const noexcept;
+  /// No input is carried: z begins as the vehicle's [x; p; u].
+  bool is_direct() const noexcept { return static_cast<int>(free_inputs_.size()) == nu_; }
 
   // The cost, which makes the kind. Each adds to what is there.
   virtual double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept = 0;
-  virtual void add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  virtual double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                         std::span<double> scratch) const noexcept = 0;
   virtual void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept = 0;
   virtual std::size_t cost_scratch_size() const noexcept = 0;
 
  private:
   void gather(const Iterate& point, StageRange range, double* x, double* u, double* p, double* p_end) const noexcept;
+  const double* gather_rows(const Iterate& point, StageRange range, double* rows) const noexcept;
+  void linearise_dynamics(StageRange steps, const Iterate& point, Hessian hessian, StageQp& qp,
+                          std::span<double> scratch) const noexcept;
+  void place_started_channels(int interval, Hessian hessian, StageQp& qp) const noexcept;
+  void scatter(int interval, const double* jacobian, const double* hessian, StageQp& qp) const noexcept;
   void fill_bounds(const Iterate& point, StageRange range, StageQp& qp) const noexcept;
 
   std::shared_ptr<const Model> model_;
   Capacity capacity_;
-  int nx_, nu_, np_, channels_, substeps_, intervals_ = 0;
+  int nx_, nu_, np_, channels_, substeps_, stride_ = 0, row_ = 0, intervals_ = 0;
   bool any_ramp_ = false;
+  AlignedDoubles lower_, upper_;
   std::vector<int> input_channel_, free_inputs_;
   std::vector<double> durations_;
   std::vector<std::uint8_t> begins_, ramp_;

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "rhec/core/export.hpp"
+#include "rhec/core/stage_rows.hpp"
 
 namespace rhec {
 
@@ -103,6 +105,13 @@ class RHEC_EXPORT Model {
     double* hessians = nullptr;
   };
   virtual void observe(const Nodes& request) const noexcept = 0;
+
+  /// The same over rows of stages, for solvers in a hurry. As they are, they gather, call the above and scatter; a
+  /// FormulaModel computes in place.
+  virtual void integrate_rows(const IntervalRows& request) const noexcept;
+  virtual void observe_rows(const NodeRows& request) const noexcept;
+  /// How many doubles of scratch these two take for `count` rows.
+  virtual std::size_t rows_scratch(int count) const noexcept;
 
   /// dx/dt at one point, for integrators of one's own (the truth vehicle of a simulation).
   virtual void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept = 0;

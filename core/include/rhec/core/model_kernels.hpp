@@ -3,6 +3,7 @@
 #include "rhec/core/dual.hpp"
 #include "rhec/core/model.hpp"
 #include "rhec/core/runge_kutta.hpp"
+#include "rhec/core/sensitive_step.hpp"
 
 namespace rhec {
 
@@ -11,21 +12,30 @@ namespace rhec {
 struct ModelKernels {
   void (*integrate)(const void* formula, const Model::Intervals& request);
   void (*observe)(const void* formula, const Model::Nodes& request);
+  /// For one Runge-Kutta step an interval, without ramps and with Jacobians.
+  void (*integrate_rows)(const void* formula, const IntervalRows& request);
+  void (*observe_rows)(const void* formula, const NodeRows& request);
 };
 
 /// How many stages a number type carries at once, and how their rows of `size` doubles are loaded and stored: lane i of
-/// entry k is rows[i * size + k]. Of `count` rows that do not fill a pack the last one is repeated, so that no lane
-/// computes with rubbish. A pack specialises this (pack.hpp).
+/// entry k is rows[i * step + k]. Of `count` rows that do not fill a pack the last one is repeated, so that no lane
+/// computes with rubbish. `store_padded` writes zeros up to the next multiple of eight. A pack specialises this
+/// (pack.hpp).
 template <class Lane>
 struct LaneTraits {
   static constexpr int width = 1;
   template <int size>
-  static void load(const double* rows, int /*count*/, Lane* out) {
+  static void load(const double* rows, int /*count*/, std::ptrdiff_t /*step*/, Lane* out) {
     for (int k = 0; k < size; ++k) out[k] = rows[k];
   }
   template <int size>
   static void store(const Lane* entries, int /*count*/, double* rows) {
     for (int k = 0; k < size; ++k) rows[k] = entries[k];
+  }
+  template <int size>
+  static void store_padded(const Lane* entries, int /*count*/, double* rows, std::ptrdiff_t /*step*/) {
+    for (int k = 0; k < size; ++k) rows[k] = entries[k];
+    for (int k = size; k < (size + 7) / 8 * 8; ++k) rows[k] = 0.0;
   }
 };
 
@@ -48,7 +58,7 @@ struct LaneOf<Scalar> {
 
 template <int size, class Lane>
 inline void load(const double* array, Rows rows, Lane* out) {
-  LaneTraits<Lane>::template load<size>(array + rows.first * size, rows.count, out);
+  LaneTraits<Lane>::template load<size>(array + rows.first * size, rows.count, size, out);
 }
 
 template <int size, class Lane>
@@ -57,15 +67,24 @@ inline void store(const Lane* entries, Rows rows, double* array) {
 }
 
 /// Loads numbers as the independent variables first_direction, first_direction + 1, ...
-template <int size, class Scalar>
-inline void load_variables(const double* array, Rows rows, int first_direction, Scalar* out) {
+template <int size, int first_direction, class Scalar>
+inline void load_variables(const double* array, Rows rows, Scalar* out) {
   if constexpr (Differentiable<Scalar>) {
     typename Scalar::Value values[room_for(size)];
     load<size>(array, rows, values);
-    for (int j = 0; j < size; ++j) out[j] = Scalar::variable(values[j], first_direction + j);
+    for_indices<size>([&](auto j) { out[j] = Scalar::template variable<first_direction + j>(values[j]); });
   } else {
     load<size>(array, rows, out);
   }
+}
+
+/// Numbers entries[first], entries[first + 1], ... as the independent variables of these numbers.
+template <int size, int first, class Lane, class Scalar>
+RHEC_INLINE inline void set_variables(const Lane* entries, Scalar* out) {
+  for_indices<size>([&](auto j) RHEC_INLINE {
+    if constexpr (Differentiable<Scalar>) out[j] = Scalar::template variable<first + j>(entries[first + j]);
+    else out[j] = entries[first + j];
+  });
 }
 
 template <int size, class Scalar>
@@ -88,20 +107,27 @@ inline void store_jacobian(const Scalar* results, Rows rows, double* out) {
   store<size * n>(jacobian, rows, out);
 }
 
-/// sum_r multipliers_r Hess(results_r), both halves.
+/// sum_r weights_r Hess(results_r), both halves.
+template <TwiceDifferentiable Scalar>
+inline void sum_hessians(const Scalar* results, int size, const typename Scalar::Value* weights,
+                         typename Scalar::Value* hessian) {
+  constexpr int n = Scalar::directions;
+  for (int i = 0, k = 0; i < n; ++i) {
+    for (int j = 0; j <= i; ++j, ++k) {
+      auto sum = results[0].dd[k] * weights[0];
+      for (int r = 1; r < size; ++r) sum = sum + results[r].dd[k] * weights[r];
+      hessian[i * n + j] = hessian[j * n + i] = sum;
+    }
+  }
+}
+
 template <int size, TwiceDifferentiable Scalar>
 inline void store_hessian(const Scalar* results, const double* multipliers, Rows rows, double* out) {
   using Lane = typename Scalar::Value;
   constexpr int n = Scalar::directions;
   Lane weights[size], hessian[n * n];
   load<size>(multipliers, rows, weights);
-  for (int i = 0, k = 0; i < n; ++i) {
-    for (int j = 0; j <= i; ++j, ++k) {
-      Lane sum = results[0].dd[k] * weights[0];
-      for (int r = 1; r < size; ++r) sum = sum + results[r].dd[k] * weights[r];
-      hessian[i * n + j] = hessian[j * n + i] = sum;
-    }
-  }
+  sum_hessians(results, size, weights, hessian);
   store<n * n>(hessian, rows, out);
 }
 
@@ -122,10 +148,10 @@ inline void integrate_pack(const Formula& formula, const Model::Intervals& q, Ro
   using Lane = typename LaneOf<Scalar>::Type;
   constexpr int nx = Formula::state_count, nu = Formula::input_count, np = Formula::parameter_count;
   Scalar x[nx], u[room_for(nu)], p[room_for(np)], p_end[room_for(np)];
-  load_variables<nx>(q.states, rows, 0, x);
-  load_variables<nu>(q.inputs, rows, nx, u);
-  load_variables<np>(q.parameters, rows, nx + nu, p);
-  if constexpr (ramp) load_variables<np>(q.parameters_end, rows, nx + nu + np, p_end);
+  load_variables<nx, 0>(q.states, rows, x);
+  load_variables<nu, nx>(q.inputs, rows, u);
+  load_variables<np, nx + nu>(q.parameters, rows, p);
+  if constexpr (ramp) load_variables<np, nx + nu + np>(q.parameters_end, rows, p_end);
   Lane duration;
   load<1>(q.durations, rows, &duration);
   const Scalar* const end = ramp ? p_end : nullptr;
@@ -136,9 +162,56 @@ inline void integrate_pack(const Formula& formula, const Model::Intervals& q, Ro
 template <class Scalar, class Formula>
 inline void observe_pack(const Formula& formula, const Model::Nodes& q, Rows rows) {
   Scalar x[Formula::state_count], y[Formula::output_count];
-  load_variables<Formula::state_count>(q.states, rows, 0, x);
+  load_variables<Formula::state_count, 0>(q.states, rows, x);
   formula.outputs(static_cast<const Scalar*>(x), y);
   store_results<Formula::output_count>(y, q, q.outputs, rows);
+}
+
+template <int size, class Lane>
+inline void store_row(const Lane* entries, Rows rows, double* array, std::ptrdiff_t step) {
+  LaneTraits<Lane>::template store_padded<size>(entries, rows.count, array + rows.first * step, step);
+}
+
+/// One step over z = [x; p; u].
+template <bool with_hessian, class Lane, class Formula>
+inline void integrate_row_pack(const Formula& formula, const IntervalRows& q, Rows rows) {
+  using Step = SensitiveStep<Formula, Lane, with_hessian>;
+  constexpr int nx = Step::nx, nz = Step::nz;
+  Lane z[nz], duration, weights[nx];
+  LaneTraits<Lane>::template load<nz>(q.z + rows.first * q.z_step, rows.count, q.z_step, z);
+  load<1>(q.durations, rows, &duration);
+  if constexpr (with_hessian)
+    LaneTraits<Lane>::template load<nx>(q.multipliers + rows.first * q.multiplier_step, rows.count, q.multiplier_step,
+                                        weights);
+  Step step;
+  step.take(formula, z, duration, weights);
+  if (q.next_states) store_row<nx>(step.next, rows, q.next_states, q.next_step);
+  for (int r = 0; r < nx; ++r) store_row<nz>(step.jacobian[r], rows, q.jacobians + r * q.jacobian_row, q.jacobian_step);
+  if constexpr (with_hessian)
+    for (int r = 0; r < nz; ++r) store_row<nz>(step.hessian[r], rows, q.hessians + r * q.hessian_row, q.hessian_step);
+}
+
+template <class Scalar, class Formula>
+[[gnu::flatten]] inline void observe_row_pack(const Formula& formula, const NodeRows& q, Rows rows) {
+  using Lane = typename LaneOf<Scalar>::Type;
+  constexpr int nx = Formula::state_count, ny = Formula::output_count;
+  Lane values[nx];
+  LaneTraits<Lane>::template load<nx>(q.states + rows.first * q.state_step, rows.count, q.state_step, values);
+  Scalar x[nx], y[ny];
+  set_variables<nx, 0>(values, x);
+  formula.outputs(static_cast<const Scalar*>(x), y);
+  const int count = q.chosen ? q.chosen_count : ny;
+  for (int j = 0; j < count; ++j) {
+    const Scalar& output = y[q.chosen ? q.chosen[j] : j];
+    if (q.outputs) {
+      double spread[LaneTraits<Lane>::width];
+      if constexpr (Differentiable<Scalar>) LaneTraits<Lane>::template store<1>(&output.value, LaneTraits<Lane>::width, spread);
+      else LaneTraits<Lane>::template store<1>(&output, LaneTraits<Lane>::width, spread);
+      for (int i = 0; i < rows.count; ++i) q.outputs[(rows.first + i) * count + j] = spread[i];
+    }
+    if constexpr (Differentiable<Scalar>)
+      store_row<nx>(output.d, rows, q.jacobians + j * q.jacobian_row, count * q.jacobian_row);
+  }
 }
 
 /// Calls `evaluate` with the rows of one pack after another.
@@ -178,12 +251,30 @@ void observe(const void* formula, const Model::Nodes& q) {
   });
 }
 
+template <class Formula, class Lane>
+void integrate_rows(const void* formula, const IntervalRows& q) {
+  const auto& f = *static_cast<const Formula*>(formula);
+  for_each_pack<Lane>(q.count, [&](Rows rows) {
+    return q.hessians ? integrate_row_pack<true, Lane>(f, q, rows) : integrate_row_pack<false, Lane>(f, q, rows);
+  });
+}
+
+template <class Formula, class Lane>
+void observe_rows(const void* formula, const NodeRows& q) {
+  const auto& f = *static_cast<const Formula*>(formula);
+  for_each_pack<Lane>(q.count, [&](Rows rows) {
+    if (q.jacobians) return observe_row_pack<Dual<Lane, Formula::state_count>>(f, q, rows);
+    return observe_row_pack<Lane>(f, q, rows);
+  });
+}
+
 }  // namespace kernels
 
 /// The kernels of a formula for one number type (double, or a pack for one instruction set).
 template <class Formula, class Lane>
 constexpr ModelKernels make_model_kernels() {
-  return {&kernels::integrate<Formula, Lane>, &kernels::observe<Formula, Lane>};
+  return {&kernels::integrate<Formula, Lane>, &kernels::observe<Formula, Lane>,
+          &kernels::integrate_rows<Formula, Lane>, &kernels::observe_rows<Formula, Lane>};
 }
 
 }  // namespace rhec

@@ -14,6 +14,7 @@ enum class OcpKind { rhe, rhc };
 
 /// Which curvature a linearisation carries.
 enum class Hessian {
+  none,          ///< H is not wanted, and may be left as it is
   gauss_newton,  ///< of the squared residuals only; positive semidefinite
   exact          ///< of the Lagrangian, with the point's costates; may be indefinite
 };
@@ -70,8 +71,9 @@ class RHEC_EXPORT Ocp {
     for (int i = 0; i < intervals(); ++i) simulate_interval(i, point, scratch);
   }
 
-  /// Fills the stages of a range of the quadratic program at a point: sizes, dynamics, costs and bounds.
-  virtual void linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  /// Fills the stages of a range of the quadratic program at a point: sizes, dynamics, costs and bounds. Returns the
+  /// objective's part of these stages.
+  virtual double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                          std::span<double> scratch) const noexcept = 0;
 
   /// Fills again what depends on data that may have come since `linearise` (measurements, references, the initial

@@ -56,11 +56,20 @@ struct LaneTraits<xsimd::batch<double, Arch>> {
   static constexpr int width = static_cast<int>(Lane::size);
 
   template <int size>
-  static void load(const double* rows, int count, Lane* out) {
+  static void load(const double* rows, int count, std::ptrdiff_t step, Lane* out) {
     const auto load_entry = [&]<int... i>(int k, std::integer_sequence<int, i...>) {
-      return Lane{rows[(i < count ? i : count - 1) * size + k]...};
+      return Lane{rows[(i < count ? i : count - 1) * step + k]...};
     };
     for (int k = 0; k < size; ++k) out[k] = load_entry(k, std::make_integer_sequence<int, width>());
+  }
+  template <int size>
+  static void store_padded(const Lane* entries, int count, double* rows, std::ptrdiff_t step) {
+    for (int k = 0; k < (size + 7) / 8 * 8; k += width) {
+      Lane block[width];
+      for (int i = 0; i < width; ++i) block[i] = k + i < size ? entries[k + i] : Lane(0.0);
+      transpose(block);
+      for (int i = 0; i < count; ++i) block[i].store_unaligned(rows + i * step + k);
+    }
   }
   /// A block of `width` entries of all rows at a time; what is left one entry at a time.
   template <int size>

@@ -74,21 +74,24 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
 
  private:
   double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept override;
-  void add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                 std::span<double> scratch) const noexcept override;
   void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
   std::size_t cost_scratch_size() const noexcept override;
 
   void residual(int node, const double* predicted, double* difference) const noexcept;
   double losses(const double* difference, double* weight, double* curvature) const noexcept;
-  void add_outputs(StageRange range, const Iterate& point, Hessian hessian, bool matrices, StageQp& qp,
-                   std::span<double> scratch) const noexcept;
-  void add_inputs_and_links(StageRange range, const Iterate& point, bool matrices, StageQp& qp) const noexcept;
-  void add_arrival(const Iterate& point, bool matrices, StageQp& qp) const noexcept;
+  int padded_states() const noexcept { return (nx() + 7) / 8 * 8; }
+  double add_outputs(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                     std::span<double> scratch) const noexcept;
+  double inputs_and_links(int interval, const Iterate& point, double* H, double* h) const noexcept;
+  double arrival_term(const Iterate& point, double* q) const noexcept;
 
   Setup setup_;
   int ny_;
   std::vector<int> robust_group_;  ///< of an output, or -1
+  std::vector<std::uint8_t> output_is_angle_;
+  AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
   std::vector<double> outputs_, measured_inputs_, link_information_;
 };
 

@@ -37,6 +37,8 @@ class RHEC_EXPORT StageQp {
   int intervals() const noexcept { return intervals_; }
   int states(int node) const noexcept { return state_counts_[node]; }
   int controls(int interval) const noexcept { return interval < intervals_ ? control_counts_[interval] : 0; }
+  const int* state_counts() const noexcept { return state_counts_.data(); }
+  const int* control_counts() const noexcept { return control_counts_.data(); }  ///< of intervals 0 .. N - 1
   void set_intervals(int intervals) noexcept { intervals_ = intervals; }
   /// Clears what a stage that has become smaller does not use any more.
   void set_sizes(int node, int states, int controls) noexcept {

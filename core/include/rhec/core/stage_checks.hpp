@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+
+#include "rhec/core/iterate.hpp"
+#include "rhec/core/stage_qp.hpp"
+
+namespace rhec {
+
+// Looks at whole stage programs and points, on registers as wide as the machine has.
+
+/// What a step that was found without some of the bounds says of them.
+struct StepCheck {
+  bool is_finite = false;        ///< states, controls and costates
+  bool violates = false;         ///< a bound b by more than tolerance (1 + |b|)
+  double largest_costate = 0.0;  ///< absolute
+};
+RHEC_EXPORT StepCheck check_step(const StageQp& qp, const Iterate& step, double tolerance) noexcept;
+
+/// Marks each of the N + 1 stages with 1 at which a bound multiplier of the point is not zero, or two bounds of the
+/// program coincide, and 0 otherwise. True where a lower bound is above its upper one by more than tolerance (1 +
+/// |bound|), or one of them is not a number.
+RHEC_EXPORT bool mark_bounds(const StageQp& qp, const Iterate& point, double tolerance, std::uint8_t* marks) noexcept;
+
+/// The point that a full step leads to: values are added, and multipliers taken over. All are of one capacity.
+RHEC_EXPORT void add_full_step(int intervals, const Iterate& from, const Iterate& step, Iterate& to) noexcept;
+
+}  // namespace rhec

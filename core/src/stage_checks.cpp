@@ -1,0 +1,27 @@
+#include "rhec/core/stage_checks.hpp"
+
+#include <cstring>
+
+#include "kernels/kernels.hpp"
+#include "kernels/program_kernels.hpp"
+#include "program_view.hpp"
+
+namespace rhec {
+
+StepCheck check_step(const StageQp& qp, const Iterate& step, double tolerance) noexcept {
+  const auto [is_finite, violates, largest_costate] = program_kernels().check_step(view_of(qp, step), tolerance);
+  return {.is_finite = is_finite, .violates = violates, .largest_costate = largest_costate};
+}
+
+bool mark_bounds(const StageQp& qp, const Iterate& point, double tolerance, std::uint8_t* marks) noexcept {
+  return program_kernels().mark_bounds(view_of(qp, point), tolerance, marks);
+}
+
+void add_full_step(int intervals, const Iterate& from, const Iterate& step, Iterate& to) noexcept {
+  const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(intervals + 1) * from.capacity().row();
+  program_kernels().add(from.row(0), step.row(0), to.row(0), count);
+  std::memcpy(to.costate(0), step.costate(0), count * sizeof(double));
+  std::memcpy(to.bound_row(0), step.bound_row(0), count * sizeof(double));
+}
+
+}  // namespace rhec
