@@ -116,7 +116,7 @@ void compare(benchmark::State& state, const Host& host, const Sequence& sequence
   const auto make = [&](const char* name) { return host.make_solver(name, parse_yaml(accuracy, "benchmark")); };
   RtiLoop sparse_sqp(sequence, make("sparse_sqp")), ipopt(sequence, make("ipopt"));
   Pass of_sparse_sqp, of_ipopt;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     of_sparse_sqp.run(sparse_sqp, sequence);
     of_ipopt.run(ipopt, sequence);
   }
@@ -146,7 +146,7 @@ void compare(benchmark::State& state, const Host& host, const Sequence& sequence
 void solve_alone(benchmark::State& state, const Host& host, const Sequence& sequence) {
   RtiLoop loop(sequence, host.make_solver("sparse_sqp", parse_yaml(accuracy, "benchmark")));
   std::vector<double> times;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     loop.restart();
     if (loop.step().status != Status::solved) throw Error(sequence.name + ": was not solved");
     times.push_back(loop.times().total_us());
@@ -157,30 +157,27 @@ void solve_alone(benchmark::State& state, const Host& host, const Sequence& sequ
   state.counters["iterations"] = loop.report().iterations;
 }
 
-template <class Run>
-auto* add(const std::string& name, const Host& host, Sequence sequence, const Run& run) {
+using Run = void(benchmark::State& state, const Host& host, const Sequence& sequence);
+
+void add(const std::string& name, const Host& host, Sequence sequence, Run* run, int iterations) {
   const auto kept = std::make_shared<Sequence>(std::move(sequence));
-  return benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) { run(state, host, *kept); })
-      ->Unit(benchmark::kMillisecond);
+  add_benchmark(
+      name, [=](benchmark::State& state) { run(state, host, *kept); }, iterations);
 }
 
 void register_all() {
   const Host host;
-  for (Sequence& sequence : drive(host, usual_drives().front())) {
-    const std::string name = "same_problem/" + sequence.name;
-    add(name, host, std::move(sequence), compare)->Iterations(1);
-  }
   constexpr int block = 20, samples = 4;
-  for (auto make : {+[](const Host& h) { return long_estimation(h, 1000, samples, block, Blocks::moving); },
-                    +[](const Host& h) { return long_control(h, 1000, samples); }}) {
-    Sequence sequence = make(host);
+  std::vector<Sequence> sequences = drive(host, usual_drives().front());
+  sequences.push_back(long_estimation(host, 1000, samples, block, Blocks::moving));
+  sequences.push_back(long_control(host, 1000, samples));
+  for (Sequence& sequence : sequences) {
     const std::string name = "same_problem/" + sequence.name;
-    add(name, host, std::move(sequence), compare)->Iterations(1);
+    add(name, host, std::move(sequence), compare, 1);
   }
   for (const int intervals : {100, 200, 500, 1000, 2000, 5000, 10000})
     add("sparse_sqp/" + std::to_string(intervals), host, long_estimation(host, intervals, 1, block, Blocks::fixed),
-        solve_alone)
-        ->Iterations(5);
+        solve_alone, 5);
 }
 
 }  // namespace

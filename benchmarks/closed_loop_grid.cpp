@@ -2,7 +2,7 @@
 // the whole grid takes, and what of a sample's time is the estimator's solver, the controller's, and all else.
 //
 //     closed_loop_grid [--share 0.02] [--threads 2]
-#include <array>
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -101,6 +101,7 @@ int run_share(double share, int thread_count) {
     totals.add(own);
   };
   std::vector<std::thread> threads;
+  threads.reserve(thread_count);
   for (int t = 0; t < thread_count; ++t) threads.emplace_back(work);
   for (std::thread& thread : threads) thread.join();
   if (failure) std::rethrow_exception(failure);

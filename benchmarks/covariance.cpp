@@ -60,7 +60,7 @@ void run(benchmark::State& state, Robot robot) {
   });
   const Model& model = *robot.model();
   const double step = robot.step();
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     std::mt19937 random(1);  // NOLINT(cert-msc32-c,cert-msc51-cpp): the same noise each time
     std::normal_distribution<double> normal;
     const auto estimator = robot.make_estimator();
@@ -96,9 +96,7 @@ void register_all() {
     Settings settings = load_yaml(how.scenario);
     for (const std::string& assignment : how.assignments) apply_assignment(settings, assignment);
     const Robot robot = sim::Scenario(host, settings).robot();
-    benchmark::RegisterBenchmark(("covariance/" + how.name).c_str(), [robot](benchmark::State& state) {
-      run(state, robot);
-    })->Unit(benchmark::kMicrosecond);
+    add_benchmark("covariance/" + how.name, [robot](benchmark::State& state) { run(state, robot); });
   }
 }
 

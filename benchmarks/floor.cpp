@@ -137,7 +137,7 @@ void run(benchmark::State& state, const Data& data, floor::Workspace& work) {
   std::vector<double> linearise, total;
   linearise.reserve(1 << 20);
   total.reserve(1 << 20);
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     const auto begin = Ticks::now();
     floor::linearise<N>(data, work);
     const auto linearised = Ticks::now();
@@ -165,8 +165,7 @@ void add(const Host& host, const Sequence& sequence, int states) {
     floor::solve<N>(*data, *work);
     compare(sequence.name, moment, *work, states);
   }
-  benchmark::RegisterBenchmark(("floor/" + sequence.name).c_str(),
-                               [data, work](benchmark::State& state) { run<N>(state, *data, *work); });
+  add_benchmark("floor/" + sequence.name, [data, work](benchmark::State& state) { run<N>(state, *data, *work); });
 }
 
 void register_all() {

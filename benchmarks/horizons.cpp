@@ -71,20 +71,16 @@ class Steps {
     least_.assign(sequence_.samples.size(), INFINITY);
   }
 
-  /// Returns the time of all steps [us].
-  double pass() {
+  void pass() {
     loop_->restart();
     loop_->step();
-    double sum = 0.0;
     for (std::size_t k = 1; k < sequence_.samples.size(); ++k) {
       const long before = allocations;
       const Report& report = loop_->step();
       if (allocations != before) throw Error(sequence_.name + ": a step allocated memory");
       if (!is_usable(report.status)) throw Error(sequence_.name + ": a step failed: " + name_of(report.status));
       least_[k] = std::min(least_[k], loop_->times().total_us());
-      sum += loop_->times().total_us();
     }
-    return sum;
   }
 
   sim::Spread spread() const { return sim::spread_of({least_.begin() + 1, least_.end()}); }
@@ -101,15 +97,13 @@ class Steps {
 void add_length(const Host& host, const std::string& kind, Sequence sequence) {
   const auto steps = std::make_shared<Steps>(host, std::move(sequence));
   const auto run = [steps](benchmark::State& state) {
-    for (auto _ : state) state.SetIterationTime(1e-6 * steps->pass());
+    while (state.KeepRunning()) steps->pass();
     state.counters["intervals"] = steps->intervals();
     state.counters["median_us"] = steps->spread().median;
     state.counters["max_us"] = steps->spread().max;
     state.counters["solver_bytes"] = static_cast<double>(steps->solver_bytes());
   };
-  benchmark::RegisterBenchmark(("horizons/" + kind + "/" + std::to_string(steps->intervals())).c_str(), run)
-      ->UseManualTime()
-      ->Unit(benchmark::kMicrosecond);
+  add_benchmark("horizons/" + kind + "/" + std::to_string(steps->intervals()), run);
 }
 
 /// A structure that changes at every sample against one that does not, pass by pass in turn.
@@ -118,14 +112,15 @@ void add_changing_structure(const Host& host, int intervals) {
     return std::make_shared<Steps>(host, long_estimation(host, intervals, samples, block, blocks));
   };
   const auto run = [moving = make(Blocks::moving), fixed = make(Blocks::fixed)](benchmark::State& state) {
-    for (auto _ : state) state.SetIterationTime(1e-6 * (moving->pass() + fixed->pass()));
+    while (state.KeepRunning()) {
+      moving->pass();
+      fixed->pass();
+    }
     state.counters["moving_us"] = moving->spread().median;
     state.counters["fixed_us"] = fixed->spread().median;
     state.counters["ratio"] = moving->spread().median / fixed->spread().median;
   };
-  benchmark::RegisterBenchmark(("changing_structure/" + std::to_string(intervals)).c_str(), run)
-      ->UseManualTime()
-      ->Unit(benchmark::kMicrosecond);
+  add_benchmark("changing_structure/" + std::to_string(intervals), run);
 }
 
 void register_all() {

@@ -39,21 +39,18 @@ void add(const Host& host, const Vehicle& vehicle) {
     const auto run = [host, kept](benchmark::State& state) {
       RtiLoop loop(*kept, host.make_solver("gn_rti"));
       std::vector<double> times;
-      for (auto _ : state) {
+      while (state.KeepRunning()) {
         loop.restart();
-        double sum = 0.0;
         for (std::size_t k = 0; k < kept->samples.size(); ++k) {
           if (!is_usable(loop.step().status)) throw Error(kept->name + ": a step failed");
-          sum += loop.times().total_us();
           if (k > 0) times.push_back(loop.times().total_us());
         }
-        state.SetIterationTime(1e-6 * sum);
       }
       state.counters["median_us"] = sim::spread_of(times).median;
       state.counters["stage_states"] = kept->workspace->capacity().states;
       state.counters["stage_controls"] = kept->workspace->capacity().controls;
     };
-    benchmark::RegisterBenchmark(("models/" + kept->name).c_str(), run)->UseManualTime()->Unit(benchmark::kMicrosecond);
+    add_benchmark("models/" + kept->name, run);
   }
 }
 

@@ -66,7 +66,7 @@ void add(const Host& host, const std::vector<sim::ProblemRecord>& records) {
       std::make_shared<Side>(sequence_of(records, make_linked_model(options)), make<Solver>(linked_gn_rti, {}));
   const auto run = [plugin, linked](benchmark::State& state) {
     std::vector<double> of_plugin, of_linked, ratios;
-    for (auto _ : state) {
+    while (state.KeepRunning()) {
       const bool plugin_first = ratios.size() % 2 == 0;
       if (plugin_first) of_plugin.push_back(plugin->pass());
       of_linked.push_back(linked->pass());
@@ -79,8 +79,7 @@ void add(const Host& host, const std::vector<sim::ProblemRecord>& records) {
     state.counters["ratio_lower_quartile"] = quantile(ratios, 0.25);
     state.counters["ratio_upper_quartile"] = quantile(ratios, 0.75);
   };
-  benchmark::RegisterBenchmark(("plugin_boundary/" + plugin->sequence.name).c_str(), run)
-      ->Unit(benchmark::kMicrosecond);
+  add_benchmark("plugin_boundary/" + plugin->sequence.name, run);
 }
 
 void register_all() {

@@ -33,6 +33,14 @@ int run_program(int count, char** words, const std::function<void()>& register_a
   return 1;
 }
 
+void add_benchmark(const std::string& name, const std::function<void(benchmark::State&)>& run, int iterations) {
+#ifndef __clang_analyzer__  // which takes Google Benchmark's list of benchmarks for a leak
+  auto* made = benchmark::RegisterBenchmark(name.c_str(), run);
+  made->UseRealTime()->Unit(benchmark::kMicrosecond);
+  if (iterations > 0) made->Iterations(iterations);
+#endif
+}
+
 std::vector<Sequence> references_or_word(const Host& host) {
   auto sequences = reference_sequences(host);
   benchmark::AddCustomContext("reference_problems", sequences.empty() ? "skipped: not there" : "there");

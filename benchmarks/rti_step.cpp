@@ -43,21 +43,18 @@ void run(benchmark::State& state, const Host& host, const Sequence& sequence) {
   RtiLoop loop(sequence, make("{mode: rti}"));
   PassTimes total(count), feedback(count);
   int refactored = 0, fallbacks = 0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     loop.restart();
     refactored = fallbacks = 0;
-    double sum = 0.0;
     for (std::size_t k = 0; k < count; ++k) {
       const Report& report = loop.step();
       if (!is_usable(report.status)) throw Error(sequence.name + ": a step failed: " + name_of(report.status));
       total.add(k, loop.times().total_us());
       feedback.add(k, loop.times().feedback_us());
-      sum += loop.times().total_us();
       if (k == 0) continue;
       refactored += report.factorisations > 1;
       fallbacks += report.fallback_used;
     }
-    state.SetIterationTime(1e-6 * sum);
   }
   const auto excess = sim::spread_of(
       excess_objectives(sequence, make("{mode: rti}"), make("{mode: converge, tolerance: 1e-9, max_iterations: 200}")));
@@ -83,10 +80,7 @@ void register_all() {
   const auto add = [&](std::vector<Sequence> sequences) {
     for (Sequence& sequence : sequences) {
       const auto kept = std::make_shared<Sequence>(std::move(sequence));
-      benchmark::RegisterBenchmark(("rti_step/" + kept->name).c_str(),
-                                   [host, kept](benchmark::State& state) { run(state, host, *kept); })
-          ->UseManualTime()
-          ->Unit(benchmark::kMicrosecond);
+      add_benchmark("rti_step/" + kept->name, [host, kept](benchmark::State& state) { run(state, host, *kept); });
     }
   };
   add(references_or_word(host));

@@ -160,6 +160,7 @@ std::vector<std::vector<ProblemRecord>> record(const Host& host, const Drive& ho
   if (!log.completed) throw Error(how.name + ": the drive ended early: " + log.ended);
 
   std::vector<std::vector<ProblemRecord>> made;
+  made.reserve(records.size());
   for (auto& [kind, kept] : records) made.push_back(std::move(kept));
   return made;
 }
