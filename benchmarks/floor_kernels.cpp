@@ -202,9 +202,70 @@ struct Passage {
 
 // --- Single stages, a row of eight numbers in a register -------------------------------------------------------------
 
-typedef double Eight __attribute__((vector_size(64)));
-inline Eight load(const Row& row) { return *reinterpret_cast<const Eight*>(row.at); }
-inline void store(Row& row, const Eight& value) { *reinterpret_cast<Eight*>(row.at) = value; }
+#if defined(__AVX512F__)
+constexpr int part_size = 8;
+#elif defined(__AVX__)
+constexpr int part_size = 4;
+#else
+constexpr int part_size = 2;
+#endif
+typedef double Part __attribute__((vector_size(8 * part_size), may_alias));
+constexpr int parts = 8 / part_size;
+
+/// Eight numbers in as many registers as the machine needs.
+struct Eight {
+  Part part[parts] = {};
+
+  Eight() = default;
+  Eight(double a, double b, double c, double d, double e, double f, double g, double h) {
+    const double values[8] = {a, b, c, d, e, f, g, h};
+    for (int k = 0; k < 8; ++k) part[k / part_size][k % part_size] = values[k];
+  }
+  static Eight of(const Row& row) {
+    Eight value;
+    for (int i = 0; i < parts; ++i) value.part[i] = reinterpret_cast<const Part*>(row.at)[i];
+    return value;
+  }
+  double operator[](int k) const { return part[k / part_size][k % part_size]; }
+  Eight& operator+=(const Eight& other) { return *this = *this + other; }
+  template <class Operation>
+  static Eight each(const Operation& operation) {
+    Eight value;
+    for (int i = 0; i < parts; ++i) value.part[i] = operation(i);
+    return value;
+  }
+  friend Eight operator+(const Eight& a, const Eight& b) {
+    return each([&](int i) { return a.part[i] + b.part[i]; });
+  }
+  friend Eight operator-(const Eight& a, const Eight& b) {
+    return each([&](int i) { return a.part[i] - b.part[i]; });
+  }
+  friend Eight operator*(const Eight& a, const Eight& b) {
+    return each([&](int i) { return a.part[i] * b.part[i]; });
+  }
+  friend Eight operator*(double factor, const Eight& a) {
+    return each([&](int i) { return factor * a.part[i]; });
+  }
+};
+inline Eight load(const Row& row) { return Eight::of(row); }
+inline void store(Row& row, const Eight& value) {
+  for (int i = 0; i < parts; ++i) reinterpret_cast<Part*>(row.at)[i] = value.part[i];
+}
+
+inline void transpose(Eight (&rows_of)[8]) {
+#if defined(__AVX512F__)
+  __m512d columns[8];
+  for (int r = 0; r < 8; ++r) columns[r] = reinterpret_cast<__m512d&>(rows_of[r].part[0]);
+  transpose(columns);
+  for (int r = 0; r < 8; ++r) rows_of[r].part[0] = reinterpret_cast<Part&>(columns[r]);
+#else
+  Row by_row[8], by_column[8];
+  for (int r = 0; r < 8; ++r) store(by_row[r], rows_of[r]);
+  for (int r = 0; r < 8; ++r)
+    for (int k = 0; k < 8; ++k) by_column[k].at[r] = by_row[r].at[k];
+  for (int r = 0; r < 8; ++r) rows_of[r] = load(by_column[r]);
+#endif
+}
 
 inline void write_dynamics(const Lanes (&rows_of)[3][8], Workspace& work, int first) {
   for (int r = 0; r < 3; ++r) store_rows(rows_of[r], &work.dynamics[first][r], 8);
@@ -259,21 +320,10 @@ inline void backward(Workspace& work) {
     store(work.cost_to_go_gradient[i], gradient + o6 * h6 + o7 * h7);
     // [A + B K, B; K, 1], whose columns carry a step on.
     Eight closed[8];
-    for (int r = 0; r < 6; ++r) closed[r] = Eight{};
     for (int r = 0; r < states; ++r) closed[r] = ab[r] + AB[r].at[6] * k6 + AB[r].at[7] * k7;
     closed[6] = k6 + unit6;
     closed[7] = k7 + unit7;
-#if defined(__AVX512F__)
-    __m512d columns[8];
-    for (int r = 0; r < 8; ++r) columns[r] = reinterpret_cast<__m512d&>(closed[r]);
-    transpose(columns);
-    for (int r = 0; r < 8; ++r) closed[r] = reinterpret_cast<Eight&>(columns[r]);
-#else
-    alignas(64) double by_row[8][8];
-    std::memcpy(by_row, closed, sizeof(by_row));
-    for (int r = 0; r < 8; ++r)
-      for (int k = 0; k < 8; ++k) closed[r][k] = by_row[k][r];
-#endif
+    transpose(closed);
     for (int r = 0; r < states; ++r) store(work.policy[i][r], closed[r]);
     store(work.policy_offset[i], load(work.defect[i]) + o6 * closed[6] + o7 * closed[7]);
   }
@@ -313,7 +363,7 @@ inline Eight free_initial_step(const Workspace& work) {
     one_over[k] = 1.0 / row[k][k];
     for (int r = k + 1; r < 6; ++r) {
       const double factor = row[k][r] * one_over[k];
-      row[r] -= factor * row[k];
+      row[r] = row[r] - factor * row[k];
       right[r] -= factor * right[k];
     }
   }
@@ -353,7 +403,7 @@ void prepare_constants(const Control& problem, Workspace& work) {
 }
 
 template <int N>
-void linearise(const Estimation& problem, Workspace& work) {
+[[gnu::flatten]] void linearise(const Estimation& problem, Workspace& work) {
   const double d = problem.vehicle.gps_offset;
   const double wx = problem.output_weights.at[0], wy = problem.output_weights.at[1], wd = problem.output_weights.at[2];
   for (int first = 0; first <= N; first += width) {
@@ -393,18 +443,23 @@ void linearise(const Estimation& problem, Workspace& work) {
   const Eight error = load(problem.point[0]) - load(problem.arrival_mean);
   Eight gradient = load(work.gradient[0]);
   Row* first = work.hessian[0];
-  const Eight of_outputs[6] = {
-      {wx, 0.0, first[0].at[2]}, {0.0, wy, first[1].at[2]}, load(first[2]), {0.0, 0.0, 0.0, wd}};
+  const double x_beta = first[0].at[2], y_beta = first[1].at[2];
+  const Eight beta_row = load(first[2]);
   for (int r = 0; r < 6; ++r) {
     const Eight information = load(problem.arrival_information[r]);
     gradient += error[r] * information;
-    store(first[r], of_outputs[r] + information);
+    store(first[r], r == 2 ? information + beta_row : information);
   }
+  first[0].at[0] += wx;
+  first[0].at[2] += x_beta;
+  first[1].at[1] += wy;
+  first[1].at[2] += y_beta;
+  first[3].at[3] += wd;
   store(work.gradient[0], gradient);
 }
 
 template <int N>
-void linearise(const Control& problem, Workspace& work) {
+[[gnu::flatten]] void linearise(const Control& problem, Workspace& work) {
   const Eight w = load(problem.stage_weights);
   for (int first = 0; first < N; first += width) {
     Lanes z[8], costate[8], rows_of[3][8], next[8];
@@ -432,21 +487,20 @@ void linearise(const Control& problem, Workspace& work) {
   const Eight terminal = load(problem.terminal_weights);
   store(work.gradient[N], terminal * (load(problem.point[N]) - load(problem.reference[N])));
   for (int r = 0; r < 4; ++r) {
-    Eight row = {};
-    row[r] = problem.terminal_weights.at[r];
-    store(work.hessian[N][r], row);
+    work.hessian[N][r] = Row{};
+    work.hessian[N][r].at[r] = problem.terminal_weights.at[r];
   }
   subtract_next<N>(problem.point, work);
 }
 
 template <int N>
-void solve(const Estimation&, Workspace& work) {
+[[gnu::flatten]] void solve(const Estimation&, Workspace& work) {
   backward<N, 6>(work);
   forward<N, 6>(work, free_initial_step(work));
 }
 
 template <int N>
-void solve(const Control& problem, Workspace& work) {
+[[gnu::flatten]] void solve(const Control& problem, Workspace& work) {
   backward<N, 4>(work);
   const Eight only_states = {1, 1, 1, 1, 0, 0, 0, 0};
   forward<N, 4>(work, (load(problem.initial_state) - load(problem.point[0])) * only_states);
