@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "program.hpp"
+#include "rhec/core/error.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"
@@ -75,16 +76,24 @@ void run(benchmark::State& state, const Host& host, const Sequence& sequence) {
   counters["excess_max"] = excess.max;
 }
 
+void add(const std::string& group, const Host& host, Sequence sequence) {
+  const auto kept = std::make_shared<Sequence>(std::move(sequence));
+  add_benchmark(group + "/" + kept->name, [host, kept](benchmark::State& state) { run(state, host, *kept); });
+}
+
 void register_all() {
   const Host host;
-  const auto add = [&](std::vector<Sequence> sequences) {
-    for (Sequence& sequence : sequences) {
-      const auto kept = std::make_shared<Sequence>(std::move(sequence));
-      add_benchmark("rti_step/" + kept->name, [host, kept](benchmark::State& state) { run(state, host, *kept); });
+  for (Sequence& sequence : references_or_word(host)) add("rti_step", host, std::move(sequence));
+  for (const Drive& how : usual_drives())
+    for (Sequence& sequence : drive(host, how)) add("rti_step", host, std::move(sequence));
+  for (const auto& records : record(host, usual_drives().front())) {
+    const auto make = [&] { return host.make_model(records[0].model, records[0].model_options); };
+    for (const std::string& instruction_set : make()->instruction_sets()) {
+      const auto model = make();
+      if (!model->use_instruction_set(instruction_set)) throw Error("the model does not take " + instruction_set);
+      add("instruction_sets/" + instruction_set, host, sequence_of(records, model));
     }
-  };
-  add(references_or_word(host));
-  for (const Drive& how : usual_drives()) add(drive(host, how));
+  }
 }
 
 }  // namespace
