@@ -19,6 +19,8 @@ RtiLoop::RtiLoop(const Sequence& sequence, std::shared_ptr<Solver> solver)
       scratch_(problem_->scratch_size()) {
   if (const std::string reason = solver_->why_not(*problem_); !reason.empty())
     throw Error(sequence.name + ": the solver cannot take this problem: " + reason);
+  if (problem_->capacity().intervals > longest_horizon)
+    throw Error(sequence.name + ": the horizon is longer than a benchmark can set");
   solver_->setup(*problem_);
 }
 

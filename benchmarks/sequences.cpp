@@ -21,7 +21,6 @@ namespace rhec::bench {
 namespace {
 
 using sim::ProblemRecord;
-constexpr int longest_horizon = 10000;
 
 /// Records by prefix, in the order in which the prefixes come.
 std::vector<std::vector<ProblemRecord>> by_prefix(std::vector<ProblemRecord> records) {
@@ -116,6 +115,9 @@ Sequence sequence_of(const std::vector<ProblemRecord>& records, const std::share
     before = first;
   }
   made.workspace = sim::build(records.front(), model, longest);
+  if (const auto* control = dynamic_cast<const RhcProblem*>(made.workspace.get());
+      control && !control->setup().blocked_inputs.empty())
+    throw Error(made.name + ": inputs are blocked, which benchmarks cannot set");
   made.start = Iterate(made.workspace->capacity());
   sim::start(records.front(), *made.workspace, made.start);
   return made;

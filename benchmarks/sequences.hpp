@@ -25,7 +25,10 @@ struct Sequence {
   Iterate start = {};                              ///< guess for the first one
 };
 
-/// The sequence of records of one prefix, in their order. Throws Error.
+inline constexpr int longest_horizon = 10000;  ///< that a sequence may have
+
+/// The sequence of records of one prefix, in their order. Throws Error, also where inputs are blocked: a benchmark
+/// would not move their blocks.
 Sequence sequence_of(const std::vector<sim::ProblemRecord>& records, const std::shared_ptr<const Model>& model);
 
 /// The reference problems, a sequence for each prefix of their ids, in the order of the files. The folder is that of
