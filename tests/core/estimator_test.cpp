@@ -492,6 +492,48 @@ TEST(Estimator, APoisonedGuessIsReportedAndGoneAtTheNextSample) {
   }
 }
 
+/// Counts what it is asked to prepare.
+class PreparationCounter final : public Solver {
+ public:
+  explicit PreparationCounter(std::shared_ptr<Solver> inner) : inner_(std::move(inner)) {}
+  std::string why_not(const Ocp& ocp) const override { return inner_->why_not(ocp); }
+  void setup(const Ocp& ocp) override { inner_->setup(ocp); }
+  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override {
+    ++count;
+    inner_->prepare(ocp, guess);
+  }
+  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override {
+    return inner_->solve(ocp, point, deadline);
+  }
+  void reset() noexcept override { inner_->reset(); }
+
+  int count = 0;
+
+ private:
+  std::shared_ptr<Solver> inner_;
+};
+
+TEST(Estimator, StampsOfOneStepNeedNoSecondPreparation) {
+  const auto model = linear_model<Hovercraft>();
+  const std::vector<double> outputs(model->output_count(), 0.1), inputs(model->input_count(), 0.1);
+  const auto counter = std::make_shared<PreparationCounter>(gn_rti());
+  Estimator estimator(make_method(false, model, counter));
+  int rounded = 0;
+  for (int k = 0; k < 60; ++k) {
+    // Multiples of 0.1 s as they are computed: their differences are not all the same.
+    const double time = 0.1 * k;
+    rounded += k > 1 && time - 0.1 * (k - 1) != 0.1;
+    if (k > 0) estimator.push_input(time - 0.1, inputs.data());
+    estimator.push_measurement(time, outputs.data());
+    const int before = counter->count;
+    estimator.estimate(time);
+    EXPECT_EQ(counter->count, before) << "at sample " << k;
+    estimator.prepare();
+    EXPECT_EQ(counter->count, before + (k > 0 ? 1 : 0));
+  }
+  EXPECT_GT(rounded, 20);
+}
+
 TEST(Estimator, WhatIsInfiniteOrAbsurdCountsAsMissing) {
   const auto model = linear_model<Hovercraft>();
   std::vector<Sample> with_gaps = simulate(*model, 40, true, 5), poisoned = with_gaps;
