@@ -8,7 +8,9 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <string>
+#include <vector>
 
 #include "rhec/core/error.hpp"
 #include "rhec/sim/random.hpp"
@@ -113,6 +115,32 @@ TEST(GaussianRandomField, IsSmoothAcrossLatticeLinesAndSameForTheSameSeed) {
     ASSERT_EQ(value, same);
     ASSERT_LT(std::abs(value - before), 6e-4) << "a jump at x = " << x;
     before = value;
+  }
+}
+
+TEST(GaussianRandomField, IsTheSmoothedNoiseThatItsHeaderDescribes) {
+  // Written down as it is defined: kernels about every lattice point, twelve lines each way, on a lattice of 40 lines.
+  constexpr int side = 40, taps = 12;
+  constexpr double length = 5.0, step = 0.7, spacing = step * length;
+  const auto field = gaussian_random_field(
+      {.seed = 3, .channels = {{0.5, 1.0}}, .correlation_length = length, .period = spacing * side});
+  RandomStream random(3, "gaussian slip field, channel 0");
+  std::vector<double> noise(side * side);
+  for (double& value : noise) value = step * std::sqrt(2.0 / std::numbers::pi) * random.normal();
+  const auto wrapped = [](double line) { return static_cast<int>(line - side * std::floor(line / side)); };
+  RandomStream places(1, "places");
+  for (int i = 0; i < 2000; ++i) {
+    const double x = places.uniform(-500.0, 500.0), y = places.uniform(-500.0, 500.0);
+    const double column = std::floor(x / spacing), row = std::floor(y / spacing);
+    double g = 0.0, value = 0.0;
+    for (int r = 1 - taps / 2; r <= taps / 2; ++r) {
+      for (int c = 1 - taps / 2; c <= taps / 2; ++c) {
+        const double dx = x / spacing - (column + c), dy = y / spacing - (row + r);
+        g += std::exp(-step * step * (dx * dx + dy * dy)) * noise[wrapped(row + r) * side + wrapped(column + c)];
+      }
+    }
+    field->sample(x, y, &value);
+    ASSERT_NEAR(value, 0.5 + 0.25 * std::erfc(-g / std::numbers::sqrt2), 1e-14) << x << ", " << y;
   }
 }
 
