@@ -49,34 +49,38 @@ TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eig
   for (Eigen::VectorXd* vector : {&parameters_, &mean_parameters_, &stage_parameters_, &sum_parameters_}) {
     vector->setZero(n_p);
   }
-  look_up(state_, parameters_);
+  position_x_ = description.roles.position_x;
+  position_y_ = description.roles.position_y;
+  look_up(state_.data(), parameters_.data());
   mean_parameters_ = parameters_;
 }
 
-void TruthVehicle::look_up(const Eigen::VectorXd& state, Eigen::VectorXd& parameters) const noexcept {
-  const Roles& roles = model_->description().roles;
-  field_->sample(state[roles.position_x], state[roles.position_y], parameters.data());
+void TruthVehicle::look_up(const double* state, double* parameters) const noexcept {
+  field_->sample(state[position_x_], state[position_y_], parameters);
 }
 
-void TruthVehicle::stop(Eigen::VectorXd& state) const noexcept {
-  if (options_.mechanical_stops) state = state.cwiseMax(lower_).cwiseMin(upper_);
+void TruthVehicle::stop(double* state) const noexcept {
+  if (!options_.mechanical_stops) return;
+  for (Eigen::Index j = 0; j < lower_.size(); ++j) state[j] = std::min(std::max(state[j], lower_[j]), upper_[j]);
 }
 
 void TruthVehicle::step(const double* inputs, double duration) noexcept {
   constexpr double reach[] = {0.0, 0.5, 0.5, 1.0};
   constexpr double weight[] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
-  sum_rates_.setZero();
+  const Eigen::Index n_x = state_.size(), n_p = parameters_.size();
+  double *state = state_.data(), *stage_state = stage_state_.data(), *stage_parameters = stage_parameters_.data();
+  double *rates = rates_.data(), *sum_rates = sum_rates_.data(), *sum_parameters = sum_parameters_.data();
+  for (Eigen::Index j = 0; j < n_x; ++j) sum_rates[j] = rates[j] = 0.0;
   for (int stage = 0; stage < 4; ++stage) {
-    stage_state_ = state_;
-    if (stage > 0) stage_state_ += reach[stage] * duration * rates_;
-    stop(stage_state_);
-    look_up(stage_state_, stage_parameters_);
-    model_->rates(stage_state_.data(), inputs, stage_parameters_.data(), rates_.data());
-    sum_rates_ += weight[stage] * rates_;
-    sum_parameters_ += weight[stage] * duration * stage_parameters_;
+    for (Eigen::Index j = 0; j < n_x; ++j) stage_state[j] = state[j] + reach[stage] * duration * rates[j];
+    stop(stage_state);
+    look_up(stage_state, stage_parameters);
+    model_->rates(stage_state, inputs, stage_parameters, rates);
+    for (Eigen::Index j = 0; j < n_x; ++j) sum_rates[j] += weight[stage] * rates[j];
+    for (Eigen::Index j = 0; j < n_p; ++j) sum_parameters[j] += weight[stage] * duration * stage_parameters[j];
   }
-  state_ += duration * sum_rates_;
-  stop(state_);
+  for (Eigen::Index j = 0; j < n_x; ++j) state[j] += duration * sum_rates[j];
+  stop(state);
 }
 
 void TruthVehicle::advance(const double* inputs, double duration) noexcept {
@@ -87,7 +91,7 @@ void TruthVehicle::advance(const double* inputs, double duration) noexcept {
   for (int i = 0; i < steps; ++i) step(inputs, duration / steps);
   time_ += duration;
   mean_parameters_ = sum_parameters_ / duration;
-  look_up(state_, parameters_);
+  look_up(state_.data(), parameters_.data());
 }
 
 namespace {

@@ -41,13 +41,14 @@ class RHEC_EXPORT TruthVehicle {
   const Eigen::VectorXd& mean_parameters() const noexcept { return mean_parameters_; }
 
  private:
-  void look_up(const Eigen::VectorXd& state, Eigen::VectorXd& parameters) const noexcept;
-  void stop(Eigen::VectorXd& state) const noexcept;
+  void look_up(const double* state, double* parameters) const noexcept;
+  void stop(double* state) const noexcept;
   void step(const double* inputs, double duration) noexcept;
 
   const Model* model_;
   const SlipField* field_;
   TruthOptions options_;
+  int position_x_ = -1, position_y_ = -1;
   Eigen::VectorXd lower_, upper_;
   double time_ = 0.0;
   Eigen::VectorXd state_, parameters_, mean_parameters_;
