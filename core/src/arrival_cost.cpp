@@ -103,14 +103,27 @@ void ArrivalCost::write(RheProblem& problem) noexcept {
     return;
   }
   factor_covariance();
+  invert_factor();
+  // D^-1 L^-T L^-1 D^-1
   for (int c = 0; c < n; ++c) {
-    inverse_.col(c).setZero();
-    inverse_(c, c) = 1.0;
-    small::solve(factor_.data(), n, n, inverse_.col(c).data());
+    for (int r = c; r < n; ++r) {
+      double sum = 0.0;
+      for (int k = r; k < n; ++k) sum += inverse_(k, r) * inverse_(k, c);
+      problem.arrival_information(r, c) = problem.arrival_information(c, r) = sum / (scale_[r] * scale_[c]);
+    }
   }
-  for (int c = 0; c < n; ++c)
-    for (int r = 0; r < n; ++r)
-      problem.arrival_information(r, c) = 0.5 * (inverse_(r, c) + inverse_(c, r)) / (scale_[r] * scale_[c]);
+}
+
+/// Of the factor L, in the lower triangle.
+void ArrivalCost::invert_factor() noexcept {
+  const int n = static_cast<int>(scale_.size());
+  for (int c = 0; c < n; ++c) {
+    for (int r = c; r < n; ++r) {
+      double value = r == c ? 1.0 : 0.0;
+      for (int k = c; k < r; ++k) value -= factor_(r, k) * inverse_(k, c);
+      inverse_(r, c) = value / factor_(r, r);
+    }
+  }
 }
 
 void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, const std::vector<Border>& borders,
@@ -143,7 +156,7 @@ void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, cons
 }
 
 void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate& solution) noexcept {
-  problem.robust_weights(solution, 0, robust_.data(), scratch_);
+  if (!problem.setup().robust.empty()) problem.robust_weights(solution, 0, robust_.data(), scratch_);
   filter_.update(problem.output(0), robust_.data());
   problem.inputs_on(solution, 0, inputs_.data());
   const bool ramp = std::any_of(ramp_variances_.begin(), ramp_variances_.end(), [](double v) { return v > 0.0; });
@@ -163,7 +176,7 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
   problem.parameters_on(solution, 0, ends_.data());
   for (int j = 0; j < np; ++j)
     if (!(ramp_variances_[j] > 0.0)) ends_[j] = p[j];
-  problem.robust_weights(solution, 0, robust_.data(), scratch_);
+  if (!problem.setup().robust.empty()) problem.robust_weights(solution, 0, robust_.data(), scratch_);
   Model::Nodes nodes;
   nodes.count = 1;
   nodes.states = x;
@@ -187,12 +200,10 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
   auto right = rows_.col(unknowns);
   // Prior: L^-1 D^-1 ([x; p] + [dx; dp] - mean). Columns of p stand behind those of u.
   factor_covariance();
+  invert_factor();
   const auto column_of = [&](int j) { return j < nx ? j : nu + j; };
   for (int c = 0; c < n; ++c) {
     for (int r = c; r < n; ++r) {
-      double value = r == c ? 1.0 : 0.0;
-      for (int k = c; k < r; ++k) value -= factor_(r, k) * inverse_(k, c);
-      inverse_(r, c) = value / factor_(r, r);
       rows_(r, column_of(c)) = inverse_(r, c) / scale_[c];
       right[r] -= rows_(r, column_of(c)) * (x[c] - filter_.mean[c]);
     }

@@ -24,10 +24,8 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   next_.assign(nx_, 0.0);
   jacobian_.assign(static_cast<std::size_t>(nx_) * (nx_ + nu_ + 2 * np_), 0.0);
   input_.assign(nu_, 0.0);
-  transition_ = Eigen::MatrixXd::Identity(n, n);
-  input_map_ = Eigen::MatrixXd::Zero(n, nu_ + np_);
   work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
-  gain_ = row_ = correction_ = Eigen::VectorXd::Zero(n);
+  gain_ = row_ = image_ = correction_ = Eigen::VectorXd::Zero(n);
 }
 
 void KalmanFilter::clip() noexcept {
@@ -57,24 +55,40 @@ void KalmanFilter::take_output(int output, double measured, double variance) noe
                                                                      : measured - predicted_[output];
   row_.setZero();
   for (int c = 0; c < nx_; ++c) row_[c] = output_jacobian_[c * ny_ + output];
-  innovation -= row_.dot(correction_);
-  gain_.noalias() = covariance.lazyProduct(row_);
-  const double total = row_.dot(gain_) + variance;
+  image_.setZero();
+  for (int c = 0; c < nx_; ++c) {
+    innovation -= row_[c] * correction_[c];
+    for (int r = 0; r < n; ++r) image_[r] += covariance(r, c) * row_[c];
+  }
+  double total = variance;
+  for (int c = 0; c < nx_; ++c) total += row_[c] * image_[c];
   if (!(total > 0.0)) return;
-  gain_ /= total;
+  for (int r = 0; r < n; ++r) gain_[r] = image_[r] / total;
   // Joseph's form, (I - k h') Pi (I - k h')' + k r k': it stays positive semidefinite, and exact where a vague prior
-  // meets a good measurement.
-  work_.setIdentity();
+  // meets a good measurement. One factor after the other, it takes no product of matrices (Bierman 1977).
   for (int c = 0; c < n; ++c)
-    for (int r = 0; r < n; ++r) work_(r, c) -= gain_[r] * row_[c];
-  transition_.noalias() = work_.lazyProduct(covariance);
-  next_covariance_.noalias() = transition_.lazyProduct(work_.transpose());
+    for (int r = 0; r < n; ++r) work_(r, c) = covariance(r, c) - gain_[r] * image_[c];
+  image_.setZero();
+  for (int c = 0; c < nx_; ++c)
+    for (int r = 0; r < n; ++r) image_[r] += work_(r, c) * row_[c];
+  bool finite = std::isfinite(innovation);
+  for (int c = 0; c < n; ++c) {
+    for (int r = 0; r < n; ++r) {
+      next_covariance_(r, c) = work_(r, c) + (variance * gain_[r] - image_[r]) * gain_[c];
+      finite = finite && std::isfinite(next_covariance_(r, c));
+    }
+  }
+  if (!finite) return;
+  for (int r = 0; r < n; ++r) correction_[r] += gain_[r] * innovation;
+  make_symmetric();
+}
+
+/// covariance = the symmetric part of the next one.
+void KalmanFilter::make_symmetric() noexcept {
+  const int n = nx_ + np_;
   for (int c = 0; c < n; ++c)
-    for (int r = 0; r < n; ++r) next_covariance_(r, c) += gain_[r] * variance * gain_[c];
-  if (!std::isfinite(innovation) || !gain_.allFinite() || !next_covariance_.allFinite()) return;
-  correction_ += gain_ * innovation;
-  for (int c = 0; c < n; ++c)
-    for (int r = 0; r < n; ++r) covariance(r, c) = 0.5 * (next_covariance_(r, c) + next_covariance_(c, r));
+    for (int r = 0; r <= c; ++r)
+      covariance(r, c) = covariance(c, r) = 0.5 * (next_covariance_(r, c) + next_covariance_(c, r));
 }
 
 void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration) noexcept {
@@ -96,34 +110,47 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   request.next_states = next_.data();
   request.jacobians = jacobian_.data();
   model_->integrate(request);
-  transition_.setIdentity();
-  for (int r = 0; r < nx_; ++r) {
-    for (int c = 0; c < nx_; ++c) transition_(r, c) = jacobian_[c * nx_ + r];
-    for (int c = 0; c < np_; ++c) {
-      transition_(r, nx_ + c) = jacobian_[(nx_ + nu_ + c) * nx_ + r];
-      if (ramp_variances) transition_(r, nx_ + c) += jacobian_[(nx_ + nu_ + np_ + c) * nx_ + r];
-    }
+  // Of the transition [F_x F_p; 0 I] only the vehicle's rows are worth a product.
+  if (ramp_variances)
+    for (int c = 0; c < np_; ++c)
+      for (int r = 0; r < nx_; ++r) jacobian_[(nx_ + nu_ + c) * nx_ + r] += jacobian_[(nx_ + nu_ + np_ + c) * nx_ + r];
+  const auto transition = [&](int column) { return jacobian_.data() + (column < nx_ ? column : nu_ + column) * nx_; };
+  for (int c = 0; c < n; ++c) {
+    double* moved = work_.col(c).data();
+    std::fill_n(moved, nx_, 0.0);
+    for (int k = 0; k < n; ++k)
+      for (int r = 0; r < nx_; ++r) moved[r] += transition(k)[r] * covariance(k, c);
   }
+  next_covariance_ = covariance;
+  for (int c = 0; c < nx_; ++c) {
+    double* next = next_covariance_.col(c).data();
+    std::fill_n(next, nx_, 0.0);
+    for (int k = 0; k < n; ++k)
+      for (int r = 0; r < nx_; ++r) next[r] += work_(r, k) * transition(k)[c];
+  }
+  for (int c = nx_; c < n; ++c)
+    for (int r = 0; r < nx_; ++r) next_covariance_(r, c) = next_covariance_(c, r) = work_(r, c);
   // Noise enters through the inputs and, on a ramp, through the change of the parameter over the interval.
-  for (int c = 0; c < nu_; ++c) {
-    const double wide = 100.0 * model_->description().inputs[c].scale;
-    const double sigma = std::isfinite(measured_input[c]) ? std::sqrt(noise_.input_variances[c]) : wide;
-    for (int r = 0; r < nx_; ++r) input_map_(r, c) = jacobian_[(nx_ + c) * nx_ + r] * sigma;
+  for (int j = 0; j < nu_; ++j) {
+    const double wide = 100.0 * model_->description().inputs[j].scale;
+    const double variance = std::isfinite(measured_input[j]) ? noise_.input_variances[j] : wide * wide;
+    const double* by_input = jacobian_.data() + (nx_ + j) * nx_;
+    for (int c = 0; c < nx_; ++c)
+      for (int r = 0; r < nx_; ++r) next_covariance_(r, c) += by_input[r] * (variance * by_input[c]);
   }
-  for (int c = 0; c < np_; ++c) {
-    const double sigma = ramp_variances ? std::sqrt(ramp_variances[c]) : 0.0;
-    input_map_.col(nu_ + c).setZero();
-    if (sigma == 0.0) continue;
-    for (int r = 0; r < nx_; ++r) input_map_(r, nu_ + c) = jacobian_[(nx_ + nu_ + np_ + c) * nx_ + r] * sigma;
-    input_map_(nx_ + c, nu_ + c) = sigma;
+  for (int j = 0; ramp_variances && j < np_; ++j) {
+    const double variance = ramp_variances[j];
+    const double* by_end = jacobian_.data() + (nx_ + nu_ + np_ + j) * nx_;
+    for (int c = 0; c < nx_; ++c) {
+      for (int r = 0; r < nx_; ++r) next_covariance_(r, c) += by_end[r] * (variance * by_end[c]);
+      next_covariance_(c, nx_ + j) += variance * by_end[c];
+      next_covariance_(nx_ + j, c) += variance * by_end[c];
+    }
+    next_covariance_(nx_ + j, nx_ + j) += variance;
   }
-  work_.noalias() = transition_.lazyProduct(covariance);
-  next_covariance_.noalias() = work_.lazyProduct(transition_.transpose());
-  next_covariance_.noalias() += input_map_.lazyProduct(input_map_.transpose());
   const bool finite = std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); });
   if (!finite || !next_covariance_.allFinite()) return;
-  for (int c = 0; c < n; ++c)
-    for (int r = 0; r < n; ++r) covariance(r, c) = 0.5 * (next_covariance_(r, c) + next_covariance_(c, r));
+  make_symmetric();
   std::copy(next_.begin(), next_.end(), mean.data());
 }
 

@@ -56,6 +56,7 @@ class RHEC_EXPORT ArrivalCost {
   void filter_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
   void smooth_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
   void factor_covariance() noexcept;
+  void invert_factor() noexcept;
 
   ArrivalKind kind_;
   std::vector<ParameterWalk> walks_;

@@ -45,14 +45,15 @@ class RHEC_EXPORT KalmanFilter {
 
  private:
   void take_output(int output, double measured, double variance) noexcept;
+  void make_symmetric() noexcept;
   void clip() noexcept;
 
   std::shared_ptr<const Model> model_;
   Noise noise_;
   int substeps_, nx_, nu_, np_, ny_;
   std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
-  Eigen::MatrixXd transition_, input_map_, work_, next_covariance_;
-  Eigen::VectorXd gain_, row_, correction_;
+  Eigen::MatrixXd work_, next_covariance_;
+  Eigen::VectorXd gain_, row_, image_, correction_;
 };
 
 }  // namespace rhec
