@@ -98,13 +98,15 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
   const Model& vehicle = problem_.model();
   const Roles& roles = vehicle.description().roles;
   const int N = problem_.intervals(), nx = vehicle.state_count(), nu = vehicle.input_count();
-  command_.reference = path_.point_at(arc_length);
+  int segment = reference_segment_;
+  command_.reference = path_.point_at(arc_length, segment);
+  reference_segment_ = segment;
   const double ground_speed = command_.reference.speed, distance = setup_.interval * std::abs(ground_speed);
   choose_straight_motion(ground_speed, parameters);
   const double most = setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset;
   if (std::isfinite(most)) go_straight(most, nominal_parameters_.data(), largest_);
   for (int i = 0; i <= N; ++i) {
-    const PathPoint target = path_.point_at(arc_length + i * distance);
+    const PathPoint target = path_.point_at(arc_length + i * distance, segment);
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);

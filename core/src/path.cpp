@@ -13,6 +13,8 @@ namespace {
 
 // Waypoints closer than this are one point: a segment so short has no heading worth following.
 constexpr double smallest_segment = 1e-9;  // [m]
+// Segments that are walked along before a search.
+constexpr int near = 32;
 
 void check(const Waypoint& waypoint, std::size_t number) {
   if (std::isfinite(waypoint.x) && std::isfinite(waypoint.y) && std::isfinite(waypoint.speed)) return;
@@ -34,6 +36,7 @@ Path::Path(const std::vector<Waypoint>& waypoints) {
       arc_length = arc_lengths_.back() + step;
       direction_x_.push_back(dx / step);
       direction_y_.push_back(dy / step);
+      headings_.push_back(std::atan2(direction_y_.back(), direction_x_.back()));
     }
     x_.push_back(waypoint.x);
     y_.push_back(waypoint.y);
@@ -52,21 +55,32 @@ int Path::segment_at(double arc_length) const noexcept {
   return static_cast<int>(after - arc_lengths_.begin()) - 1;
 }
 
-PathPoint Path::point_at(double arc_length) const noexcept {
-  const int i = segment_at(arc_length);
+PathPoint Path::point_on(int i, double arc_length) const noexcept {
   const double along = arc_length - arc_lengths_[i];
   const double fraction = std::clamp(along / (arc_lengths_[i + 1] - arc_lengths_[i]), 0.0, 1.0);
   return {.x = x_[i] + along * direction_x_[i],
           .y = y_[i] + along * direction_y_[i],
-          .heading = std::atan2(direction_y_[i], direction_x_[i]),
+          .heading = headings_[i],
           .speed = (1.0 - fraction) * speeds_[i] + fraction * speeds_[i + 1]};
 }
 
-PathProjection Path::closest(double x, double y, double from, double to) const noexcept {
-  PathProjection best{.arc_length = from};
-  double best_square = std::numeric_limits<double>::infinity();
+PathPoint Path::point_at(double arc_length) const noexcept { return point_on(segment_at(arc_length), arc_length); }
+
+PathPoint Path::point_at(double arc_length, int& segment) const noexcept {
   const int last = size() - 2;
-  for (int i = segment_at(from); i <= last; ++i) {
+  int i = std::clamp(segment, 0, last), steps = near;
+  while (steps > 0 && i < last && arc_lengths_[i + 1] <= arc_length) ++i, --steps;
+  while (steps > 0 && i > 0 && arc_lengths_[i] > arc_length) --i, --steps;
+  segment = steps > 0 ? i : segment_at(arc_length);
+  return point_on(segment, arc_length);
+}
+
+PathProjection Path::closest(double x, double y, double from, double to) const noexcept {
+  struct Nearest {
+    double along, off_x, off_y, square;
+  };
+  const int last = size() - 2, first = segment_at(from);
+  const auto nearest_on = [&](int i) -> Nearest {
     // The part of this segment that lies in the stretch, as distances from the segment's start.
     const double begin = from - arc_lengths_[i];
     const double end = i == last ? to - arc_lengths_[i] : std::min(to, arc_lengths_[i + 1]) - arc_lengths_[i];
@@ -74,13 +88,31 @@ PathProjection Path::closest(double x, double y, double from, double to) const n
     const double along =
         std::clamp(dx * direction_x_[i] + dy * direction_y_[i], i == 0 ? begin : std::max(begin, 0.0), end);
     const double off_x = dx - along * direction_x_[i], off_y = dy - along * direction_y_[i];
-    const double square = off_x * off_x + off_y * off_y;
+    return {along, off_x, off_y, off_x * off_x + off_y * off_y};
+  };
+  // The best point is at most as far as any: as one about as far on as the position is away, which on a path that does
+  // not wind is near it.
+  double at_most = std::sqrt(nearest_on(first).square);
+  const double ahead = std::min(at_most * (last + 1) / length(), static_cast<double>(last - first));
+  if (const int guess = first + static_cast<int>(ahead); arc_lengths_[guess] <= to)
+    at_most = std::min(at_most, std::sqrt(nearest_on(guess).square));
+
+  PathProjection best{.arc_length = from};
+  double best_square = std::numeric_limits<double>::infinity();
+  for (int i = first; i <= last; ++i) {
+    const auto [along, off_x, off_y, square] = nearest_on(i);
+    const double distance = std::sqrt(square);
     if (square < best_square) {
       best_square = square;
       const double left = direction_x_[i] * off_y - direction_y_[i] * off_x;
-      best = {.arc_length = arc_lengths_[i] + along, .lateral = std::copysign(std::sqrt(square), left)};
+      best = {.arc_length = arc_lengths_[i] + along, .lateral = std::copysign(distance, left)};
+      at_most = std::min(at_most, distance);
     }
     if (to <= arc_lengths_[i + 1]) break;
+    // Whoever goes on for some length comes nearer by no more than that: segments from which the best point is out of
+    // reach are passed over.
+    const double reach = arc_lengths_[i + 1] + distance - at_most - smallest_segment;
+    while (i + 1 < last && arc_lengths_[i + 2] < std::min(reach, to)) ++i;
   }
   return best;
 }

@@ -15,6 +15,7 @@
 namespace rhec {
 namespace {
 
+constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int longest_row = 64;
 
 }  // namespace
@@ -53,21 +54,23 @@ void RhcProblem::set_blocks(int input, const std::uint8_t* begins) noexcept {
 int RhcProblem::finish(std::span<double> scratch) noexcept {
   finish_structure();
   const int ns = capacity().states;
-  clear_bounds();
-  for (int i = 0; i <= intervals(); ++i) {
-    if (i > 0) {
-      std::copy_n(setup_.state_lower.data(), nx(), lower_row(i));
-      std::copy_n(setup_.state_upper.data(), nx(), upper_row(i));
-    }
-    if (i == intervals()) break;
+  // Node 0 and what the channels carry stay without bounds, as they were made.
+  if (!is_direct()) clear_bounds();
+  for (int i = 1; i <= intervals(); ++i) {
+    std::copy_n(setup_.state_lower.data(), nx(), lower_row(i));
+    std::copy_n(setup_.state_upper.data(), nx(), upper_row(i));
+  }
+  std::fill_n(lower_row(intervals()) + ns, capacity().controls, -infinity);
+  std::fill_n(upper_row(intervals()) + ns, capacity().controls, infinity);
+  for (int i = 0; i < intervals(); ++i) {
     for (int j = 0; j < nu(); ++j) {
       const int control = control_of_input(i, j);
       if (control < 0) continue;
       // A block keeps the bounds of every interval that it covers.
-      double lower = input_lower_[i * nu() + j], upper = input_upper_[i * nu() + j];
+      double lower = input_lower(i, j), upper = input_upper(i, j);
       for (int later = i + 1; later < intervals() && control_of_input(later, j) < 0; ++later) {
-        lower = std::max(lower, input_lower_[later * nu() + j]);
-        upper = std::min(upper, input_upper_[later * nu() + j]);
+        lower = std::max(lower, input_lower(later, j));
+        upper = std::min(upper, input_upper(later, j));
       }
       lower_row(i)[ns + control] = lower;
       upper_row(i)[ns + control] = upper;
@@ -126,7 +129,7 @@ int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
     std::copy_n(initial_.data(), n, x);
     for (int first = 0; first < intervals() && violation(x) > 0.0;) {
       const int end = stretch_end(first);
-      double least = std::numeric_limits<double>::infinity();
+      double least = infinity;
       int best = 0;
       for (int candidate = 0; candidate < candidates; ++candidate) {
         std::copy_n(x, n, trial);

@@ -97,6 +97,68 @@ TEST(Path, ClosestPointIsWhatAFineSearchFinds) {
   }
 }
 
+/// Short segments that wind about, so that the nearest of many may be anywhere.
+Path winding_path(unsigned seed, std::vector<double>* arc_lengths) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> turn(0.0, 0.4);
+  std::uniform_real_distribution<double> length(0.01, 0.3);
+  std::vector<Waypoint> waypoints{{0.0, 0.0, 1.0}};
+  arc_lengths->assign(1, 0.0);
+  double heading = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    heading += turn(random);
+    const double step = length(random);
+    const Waypoint& last = waypoints.back();
+    waypoints.push_back({last.x + step * std::cos(heading), last.y + step * std::sin(heading), 1.0 + 0.01 * i});
+    arc_lengths->push_back(arc_lengths->back() + step);
+  }
+  return Path(waypoints);
+}
+
+TEST(Path, ClosestPointIsTheBestOfAllSegments) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::vector<double> arc_lengths;
+    const Path path = winding_path(seed, &arc_lengths);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> place(-6.0, 6.0), share(-0.1, 1.1);
+    for (int trial = 0; trial < 100; ++trial) {
+      const double x = place(random), y = place(random);
+      double from = path.length() * share(random), to = path.length() * share(random);
+      if (from > to) std::swap(from, to);
+      // One segment after the other, each by itself.
+      double nearest = std::numeric_limits<double>::infinity(), begin = from;
+      for (const double end : arc_lengths) {
+        if (end <= begin || end >= to) continue;
+        nearest = std::min(nearest, std::abs(path.closest(x, y, begin, end).lateral));
+        begin = end;
+      }
+      nearest = std::min(nearest, std::abs(path.closest(x, y, begin, to).lateral));
+      ASSERT_NEAR(std::abs(path.closest(x, y, from, to).lateral), nearest, 1e-12) << "seed " << seed << ", " << trial;
+    }
+  }
+}
+
+TEST(Path, APointIsTheSameFromWhateverSegmentItIsSearched) {
+  std::vector<double> arc_lengths;
+  const Path path = winding_path(1, &arc_lengths);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> share(-0.1, 1.1);
+  int segment = -7;
+  for (int trial = 0; trial < 2000; ++trial) {
+    // Far away, or a little on or back, or a waypoint itself.
+    const double arc_length = trial % 3 == 0   ? path.length() * share(random)
+                              : trial % 3 == 1 ? arc_lengths[segment] + share(random)
+                                               : arc_lengths[random() % arc_lengths.size()];
+    const PathPoint expected = path.point_at(arc_length), found = path.point_at(arc_length, segment);
+    ASSERT_EQ(found.x, expected.x) << arc_length;
+    ASSERT_EQ(found.y, expected.y);
+    ASSERT_EQ(found.heading, expected.heading);
+    ASSERT_EQ(found.speed, expected.speed);
+    ASSERT_GE(segment, 0);
+    ASSERT_LT(segment, path.size() - 1);
+  }
+}
+
 TEST(PathFollower, ProjectsOnSegmentsWithASignedDistance) {
   const Path path = corner();
   PathFollower follower(path);

@@ -77,6 +77,7 @@ class RHEC_EXPORT Controller {
   Iterate point_;
   Command command_;
   bool has_plan_ = false, prepared_ = false;
+  int reference_segment_ = 0;  ///< of the path, where the last reference began
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_;
   std::vector<double> nominal_parameters_, reference_parameters_;

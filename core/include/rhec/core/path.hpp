@@ -43,6 +43,9 @@ class RHEC_EXPORT Path {
 
   /// The point at an arc length [m], by a binary search.
   PathPoint point_at(double arc_length) const noexcept;
+  /// The same for one point after another: found at once where it lies on or near the segment of the last one, whose
+  /// number is kept in `segment` (at first any).
+  PathPoint point_at(double arc_length, int& segment) const noexcept;
 
   /// The closest point to (x, y) among those with an arc length in [from, to] [m], with from <= to: an exact projection
   /// on segments, at a cost that grows with the number of waypoints in that stretch only. Of equally close points the
@@ -51,9 +54,11 @@ class RHEC_EXPORT Path {
 
  private:
   int segment_at(double arc_length) const noexcept;
+  PathPoint point_on(int segment, double arc_length) const noexcept;
 
   std::vector<double> x_, y_, speeds_, arc_lengths_;  // one per waypoint
   std::vector<double> direction_x_, direction_y_;     // unit vectors, one per segment
+  std::vector<double> headings_;                      // one per segment
 };
 
 /// Goes along a path with a vehicle: each time the closest point is searched for only near the last one, so that a path
