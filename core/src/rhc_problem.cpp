@@ -64,6 +64,11 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
   std::fill_n(upper_row(intervals()) + ns, capacity().controls, infinity);
   for (int i = 0; i < intervals(); ++i) {
     for (int j = 0; j < nu(); ++j) {
+      if (is_direct()) {
+        lower_row(i)[ns + j] = input_lower(i, j);
+        upper_row(i)[ns + j] = input_upper(i, j);
+        continue;
+      }
       const int control = control_of_input(i, j);
       if (control < 0) continue;
       // A block keeps the bounds of every interval that it covers.
