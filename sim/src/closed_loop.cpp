@@ -15,11 +15,47 @@ namespace {
 // A vehicle this far off its path is lost [m].
 constexpr double lost = 50.0;
 
-double nees_of(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
-  const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
-  if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
-  return error.dot(factor.solve(error));
-}
+/// error' covariance^-1 error
+class Nees {
+ public:
+  explicit Nees(int size) : error(size), factor_(size, size), solved_(size) {}
+
+  Eigen::VectorXd error;
+
+  double with(const Eigen::MatrixXd& covariance) {
+    // L D L' row by row, and z = L^-1 error beside it: the sum of z_i^2 / d_i.
+    double sum = 0.0;
+    for (Eigen::Index i = 0; i < error.size(); ++i) {
+      double pivot = covariance(i, i), z = error[i];
+      for (Eigen::Index j = 0; j < i; ++j) {
+        double value = covariance(i, j);  // of L D
+        for (Eigen::Index k = 0; k < j; ++k) value -= factor_(k, i) * factor_(j, k);
+        factor_(j, i) = value;
+        const double entry = value / factor_(j, j);  // of L
+        factor_(i, j) = entry;
+        pivot -= entry * value;
+        z -= entry * solved_[j];
+      }
+      if (!(pivot > least_pivot * covariance(i, i))) return with_singular(covariance);
+      factor_(i, i) = pivot;
+      solved_[i] = z;
+      sum += z * z / pivot;
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr double least_pivot = 1e-14;  // of a diagonal entry: below it pivots are rounding
+
+  double with_singular(const Eigen::MatrixXd& covariance) const {
+    const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
+    if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
+    return error.dot(factor.solve(error));
+  }
+
+  Eigen::MatrixXd factor_;  // L below the diagonal, D on it, L D above
+  Eigen::VectorXd solved_;
+};
 
 /// Sums of absolute and squared errors.
 class Errors {
@@ -92,6 +128,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   const auto limit =
       static_cast<std::int64_t>(3.0 * scenario.path().length() / (scenario.options().speed * step)) + 100;
   std::vector<double> outputs(model.output_count()), measured(model.input_count());
+  Nees nees(nx + np);
   Estimate known;
   known.state.resize(nx);
   known.parameters.resize(np);
@@ -123,11 +160,11 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.nees = std::numeric_limits<double>::quiet_NaN();
     if (!oracle) {
       sample.sigma = estimate->covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-      Eigen::VectorXd error(nx + np);
-      error << sample.state - sample.true_state, sample.parameters - sample.true_parameters;
+      nees.error << sample.state - sample.true_state, sample.parameters - sample.true_parameters;
       for (int j = 0; j < nx; ++j)
-        if (model.description().states[j].is_angle) error[j] = angle_difference(sample.state[j], sample.true_state[j]);
-      sample.nees = nees_of(error, estimate->covariance);
+        if (model.description().states[j].is_angle)
+          nees.error[j] = angle_difference(sample.state[j], sample.true_state[j]);
+      sample.nees = nees.with(estimate->covariance);
     }
     sample.inputs = command.inputs;
     sample.reference = command.reference;
