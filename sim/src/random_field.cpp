@@ -67,6 +67,7 @@ class Gaussian final : public SlipField {
   }
 
   int channels() const noexcept override { return static_cast<int>(ranges_.size()); }
+  bool is_smooth() const noexcept override { return true; }
 
  private:
   static constexpr double lattice_step = 0.7;  // in correlation lengths

@@ -77,7 +77,8 @@ const OptionTable<TerrainOptions>& terrain_table() {
 const OptionTable<TruthOptions>& vehicle_table() {
   static const auto rows =
       OptionTable<TruthOptions>()
-          .number("step", &TruthOptions::step, "largest integration step of the truth [s]", between(1e-6, 1.0))
+          .number("step", &TruthOptions::step,
+                  "integration step of the truth; on smooth ground it may take longer ones [s]", between(1e-6, 1.0))
           .flag("mechanical_stops", &TruthOptions::mechanical_stops, "bounded states cannot leave their bounds");
   return rows;
 }

@@ -15,6 +15,7 @@ class Constant final : public SlipField {
  public:
   explicit Constant(std::vector<double> values) : values_(std::move(values)) {}
   int channels() const noexcept override { return static_cast<int>(values_.size()); }
+  bool is_smooth() const noexcept override { return true; }
   void look_up(double, double, double* values) const noexcept override {
     std::copy(values_.begin(), values_.end(), values);
   }

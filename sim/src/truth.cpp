@@ -8,6 +8,14 @@
 #include "rhec/core/error.hpp"
 
 namespace rhec::sim {
+namespace {
+
+// Steps that are made as one where that does not show.
+constexpr int longest = 5;
+// What shows, in typical magnitudes of a state.
+constexpr double seen = 1e-8;
+
+}  // namespace
 
 TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eigen::VectorXd& initial_state,
                            const TruthOptions& options)
@@ -35,18 +43,22 @@ TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eig
   }
   lower_.resize(n_x);
   upper_.resize(n_x);
+  scales_.resize(n_x);
   for (int i = 0; i < n_x; ++i) {
     const Variable& variable = description.states[i];
     lower_[i] = variable.lower;
     upper_[i] = variable.upper;
+    scales_[i] = variable.scale;
     const bool inside = !options.mechanical_stops || (state_[i] >= lower_[i] && state_[i] <= upper_[i]);
     if (!std::isfinite(state_[i]) || !inside) {
       throw Error(fmt::format("truth vehicle: the initial {} is {} {}; expected a value in [{}, {}]", variable.name,
                               state_[i], variable.unit, lower_[i], upper_[i]));
     }
   }
-  for (Eigen::VectorXd* vector : {&stage_state_, &rates_, &sum_rates_}) vector->setZero(n_x);
-  for (Eigen::VectorXd* vector : {&parameters_, &mean_parameters_, &stage_parameters_, &sum_parameters_}) {
+  for (Eigen::VectorXd* vector : {&stage_state_, &rates_, &stage_rates_, &end_rates_, &sum_rates_})
+    vector->setZero(n_x);
+  for (Eigen::VectorXd* vector :
+       {&parameters_, &mean_parameters_, &stage_parameters_, &step_parameters_, &sum_parameters_}) {
     vector->setZero(n_p);
   }
   position_x_ = description.roles.position_x;
@@ -59,28 +71,58 @@ void TruthVehicle::look_up(const double* state, double* parameters) const noexce
   field_->sample(state[position_x_], state[position_y_], parameters);
 }
 
-void TruthVehicle::stop(double* state) const noexcept {
-  if (!options_.mechanical_stops) return;
-  for (Eigen::Index j = 0; j < lower_.size(); ++j) state[j] = std::min(std::max(state[j], lower_[j]), upper_[j]);
+/// True where it had to move the state.
+bool TruthVehicle::stop(double* state) const noexcept {
+  if (!options_.mechanical_stops) return false;
+  bool stopped = false;
+  for (Eigen::Index j = 0; j < lower_.size(); ++j) {
+    const double inside = std::min(std::max(state[j], lower_[j]), upper_[j]);
+    stopped = stopped || inside != state[j];
+    state[j] = inside;
+  }
+  return stopped;
 }
 
-void TruthVehicle::step(const double* inputs, double duration) noexcept {
+/// From the state, whose slip and rates are known, to the next one, with its slip and rates. A step that `must_fit` is
+/// not made where its error might be seen: then the answer is false.
+bool TruthVehicle::step(const double* inputs, double duration, bool must_fit) noexcept {
   constexpr double reach[] = {0.0, 0.5, 0.5, 1.0};
   constexpr double weight[] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   const Eigen::Index n_x = state_.size(), n_p = parameters_.size();
-  double *state = state_.data(), *stage_state = stage_state_.data(), *stage_parameters = stage_parameters_.data();
-  double *rates = rates_.data(), *sum_rates = sum_rates_.data(), *sum_parameters = sum_parameters_.data();
-  for (Eigen::Index j = 0; j < n_x; ++j) sum_rates[j] = rates[j] = 0.0;
+  const double* const state = state_.data();
+  double *stage_state = stage_state_.data(), *stage_parameters = stage_parameters_.data(), *rates = stage_rates_.data();
+  double *sum_rates = sum_rates_.data(), *sum_parameters = step_parameters_.data();
+  bool stopped = false;
+  stage_rates_ = rates_;
+  stage_parameters_ = parameters_;
   for (int stage = 0; stage < 4; ++stage) {
-    for (Eigen::Index j = 0; j < n_x; ++j) stage_state[j] = state[j] + reach[stage] * duration * rates[j];
-    stop(stage_state);
-    look_up(stage_state, stage_parameters);
-    model_->rates(stage_state, inputs, stage_parameters, rates);
-    for (Eigen::Index j = 0; j < n_x; ++j) sum_rates[j] += weight[stage] * rates[j];
-    for (Eigen::Index j = 0; j < n_p; ++j) sum_parameters[j] += weight[stage] * duration * stage_parameters[j];
+    if (stage > 0) {
+      for (Eigen::Index j = 0; j < n_x; ++j) stage_state[j] = state[j] + reach[stage] * duration * rates[j];
+      stopped = stop(stage_state) || stopped;
+      look_up(stage_state, stage_parameters);
+      model_->rates(stage_state, inputs, stage_parameters, rates);
+    }
+    for (Eigen::Index j = 0; j < n_x; ++j) sum_rates[j] = (stage > 0 ? sum_rates[j] : 0.0) + weight[stage] * rates[j];
+    for (Eigen::Index j = 0; j < n_p; ++j)
+      sum_parameters[j] = (stage > 0 ? sum_parameters[j] : 0.0) + weight[stage] * duration * stage_parameters[j];
   }
-  for (Eigen::Index j = 0; j < n_x; ++j) state[j] += duration * sum_rates[j];
-  stop(state);
+  for (Eigen::Index j = 0; j < n_x; ++j) stage_state[j] = state[j] + duration * sum_rates[j];
+  stopped = stop(stage_state) || stopped;
+  look_up(stage_state, stage_parameters);
+  double* const end_rates = end_rates_.data();
+  model_->rates(stage_state, inputs, stage_parameters, end_rates);
+  if (must_fit) {
+    if (stopped) return false;
+    // With the rates at the end in place of those of the last stage the step is one of third order (Hairer, Norsett &
+    // Wanner 1993, II.4): how far the two are apart bounds its error with a wide margin.
+    for (Eigen::Index j = 0; j < n_x; ++j)
+      if (!(std::abs(duration / 6.0 * (rates[j] - end_rates[j])) <= seen * scales_[j])) return false;
+  }
+  state_.swap(stage_state_);
+  parameters_.swap(stage_parameters_);
+  rates_.swap(end_rates_);
+  sum_parameters_ += step_parameters_;
+  return true;
 }
 
 void TruthVehicle::advance(const double* inputs, double duration) noexcept {
@@ -88,10 +130,15 @@ void TruthVehicle::advance(const double* inputs, double duration) noexcept {
   // A duration that is a whole number of steps but for rounding takes that number.
   const int steps = std::max(1, static_cast<int>(std::ceil(duration / options_.step - 1e-9)));
   sum_parameters_.setZero();
-  for (int i = 0; i < steps; ++i) step(inputs, duration / steps);
+  model_->rates(state_.data(), inputs, parameters_.data(), rates_.data());
+  int most = field_->is_smooth() ? longest : 1;
+  for (int done = 0; done < steps;) {
+    int at_once = std::min(most, steps - done);
+    while (!step(inputs, duration * at_once / steps, at_once > 1)) at_once = most = at_once / 2;
+    done += at_once;
+  }
   time_ += duration;
   mean_parameters_ = sum_parameters_ / duration;
-  look_up(state_.data(), parameters_.data());
 }
 
 namespace {

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <utility>
 
 #include "bicycle.hpp"
 #include "rhec/core/error.hpp"
@@ -79,6 +81,56 @@ TEST(TruthVehicle, SteeringStopsAtItsStop) {
   EXPECT_NEAR(free.state()[3], 1.0, 1e-12);
   stopped.advance(back.data(), 1.0);
   EXPECT_NEAR(stopped.state()[3], steering_limit - 0.1, 1e-12) << "it leaves the stop at once";
+}
+
+/// Counts the look-ups in another field, and may hide that it is smooth.
+class CountedField final : public SlipField {
+ public:
+  CountedField(std::unique_ptr<const SlipField> field, bool smooth) : field_(std::move(field)), smooth_(smooth) {}
+  int channels() const noexcept override { return field_->channels(); }
+  bool is_smooth() const noexcept override { return smooth_; }
+  int count() const { return count_; }
+
+ private:
+  void look_up(double x, double y, double* values) const noexcept override {
+    ++count_;
+    field_->sample(x, y, values);
+  }
+  std::unique_ptr<const SlipField> field_;
+  bool smooth_;
+  mutable int count_ = 0;
+};
+
+TEST(TruthVehicle, TakesLongerStepsOnSmoothGround) {
+  const Bicycle model;
+  const CountedField smooth(gaussian_random_field({.seed = 2}), true), rough(gaussian_random_field({.seed = 2}), false);
+  TruthVehicle fast(model, smooth, state(0, 0, 0, 0)), slow(model, rough, state(0, 0, 0, 0));
+  for (int i = 0; i < 40; ++i) {
+    const std::array<double, 2> inputs{8.0, i % 20 < 10 ? 0.02 : -0.02};
+    fast.advance(inputs.data(), 0.2);
+    slow.advance(inputs.data(), 0.2);
+    ASSERT_LE((fast.state() - slow.state()).cwiseAbs().maxCoeff(), 1e-7);
+    ASSERT_LE((fast.parameters() - slow.parameters()).cwiseAbs().maxCoeff(), 1e-8);
+    ASSERT_LE((fast.mean_parameters() - slow.mean_parameters()).cwiseAbs().maxCoeff(), 1e-7);
+  }
+  EXPECT_EQ(rough.count(), 1 + 40 * 80);
+  EXPECT_LT(2 * smooth.count(), rough.count());
+}
+
+TEST(TruthVehicle, TakesShortStepsWhereItReachesAStop) {
+  // Constant slip: all error is that of the step in which the steering stops.
+  const Bicycle model;
+  const CountedField smooth(constant_field({0.8, 0.9}), true), rough(constant_field({0.8, 0.9}), false);
+  const auto end = [&](const SlipField& field, double step) {
+    TruthVehicle vehicle(model, field, state(0, 0, 0, 0), {.step = step});
+    const std::array<double, 2> inputs{8.0, 1.0};
+    for (int i = 0; i < 5; ++i) vehicle.advance(inputs.data(), 0.2);
+    return vehicle.state();
+  };
+  const Eigen::VectorXd exact = end(rough, 0.0001);
+  const double error = (end(rough, 0.01) - exact).norm(), unseen = (end(rough, 0.05) - exact).norm();
+  EXPECT_GT(unseen, 10.0 * error) << "the case shows nothing";
+  EXPECT_LE((end(smooth, 0.01) - exact).norm(), 1.1 * error);
 }
 
 TEST(TruthVehicle, RefusesWhatDoesNotFit) {

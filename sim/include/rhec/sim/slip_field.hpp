@@ -15,6 +15,9 @@ class RHEC_EXPORT SlipField {
  public:
   virtual ~SlipField() = default;
   virtual int channels() const noexcept = 0;
+  /// True for a field without edges and kinks, on which a vehicle's integration may take steps as long as their error
+  /// allows.
+  virtual bool is_smooth() const noexcept { return false; }
   /// Writes `channels()` values for the position (x, y) [m], anywhere on the plane; NaNs if it is not a position.
   void sample(double x, double y, double* values) const noexcept;
 

@@ -13,7 +13,7 @@
 namespace rhec::sim {
 
 struct TruthOptions {
-  double step = 0.01;            ///< largest Runge-Kutta step [s]: 20 in an interval of 0.2 s
+  double step = 0.01;            ///< Runge-Kutta step [s]: at most 20 in an interval of 0.2 s
   bool mechanical_stops = true;  ///< a state with bounds (the steering angle) cannot leave them, whatever the input
 };
 
@@ -22,6 +22,8 @@ struct TruthOptions {
 ///     dx/dt = f(x, u, p(x)),      p(x) the slip field at the vehicle's position
 ///
 /// by classical Runge-Kutta steps that look up the slip at each of their stages, with the input held between two calls.
+/// On smooth ground, away from its stops, up to five steps are made at once where the difference to the embedded method
+/// of third order is below 1e-8 of every state's typical magnitude.
 /// `advance` does not allocate or throw.
 class RHEC_EXPORT TruthVehicle {
  public:
@@ -42,17 +44,18 @@ class RHEC_EXPORT TruthVehicle {
 
  private:
   void look_up(const double* state, double* parameters) const noexcept;
-  void stop(double* state) const noexcept;
-  void step(const double* inputs, double duration) noexcept;
+  bool stop(double* state) const noexcept;
+  bool step(const double* inputs, double duration, bool must_fit) noexcept;
 
   const Model* model_;
   const SlipField* field_;
   TruthOptions options_;
   int position_x_ = -1, position_y_ = -1;
-  Eigen::VectorXd lower_, upper_;
+  Eigen::VectorXd lower_, upper_, scales_;
   double time_ = 0.0;
   Eigen::VectorXd state_, parameters_, mean_parameters_;
-  Eigen::VectorXd stage_state_, stage_parameters_, rates_, sum_rates_, sum_parameters_;
+  Eigen::VectorXd rates_, stage_state_, stage_parameters_, stage_rates_, end_rates_, sum_rates_;
+  Eigen::VectorXd step_parameters_, sum_parameters_;
 };
 
 /// Standard deviations of what is measured, in the units of the model's outputs and inputs; empty: no noise.
