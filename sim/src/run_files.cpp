@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -40,6 +42,14 @@ std::pair<double, double> true_range(const RunLog& log, Eigen::Index parameter) 
   return {middle - 0.5 * least_width, middle + 0.5 * least_width};
 }
 
+/// A comma, and the number like "{:.10g}", in half of its time.
+void append_number(double value, std::string& text) {
+  std::array<char, 32> digits;
+  const auto [end, error] = std::to_chars(digits.begin(), digits.end(), value, std::chars_format::general, 10);
+  text += ',';
+  text.append(digits.begin(), end);
+}
+
 template <class Function>
 Curve curve_of(const RunLog& log, std::string label, CurveRole role, const Function& value_of) {
   Curve curve;
@@ -70,12 +80,12 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
   text +=
       ",reference_x,reference_y,reference_heading,tracking,nees,estimator_status,controller_status,estimator_fallback,"
       "controller_fallback,softened\n";
-  auto out = std::back_inserter(text);
   const std::size_t sigmas = about.states.size() + about.parameters.size();
   for (const Sample& sample : log.samples) {
-    fmt::format_to(out, "{},{:.10g}", sample.step, sample.time);
+    fmt::format_to(std::back_inserter(text), "{}", sample.step);
+    append_number(sample.time, text);
     const auto row = [&](const auto& values) {
-      for (const double value : values) fmt::format_to(out, ",{:.10g}", value);
+      for (const double value : values) append_number(value, text);
     };
     row(sample.true_state);
     row(sample.true_parameters);
@@ -87,11 +97,15 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
       text.append(sigmas, ',');
     }
     row(sample.inputs);
-    fmt::format_to(out, ",{:.10g},{:.10g},{:.10g},{:.10g},", sample.reference.x, sample.reference.y,
-                   sample.reference.heading, sample.tracking);
-    if (std::isfinite(sample.nees)) fmt::format_to(out, "{:.10g}", sample.nees);
-    fmt::format_to(out, ",{},{},{:d},{:d},{:d}\n", name_of(sample.estimator_status), name_of(sample.controller_status),
-                   sample.estimator_fallback, sample.controller_fallback, sample.softened);
+    row(std::array{sample.reference.x, sample.reference.y, sample.reference.heading, sample.tracking});
+    if (std::isfinite(sample.nees)) {
+      append_number(sample.nees, text);
+    } else {
+      text += ',';
+    }
+    fmt::format_to(std::back_inserter(text), ",{},{},{:d},{:d},{:d}\n", name_of(sample.estimator_status),
+                   name_of(sample.controller_status), sample.estimator_fallback, sample.controller_fallback,
+                   sample.softened);
   }
   return text;
 }
