@@ -84,7 +84,6 @@ class Bench {
     load(record, model, record.intervals);
     begin(record);
     outcome = solve(point_);
-    outcome.objective = problem_->evaluate(point_, nullptr, scratch_);
     return sim::solution_line(record, *problem_, point_, outcome);
   }
 
@@ -147,6 +146,9 @@ class Bench {
     outcome.solver = name_;
     outcome.status = report.status;
     outcome.iterations = report.iterations;
+    // The very number that a live solve reports; of what is no point there is none.
+    outcome.objective =
+        report.status == Status::bad_input ? problem_->evaluate(point, nullptr, scratch_) : report.objective;
     outcome.kkt_residual = kkt_residual(*problem_, point, qp_, scratch_).largest();
     outcome.solve_time_us = time;
     return outcome;

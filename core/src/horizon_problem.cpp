@@ -219,9 +219,8 @@ double HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian
   for (int i = range.first; i <= range.last; ++i) {
     const int controls = i < intervals_ ? control_counts_[i] : 0;
     qp.set_sizes(i, ns, controls);
-    std::fill_n(qp.h(i), stride_, 0.0);
-    if (hessian != Hessian::none) std::fill_n(qp.H(i), (ns + controls) * stride_, 0.0);
   }
+  program_kernels().clear_costs(cost_view(qp), range.first, range.last, hessian != Hessian::none);
   const StageRange steps{range.first, std::min(range.last, intervals_ - 1)};
   if (steps.last >= steps.first) linearise_dynamics(steps, point, hessian, qp, scratch);
   fill_bounds(point, range, qp);
@@ -279,22 +278,22 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
   request.scratch = position;
   model_->integrate_rows(request);
 
-  const int written = (nx_ + np_ + nu_ + 7) / 8 * 8;
+  if (!in_place) std::fill_n(qp.F(steps.first), static_cast<std::ptrdiff_t>(count) * ns * stride_, 0.0);
+  DynamicsView dynamics{};
+  dynamics.first = steps.first;
+  dynamics.last = steps.last;
+  dynamics.states = ns;
+  dynamics.controls = capacity_.controls;
+  dynamics.stride = stride_;
+  dynamics.vehicle_states = nx_;
+  dynamics.channels = channels_;
+  dynamics.written = in_place ? (nx_ + np_ + nu_ + 7) / 8 * 8 : stride_;
+  dynamics.control_of = control_index_.data();
+  dynamics.values = point.row(0);
+  dynamics.F = qp.F(0);
+  dynamics.b = qp.b(0);
+  program_kernels().complete_dynamics(dynamics);
   for (int i = steps.first; i <= steps.last; ++i) {
-    double *F = qp.F(i), *b = qp.b(i);
-    if (in_place) {
-      for (int r = 0; r < nx_; ++r) std::fill(F + r * stride_ + written, F + (r + 1) * stride_, 0.0);
-    } else {
-      std::fill_n(F, nx_ * stride_, 0.0);
-    }
-    std::fill_n(F + nx_ * stride_, channels_ * stride_, 0.0);
-    const double *s = point.state(i), *w = point.control(i), *s_next = point.state(i + 1);
-    for (int r = 0; r < nx_; ++r) b[r] -= s_next[r];
-    for (int c = 0; c < channels_; ++c) {
-      const int control = control_of_channel(i, c);
-      F[(nx_ + c) * stride_ + (control >= 0 ? ns + control : nx_ + c)] = 1.0;
-      b[nx_ + c] = (control >= 0 ? w[control] : s[nx_ + c]) - s_next[nx_ + c];
-    }
     if (!in_place) {
       scatter(i, jacobians + (i - steps.first) * nx_ * row_,
               hessian == Hessian::exact ? hessians + (i - steps.first) * row_ * row_ : nullptr, qp);
@@ -302,6 +301,18 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
       place_started_channels(i, hessian, qp);
     }
   }
+}
+
+CostView HorizonProblem::cost_view(StageQp& qp) const noexcept {
+  CostView view{};
+  view.intervals = intervals_;
+  view.states = capacity_.states;
+  view.controls = capacity_.controls;
+  view.stride = stride_;
+  view.control_counts = control_counts_.data();
+  view.H = qp.H(0);
+  view.h = qp.h(0);
+  return view;
 }
 
 /// What the model says of a parameter is that of its control where a block of it starts.

@@ -220,11 +220,12 @@ void RecedingHorizonEstimation::add_node(double duration, const double* inputs, 
     fits = fits && std::isnan(problem_.output(last)[j]) != is_measurement(outputs[j]);
   for (std::size_t j = 0; j < inputs_.size(); ++j)
     fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) != is_measurement(inputs[j]);
-  problem_.set_duration(last - 1, duration);
   take_inputs(last - 1, inputs);
   take_outputs(last, outputs);
+  if (fits) return;
+  problem_.set_duration(last - 1, duration);
   if (!same_duration) problem_.simulate_interval(last - 1, point_, scratch_);
-  if (!fits) solver_->prepare(problem_, point_);
+  solver_->prepare(problem_, point_);
 }
 
 bool RecedingHorizonEstimation::amend(int back, const double* outputs) noexcept {

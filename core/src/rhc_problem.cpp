@@ -191,8 +191,8 @@ double RhcProblem::add_stage(int i, const Iterate& point, double* H, double* h) 
   const bool is_last = i == intervals();
   const AlignedDoubles& weights = is_last ? terminal_weights_ : stage_weights_;
   const int columns = capacity().states + (is_last ? 0 : nu());
-  double total = program_kernels().add_tracking(point.row(i), row(reference_, i, stride()), weights.data(), turn_.data(),
-                                                H, h, columns, stride());
+  double total = program_kernels().add_tracking(point.row(i), row(reference_, i, stride()), weights.data(),
+                                                turn_.data(), H, h, columns, stride());
   if (is_last || is_direct()) return total;
   for (int j = 0; j < nu(); ++j) {
     const int column = column_of_input(i, j);

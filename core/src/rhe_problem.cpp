@@ -166,7 +166,10 @@ double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<dou
     residual(i, predicted + i * ny_, difference);
     add(i, losses(difference, weight, nullptr));
   }
-  for (int i = 0; i < intervals(); ++i) add(i, inputs_and_links(i, point, nullptr, nullptr));
+  for (int i = 0; i < intervals(); ++i) {
+    add(i, inputs(i, point, nullptr, nullptr));
+    if (control_count(i) > nu()) add(i, links(i, point, nullptr, nullptr));
+  }
   return total;
 }
 
@@ -180,9 +183,9 @@ double RheProblem::add_cost(StageRange range, const Iterate& point, Hessian hess
     for (int c = 0; matrices && c < n; ++c)
       for (int r = 0; r < n; ++r) qp.H(0)[c * stride() + r] += 2.0 * arrival_information(r, c);
   }
-  total += add_outputs(range, point, hessian, qp, scratch);
+  total += add_measurements(range, point, hessian, qp, scratch);
   for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
-    total += inputs_and_links(i, point, matrices ? qp.H(i) : nullptr, qp.h(i));
+    if (control_count(i) > nu()) total += links(i, point, matrices ? qp.H(i) : nullptr, qp.h(i));
   return total;
 }
 
@@ -204,8 +207,8 @@ double RheProblem::arrival_term(const Iterate& point, double* q) const noexcept 
   return total;
 }
 
-double RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                               std::span<double> scratch) const noexcept {
+double RheProblem::add_measurements(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                                    std::span<double> scratch) const noexcept {
   const int count = range.last - range.first + 1, n = nx(), width = padded_states();
   auto* jacobians = reinterpret_cast<double*>((reinterpret_cast<std::uintptr_t>(scratch.data()) + 63) / 64 * 64);
   double* predicted = jacobians + static_cast<std::ptrdiff_t>(count) * ny_ * width;
@@ -225,7 +228,25 @@ double RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian h
 
   const ProgramKernels& kernels = program_kernels();
   const bool exact = hessian == Hessian::exact;
+  if (setup_.robust.empty() && !exact) {
+    MeasurementView measured{};
+    measured.vehicle_states = n;
+    measured.output_count = ny_;
+    measured.input_count = nu();
+    measured.outputs = outputs_.data();
+    measured.inputs = measured_inputs_.data();
+    measured.predicted = predicted;
+    measured.jacobians = jacobians;
+    measured.output_weights = setup_.output_weights.data();
+    measured.input_weights = setup_.input_weights.data();
+    measured.is_angle = output_is_angle_.data();
+    measured.values = point.row(0);
+    measured.room = difference;  // and what follows it
+    return kernels.add_measurements(cost_view(qp), measured, range.first, range.last, hessian != Hessian::none);
+  }
   double total = 0.0;
+  for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
+    total += inputs(i, point, hessian == Hessian::none ? nullptr : qp.H(i), qp.h(i));
   for (int i = 0; i < count; ++i) {
     const int node = range.first + i;
     residual(node, predicted + i * ny_, difference);
@@ -268,8 +289,8 @@ double RheProblem::add_outputs(StageRange range, const Iterate& point, Hessian h
   return total;
 }
 
-/// The terms of measured inputs and linked blocks of one interval; adds to H and h, where they are not null.
-double RheProblem::inputs_and_links(int i, const Iterate& point, double* H, double* h) const noexcept {
+/// The terms of measured inputs of one interval; adds to H and h, where they are not null.
+double RheProblem::inputs(int i, const Iterate& point, double* H, double* h) const noexcept {
   const int ns = capacity().states;
   const double *u = point.control(i), *measured = measured_input(i);
   double total = 0.0;
@@ -280,7 +301,14 @@ double RheProblem::inputs_and_links(int i, const Iterate& point, double* H, doub
     if (h) h[ns + j] += 2.0 * pull;
     if (H) H[(ns + j) * stride() + ns + j] += 2.0 * setup_.input_weights[j];
   }
-  if (control_count(i) == nu()) return total;
+  return total;
+}
+
+/// The same for linked blocks that start there.
+double RheProblem::links(int i, const Iterate& point, double* H, double* h) const noexcept {
+  const int ns = capacity().states;
+  const double* u = point.control(i);
+  double total = 0.0;
   for (int j = 0; j < np(); ++j) {
     const int control = control_of_channel(i, j), state = nx() + j;
     if (control < 0) continue;

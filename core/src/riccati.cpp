@@ -201,8 +201,9 @@ void Riccati::covariances(const StageQp& qp, double* covariance, double* last) n
   store(0, covariance);
   for (int i = 0; i < N; ++i) {
     const int n = qp.states(i), n_next = qp.states(i + 1), m = qp.controls(i);
+    if (is_special_[i] != 0) add_special_controls(i, n, m, now);
     // A control follows its policy of what is before it, with a variance of its own.
-    for (int k = 0; k < m; ++k) {
+    for (int k = 0; is_special_[i] == 0 && k < m; ++k) {
       const double* column = U_.data() + (static_cast<std::ptrdiff_t>(i) * nw_ + k) * stride_;
       const double inverse = inverse_[static_cast<std::ptrdiff_t>(i) * nw_ + k];
       double* of_control = now + (ns_ + k) * stride_;

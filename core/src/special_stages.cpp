@@ -1,5 +1,5 @@
-// The stages of the recursion that the kernels leave out: those whose next state is held at bounds, which their controls
-// have to keep, and those whose reduced Hessian is not positive definite. Also a free initial state.
+// The stages of the recursion that the kernels leave out: those whose next state is held at bounds, which their
+// controls have to keep, and those whose reduced Hessian is not positive definite. Also a free initial state.
 #include <algorithm>
 #include <cmath>
 
@@ -25,11 +25,11 @@ double bound_of(std::int8_t side, double lower, double upper) { return side < 0 
 
 Riccati::Special Riccati::special(int i) noexcept {
   const std::ptrdiff_t wide = width_, rows = max_rows_, ns = ns_, k = i;
-  return {G_.data() + k * wide * wide,   L_.data() + k * wide * ns,
+  return {G_.data() + k * wide * wide,      L_.data() + k * wide * ns,
           factor_.data() + k * wide * wide, K_.data() + k * wide * ns,
-          T_.data() + k * wide * wide,   Y_.data() + k * wide * ns,
-          C_.data() + k * rows * ns,     eliminator_.data() + k * rows * rows,
-          pivot_row_.data() + k * rows,  pivot_column_.data() + k * rows,
+          T_.data() + k * wide * wide,      Y_.data() + k * wide * ns,
+          C_.data() + k * rows * ns,        eliminator_.data() + k * rows * rows,
+          pivot_row_.data() + k * rows,     pivot_column_.data() + k * rows,
           left_row_.data() + k * rows};
 }
 
@@ -268,7 +268,8 @@ void Riccati::factor_special(const StageQp& qp, const ActiveSet& active, const R
   }
   small::add_transposed(reduced_L, width_, v.K, width_, H, stride_, n, f, n, -1.0);
   for (int c = 0; c < n; ++c)
-    for (int r = 0; r < c; ++r) H[c * stride_ + r] = H[r * stride_ + c] = 0.5 * (H[c * stride_ + r] + H[r * stride_ + c]);
+    for (int r = 0; r < c; ++r)
+      H[c * stride_ + r] = H[r * stride_ + c] = 0.5 * (H[c * stride_ + r] + H[r * stride_ + c]);
 }
 
 void Riccati::factor_initial(const StageQp& qp, const ActiveSet& /*active*/) noexcept {
@@ -420,6 +421,29 @@ bool Riccati::solve_initial(const StageQp& qp, const ActiveSet& active, Iterate&
   }
   write_bound_multipliers(qp, active, step, 0);
   return true;
+}
+
+/// The rows and columns of a stage's controls in the covariance of z = [s; w], from w = -K s and G^-1; no bound holds.
+void Riccati::add_special_controls(int i, int n, int m, double* covariance) noexcept {
+  const Special v = special(i);
+  for (int k = 0; k < m; ++k) {
+    double* of_control = covariance + (ns_ + k) * stride_;
+    for (int j = 0; j < n; ++j) {
+      double sum = 0.0;
+      for (int l = 0; l < n; ++l) sum -= v.K[l * width_ + k] * covariance[j * stride_ + l];
+      of_control[j] = covariance[j * stride_ + ns_ + k] = sum;
+    }
+  }
+  for (int k = 0; k < m; ++k) {
+    double unit[max_width] = {};
+    unit[k] = 2.0;
+    small::solve(v.factor, width_, m, unit);
+    for (int l = 0; l < m; ++l) {
+      double sum = unit[l];
+      for (int j = 0; j < n; ++j) sum -= v.K[j * width_ + l] * covariance[(ns_ + k) * stride_ + j];
+      covariance[(ns_ + k) * stride_ + ns_ + l] = sum;
+    }
+  }
 }
 
 void Riccati::write_bound_multipliers(const StageQp& qp, const ActiveSet& active, Iterate& step, int node) noexcept {

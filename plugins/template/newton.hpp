@@ -91,8 +91,7 @@ class Newton {
       add_terms(qp.r(i), best.control_bound(i), terms_.control(i), terms_.control_bound(i), qp.controls(i));
     }
     riccati_.factor(qp, none_active_, terms_.bound_row(0));
-    return riccati_.solve(qp, none_active_, step_, terms_.row(0)) ==
-               rhec::Riccati::Outcome::done &&
+    return riccati_.solve(qp, none_active_, step_, terms_.row(0)) == rhec::Riccati::Outcome::done &&
            is_finite(ocp, step_);
   }
 

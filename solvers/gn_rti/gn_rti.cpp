@@ -206,8 +206,9 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
       qp_solver_.guess_from(qp_, from);
     }
     ready = false;
-    if (solve_program(report) == StageQpSolver::Outcome::infeasible) {
-      report.status = Status::infeasible;
+    const auto outcome = solve_program(report, deadline);
+    if (outcome == StageQpSolver::Outcome::infeasible || outcome == StageQpSolver::Outcome::out_of_time) {
+      report.status = outcome == StageQpSolver::Outcome::infeasible ? Status::infeasible : Status::deadline;
       break;
     }
     add_full_step(ocp.intervals(), from, step_, trial_);
@@ -276,8 +277,8 @@ bool GnRti::search_along_step(const Ocp& ocp, double residual, double& merit_aft
   return false;
 }
 
-StageQpSolver::Outcome GnRti::solve_program(Report& report) noexcept {
-  const auto outcome = qp_solver_.solve(qp_, step_);
+StageQpSolver::Outcome GnRti::solve_program(Report& report, Clock::time_point deadline) noexcept {
+  const auto outcome = qp_solver_.solve(qp_, step_, deadline);
   report.factorisations += qp_solver_.factorisations();
   report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
   return outcome;
@@ -335,23 +336,25 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
     least_residual = std::min(least_residual, residual);
 
     double merit_after = 0.0;
-    bool feasible = false, accepted = false;
+    bool feasible = false, accepted = false, late = false;
     const auto try_step = [&] {
       qp_solver_.guess_from(qp_, best_);
-      auto outcome = solve_program(report);
+      auto outcome = solve_program(report, deadline);
       // Linearised equations can contradict bounds that the true ones do not: then less is asked of a single step.
       for (asked_share_ = 1.0; outcome == StageQpSolver::Outcome::infeasible && asked_share_ > least_asked_share;) {
         ask_for_less(0.5);
-        outcome = solve_program(report);
+        outcome = solve_program(report, deadline);
       }
-      if (outcome == StageQpSolver::Outcome::infeasible || !is_finite(ocp, step_)) return false;
+      late = outcome == StageQpSolver::Outcome::out_of_time;
+      if (late || outcome == StageQpSolver::Outcome::infeasible || !is_finite(ocp, step_)) return false;
       feasible = true;
       return search_along_step(ocp, residual, merit_after);
     };
     accepted = try_step();
     // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own. Near the solution
     // merits differ by rounding only, and the exact curvature is what converges.
-    if (hessian_for(ocp) == Hessian::exact && (!accepted || (qp_solver_.was_bent() && residual > near_solution))) {
+    if (!late && hessian_for(ocp) == Hessian::exact &&
+        (!accepted || (qp_solver_.was_bent() && residual > near_solution))) {
       std::swap(trial_, other_trial_);
       const bool exact_accepted = accepted;
       const double exact_merit = merit_after;
@@ -363,7 +366,7 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
       }
     }
     if (!accepted) {
-      report.status = feasible ? Status::stalled : Status::infeasible;
+      report.status = late ? Status::deadline : feasible ? Status::stalled : Status::infeasible;
       break;
     }
     std::swap(best_, trial_);

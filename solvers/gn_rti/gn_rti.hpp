@@ -55,7 +55,7 @@ class GnRti final : public Solver {
   void add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept;
   void roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept;
   double merit(const Ocp& ocp, const Iterate& point) noexcept;
-  StageQpSolver::Outcome solve_program(Report& report) noexcept;
+  StageQpSolver::Outcome solve_program(Report& report, Clock::time_point deadline) noexcept;
   void ask_for_less(double share) noexcept;
   bool search_along_step(const Ocp& ocp, double residual, double& merit_after) noexcept;
 

@@ -98,8 +98,10 @@ StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, c
   return found;
 }
 
-bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds) noexcept {
+bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds, Clock::time_point deadline) noexcept {
   for (int round = 0; round < rounds; ++round) {
+    out_of_time_ = round > 0 && Clock::now() > deadline;
+    if (out_of_time_) return false;
     if (!factored_) factor(qp);
     if (riccati_.solve(qp, active_, step) != Riccati::Outcome::done) return false;
     const Violations violations = correct_active_set(qp, step);
@@ -110,19 +112,21 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
   return false;
 }
 
-StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step) noexcept {
+StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept {
   // An active set takes one side of such bounds and does not see that the other is violated.
   if (mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
-  return try_active_sets(qp, step, warm_rounds) ? Outcome::active_set : solve_by_interior_point(qp, step);
+  if (try_active_sets(qp, step, warm_rounds, deadline)) return Outcome::active_set;
+  return out_of_time_ ? Outcome::out_of_time : solve_by_interior_point(qp, step, deadline);
 }
 
-StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Iterate& step) noexcept {
+StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Iterate& step,
+                                                              Clock::time_point deadline) noexcept {
   // From here on one fixed, convex program is solved.
   convexify(qp);
-  if (!interior_point(qp, step, ready_to_polish)) {
+  if (!interior_point(qp, step, ready_to_polish, deadline)) {
     active_.clear();
     factored_ = false;
-    return Outcome::infeasible;
+    return out_of_time_ ? Outcome::out_of_time : Outcome::infeasible;
   }
   // The set on which the interior point has settled; kept only if it leads to the exact solution.
   active_.clear();
@@ -136,11 +140,12 @@ StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Itera
                                                                               : std::int8_t{0};
   }
   factored_ = false;
-  if (try_active_sets(qp, step, polish_rounds)) return Outcome::interior_point;
+  if (try_active_sets(qp, step, polish_rounds, deadline)) return Outcome::interior_point;
   // Polishing has overwritten the step. If rounding keeps the second run from its accuracy, the first one's must do.
   factored_ = false;
-  if (!interior_point(qp, step, on_its_own)) interior_point(qp, step, ready_to_polish);
-  return Outcome::interior_point;
+  if (!out_of_time_ && !interior_point(qp, step, on_its_own, deadline) && !out_of_time_)
+    interior_point(qp, step, ready_to_polish, deadline);
+  return out_of_time_ ? Outcome::out_of_time : Outcome::interior_point;
 }
 
 void StageQpSolver::convexify(StageQp& qp) noexcept {
@@ -178,8 +183,8 @@ void StageQpSolver::barrier_terms(const StageQp& qp, double target) noexcept {
   std::fill_n(diagonal_.data(), entries, 0.0);
   std::copy_n(qp.h(0), entries, h_.data());
   for (const Bounded& v : bounded_) {
-    const std::ptrdiff_t entry = static_cast<std::ptrdiff_t>(v.stage) * qp.stride() + v.component +
-                                 (v.is_state ? 0 : capacity_.states);
+    const std::ptrdiff_t entry =
+        static_cast<std::ptrdiff_t>(v.stage) * qp.stride() + v.component + (v.is_state ? 0 : capacity_.states);
     double &diagonal = diagonal_[entry], &gradient = h_[entry];
     if (std::isfinite(v.lower)) {
       const Side& s = v.below;
@@ -196,7 +201,8 @@ void StageQpSolver::barrier_terms(const StageQp& qp, double target) noexcept {
   }
 }
 
-bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted) noexcept {
+bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted,
+                                   Clock::time_point deadline) noexcept {
   collect_bounded(qp);
   double scale = 1.0;
   for (int i = 0; i <= qp.intervals(); ++i) {
@@ -217,7 +223,7 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accur
     if (std::isfinite(v.lower)) start(v.below, v.value - v.lower);
     if (std::isfinite(v.upper)) start(v.above, v.upper - v.value);
   }
-  if (sides == 0) return try_active_sets(qp, step, 1);
+  if (sides == 0) return try_active_sets(qp, step, 1, deadline);
   active_.clear();
 
   const auto value_in = [](const Iterate& trial, const Bounded& v) {
@@ -258,6 +264,8 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accur
   };
 
   for (int iteration = 0; iteration < max_interior_iterations; ++iteration) {
+    out_of_time_ = Clock::now() > deadline;
+    if (out_of_time_) return false;
     each_side([](const Bounded&, Side& s) { s.slack_step = s.multiplier_step = s.correction = 0.0; });
     const double complementarity = mean_complementarity(0.0);
     barrier_terms(qp, 0.0);

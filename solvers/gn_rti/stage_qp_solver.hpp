@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "rhec/core/riccati.hpp"
+#include "rhec/core/solver.hpp"
 
 namespace rhec::gn_rti {
 
@@ -18,7 +19,8 @@ class StageQpSolver {
   enum class Outcome {
     active_set,      ///< exact, by active sets alone
     interior_point,  ///< the interior-point method was needed; exact after polishing, or to its tolerance
-    infeasible       ///< the bounds cannot be satisfied
+    infeasible,      ///< the bounds cannot be satisfied
+    out_of_time      ///< the deadline came first; `step` is of no use
   };
   /// When the interior-point method stops: complementarity relative to the gradient, and violation of the bounds.
   struct Accuracy {
@@ -34,9 +36,11 @@ class StageQpSolver {
 
   /// The minimiser goes to `step`: primal steps, new costates and bound multipliers. The program's R may be
   /// convexified.
-  Outcome solve(StageQp& qp, Iterate& step) noexcept;
+  /// The deadline is looked at between factorisations, of which the first is always made.
+  Outcome solve(StageQp& qp, Iterate& step, Clock::time_point deadline = Clock::time_point::max()) noexcept;
   /// The robust path alone: convexify, interior point, polish.
-  Outcome solve_by_interior_point(StageQp& qp, Iterate& step) noexcept;
+  Outcome solve_by_interior_point(StageQp& qp, Iterate& step,
+                                  Clock::time_point deadline = Clock::time_point::max()) noexcept;
 
   /// The control of stage i that the last solution's policy chooses for a stage-state step.
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept {
@@ -54,8 +58,8 @@ class StageQpSolver {
   };
   void factor(const StageQp& qp) noexcept;
   Violations correct_active_set(const StageQp& qp, const Iterate& step) noexcept;
-  bool try_active_sets(const StageQp& qp, Iterate& step, int rounds) noexcept;
-  bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted) noexcept;
+  bool try_active_sets(const StageQp& qp, Iterate& step, int rounds, Clock::time_point deadline) noexcept;
+  bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted, Clock::time_point deadline) noexcept;
   void convexify(StageQp& qp) noexcept;
 
   /// One bounded variable in the interior-point method: slacks and multipliers of its two sides.
@@ -75,9 +79,10 @@ class StageQpSolver {
   Riccati riccati_;
   ActiveSet active_;
   bool factored_ = false, bent_ = false;
+  bool out_of_time_ = false;
   bool any_active_ = true;  ///< false: no bound is active, for certain
   int factorisations_ = 0;
-  double gradient_scale_ = 1.0;  ///< of the last interior-point solution: what a slack of one weighs
+  double gradient_scale_ = 1.0;      ///< of the last interior-point solution: what a slack of one weighs
   std::vector<std::uint8_t> marks_;  ///< stages at which a bound may be active
   std::vector<Bounded> bounded_;
   std::vector<double> diagonal_, h_;  ///< rows of the program's stride: barrier terms

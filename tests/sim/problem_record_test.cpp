@@ -311,7 +311,7 @@ class Disguised final : public Ocp {
     of_.simulate_interval(i, point, scratch);
   }
   double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                 std::span<double> scratch) const noexcept override {
+                   std::span<double> scratch) const noexcept override {
     return of_.linearise(range, point, hessian, qp, scratch);
   }
   void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override {

@@ -84,7 +84,7 @@ class Scaled final : public Ocp {
     of_.simulate_interval(i, point, scratch);
   }
   double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                 std::span<double> scratch) const noexcept override {
+                   std::span<double> scratch) const noexcept override {
     ++linearisations;
     weighted_ = point;
     for (int i = 0; i <= intervals(); ++i)

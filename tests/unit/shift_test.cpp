@@ -353,7 +353,7 @@ TEST(Shift, CostatesOfCarriedParametersFitTheNewStructure) {
   std::vector<double> scratch(problem.scratch_size());
   problem.linearise(all_stages(problem), old, Hessian::gauss_newton, qp, scratch);
   double expected = qp.q(2)[2] + old.costate(3)[2];
-  for (int r = 0; r < 2; ++r) expected += qp.A(2)[2 * problem.capacity().states + r] * old.costate(3)[r];
+  for (int r = 0; r < 2; ++r) expected += qp.A_of(2)(r, 2) * old.costate(3)[r];
   EXPECT_NEAR(guess.costate(2)[2], expected, 1e-9 * (1.0 + std::abs(expected)));
 }
 

@@ -1,17 +1,30 @@
 #pragma once
 
-// Eight doubles that are computed with at once, in terms of the compiler's own vectors: one register of AVX-512, two of
-// AVX2, four of SSE2. Included only by the units that are compiled once for each instruction set, all of whose code is
+// Doubles that are computed with at once, in terms of the compiler's own vectors: as many as a register of the
+// instruction set has. Included only by the units that are compiled once for each instruction set, all of whose code is
 // local to them: no function of theirs may be merged with that of another set.
 
 namespace rhec::kernels {
 namespace {
 
+#if defined(__AVX512F__)
+constexpr int lane_count = 8;
 using Lanes = double __attribute__((vector_size(64)));
 using LaneMask = long long __attribute__((vector_size(64)));
-
-constexpr int lane_count = 8;
 constexpr LaneMask lane_numbers = {0, 1, 2, 3, 4, 5, 6, 7};
+#elif defined(__AVX2__)
+constexpr int lane_count = 4;
+using Lanes = double __attribute__((vector_size(32)));
+using LaneMask = long long __attribute__((vector_size(32)));
+constexpr LaneMask lane_numbers = {0, 1, 2, 3};
+#else
+constexpr int lane_count = 2;
+using Lanes = double __attribute__((vector_size(16)));
+using LaneMask = long long __attribute__((vector_size(16)));
+constexpr LaneMask lane_numbers = {0, 1};
+#endif
+/// Rows are multiples of eight doubles long.
+constexpr int padded(int size) { return (size + 7) / 8 * 8; }
 
 inline Lanes load(const double* from) {
   Lanes lanes;

@@ -16,7 +16,8 @@ inline int parts_of(const ProgramView& view, int stage) {
 KktParts kkt(const ProgramView& view) {
   const long stride = view.stride;
   const int state_parts = (view.states + lane_count - 1) / lane_count;
-  Lanes stationarity{}, defect{}, violation{}, complementarity{}, term{}, rest{};  // rest stays 0 as long as all is finite
+  Lanes stationarity{}, defect{}, violation{}, complementarity{}, term{},
+      rest{};  // rest stays 0 as long as all is finite
   for (int i = 0; i <= view.intervals; ++i) {
     const double* row_F = view.F + i * view.states * stride;
     const double* next_costate = view.costates + (i + 1) * stride;
@@ -125,17 +126,18 @@ void add(const double* from, const double* step, double* to, long count) {
 void add_squares(const double* J, const double* weights, const double* residuals, int count, int columns, double* H,
                  double* h, int stride) {
   const int parts = (columns + lane_count - 1) / lane_count;
+  const long width = padded(columns);
   for (int v = 0; v < parts; ++v) {
     Lanes gradient = load(h + v * lane_count);
     for (int j = 0; j < count; ++j)
-      gradient += load(J + (static_cast<long>(j) * parts + v) * lane_count) * (2.0 * weights[j] * residuals[j]);
+      gradient += load(J + j * width + v * lane_count) * (2.0 * weights[j] * residuals[j]);
     store(gradient, h + v * lane_count);
     if (!H) continue;
     for (int c = 0; c < columns; ++c) {
       double* column = H + static_cast<long>(c) * stride + v * lane_count;
       Lanes sum = load(column);
       for (int j = 0; j < count; ++j) {
-        const double* row = J + static_cast<long>(j) * parts * lane_count;
+        const double* row = J + j * width;
         sum += load(row + v * lane_count) * (2.0 * weights[j] * row[c]);
       }
       store(sum, column);
@@ -164,6 +166,88 @@ double add_tracking(const double* z, const double* reference, const double* weig
   return total;
 }
 
+void complete_dynamics(const DynamicsView& view) {
+  const long stride = view.stride;
+  const int parts = view.stride / lane_count, state_parts = (view.states + lane_count - 1) / lane_count;
+  for (int i = view.first; i <= view.last; ++i) {
+    double *F = view.F + i * view.states * stride, *b = view.b + i * stride;
+    const double *z = view.values + i * stride, *next = z + stride;
+    const int* control_of = view.control_of + i * view.channels;
+    for (int r = 0; r < view.vehicle_states; ++r)
+      for (int k = view.written; k < view.stride; k += lane_count) store(Lanes{}, F + r * stride + k);
+    for (int v = 0; v < state_parts; ++v) {
+      const LaneMask is_vehicle = lane_numbers < static_cast<long long>(view.vehicle_states - v * lane_count);
+      const Lanes reached = is_vehicle ? load(b + v * lane_count) : load(z + v * lane_count);
+      store(first_of(reached - load(next + v * lane_count), v, view.states), b + v * lane_count);
+    }
+    for (int c = 0; c < view.channels; ++c) {
+      const int row = view.vehicle_states + c, control = control_of[c];
+      const int column = control >= 0 ? view.states + control : row;
+      for (int v = 0; v < parts; ++v) {
+        const LaneMask is_column = lane_numbers == static_cast<long long>(column - v * lane_count);
+        store(is_column ? all(1.0) : Lanes{}, F + row * stride + v * lane_count);
+      }
+      if (control >= 0) b[row] = z[column] - next[row];
+    }
+  }
+}
+
+void clear_costs(const CostView& view, int first, int last, bool matrices) {
+  const long stride = view.stride, wide = view.states + view.controls;
+  for (int i = first; i <= last; ++i) {
+    const int used = view.states + (i < view.intervals ? view.control_counts[i] : 0);
+    for (int k = 0; k < view.stride; k += lane_count) store(Lanes{}, view.h + i * stride + k);
+    if (!matrices) continue;
+    const int length = padded(used);
+    for (int c = 0; c < used; ++c)
+      for (int k = 0; k < length; k += lane_count) store(Lanes{}, view.H + (i * wide + c) * stride + k);
+  }
+}
+
+double add_measurements(const CostView& view, const MeasurementView& measured, int first, int last, bool matrices) {
+  constexpr double to_integer = 6755399441055744.0, turn = 6.283185307179586;
+  const long stride = view.stride, wide = view.states + view.controls, width = padded(measured.vehicle_states);
+  double *weights = measured.room, *pulls = weights + measured.output_count;
+  double total = 0.0;
+  for (int i = first; i <= last; ++i) {
+    double *H = view.H + i * wide * stride, *h = view.h + i * stride;
+    const double* y = measured.outputs + static_cast<long>(i) * measured.output_count;
+    const double* predicted = measured.predicted + static_cast<long>(i - first) * measured.output_count;
+    const double* J = measured.jacobians + static_cast<long>(i - first) * measured.output_count * width;
+    for (int j = 0; j < measured.output_count; ++j) {
+      const bool is_missing = y[j] != y[j];
+      double error = is_missing ? 0.0 : predicted[j] - y[j];
+      if (measured.is_angle[j] != 0) error -= ((error / turn + to_integer) - to_integer) * turn;
+      weights[j] = is_missing ? 0.0 : 2.0 * measured.output_weights[j];
+      pulls[j] = weights[j] * error;
+      total += 0.5 * pulls[j] * error;
+    }
+    for (int k = 0; k < width; k += lane_count) {
+      Lanes gradient = load(h + k);
+      for (int j = 0; j < measured.output_count; ++j) gradient += load(J + j * width + k) * pulls[j];
+      store(gradient, h + k);
+      for (int c = 0; matrices && c < measured.vehicle_states; ++c) {
+        Lanes column = load(H + c * stride + k);
+        for (int j = 0; j < measured.output_count; ++j)
+          column += load(J + j * width + k) * (weights[j] * J[j * width + c]);
+        store(column, H + c * stride + k);
+      }
+    }
+    if (i == view.intervals) break;
+    const double* u = measured.values + i * stride + view.states;
+    const double* u_measured = measured.inputs + static_cast<long>(i) * measured.input_count;
+    for (int j = 0; j < measured.input_count; ++j) {
+      if (u_measured[j] != u_measured[j]) continue;
+      const double error = u[j] - u_measured[j], weight = measured.input_weights[j];
+      const int at = view.states + j;
+      total += weight * error * error;
+      h[at] += 2.0 * weight * error;
+      if (matrices) H[at * stride + at] += 2.0 * weight;
+    }
+  }
+  return total;
+}
+
 }  // namespace
 }  // namespace kernels
 
@@ -171,7 +255,8 @@ double add_tracking(const double* z, const double* reference, const double* weig
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET);
 constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {
-    &kernels::kkt, &kernels::check_step,  &kernels::mark_bounds, &kernels::subtract,
-    &kernels::add, &kernels::add_squares, &kernels::add_tracking};
+    &kernels::kkt,         &kernels::check_step,      &kernels::mark_bounds,  &kernels::subtract,
+    &kernels::add,         &kernels::add_squares,     &kernels::add_tracking, &kernels::complete_dynamics,
+    &kernels::clear_costs, &kernels::add_measurements};
 
 }  // namespace rhec

@@ -21,29 +21,63 @@ struct KktParts {
 /// What a step that solves a program without its inactive bounds does to them.
 struct StepParts {
   bool is_finite;
-  bool violates;           ///< some bound, by more than the tolerance
+  bool violates;  ///< some bound, by more than the tolerance
   double largest_costate;
+};
+
+/// Where a model has written next states (to b) and its Jacobian's rows (to F): what is left to fill.
+struct DynamicsView {
+  int first, last;               ///< intervals
+  int states, controls, stride;  ///< of the capacity
+  int vehicle_states, channels;  ///< what a state is made of
+  int written;                   ///< entries of each row of F that the model has written
+  const int* control_of;         ///< of each interval's channels: the control that starts it, or -1
+  const double* values;          ///< rows of the point
+  double *F, *b;
+};
+
+struct CostView {
+  int intervals, states, controls, stride;
+  const int* control_counts;
+  double *H, *h;
+};
+
+/// An estimator's measurements, NaN where missing, with weights 1 / variance.
+struct MeasurementView {
+  int vehicle_states, output_count, input_count;
+  const double *outputs, *inputs;       ///< rows of all nodes and intervals
+  const double *predicted, *jacobians;  ///< of the range's nodes; Jacobians as rows of whole eights
+  const double *output_weights, *input_weights;
+  const unsigned char* is_angle;
+  const double* values;  ///< rows of the point
+  double* room;          ///< for two numbers an output
 };
 
 /// Inner loops over whole horizons.
 struct ProgramKernels {
   KktParts (*kkt)(const ProgramView& view);
   StepParts (*check_step)(const ProgramView& view, double tolerance);
-  /// Marks with 1 the stages of which a multiplier is not zero or bounds coincide; true where a lower bound is above its
-  /// upper one by more than the tolerance, or one of them is not a number.
+  /// Marks with 1 the stages of which a multiplier is not zero or bounds coincide; true where a lower bound is above
+  /// its upper one by more than the tolerance, or one of them is not a number.
   bool (*mark_bounds)(const ProgramView& view, double tolerance, unsigned char* marks);
   /// out = a - b.
   void (*subtract)(const double* a, const double* b, double* out, long count);
   /// to = from + step.
   void (*add)(const double* from, const double* step, double* to, long count);
-  /// H += 2 sum_j w_j J_j J_j' over its first `columns` columns (null: not) and h += 2 sum_j w_j r_j J_j, with the `count`
-  /// rows J_j of one stage; rows are as long as `columns` needs in multiples of eight.
-  void (*add_squares)(const double* J, const double* weights, const double* residuals, int count, int columns, double* H,
-                      double* h, int stride);
+  /// H += 2 sum_j w_j J_j J_j' over its first `columns` columns (null: not) and h += 2 sum_j w_j r_j J_j, with the
+  /// `count` rows J_j of one stage; rows are as long as `columns` needs in multiples of eight.
+  void (*add_squares)(const double* J, const double* weights, const double* residuals, int count, int columns,
+                      double* H, double* h, int stride);
   /// Adds weights (z - reference)^2 of one stage: gradient, diagonal of H (null: not); returns the sum. Differences of
   /// entries whose `turn` is not 0 are taken on a circle of that length.
   double (*add_tracking)(const double* z, const double* reference, const double* weights, const double* turn, double* H,
                          double* h, int columns, int stride);
+  /// Rows of carried channels in F, what is beyond the model's columns, and b = F(s, w) - s_next.
+  void (*complete_dynamics)(const DynamicsView& view);
+  /// Zeros to h, and to what is used of H, of stages first .. last.
+  void (*clear_costs)(const CostView& view, int first, int last, bool matrices);
+  /// Squares of measured outputs and inputs; returns their sum.
+  double (*add_measurements)(const CostView& view, const MeasurementView& measured, int first, int last, bool matrices);
 };
 
 }  // namespace rhec

@@ -10,12 +10,12 @@ namespace {
 // A stage's row may be this long: 32 states and 32 controls.
 constexpr int longest_row = 64;
 
-/// What is known of a stage when its kernel is compiled: how many registers of lanes a row has, and how many states and
-/// controls (unknown: 0).
-template <int register_count, int state_count, int control_count>
+/// What is known of a stage when its kernel is compiled: how many times eight entries a row has, and how many states
+/// and controls (unknown: 0).
+template <int eights, int state_count, int control_count>
 struct Shape {
-  static constexpr int registers = register_count;
-  static constexpr int most_columns = register_count * lane_count;
+  static constexpr int most_columns = eights * 8;
+  static constexpr int registers = most_columns / lane_count;
   static constexpr int most_states = state_count > 0 ? state_count : (most_columns < 32 ? most_columns : 32);
   int states, next_states, offset, controls;
 
@@ -271,7 +271,7 @@ void form(const RiccatiView& view, int i, double* out) {
 #define RHEC_JOIN(a, b) a##b
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET);
-constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {
-    &kernels::factor, &kernels::solve_backward, &kernels::solve_forward, &kernels::form};
+constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {&kernels::factor, &kernels::solve_backward,
+                                                                         &kernels::solve_forward, &kernels::form};
 
 }  // namespace rhec

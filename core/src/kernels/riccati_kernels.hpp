@@ -4,8 +4,8 @@
 
 namespace rhec {
 
-/// What the kernels of the Riccati recursion work on: plain pointers, so that units for different instruction sets share
-/// nothing else. All rows have `stride` entries; see StageQp for the program and Riccati for the rest.
+/// What the kernels of the Riccati recursion work on: plain pointers, so that units for different instruction sets
+/// share nothing else. All rows have `stride` entries; see StageQp for the program and Riccati for the rest.
 struct RiccatiView {
   int intervals = 0;
   int states = 0;    ///< of the capacity: where the controls begin in a row
@@ -16,8 +16,8 @@ struct RiccatiView {
 
   const double *F = nullptr, *H = nullptr, *h = nullptr, *b = nullptr;
   const double *lower = nullptr, *upper = nullptr;
-  const double* diagonal = nullptr;     ///< a row a stage, added to the diagonal of H; or null
-  const std::int8_t* sides = nullptr;   ///< a row a stage: which bounds hold
+  const double* diagonal = nullptr;       ///< a row a stage, added to the diagonal of H; or null
+  const std::int8_t* sides = nullptr;     ///< a row a stage: which bounds hold
   const std::uint8_t* special = nullptr;  ///< stages that are not for the kernels
 
   double* P = nullptr;        ///< n_s rows a node
@@ -32,8 +32,8 @@ struct RiccatiView {
 
 /// The recursion over stages at which no state bound holds that must be kept by their controls.
 struct RiccatiKernels {
-  /// Factorises stages first, first - 1, ..., 0; returns the one that it leaves to the caller (a special one, or one whose
-  /// pivot is not above `tolerance` times its diagonal entry), or -1.
+  /// Factorises stages first, first - 1, ..., 0; returns the one that it leaves to the caller (a special one, or one
+  /// whose pivot is not above `tolerance` times its diagonal entry), or -1.
   int (*factor)(const RiccatiView& view, int first, double tolerance);
   /// The same for gradients; only special stages are left to the caller.
   int (*solve_backward)(const RiccatiView& view, int first);

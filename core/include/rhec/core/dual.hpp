@@ -8,13 +8,27 @@
 
 namespace rhec {
 
+/// Up to here lists of entries are written out when they are compiled; longer ones are loops.
+inline constexpr int longest_list = 24;
+
 /// function(0), ..., function(count - 1) one after the other, with indices that the compiler knows: no loop is left of
 /// it, so that what it knows of single entries (a derivative that is always 0 or 1) is not forgotten.
 template <int count, class Function>
 RHEC_INLINE constexpr void for_indices(const Function& function) {
   [&]<int... index>(std::integer_sequence<int, index...>) RHEC_INLINE {
     (function(std::integral_constant<int, index>()), ...);
-  }(std::make_integer_sequence<int, count>());
+  }
+  (std::make_integer_sequence<int, count>());
+}
+
+/// The same, as a loop where there are many.
+template <int count, class Function>
+RHEC_INLINE constexpr void for_each_index(const Function& function) {
+  if constexpr (count <= longest_list) {
+    for_indices<count>(function);
+  } else {
+    for (int j = 0; j < count; ++j) function(j);
+  }
 }
 
 /// A number and its first derivatives along N directions:  a + sum_j d_j e_j,  e_i e_j = 0.
@@ -30,11 +44,14 @@ struct Dual {
   /// A constant is a number.
   template <std::convertible_to<T> Constant>
   Dual(const Constant& constant) : value(constant) {  // NOLINT(google-explicit-constructor)
-    for_indices<N>([&](auto j) { d[j] = T(0.0); });
+    for_each_index<N>([&](auto j) { d[j] = T(0.0); });
   }
   /// The independent variable number `direction`.
   template <int direction>
   static Dual variable(const T& value) {
+    return variable(value, direction);
+  }
+  static Dual variable(const T& value, int direction) {
     Dual result(value);
     result.d[direction] = T(1.0);
     return result;
@@ -43,13 +60,13 @@ struct Dual {
   static Dual chain(const Dual& a, const T& g, const T& g1, const T& /*g2*/) {
     Dual result;
     result.value = g;
-    for_indices<N>([&](auto j) { result.d[j] = g1 * a.d[j]; });
+    for_each_index<N>([&](auto j) { result.d[j] = g1 * a.d[j]; });
     return result;
   }
   static Dual product(const Dual& a, const Dual& b) {
     Dual result;
     result.value = a.value * b.value;
-    for_indices<N>([&](auto j) { result.d[j] = a.d[j] * b.value + a.value * b.d[j]; });
+    for_each_index<N>([&](auto j) { result.d[j] = a.d[j] * b.value + a.value * b.d[j]; });
     return result;
   }
   /// What is linear acts alike on the value and on every derivative.
@@ -63,7 +80,7 @@ struct Dual {
   template <class Operation, class... Others>
   static void assign_linear(Dual& out, Operation operation, const Others&... a) {
     out.value = operation(a.value...);
-    for_indices<N>([&](auto j) { out.d[j] = operation(a.d[j]...); });
+    for_each_index<N>([&](auto j) { out.d[j] = operation(a.d[j]...); });
   }
 };
 
@@ -81,11 +98,14 @@ struct SecondOrder {
   SecondOrder() = default;
   template <std::convertible_to<T> Constant>
   SecondOrder(const Constant& constant) : value(constant) {  // NOLINT(google-explicit-constructor)
-    for_indices<N>([&](auto j) { d[j] = T(0.0); });
-    for_indices<hessian_size>([&](auto k) { dd[k] = T(0.0); });
+    for_each_index<N>([&](auto j) { d[j] = T(0.0); });
+    for_each_index<hessian_size>([&](auto k) { dd[k] = T(0.0); });
   }
   template <int direction>
   static SecondOrder variable(const T& value) {
+    return variable(value, direction);
+  }
+  static SecondOrder variable(const T& value, int direction) {
     SecondOrder result(value);
     result.d[direction] = T(1.0);
     return result;
@@ -93,27 +113,33 @@ struct SecondOrder {
   static SecondOrder chain(const SecondOrder& a, const T& g, const T& g1, const T& g2) {
     SecondOrder result;
     result.value = g;
-    for_indices<N>([&](auto j) { result.d[j] = g1 * a.d[j]; });
-    for_indices<M>([&](auto i) {
-      const T g2_di = g2 * a.d[i];
-      for_indices<i + 1>([&](auto j) {
-        constexpr int k = i * (i + 1) / 2 + j;
-        result.dd[k] = g1 * a.dd[k] + g2_di * a.d[j];
-      });
-    });
+    for_each_index<N>([&](auto j) { result.d[j] = g1 * a.d[j]; });
+    const auto fill = [&](int i, int j) {
+      result.dd[i * (i + 1) / 2 + j] = g1 * a.dd[i * (i + 1) / 2 + j] + g2 * a.d[i] * a.d[j];
+    };
+    for_each_pair(fill);
     return result;
   }
   static SecondOrder product(const SecondOrder& a, const SecondOrder& b) {
     SecondOrder result;
     result.value = a.value * b.value;
-    for_indices<N>([&](auto j) { result.d[j] = a.d[j] * b.value + a.value * b.d[j]; });
-    for_indices<M>([&](auto i) {
-      for_indices<i + 1>([&](auto j) {
-        constexpr int k = i * (i + 1) / 2 + j;
-        result.dd[k] = a.dd[k] * b.value + a.value * b.dd[k] + (a.d[i] * b.d[j] + a.d[j] * b.d[i]);
-      });
-    });
+    for_each_index<N>([&](auto j) { result.d[j] = a.d[j] * b.value + a.value * b.d[j]; });
+    const auto fill = [&](int i, int j) {
+      const int k = i * (i + 1) / 2 + j;
+      result.dd[k] = a.dd[k] * b.value + a.value * b.dd[k] + (a.d[i] * b.d[j] + a.d[j] * b.d[i]);
+    };
+    for_each_pair(fill);
     return result;
+  }
+  /// function(i, j) for all j <= i < M.
+  template <class Function>
+  static void for_each_pair(const Function& function) {
+    if constexpr (M <= longest_list) {
+      for_indices<M>([&](auto i) { for_indices<i + 1>([&](auto j) { function(i, j); }); });
+    } else {
+      for (int i = 0; i < M; ++i)
+        for (int j = 0; j <= i; ++j) function(i, j);
+    }
   }
   template <class Operation, class... Others>
   static SecondOrder linear(Operation operation, const Others&... a) {
@@ -125,8 +151,8 @@ struct SecondOrder {
   template <class Operation, class... Others>
   static void assign_linear(SecondOrder& out, Operation operation, const Others&... a) {
     out.value = operation(a.value...);
-    for_indices<N>([&](auto j) { out.d[j] = operation(a.d[j]...); });
-    for_indices<hessian_size>([&](auto k) { out.dd[k] = operation(a.dd[k]...); });
+    for_each_index<N>([&](auto j) { out.d[j] = operation(a.d[j]...); });
+    for_each_index<hessian_size>([&](auto k) { out.dd[k] = operation(a.dd[k]...); });
   }
 };
 

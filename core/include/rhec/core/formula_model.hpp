@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "rhec/core/model_kernels.hpp"
+#include "rhec/core/row_kernels.hpp"
 
 namespace rhec {
 
@@ -72,10 +72,14 @@ class FormulaModel : public Model {
   void integrate(const Intervals& request) const noexcept override { kernels_->integrate(&formula_, request); }
   void observe(const Nodes& request) const noexcept override { kernels_->observe(&formula_, request); }
   void integrate_rows(const IntervalRows& request) const noexcept override {
-    if (request.substeps != 1 || request.ramp || !request.jacobians) return Model::integrate_rows(request);
+    if (!kernels_->integrate_rows || request.substeps != 1 || request.ramp || !request.jacobians)
+      return Model::integrate_rows(request);
     kernels_->integrate_rows(&formula_, request);
   }
-  void observe_rows(const NodeRows& request) const noexcept override { kernels_->observe_rows(&formula_, request); }
+  void observe_rows(const NodeRows& request) const noexcept override {
+    if (!kernels_->observe_rows) return Model::observe_rows(request);
+    kernels_->observe_rows(&formula_, request);
+  }
   void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
     formula_.dynamics(x, u, p, dxdt);
   }

@@ -10,6 +10,8 @@
 
 namespace rhec {
 
+struct CostView;
+
 /// What the two kinds of problem share: a model over a horizon, with channels (parameters or blocked inputs) whose
 /// values are carried from stage to stage.
 ///
@@ -39,7 +41,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
                          std::span<double> scratch) const noexcept override;
   void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept override;
   double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                 std::span<double> scratch) const noexcept override;
+                   std::span<double> scratch) const noexcept override;
   void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
 
   /// Length of an interval [s].
@@ -98,6 +100,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   /// Bounds of z = [s; w] at every stage, as the rows of StageQp.
   double* lower_row(int stage) noexcept { return row(lower_, stage, stride_); }
   double* upper_row(int stage) noexcept { return row(upper_, stage, stride_); }
+  /// Where the kernels of costs write to.
+  CostView cost_view(StageQp& qp) const noexcept;
   /// Removes all bounds.
   void clear_bounds() noexcept;
   /// Where an input is found in z of an interval: free, or that of its channel.
@@ -108,7 +112,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   // The cost, which makes the kind. Each adds to what is there.
   virtual double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept = 0;
   virtual double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                        std::span<double> scratch) const noexcept = 0;
+                          std::span<double> scratch) const noexcept = 0;
   virtual void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept = 0;
   virtual std::size_t cost_scratch_size() const noexcept = 0;
 

@@ -74,7 +74,7 @@ class RHEC_EXPORT Ocp {
   /// Fills the stages of a range of the quadratic program at a point: sizes, dynamics, costs and bounds. Returns the
   /// objective's part of these stages.
   virtual double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                         std::span<double> scratch) const noexcept = 0;
+                           std::span<double> scratch) const noexcept = 0;
 
   /// Fills again what depends on data that may have come since `linearise` (measurements, references, the initial
   /// state, bounds): q, r, the bounds and the initial step. Matrices stay.

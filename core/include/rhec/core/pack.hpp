@@ -13,7 +13,7 @@
 #include <utility>
 #include <xsimd/xsimd.hpp>
 
-#include "rhec/core/model_kernels.hpp"
+#include "rhec/core/row_kernels.hpp"
 
 namespace rhec {
 

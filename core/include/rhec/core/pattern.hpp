@@ -98,7 +98,9 @@ constexpr auto pattern_of_dynamics() {
 
 /// Formulas that can be asked for their pattern when they are compiled.
 template <class Formula>
-concept HasPattern = requires { typename std::bool_constant<(pattern_of_dynamics<Formula>(), true)>; };
+concept HasPattern = requires {
+  typename std::bool_constant<(pattern_of_dynamics<Formula>(), true)>;
+};
 
 /// What a Runge-Kutta step needs to know of f's derivatives by a = [x; p; u]; of a formula that cannot tell, nothing is
 /// left out.
@@ -108,7 +110,7 @@ struct DynamicsPattern {
   static constexpr int arguments = nx + Formula::parameter_count + Formula::input_count;
   static_assert(arguments <= DerivativePattern::most_arguments);
 
-  std::array<std::uint64_t, nx> first{};         ///< of each state's rate
+  std::array<std::uint64_t, nx> first{};          ///< of each state's rate
   std::array<std::uint64_t, arguments> second{};  ///< of any of them
   /// The arguments that f depends on, those that it is curved in first: directions to differentiate along.
   std::array<int, arguments> direction_of{};  ///< -1: none

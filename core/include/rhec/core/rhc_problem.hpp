@@ -36,7 +36,9 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   double* state_reference(int node) noexcept { return row(reference_, node, stride()); }
   double* input_reference(int interval) noexcept { return row(reference_, interval, stride()) + capacity().states; }
   const double* state_reference(int node) const noexcept { return row(reference_, node, stride()); }
-  const double* input_reference(int interval) const noexcept { return row(reference_, interval, stride()) + capacity().states; }
+  const double* input_reference(int interval) const noexcept {
+    return row(reference_, interval, stride()) + capacity().states;
+  }
   /// Bounds of an input, per interval; they start as the set-up's.
   double& input_lower(int interval, int input) noexcept { return input_lower_[interval * nu() + input]; }
   double& input_upper(int interval, int input) noexcept { return input_upper_[interval * nu() + input]; }
@@ -56,7 +58,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
  private:
   double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept override;
   double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                std::span<double> scratch) const noexcept override;
+                  std::span<double> scratch) const noexcept override;
   void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
   std::size_t cost_scratch_size() const noexcept override { return 0; }
   double add_stage(int stage, const Iterate& point, double* H, double* h) const noexcept;
@@ -64,7 +66,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
 
   Setup setup_;
   std::vector<double> initial_, input_lower_, input_upper_;
-  AlignedDoubles reference_;                              ///< of [x; p; u], a row a stage
+  AlignedDoubles reference_;                                ///< of [x; p; u], a row a stage
   AlignedDoubles stage_weights_, terminal_weights_, turn_;  ///< rows of [x; p; u]; a full turn where it is an angle
 };
 

@@ -75,16 +75,17 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
  private:
   double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept override;
   double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                std::span<double> scratch) const noexcept override;
+                  std::span<double> scratch) const noexcept override;
   void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
   std::size_t cost_scratch_size() const noexcept override;
 
   void residual(int node, const double* predicted, double* difference) const noexcept;
   double losses(const double* difference, double* weight, double* curvature) const noexcept;
   int padded_states() const noexcept { return (nx() + 7) / 8 * 8; }
-  double add_outputs(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                     std::span<double> scratch) const noexcept;
-  double inputs_and_links(int interval, const Iterate& point, double* H, double* h) const noexcept;
+  double add_measurements(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                          std::span<double> scratch) const noexcept;
+  double inputs(int interval, const Iterate& point, double* H, double* h) const noexcept;
+  double links(int interval, const Iterate& point, double* H, double* h) const noexcept;
   double arrival_term(const Iterate& point, double* q) const noexcept;
 
   Setup setup_;

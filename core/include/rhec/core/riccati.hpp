@@ -117,6 +117,7 @@ class RHEC_EXPORT Riccati {
   bool solve_special_backward(const StageQp& qp, const ActiveSet& active, const double* h, int i) noexcept;
   bool solve_initial(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept;
   void solve_special_forward(const StageQp& qp, const ActiveSet& active, Iterate& step, int i) noexcept;
+  void add_special_controls(int i, int states, int controls, double* covariance) noexcept;
   void write_bound_multipliers(const StageQp& qp, const ActiveSet& active, Iterate& step, int node) noexcept;
 
   Capacity capacity_;
@@ -125,11 +126,11 @@ class RHEC_EXPORT Riccati {
   const RiccatiKernels* kernels_ = nullptr;
   AlignedDoubles P_, U_, inverse_, drift_, g_, p_;  // see RiccatiView
   std::vector<int> state_counts_, control_counts_;
-  std::vector<std::uint8_t> is_special_;            // N stages
-  std::vector<Reduction> reductions_;       // N stages, then node 0
-  std::vector<double> G_, L_, factor_;      // of special stages: full G and L; Cholesky factor of the reduced G
-  std::vector<double> K_, T_, Y_;           // v = -K s - k, w = T v + Y s + y0
-  std::vector<double> C_, eliminator_;      // rows at each node; row operations of the elimination at each stage
+  std::vector<std::uint8_t> is_special_;  // N stages
+  std::vector<Reduction> reductions_;     // N stages, then node 0
+  std::vector<double> G_, L_, factor_;    // of special stages: full G and L; Cholesky factor of the reduced G
+  std::vector<double> K_, T_, Y_;         // v = -K s - k, w = T v + Y s + y0
+  std::vector<double> C_, eliminator_;    // rows at each node; row operations of the elimination at each stage
   std::vector<int> pivot_row_, pivot_column_, left_row_;
   std::vector<double> d_, special_g_, y0_, k_, row_multipliers_, work_;
 };

@@ -27,34 +27,34 @@ inline void runge_kutta(const Formula& formula, Scalar* x, const Scalar* u, cons
   const Lane h = duration * Lane(1.0 / substeps);
   const Lane half = h * Lane(0.5), third = h * Lane(1.0 / 3.0), sixth = h * Lane(1.0 / 6.0);
   Scalar p_now[room_for(np)];
-  for_indices<np>([&](auto j) { p_now[j] = p[j]; });
+  for_each_index<np>([&](auto j) { p_now[j] = p[j]; });
   const auto move_parameters_to = [&](double step) {
     if (!p_end) return;
     const Lane fraction(step / substeps);
-    for_indices<np>([&](auto j) { p_now[j] = p[j] + (p_end[j] - p[j]) * fraction; });
+    for_each_index<np>([&](auto j) { p_now[j] = p[j] + (p_end[j] - p[j]) * fraction; });
   };
   const auto take_step = [&](int step) {
     Scalar rate[nx], inner[nx], next[nx];
     move_parameters_to(step);
     formula.dynamics(x, u, p_now, rate);
-    for_indices<nx>([&](auto j) {
+    for_each_index<nx>([&](auto j) {
       add_scaled(x[j], rate[j], sixth, next[j]);
       add_scaled(x[j], rate[j], half, inner[j]);
     });
     move_parameters_to(step + 0.5);
     formula.dynamics(inner, u, p_now, rate);
-    for_indices<nx>([&](auto j) {
+    for_each_index<nx>([&](auto j) {
       add_scaled(next[j], rate[j], third, next[j]);
       add_scaled(x[j], rate[j], half, inner[j]);
     });
     formula.dynamics(inner, u, p_now, rate);
-    for_indices<nx>([&](auto j) {
+    for_each_index<nx>([&](auto j) {
       add_scaled(next[j], rate[j], third, next[j]);
       add_scaled(x[j], rate[j], h, inner[j]);
     });
     move_parameters_to(step + 1.0);
     formula.dynamics(inner, u, p_now, rate);
-    for_indices<nx>([&](auto j) { add_scaled(next[j], rate[j], sixth, x[j]); });
+    for_each_index<nx>([&](auto j) { add_scaled(next[j], rate[j], sixth, x[j]); });
   };
   for (int step = 0; step < substeps; ++step) take_step(step);
 }

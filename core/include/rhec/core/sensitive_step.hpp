@@ -4,8 +4,9 @@
 
 namespace rhec::kernels {
 
-/// One step of the classical Runge-Kutta method with its derivatives by z = [x; p; u]. Derivatives are taken of f alone, along the directions that f depends on, and carried through the step by the chain
-/// rule. With the stages f_k = f(x_k, p, u), x_{k+1} = x + c_{k+1} h f_k:
+/// One step of the classical Runge-Kutta method with its derivatives by z = [x; p; u]. Derivatives are taken of f
+/// alone, along the directions that f depends on, and carried through the step by the chain rule. With the stages f_k =
+/// f(x_k, p, u), x_{k+1} = x + c_{k+1} h f_k:
 ///
 ///     dx_{k+1}/dz = dx/dz + c_{k+1} h (df_k/d(x, p, u)) S_k,      S_k = d(x_k, p, u)/dz
 ///
@@ -41,18 +42,26 @@ class SensitiveStep {
   static constexpr double reach[4] = {0.0, 0.5, 0.5, 1.0}, share[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   using Number = SecondOrder<Lane, pattern.directions, with_hessian ? pattern.curved : 0>;
 
-  /// Whether argument a of f_k can depend on z_j, and whether f_k's row r can.
-  template <int k>
-  static constexpr bool argument_depends(int a, int j) {
-    if (a >= nx) return j == a;
-    if (a == j) return true;
-    if constexpr (k == 0) return false;
-    else return rate_depends<k - 1>(a, j);
+  /// Which entries of z the rates f_k can depend on, as bits.
+  static constexpr auto find_dependence() {
+    std::array<std::array<std::uint64_t, nx>, 4> depends{};
+    for (int k = 0; k < 4; ++k)
+      for (int r = 0; r < nx; ++r)
+        for (int a = 0; a < nz; ++a)
+          if (pattern.first[r] >> a & 1)
+            depends[k][r] |= std::uint64_t{1} << a | (k > 0 && a < nx ? depends[k - 1][a] : 0);
+    return depends;
   }
+  static constexpr std::array<std::array<std::uint64_t, nx>, 4> dependence = find_dependence();
   template <int k>
   static constexpr bool rate_depends(int r, int j) {
-    for (int a = 0; a < nz; ++a)
-      if ((pattern.first[r] >> a & 1) && argument_depends<k>(a, j)) return true;
+    return (dependence[k][r] >> j & 1) != 0;
+  }
+  /// The same for argument a of f_k.
+  template <int k>
+  static constexpr bool argument_depends(int a, int j) {
+    if (a == j) return true;
+    if constexpr (k > 0) return a < nx && rate_depends<k - 1>(a, j);
     return false;
   }
   static constexpr bool curves(int a, int b) { return (pattern.second[a] >> b & 1) != 0; }
@@ -73,19 +82,18 @@ class SensitiveStep {
   [[gnu::flatten]] void evaluate(const Formula& formula, const Lane* z, const Lane& h) {
     Number x[nx], p[np > 0 ? np : 1], u[nu > 0 ? nu : 1];
     const auto set = [&]<int a>(std::integral_constant<int, a>, Number& number, const Lane& value) RHEC_INLINE {
-      if constexpr (pattern.direction_of[a] >= 0) number = Number::template variable<pattern.direction_of[a]>(value);
-      else number = Number(value);
+      if constexpr (pattern.direction_of[a] >= 0)
+        number = Number::template variable<pattern.direction_of[a]>(value);
+      else
+        number = Number(value);
     };
     for_indices<nx>([&](auto r) RHEC_INLINE {
       Lane value = z[r];
       if constexpr (k > 0) value = value + h * Lane(reach[k]) * f_[k - 1][r].value;
       set(r, x[r], value);
     });
-    for_indices<np>(
-        [&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + j>(), p[j], z[nx + j]); });
-    for_indices<nu>([&](auto j) RHEC_INLINE {
-      set(std::integral_constant<int, nx + np + j>(), u[j], z[nx + np + j]);
-    });
+    for_indices<np>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + j>(), p[j], z[nx + j]); });
+    for_indices<nu>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + np + j>(), u[j], z[nx + np + j]); });
     formula.dynamics(static_cast<const Number*>(x), static_cast<const Number*>(u), static_cast<const Number*>(p),
                      f_[k]);
     for_indices<nx>([&](auto r) RHEC_INLINE {
@@ -114,8 +122,7 @@ class SensitiveStep {
         if constexpr (k < 3) {
           Lane pulled(0.0);
           for_indices<nx>([&](auto r) RHEC_INLINE {
-            if constexpr (pattern.first[r] >> c & 1)
-              pulled = pulled + f_[k + 1][r].d[pattern.direction_of[c]] * mu[r];
+            if constexpr (pattern.first[r] >> c & 1) pulled = pulled + f_[k + 1][r].d[pattern.direction_of[c]] * mu[r];
           });
           now[c] = now[c] + h * Lane(reach[k + 1]) * pulled;
         }
@@ -135,8 +142,8 @@ class SensitiveStep {
         Lane second[nz];
         for_indices<nz>([&](auto a) RHEC_INLINE {
           if constexpr (curves(b, a)) {
-            constexpr int i = pattern.direction_of[b] > pattern.direction_of[a] ? pattern.direction_of[b]
-                                                                                : pattern.direction_of[a];
+            constexpr int i =
+                pattern.direction_of[b] > pattern.direction_of[a] ? pattern.direction_of[b] : pattern.direction_of[a];
             constexpr int j = pattern.direction_of[b] + pattern.direction_of[a] - i;
             Lane sum(0.0);
             for_indices<nx>([&](auto r) RHEC_INLINE {

@@ -22,10 +22,10 @@ namespace rhec {
 /// as z has entries, both halves filled. What a stage does not use of a row is zero, and free of bounds.
 class RHEC_EXPORT StageQp {
  public:
-  using Rows = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0,
-                          Eigen::OuterStride<>>;
-  using ConstRows = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0,
-                               Eigen::OuterStride<>>;
+  using Rows =
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0, Eigen::OuterStride<>>;
+  using ConstRows =
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0, Eigen::OuterStride<>>;
   using Vector = Eigen::Map<Eigen::VectorXd>;
   using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 

@@ -5,9 +5,9 @@
 namespace rhec {
 
 /// What `Model::integrate_rows` is asked for: the same as `Model::integrate`, over rows that lie in memory as those of
-/// Iterate and StageQp do. z = [x; p; u], or [x; p; u; p_end] with `ramp`, where p runs to p_end on an interval. All rows
-/// are multiples of eight long: of z what is beyond is not looked at, of results it becomes 0 up to the next multiple of
-/// eight. A null result pointer means 'not asked for'; the caller lends `scratch` (`Model::rows_scratch`).
+/// Iterate and StageQp do. z = [x; p; u], or [x; p; u; p_end] with `ramp`, where p runs to p_end on an interval. All
+/// rows are multiples of eight long: of z what is beyond is not looked at, of results it becomes 0 up to the next
+/// multiple of eight. A null result pointer means 'not asked for'; the caller lends `scratch` (`Model::rows_scratch`).
 struct IntervalRows {
   int count = 0;
   const double* z = nullptr;
