@@ -16,7 +16,6 @@ namespace rhec {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr int longest_row = 64;
 
 }  // namespace
 
@@ -163,11 +162,11 @@ int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
   return moved;
 }
 
-double RhcProblem::cost(const Iterate& point, double* stage_costs, std::span<double> /*scratch*/) const noexcept {
+double RhcProblem::cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept {
   double total = 0.0;
+  std::fill_n(scratch.data(), stride(), 0.0);  // a gradient that nobody asks for
   for (int i = 0; i <= intervals(); ++i) {
-    double gradient[longest_row] = {};
-    const double part = add_stage(i, point, nullptr, gradient);
+    const double part = add_stage(i, point, nullptr, scratch.data());
     total += part;
     if (stage_costs) stage_costs[i] += part;
   }

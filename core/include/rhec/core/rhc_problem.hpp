@@ -60,7 +60,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                   std::span<double> scratch) const noexcept override;
   void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
-  std::size_t cost_scratch_size() const noexcept override { return 0; }
+  std::size_t cost_scratch_size() const noexcept override { return static_cast<std::size_t>(stride()); }
   double add_stage(int stage, const Iterate& point, double* H, double* h) const noexcept;
   int soften_unreachable_bounds(std::span<double> scratch) noexcept;
 
