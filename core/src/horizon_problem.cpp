@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "aligned_scratch.hpp"
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
 #include "rhec/core/error.hpp"
@@ -251,7 +252,7 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
                                         std::span<double> scratch) const noexcept {
   const int count = steps.last - steps.first + 1, ns = capacity_.states;
   // Memory that begins where registers do.
-  auto* position = reinterpret_cast<double*>((reinterpret_cast<std::uintptr_t>(scratch.data()) + 63) / 64 * 64);
+  double* position = scratch.data() + first_aligned(scratch.data());
   const auto take = [&](std::ptrdiff_t size) { return std::exchange(position, position + size * count); };
   double *z = take(row_), *jacobians = take(nx_ * row_), *hessians = take(row_ * row_);
   // Without carried inputs and ramps the model's rows are those of the program, but for channels that start.

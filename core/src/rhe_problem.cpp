@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "aligned_scratch.hpp"
 #include "checks.hpp"
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
@@ -210,7 +210,7 @@ double RheProblem::arrival_term(const Iterate& point, double* q) const noexcept 
 double RheProblem::add_measurements(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                                     std::span<double> scratch) const noexcept {
   const int count = range.last - range.first + 1, n = nx(), width = padded_states();
-  auto* jacobians = reinterpret_cast<double*>((reinterpret_cast<std::uintptr_t>(scratch.data()) + 63) / 64 * 64);
+  double* jacobians = scratch.data() + first_aligned(scratch.data());
   double* predicted = jacobians + static_cast<std::ptrdiff_t>(count) * ny_ * width;
   double* multipliers = predicted + count * ny_;
   double* difference = multipliers + count * ny_;
