@@ -3,111 +3,181 @@
 #include <cholmod.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <new>
 #include <numeric>
+#include <utility>
 
 namespace rhec::sparse_sqp {
 namespace {
 
 constexpr int most_refinements = 6;
 // Below this relative residual refinement gains nothing more.
-constexpr double refined_enough = 1e-15;
+constexpr double refined_enough = 2e-15;
+// Passes of equilibration, and a factor between a row's largest entry and one at which another pass gains nothing.
+constexpr int most_scalings = 3;
+constexpr double scaled_enough = 8.0;
+
+double largest_of(const std::vector<double>& numbers) noexcept {
+  double largest = 0.0;
+  for (const double number : numbers) largest = std::max(largest, std::abs(number));
+  return largest;
+}
+
+/// The largest power of two that is not above a positive number.
+double power_of_two(double value) noexcept {
+  constexpr std::uint64_t exponent = 0x7ff0'0000'0000'0000;
+  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(value) & exponent);
+}
 
 }  // namespace
 
-/// CHOLMOD's workspace and the dense vectors that its solver reuses.
+/// CHOLMOD's workspace.
 struct KktFactor::Workspace {
   cholmod_common common{};
-  cholmod_dense *x = nullptr, *y = nullptr, *e = nullptr;
 
   Workspace() {
     cholmod_start(&common);
     common.print = 0;
     common.error_handler = nullptr;
-    // The simplicial LDL' is of CHOLMOD's Core and Cholesky modules (LGPL) alone.
-    common.supernodal = CHOLMOD_SIMPLICIAL;
-    common.final_ll = 0;
-    common.nmethods = 1;
-    common.method[0].ordering = CHOLMOD_AMD;
-    common.postorder = 1;
   }
-  ~Workspace() {
-    for (cholmod_dense** vector : {&x, &y, &e}) cholmod_free_dense(vector, &common);
-    cholmod_finish(&common);
-  }
+  ~Workspace() { cholmod_finish(&common); }
   Workspace(const Workspace&) = delete;
   Workspace& operator=(const Workspace&) = delete;
 };
 
-/// K's ordering and pattern for one structure: its upper triangle in the order of elimination, and where the numbers of
-/// H, J and the diagonals go.
+/// K's ordering and the patterns of K and L for one structure, and where the numbers of H and J go.
 struct KktFactor::Symbolic {
   std::vector<std::int32_t> signature;  ///< of the structure
-  cholmod_common* common = nullptr;
-  cholmod_sparse* matrix = nullptr;
-  cholmod_factor* factor = nullptr;
-  std::vector<int> place;  ///< of a variable or constraint in the order of elimination
-  std::vector<int> hessian_entries, jacobian_entries, diagonal_entries;
+  std::vector<int> place;               ///< of a variable or constraint in the order of elimination
+  // K's upper triangle in that order, by columns with rows in order: the diagonal is the last entry of each.
+  std::vector<int> starts, rows;
+  std::vector<int> hessian_entries, jacobian_entries;
+  // L without its diagonal, once by columns and once by rows, indices in order.
+  std::vector<int> l_starts, l_rows, l_row_starts, l_columns;
 
-  explicit Symbolic(cholmod_common* workspace) : common(workspace) {}
-  ~Symbolic() {
-    cholmod_free_sparse(&matrix, common);
-    cholmod_free_factor(&factor, common);
+  /// An order of few fill-ins. Chains of stages have those whose neighbours are eliminated close to each other, so the
+  /// numbers of a long horizon are gone through as they lie in memory.
+  void choose_order(const SparseNlp& nlp, cholmod_common* common) {
+    const int n = nlp.variables(), m = nlp.constraints(), size = n + m;
+    const auto &H = nlp.hessian(), &J = nlp.jacobian();
+    // K's lower triangle as it comes, without the diagonal of the constraints.
+    std::vector<int> column_starts(1, 0), row_indices;
+    column_starts.reserve(static_cast<std::size_t>(size) + 1);
+    row_indices.reserve(static_cast<std::size_t>(H.entries()) + J.entries());
+    for (int c = 0; c < n; ++c) {
+      row_indices.insert(row_indices.end(), H.row_indices.begin() + H.starts[c],
+                         H.row_indices.begin() + H.starts[c + 1]);
+      for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) row_indices.push_back(n + J.row_indices[k]);
+      column_starts.push_back(static_cast<int>(row_indices.size()));
+    }
+    column_starts.resize(static_cast<std::size_t>(size) + 1, column_starts.back());
+    cholmod_sparse pattern{};
+    pattern.nrow = pattern.ncol = static_cast<std::size_t>(size);
+    pattern.nzmax = row_indices.size();
+    pattern.p = column_starts.data();
+    pattern.i = row_indices.data();
+    pattern.stype = -1;
+    pattern.itype = CHOLMOD_INT;
+    pattern.xtype = CHOLMOD_PATTERN;
+    pattern.dtype = CHOLMOD_DOUBLE;
+    pattern.sorted = pattern.packed = 1;
+    std::vector<int> order(size);
+    if (!cholmod_amd(&pattern, nullptr, 0, order.data(), common)) throw std::bad_alloc();
+    place.resize(size);
+    for (int k = 0; k < size; ++k) place[order[k]] = k;
   }
-  Symbolic(const Symbolic&) = delete;
-  Symbolic& operator=(const Symbolic&) = delete;
 
-  /// The upper triangle of K with its rows and columns moved to `place`; remembers where each number went.
+  /// The upper triangle of K with its rows and columns moved to `place`; remembers where each number went. The diagonal
+  /// is the last entry of each column.
   void make_matrix(const SparseNlp& nlp) {
     const int n = nlp.variables(), m = nlp.constraints();
     const auto &H = nlp.hessian(), &J = nlp.jacobian();
-    std::vector<int> rows, columns;
-    const auto add = [&](int r, int c) {
-      rows.push_back(std::min(place[r], place[c]));
-      columns.push_back(std::max(place[r], place[c]));
+    const std::size_t size = static_cast<std::size_t>(n) + m;
+    // By rows first, and from those in their order into columns: then rows are in order within a column.
+    std::vector<int> row_starts(size + 1, 0), next;
+    const auto for_each_entry = [&](const auto& visit) {
+      for (int c = 0; c < n; ++c)
+        for (int k = H.starts[c]; k < H.starts[c + 1]; ++k) visit(k, place[H.row_indices[k]], place[c]);
+      for (int c = 0; c < n; ++c)
+        for (int k = J.starts[c]; k < J.starts[c + 1]; ++k)
+          visit(H.entries() + k, place[n + J.row_indices[k]], place[c]);
+      for (int r = 0; r < m; ++r) visit(H.entries() + J.entries() + r, place[n + r], place[n + r]);
     };
-    for (int c = 0; c < n; ++c)
-      for (int k = H.starts[c]; k < H.starts[c + 1]; ++k) add(H.row_indices[k], c);
-    for (int c = 0; c < n; ++c)
-      for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) add(n + J.row_indices[k], c);
-    for (int r = 0; r < m; ++r) add(n + r, n + r);
+    const std::size_t entries = static_cast<std::size_t>(H.entries()) + J.entries() + m;
+    starts.assign(size + 1, 0);
+    for_each_entry([&](int, int a, int b) {
+      ++row_starts[std::min(a, b) + 1];
+      ++starts[std::max(a, b) + 1];
+    });
+    for (std::size_t i = 0; i < size; ++i) {
+      row_starts[i + 1] += row_starts[i];
+      starts[i + 1] += starts[i];
+    }
+    struct Entry {
+      int number, column;
+    };
+    std::vector<Entry> by_rows(entries);
+    next.assign(row_starts.begin(), row_starts.end() - 1);
+    for_each_entry([&](int number, int a, int b) { by_rows[next[std::min(a, b)]++] = {number, std::max(a, b)}; });
 
-    // Sort the entries into columns, and by rows within them: two stable counting passes.
-    const std::size_t entries = rows.size();
-    const std::size_t size = static_cast<std::size_t>(n) + static_cast<std::size_t>(m);
-    std::vector<int> order(entries), next(entries), starts(size + 1, 0);
-    for (std::size_t k = 0; k < entries; ++k) order[k] = static_cast<int>(k);
-    for (const std::vector<int>* key : {&rows, &columns}) {
-      std::fill(starts.begin(), starts.end(), 0);
-      for (const int value : *key) ++starts[value + 1];
-      for (std::size_t i = 0; i < size; ++i) starts[i + 1] += starts[i];
-      std::vector<int> at(starts.begin(), starts.end() - 1);
-      for (const int k : order) next[at[(*key)[k]]++] = k;
-      std::swap(order, next);
-    }
-    cholmod_free_sparse(&matrix, common);
-    matrix = cholmod_allocate_sparse(size, size, entries, 1, 1, 1, CHOLMOD_REAL, common);
-    if (!matrix) throw std::bad_alloc();
-    std::copy(starts.begin(), starts.end(), static_cast<int*>(matrix->p));
+    rows.resize(entries);
     std::vector<int> entry_of(entries);
-    for (std::size_t k = 0; k < entries; ++k) {
-      static_cast<int*>(matrix->i)[k] = rows[order[k]];
-      entry_of[order[k]] = static_cast<int>(k);
+    next.assign(starts.begin(), starts.end() - 1);
+    for (std::size_t row = 0; row < size; ++row) {
+      for (int k = row_starts[row]; k < row_starts[row + 1]; ++k) {
+        const int at = next[by_rows[k].column]++;
+        rows[at] = static_cast<int>(row);
+        entry_of[by_rows[k].number] = at;
+      }
     }
-    std::fill_n(static_cast<double*>(matrix->x), entries, 0.0);
-    const auto first_of_j = entry_of.begin() + H.entries(), first_of_diagonal = first_of_j + J.entries();
-    hessian_entries.assign(entry_of.begin(), first_of_j);
-    jacobian_entries.assign(first_of_j, first_of_diagonal);
-    diagonal_entries.assign(first_of_diagonal, entry_of.end());
+    hessian_entries.assign(entry_of.begin(), entry_of.begin() + H.entries());
+    jacobian_entries.assign(entry_of.begin() + H.entries(), entry_of.end() - m);
+  }
+
+  /// The pattern of L. Row k has an entry wherever the elimination tree leads from an entry of K's column k up to k.
+  void analyse() {
+    const int size = static_cast<int>(starts.size()) - 1;
+    std::vector<int> parent(size, -1), reached_by(size, -1), ancestor(size, -1), counts(size, 0);
+    for (int k = 0; k < size; ++k) {
+      for (int at = starts[k]; at < starts[k + 1]; ++at) {
+        for (int j = rows[at]; j != -1 && j < k;) {
+          const int above = std::exchange(ancestor[j], k);
+          if (above == -1) parent[j] = k;
+          j = above;
+        }
+      }
+    }
+    l_row_starts.assign(1, 0);
+    l_row_starts.reserve(static_cast<std::size_t>(size) + 1);
+    l_columns.reserve(2 * rows.size());
+    for (int k = 0; k < size; ++k) {
+      const auto first = static_cast<std::ptrdiff_t>(l_columns.size());
+      reached_by[k] = k;
+      for (int at = starts[k]; at < starts[k + 1]; ++at) {
+        for (int j = rows[at]; reached_by[j] != k; j = parent[j]) {
+          reached_by[j] = k;
+          l_columns.push_back(j);
+          ++counts[j];
+        }
+      }
+      std::sort(l_columns.begin() + first, l_columns.end());
+      l_row_starts.push_back(static_cast<int>(l_columns.size()));
+    }
+    l_starts.assign(static_cast<std::size_t>(size) + 1, 0);
+    std::partial_sum(counts.begin(), counts.end(), l_starts.begin() + 1);
+    l_rows.resize(l_columns.size());
+    std::vector<int> next(l_starts.begin(), l_starts.end() - 1);
+    for (int k = 0; k < size; ++k)
+      for (int at = l_row_starts[k]; at < l_row_starts[k + 1]; ++at) l_rows[next[l_columns[at]]++] = k;
   }
 };
 
 KktFactor::KktFactor() : workspace_(std::make_unique<Workspace>()) {}
-KktFactor::~KktFactor() {
-  forget();  // before the workspace that they were made with
-}
+KktFactor::~KktFactor() = default;
 
 void KktFactor::forget() noexcept {
   symbolic_.reset();
@@ -115,193 +185,192 @@ void KktFactor::forget() noexcept {
   nlp_ = nullptr;
 }
 
+void KktFactor::forget_scales() noexcept { std::fill(scale_.begin(), scale_.end(), 1.0); }
+
 int KktFactor::symbolic_factors() const noexcept { return static_cast<int>(known_.size()); }
 
 std::int64_t KktFactor::entries() const noexcept {
-  const auto* counts = static_cast<const int*>(symbolic_->factor->ColCount);
-  return std::accumulate(counts, counts + symbolic_->factor->n, std::int64_t{0});
+  return static_cast<std::int64_t>(symbolic_->l_rows.size() + symbolic_->place.size());
 }
 
 void KktFactor::take_structure(const SparseNlp& nlp) {
   nlp_ = &nlp;
   n_ = nlp.variables();
   m_ = nlp.constraints();
-  const std::size_t size = static_cast<std::size_t>(n_) + static_cast<std::size_t>(m_);
-  for (auto* vector : {&scale_, &norm_, &right_, &residual_, &correction_, &terms_}) vector->assign(size, 0.0);
   const auto& signature = nlp.signature();
   const auto at =
       std::find_if(known_.begin(), known_.end(), [&](const auto& one) { return one->signature == signature; });
   if (at != known_.end()) {
     std::rotate(at, at + 1, known_.end());
     symbolic_ = known_.back();
-    return;
+  } else {
+    auto made = std::make_shared<Symbolic>();
+    made->signature = signature;
+    made->choose_order(nlp, &workspace_->common);
+    made->make_matrix(nlp);
+    made->analyse();
+    ++analyses_;
+    if (known_.size() >= static_cast<std::size_t>(most_structures)) known_.erase(known_.begin());
+    known_.push_back(made);
+    symbolic_ = std::move(made);
   }
-  auto made = std::make_shared<Symbolic>(&workspace_->common);
-  made->signature = signature;
-  made->place.resize(size);
-  for (std::size_t k = 0; k < size; ++k) made->place[k] = static_cast<int>(k);
-  made->make_matrix(nlp);
-  // The ordering comes from a first analysis; K is then laid out in that order, so that no factorisation has to move
-  // its numbers again.
-  cholmod_common& common = workspace_->common;
-  common.method[0].ordering = CHOLMOD_AMD;
-  cholmod_factor* ordered = cholmod_analyze(made->matrix, &common);
-  if (!ordered) throw std::bad_alloc();
-  const int* permutation = static_cast<const int*>(ordered->Perm);
-  for (std::size_t k = 0; k < size; ++k) made->place[permutation[k]] = static_cast<int>(k);
-  cholmod_free_factor(&ordered, &common);
-  made->make_matrix(nlp);
-  common.method[0].ordering = CHOLMOD_NATURAL;
-  common.postorder = 0;
-  made->factor = cholmod_analyze(made->matrix, &common);
-  common.postorder = 1;
-  if (!made->factor) throw std::bad_alloc();
-  ++analyses_;
-  if (known_.size() >= static_cast<std::size_t>(most_structures)) known_.erase(known_.begin());
-  known_.push_back(made);
-  symbolic_ = std::move(made);
+  const std::size_t size = static_cast<std::size_t>(n_) + static_cast<std::size_t>(m_);
+  scale_.resize(size);
+  forget_scales();
+  for (auto* vector : {&norm_, &diagonal_, &inverse_pivots_, &right_, &solution_, &residual_, &correction_})
+    vector->assign(size, 0.0);
+  ends_.assign(size, 0);
+  values_.assign(symbolic_->rows.size(), 0.0);
+  l_values_.assign(symbolic_->l_rows.size(), 0.0);
 }
 
-/// Scales rows and columns towards a largest entry of one (Ruiz 2001).
-void KktFactor::equilibrate() noexcept {
+/// Writes the numbers of K to their places.
+void KktFactor::scatter() noexcept {
   const auto &H = nlp_->hessian(), &J = nlp_->jacobian();
-  const auto is_fixed = [&](int variable) { return numbers_.fixed && numbers_.fixed[variable]; };
-  std::fill(scale_.begin(), scale_.end(), 1.0);
-  for (int pass = 0; pass < 3; ++pass) {
-    std::fill(norm_.begin(), norm_.end(), 0.0);
-    const auto note = [&](int r, int c, double value) {
-      const double size = std::abs(value) * scale_[r] * scale_[c];
-      norm_[r] = std::max(norm_[r], size);
-      norm_[c] = std::max(norm_[c], size);
-    };
-    for (int c = 0; c < n_; ++c) {
-      if (is_fixed(c)) continue;
-      for (int k = H.starts[c]; k < H.starts[c + 1]; ++k) {
-        const int r = H.row_indices[k];
-        if (!is_fixed(r)) note(r, c, numbers_.hessian[k] + (r == c && numbers_.primal ? numbers_.primal[c] : 0.0));
-      }
-      for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) note(n_ + J.row_indices[k], c, numbers_.jacobian[k]);
-    }
-    for (int r = 0; r < m_; ++r)
-      if (numbers_.dual) note(n_ + r, n_ + r, numbers_.dual[r]);
-    for (int k = 0; k < n_ + m_; ++k) {
-      if (norm_[k] == 0.0 || !std::isfinite(norm_[k])) continue;
-      scale_[k] /= std::sqrt(norm_[k]);
-    }
-  }
-  for (int c = 0; c < n_; ++c)
-    if (is_fixed(c)) scale_[c] = 1.0;
-}
-
-bool KktFactor::factor(const Numbers& numbers) {
-  numbers_ = numbers;
-  equilibrate();
-  const auto &H = nlp_->hessian(), &J = nlp_->jacobian();
-  const auto is_fixed = [&](int variable) { return numbers_.fixed && numbers_.fixed[variable]; };
-  auto* values = static_cast<double*>(symbolic_->matrix->x);
-  const double regularisation = numbers_.regularisation;
+  double* values = values_.data();
+  const std::uint8_t* fixed = numbers_.fixed;
   for (int c = 0; c < n_; ++c) {
+    const bool is_fixed = fixed && fixed[c];
     for (int k = H.starts[c]; k < H.starts[c + 1]; ++k) {
       const int r = H.row_indices[k];
-      double& value = values[symbolic_->hessian_entries[k]];
-      if (is_fixed(r) || is_fixed(c)) {
-        value = r == c ? 1.0 : 0.0;
-      } else {
-        value = numbers.hessian[k] * scale_[r] * scale_[c];
-        if (r == c) value += (numbers.primal ? numbers.primal[c] * scale_[c] * scale_[c] : 0.0) + regularisation;
-      }
+      double value = numbers_.hessian[k] + (r == c && numbers_.primal ? numbers_.primal[c] : 0.0);
+      if (is_fixed || (fixed && fixed[r])) value = r == c ? 1.0 : 0.0;
+      values[symbolic_->hessian_entries[k]] = value;
     }
     for (int k = J.starts[c]; k < J.starts[c + 1]; ++k)
-      values[symbolic_->jacobian_entries[k]] =
-          is_fixed(c) ? 0.0 : numbers.jacobian[k] * scale_[n_ + J.row_indices[k]] * scale_[c];
+      values[symbolic_->jacobian_entries[k]] = is_fixed ? 0.0 : numbers_.jacobian[k];
   }
-  for (int r = 0; r < m_; ++r) {
-    const double s = scale_[n_ + r];
-    values[symbolic_->diagonal_entries[r]] = -(numbers.dual ? numbers.dual[r] * s * s : 0.0) - regularisation;
+  const int* starts = symbolic_->starts.data();
+  for (int r = 0; r < m_; ++r)
+    values[starts[symbolic_->place[n_ + r] + 1] - 1] = numbers_.dual ? -numbers_.dual[r] : 0.0;
+}
+
+/// Scales rows and columns towards a largest entry of one (Ruiz 2001), by powers of two: that changes no digit. It
+/// begins with the scales of the last matrix, which a solver's next one resembles.
+void KktFactor::equilibrate() noexcept {
+  const int *starts = symbolic_->starts.data(), *rows = symbolic_->rows.data();
+  double* values = values_.data();
+  const int size = n_ + m_;
+  for (int pass = 0; pass < most_scalings; ++pass) {
+    std::fill(norm_.begin(), norm_.end(), 0.0);
+    for (int c = 0; c < size; ++c) {
+      double largest = 0.0;
+      for (int k = starts[c]; k < starts[c + 1]; ++k) {
+        const double value = std::abs(values[k]) * scale_[c];
+        norm_[rows[k]] = std::max(norm_[rows[k]], value);
+        largest = std::max(largest, std::abs(values[k]) * scale_[rows[k]]);
+      }
+      norm_[c] = std::max(norm_[c], largest);
+    }
+    double most = 1.0;  // that a row is off by
+    for (int k = 0; k < size; ++k) {
+      const double norm = norm_[k] * scale_[k];
+      if (!(norm > 0.0) || !std::isfinite(norm)) continue;
+      most = std::max({most, norm, 1.0 / norm});
+      scale_[k] /= std::sqrt(norm);
+    }
+    if (most <= scaled_enough) break;
   }
-  cholmod_factorize(symbolic_->matrix, symbolic_->factor, &workspace_->common);
-  const cholmod_factor& L = *symbolic_->factor;
-  if (L.xtype != CHOLMOD_REAL || L.minor < L.n) return false;
-  const auto* starts = static_cast<const int*>(L.p);
-  const auto* x = static_cast<const double*>(L.x);
+  for (double& scale : scale_) scale = power_of_two(scale);
+  for (int c = 0; c < size; ++c) {
+    for (int k = starts[c]; k < starts[c + 1]; ++k) values[k] *= scale_[rows[k]] * scale_[c];
+    diagonal_[c] = values[starts[c + 1] - 1];
+  }
+}
+
+/// Row after row of L, each from the columns before it. False where a pivot is zero or no number, or where not as many
+/// are negative as there are constraints.
+bool KktFactor::eliminate() noexcept {
+  const Symbolic& of = *symbolic_;
+  const int *starts = of.starts.data(), *rows = of.rows.data(), *l_starts = of.l_starts.data(),
+            *l_rows = of.l_rows.data(), *l_row_starts = of.l_row_starts.data(), *l_columns = of.l_columns.data();
+  double *row = correction_.data(), *l_values = l_values_.data();
+  std::copy_n(l_starts, ends_.size(), ends_.data());
+  std::fill(correction_.begin(), correction_.end(), 0.0);
   int negative = 0;
-  for (std::size_t k = 0; k < L.n; ++k) {
-    const double pivot = x[starts[k]];
+  for (int k = 0; k < n_ + m_; ++k) {
+    const int last = starts[k + 1] - 1;
+    for (int at = starts[k]; at < last; ++at) row[rows[at]] = values_[at];
+    double pivot = values_[last];
+    for (int at = l_row_starts[k]; at < l_row_starts[k + 1]; ++at) {
+      const int column = l_columns[at], end = ends_[column]++;
+      const double value = std::exchange(row[column], 0.0), entry = value * inverse_pivots_[column];
+      for (int entry_at = l_starts[column]; entry_at < end; ++entry_at)
+        row[l_rows[entry_at]] -= l_values[entry_at] * value;
+      l_values[end] = entry;
+      pivot -= entry * value;
+    }
     if (!std::isfinite(pivot) || pivot == 0.0) return false;
     negative += pivot < 0.0;
+    inverse_pivots_[k] = 1.0 / pivot;
   }
   return negative == m_;
 }
 
-/// y = K x, with the numbers as they were given; `terms_` gets the sizes that went into each row.
-void KktFactor::multiply(const double* x, double* y) const noexcept {
-  const auto &H = nlp_->hessian(), &J = nlp_->jacobian();
-  const auto is_fixed = [&](int variable) { return numbers_.fixed && numbers_.fixed[variable]; };
-  std::fill_n(y, n_ + m_, 0.0);
-  for (int c = 0; c < n_; ++c) {
-    if (is_fixed(c)) {
-      y[c] = x[c];
-      continue;
-    }
-    double sum = numbers_.primal ? numbers_.primal[c] * x[c] : 0.0;
-    for (int k = H.starts[c]; k < H.starts[c + 1]; ++k) {
-      const int r = H.row_indices[k];
-      if (is_fixed(r)) continue;
-      sum += numbers_.hessian[k] * x[r];
-      if (r != c) y[r] += numbers_.hessian[k] * x[c];
-    }
-    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) {
-      const int r = n_ + J.row_indices[k];
-      sum += numbers_.jacobian[k] * x[r];
-      y[r] += numbers_.jacobian[k] * x[c];
-    }
-    y[c] += sum;
+bool KktFactor::factor(const Numbers& numbers) {
+  numbers_ = numbers;
+  scatter();
+  equilibrate();
+  const int* starts = symbolic_->starts.data();
+  for (int k = 0; k < n_ + m_; ++k) {
+    if (k < n_ && numbers_.fixed && numbers_.fixed[k]) continue;
+    const int place = symbolic_->place[k];
+    values_[starts[place + 1] - 1] = diagonal_[place] + (k < n_ ? numbers_.regularisation : -numbers_.regularisation);
   }
-  for (int r = 0; r < m_; ++r)
-    if (numbers_.dual) y[n_ + r] -= numbers_.dual[r] * x[n_ + r];
+  return eliminate();
+}
+
+/// x = (L D L')^-1 x
+void KktFactor::solve_with_factor(double* x) const noexcept {
+  const int *starts = symbolic_->l_starts.data(), *rows = symbolic_->l_rows.data();
+  const double* values = l_values_.data();
+  const int size = n_ + m_;
+  for (int c = 0; c < size; ++c) {
+    const double value = x[c];
+    for (int k = starts[c]; k < starts[c + 1]; ++k) x[rows[k]] -= values[k] * value;
+  }
+  for (int c = size - 1; c >= 0; --c) {
+    double value = x[c] * inverse_pivots_[c];
+    for (int k = starts[c]; k < starts[c + 1]; ++k) value -= values[k] * x[rows[k]];
+    x[c] = value;
+  }
+}
+
+/// residual_ = right_ - K x; returns its largest entry.
+double KktFactor::find_residual(const double* x) noexcept {
+  const int *starts = symbolic_->starts.data(), *rows = symbolic_->rows.data();
+  double* residual = residual_.data();
+  for (int c = 0; c < n_ + m_; ++c) {
+    double sum = diagonal_[c] * x[c];
+    for (int k = starts[c]; k < starts[c + 1] - 1; ++k) {
+      sum += values_[k] * x[rows[k]];
+      residual[rows[k]] -= values_[k] * x[c];
+    }
+    residual[c] = right_[c] - sum;
+  }
+  return largest_of(residual_);
 }
 
 double KktFactor::solve(const double* rhs, double* x) {
   const int size = n_ + m_;
-  std::fill_n(x, size, 0.0);
-  std::copy_n(rhs, size, residual_.data());
-  double best = std::numeric_limits<double>::infinity();
-  const auto scaled_norm = [&](const double* v) {
-    double largest = 0.0;
-    for (int k = 0; k < size; ++k) largest = std::max(largest, std::abs(v[k] * scale_[k]));
-    return largest;
-  };
-  const double size_of_rhs = scaled_norm(rhs);
-  if (size_of_rhs == 0.0) return 0.0;
-  for (int round = 0; round <= most_refinements; ++round) {
-    cholmod_dense b{};
-    b.nrow = b.d = b.nzmax = static_cast<std::size_t>(size);
-    b.ncol = 1;
-    b.xtype = CHOLMOD_REAL;
-    b.dtype = CHOLMOD_DOUBLE;
-    for (int k = 0; k < size; ++k) right_[symbolic_->place[k]] = residual_[k] * scale_[k];
-    b.x = right_.data();
-    if (!cholmod_solve2(CHOLMOD_A, symbolic_->factor, &b, nullptr, &workspace_->x, nullptr, &workspace_->y,
-                        &workspace_->e, &workspace_->common))
-      throw std::bad_alloc();
-    const auto* solution = static_cast<const double*>(workspace_->x->x);
-    for (int k = 0; k < size; ++k) {
-      correction_[k] = solution[symbolic_->place[k]] * scale_[k];
-      x[k] += correction_[k];
-    }
-    multiply(x, terms_.data());
-    for (int k = 0; k < size; ++k) terms_[k] = rhs[k] - terms_[k];
-    double solution_size = 0.0;
-    for (int k = 0; k < size; ++k) solution_size = std::max(solution_size, std::abs(x[k]) / scale_[k]);
-    const double remaining = scaled_norm(terms_.data()) / (size_of_rhs + solution_size);
+  const auto& place = symbolic_->place;
+  for (int k = 0; k < size; ++k) right_[place[k]] = rhs[k] * scale_[place[k]];
+  std::copy(right_.begin(), right_.end(), residual_.begin());
+  std::fill(solution_.begin(), solution_.end(), 0.0);
+  const double size_of_rhs = largest_of(right_);
+  double best = size_of_rhs == 0.0 ? 0.0 : std::numeric_limits<double>::infinity();
+  for (int round = 0; round <= most_refinements && best > refined_enough; ++round) {
+    std::copy(residual_.begin(), residual_.end(), correction_.begin());
+    solve_with_factor(correction_.data());
+    for (int k = 0; k < size; ++k) solution_[k] += correction_[k];
+    const double remaining = find_residual(solution_.data()) / (size_of_rhs + largest_of(solution_));
     if (!(remaining < best)) {  // also where it is not a number
-      for (int k = 0; k < size; ++k) x[k] -= correction_[k];
+      for (int k = 0; k < size; ++k) solution_[k] -= correction_[k];
       break;
     }
     best = remaining;
-    std::swap(residual_, terms_);
-    if (best < refined_enough) break;
   }
+  for (int k = 0; k < size; ++k) x[k] = solution_[place[k]] * scale_[place[k]];
   return best;
 }
 

@@ -13,11 +13,11 @@ namespace rhec::sparse_sqp {
 ///     K = [ H + diag(primal)   J'          ]
 ///         [ J                 -diag(dual)  ]      with primal, dual >= 0,
 ///
-/// as L D L' without pivoting (CHOLMOD, simplicial). Variables that are fixed have the identity's row and column in the
-/// place of their own, so the pattern never changes. K is equilibrated, and a small regularisation makes it
-/// quasi-definite: then any ordering is stable enough for iterative refinement against K itself (Vanderbei 1995;
-/// Friedlander and Orban 2012). The reduced Hessian is positive definite if and only if D has as many negative entries
-/// as there are constraints.
+/// as L D L' without pivoting, in an order that CHOLMOD chooses (AMD). Variables that are fixed have the identity's row
+/// and column in the place of their own, so the pattern never changes. K is equilibrated, and a small regularisation
+/// makes it quasi-definite: then any ordering is stable enough for iterative refinement against K itself (Vanderbei
+/// 1995; Friedlander and Orban 2012). The reduced Hessian is positive definite if and only if D has as many negative
+/// entries as there are constraints.
 ///
 /// Orderings and symbolic factors are kept for every structure that was seen, up to a limit.
 class KktFactor {
@@ -30,6 +30,8 @@ class KktFactor {
   /// Chooses the symbolic factor of a structure, made now where it is new. Throws std::bad_alloc.
   void take_structure(const SparseNlp& nlp);
   void forget() noexcept;
+  /// The next matrix is scaled as if it were the first.
+  void forget_scales() noexcept;
   /// Structures whose symbolic factors are kept: more than any blocking has positions in a window.
   static constexpr int most_structures = 64;
   int symbolic_factors() const noexcept;
@@ -55,8 +57,11 @@ class KktFactor {
  private:
   struct Symbolic;
   struct Workspace;
-  void multiply(const double* x, double* y) const noexcept;
+  void scatter() noexcept;
   void equilibrate() noexcept;
+  bool eliminate() noexcept;
+  void solve_with_factor(double* x) const noexcept;
+  double find_residual(const double* x) noexcept;
 
   std::unique_ptr<Workspace> workspace_;
   std::vector<std::shared_ptr<Symbolic>> known_;  ///< in the order of use, the newest last
@@ -64,7 +69,11 @@ class KktFactor {
   const SparseNlp* nlp_ = nullptr;
   int n_ = 0, m_ = 0, analyses_ = 0;
   Numbers numbers_;
-  std::vector<double> scale_, norm_, right_, residual_, correction_, terms_;
+  // In the order of elimination, and scaled.
+  std::vector<double> scale_, norm_, diagonal_, right_, solution_, residual_, correction_;
+  std::vector<double> values_;  ///< of K's upper triangle, with the regularisation; `diagonal_` is without
+  std::vector<double> l_values_, inverse_pivots_;
+  std::vector<int> ends_;  ///< of what there is of L's columns
 };
 
 }  // namespace rhec::sparse_sqp

@@ -90,7 +90,7 @@ class SparseQp {
   KktFactor factor_;
   const SparseNlp* nlp_ = nullptr;
   int n_ = 0, m_ = 0, factorisations_ = 0;
-  static constexpr double first_regularisation = 1e-9, largest_regularisation = 1e-5, least_regularisation = 1e-15;
+  static constexpr double first_regularisation = 2e-12, largest_regularisation = 1e-5, least_regularisation = 1e-15;
   double regularisation_ = first_regularisation;  ///< to begin with; smaller where that proved too large for refinement
   KktFactor::Numbers numbers_;                    ///< of the present factor
   bool used_interior_point_ = false;

@@ -38,6 +38,7 @@ constexpr int neighbourhood = 20;
 constexpr double least_rise = 1e-6;
 constexpr double steepest_passage = 0.05;
 constexpr int most_penalty_cuts = 20;
+constexpr int stages_at_once = 64;
 
 double norm1(const std::vector<double>& v) {
   double sum = 0.0;
@@ -48,6 +49,16 @@ double norm1(const std::vector<double>& v) {
 bool is_step(SparseQp::Outcome outcome) {
   return outcome == SparseQp::Outcome::solved || outcome == SparseQp::Outcome::feasible ||
          outcome == SparseQp::Outcome::relaxed;
+}
+
+/// Linearises a horizon piece by piece, each small enough for a processor's cache. Returns the objective.
+double linearise_stages(const Ocp& ocp, const Iterate& point, Hessian hessian, StageQp& qp, std::span<double> scratch) {
+  double objective = 0.0;
+  for (int first = 0; first <= ocp.intervals(); first += stages_at_once) {
+    const int last = std::min(first + stages_at_once - 1, ocp.intervals());
+    objective += ocp.linearise({first, last}, point, hessian, qp, scratch);
+  }
+  return objective;
 }
 
 double max_abs(const std::vector<double>& v) {
@@ -121,7 +132,7 @@ SparseQp::Program SparseSqp::program() const noexcept {
 }
 
 void SparseSqp::linearise(const Ocp& ocp, Hessian hessian) {
-  ocp.linearise(all_stages(ocp), current_, hessian, stages_, scratch_);
+  objective_ = linearise_stages(ocp, current_, hessian, stages_, scratch_);
   hessian_is_convex_ = hessian == Hessian::gauss_newton;
   nlp_.hessian(stages_, hessian_.data());
   nlp_.jacobian(stages_, jacobian_.data());
@@ -157,7 +168,7 @@ void SparseSqp::move(const Ocp& ocp) {
 /// round, whatever is active.
 void SparseSqp::convexify(const Ocp& ocp, int round) {
   const bool for_all = round == convexifications;
-  if (round == 1) ocp.linearise(all_stages(ocp), current_, Hessian::gauss_newton, other_stages_, scratch_);
+  if (round == 1) linearise_stages(ocp, current_, Hessian::gauss_newton, other_stages_, scratch_);
   convexify_by_stages(stages_, other_stages_, for_all ? std::span<const std::uint8_t>() : qp_.fixed());
   nlp_.hessian(stages_, hessian_.data());
   hessian_is_convex_ = for_all;
@@ -226,7 +237,7 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     penalty_ = 2.0 * least_penalty;
     --penalty_cuts_left_;
   }
-  const double before = merit(ocp, current_);
+  const double before = objective_ + penalty_ * defect;
   double slope = penalty_ * (predicted_defect_ - defect);
   for (std::size_t k = 0; k < z_.size(); ++k) slope += gradient_[k] * step_[k];
   const auto acceptable = [&](double length) {
@@ -234,7 +245,6 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     return std::isfinite(after) && after <= before + sufficient_decrease * length * std::min(slope, 0.0) +
                                                 merit_rounding * (1.0 + std::abs(before));
   };
-  merits_before_ = stage_merits_;
   // The merit refuses what the equations bend: correct that, with the same matrix.
   const auto correct = [&](double length) {
     if (!std::isfinite(after) || predicted_defect_ > 0.0) return false;
@@ -261,11 +271,16 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     if (acceptable(shortest)) return true;
     // Near the solution the merit may refuse a step that Newton's method is right about.
     if (round == 0 && residual < near_solution && std::isfinite(after)) {
-      ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_stages_, scratch_);
+      linearise_stages(ocp, trial_, Hessian::gauss_newton, other_stages_, scratch_);
       if (kkt_residual(other_stages_, trial_).largest() < 0.5 * residual) return true;
     }
     if (!std::isfinite(after)) break;
     if (correct(shortest)) return true;
+    if (round == 0) {
+      stage_merits_.swap(merits_before_);
+      merit(ocp, current_);
+      stage_merits_.swap(merits_before_);
+    }
     if (!shorten_locally()) break;
   }
   for (double length = 0.5; length >= shortest_step; length *= 0.5) {
@@ -303,14 +318,14 @@ bool SparseSqp::shorten_locally() {
 /// of the objective than a solution should be off by: then one more step, which is kept where it leaves less.
 void SparseSqp::polish(const Ocp& ocp, Report& report, Clock::time_point deadline) {
   const double price = report.kkt.defect * max_abs(multipliers_);
-  if (price <= negligible_share * std::abs(ocp.evaluate(current_, nullptr, scratch_))) return;
+  if (price <= negligible_share * std::abs(objective_)) return;
   if (report.iterations == options_.max_iterations || Clock::now() > deadline) return;
   const auto outcome = find_step(ocp, report, deadline);
   if (outcome != SparseQp::Outcome::solved && outcome != SparseQp::Outcome::feasible) return;
   ++report.iterations;
   std::fill(lengths_.begin(), lengths_.end(), 1.0);
   move(ocp);
-  ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_stages_, scratch_);
+  linearise_stages(ocp, trial_, Hessian::gauss_newton, other_stages_, scratch_);
   SparseNlp::set_costate_0(other_stages_, trial_);
   const KktResidual after = kkt_residual(other_stages_, trial_);
   if (after.largest() <= options_.tolerance && after.defect < report.kkt.defect) std::swap(current_, trial_);
@@ -327,7 +342,7 @@ Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point dead
   for (;; ++report.iterations) {
     if (use_exact && !has_costates) {
       // Exact curvature needs costates: those that fit the start.
-      ocp.linearise(all_stages(ocp), current_, Hessian::gauss_newton, stages_, scratch_);
+      linearise_stages(ocp, current_, Hessian::gauss_newton, stages_, scratch_);
       set_costates(stages_, current_);
       nlp_.read(ocp, current_, nullptr, multipliers_.data(), nullptr);
       has_costates = true;
@@ -383,6 +398,7 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
   const int factorisations_before = qp_.factorisations();
   try {
     take_structure(ocp);
+    qp_.factor().forget_scales();
     penalty_ = 0.0;
     penalty_cuts_left_ = most_penalty_cuts;
     nlp_.bounds(ocp, lower_z_.data(), upper_z_.data());
@@ -415,7 +431,7 @@ bool SparseSqp::covariances(const Ocp& ocp, const Iterate& point, std::span<doub
       blocks.size() < (static_cast<std::size_t>(ocp.intervals()) + 1) * stride * stride)
     return false;
   try {
-    ocp.linearise(all_stages(ocp), point, Hessian::gauss_newton, stages_, scratch_);
+    linearise_stages(ocp, point, Hessian::gauss_newton, stages_, scratch_);
     return stage_covariances(stages_, blocks);
   } catch (const std::bad_alloc&) {
     return false;

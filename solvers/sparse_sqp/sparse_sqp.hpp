@@ -69,6 +69,7 @@ class SparseSqp final : public Solver {
   std::vector<double> correction_, trial_z_, trial_multipliers_, trial_bound_multipliers_, trial_constraints_;
   std::vector<double> lower_z_, upper_z_;
   std::vector<double> relaxed_step_, relaxed_multipliers_, relaxed_bound_multipliers_;
+  double objective_ = 0.0;  ///< at `current_`
   bool hessian_is_convex_ = false;
   std::vector<int> stage_of_variable_, stage_of_row_;  ///< a defect belongs to the stage that its interval starts at
   std::vector<double> stage_merits_, merits_before_;   ///< of the point looked at last, and of `current_`
