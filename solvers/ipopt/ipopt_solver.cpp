@@ -219,7 +219,10 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   spare_iterations_ = most_spare_iterations;
   nlp_->set_start(from, barrier);
   const Ipopt::SmartPtr<Ipopt::TNLP> nlp = Ipopt::GetRawPtr(nlp_);
+  const auto begin = Clock::now();
+  const double ours = nlp_->microseconds();
   const auto outcome = application_->OptimizeTNLP(nlp);
+  backend_us_ += microseconds_since(begin) - (nlp_->microseconds() - ours);
   if (best_kkt_.largest() <= options_.tolerance) return Ending::converged;
   if (stopped_late_ || outcome == Ipopt::Maximum_CpuTime_Exceeded) return Ending::out_of_time;
   if (outcome == Ipopt::Maximum_Iterations_Exceeded || iterations_ >= options_.max_iterations)
@@ -301,6 +304,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
   }
   deadline_ = deadline;
   iterations_ = 0;
+  backend_us_ = 0.0;
   stopped_late_ = false;
   try {
     std::unique_lock hold(backend_lock(), std::defer_lock);

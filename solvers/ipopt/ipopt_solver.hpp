@@ -48,6 +48,9 @@ class IpoptSolver final : public Solver, private Spectator {
   Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
   void reset() noexcept override {}
 
+  /// Of the last solve, the time within Ipopt, without what its calls back took [us].
+  double backend_us() const noexcept { return backend_us_; }
+
  private:
   /// How a run of Ipopt begins.
   enum class Start {
@@ -83,6 +86,7 @@ class IpoptSolver final : public Solver, private Spectator {
   Clock::time_point deadline_;
   Iterate best_, seen_;
   KktResidual best_kkt_, seen_kkt_;
+  double backend_us_ = 0.0;
   bool stopped_late_ = false;
   int iterations_ = 0;
   int spare_iterations_ = 0;  ///< left for the barrier to become negligible once the residual is within the tolerance

@@ -7,7 +7,13 @@
 
 #include "rhec/core/kkt.hpp"
 #include "rhec/core/ocp.hpp"
+#include "rhec/core/solver.hpp"
 #include "rhec/core/sparse_nlp.hpp"
+
+namespace Ipopt {
+class OrigIpoptNLP;
+class TNLPAdapter;
+}  // namespace Ipopt
 
 namespace rhec::ipopt {
 
@@ -33,7 +39,8 @@ class Spectator {
 };
 
 /// An Ocp as the sparse nonlinear program that Ipopt solves. Every point is evaluated once, whoever asks: objective and
-/// constraints together, then gradient and Jacobian from one linearisation, which also judges the iterate.
+/// constraints together, then gradient, Jacobian and the Hessian for the iterate's multipliers from one linearisation,
+/// which also judges the iterate.
 class OcpNlp final : public Ipopt::TNLP {
  public:
   OcpNlp(const Ocp& ocp, Curvature curvature);
@@ -60,7 +67,9 @@ class OcpNlp final : public Ipopt::TNLP {
   /// Sum of |bound multiplier| x distance from the bound: what the barrier still adds to the objective.
   double complementarity_gap(const Iterate& point) noexcept;
   double objective(const Iterate& point) noexcept { return ocp_->evaluate(point, nullptr, scratch_); }
-  KktResidual judge(const Iterate& point) noexcept { return kkt_residual(*ocp_, point, exact_, scratch_); }
+  KktResidual judge(const Iterate& point) noexcept { return kkt_residual(*ocp_, point, other_, scratch_); }
+  /// The time that Ipopt's calls of this object have taken since it was made [us].
+  double microseconds() const noexcept { return microseconds_; }
 
   // Ipopt::TNLP. Arrays are Ipopt's.
   bool get_nlp_info(Ipopt::Index& n, Ipopt::Index& m, Ipopt::Index& jacobian_entries, Ipopt::Index& hessian_entries,
@@ -88,10 +97,23 @@ class OcpNlp final : public Ipopt::TNLP {
                              const Ipopt::IpoptData* data, Ipopt::IpoptCalculatedQuantities* quantities) override;
 
  private:
+  /// Adds the time that it exists.
+  class Timer {
+   public:
+    explicit Timer(double& microseconds) noexcept : microseconds_(&microseconds) {}
+    ~Timer() { *microseconds_ += microseconds_since(start_); }
+    Timer(const Timer&) = delete;
+    Timer& operator=(const Timer&) = delete;
+
+   private:
+    double* microseconds_;
+    Clock::time_point start_ = Clock::now();
+  };
   bool evaluate_at(const double* z) noexcept;
-  bool linearise_at(const double* z) noexcept;
-  /// The Hessian of the Lagrangian with unit weight of the objective; multipliers null: of the objective alone.
-  void exact_hessian(const double* z, const double* multipliers, double factor, double* values) noexcept;
+  bool linearise_at(const double* z, const double* multipliers = nullptr);
+  bool guess_multipliers();
+  void read_multipliers(double* multipliers);
+  void linearise(const double* z, const double* multipliers, double factor, Hessian hessian, StageQp& qp) noexcept;
 
   const Ocp* ocp_ = nullptr;
   Curvature curvature_;
@@ -103,12 +125,21 @@ class OcpNlp final : public Ipopt::TNLP {
 
   std::vector<double> scratch_, defects_;
   Iterate work_;
-  StageQp linear_, exact_;
-  std::vector<double> evaluated_z_, linear_z_, constraints_, gradient_, jacobian_;
+  StageQp linear_, other_;
+  std::vector<double> evaluated_z_, linear_z_, linear_multipliers_, constraints_, gradient_, jacobian_;
+  /// Where Ipopt has its iterates, from the first that it shows to its end.
+  struct {
+    const Ipopt::IpoptData* data = nullptr;
+    Ipopt::OrigIpoptNLP* scaled = nullptr;
+    Ipopt::TNLPAdapter* adapter = nullptr;
+  } iterates_;
+  bool starts_with_multipliers_ = false, any_fixed_ = false;
   bool is_evaluated_ = false, is_linear_ = false;              ///< what is held belongs to the z beside it
   bool is_evaluated_sound_ = false, is_linear_sound_ = false;  ///< and is finite
+  bool is_linear_exact_ = false;                               ///< with the multipliers beside it
   double objective_ = 0.0;
   std::vector<double> weighted_, clipped_, bound_multipliers_, hessian_part_;
+  double microseconds_ = 0.0;
 };
 
 }  // namespace rhec::ipopt
