@@ -23,6 +23,9 @@ constexpr int most_spare_iterations = 6;
 /// A residual below which Newton's method finishes what is left.
 constexpr double near_solution = 1e-4;
 constexpr int most_polishes = 2;
+/// Iterations of a run after which another way of starting promises more. Interior points that take longer are most
+/// often those that wander with negative curvature.
+constexpr int patience = 150;
 /// A violation of the dynamics that no rounding explains.
 constexpr double clear_violation = 1e-6;
 /// Where the barrier of a warm start begins, as a part of the guess' residual, and its limits.
@@ -161,6 +164,19 @@ void IpoptSolver::set(const char* name, const char* value) {
   if (!native_.contains(name)) application_->Options()->SetStringValue(name, value);
 }
 
+/// How a run begins that follows one that was lost; the last, `adaptive`, is followed by none.
+IpoptSolver::Start IpoptSolver::start_after(Start start, Ending ending) const noexcept {
+  if (start == Start::warm) return Start::cold;
+  // Another curvature makes nothing feasible.
+  const bool may_help = options_.hessian == Curvature::exact && ending != Ending::infeasible;
+  return start == Start::cold && may_help ? Start::gauss_newton : Start::adaptive;
+}
+
+int IpoptSolver::iterations_of(Start start) const noexcept {
+  const int left = std::max(options_.max_iterations - iterations_, 0);
+  return start == Start::adaptive ? left : std::min(left, patience);
+}
+
 void IpoptSolver::set_run_options(Start start, double barrier) {
   const double tolerance = std::max(inner_tolerance * options_.tolerance, smallest_inner_tolerance);
   set("tol", tolerance);
@@ -169,7 +185,7 @@ void IpoptSolver::set_run_options(Start start, double barrier) {
   set("constr_viol_tol", tolerance);
   set("compl_inf_tol", tolerance);
   set("acceptable_iter", 0);
-  set("max_iter", std::max(options_.max_iterations - iterations_, 0));
+  set("max_iter", iterations_of(start));
   set("hessian_approximation", options_.hessian == Curvature::limited_memory ? "limited-memory" : "exact");
   set("limited_memory_max_history", limited_memory_history);
   set("nlp_scaling_method", "none");
@@ -217,6 +233,7 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   if (start == Start::polish) barrier = polish_barrier;
   set_run_options(start, barrier);
   spare_iterations_ = most_spare_iterations;
+  nlp_->set_curvature(start == Start::gauss_newton ? Curvature::gauss_newton : options_.hessian);
   nlp_->set_start(from, barrier);
   const Ipopt::SmartPtr<Ipopt::TNLP> nlp = Ipopt::GetRawPtr(nlp_);
   const auto begin = Clock::now();
@@ -225,8 +242,7 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   backend_us_ += microseconds_since(begin) - (nlp_->microseconds() - ours);
   if (best_kkt_.largest() <= options_.tolerance) return Ending::converged;
   if (stopped_late_ || outcome == Ipopt::Maximum_CpuTime_Exceeded) return Ending::out_of_time;
-  if (outcome == Ipopt::Maximum_Iterations_Exceeded || iterations_ >= options_.max_iterations)
-    return Ending::out_of_iterations;
+  if (iterations_ >= options_.max_iterations) return Ending::out_of_iterations;
   if ((outcome == Ipopt::Infeasible_Problem_Detected || outcome == Ipopt::Restoration_Failed) &&
       seen_kkt_.defect > clear_violation)
     return Ending::infeasible;
@@ -255,7 +271,8 @@ void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
   } else {
     int polishes = 0;
     bool claimed_infeasible = false;
-    for (Start start = warm ? Start::warm : Start::cold;;) {
+    Start begun = warm ? Start::warm : Start::cold;
+    for (Start start = begun;;) {
       ending = run(start, start == Start::polish ? Iterate(best_) : guess);
       claimed_infeasible |= ending == Ending::infeasible && start != Start::warm;
       if (ending == Ending::near && polishes++ < most_polishes) {
@@ -264,14 +281,11 @@ void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
       }
       if (ending != Ending::near && ending != Ending::lost && ending != Ending::infeasible) break;
       report.fallback_used = true;
-      if (start == Start::warm) {
-        start = Start::cold;
-      } else if (start == Start::cold) {
-        start = Start::adaptive;
-      } else {
+      if (begun == Start::adaptive) {
         if (claimed_infeasible && best_kkt_.defect > clear_violation) ending = Ending::infeasible;
         break;
       }
+      start = begun = start_after(begun, ending);
     }
   }
   switch (ending) {

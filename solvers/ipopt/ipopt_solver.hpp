@@ -29,6 +29,11 @@ struct IpoptOptions {
 /// negligible; it never decides itself that it is done. A guess with multipliers is a warm start: its multipliers say
 /// which bounds are close, and its residual how small the barrier may begin.
 ///
+/// A run that is lost, or has found nothing after so many iterations that it is likely to be, is followed by others
+/// from the guess, in this order: without the guess' multipliers, with Gauss-Newton's curvature in the place of the
+/// exact one, and with an adaptive barrier. All of them together make max_iterations at most, and the report says that
+/// there was a fallback.
+///
 /// Ipopt 3.11 counts with a global variable and MUMPS keeps global state, so solves wait for each other, process-wide;
 /// the time they wait counts for their deadline. Every solve builds Ipopt's algorithm anew, so nothing is remembered
 /// from one to the next but the guess.
@@ -54,15 +59,18 @@ class IpoptSolver final : public Solver, private Spectator {
  private:
   /// How a run of Ipopt begins.
   enum class Start {
-    warm,      ///< from the guess and its multipliers
-    cold,      ///< from the guess alone
-    adaptive,  ///< the same with the other strategy for the barrier
-    polish     ///< from the best iterate so far, near the solution
+    warm,          ///< from the guess and its multipliers
+    cold,          ///< from the guess alone
+    gauss_newton,  ///< the same with that curvature
+    adaptive,      ///< the same with the other strategy for the barrier
+    polish         ///< from the best iterate so far, near the solution
   };
   enum class Ending { converged, out_of_time, out_of_iterations, infeasible, near, lost };
 
   void improve(const Ocp& ocp, Iterate& point, Report& report);
   Ending run(Start start, const Iterate& from);
+  Start start_after(Start start, Ending ending) const noexcept;
+  int iterations_of(Start start) const noexcept;
   void set_run_options(Start start, double barrier);
   bool see(int iteration, const PrimalDual* iterate) noexcept override;
   void see_last(const PrimalDual& iterate) noexcept override;

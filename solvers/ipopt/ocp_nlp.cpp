@@ -70,6 +70,11 @@ bool OcpNlp::has_empty_bounds() const noexcept {
   return false;
 }
 
+void OcpNlp::set_curvature(Curvature curvature) noexcept {
+  is_linear_ = is_linear_ && curvature == curvature_;
+  curvature_ = curvature;
+}
+
 void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
   iterates_ = {};
   starts_with_multipliers_ = barrier > 0.0;

@@ -58,6 +58,8 @@ class OcpNlp final : public Ipopt::TNLP {
   /// Where Ipopt starts. With a barrier parameter above zero the point's multipliers count too: each variable and the
   /// multiplier of its bound are moved until their product is that parameter or more, as little as that takes.
   void set_start(const Iterate& point, double barrier) noexcept;
+  /// From the next run on.
+  void set_curvature(Curvature curvature) noexcept;
   /// For the length of a solve.
   void set_spectator(Spectator* spectator) noexcept { spectator_ = spectator; }
 

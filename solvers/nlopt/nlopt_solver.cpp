@@ -27,6 +27,11 @@ constexpr int most_newton_steps = 30;
 constexpr int many_variables = 100;
 constexpr long iterations_of_many_variables = 3;
 constexpr long iterations_of_few_variables = 15;
+// By how much the runs of a second attempt are longer. Where weights are very uneven, rounding decides how far a short
+// run gets.
+constexpr long longer_runs = 3;
+// Iterations after which an attempt with short runs is given up.
+constexpr long patience = 300;
 // How near a bound is at which a multiplier may be: the smallest residual decides.
 constexpr double distances[] = {1e-9, 1e-6, 1e-4};
 // Curvature below this part of the largest is taken as if it were that.
@@ -126,6 +131,8 @@ Report NloptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
   if (ocp.capacity() == capacity_ && is_sound_start(ocp, point, scratch_)) {
     factorisations_ = 0;
     iterations_ = 0;
+    limit_ = options_.max_iterations;
+    fallback_used_ = false;
     try {
       report = optimise(ocp, point, deadline);
     } catch (const std::exception&) {  // memory ran out; `point` is written last
@@ -133,6 +140,7 @@ Report NloptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
       rhec::judge(ocp, point, qp_, scratch_, report);
     }
     report.factorisations = factorisations_;
+    report.fallback_used = fallback_used_;
   }
   report.feedback_us = microseconds_since(start);
   return report;
@@ -325,13 +333,30 @@ Status NloptSolver::restore_feasibility(const Ocp& ocp, Answer& answer, Clock::t
   return Status::solved;
 }
 
+/// Attempts from the start that is given, with short runs and, where these got stuck, with longer ones: not where
+/// variables are many, since long runs take too long there and get no further.
 Status NloptSolver::improve(const Ocp& ocp, Answer& answer, Clock::time_point deadline) {
+  // With the curvature known at the start, a fresh start soon serves better than quasi-Newton updates do.
+  const long quota = scales_fully() && traits_.gradients ? iterations_per_run() : 0;
+  const bool may_retry = quota > 0 && problem_.variables() > 0 && problem_.variables() <= many_variables;
+  if (!may_retry) return attempt(ocp, answer, quota, deadline);
+  Answer other = answer;
+  limit_ = std::min<long>(options_.max_iterations, patience);
+  const Status status = attempt(ocp, answer, quota, deadline);
+  limit_ = options_.max_iterations;
+  const bool is_stuck = status == Status::stalled || status == Status::iteration_limit;
+  if (!is_stuck || iterations_left() <= 0) return status;
+  fallback_used_ = true;
+  const Status second = attempt(ocp, other, longer_runs * quota, deadline);
+  if (second == Status::solved || is_better(other, answer)) answer = std::move(other);
+  return second;
+}
+
+Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::time_point deadline) {
   if (problem_.variables() == 0) {
     if (answer.kkt.largest() <= options_.tolerance) return Status::solved;
     return answer.violation > options_.tolerance ? Status::infeasible : Status::stalled;
   }
-  // With the curvature known at the start, a fresh start soon serves better than quasi-Newton updates do.
-  const long quota = scales_fully() && traits_.gradients ? iterations_per_run() : 0;
   bool restored = false;
   double least_residual = answer.kkt.largest();
   int idle = 0;

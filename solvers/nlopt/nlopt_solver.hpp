@@ -17,7 +17,8 @@ namespace rhec::nlopt {
 /// the bounds that are active, the core's residual is computed with them, and the run is repeated from its last point
 /// (scaled anew) until that residual is met. By default each run is also finished by Newton steps on the condensed
 /// problem with its active bounds (`polish`): quasi-Newton methods that compare objectives end where these differ by
-/// rounding only, which is about half of the digits.
+/// rounding only, which is about half of the digits. With few decisions, an attempt that gets stuck is followed by one
+/// from the guess with longer runs, within the same limit of iterations; the report says that there was a fallback.
 ///
 /// The condensed problem is dense: memory grows with the square of the number of decisions and an iteration of SLSQP
 /// with its cube. Evaluation and NLopt allocate while solving.
@@ -43,6 +44,7 @@ class NloptSolver final : public Solver {
   };
   Report optimise(const Ocp& ocp, Iterate& point, Clock::time_point deadline);
   Status improve(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
+  Status attempt(const Ocp& ocp, Answer& answer, long quota, Clock::time_point deadline);
   Status restore_feasibility(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
   bool find_start(const Ocp& ocp, const Iterate& point);
   Eigen::VectorXd within_bounds(const Eigen::VectorXd& x) const;
@@ -53,7 +55,7 @@ class NloptSolver final : public Solver {
   bool polish(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
   Transformation transformation_at(const Ocp& ocp, const Answer& answer);
   long iterations_per_run() const noexcept;
-  long iterations_left() const noexcept { return options_.max_iterations - iterations_; }
+  long iterations_left() const noexcept { return limit_ - iterations_; }
   bool scales_fully() const noexcept;
 
   Options options_;
@@ -64,6 +66,8 @@ class NloptSolver final : public Solver {
   StageQp qp_;
   int factorisations_ = 0;
   long iterations_ = 0;
+  long limit_ = 0;  ///< of the iterations, for the attempt under way
+  bool fallback_used_ = false;
 };
 
 }  // namespace rhec::nlopt

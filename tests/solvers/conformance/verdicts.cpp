@@ -135,7 +135,7 @@ std::vector<Compared> compare(const std::vector<Verdict>& verdicts) {
 
 /// What became of all problems of a family, for one solver.
 struct Summary {
-  int problems = 0, good = 0, refused = 0, most_iterations = 0, other_optima = 0, unsolved = 0;
+  int problems = 0, good = 0, refused = 0, most_iterations = 0, other_optima = 0;
   std::string outcome, words;
   double residual = 0.0, gap = 0.0, distance = 0.0, milliseconds = 0.0;
 };
@@ -149,9 +149,6 @@ Summary summarise(const std::vector<const Compared*>& of_family) {
     if (v.outcome == "refused") {
       ++s.refused;
       s.words = v.reason;
-    } else if (v.outcome == "unsolved") {
-      ++s.good;
-      ++s.unsolved;
     } else if (v.outcome == "failed") {
       s.words += fmt::format("{}seed {}: {}", s.words.empty() ? "" : "; ", v.seed, v.reason);
     } else {
@@ -179,7 +176,6 @@ std::string describe(const Summary& s) {
   if (s.outcome == "infeasible") return "and it is";
   std::string text = fmt::format("{:3} iterations, residual {:.0e}, gap {:.0e}, distance {:.0e}, {:.1f} ms",
                                  s.most_iterations, s.residual, s.gap, s.distance, s.milliseconds);
-  if (s.unsolved > 0) text += fmt::format(" ({} given up, and said so)", s.unsolved);
   if (s.other_optima > 0) text += fmt::format(" ({} in another optimum)", s.other_optima);
   return text;
 }
