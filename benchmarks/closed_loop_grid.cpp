@@ -1,22 +1,28 @@
 // Closed-loop runs over a grid: paths, speeds, block structures and seeds. Says how many runs a second there are, what
-// the whole grid takes, and what of a sample's time is the estimator's solver, the controller's, and all else.
+// the whole grid takes, and what of a sample's time is the estimator's solver, the controller's, and each part of all
+// else.
 //
 //     closed_loop_grid [--share 0.02] [--threads 2]
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <memory>
 #include <mutex>
+#include <numeric>
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "rhec/core/error.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
+#include "ticks.hpp"
 
 namespace rhec::bench {
 namespace {
@@ -24,7 +30,7 @@ namespace {
 using Steady = std::chrono::steady_clock;
 
 struct Run {
-  std::string scenario;
+  std::shared_ptr<const Settings> scenario;  // of a path, read once
   std::vector<std::string> assignments;
 };
 
@@ -36,46 +42,119 @@ std::vector<Run> whole_grid() {
       blockings.push_back("{name: structured, size: " + std::to_string(size) + ", overlap: " + std::to_string(overlap) +
                           "}");
   std::vector<Run> grid;
-  for (const char* path : {"figure8", "zigzag"})
+  for (const char* path : {"figure8", "zigzag"}) {
+    const auto scenario =
+        std::make_shared<const Settings>(load_yaml(RHEC_SOURCE_DIRECTORY "/scenarios/" + std::string(path) + ".yaml"));
     for (int speed = 1; speed <= 10; ++speed)
       for (const std::string& blocking : blockings)
         for (int seed = 1; seed <= 16; ++seed)
           grid.push_back(
-              {RHEC_SOURCE_DIRECTORY "/scenarios/" + std::string(path) + ".yaml",
+              {scenario,
                {"speed=" + std::to_string(speed), "seed=" + std::to_string(seed), "blocking.kappa=" + blocking}});
+  }
   return grid;
+}
+
+// What a run's time goes to; LoopPart names those of a sample. The solvers report their own times.
+enum Part {
+  estimator_solver,
+  controller_solver,
+  simulation,
+  window,
+  covariance,
+  references,
+  log,
+  setup,
+  making,
+  summary,
+  part_count,
+};
+constexpr std::array part_names = {"estimator_solver",
+                                   "controller_solver",
+                                   "simulation",
+                                   "window",
+                                   "covariance",
+                                   "references",
+                                   "log",
+                                   "setup",
+                                   "making",
+                                   "summary"};
+static_assert(part_names.size() == part_count);
+
+/// Where the time goes once that has begun; what the solvers say that they took is taken off it afterwards.
+Part part_of(sim::LoopPart part) {
+  switch (part) {
+    case sim::LoopPart::simulate:
+      return simulation;
+    case sim::LoopPart::estimate:
+      return covariance;
+    case sim::LoopPart::prepare_estimate:
+      return window;
+    case sim::LoopPart::control:
+    case sim::LoopPart::prepare_control:
+      return references;
+    case sim::LoopPart::log:
+      return log;
+    case sim::LoopPart::end:  // what is left is to take it down
+      break;
+  }
+  return setup;
 }
 
 struct Totals {
   long runs = 0, completed = 0, samples = 0;
-  double estimator_us = 0.0, controller_us = 0.0, loop_us = 0.0, making_us = 0.0;
+  std::array<double, part_count> us{};
+  double csv_us = 0.0;  // no part: a grid keeps the summaries
   void add(const Totals& other) {
     runs += other.runs, completed += other.completed, samples += other.samples;
-    estimator_us += other.estimator_us, controller_us += other.controller_us;
-    loop_us += other.loop_us, making_us += other.making_us;
+    for (int part = 0; part < part_count; ++part) us[part] += other.us[part];
+    csv_us += other.csv_us;
   }
 };
 
-double us_since(Steady::time_point start) {
-  return std::chrono::duration<double, std::micro>(Steady::now() - start).count();
-}
+/// Tells what a stretch of time after the other took.
+class Stopwatch {
+ public:
+  double lap_us() {
+    const Ticks::Count now = Ticks::now(), before = std::exchange(last_, now);
+    return Ticks::microseconds(before, now);
+  }
+
+ private:
+  Ticks::Count last_ = Ticks::now();
+};
 
 void drive(const Host& host, const Run& run, Totals& totals) {
-  const auto start = Steady::now();
-  Settings settings = load_yaml(run.scenario);
+  Stopwatch watch;
+  Settings settings = *run.scenario;
   for (const std::string& assignment : run.assignments) apply_assignment(settings, assignment);
   const sim::Scenario scenario(host, settings);
-  totals.making_us += us_since(start);
-  const auto begin = Steady::now();
-  const sim::RunLog log = sim::run_closed_loop(scenario);
-  totals.loop_us += us_since(begin);
-  ++totals.runs;
-  totals.completed += log.completed;
-  totals.samples += static_cast<long>(log.samples.size());
-  for (const sim::Sample& sample : log.samples) {
-    totals.estimator_us += sample.estimator_us;
-    totals.controller_us += sample.controller_us;
+  totals.us[making] += watch.lap_us();
+
+  // Before the first part of the first sample the loop is set up.
+  Part current = setup;
+  sim::LoopHooks hooks;
+  hooks.begins = [&](sim::LoopPart next) {
+    totals.us[current] += watch.lap_us();
+    current = part_of(next);
+  };
+  const sim::RunLog log_of_run = sim::run_closed_loop(scenario, hooks);
+  totals.us[setup] += watch.lap_us();
+  const sim::RunSummary result = sim::summarise(log_of_run, scenario);
+  totals.us[summary] += watch.lap_us();
+  if (sim::steps_csv(log_of_run, scenario).empty()) throw Error("a run left no log");
+  totals.csv_us += watch.lap_us();
+  for (const sim::Sample& sample : log_of_run.samples) {
+    const double preparation = sample.estimator_us - sample.estimator_feedback_us;
+    totals.us[estimator_solver] += sample.estimator_us;
+    totals.us[controller_solver] += sample.controller_us;
+    totals.us[window] -= preparation;
+    totals.us[covariance] -= sample.estimator_feedback_us;
+    totals.us[references] -= sample.controller_us;
   }
+  ++totals.runs;
+  totals.completed += result.completed;
+  totals.samples += result.steps;
 }
 
 /// Runs in an order that is random but always the same, so that a share of them is a fair sample.
@@ -84,6 +163,7 @@ int run_share(double share, int thread_count) {
   std::shuffle(grid.begin(), grid.end(), std::mt19937(1));  // NOLINT(cert-msc32-c,cert-msc51-cpp)
   const auto wanted = std::max<std::size_t>(1, static_cast<std::size_t>(share * static_cast<double>(grid.size())));
   const Host host;
+  Stopwatch().lap_us();  // the first one of all finds out how long a tick is
   std::atomic<std::size_t> next{0};
   std::mutex mutex;
   Totals totals;
@@ -105,18 +185,23 @@ int run_share(double share, int thread_count) {
   for (int t = 0; t < thread_count; ++t) threads.emplace_back(work);
   for (std::thread& thread : threads) thread.join();
   if (failure) std::rethrow_exception(failure);
-  const double seconds = 1e-6 * us_since(start);
+  // What writes the logs is no part of the grid; the threads share it.
+  const double seconds =
+      std::chrono::duration<double>(Steady::now() - start).count() - 1e-6 * totals.csv_us / thread_count;
 
-  const double all = totals.loop_us + totals.making_us, samples = static_cast<double>(totals.samples);
+  const double samples = static_cast<double>(totals.samples), runs = static_cast<double>(totals.runs);
+  const double all = std::accumulate(totals.us.begin(), totals.us.end(), 0.0);
+  const double solves = totals.us[estimator_solver] + totals.us[controller_solver];
   std::printf(
       "{\"grid_runs\": %zu, \"runs\": %ld, \"completed\": %ld, \"threads\": %d, \"seconds\": %.3f, "
       "\"runs_per_second\": %.2f, \"grid_seconds\": %.1f, \"samples\": %ld, \"us_per_sample\": %.3f, "
-      "\"estimator_solver_share\": %.4f, \"controller_solver_share\": %.4f, \"rest_of_loop_share\": %.4f, "
-      "\"making_share\": %.4f}\n",
-      grid.size(), totals.runs, totals.completed, thread_count, seconds, static_cast<double>(totals.runs) / seconds,
-      seconds * static_cast<double>(grid.size()) / static_cast<double>(totals.runs), totals.samples, all / samples,
-      totals.estimator_us / all, totals.controller_us / all,
-      (totals.loop_us - totals.estimator_us - totals.controller_us) / all, totals.making_us / all);
+      "\"rest_to_solves\": %.4f, \"csv_us_per_sample\": %.3f, \"parts_us_per_sample\": {",
+      grid.size(), totals.runs, totals.completed, thread_count, seconds, runs / seconds,
+      seconds * static_cast<double>(grid.size()) / runs, totals.samples, all / samples, (all - solves) / solves,
+      totals.csv_us / samples);
+  for (int part = 0; part < part_count; ++part)
+    std::printf("%s\"%s\": %.4f", part == 0 ? "" : ", ", part_names[part], totals.us[part] / samples);
+  std::printf("}}\n");
   return 0;
 }
 

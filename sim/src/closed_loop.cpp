@@ -134,6 +134,10 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   known.parameters.resize(np);
   RunLog log;
   log.samples.reserve(static_cast<std::size_t>(limit));
+  const auto begin = [&hooks](LoopPart part) {
+    if (hooks.begins) hooks.begins(part);
+  };
+  begin(LoopPart::simulate);
   for (;; ++k) {
     const double time = static_cast<double>(k) * step;
     const Estimate* estimate = &known;
@@ -144,10 +148,13 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
       known.report.status = Status::solved;
     } else {
       sensors.observe(truth.state().data(), outputs.data());
+      begin(LoopPart::estimate);
       estimator->push_measurement(time, outputs.data());
       estimate = &estimator->estimate(time);
     }
+    begin(LoopPart::control);
     const Controller::Command& command = controller->control(*estimate);
+    begin(LoopPart::log);
     true_follower.advance(truth.state()[roles.position_x], truth.state()[roles.position_y]);
 
     Sample sample;
@@ -175,6 +182,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.controller_fallback = command.fallback;
     sample.softened = command.softened;
     sample.estimator_us = estimate->report.preparation_us + estimate->report.feedback_us;
+    sample.estimator_feedback_us = estimate->report.feedback_us;
     sample.controller_us = command.report.preparation_us + command.report.feedback_us;
     log.samples.push_back(std::move(sample));
     if (hooks.progress) hooks.progress(std::min(1.0, true_follower.arc_length() / scenario.path().length()));
@@ -192,14 +200,19 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
       log.ended = "the vehicle took more than three times as long as it should have";
       break;
     }
+    begin(LoopPart::simulate);
     truth.advance(command.inputs.data(), step);
     sensors.measure_inputs(command.inputs.data(), measured.data());
+    begin(LoopPart::prepare_control);
     controller->prepare();
+    begin(LoopPart::prepare_estimate);
     if (!oracle) {
       estimator->push_input(time, measured.data());
       estimator->prepare();
     }
+    begin(LoopPart::simulate);
   }
+  begin(LoopPart::end);
   return log;
 }
 

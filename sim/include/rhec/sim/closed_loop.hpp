@@ -25,6 +25,7 @@ struct Sample {
   Status estimator_status = Status::solved, controller_status = Status::solved;
   bool estimator_fallback = false, controller_fallback = false, softened = false;
   double estimator_us = 0.0, controller_us = 0.0;  ///< preparation and feedback of the solvers [us]
+  double estimator_feedback_us = 0.0;              ///< of it, what came after the measurement [us]
 };
 
 struct RunLog {

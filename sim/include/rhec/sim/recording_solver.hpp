@@ -37,6 +37,17 @@ class RHEC_EXPORT RecordingSolver final : public Solver {
   Iterate guess_;
 };
 
+/// What a closed loop does in a sample, and its end.
+enum class LoopPart {
+  simulate,          ///< the vehicle moves, its sensors measure
+  estimate,          ///< once the measurement is known
+  control,           ///< once the estimate is known
+  log,               ///< what is kept of the sample
+  prepare_control,   ///< for the next sample
+  prepare_estimate,  ///< for the next sample
+  end,               ///< of the loop
+};
+
 /// What a caller can hang into a loop (a closed one, or the replay of a log).
 struct LoopHooks {
   /// Told the share of the way that is done.
@@ -46,6 +57,8 @@ struct LoopHooks {
   std::function<void(std::int64_t step, const HorizonProblem& problem, const Iterate& guess, const Iterate& result,
                      const Report& report)>
       solved;
+  /// Told which part of a sample begins, in a closed loop: for who takes the time.
+  std::function<void(LoopPart part)> begins;
 };
 
 /// A copy of a robot whose solvers tell `hooks.solved`; `step` is asked at each solve. The robot alone, where nobody
