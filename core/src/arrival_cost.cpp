@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "small_matrix.hpp"
+#include "with_size.hpp"
 
 namespace rhec {
 namespace {
@@ -86,13 +87,16 @@ void ArrivalCost::factor_covariance() noexcept {
     scale_[j] = std::sqrt(std::max(filter_.covariance(j, j), least * least));
   }
   double ridge = 0.0;
-  do {
-    for (int c = 0; c < n; ++c) {
-      for (int r = 0; r < n; ++r)
-        factor_(r, c) = r == c ? 1.0 + ridge : filter_.covariance(r, c) / (scale_[r] * scale_[c]);
+  const auto factor_with_ridge = [&](auto size) {
+    const double *covariance = filter_.covariance.data(), *scale = scale_.data();
+    double* factor = factor_.data();
+    for (int c = 0; c < size; ++c) {
+      factor[c * size + c] = 1.0 + ridge;
+      for (int r = c + 1; r < size; ++r) factor[c * size + r] = covariance[c * size + r] / (scale[r] * scale[c]);
     }
-    ridge = ridge == 0.0 ? least_pivot : 10.0 * ridge;
-  } while (!small::factor(factor_.data(), n, n, least_pivot) && ridge < 100.0);
+    return small::factor(factor, size, size, least_pivot);
+  };
+  while (!with_size(n, factor_with_ridge) && ridge < 10.0) ridge = ridge == 0.0 ? least_pivot : 10.0 * ridge;
 }
 
 void ArrivalCost::write(RheProblem& problem) noexcept {
@@ -105,25 +109,32 @@ void ArrivalCost::write(RheProblem& problem) noexcept {
   factor_covariance();
   invert_factor();
   // D^-1 L^-T L^-1 D^-1
-  for (int c = 0; c < n; ++c) {
-    for (int r = c; r < n; ++r) {
-      double sum = 0.0;
-      for (int k = r; k < n; ++k) sum += inverse_(k, r) * inverse_(k, c);
-      problem.arrival_information(r, c) = problem.arrival_information(c, r) = sum / (scale_[r] * scale_[c]);
+  with_size(n, [&](auto size) {
+    const double *inverse = inverse_.data(), *scale = scale_.data();
+    double* information = problem.arrival_information.data();
+    for (int c = 0; c < size; ++c) {
+      for (int r = c; r < size; ++r) {
+        double sum = 0.0;
+        for (int k = r; k < size; ++k) sum += inverse[r * size + k] * inverse[c * size + k];
+        information[c * size + r] = information[r * size + c] = sum / (scale[r] * scale[c]);
+      }
     }
-  }
+  });
 }
 
 /// Of the factor L, in the lower triangle.
 void ArrivalCost::invert_factor() noexcept {
-  const int n = static_cast<int>(scale_.size());
-  for (int c = 0; c < n; ++c) {
-    for (int r = c; r < n; ++r) {
-      double value = r == c ? 1.0 : 0.0;
-      for (int k = c; k < r; ++k) value -= factor_(r, k) * inverse_(k, c);
-      inverse_(r, c) = value / factor_(r, r);
+  with_size(static_cast<int>(scale_.size()), [&](auto n) {
+    const double* factor = factor_.data();
+    double* inverse = inverse_.data();
+    for (int c = 0; c < n; ++c) {
+      for (int r = c; r < n; ++r) {
+        double value = r == c ? 1.0 : 0.0;
+        for (int k = c; k < r; ++k) value -= factor[k * n + r] * inverse[c * n + k];
+        inverse[c * n + r] = value / factor[r * n + r];
+      }
     }
-  }
+  });
 }
 
 void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, const std::vector<Border>& borders,

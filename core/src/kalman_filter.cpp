@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "rhec/core/rhe_problem.hpp"
+#include "with_size.hpp"
 
 namespace rhec {
 
@@ -25,7 +26,7 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   jacobian_.assign(static_cast<std::size_t>(nx_) * (nx_ + nu_ + 2 * np_), 0.0);
   input_.assign(nu_, 0.0);
   work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
-  gain_ = row_ = image_ = correction_ = Eigen::VectorXd::Zero(n);
+  gain_ = image_ = zeros_ = correction_ = Eigen::VectorXd::Zero(n);
 }
 
 void KalmanFilter::clip() noexcept {
@@ -50,45 +51,56 @@ void KalmanFilter::update(const double* y, const double* robust_weights) noexcep
 }
 
 void KalmanFilter::take_output(int output, double measured, double variance) noexcept {
-  const int n = nx_ + np_;
   double innovation = model_->description().outputs[output].is_angle ? angle_difference(measured, predicted_[output])
                                                                      : measured - predicted_[output];
-  row_.setZero();
-  for (int c = 0; c < nx_; ++c) row_[c] = output_jacobian_[c * ny_ + output];
-  image_.setZero();
-  for (int c = 0; c < nx_; ++c) {
-    innovation -= row_[c] * correction_[c];
-    for (int r = 0; r < n; ++r) image_[r] += covariance(r, c) * row_[c];
-  }
-  double total = variance;
-  for (int c = 0; c < nx_; ++c) total += row_[c] * image_[c];
-  if (!(total > 0.0)) return;
-  for (int r = 0; r < n; ++r) gain_[r] = image_[r] / total;
-  // Joseph's form, (I - k h') Pi (I - k h')' + k r k': it stays positive semidefinite, and exact where a vague prior
-  // meets a good measurement. One factor after the other, it takes no product of matrices (Bierman 1977).
-  for (int c = 0; c < n; ++c)
-    for (int r = 0; r < n; ++r) work_(r, c) = covariance(r, c) - gain_[r] * image_[c];
-  image_.setZero();
-  for (int c = 0; c < nx_; ++c)
-    for (int r = 0; r < n; ++r) image_[r] += work_(r, c) * row_[c];
-  bool finite = std::isfinite(innovation);
-  for (int c = 0; c < n; ++c) {
-    for (int r = 0; r < n; ++r) {
-      next_covariance_(r, c) = work_(r, c) + (variance * gain_[r] - image_[r]) * gain_[c];
-      finite = finite && std::isfinite(next_covariance_(r, c));
+  const double* of_output = output_jacobian_.data() + output;
+  for (int c = 0; c < nx_; ++c) innovation -= of_output[c * ny_] * correction_[c];
+  const bool taken = with_size(nx_ + np_, [&](auto n) {
+    const double* P = covariance.data();
+    double* __restrict image = image_.data();
+    double* __restrict gain = gain_.data();
+    double* __restrict work = work_.data();
+    double* __restrict next = next_covariance_.data();
+    const auto multiply_row = [&](const double* by) {
+      std::fill_n(image, n, 0.0);
+      for (int c = 0; c < nx_; ++c)
+        for (int r = 0; r < n; ++r) image[r] += by[c * n + r] * of_output[c * ny_];
+    };
+    multiply_row(P);
+    double total = variance;
+    for (int c = 0; c < nx_; ++c) total += of_output[c * ny_] * image[c];
+    if (!(total > 0.0)) return false;
+    for (int r = 0; r < n; ++r) gain[r] = image[r] / total;
+    // Joseph's form, (I - k h') Pi (I - k h')' + k r k': it stays positive semidefinite, and exact where a vague prior
+    // meets a good measurement. One factor after the other, it takes no product of matrices (Bierman 1977).
+    for (int c = 0; c < n; ++c)
+      for (int r = 0; r < n; ++r) work[c * n + r] = P[c * n + r] - gain[r] * image[c];
+    multiply_row(work);
+    for (int r = 0; r < n; ++r) image[r] = variance * gain[r] - image[r];
+    double* __restrict zeros = zeros_.data();  // as long as every number is finite, else NaN
+    std::fill_n(zeros, n, 0.0 * innovation);
+    for (int c = 0; c < n; ++c) {
+      for (int r = 0; r < n; ++r) {
+        next[c * n + r] = work[c * n + r] + image[r] * gain[c];
+        zeros[r] += 0.0 * next[c * n + r];
+      }
     }
-  }
-  if (!finite) return;
-  for (int r = 0; r < n; ++r) correction_[r] += gain_[r] * innovation;
-  make_symmetric();
+    for (int r = 0; r < n; ++r)
+      if (zeros[r] != 0.0) return false;
+    for (int r = 0; r < n; ++r) correction_[r] += gain[r] * innovation;
+    return true;
+  });
+  if (taken) make_symmetric();
 }
 
 /// covariance = the symmetric part of the next one.
 void KalmanFilter::make_symmetric() noexcept {
-  const int n = nx_ + np_;
-  for (int c = 0; c < n; ++c)
-    for (int r = 0; r <= c; ++r)
-      covariance(r, c) = covariance(c, r) = 0.5 * (next_covariance_(r, c) + next_covariance_(c, r));
+  with_size(nx_ + np_, [&](auto n) {
+    double* __restrict P = covariance.data();
+    const double* next = next_covariance_.data();
+    for (int c = 0; c < n; ++c)
+      for (int r = 0; r < n; ++r) P[c * n + r] = 0.5 * (next[c * n + r] + next[r * n + c]);
+  });
 }
 
 void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration) noexcept {
@@ -114,22 +126,27 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   if (ramp_variances)
     for (int c = 0; c < np_; ++c)
       for (int r = 0; r < nx_; ++r) jacobian_[(nx_ + nu_ + c) * nx_ + r] += jacobian_[(nx_ + nu_ + np_ + c) * nx_ + r];
-  const auto transition = [&](int column) { return jacobian_.data() + (column < nx_ ? column : nu_ + column) * nx_; };
-  for (int c = 0; c < n; ++c) {
-    double* moved = work_.col(c).data();
-    std::fill_n(moved, nx_, 0.0);
-    for (int k = 0; k < n; ++k)
-      for (int r = 0; r < nx_; ++r) moved[r] += transition(k)[r] * covariance(k, c);
-  }
-  next_covariance_ = covariance;
-  for (int c = 0; c < nx_; ++c) {
-    double* next = next_covariance_.col(c).data();
-    std::fill_n(next, nx_, 0.0);
-    for (int k = 0; k < n; ++k)
-      for (int r = 0; r < nx_; ++r) next[r] += work_(r, k) * transition(k)[c];
-  }
-  for (int c = nx_; c < n; ++c)
-    for (int r = 0; r < nx_; ++r) next_covariance_(r, c) = next_covariance_(c, r) = work_(r, c);
+  with_size(nx_, [&](auto nx) {
+    const auto transition = [&](int column) { return jacobian_.data() + (column < nx ? column : nu_ + column) * nx; };
+    const double* P = covariance.data();
+    double* __restrict work = work_.data();
+    double* __restrict next = next_covariance_.data();
+    for (int c = 0; c < n; ++c) {
+      double* moved = work + c * n;
+      std::fill_n(moved, nx, 0.0);
+      for (int k = 0; k < n; ++k)
+        for (int r = 0; r < nx; ++r) moved[r] += transition(k)[r] * P[c * n + k];
+    }
+    std::copy_n(P, n * n, next);
+    for (int c = 0; c < nx; ++c) {
+      double* column = next + c * n;
+      std::fill_n(column, nx, 0.0);
+      for (int k = 0; k < n; ++k)
+        for (int r = 0; r < nx; ++r) column[r] += work[k * n + r] * transition(k)[c];
+    }
+    for (int c = nx; c < n; ++c)
+      for (int r = 0; r < nx; ++r) next[c * n + r] = next[r * n + c] = work[c * n + r];
+  });
   // Noise enters through the inputs and, on a ramp, through the change of the parameter over the interval.
   for (int j = 0; j < nu_; ++j) {
     const double wide = 100.0 * model_->description().inputs[j].scale;

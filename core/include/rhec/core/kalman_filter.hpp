@@ -53,7 +53,7 @@ class RHEC_EXPORT KalmanFilter {
   int substeps_, nx_, nu_, np_, ny_;
   std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
   Eigen::MatrixXd work_, next_covariance_;
-  Eigen::VectorXd gain_, row_, image_, correction_;
+  Eigen::VectorXd gain_, image_, zeros_, correction_;
 };
 
 }  // namespace rhec
