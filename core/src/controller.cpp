@@ -102,24 +102,31 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
   command_.reference = path_.point_at(arc_length, segment);
   reference_segment_ = segment;
   const double ground_speed = command_.reference.speed, distance = setup_.interval * std::abs(ground_speed);
+  bound_speed(setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset);
   choose_straight_motion(ground_speed, parameters);
-  const double most = setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset;
-  if (std::isfinite(most)) go_straight(most, nominal_parameters_.data(), largest_);
+  for (int j = 0; j < nu; ++j)
+    straight_[nx + j] = std::min(std::max(straight_[nx + j], problem_.input_lower(0, j)), problem_.input_upper(0, j));
   for (int i = 0; i <= N; ++i) {
     const PathPoint target = path_.point_at(arc_length + i * distance, segment);
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
-    if (i == N) break;
-    double* u = problem_.input_reference(i);
+    if (i < N) std::copy_n(straight_.data() + nx, nu, problem_.input_reference(i));
+  }
+}
+
+/// Inputs that drive the vehicle ahead at most as fast as a speed over ground without slip asks for.
+void Controller::bound_speed(double most) noexcept {
+  if (!std::isfinite(most) || most == bounded_speed_) return;
+  bounded_speed_ = most;
+  go_straight(most, nominal_parameters_.data(), largest_);
+  const int nx = problem_.model().state_count(), nu = problem_.model().input_count();
+  for (int i = 0; i < problem_.intervals(); ++i) {
     for (int j = 0; j < nu; ++j) {
-      double &lower = problem_.input_lower(i, j), &upper = problem_.input_upper(i, j);
       const double largest = largest_[nx + j];
-      if (std::isfinite(most) && largest != 0.0) {
-        lower = std::min(0.0, largest);
-        upper = std::max(0.0, largest);
-      }
-      u[j] = std::min(std::max(straight_[nx + j], lower), upper);
+      if (largest == 0.0) continue;
+      problem_.input_lower(i, j) = std::min(0.0, largest);
+      problem_.input_upper(i, j) = std::max(0.0, largest);
     }
   }
 }

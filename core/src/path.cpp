@@ -25,6 +25,8 @@ void check(const Waypoint& waypoint, std::size_t number) {
 }  // namespace
 
 Path::Path(const std::vector<Waypoint>& waypoints) {
+  for (auto* of : {&x_, &y_, &speeds_, &arc_lengths_, &direction_x_, &direction_y_, &headings_})
+    of->reserve(waypoints.size());
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     const Waypoint& waypoint = waypoints[i];
     check(waypoint, i + 1);
@@ -55,6 +57,17 @@ int Path::segment_at(double arc_length) const noexcept {
   return static_cast<int>(after - arc_lengths_.begin()) - 1;
 }
 
+/// The same, by a few steps from where it would be if all segments were as long as one that lies near.
+int Path::segment_near(int known, double arc_length) const noexcept {
+  const int last = size() - 2;
+  known = std::clamp(known, 0, last);
+  const double on = (arc_length - arc_lengths_[known]) / (arc_lengths_[known + 1] - arc_lengths_[known]);
+  int i = static_cast<int>(std::min(std::max(0.0, known + on), static_cast<double>(last))), steps = near;
+  while (steps > 0 && i < last && arc_lengths_[i + 1] <= arc_length) ++i, --steps;
+  while (steps > 0 && i > 0 && arc_lengths_[i] > arc_length) --i, --steps;
+  return steps > 0 ? i : segment_at(arc_length);
+}
+
 PathPoint Path::point_on(int i, double arc_length) const noexcept {
   const double along = arc_length - arc_lengths_[i];
   const double fraction = std::clamp(along / (arc_lengths_[i + 1] - arc_lengths_[i]), 0.0, 1.0);
@@ -67,11 +80,7 @@ PathPoint Path::point_on(int i, double arc_length) const noexcept {
 PathPoint Path::point_at(double arc_length) const noexcept { return point_on(segment_at(arc_length), arc_length); }
 
 PathPoint Path::point_at(double arc_length, int& segment) const noexcept {
-  const int last = size() - 2;
-  int i = std::clamp(segment, 0, last), steps = near;
-  while (steps > 0 && i < last && arc_lengths_[i + 1] <= arc_length) ++i, --steps;
-  while (steps > 0 && i > 0 && arc_lengths_[i] > arc_length) --i, --steps;
-  segment = steps > 0 ? i : segment_at(arc_length);
+  segment = segment_near(segment, arc_length);
   return point_on(segment, arc_length);
 }
 
@@ -79,7 +88,9 @@ PathProjection Path::closest(double x, double y, double from, double to) const n
   struct Nearest {
     double along, off_x, off_y, square;
   };
-  const int last = size() - 2, first = segment_at(from);
+  const int last = size() - 2;
+  const double evenly = from / length() * (last + 1);  // where it would be if all segments were of one length
+  const int first = segment_near(static_cast<int>(std::min(std::max(0.0, evenly), static_cast<double>(last))), from);
   const auto nearest_on = [&](int i) -> Nearest {
     // The part of this segment that lies in the stretch, as distances from the segment's start.
     const double begin = from - arc_lengths_[i];
@@ -111,8 +122,8 @@ PathProjection Path::closest(double x, double y, double from, double to) const n
     if (to <= arc_lengths_[i + 1]) break;
     // Whoever goes on for some length comes nearer by no more than that: segments from which the best point is out of
     // reach are passed over.
-    const double reach = arc_lengths_[i + 1] + distance - at_most - smallest_segment;
-    while (i + 1 < last && arc_lengths_[i + 2] < std::min(reach, to)) ++i;
+    const double reach = std::min(arc_lengths_[i + 1] + distance - at_most - smallest_segment, to);
+    if (i + 1 < last && arc_lengths_[i + 2] < reach) i = segment_near(i + 1, reach) - 1;
   }
   return best;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -65,6 +66,7 @@ class RHEC_EXPORT Controller {
  private:
   void go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept;
   void choose_straight_motion(double ground_speed, const double* parameters) noexcept;
+  void bound_speed(double most) noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
   void start_cold() noexcept;
 
@@ -77,7 +79,8 @@ class RHEC_EXPORT Controller {
   Iterate point_;
   Command command_;
   bool has_plan_ = false, prepared_ = false;
-  int reference_segment_ = 0;  ///< of the path, where the last reference began
+  double bounded_speed_ = std::numeric_limits<double>::quiet_NaN();  ///< that the inputs' bounds are made for [m/s]
+  int reference_segment_ = 0;                                        ///< of the path, where the last reference began
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_;
   std::vector<double> nominal_parameters_, reference_parameters_;

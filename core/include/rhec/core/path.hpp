@@ -54,6 +54,7 @@ class RHEC_EXPORT Path {
 
  private:
   int segment_at(double arc_length) const noexcept;
+  int segment_near(int known, double arc_length) const noexcept;
   PathPoint point_on(int segment, double arc_length) const noexcept;
 
   std::vector<double> x_, y_, speeds_, arc_lengths_;  // one per waypoint
