@@ -7,6 +7,7 @@
 #include <cstring>
 #include <numbers>
 
+#include "lattice_sum.hpp"
 #include "piecewise_polynomial.hpp"
 #include "rhec/core/error.hpp"
 #include "rhec/sim/random.hpp"
@@ -62,8 +63,7 @@ class Gaussian final : public SlipField {
       }
       std::copy_n(noise, (stride_ - side_) * stride_, end);
     }
-    for (int tap = 0; tap < taps; ++tap)
-      fixed_weights_[tap / 2][tap % 2] = std::exp(-std::pow(lattice_step * offset(tap), 2));
+    for (int tap = 0; tap < taps; ++tap) fixed_weights_[tap] = std::exp(-std::pow(lattice_step * offset(tap), 2));
   }
 
   int channels() const noexcept override { return static_cast<int>(ranges_.size()); }
@@ -71,13 +71,13 @@ class Gaussian final : public SlipField {
 
  private:
   static constexpr double lattice_step = 0.7;  // in correlation lengths
-  static constexpr int taps = 12;              // beyond them the kernel is below 1e-7
+  static constexpr int taps = lattice_taps;    // beyond them the kernel is below 1e-7
   static constexpr int offset(int tap) { return tap - (taps / 2 - 1); }
   static constexpr double farthest = 8.5;  // standard deviations: what is normal and lies beyond is less than rounding
 
+  using Taps = std::array<double, taps>;
   // Two neighbours at once, as every machine can; left to itself the compiler takes them one by one.
   using Pair [[gnu::vector_size(2 * sizeof(double))]] = double;
-  using Taps = std::array<Pair, taps / 2>;
 
   // What would be exponential and error functions at every look-up.
   struct Tables {
@@ -104,8 +104,12 @@ class Gaussian final : public SlipField {
     const double ratio = tables_->ratio(fraction), square = ratio * ratio;
     Axis axis;
     Pair factor = tables_->first_weight(fraction) * Pair{1.0, ratio};
-    for (std::size_t pair = 0; pair < axis.weights.size(); ++pair, factor *= square)
-      axis.weights[pair] = factor * fixed_weights_[pair];
+    for (int tap = 0; tap < taps; tap += 2, factor *= square) {
+      Pair weights;
+      std::memcpy(&weights, &fixed_weights_[tap], sizeof weights);
+      weights *= factor;
+      std::memcpy(&axis.weights[tap], &weights, sizeof weights);
+    }
     const double first = whole + offset(0);
     axis.first = static_cast<std::ptrdiff_t>(first - side_ * std::floor(first / side_));
     return axis;
@@ -115,24 +119,15 @@ class Gaussian final : public SlipField {
     const Axis columns = look_at(x / spacing_), rows = look_at(y / spacing_);
     const double* corner = noise_.data() + rows.first * stride_ + columns.first;
     for (const auto& [lower, upper] : ranges_) {
-      Taps sums = {};
-      const double* row = corner;
-      for (int tap = 0; tap < taps; ++tap, row += stride_) {
-        for (std::size_t pair = 0; pair < sums.size(); ++pair) {
-          Pair noise;
-          std::memcpy(&noise, row + 2 * pair, sizeof noise);
-          sums[pair] += rows.weights[tap / 2][tap % 2] * noise;
-        }
-      }
-      Pair total = {};
-      for (std::size_t pair = 0; pair < sums.size(); ++pair) total += columns.weights[pair] * sums[pair];
-      const double g = std::min(std::max(total[0] + total[1], -farthest), farthest);
+      const double sum = lattice_sum_(corner, stride_, rows.weights.data(), columns.weights.data());
+      const double g = std::min(std::max(sum, -farthest), farthest);
       *values++ = lower + (upper - lower) * tables_->share_below(g);
       corner += stride_ * stride_;
     }
   }
 
   const Tables* tables_;
+  LatticeSum lattice_sum_ = available_lattice_sums().back();
   std::vector<SlipRange> ranges_;
   double spacing_;
   std::ptrdiff_t side_ = 0, stride_ = 0;
