@@ -93,7 +93,7 @@ Part part_of(sim::LoopPart part) {
     case sim::LoopPart::control:
     case sim::LoopPart::prepare_control:
       return references;
-    case sim::LoopPart::log:
+    case sim::LoopPart::log_sample:
       return log;
     case sim::LoopPart::end:  // what is left is to take it down
       break;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -154,7 +155,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     }
     begin(LoopPart::control);
     const Controller::Command& command = controller->control(*estimate);
-    begin(LoopPart::log);
+    begin(LoopPart::log_sample);
     true_follower.advance(truth.state()[roles.position_x], truth.state()[roles.position_y]);
 
     Sample sample;
@@ -224,6 +225,7 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
   summary.ended = log.ended;
   Errors all(about), after_start(about);
   std::vector<double> estimator_us, controller_us;
+  std::map<Status, std::int64_t> estimator_statuses, controller_statuses;
   double nees = 0.0;
   std::int64_t with_nees = 0;
   const bool solves_estimation = scenario.robot().estimator_options().name == EstimatorOptions::Name::rhe;
@@ -236,15 +238,17 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
     }
     if (solves_estimation) {
       estimator_us.push_back(sample.estimator_us);
-      ++summary.estimator_statuses[name_of(sample.estimator_status)];
+      ++estimator_statuses[sample.estimator_status];
       summary.fallbacks += sample.estimator_fallback;
       ++summary.solves;
     }
     controller_us.push_back(sample.controller_us);
-    ++summary.controller_statuses[name_of(sample.controller_status)];
+    ++controller_statuses[sample.controller_status];
     summary.fallbacks += sample.controller_fallback;
     ++summary.solves;
   }
+  for (const auto& [status, count] : estimator_statuses) summary.estimator_statuses[name_of(status)] = count;
+  for (const auto& [status, count] : controller_statuses) summary.controller_statuses[name_of(status)] = count;
   summary.mae = all.absolute();
   summary.rmse = all.root_mean_square();
   summary.mae_after_start = after_start.absolute();

@@ -42,7 +42,7 @@ enum class LoopPart {
   simulate,          ///< the vehicle moves, its sensors measure
   estimate,          ///< once the measurement is known
   control,           ///< once the estimate is known
-  log,               ///< what is kept of the sample
+  log_sample,        ///< what is kept of the sample
   prepare_control,   ///< for the next sample
   prepare_estimate,  ///< for the next sample
   end,               ///< of the loop
