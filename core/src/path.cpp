@@ -123,7 +123,7 @@ PathProjection Path::closest(double x, double y, double from, double to) const n
     // Whoever goes on for some length comes nearer by no more than that: segments from which the best point is out of
     // reach are passed over.
     const double reach = std::min(arc_lengths_[i + 1] + distance - at_most - smallest_segment, to);
-    if (i + 1 < last && arc_lengths_[i + 2] < reach) i = segment_near(i + 1, reach) - 1;
+    while (i + 1 < last && arc_lengths_[i + 2] < reach) ++i;
   }
   return best;
 }
