@@ -58,7 +58,7 @@ struct LoopHooks {
                      const Report& report)>
       solved;
   /// Told which part of a sample begins, in a closed loop: for who takes the time.
-  std::function<void(LoopPart part)> begins;
+  std::function<void(LoopPart part)> begins = {};
 };
 
 /// A copy of a robot whose solvers tell `hooks.solved`; `step` is asked at each solve. The robot alone, where nobody
