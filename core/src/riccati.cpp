@@ -145,6 +145,86 @@ Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iter
   return Outcome::done;
 }
 
+Riccati::Responses::Responses(const Capacity& capacity) {
+  for (auto* v : {&values, &costates})
+    v->assign(static_cast<std::size_t>(capacity.intervals + 1) * capacity.row() * size, 0.0);
+}
+
+bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
+                      bool with_minimiser, Responses& responses) noexcept {
+  constexpr int size = Responses::size, minimiser = size - 1;
+  static_assert(size == response_batch);
+  const int N = qp.intervals(), n = qp.states(0);
+  const auto is_set = [](std::uint8_t flag) { return flag != 0; };
+  if (std::any_of(is_special_.data(), is_special_.data() + N, is_set) || reductions_[N].rows > 0) return false;
+  double *values = responses.values.data(), *costates = responses.costates.data();
+  for (int i = 0; i <= N; ++i)
+    std::fill_n(values + static_cast<std::ptrdiff_t>(i) * stride_ * size, (ns_ + qp.controls(i)) * size, 0.0);
+  int last = 0;
+  for (int c = 0; c < count; ++c) {
+    const auto [stage, place] = gradients[c];
+    values[(static_cast<std::ptrdiff_t>(stage) * stride_ + place) * size + c] = 1.0;
+    last = std::max(last, stage);
+  }
+  if (with_minimiser) {
+    last = N;
+    for (int j = 0; j < qp.states(N); ++j)
+      values[(static_cast<std::ptrdiff_t>(N) * stride_ + j) * size + minimiser] = qp.q(N)[j];
+  }
+  const RiccatiView view = view_of(qp, active);
+  kernels_->respond_backward(view, last, values, with_minimiser);
+  std::fill_n(costates, with_minimiser ? stride_ * size : 0, 0.0);
+  if (qp.initial_state_is_given) {
+    const double* s0 = qp.initial_step();
+    if (with_minimiser) {
+      std::copy_n(values, n * size, costates);
+      for (int j = 0; j < n; ++j)
+        for (int l = 0; l < n; ++l) costates[j * size + minimiser] += P(0)[l * stride_ + j] * s0[l];
+    }
+    std::fill_n(values, n * size, 0.0);
+    for (int j = 0; with_minimiser && j < n; ++j) values[j * size + minimiser] = s0[j];
+  } else {
+    // -(G G')^-1 of the gradients, with the factor's lower triangle.
+    const double* G = special(N).factor;
+    const auto row = [values](int j) { return values + static_cast<std::ptrdiff_t>(j) * size; };
+    const auto subtract = [&row](int from, int other, double factor) {
+      for (int c = 0; c < size; ++c) row(from)[c] -= row(other)[c] * factor;
+    };
+    const auto scale = [&row](int j, double factor) {
+      for (int c = 0; c < size; ++c) row(j)[c] *= factor;
+    };
+    for (int j = 0; j < n; ++j) {
+      for (int k = 0; k < j; ++k) subtract(j, k, G[k * width_ + j]);
+      scale(j, 1.0 / G[j * width_ + j]);
+    }
+    for (int j = n - 1; j >= 0; --j) {
+      for (int k = j + 1; k < n; ++k) subtract(j, k, -G[j * width_ + k]);
+      scale(j, -1.0 / G[j * width_ + j]);
+    }
+  }
+  kernels_->respond_forward(view, values, with_minimiser ? costates : nullptr);
+  return true;
+}
+
+void Riccati::combine(const StageQp& qp, const ActiveSet& active, const Responses& responses, const double* weights,
+                      Iterate& step) noexcept {
+  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(qp.intervals() + 1) * stride_;
+  for (double* rows : {step.row(0), step.costate(0), step.bound_row(0)}) std::fill_n(rows, entries, 0.0);
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(i) * stride_ * Responses::size;
+    kernels_->combine(responses.values.data() + first, weights, step.row(i), ns_ + qp.controls(i));
+    kernels_->combine(responses.costates.data() + first, weights, step.costate(i), qp.states(i));
+  }
+  for (int i = 0; i < qp.intervals(); ++i) {
+    for (int j = 0; j < qp.controls(i); ++j) {
+      const std::int8_t side = active.control(i)[j];
+      if (side == 0) continue;
+      step.control_bound(i)[j] = step.control(i)[j];
+      step.control(i)[j] = (side < 0 ? qp.control_lower(i) : qp.control_upper(i))[j];
+    }
+  }
+}
+
 void Riccati::feedback(const StageQp& qp, int i, const double* s, double* w) noexcept {
   const int n = qp.states(i), m = qp.controls(i);
   if (is_special_[i] == 0) {

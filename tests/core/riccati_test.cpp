@@ -85,6 +85,104 @@ TEST(Riccati, AgreesWithTheDenseSystemWithActiveControlsAndStates) {
   EXPECT_GT(compared, 150);
 }
 
+TEST(Riccati, RespondsToAGradientAsTheSolutionChangesWithIt) {
+  RandomQp random(8);
+  for (int trial = 0; trial < 60; ++trial) {
+    StageQp qp = random.make(random.integer(1, 8), random.integer(1, 7), random.integer(1, 11), trial % 2 == 0);
+    const int N = qp.intervals(), ns = qp.capacity().states, stride = qp.stride();
+    ActiveSet active(qp.capacity());
+    std::vector<Riccati::Entry> places;
+    for (int i = 0; i <= N; ++i) {
+      for (int j = 0; j < qp.states(i); ++j) places.push_back({i, j});
+      for (int j = 0; j < qp.controls(i); ++j) {
+        active.control(i)[j] = random.uniform(0.0, 1.0) < 0.3 ? -1 : 0;
+        qp.control_lower(i)[j] = -0.2;
+        if (active.control(i)[j] == 0) places.push_back({i, ns + j});
+      }
+    }
+    Riccati riccati(qp.capacity());
+    riccati.factor(qp, active);
+    Iterate before(qp.capacity()), after(qp.capacity());
+    ASSERT_EQ(riccati.solve(qp, active, before), Riccati::Outcome::done);
+    std::vector<Riccati::Entry> gradients;
+    for (int c = random.integer(1, Riccati::Responses::size); c > 0; --c)
+      gradients.push_back(places[random.integer(0, static_cast<int>(places.size()) - 1)]);
+    const int count = static_cast<int>(gradients.size());
+    const bool with_minimiser = count < Riccati::Responses::size;
+    Riccati::Responses responses(qp.capacity());
+    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), count, with_minimiser, responses));
+    for (int c = 0; c < count; ++c) {
+      StageQp changed = qp;
+      changed.h(gradients[c].stage)[gradients[c].place] += 1.0;
+      ASSERT_EQ(riccati.solve(changed, active, after), Riccati::Outcome::done);
+      for (int i = 0; i <= N; ++i) {
+        const auto expect_response = [&](int place, double difference) {
+          ASSERT_NEAR(responses.values[(i * stride + place) * Riccati::Responses::size + c], difference, 1e-9)
+              << "trial " << trial << ", stage " << i << ", place " << place;
+        };
+        for (int j = 0; j < qp.states(i); ++j) expect_response(j, after.state(i)[j] - before.state(i)[j]);
+        for (int j = 0; j < qp.controls(i); ++j)
+          expect_response(ns + j, active.control(i)[j] ? after.control_bound(i)[j] - before.control_bound(i)[j]
+                                                       : after.control(i)[j] - before.control(i)[j]);
+      }
+    }
+  }
+}
+
+TEST(Riccati, CombinesResponsesToTheSolutionWithTheirGradients) {
+  RandomQp random(10);
+  for (int trial = 0; trial < 60; ++trial) {
+    StageQp qp = random.make(random.integer(1, 8), random.integer(1, 7), random.integer(1, 11), trial % 2 == 0);
+    ActiveSet active(qp.capacity());
+    for (int i = 0; i < qp.intervals(); ++i) {
+      for (int j = 0; j < qp.controls(i); ++j) {
+        active.control(i)[j] = random.uniform(0.0, 1.0) < 0.3 ? 1 : 0;
+        qp.control_upper(i)[j] = 0.3;
+      }
+    }
+    Riccati riccati(qp.capacity());
+    riccati.factor(qp, active);
+    Riccati::Responses responses(qp.capacity());
+    alignas(64) double weights[Riccati::Responses::size] = {};
+    weights[Riccati::Responses::size - 1] = 1.0;
+    StageQp changed = qp;
+    std::vector<Riccati::Entry> gradients;
+    for (int c = 0; c < trial % Riccati::Responses::size; ++c) {
+      const int stage = random.integer(0, qp.intervals());
+      gradients.push_back({stage, random.integer(0, qp.states(stage) - 1)});
+      weights[c] = random.uniform(-2.0, 2.0);
+      changed.h(stage)[gradients[c].place] += weights[c];
+    }
+    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), static_cast<int>(gradients.size()), true, responses));
+    Iterate expected(qp.capacity()), step(qp.capacity());
+    riccati.combine(qp, active, responses, weights, step);
+    ASSERT_EQ(riccati.solve(changed, active, expected), Riccati::Outcome::done);
+    for (int i = 0; i <= qp.intervals(); ++i) {
+      for (int j = 0; j < qp.states(i); ++j) {
+        ASSERT_NEAR(step.state(i)[j], expected.state(i)[j], 1e-9);
+        ASSERT_NEAR(step.costate(i)[j], expected.costate(i)[j], 1e-9) << "trial " << trial << ", node " << i;
+        ASSERT_EQ(step.state_bound(i)[j], 0.0);
+      }
+      for (int j = 0; j < qp.controls(i); ++j) {
+        ASSERT_NEAR(step.control(i)[j], expected.control(i)[j], 1e-9);
+        ASSERT_NEAR(step.control_bound(i)[j], expected.control_bound(i)[j], 1e-9);
+      }
+    }
+  }
+}
+
+TEST(Riccati, HasNoResponsesWhereStateBoundsHold) {
+  RandomQp random(9);
+  const StageQp qp = random.make(4, 3, 2, true);
+  ActiveSet active(qp.capacity());
+  active.state(2)[1] = 1;
+  Riccati riccati(qp.capacity());
+  riccati.factor(qp, active);
+  Riccati::Responses responses(qp.capacity());
+  const Riccati::Entry gradient{1, 0};
+  EXPECT_FALSE(riccati.respond(qp, active, &gradient, 1, false, responses));
+}
+
 TEST(Riccati, RefusesActiveBoundsThatContradictEachOther) {
   RandomQp random(3);
   StageQp qp = random.make(2, 1, 1, true);

@@ -45,6 +45,19 @@ inline Lanes absolute(const Lanes& lanes) { return lanes < 0.0 ? -lanes : lanes;
 inline Lanes larger(const Lanes& a, const Lanes& b) { return b > a ? b : a; }
 inline Lanes smaller(const Lanes& a, const Lanes& b) { return b < a ? b : a; }
 
+inline double sum_of(const Lanes& lanes) {
+#if defined(__AVX512F__)
+  const Lanes fours = lanes + __builtin_shuffle(lanes, LaneMask{4, 5, 6, 7, 0, 1, 2, 3});
+  const Lanes twos = fours + __builtin_shuffle(fours, LaneMask{2, 3, 0, 1, 6, 7, 4, 5});
+  return twos[0] + twos[1];
+#elif defined(__AVX2__)
+  const Lanes twos = lanes + __builtin_shuffle(lanes, LaneMask{2, 3, 0, 1});
+  return twos[0] + twos[1];
+#else
+  return lanes[0] + lanes[1];
+#endif
+}
+
 inline double largest_of(const Lanes& lanes) {
   double result = lanes[0];
   for (int k = 1; k < lane_count; ++k) result = lanes[k] > result ? lanes[k] : result;

@@ -214,6 +214,121 @@ inline void solve_stage_forward(const RiccatiView& view, int i) {
   }
 }
 
+/// One entry of the rows of a batch of responses.
+using Batch = Row<response_batch / lane_count>;
+
+/// What stands before the program's own vectors: 1 for the minimiser, which is the last of a batch, 0 for the others.
+inline Batch minimiser_alone() {
+  Batch unit{};
+  unit.part[response_batch / lane_count - 1][lane_count - 1] = 1.0;
+  return unit;
+}
+
+template <class Stage, bool with_minimiser>
+inline void respond_stage_backward(const RiccatiView& view, int i, double* gradients) {
+  const Stage stage(view, i);
+  const long stride = view.stride;
+  const double* F = view.F + i * view.states * stride;
+  const double* U = view.U + i * view.controls * stride;
+  const double* inverse = view.inverse + i * view.controls;
+  const std::int8_t* sides = view.sides + i * stride;
+  double* own = gradients + i * stride * response_batch;
+  const double* next = own + stride * response_batch;
+  const Batch unit = minimiser_alone();
+  Batch costates[Stage::most_states], gradient[Stage::most_columns];
+  for (int l = 0; l < stage.next_states; ++l) {
+    costates[l] = Batch::from(next + l * response_batch);
+    if (with_minimiser) costates[l].add(unit, view.drift[i * stride + l]);
+  }
+  const auto form = [&](int k) {
+    gradient[k] = Batch::from(own + k * response_batch);
+    if (with_minimiser) gradient[k].add(unit, view.h[i * stride + k]);
+    for (int l = 0; l < stage.next_states; ++l) gradient[k].add(costates[l], F[l * stride + k]);
+  };
+  for (int k = stage.offset; k < stage.columns(); ++k) {
+    form(k);
+    gradient[k].to(own + k * response_batch);
+  }
+  for (int k = 0; k < stage.states; ++k) form(k);
+  if (with_minimiser) {
+    for (int f = stage.offset; f < stage.columns(); ++f) {
+      if (sides[f] == 0) continue;
+      const double* column = U + (f - stage.offset) * stride;
+      const double bound = (sides[f] < 0 ? view.lower : view.upper)[i * stride + f];
+      for (int k = stage.offset; k < stage.columns(); ++k)
+        if (sides[k] == 0) gradient[k].add(unit, column[k] * bound);
+      for (int k = 0; k < stage.states; ++k) gradient[k].add(unit, column[k] * bound);
+    }
+  }
+  for (int k = stage.columns() - 1; k >= stage.offset; --k) {
+    if (sides[k] != 0) continue;
+    const double* column = U + (k - stage.offset) * stride;
+    Batch of_control{};
+    of_control.add(gradient[k], -inverse[k - stage.offset]);
+    for (int j = stage.offset; j < k; ++j) gradient[j].add(of_control, column[j]);
+    for (int j = 0; j < stage.states; ++j) gradient[j].add(of_control, column[j]);
+    gradient[k].to(own + k * response_batch);
+  }
+  for (int k = 0; k < stage.states; ++k) gradient[k].to(own + k * response_batch);
+}
+
+template <class Stage, bool with_minimiser>
+inline void respond_stage_forward(const RiccatiView& view, int i, double* responses, double* costates) {
+  const Stage stage(view, i);
+  const long stride = view.stride;
+  const double* F = view.F + i * view.states * stride;
+  const double* U = view.U + i * view.controls * stride;
+  const double* inverse = view.inverse + i * view.controls;
+  const std::int8_t* sides = view.sides + i * stride;
+  double* own = responses + i * stride * response_batch;
+  double* next = own + stride * response_batch;
+  const Batch unit = minimiser_alone();
+  Batch z[Stage::most_columns];
+  for (int j = 0; j < stage.states; ++j) z[j] = Batch::from(own + j * response_batch);
+  for (int k = stage.offset; k < stage.columns(); ++k) {
+    z[k] = {};
+    if (sides[k] != 0) {
+      if (with_minimiser) z[k].add(unit, (sides[k] < 0 ? view.lower : view.upper)[i * stride + k]);
+      continue;
+    }
+    const double* column = U + (k - stage.offset) * stride;
+    Batch sum = Batch::from(own + k * response_batch);
+    for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
+    for (int j = stage.offset; j < k; ++j) sum.add(z[j], column[j]);
+    z[k].add(sum, -inverse[k - stage.offset]);
+  }
+  Batch next_state[Stage::most_states];
+  for (int l = 0; l < stage.next_states; ++l) {
+    Batch sum{};
+    if (with_minimiser) sum.add(unit, view.b[i * stride + l]);
+    for (int j = 0; j < stage.states; ++j) sum.add(z[j], F[l * stride + j]);
+    for (int k = stage.offset; k < stage.columns(); ++k) sum.add(z[k], F[l * stride + k]);
+    next_state[l] = sum;
+  }
+  if (with_minimiser) {
+    const double* P_next = view.P + (i + 1) * view.states * stride;
+    for (int l = 0; l < stage.next_states; ++l) {
+      Batch sum = Batch::from(next + l * response_batch);
+      for (int j = 0; j < stage.next_states; ++j) sum.add(next_state[j], P_next[l * stride + j]);
+      sum.to(costates + ((i + 1) * stride + l) * response_batch);
+    }
+  }
+  for (int l = 0; l < stage.next_states; ++l) next_state[l].to(next + l * response_batch);
+  for (int k = stage.offset; k < stage.columns(); ++k) {
+    Batch answer = z[k];
+    if (sides[k] != 0) {
+      // What a fixed control answers with is its multiplier.
+      const double* column = U + (k - stage.offset) * stride;
+      Batch sum = Batch::from(own + k * response_batch);
+      for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
+      for (int j = stage.offset; j < stage.columns(); ++j) sum.add(z[j], column[j]);
+      answer = {};
+      answer.add(sum, -1.0);
+    }
+    answer.to(own + k * response_batch);
+  }
+}
+
 /// Calls `function` with the type of a stage's shape: one of the sizes that kernels are compiled for, or any.
 template <class Function>
 inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
@@ -256,6 +371,40 @@ int solve_forward(const RiccatiView& view, int first) {
   return view.intervals;
 }
 
+void respond_backward(const RiccatiView& view, int last, double* gradients, bool with_minimiser) {
+  for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0; --i) {
+    with_shape(view, i, [&]<class Stage>() {
+      if (with_minimiser) {
+        respond_stage_backward<Stage, true>(view, i, gradients);
+      } else {
+        respond_stage_backward<Stage, false>(view, i, gradients);
+      }
+    });
+  }
+}
+
+void respond_forward(const RiccatiView& view, double* responses, double* costates) {
+  for (int i = 0; i < view.intervals; ++i) {
+    with_shape(view, i, [&]<class Stage>() {
+      if (costates) {
+        respond_stage_forward<Stage, true>(view, i, responses, costates);
+      } else {
+        respond_stage_forward<Stage, false>(view, i, responses, costates);
+      }
+    });
+  }
+}
+
+void combine(const double* batch, const double* weights, double* sums, long count) {
+  const Batch weight = Batch::from(weights);
+  for (long k = 0; k < count; ++k) {
+    const Batch entry = Batch::from(batch + k * response_batch);
+    Lanes sum = entry.part[0] * weight.part[0];
+    for (int v = 1; v < response_batch / lane_count; ++v) sum += entry.part[v] * weight.part[v];
+    sums[k] = sum_of(sum);
+  }
+}
+
 void form(const RiccatiView& view, int i, double* out) {
   with_shape(view, i, [&]<class Stage>() {
     Row<Stage::registers> X[Stage::most_columns]{};
@@ -271,7 +420,8 @@ void form(const RiccatiView& view, int i, double* out) {
 #define RHEC_JOIN(a, b) a##b
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET);
-constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {&kernels::factor, &kernels::solve_backward,
-                                                                         &kernels::solve_forward, &kernels::form};
+constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {
+    &kernels::factor,          &kernels::solve_backward, &kernels::solve_forward, &kernels::respond_backward,
+    &kernels::respond_forward, &kernels::combine,        &kernels::form};
 
 }  // namespace rhec

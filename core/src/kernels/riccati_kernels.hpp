@@ -4,6 +4,8 @@
 
 namespace rhec {
 
+constexpr int response_batch = 8;
+
 /// What the kernels of the Riccati recursion work on: plain pointers, so that units for different instruction sets
 /// share nothing else. All rows have `stride` entries; see StageQp for the program and Riccati for the rest.
 struct RiccatiView {
@@ -39,6 +41,14 @@ struct RiccatiKernels {
   int (*solve_backward)(const RiccatiView& view, int first);
   /// Control, next state and costate of stages first, first + 1, ...; returns the special one, or N.
   int (*solve_forward)(const RiccatiView& view, int first);
+  /// Responses to `response_batch` gradients at once, each entry of a row beside those of the others: from gradients of
+  /// the stages up to `last` to the value functions' gradients (in place), and from those and the initial states to the
+  /// responses (in place). There must be no special stage. If `costates` is not null, the last of the batch is the
+  /// minimiser itself, and the costates of all go there.
+  void (*respond_backward)(const RiccatiView& view, int last, double* gradients, bool with_minimiser);
+  void (*respond_forward)(const RiccatiView& view, double* responses, double* costates);
+  /// The sums of a batch, each response by its weight, over `count` entries.
+  void (*combine)(const double* batch, const double* weights, double* sums, long count);
   /// H + F'PF of one stage, as rows of `out`.
   void (*form)(const RiccatiView& view, int stage, double* out);
 };

@@ -69,6 +69,27 @@ class RHEC_EXPORT Riccati {
     return solve(qp, active, step, nullptr);
   }
 
+  /// What the minimiser answers to gradients of one entry each: with h = e_k and all else of the program's vectors 0,
+  /// the values z of all stages, and in the places of active controls their multipliers. All in the time of one:
+  /// entry c of the row of stage i is at values[(i * stride + c) * size + (number of the gradient)].
+  struct Responses {
+    static constexpr int size = 8;
+    AlignedDoubles values, costates;
+    Responses() = default;
+    explicit Responses(const Capacity& capacity);
+  };
+  struct Entry {
+    int stage, place;
+  };
+  /// With the minimiser, that is number size - 1, and `count` at most that. False where the last factorisation holds
+  /// state bounds or was convexified: those have no responses here.
+  bool respond(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count, bool with_minimiser,
+               Responses& responses) noexcept;
+  /// The same as `solve`, but for `feedback`, with each gradient by its weight (the minimiser's is 1), from responses
+  /// with the minimiser.
+  void combine(const StageQp& qp, const ActiveSet& active, const Responses& responses, const double* weights,
+               Iterate& step) noexcept;
+
   /// The control of stage i as the last `solve` would choose it for any stage-state step: w = T v(s) + Y s + y0.
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
 
