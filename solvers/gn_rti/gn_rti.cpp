@@ -147,6 +147,7 @@ void GnRti::add_step(const Ocp& ocp, const Iterate& from, double length, Iterate
 /// so that the result has no defect. Far from the solution this carries much further than the linearised states do.
 void GnRti::roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept {
   add_step(ocp, from, length, to);
+  qp_solver_.prepare_feedback(qp_);
   double deviation[Riccati::max_width], policy[Riccati::max_width];
   for (int i = 0; i < ocp.intervals(); ++i) {
     const int n = ocp.state_count(i), m = ocp.control_count(i);

@@ -4,28 +4,26 @@
 #include <cmath>
 
 #include "rhec/core/stage_checks.hpp"
+#include "tolerances.hpp"
 
 namespace rhec::gn_rti {
 namespace {
 
-constexpr int warm_rounds = 8;    // corrections of the active set before the interior-point method is called
-constexpr int polish_rounds = 6;  // the same from the interior-point method's active set
+constexpr int claimed_rounds = 1;  // tries of the claimed set where the program is not convex
+constexpr int warm_rounds = 8;     // corrections of the active set before the interior-point method is called
+constexpr int polish_rounds = 6;   // the same from the interior-point method's active set
+constexpr int few_states = 2;
 constexpr int max_interior_iterations = 60;
 // The interior point stops well before rounding spoils its Newton systems; polishing does the rest.
 constexpr StageQpSolver::Accuracy ready_to_polish{1e-8, 1e-7};
 // Where polishing does not settle, the interior point itself has to be accurate.
 constexpr StageQpSolver::Accuracy on_its_own{1e-12, 1e-10};
 constexpr double divergence = 1e10;
-constexpr double bound_tolerance = 1e-10;
-constexpr double multiplier_tolerance = 1e-9;
-
-bool is_equality(double lower, double upper) {
-  return std::isfinite(lower) && upper - lower <= 1e-14 * (1.0 + std::abs(lower));
-}
 
 }  // namespace
 
-StageQpSolver::StageQpSolver(const Capacity& capacity) : capacity_(capacity), riccati_(capacity), active_(capacity) {
+StageQpSolver::StageQpSolver(const Capacity& capacity)
+    : capacity_(capacity), riccati_(capacity), active_(capacity), no_bounds_(capacity), dual_(capacity) {
   const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1;
   marks_.assign(nodes, 0);
   bounded_.reserve(nodes * (capacity.states + capacity.controls));
@@ -34,13 +32,13 @@ StageQpSolver::StageQpSolver(const Capacity& capacity) : capacity_(capacity), ri
 
 void StageQpSolver::reset() noexcept {
   active_.clear();
-  factored_ = false;
+  factored_ = prepared_ = false;
   factorisations_ = 0;
 }
 
 void StageQpSolver::guess_from(const StageQp& qp, const Iterate& point) noexcept {
   active_.clear();
-  factored_ = bent_ = false;
+  factored_ = prepared_ = bent_ = false;
   factorisations_ = 0;
   const auto side = [](double multiplier, double lower, double upper) -> std::int8_t {
     if (is_equality(lower, upper)) return 1;
@@ -67,7 +65,29 @@ void StageQpSolver::factor(const StageQp& qp) noexcept {
   ++factorisations_;
 }
 
-void StageQpSolver::prepare(const StageQp& qp) noexcept { factor(qp); }
+/// Few state bounds of an estimator: those stay from sample to sample, mostly, and are cheap inside the factorisation.
+/// A controller's move with its horizon, so that their responses are needed in most samples.
+bool StageQpSolver::claim_is_likely(const StageQp& qp) const noexcept {
+  if (!any_active_ || qp.initial_state_is_given) return false;
+  int states = 0;
+  for (int i = 0; i <= qp.intervals(); ++i)
+    if (marks_[i] != 0)
+      for (int j = 0; j < qp.states(i); ++j) states += active_.state(i)[j] != 0;
+  return states > 0 && states <= few_states;
+}
+
+void StageQpSolver::prepare(const StageQp& qp) noexcept {
+  if (claim_is_likely(qp)) {
+    factor(qp);
+  } else {
+    prepare_changes(qp);
+  }
+}
+
+void StageQpSolver::prepare_changes(const StageQp& qp) noexcept {
+  dual_.prepare(qp, riccati_, any_active_ ? &active_ : nullptr);
+  prepared_ = true;
+}
 
 StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, const Iterate& step) noexcept {
   Violations found;
@@ -115,8 +135,38 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
 StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept {
   // An active set takes one side of such bounds and does not see that the other is violated.
   if (mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
-  if (try_active_sets(qp, step, warm_rounds, deadline)) return Outcome::active_set;
+  is_dual_ = false;
+  if (!factored_ && !prepared_) prepare(qp);
+  if (factored_) {
+    if (try_active_sets(qp, step, 1, deadline)) return Outcome::active_set;
+    factored_ = false;
+    if (Clock::now() > deadline) return Outcome::out_of_time;
+  }
+  auto outcome = solve_from_guess(qp, step, deadline);
+  if (outcome == DualActiveSet::Outcome::not_convex) {
+    // State bounds may hold what has no minimiser without them.
+    if (try_active_sets(qp, step, claimed_rounds, deadline)) return Outcome::active_set;
+    if (out_of_time_) return Outcome::out_of_time;
+    convexify(qp);
+    prepared_ = false;
+    outcome = solve_from_guess(qp, step, deadline);
+  }
+  factored_ = false;
+  if (outcome == DualActiveSet::Outcome::solved) return Outcome::active_set;
+  if (outcome == DualActiveSet::Outcome::out_of_time) return Outcome::out_of_time;
+  if (outcome == DualActiveSet::Outcome::too_much && try_active_sets(qp, step, warm_rounds, deadline))
+    return Outcome::active_set;
   return out_of_time_ ? Outcome::out_of_time : solve_by_interior_point(qp, step, deadline);
+}
+
+DualActiveSet::Outcome StageQpSolver::solve_from_guess(const StageQp& qp, Iterate& step,
+                                                       Clock::time_point deadline) noexcept {
+  if (!prepared_) prepare_changes(qp);
+  prepared_ = false;
+  const auto outcome = dual_.solve(qp, riccati_, active_, step, deadline);
+  is_dual_ = outcome == DualActiveSet::Outcome::solved;
+  factorisations_ += dual_.factorisations();
+  return outcome;
 }
 
 StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Iterate& step,
@@ -149,8 +199,7 @@ StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(StageQp& qp, Itera
 }
 
 void StageQpSolver::convexify(StageQp& qp) noexcept {
-  active_.clear();
-  riccati_.factor(qp, active_);
+  riccati_.factor(qp, no_bounds_);
   ++factorisations_;
   if (!riccati_.was_convexified()) return;
   riccati_.write_convexified(qp);

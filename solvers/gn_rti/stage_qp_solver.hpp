@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dual_active_set.hpp"
 #include "rhec/core/riccati.hpp"
 #include "rhec/core/solver.hpp"
 
@@ -10,10 +11,12 @@ namespace rhec::gn_rti {
 
 /// Solves a StageQp with all its bounds, exactly.
 ///
-/// The active set of the last sample is tried first: one factorisation, accepted only if the KKT conditions hold. Where
-/// they do not, the set is corrected by the primal-dual rule (Hintermueller, Ito & Kunisch 2002: what is violated is
-/// added, what pulls the wrong way is dropped) for a few rounds. Should that not settle, a primal-dual interior-point
-/// method takes over, whose active set is then polished to the exact solution.
+/// It starts from the active set that the last sample's multipliers claim and corrects it by a dual active-set method
+/// (DualActiveSet); where a few bounds of states make up the claim, that is first tried as it is, inside one
+/// factorisation. Should the dual method have too much to do, the set is corrected by the primal-dual rule
+/// (Hintermueller, Ito & Kunisch 2002: what is violated is added, what pulls the wrong way is dropped) for a few rounds
+/// of factorisations; and should that not settle, a primal-dual interior-point method takes over, whose active set is
+/// then polished to the exact solution. The last also has the last word on whether there is a solution.
 class StageQpSolver {
  public:
   enum class Outcome {
@@ -31,7 +34,7 @@ class StageQpSolver {
 
   /// The active set that a point's bound multipliers claim.
   void guess_from(const StageQp& qp, const Iterate& point) noexcept;
-  /// Factorises with the guess, so that `solve` needs only vectors if the guess is right.
+  /// Factorises with the guess, so that `solve` needs no factorisation if the guess is right.
   void prepare(const StageQp& qp) noexcept;
 
   /// The minimiser goes to `step`: primal steps, new costates and bound multipliers. The program's R may be
@@ -43,6 +46,10 @@ class StageQpSolver {
                                   Clock::time_point deadline = Clock::time_point::max()) noexcept;
 
   /// The control of stage i that the last solution's policy chooses for a stage-state step.
+  /// After `prepare_feedback` for the same program, which has to be as it was solved.
+  void prepare_feedback(const StageQp& qp) noexcept {
+    if (is_dual_) dual_.complete_policy(qp, riccati_);
+  }
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept {
     riccati_.feedback(qp, i, state_step, control_step);
   }
@@ -57,6 +64,9 @@ class StageQpSolver {
     bool finite = true;
   };
   void factor(const StageQp& qp) noexcept;
+  bool claim_is_likely(const StageQp& qp) const noexcept;
+  void prepare_changes(const StageQp& qp) noexcept;
+  DualActiveSet::Outcome solve_from_guess(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   Violations correct_active_set(const StageQp& qp, const Iterate& step) noexcept;
   bool try_active_sets(const StageQp& qp, Iterate& step, int rounds, Clock::time_point deadline) noexcept;
   bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted, Clock::time_point deadline) noexcept;
@@ -77,8 +87,11 @@ class StageQpSolver {
 
   Capacity capacity_;
   Riccati riccati_;
-  ActiveSet active_;
+  ActiveSet active_, no_bounds_;
+  DualActiveSet dual_;
   bool factored_ = false, bent_ = false;
+  bool prepared_ = false;  ///< for the active set as it was guessed
+  bool is_dual_ = false;   ///< the last solution is by `dual_`
   bool out_of_time_ = false;
   bool any_active_ = true;  ///< false: no bound is active, for certain
   int factorisations_ = 0;

@@ -2,60 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include "random_qp.hpp"
+#include "qp_conditions.hpp"
 
 namespace rhec::gn_rti {
 namespace {
 
+using rhec::testing::bounded_qp;
+using rhec::testing::feasible_qp;
+using rhec::testing::kkt_violation;
 using rhec::testing::RandomQp;
-
-/// Largest violation of the KKT conditions of the program by a step with its multipliers.
-double kkt_violation(const StageQp& qp, const Iterate& step) {
-  double worst = 0.0;
-  const int N = qp.intervals();
-  for (int i = 0; i <= N; ++i) {
-    const Eigen::Map<const Eigen::VectorXd> s(step.state(i), qp.states(i)),
-        w(step.control(i < N ? i : 0), qp.controls(i));
-    Eigen::VectorXd by_state = qp.Q_of(i) * s + qp.q_of(i);
-    Eigen::VectorXd by_control = Eigen::VectorXd::Zero(qp.controls(i));
-    if (i < N) {
-      const Eigen::Map<const Eigen::VectorXd> costate(step.costate(i + 1), qp.states(i + 1));
-      by_state += qp.S_of(i).transpose() * w + qp.A_of(i).transpose() * costate;
-      by_control = qp.R_of(i) * w + qp.S_of(i) * s + qp.r_of(i) + qp.B_of(i).transpose() * costate;
-      const Eigen::Map<const Eigen::VectorXd> next(step.state(i + 1), qp.states(i + 1));
-      worst = std::max(worst, (qp.A_of(i) * s + qp.B_of(i) * w + qp.b_of(i) - next).lpNorm<Eigen::Infinity>());
-    }
-    const auto check = [&](double gradient, double multiplier, double value, double lower, double upper) {
-      worst = std::max({worst, std::abs(gradient + multiplier), lower - value, value - upper});
-      if (multiplier > 0.0) worst = std::max(worst, multiplier * std::min(1.0, std::abs(upper - value)));
-      if (multiplier < 0.0) worst = std::max(worst, -multiplier * std::min(1.0, std::abs(lower - value)));
-    };
-    for (int j = 0; j < qp.states(i); ++j)
-      check(by_state[j] - step.costate(i)[j], step.state_bound(i)[j], s[j],
-            i == 0 && qp.initial_state_is_given ? -1e9 : qp.state_lower(i)[j],
-            i == 0 && qp.initial_state_is_given ? 1e9 : qp.state_upper(i)[j]);
-    for (int j = 0; j < qp.controls(i); ++j)
-      check(by_control[j], step.control_bound(i)[j], w[j], qp.control_lower(i)[j], qp.control_upper(i)[j]);
-  }
-  return worst;
-}
-
-StageQp bounded_qp(RandomQp& random, bool given, double tightness) {
-  StageQp qp = random.make(random.integer(2, 15), random.integer(1, 5), random.integer(1, 4), given);
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    for (int j = 0; j < qp.controls(i); ++j) {
-      qp.control_lower(i)[j] = -random.uniform(0.1, 1.0) * tightness;
-      qp.control_upper(i)[j] = random.uniform(0.1, 1.0) * tightness;
-    }
-    // Roomy enough that some trajectory keeps them.
-    for (int j = 0; j < qp.states(i); ++j) {
-      qp.state_lower(i)[j] = -4.0;
-      qp.state_upper(i)[j] = 4.0;
-    }
-    for (int j = 0; i < qp.intervals() && j < qp.states(i + 1); ++j) qp.b(i)[j] *= 0.3;
-  }
-  return qp;
-}
 
 TEST(StageQpSolver, SolvesRandomProgramsToTheirKktConditions) {
   RandomQp random(11);
@@ -92,6 +47,40 @@ TEST(StageQpSolver, TheInteriorPointMethodAgreesWithActiveSets) {
       for (int j = 0; j < qp.states(i); ++j) ASSERT_NEAR(by_sets.state(i)[j], by_interior.state(i)[j], 1e-7);
   }
   EXPECT_GT(compared, 80);
+}
+
+TEST(StageQpSolver, StartsFromTheMultipliersOfAPoint) {
+  RandomQp random(14);
+  int with_states = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    StageQp qp = feasible_qp(random, trial % 2 == 0, 0.8);
+    StageQpSolver solver(qp.capacity());
+    Iterate solution(qp.capacity()), step(qp.capacity());
+    solver.guess_from(qp, solution);
+    if (solver.solve(qp, solution) != StageQpSolver::Outcome::active_set) continue;
+    solver.guess_from(qp, solution);
+    solver.prepare(qp);
+    ASSERT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::active_set) << "trial " << trial;
+    EXPECT_EQ(solver.factorisations(), 1) << "trial " << trial;
+    ASSERT_LT(kkt_violation(qp, step), 1e-7) << "trial " << trial;
+    // Multipliers that claim too much, too little, or the other side.
+    Iterate wrong = solution;
+    int states = 0;
+    for (int i = 1; i <= qp.intervals(); ++i) {
+      for (int j = 0; j < qp.states(i); ++j) {
+        states += solution.state_bound(i)[j] != 0.0;
+        if (random.uniform(0.0, 1.0) < 0.1) wrong.state_bound(i)[j] = random.uniform(-1.0, 1.0);
+      }
+      for (int j = 0; j < qp.controls(i); ++j)
+        if (random.uniform(0.0, 1.0) < 0.3) wrong.control_bound(i)[j] = random.uniform(-1.0, 1.0);
+    }
+    with_states += states > 0;
+    solver.guess_from(qp, wrong);
+    solver.prepare(qp);
+    ASSERT_NE(solver.solve(qp, step), StageQpSolver::Outcome::infeasible) << "trial " << trial;
+    ASSERT_LT(kkt_violation(qp, step), 1e-7) << "trial " << trial;
+  }
+  EXPECT_GT(with_states, 60);
 }
 
 TEST(StageQpSolver, SaysSoWhenTheBoundsCannotBeSatisfied) {
