@@ -95,7 +95,7 @@ Sequence long_estimation(const Host& host, int intervals, int samples, int block
     problem->arrival_mean[4] = problem->arrival_mean[5] = 0.75;
     problem->arrival_information.setIdentity();
     problem->arrival_information *= 10.0;
-    std::copy_n(outputs[first].data(), 3 * (intervals + 1), problem->output(0));
+    for (int i = 0; i <= intervals; ++i) std::copy_n(outputs[first + i].data(), 3, problem->output(i));
     std::copy_n(inputs[first].data(), 2 * intervals, problem->measured_input(0));
     std::vector<std::uint8_t> begins(intervals, 0), never(intervals, 0);
     for (int i = 0; i < intervals; ++i) {

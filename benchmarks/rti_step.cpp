@@ -69,7 +69,7 @@ void run(benchmark::State& state, const Host& host, const Sequence& sequence) {
   counters["feedback_us"] = feedback.spread().median;
   counters["feedback_p99_us"] = feedback.spread().p99;
   counters["feedback_share"] = feedback.spread().median / total.spread().median;
-  counters["active_set_changed"] = refactored;
+  counters["factorised_again"] = refactored;
   counters["fallbacks"] = fallbacks;
   counters["excess_median"] = excess.median;
   counters["excess_p99"] = excess.p99;

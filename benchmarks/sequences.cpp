@@ -54,7 +54,8 @@ void set_known(const RheProblem& from, RheProblem& to) noexcept {
   to.set_intervals(N);
   to.arrival_mean = from.arrival_mean;
   to.arrival_information = from.arrival_information;
-  std::copy_n(from.output(0), N * ny, to.output(0));
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j < ny; ++j) to.output(i)[j] = from.output(i)[j];
   std::copy_n(from.measured_input(0), N * nu, to.measured_input(0));
   for (int i = 0; i < N; ++i) to.set_duration(i, from.duration(i));
   set_blocks(from, to);
@@ -114,7 +115,7 @@ Sequence sequence_of(const std::vector<ProblemRecord>& records, const std::share
     made.samples.push_back({sim::build(record, model, longest), static_cast<int>(first - before)});
     before = first;
   }
-  made.workspace = sim::build(records.front(), model, longest);
+  made.workspace = sim::build(records.front(), model, longest, sim::one_block_parameters(records, *model));
   if (const auto* control = dynamic_cast<const RhcProblem*>(made.workspace.get());
       control && !control->setup().blocked_inputs.empty())
     throw Error(made.name + ": inputs are blocked, which benchmarks cannot set");

@@ -40,9 +40,11 @@ constinit const ModelKernels ${TABLE} = make_model_kernels<${ARG_FORMULA}, Wides
       target_compile_features(${PREFIX}_${SET} PRIVATE cxx_std_20)
       target_link_libraries(${PREFIX}_${SET} PRIVATE rhec::core xsimd $<TARGET_NAME_IF_EXISTS:rhec_flags>)
       # -O3 in every configuration: what is inlined leaves no copy behind that the linker could take for another unit's.
-      # Not with sanitizers, whose checks in every line make that take minutes.
+      # Not with sanitizers, whose checks in every line make that take minutes. Without signed zeros the sums of
+      # derivatives lose their terms that are always zero.
       target_compile_options(${PREFIX}_${SET} PRIVATE
-        $<$<NOT:$<BOOL:${RHEC_SANITIZE}>>:-O3> ${RHEC_WIDE_FLAGS_${SET}} -fno-math-errno -fno-trapping-math -ffp-contract=fast
+        $<$<NOT:$<BOOL:${RHEC_SANITIZE}>>:-O3> ${RHEC_WIDE_FLAGS_${SET}} -fno-math-errno -fno-trapping-math
+        -fno-signed-zeros -ffp-contract=fast
         "$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized;-Wno-uninitialized>")  # in gcc's own intrinsics
       set_target_properties(${PREFIX}_${SET} PROPERTIES
         CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON POSITION_INDEPENDENT_CODE ON)

@@ -18,6 +18,7 @@ class FullHorizon : public Blocking {
     begins[0] = 1;
     return 0;  // there is one block, and it began with the run
   }
+  bool is_one_block() const noexcept override { return true; }
 };
 
 }  // namespace

@@ -31,4 +31,11 @@ void set_block_structure(const Window& window, const std::vector<std::shared_ptr
   problem.finish();
 }
 
+std::vector<int> one_block_parameters(const std::vector<std::shared_ptr<const Blocking>>& blockings) {
+  std::vector<int> found;
+  for (std::size_t j = 0; j < blockings.size(); ++j)
+    if (blockings[j]->is_one_block()) found.push_back(static_cast<int>(j));
+  return found;
+}
+
 }  // namespace rhec

@@ -17,4 +17,7 @@ void set_block_structure(const Window& window, const std::vector<std::shared_ptr
                          const std::vector<ParameterWalk>& walks, std::vector<std::int64_t>& first_starts,
                          std::vector<std::uint8_t>& begins, RheProblem& problem) noexcept;
 
+/// The parameters whose blocking makes one block of every window.
+std::vector<int> one_block_parameters(const std::vector<std::shared_ptr<const Blocking>>& blockings);
+
 }  // namespace rhec

@@ -134,6 +134,7 @@ SmoothedRun FullInformationEstimation::estimate(const NodeLog& log, Clock::time_
   if (N < 1) throw Error("smoother: the log has fewer than two nodes; there is nothing between them to estimate");
   RheProblem::Setup problem_setup = setup_.problem;
   problem_setup.max_intervals = N;
+  problem_setup.one_block = one_block_parameters(setup_.blockings);
   for (int j = 0; j < np; ++j)
     if (const std::string reason = setup_.blockings[j]->why_not(N); !reason.empty())
       throw Error(fmt::format("blocking of '{}': {}", model_->description().parameters[j].name, reason));

@@ -5,10 +5,10 @@
 #include <limits>
 #include <utility>
 
-#include "aligned_scratch.hpp"
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
 #include "rhec/core/error.hpp"
+#include "scratch.hpp"
 
 namespace rhec {
 namespace {
@@ -26,7 +26,9 @@ HorizonProblem::HorizonProblem(std::shared_ptr<const Model> model, const Shape& 
       substeps_(shape.substeps) {
   if (shape.max_intervals < 1) throw Error("horizon: expected at least 1 interval; set it to 1 or more");
   if (shape.substeps < 1) throw Error("substeps: expected at least 1 integration step per interval");
-  capacity_ = {shape.max_intervals, nx_ + channels_, nu_ + np_};
+  capacity_ = {shape.max_intervals, nx_ + channels_, nu_};
+  for (int j = 0; shape.decides_parameters && j < np_; ++j)
+    capacity_.controls += std::ranges::count(shape.one_block, j) == 0;
   const auto nodes = static_cast<std::size_t>(shape.max_intervals) + 1;
   input_channel_.assign(nu_, -1);
   for (std::size_t j = 0; j < shape.blocked_inputs.size(); ++j)
@@ -60,10 +62,13 @@ void HorizonProblem::set_ramp(int channel, bool ramp) noexcept {
 }
 
 void HorizonProblem::finish_structure() noexcept {
+  const int free_count = static_cast<int>(free_inputs_.size());
+  any_start_ = false;
   for (int i = 0; i < intervals_; ++i) {
-    int next = static_cast<int>(free_inputs_.size());
+    int next = free_count;
     for (int c = 0; c < channels_; ++c) control_index_[i * channels_ + c] = begins(i, c) ? next++ : -1;
     control_counts_[i] = next;
+    any_start_ |= next > free_count;
   }
 }
 
@@ -144,20 +149,15 @@ void HorizonProblem::gather(const Iterate& point, StageRange range, double* x, d
 
 namespace {
 
-/// Dense rows for a range of intervals, cut out of the caller's scratch.
+/// Dense rows for a range of intervals.
 struct Rows {
   double *x, *u, *p, *p_end, *next;
-  Rows(std::span<double> scratch, int count, int nx, int nu, int np) {
-    double* position = scratch.data();
-    const auto take = [&](int width) {
-      return std::exchange(position, position + static_cast<std::ptrdiff_t>(count) * width);
-    };
-    x = take(nx);
-    u = take(nu);
-    p = take(np);
-    p_end = take(np);
-    next = take(nx);
-  }
+  Rows(Scratch scratch, std::ptrdiff_t count, int nx, int nu, int np)
+      : x(scratch.take(count * nx)),
+        u(scratch.take(count * nu)),
+        p(scratch.take(count * np)),
+        p_end(scratch.take(count * np)),
+        next(scratch.take(count * nx)) {}
 };
 
 }  // namespace
@@ -165,7 +165,7 @@ struct Rows {
 double HorizonProblem::evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
                                        std::span<double> scratch) const noexcept {
   if (defects) {
-    const Rows rows(scratch, intervals_, nx_, nu_, np_);
+    const Rows rows(Scratch(scratch.data()), intervals_, nx_, nu_, np_);
     gather(point, {0, intervals_ - 1}, rows.x, rows.u, rows.p, rows.p_end);
     Model::Intervals request;
     request.count = intervals_;
@@ -192,7 +192,7 @@ double HorizonProblem::evaluate_stages(const Iterate& point, double* defects, do
 }
 
 void HorizonProblem::simulate_interval(int i, Iterate& point, std::span<double> scratch) const noexcept {
-  const Rows rows(scratch, 1, nx_, nu_, np_);
+  const Rows rows(Scratch(scratch.data()), 1, nx_, nu_, np_);
   gather(point, {i, i}, rows.x, rows.u, rows.p, rows.p_end);
   Model::Intervals request;
   request.count = 1;
@@ -212,24 +212,39 @@ void HorizonProblem::simulate_interval(int i, Iterate& point, std::span<double> 
 
 double HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                                  std::span<double> scratch) const noexcept {
-  const int ns = capacity_.states;
+  const Parts parts = hessian == Hessian::none ? Parts::vectors : Parts::all;
+  fill_stages(range, point, hessian, qp, scratch);
+  return add_cost(range, point, hessian, parts, qp, scratch);
+}
+
+void HorizonProblem::prepare(const Iterate& point, Hessian hessian, StageQp& qp,
+                             std::span<double> scratch) const noexcept {
+  fill_stages({0, intervals_}, point, hessian, qp, scratch);
+  add_cost({0, intervals_}, point, hessian, Parts::matrices, qp, scratch);
+}
+
+void HorizonProblem::refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
+  const StageRange all{0, intervals_};
+  fill_bounds(point, all, qp);
+  add_cost(all, point, Hessian::none, Parts::vectors, qp, scratch);
+}
+
+/// Sizes, dynamics with their curvature, and bounds.
+void HorizonProblem::fill_stages(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                                 std::span<double> scratch) const noexcept {
   if (range.first == 0) {
     qp.set_intervals(intervals_);
     qp.initial_state_is_given = initial_state() != nullptr;
   }
-  for (int i = range.first; i <= range.last; ++i) {
-    const int controls = i < intervals_ ? control_counts_[i] : 0;
-    qp.set_sizes(i, ns, controls);
-  }
-  program_kernels().clear_costs(cost_view(qp), range.first, range.last, hessian != Hessian::none);
+  for (int i = range.first; i <= range.last; ++i)
+    qp.set_sizes(i, capacity_.states, i < intervals_ ? control_counts_[i] : 0);
   const StageRange steps{range.first, std::min(range.last, intervals_ - 1)};
   if (steps.last >= steps.first) linearise_dynamics(steps, point, hessian, qp, scratch);
   fill_bounds(point, range, qp);
-  return add_cost(range, point, hessian, qp, scratch);
 }
 
 /// z = [x; p; u (; p_end)] of each interval, as `Model::integrate_rows` takes it.
-const double* HorizonProblem::gather_rows(const Iterate& point, StageRange range, double* rows) const noexcept {
+void HorizonProblem::gather_rows(const Iterate& point, StageRange range, double* rows) const noexcept {
   double* z = rows;
   for (int i = range.first; i <= range.last; ++i, z += row_) {
     const double *s = point.state(i), *w = point.control(i);
@@ -245,22 +260,27 @@ const double* HorizonProblem::gather_rows(const Iterate& point, StageRange range
       if (control >= 0 && ramp_[j] == 0) z[nx_ + j] = w[control];
     }
   }
-  return rows;
 }
 
 void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, Hessian hessian, StageQp& qp,
                                         std::span<double> scratch) const noexcept {
-  const int count = steps.last - steps.first + 1, ns = capacity_.states;
-  // Memory that begins where registers do.
-  double* position = scratch.data() + first_aligned(scratch.data());
-  const auto take = [&](std::ptrdiff_t size) { return std::exchange(position, position + size * count); };
-  double *z = take(row_), *jacobians = take(nx_ * row_), *hessians = take(row_ * row_);
+  const int ns = capacity_.states;
+  const std::ptrdiff_t count = steps.last - steps.first + 1;
+  Scratch memory(scratch.data());
+  double *z = memory.take(count * row_), *jacobians = memory.take(count * nx_ * row_),
+         *hessians = memory.take(count * row_ * row_);
   // Without carried inputs and ramps the model's rows are those of the program, but for channels that start.
   const bool in_place = is_direct() && !any_ramp_;
   IntervalRows request;
-  request.count = count;
-  request.z = gather_rows(point, steps, z);
-  request.z_step = row_;
+  request.count = static_cast<int>(count);
+  if (in_place && !any_start_) {
+    request.z = point.row(steps.first);
+    request.z_step = stride_;
+  } else {
+    gather_rows(point, steps, z);
+    request.z = z;
+    request.z_step = row_;
+  }
   request.ramp = any_ramp_;
   request.durations = durations_.data() + steps.first;
   request.substeps = substeps_;
@@ -276,10 +296,13 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
     request.hessian_row = in_place ? stride_ : row_;
     request.hessian_step = in_place ? (capacity_.states + capacity_.controls) * stride_ : row_ * row_;
   }
-  request.scratch = position;
+  request.scratch = memory.rest();
   model_->integrate_rows(request);
 
-  if (!in_place) std::fill_n(qp.F(steps.first), static_cast<std::ptrdiff_t>(count) * ns * stride_, 0.0);
+  if (!in_place) {
+    std::fill_n(qp.F(steps.first), count * ns * stride_, 0.0);
+    if (hessian == Hessian::exact) std::fill_n(qp.H(steps.first), count * (ns + capacity_.controls) * stride_, 0.0);
+  }
   DynamicsView dynamics{};
   dynamics.first = steps.first;
   dynamics.last = steps.last;
@@ -288,12 +311,12 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
   dynamics.stride = stride_;
   dynamics.vehicle_states = nx_;
   dynamics.channels = channels_;
-  dynamics.written = in_place ? (nx_ + np_ + nu_ + 7) / 8 * 8 : stride_;
   dynamics.control_of = control_index_.data();
   dynamics.values = point.row(0);
   dynamics.F = qp.F(0);
   dynamics.b = qp.b(0);
   program_kernels().complete_dynamics(dynamics);
+  if (in_place && !any_start_) return;
   for (int i = steps.first; i <= steps.last; ++i) {
     if (!in_place) {
       scatter(i, jacobians + (i - steps.first) * nx_ * row_,
@@ -304,15 +327,21 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
   }
 }
 
-CostView HorizonProblem::cost_view(StageQp& qp) const noexcept {
+CostView HorizonProblem::cost_view(Parts parts, Hessian hessian, StageQp& qp) const noexcept {
+  CostView view = cost_view();
+  view.bends = hessian == Hessian::exact;
+  if (parts != Parts::vectors) view.H = qp.H(0);
+  if (parts != Parts::matrices) view.h = qp.h(0);
+  return view;
+}
+
+CostView HorizonProblem::cost_view() const noexcept {
   CostView view{};
   view.intervals = intervals_;
   view.states = capacity_.states;
   view.controls = capacity_.controls;
   view.stride = stride_;
   view.control_counts = control_counts_.data();
-  view.H = qp.H(0);
-  view.h = qp.h(0);
   return view;
 }
 
@@ -350,12 +379,6 @@ void HorizonProblem::scatter(int i, const double* jacobian, const double* hessia
   if (!hessian) return;
   for (int r = 0; r < nz; ++r)
     for (int z = 0; z < nz; ++z) qp.H(i)[column_of(r) * stride_ + column_of(z)] += hessian[r * row_ + z];
-}
-
-void HorizonProblem::refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
-  std::fill_n(qp.h(0), static_cast<std::ptrdiff_t>(intervals_ + 1) * stride_, 0.0);
-  fill_bounds(point, {0, intervals_}, qp);
-  add_gradient(point, qp, scratch);
 }
 
 void HorizonProblem::fill_bounds(const Iterate& point, StageRange range, StageQp& qp) const noexcept {

@@ -1,7 +1,8 @@
 #include "rhec/core/model.hpp"
 
 #include <algorithm>
-#include <utility>
+#include "rhec/core/padded.hpp"
+#include "scratch.hpp"
 
 namespace rhec {
 
@@ -44,33 +45,17 @@ std::size_t Model::rows_scratch(int count) const noexcept {
              np = static_cast<std::size_t>(parameter_count()), ny = static_cast<std::size_t>(output_count());
   const std::size_t nz = nx + nu + 2 * np;
   const std::size_t interval = 2 * nx + nu + 2 * np + nx + nx * nz + nz * nz, node = nx + ny + nx * ny;
-  return static_cast<std::size_t>(count) * std::max(interval, node);
+  return static_cast<std::size_t>(count) * std::max(interval, node) + 7;
 }
-
-namespace {
-
-/// Dense arrays one after the other, cut out of the caller's scratch.
-class Cutter {
- public:
-  explicit Cutter(double* scratch) : next_(scratch) {}
-  double* take(std::ptrdiff_t size) { return std::exchange(next_, next_ + size); }
-
- private:
-  double* next_;
-};
-
-int padded(int size) { return (size + 7) / 8 * 8; }
-
-}  // namespace
 
 void Model::integrate_rows(const IntervalRows& q) const noexcept {
   const int nx = state_count(), nu = input_count(), np = parameter_count();
   const int nz = nx + nu + np + (q.ramp ? np : 0);
-  Cutter cutter(q.scratch);
-  double *x = cutter.take(q.count * nx), *u = cutter.take(q.count * nu), *p = cutter.take(q.count * np),
-         *p_end = cutter.take(q.count * np), *multipliers = cutter.take(q.count * nx),
-         *next = cutter.take(q.count * nx), *jacobians = cutter.take(q.count * nx * nz),
-         *hessians = cutter.take(q.count * nz * nz);
+  Scratch scratch(q.scratch);
+  double *x = scratch.take(q.count * nx), *u = scratch.take(q.count * nu), *p = scratch.take(q.count * np),
+         *p_end = scratch.take(q.count * np), *multipliers = scratch.take(q.count * nx),
+         *next = scratch.take(q.count * nx), *jacobians = scratch.take(q.count * nx * nz),
+         *hessians = scratch.take(q.count * nz * nz);
   for (int i = 0; i < q.count; ++i) {
     const double* z = q.z + i * q.z_step;
     std::copy_n(z, nx, x + i * nx);
@@ -114,9 +99,9 @@ void Model::integrate_rows(const IntervalRows& q) const noexcept {
 
 void Model::observe_rows(const NodeRows& q) const noexcept {
   const int nx = state_count(), all = output_count(), ny = q.chosen ? q.chosen_count : all;
-  Cutter cutter(q.scratch);
-  double *x = cutter.take(q.count * nx), *outputs = cutter.take(q.count * all),
-         *jacobians = cutter.take(q.count * nx * all);
+  Scratch scratch(q.scratch);
+  double *x = scratch.take(q.count * nx), *outputs = scratch.take(q.count * all),
+         *jacobians = scratch.take(q.count * nx * all);
   for (int i = 0; i < q.count; ++i) std::copy_n(q.states + i * q.state_step, nx, x + i * nx);
   Nodes request;
   request.count = q.count;
@@ -125,9 +110,10 @@ void Model::observe_rows(const NodeRows& q) const noexcept {
   request.jacobians = q.jacobians ? jacobians : nullptr;
   observe(request);
   for (int i = 0; i < q.count; ++i) {
+    if (q.outputs) std::fill_n(q.outputs + i * q.output_step, padded(ny), 0.0);
     for (int j = 0; j < ny; ++j) {
       const int from = q.chosen ? q.chosen[j] : j;
-      if (q.outputs) q.outputs[i * ny + j] = outputs[i * all + from];
+      if (q.outputs) q.outputs[i * q.output_step + j] = outputs[i * all + from];
       if (!q.jacobians) continue;
       double* row = q.jacobians + (i * ny + j) * q.jacobian_row;
       std::fill_n(row, padded(nx), 0.0);

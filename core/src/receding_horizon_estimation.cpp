@@ -34,7 +34,9 @@ RheProblem make_problem(std::shared_ptr<const Model> model, const RecedingHorizo
   for (std::size_t j = 0; j < np; ++j)
     if (const std::string reason = setup.blockings[j]->why_not(setup.problem.max_intervals); !reason.empty())
       throw Error(fmt::format("blocking of '{}': {}", model->description().parameters[j].name, reason));
-  return {std::move(model), setup.problem};
+  RheProblem::Setup problem = setup.problem;
+  problem.one_block = one_block_parameters(setup.blockings);
+  return {std::move(model), std::move(problem)};
 }
 
 }  // namespace
@@ -321,7 +323,7 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
 /// Of the state of a node and the parameters before it. Where it comes to nothing, the last one stays.
 void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noexcept {
   const int n = static_cast<int>(last_state_.size()), ns = problem_.capacity().states;
-  problem_.linearise(all_stages(problem_), point_, Hessian::gauss_newton, covariance_qp_, scratch_);
+  problem_.prepare(point_, Hessian::gauss_newton, covariance_qp_, scratch_);
   covariance_riccati_.factor(covariance_qp_, no_active_bounds_);
   const bool is_last = node == window_.intervals;
   double* of_node = covariances_.data() + (is_last ? 0 : static_cast<std::ptrdiff_t>(node) * ns * ns);

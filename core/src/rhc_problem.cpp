@@ -10,7 +10,7 @@
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
 #include "rhec/core/error.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "scratch.hpp"
 
 namespace rhec {
 namespace {
@@ -31,13 +31,16 @@ RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup)
   const auto nodes = static_cast<std::size_t>(setup_.max_intervals) + 1;
   initial_.assign(capacity().states, 0.0);
   reference_.assign(nodes * stride(), 0.0);
-  for (auto* v : {&stage_weights_, &terminal_weights_, &turn_}) v->assign(stride(), 0.0);
+  for (auto* v : {&stage_weights_, &terminal_weights_, &turns_, &inverse_turns_}) v->assign(stride(), 0.0);
   std::copy(setup_.state_weights.begin(), setup_.state_weights.end(), stage_weights_.begin());
   std::copy(setup_.terminal_weights.begin(), setup_.terminal_weights.end(), terminal_weights_.begin());
   if (is_direct())
     std::copy(setup_.input_weights.begin(), setup_.input_weights.end(), stage_weights_.begin() + capacity().states);
-  for (int j = 0; j < nx(); ++j)
-    if (about.states[j].is_angle) turn_[j] = 2.0 * std::numbers::pi;
+  for (int j = 0; j < nx(); ++j) {
+    if (!about.states[j].is_angle) continue;
+    turns_[j] = 2.0 * std::numbers::pi;
+    inverse_turns_[j] = 1.0 / turns_[j];
+  }
   for (std::size_t i = 0; i < nodes; ++i) {
     input_lower_.insert(input_lower_.end(), setup_.input_lower.begin(), setup_.input_lower.end());
     input_upper_.insert(input_upper_.end(), setup_.input_upper.begin(), setup_.input_upper.end());
@@ -56,8 +59,11 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
   // Node 0 and what the channels carry stay without bounds, as they were made.
   if (!is_direct()) clear_bounds();
   for (int i = 1; i <= intervals(); ++i) {
-    std::copy_n(setup_.state_lower.data(), nx(), lower_row(i));
-    std::copy_n(setup_.state_upper.data(), nx(), upper_row(i));
+    double *lower = lower_row(i), *upper = upper_row(i);
+    for (int j = 0; j < nx(); ++j) {
+      lower[j] = setup_.state_lower[j];
+      upper[j] = setup_.state_upper[j];
+    }
   }
   std::fill_n(lower_row(intervals()) + ns, capacity().controls, -infinity);
   std::fill_n(upper_row(intervals()) + ns, capacity().controls, infinity);
@@ -162,43 +168,47 @@ int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
   return moved;
 }
 
+std::size_t RhcProblem::cost_scratch_size() const noexcept {
+  return (static_cast<std::size_t>(capacity().intervals) + 1) * stride() + 8;
+}
+
 double RhcProblem::cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept {
+  CostView view = cost_view();
+  view.h = Scratch(scratch.data()).rest();  // gradients that nobody asks for
   double total = 0.0;
-  std::fill_n(scratch.data(), stride(), 0.0);  // a gradient that nobody asks for
   for (int i = 0; i <= intervals(); ++i) {
-    const double part = add_stage(i, point, nullptr, scratch.data());
+    const double part = write_costs({i, i}, point, view);
     total += part;
     if (stage_costs) stage_costs[i] += part;
   }
   return total;
 }
 
-double RhcProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+double RhcProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                             std::span<double> /*scratch*/) const noexcept {
-  double total = 0.0;
-  for (int i = range.first; i <= range.last; ++i)
-    total += add_stage(i, point, hessian == Hessian::none ? nullptr : qp.H(i), qp.h(i));
-  return total;
+  return write_costs(range, point, cost_view(parts, hessian, qp));
 }
 
-void RhcProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
-  add_cost({0, intervals()}, point, Hessian::none, qp, scratch);
-}
-
-/// The cost of one stage; adds to H (if not null) and h.
-double RhcProblem::add_stage(int i, const Iterate& point, double* H, double* h) const noexcept {
-  const bool is_last = i == intervals();
-  const AlignedDoubles& weights = is_last ? terminal_weights_ : stage_weights_;
-  const int columns = capacity().states + (is_last ? 0 : nu());
-  double total = program_kernels().add_tracking(point.row(i), row(reference_, i, stride()), weights.data(),
-                                                turn_.data(), H, h, columns, stride());
-  if (is_last || is_direct()) return total;
-  for (int j = 0; j < nu(); ++j) {
-    const int column = column_of_input(i, j);
-    const double error = point.row(i)[column] - input_reference(i)[j], weight = setup_.input_weights[j];
-    total += weight * error * error;
-    h[column] += 2.0 * weight * error;
-    if (H) H[column * stride() + column] += 2.0 * weight;
+double RhcProblem::write_costs(StageRange range, const Iterate& point, const CostView& view) const noexcept {
+  TrackingView tracked{};
+  tracked.values = point.row(0);
+  tracked.references = reference_.data();
+  tracked.stage_weights = stage_weights_.data();
+  tracked.terminal_weights = terminal_weights_.data();
+  tracked.turns = turns_.data();
+  tracked.inverse_turns = inverse_turns_.data();
+  double total = program_kernels().write_tracking(view, tracked, range.first, range.last);
+  if (is_direct()) return total;
+  const std::ptrdiff_t wide = capacity().states + capacity().controls;
+  for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i) {
+    for (int j = 0; j < nu(); ++j) {
+      const int column = column_of_input(i, j);
+      const double error = point.row(i)[column] - input_reference(i)[j], weight = setup_.input_weights[j];
+      if (view.H) view.H[(i * wide + column) * stride() + column] += 2.0 * weight;
+      if (!view.h) continue;
+      total += weight * error * error;
+      view.h[static_cast<std::ptrdiff_t>(i) * stride() + column] += 2.0 * weight * error;
+    }
   }
   return total;
 }

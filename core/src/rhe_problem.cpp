@@ -8,11 +8,11 @@
 
 #include <fmt/format.h>
 
-#include "aligned_scratch.hpp"
 #include "checks.hpp"
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
 #include "rhec/core/error.hpp"
+#include "scratch.hpp"
 
 namespace rhec {
 
@@ -22,15 +22,22 @@ double angle_difference(double a, double b) noexcept {
 }
 
 RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
-    : HorizonProblem(std::move(model), {setup.max_intervals, setup.substeps, {}}),
+    : HorizonProblem(std::move(model), {setup.max_intervals, setup.substeps, {}, true, setup.one_block}),
       setup_(std::move(setup)),
-      ny_(this->model().output_count()) {
+      ny_(this->model().output_count()),
+      output_row_(padded(ny_)) {
   const ModelDescription& about = this->model().description();
   check_weights("output weights", setup_.output_weights, about.outputs);
   check_weights("input weights", setup_.input_weights, about.inputs);
   fill_default_bounds("state bounds", setup_.state_lower, setup_.state_upper, about.states, true);
   fill_default_bounds("input bounds", setup_.input_lower, setup_.input_upper, about.inputs, false);
   fill_default_bounds("parameter bounds", setup_.parameter_lower, setup_.parameter_upper, about.parameters, true);
+  is_one_block_.assign(np(), 0);
+  for (const int parameter : setup_.one_block) {
+    if (parameter < 0 || parameter >= np())
+      throw Error(fmt::format("one block: there is no parameter {}; the model has {}", parameter, np()));
+    is_one_block_[parameter] = 1;
+  }
   robust_group_.assign(ny_, -1);
   for (std::size_t g = 0; g < setup_.robust.size(); ++g) {
     const RobustLoss& loss = setup_.robust[g];
@@ -49,10 +56,16 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   std::copy(setup_.state_upper.begin(), setup_.state_upper.end(), upper_pattern_.begin());
   std::copy(setup_.input_lower.begin(), setup_.input_lower.end(), lower_pattern_.begin() + capacity().states);
   std::copy(setup_.input_upper.begin(), setup_.input_upper.end(), upper_pattern_.begin() + capacity().states);
-  for (const Variable& output : about.outputs) output_is_angle_.push_back(output.is_angle);
+  for (auto* v : {&output_weights_, &output_turns_, &output_inverse_turns_}) v->assign(output_row_, 0.0);
+  std::copy(setup_.output_weights.begin(), setup_.output_weights.end(), output_weights_.begin());
+  for (int j = 0; j < ny_; ++j) {
+    if (!about.outputs[j].is_angle) continue;
+    output_turns_[j] = 2.0 * std::numbers::pi;
+    output_inverse_turns_[j] = 1.0 / output_turns_[j];
+  }
   const auto nodes = static_cast<std::size_t>(setup_.max_intervals) + 1;
   const double missing = std::numeric_limits<double>::quiet_NaN();
-  outputs_.assign(nodes * ny_, missing);
+  outputs_.assign(nodes * output_row_, missing);
   measured_inputs_.assign(nodes * nu(), missing);
   link_information_.assign(nodes * np(), 0.0);
   arrival_mean = Eigen::VectorXd::Zero(nx() + np());
@@ -60,11 +73,12 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
 }
 
 void RheProblem::set_blocks(int parameter, const std::uint8_t* begins, Transition transition) noexcept {
-  const bool ramp = transition == Transition::ramp;
+  const bool is_one_block = is_one_block_[parameter] != 0;
+  const bool ramp = transition == Transition::ramp && !is_one_block;
   set_ramp(parameter, ramp);
   // Node 0 carries the first block's value, so the first interval has nothing to decide, unless a ramp starts there.
-  for (int i = 0; i < intervals(); ++i) set_begins(i, parameter, begins[i] && (i > 0 || ramp));
-  for (int i = 0; i < intervals(); ++i) link(i, parameter, std::numeric_limits<double>::infinity());
+  for (int i = 0; i < intervals(); ++i) set_begins(i, parameter, !is_one_block && begins[i] && (i > 0 || ramp));
+  for (int i = 0; i < intervals(); ++i) link_information_[i * np() + parameter] = 0.0;
 }
 
 void RheProblem::link(int interval, int parameter, double variance) noexcept {
@@ -76,8 +90,10 @@ void RheProblem::finish() noexcept {
   const int ns = capacity().states;
   for (int i = 0; i <= intervals(); ++i) {
     double *lower = lower_row(i), *upper = upper_row(i);
-    std::copy_n(lower_pattern_.data(), stride(), lower);
-    std::copy_n(upper_pattern_.data(), stride(), upper);
+    for (int k = 0; k < stride(); ++k) {
+      lower[k] = lower_pattern_[k];
+      upper[k] = upper_pattern_[k];
+    }
     // A block is bounded once, where its value is decided: at node 0 or by the control that starts it.
     if (i == 0) {
       std::copy_n(setup_.parameter_lower.data(), np(), lower + nx());
@@ -100,15 +116,17 @@ void RheProblem::finish() noexcept {
 
 void RheProblem::drop_first_interval() noexcept {
   for (int i = 0; i + 1 < intervals(); ++i) set_duration(i, duration(i + 1));
-  std::copy(outputs_.begin() + ny_, outputs_.end(), outputs_.begin());
+  std::copy(outputs_.begin() + output_row_, outputs_.end(), outputs_.begin());
   std::copy(measured_inputs_.begin() + nu(), measured_inputs_.end(), measured_inputs_.begin());
 }
 
 std::size_t RheProblem::cost_scratch_size() const noexcept {
-  const std::size_t nodes = static_cast<std::size_t>(capacity().intervals) + 1;
-  // states, outputs, multipliers, jacobians, hessians of all nodes, what the model needs, and four rows of outputs
-  return nodes * (nx() + 2 * ny_ + ny_ * padded_states() + nx() * nx()) +
-         model().rows_scratch(static_cast<int>(nodes)) + 4 * static_cast<std::size_t>(ny_) + 8;
+  const std::size_t nodes = static_cast<std::size_t>(capacity().intervals) + 1, outputs = output_row_, ny = ny_,
+                    width = padded(nx());
+  // Of all nodes Jacobians, outputs, multipliers, states and Hessians, and what the model needs; of one, the kernels'
+  // room and three rows of outputs.
+  return nodes * (ny * width + outputs + ny + nx() + static_cast<std::size_t>(nx()) * nx()) +
+         model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 8;
 }
 
 void RheProblem::residual(int node, const double* predicted, double* difference) const noexcept {
@@ -117,7 +135,7 @@ void RheProblem::residual(int node, const double* predicted, double* difference)
     if (std::isnan(y[j])) {
       difference[j] = 0.0;
     } else {
-      difference[j] = output_is_angle_[j] != 0 ? angle_difference(predicted[j], y[j]) : predicted[j] - y[j];
+      difference[j] = output_turns_[j] != 0.0 ? angle_difference(predicted[j], y[j]) : predicted[j] - y[j];
     }
   }
 }
@@ -145,15 +163,16 @@ double RheProblem::losses(const double* difference, double* weight, double* curv
 
 double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept {
   const int count = intervals() + 1;
-  double* predicted = scratch.data();
-  double* difference = predicted + count * ny_;
-  double* weight = difference + ny_;
+  Scratch memory(scratch.data());
+  double *predicted = memory.take(static_cast<std::ptrdiff_t>(count) * output_row_),
+         *difference = memory.take(output_row_), *weight = memory.take(output_row_);
   NodeRows request;
   request.count = count;
   request.states = point.state(0);
   request.state_step = stride();
   request.outputs = predicted;
-  request.scratch = weight + ny_;
+  request.output_step = output_row_;
+  request.scratch = memory.rest();
   model().observe_rows(request);
 
   double total = 0.0;
@@ -163,7 +182,7 @@ double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<dou
   };
   add(0, arrival_term(point, nullptr));
   for (int i = 0; i < count; ++i) {
-    residual(i, predicted + i * ny_, difference);
+    residual(i, predicted + i * output_row_, difference);
     add(i, losses(difference, weight, nullptr));
   }
   for (int i = 0; i < intervals(); ++i) {
@@ -173,24 +192,20 @@ double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<dou
   return total;
 }
 
-double RheProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+double RheProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                             std::span<double> scratch) const noexcept {
-  const bool matrices = hessian != Hessian::none;
-  double total = 0.0;
+  const bool matrices = parts != Parts::vectors, vectors = parts != Parts::matrices;
+  double total = write_measurements(range, point, hessian, cost_view(parts, hessian, qp), scratch);
   if (range.first == 0) {
-    total += arrival_term(point, qp.h(0));
+    if (vectors) total += arrival_term(point, qp.h(0));
     const int n = nx() + np();
     for (int c = 0; matrices && c < n; ++c)
       for (int r = 0; r < n; ++r) qp.H(0)[c * stride() + r] += 2.0 * arrival_information(r, c);
   }
-  total += add_measurements(range, point, hessian, qp, scratch);
-  for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
-    if (control_count(i) > nu()) total += links(i, point, matrices ? qp.H(i) : nullptr, qp.h(i));
+  if (any_start())
+    for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
+      if (control_count(i) > nu()) total += links(i, point, matrices ? qp.H(i) : nullptr, vectors ? qp.h(i) : nullptr);
   return total;
-}
-
-void RheProblem::add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
-  add_cost({0, intervals()}, point, Hessian::none, qp, scratch);
 }
 
 /// The arrival cost; adds its gradient to q, if not null.
@@ -207,58 +222,77 @@ double RheProblem::arrival_term(const Iterate& point, double* q) const noexcept 
   return total;
 }
 
-double RheProblem::add_measurements(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                                    std::span<double> scratch) const noexcept {
-  const int count = range.last - range.first + 1, n = nx(), width = padded_states();
-  double* jacobians = scratch.data() + first_aligned(scratch.data());
-  double* predicted = jacobians + static_cast<std::ptrdiff_t>(count) * ny_ * width;
-  double* multipliers = predicted + count * ny_;
-  double* difference = multipliers + count * ny_;
-  double *weight = difference + ny_, *curvature = weight + ny_, *w = curvature + ny_;
-  double* rest = w + ny_;
+double RheProblem::write_measurements(StageRange range, const Iterate& point, Hessian hessian, const CostView& view,
+                                      std::span<double> scratch) const noexcept {
+  const std::ptrdiff_t count = range.last - range.first + 1, width = padded(nx());
+  Scratch memory(scratch.data());
+  double *jacobians = memory.take(count * ny_ * width), *predicted = memory.take(count * output_row_),
+         *room = memory.take(std::ptrdiff_t{2} * output_row_);
   NodeRows request;
-  request.count = count;
+  request.count = static_cast<int>(count);
   request.states = point.state(range.first);
   request.state_step = stride();
   request.outputs = predicted;
+  request.output_step = output_row_;
   request.jacobians = jacobians;
   request.jacobian_row = width;
-  request.scratch = rest;
+  request.scratch = memory.rest();
   model().observe_rows(request);
+  if (!setup_.robust.empty() || hessian == Hessian::exact)
+    return write_bent_measurements(range, point, hessian, view, predicted, jacobians, memory.rest());
+  MeasurementView measured{};
+  measured.vehicle_states = nx();
+  measured.output_count = ny_;
+  measured.input_count = nu();
+  measured.outputs = outputs_.data();
+  measured.inputs = measured_inputs_.data();
+  measured.predicted = predicted;
+  measured.jacobians = jacobians;
+  measured.output_weights = output_weights_.data();
+  measured.input_weights = setup_.input_weights.data();
+  measured.turns = output_turns_.data();
+  measured.inverse_turns = output_inverse_turns_.data();
+  measured.values = point.row(0);
+  measured.room = room;
+  return program_kernels().write_measurements(view, measured, range.first, range.last);
+}
 
-  const ProgramKernels& kernels = program_kernels();
-  const bool exact = hessian == Hessian::exact;
-  if (setup_.robust.empty() && !exact) {
-    MeasurementView measured{};
-    measured.vehicle_states = n;
-    measured.output_count = ny_;
-    measured.input_count = nu();
-    measured.outputs = outputs_.data();
-    measured.inputs = measured_inputs_.data();
-    measured.predicted = predicted;
-    measured.jacobians = jacobians;
-    measured.output_weights = setup_.output_weights.data();
-    measured.input_weights = setup_.input_weights.data();
-    measured.is_angle = output_is_angle_.data();
-    measured.values = point.row(0);
-    measured.room = difference;  // and what follows it
-    return kernels.add_measurements(cost_view(qp), measured, range.first, range.last, hessian != Hessian::none);
-  }
+/// The same with losses that bend, or with the curvature of the outputs.
+double RheProblem::write_bent_measurements(StageRange range, const Iterate& point, Hessian hessian,
+                                           const CostView& view, const double* predicted, const double* jacobians,
+                                           double* rest) const noexcept {
+  const int count = range.last - range.first + 1, n = nx(), width = padded(n), ns = capacity().states;
+  const bool exact = hessian == Hessian::exact && view.H;
+  CostView fresh = view;
+  if (view.bends) fresh.H = nullptr;
+  program_kernels().clear_costs(fresh, range.first, range.last);
+  fresh.H = view.H;
+  if (view.bends && range.last == intervals()) program_kernels().clear_costs(fresh, range.last, range.last);
+  Scratch memory(rest);
+  double *difference = memory.take(output_row_), *weight = memory.take(output_row_),
+         *curvature = memory.take(output_row_), *w = memory.take(output_row_),
+         *multipliers = memory.take(static_cast<std::ptrdiff_t>(count) * ny_),
+         *states = memory.take(static_cast<std::ptrdiff_t>(count) * n),
+         *hessians = memory.take(static_cast<std::ptrdiff_t>(count) * n * n);
+  const auto H_of = [&](int i) {
+    return view.H ? view.H + static_cast<std::ptrdiff_t>(i) * (ns + capacity().controls) * stride() : nullptr;
+  };
+  const auto h_of = [&](int i) { return view.h ? view.h + static_cast<std::ptrdiff_t>(i) * stride() : nullptr; };
   double total = 0.0;
   for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
-    total += inputs(i, point, hessian == Hessian::none ? nullptr : qp.H(i), qp.h(i));
+    total += inputs(i, point, H_of(i), h_of(i));
   for (int i = 0; i < count; ++i) {
     const int node = range.first + i;
-    residual(node, predicted + i * ny_, difference);
+    residual(node, predicted + i * output_row_, difference);
     total += losses(difference, weight, curvature);
     const double* y = output(node);
     const double* J = jacobians + static_cast<std::ptrdiff_t>(i) * ny_ * width;
-    double* H = qp.H(node);
+    double* H = H_of(node);
     for (int j = 0; j < ny_; ++j) {
       w[j] = std::isnan(y[j]) ? 0.0 : weight[j] * setup_.output_weights[j];
       multipliers[i * ny_ + j] = 2.0 * w[j] * difference[j];
     }
-    kernels.add_squares(J, w, difference, ny_, n, hessian == Hessian::none ? nullptr : H, qp.h(node), stride());
+    program_kernels().add_squares(J, w, difference, ny_, n, H, h_of(node), stride());
     if (!exact) continue;
     // The loss itself bends: 4 rho'' (J' W r)(J' W r)'.
     for (const RobustLoss& loss : setup_.robust) {
@@ -275,7 +309,6 @@ double RheProblem::add_measurements(StageRange range, const Iterate& point, Hess
     }
   }
   if (!exact) return total;
-  double *states = rest, *hessians = states + static_cast<std::ptrdiff_t>(count) * n;
   for (int i = 0; i < count; ++i) std::copy_n(point.state(range.first + i), n, states + i * n);
   Model::Nodes bent;
   bent.count = count;
@@ -285,7 +318,7 @@ double RheProblem::add_measurements(StageRange range, const Iterate& point, Hess
   model().observe(bent);
   for (int i = 0; i < count; ++i)
     for (int c = 0; c < n; ++c)
-      for (int r = 0; r < n; ++r) qp.H(range.first + i)[c * stride() + r] += hessians[(i * n + c) * n + r];
+      for (int r = 0; r < n; ++r) H_of(range.first + i)[c * stride() + r] += hessians[(i * n + c) * n + r];
   return total;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include <fmt/format.h>
 
@@ -16,6 +17,17 @@ ActiveSet::ActiveSet(const Capacity& capacity)
     : capacity_(capacity),
       row_(capacity.row()),
       sides_(static_cast<std::size_t>(capacity.intervals + 1) * capacity.row(), 0) {}
+
+bool ActiveSet::is_empty() const noexcept {
+  // Rows are whole eights.
+  std::uint64_t any = 0;
+  for (std::size_t k = 0; k < sides_.size(); k += sizeof any) {
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, sides_.data() + k, sizeof eight);
+    any |= eight;
+  }
+  return any == 0;
+}
 
 void ActiveSet::clear() noexcept { std::fill(sides_.begin(), sides_.end(), std::int8_t{0}); }
 
@@ -35,12 +47,13 @@ Riccati::Riccati(const Capacity& capacity)
   const auto stages = static_cast<std::size_t>(capacity.intervals) + 1;
   const std::size_t wide = width_, rows = max_rows_, row = stride_;
   P_.assign(stages * ns_ * row, 0.0);
-  U_.assign(stages * nw_ * row, 0.0);
+  for (auto* v : {&U_, &V_}) v->assign(stages * nw_ * row, 0.0);
+  columns_.assign(stages * 64, 0.0);
   inverse_.assign(stages * nw_, 0.0);
   for (auto* v : {&drift_, &g_, &p_}) v->assign(stages * row, 0.0);
   state_counts_.assign(stages, 0);
   control_counts_.assign(stages, 0);
-  is_special_.assign(stages, 0);
+  for (auto* v : {&is_special_, &fixes_control_}) v->assign(stages, 0);
   reductions_.resize(stages);
   for (auto* v : {&G_, &factor_, &T_}) v->assign(stages * wide * wide, 0.0);
   for (auto* v : {&L_, &K_, &Y_}) v->assign(stages * wide * ns_, 0.0);
@@ -58,9 +71,11 @@ bool holds_any(const std::int8_t* sides, int count) noexcept {
   return std::any_of(sides, sides + count, [](std::int8_t side) { return side != 0; });
 }
 
+static_assert(small::longest >= Riccati::max_width);
+
 }  // namespace
 
-RiccatiView Riccati::view_of(const StageQp& qp, const ActiveSet& active) noexcept {
+RiccatiView Riccati::view_of(const StageQp& qp, const std::int8_t* sides) noexcept {
   RiccatiView view;
   view.intervals = qp.intervals();
   view.states = ns_;
@@ -74,11 +89,14 @@ RiccatiView Riccati::view_of(const StageQp& qp, const ActiveSet& active) noexcep
   view.b = qp.b(0);
   view.lower = qp.lower(0);
   view.upper = qp.upper(0);
-  view.sides = active.row(0);
+  view.sides = sides;
   view.special = is_special_.data();
   view.P = P_.data();
   view.U = U_.data();
+  view.V = V_.data();
+  view.T = columns_.data();
   view.inverse = inverse_.data();
+  view.fixes = fixes_control_.data();
   view.drift = drift_.data();
   view.g = g_.data();
   view.p = p_.data();
@@ -88,18 +106,19 @@ RiccatiView Riccati::view_of(const StageQp& qp, const ActiveSet& active) noexcep
 void Riccati::factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept {
   const int N = qp.intervals(), n = qp.states(N);
   convexified_ = false;
-  for (int i = 0; i <= N; ++i) {
-    state_counts_[i] = qp.states(i);
-    control_counts_[i] = qp.controls(i);
-    // What its controls have to keep: bounds of the next state.
-    is_special_[i] = i < N && holds_any(active.state(i + 1), ns_);
-  }
-  RiccatiView view = view_of(qp, active);
+  std::copy_n(qp.state_counts(), N + 1, state_counts_.data());
+  std::copy_n(qp.control_counts(), N, control_counts_.data());
+  control_counts_[N] = 0;
+  std::fill_n(is_special_.data(), N + 1, std::uint8_t{0});
+  // What the controls of a stage have to keep: bounds of the next state.
+  if (!active.is_empty())
+    for (int i = 0; i < N; ++i) is_special_[i] = holds_any(active.state(i + 1), ns_);
+  RiccatiView view = view_of(qp, active.row(0));
   view.diagonal = diagonal;
   for (int c = 0; c < n; ++c) {
-    std::fill_n(P(N) + c * stride_, stride_, 0.0);
-    std::copy_n(qp.H(N) + c * stride_, n, P(N) + c * stride_);
-    if (diagonal) P(N)[c * stride_ + c] += diagonal[static_cast<std::ptrdiff_t>(N) * stride_ + c];
+    double* row = P(N) + c * stride_;
+    for (int k = 0; k < stride_; ++k) row[k] = k < n ? qp.H(N)[c * stride_ + k] : 0.0;
+    if (diagonal) row[c] += diagonal[static_cast<std::ptrdiff_t>(N) * stride_ + c];
   }
   int left = 0;
   for (int i = kernels_->factor(view, N - 1, definite_tolerance); i >= 0;
@@ -124,13 +143,13 @@ void Riccati::factor(const StageQp& qp, const ActiveSet& active, const double* d
 Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* h) noexcept {
   const int N = qp.intervals();
   if (!h) h = qp.h(0);
-  RiccatiView view = view_of(qp, active);
+  RiccatiView view = view_of(qp, active.row(0));
   view.h = h;
   view.values = step.row(0);
   view.costates = step.costate(0);
   view.bounds = step.bound_row(0);
-  std::fill_n(p(N), stride_, 0.0);
-  std::copy_n(h + static_cast<std::ptrdiff_t>(N) * stride_, qp.states(N), p(N));
+  const double* last = h + static_cast<std::ptrdiff_t>(N) * stride_;
+  for (int k = 0; k < stride_; ++k) p(N)[k] = k < qp.states(N) ? last[k] : 0.0;
   for (int i = kernels_->solve_backward(view, N - 1); i >= 0; i = kernels_->solve_backward(view, i - 1)) {
     write_active_bounds(qp, active, i + 1);
     if (!solve_special_backward(qp, active, h, i)) return Outcome::inconsistent;
@@ -171,7 +190,7 @@ bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* g
     for (int j = 0; j < qp.states(N); ++j)
       values[(static_cast<std::ptrdiff_t>(N) * stride_ + j) * size + minimiser] = qp.q(N)[j];
   }
-  const RiccatiView view = view_of(qp, active);
+  const RiccatiView view = view_of(qp, active.row(0));
   kernels_->respond_backward(view, last, values, with_minimiser);
   std::fill_n(costates, with_minimiser ? stride_ * size : 0, 0.0);
   if (qp.initial_state_is_given) {
@@ -228,19 +247,10 @@ void Riccati::combine(const StageQp& qp, const ActiveSet& active, const Response
 void Riccati::feedback(const StageQp& qp, int i, const double* s, double* w) noexcept {
   const int n = qp.states(i), m = qp.controls(i);
   if (is_special_[i] == 0) {
-    const double* columns = U_.data() + static_cast<std::ptrdiff_t>(i) * nw_ * stride_;
     for (int k = 0; k < m; ++k) {
-      const double* column = columns + k * stride_;
-      // A fixed control has no pivot, and its bound in the place of the gradient.
-      const double inverse = inverse_[static_cast<std::ptrdiff_t>(i) * nw_ + k];
-      if (inverse == 0.0) {
-        w[k] = p(i)[ns_ + k];
-        continue;
-      }
-      double sum = p(i)[ns_ + k];
-      for (int j = 0; j < n; ++j) sum += column[j] * s[j];
-      for (int j = 0; j < k; ++j) sum += column[ns_ + j] * w[j];
-      w[k] = -sum * inverse;
+      const double* policy = V_.data() + (static_cast<std::ptrdiff_t>(i) * nw_ + k) * stride_;
+      w[k] = p(i)[ns_ + k];
+      for (int j = 0; j < n; ++j) w[k] -= policy[j] * s[j];
     }
     return;
   }
@@ -268,7 +278,7 @@ void Riccati::covariances(const StageQp& qp, double* covariance, double* last) n
   double* half = now + static_cast<std::ptrdiff_t>(width) * stride_;
   const Special initial = special(N);
   for (int c = 0; c < n0; ++c) {
-    std::fill_n(now + c * stride_, n0, 0.0);
+    std::fill_n(now + c * stride_, stride_, 0.0);
     now[c * stride_ + c] = 2.0;
     small::solve(initial.factor, width_, n0, now + c * stride_);
   }
@@ -279,26 +289,11 @@ void Riccati::covariances(const StageQp& qp, double* covariance, double* last) n
       for (int r = 0; r < n; ++r) target[c * ns_ + r] = 0.5 * (now[c * stride_ + r] + now[r * stride_ + c]);
   };
   store(0, covariance);
-  for (int i = 0; i < N; ++i) {
+  const RiccatiView view = view_of(qp, nullptr);  // no bound is looked at
+  for (int i = kernels_->carry_covariance(view, 0, now, covariance); i < N;
+       i = kernels_->carry_covariance(view, i + 1, now, covariance)) {
     const int n = qp.states(i), n_next = qp.states(i + 1), m = qp.controls(i);
-    if (is_special_[i] != 0) add_special_controls(i, n, m, now);
-    // A control follows its policy of what is before it, with a variance of its own.
-    for (int k = 0; is_special_[i] == 0 && k < m; ++k) {
-      const double* column = U_.data() + (static_cast<std::ptrdiff_t>(i) * nw_ + k) * stride_;
-      const double inverse = inverse_[static_cast<std::ptrdiff_t>(i) * nw_ + k];
-      double* of_control = now + (ns_ + k) * stride_;
-      double variance = 2.0 * inverse;
-      const auto add = [&](int j) {
-        double sum = 0.0;
-        for (int l = 0; l < n; ++l) sum += column[l] * now[j * stride_ + l];
-        for (int l = ns_; l < ns_ + k; ++l) sum += column[l] * now[j * stride_ + l];
-        of_control[j] = now[j * stride_ + ns_ + k] = -inverse * sum;
-        variance -= inverse * column[j] * of_control[j];
-      };
-      for (int j = 0; j < n; ++j) add(j);
-      for (int j = ns_; j < ns_ + k; ++j) add(j);
-      of_control[ns_ + k] = variance;
-    }
+    add_special_controls(i, n, m, now);
     // F Sigma F'
     for (int l = 0; l < n_next; ++l) {
       const double* F = qp.F(i) + l * stride_;
@@ -312,6 +307,7 @@ void Riccati::covariances(const StageQp& qp, double* covariance, double* last) n
     }
     for (int c = 0; c < n_next; ++c) {
       const double* F = qp.F(i) + c * stride_;
+      std::fill_n(now + c * stride_, stride_, 0.0);
       for (int r = 0; r < n_next; ++r) {
         double sum = 0.0;
         for (int j = 0; j < n; ++j) sum += half[r * stride_ + j] * F[j];

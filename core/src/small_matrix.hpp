@@ -5,6 +5,9 @@
 
 namespace rhec::small {
 
+/// The largest number of rows of what is factorised.
+inline constexpr int longest = 32;
+
 /// C = A B;  A is m x k (leading dimension lda), B is k x n (ldb), C is m x n (ldc).
 inline void multiply(const double* A, int lda, const double* B, int ldb, double* C, int ldc, int m, int k,
                      int n) noexcept {
@@ -56,34 +59,33 @@ inline void add_transposed_product(const double* A, int lda, const double* x, do
 /// Cholesky factor of a symmetric matrix in its lower triangle, in place; false where a pivot is not above the part
 /// `relative` of its own diagonal entry, so that the scale of one variable does not decide about another.
 inline bool factor(double* G, int ld, int n, double relative) noexcept {
+  double least[longest];
+  for (int j = 0; j < n; ++j) least[j] = relative * G[j * ld + j];
   for (int j = 0; j < n; ++j) {
     double* column = G + j * ld;
-    const double least = relative * column[j];
-    double pivot = column[j];
-    for (int k = 0; k < j; ++k) pivot -= G[k * ld + j] * G[k * ld + j];
-    if (!(pivot > least && pivot > 0.0)) return false;
+    const double pivot = column[j];
+    if (!(pivot > least[j] && pivot > 0.0)) return false;
     const double root = __builtin_sqrt(pivot), inverse = 1.0 / root;
     column[j] = root;
-    for (int i = j + 1; i < n; ++i) {
-      double sum = column[i];
-      for (int k = 0; k < j; ++k) sum -= G[k * ld + i] * G[k * ld + j];
-      column[i] = sum * inverse;
-    }
+    for (int i = j + 1; i < n; ++i) column[i] *= inverse;
+    for (int k = j + 1; k < n; ++k)
+      for (int i = k; i < n; ++i) G[k * ld + i] -= column[i] * column[k];
   }
   return true;
 }
 
 /// x := (G G')^-1 x with the factor's lower triangle.
 inline void solve(const double* G, int ld, int n, double* x) noexcept {
+  double inverse[longest];
+  for (int i = 0; i < n; ++i) inverse[i] = 1.0 / G[i * ld + i];
   for (int i = 0; i < n; ++i) {
-    double sum = x[i];
-    for (int k = 0; k < i; ++k) sum -= G[k * ld + i] * x[k];
-    x[i] = sum / G[i * ld + i];
+    x[i] *= inverse[i];
+    for (int k = i + 1; k < n; ++k) x[k] -= G[i * ld + k] * x[i];
   }
   for (int i = n - 1; i >= 0; --i) {
     double sum = x[i];
     for (int k = i + 1; k < n; ++k) sum -= G[i * ld + k] * x[k];
-    x[i] = sum / G[i * ld + i];
+    x[i] = sum * inverse[i];
   }
 }
 

@@ -689,6 +689,15 @@ bool fits(const RhcProblem::Setup& wanted, const RhcProblem::Setup& there) {
          wanted.state_upper == there.state_upper && wanted.blocked_inputs == there.blocked_inputs;
 }
 
+/// Whether a record's estimation has one value of a parameter.
+bool is_one_block(const ProblemRecord& record, const Model& model, int parameter) {
+  const std::string& name = model.description().parameters[parameter].name;
+  const auto starts = record.block_starts.find(name);
+  const auto transition = record.transition.find(name);
+  return starts != record.block_starts.end() && starts->second == std::vector<int>{0} &&
+         (transition == record.transition.end() || transition->second == Transition::step);
+}
+
 template <class Problem, class Setup>
 std::unique_ptr<HorizonProblem> build_from(const ProblemRecord& record, std::shared_ptr<const Model> model, Setup setup,
                                            int max_intervals) {
@@ -797,10 +806,19 @@ std::vector<ProblemRecord> read_problems(std::string_view text, const std::strin
   return records;
 }
 
+std::vector<int> one_block_parameters(std::span<const ProblemRecord> records, const Model& model) {
+  std::vector<int> found;
+  for (int j = 0; j < model.parameter_count(); ++j)
+    if (std::ranges::all_of(records, [&](const ProblemRecord& record) { return is_one_block(record, model, j); }))
+      found.push_back(j);
+  return found;
+}
+
 std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
-                                      int max_intervals) {
+                                      int max_intervals, std::vector<int> one_block) {
   if (record.kind == OcpKind::rhe) {
     auto setup = rhe_setup(record, *model);
+    setup.one_block = std::move(one_block);
     return build_from<RheProblem>(record, std::move(model), std::move(setup), max_intervals);
   }
   auto setup = rhc_setup(record, *model);
@@ -811,6 +829,8 @@ bool refill(const ProblemRecord& record, HorizonProblem& problem) {
   if (record.kind != problem.kind()) return false;
   if (auto* rhe = dynamic_cast<RheProblem*>(&problem)) {
     if (!fits(rhe_setup(record, problem.model()), rhe->setup())) return false;
+    for (const int parameter : rhe->setup().one_block)
+      if (!is_one_block(record, problem.model(), parameter)) return false;
     fill(record, *rhe);
     check_guess(record, *rhe);
     return true;

@@ -116,9 +116,16 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
   prepared_ = false;
   use_exact_ = false;
   if (!(ocp.capacity() == capacity_) || !(guess.capacity() == capacity_)) return;
-  prepared_point_ = guess;
-  linearise(ocp, prepared_point_);
-  qp_solver_.guess_from(qp_, prepared_point_);
+  const Hessian hessian = hessian_for(ocp);
+  if (hessian == Hessian::exact && !has_costates(ocp, guess)) {
+    prepared_point_ = guess;
+    linearise(ocp, prepared_point_);
+  } else {
+    std::copy_n(guess.row(0), static_cast<std::ptrdiff_t>(ocp.intervals() + 1) * capacity_.row(),
+                prepared_point_.row(0));
+    ocp.prepare(guess, hessian, qp_, scratch_);
+  }
+  qp_solver_.guess_from(qp_, guess);
   qp_solver_.prepare(qp_);
   prepared_ = true;
   preparation_us_ = microseconds_since(start);

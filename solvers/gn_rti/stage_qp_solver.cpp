@@ -71,8 +71,7 @@ bool StageQpSolver::claim_is_likely(const StageQp& qp) const noexcept {
   if (!any_active_ || qp.initial_state_is_given) return false;
   int states = 0;
   for (int i = 0; i <= qp.intervals(); ++i)
-    if (marks_[i] != 0)
-      for (int j = 0; j < qp.states(i); ++j) states += active_.state(i)[j] != 0;
+    for (int j = 0; j < qp.states(i); ++j) states += active_.state(i)[j] != 0;
   return states > 0 && states <= few_states;
 }
 
@@ -133,8 +132,9 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
 }
 
 StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept {
-  // An active set takes one side of such bounds and does not see that the other is violated.
-  if (mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
+  // An active set takes one side of bounds that cross and does not see that the other is violated.
+  const bool has_claims = any_active_;
+  if (has_claims && mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
   is_dual_ = false;
   if (!factored_ && !prepared_) prepare(qp);
   if (factored_) {
@@ -143,6 +143,8 @@ StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step, Clock::t
     if (Clock::now() > deadline) return Outcome::out_of_time;
   }
   auto outcome = solve_from_guess(qp, step, deadline);
+  if (outcome != DualActiveSet::Outcome::solved && !has_claims && mark_bounds(qp, step, bound_tolerance, marks_.data()))
+    return Outcome::infeasible;
   if (outcome == DualActiveSet::Outcome::not_convex) {
     // State bounds may hold what has no minimiser without them.
     if (try_active_sets(qp, step, claimed_rounds, deadline)) return Outcome::active_set;

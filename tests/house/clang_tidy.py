@@ -20,6 +20,7 @@ import house
 QUOTED = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 # Compiler warnings are the compiler's business; what it is told about them must not stop clang.
 EXTRA = ["--extra-arg=-Wno-error", "--extra-arg=-Wno-unknown-warning-option", "--extra-arg=-Wno-unused-command-line-argument"]
+UNKNOWN_TO_CLANG = {"-fno-tree-loop-distribute-patterns"}
 
 
 class Headers:
@@ -57,16 +58,22 @@ def main():
     root, build = arguments.root.resolve(), arguments.build.resolve()
 
     wanted = [(root / name).resolve() for name in (arguments.only or house.FOLDERS)]
+    passed = build / "clang-tidy"
+    passed.mkdir(exist_ok=True)
+    commands = json.loads((build / "compile_commands.json").read_text())
+    for entry in commands:
+        entry["command"] = " ".join(word for word in entry["command"].split(" ") if word not in UNKNOWN_TO_CLANG)
+    aside = passed / "compile_commands.json.new"
+    aside.write_text(json.dumps(commands))
+    aside.replace(passed / "compile_commands.json")
     entries = {}
-    for entry in json.loads((build / "compile_commands.json").read_text()):
+    for entry in commands:
         file = pathlib.Path(entry["directory"], entry["file"]).resolve()
         if any(file.is_relative_to(place) for place in wanted):
             entries.setdefault(file, entry["command"])
 
     version = subprocess.run(["clang-tidy", "--version"], check=True, capture_output=True, text=True).stdout
     common = version + (root / ".clang-tidy").read_text() + " ".join(EXTRA)
-    passed = build / "clang-tidy"
-    passed.mkdir(exist_ok=True)
     headers = Headers(root)
     header_filter = f"--header-filter=^{re.escape(str(root))}/({'|'.join(house.FOLDERS)})/"
 
@@ -76,7 +83,7 @@ def main():
         if stamp.exists():
             return file, "", 0.0
         start = time.monotonic()
-        command = ["clang-tidy", "--quiet", "-p", str(build), header_filter, *EXTRA, str(file)]
+        command = ["clang-tidy", "--quiet", "-p", str(passed), header_filter, *EXTRA, str(file)]
         result = subprocess.run(command, capture_output=True, text=True)
         if result.returncode == 0:
             stamp.touch()

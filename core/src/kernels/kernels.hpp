@@ -1,13 +1,22 @@
 #pragma once
 
-#include "rhec/core/export.hpp"
+#include <span>
 
 namespace rhec {
 
 struct RiccatiKernels;
 struct ProgramKernels;
 
-/// The kernels for the widest instruction set that this machine has.
+/// The kernels for one instruction set.
+struct KernelSet {
+  const char* instruction_set;
+  const RiccatiKernels* riccati;
+  const ProgramKernels* program;
+};
+/// Those that this machine can run, narrowest first.
+std::span<const KernelSet> runnable_kernels() noexcept;
+
+/// Of the widest of them.
 const RiccatiKernels& riccati_kernels() noexcept;
 const ProgramKernels& program_kernels() noexcept;
 

@@ -1,11 +1,31 @@
 #pragma once
 
+#include "rhec/core/padded.hpp"
+
 // Doubles that are computed with at once, in terms of the compiler's own vectors: as many as a register of the
 // instruction set has. Included only by the units that are compiled once for each instruction set, all of whose code is
 // local to them: no function of theirs may be merged with that of another set.
 
 namespace rhec::kernels {
 namespace {
+
+#define RHEC_ALWAYS_INLINE __attribute__((always_inline))
+
+/// A number that is known when it is compiled; lists of them. (Of the standard's templates the linker could keep the
+/// instance of another instruction set.)
+template <int number>
+struct Constant {
+  constexpr operator int() const { return number; }
+};
+template <int...>
+struct Constants {};
+template <int count, int... numbers>
+constexpr auto make_constants() {
+  if constexpr (count > 0)
+    return make_constants<count - 1, count - 1, numbers...>();
+  else
+    return Constants<numbers...>();
+}
 
 #if defined(__AVX512F__)
 constexpr int lane_count = 8;
@@ -23,16 +43,12 @@ using Lanes = double __attribute__((vector_size(16)));
 using LaneMask = long long __attribute__((vector_size(16)));
 constexpr LaneMask lane_numbers = {0, 1};
 #endif
-/// Rows are multiples of eight doubles long.
-constexpr int padded(int size) { return (size + 7) / 8 * 8; }
 
-inline Lanes load(const double* from) {
-  Lanes lanes;
-  __builtin_memcpy(&lanes, from, sizeof lanes);
-  return lanes;
-}
-inline void store(const Lanes& lanes, double* to) { __builtin_memcpy(to, &lanes, sizeof lanes); }
-inline Lanes all(double value) { return Lanes{} + value; }
+// In memory anywhere among doubles. (By memcpy the compiler would have to think that every store changes everything.)
+using LanesInMemory [[gnu::aligned(sizeof(double))]] = Lanes;
+inline Lanes load(const double* from) { return *reinterpret_cast<const LanesInMemory*>(from); }
+inline void store(const Lanes& lanes, double* to) { *reinterpret_cast<LanesInMemory*>(to) = lanes; }
+inline Lanes all(double value) { return value - Lanes{}; }
 
 /// What is left of a row's part number `part` when only its first `count` entries are kept.
 inline Lanes first_of(const Lanes& lanes, int part, int count) {
@@ -47,11 +63,11 @@ inline Lanes smaller(const Lanes& a, const Lanes& b) { return b < a ? b : a; }
 
 inline double sum_of(const Lanes& lanes) {
 #if defined(__AVX512F__)
-  const Lanes fours = lanes + __builtin_shuffle(lanes, LaneMask{4, 5, 6, 7, 0, 1, 2, 3});
-  const Lanes twos = fours + __builtin_shuffle(fours, LaneMask{2, 3, 0, 1, 6, 7, 4, 5});
+  const Lanes fours = lanes + __builtin_shufflevector(lanes, lanes, 4, 5, 6, 7, 0, 1, 2, 3);
+  const Lanes twos = fours + __builtin_shufflevector(fours, fours, 2, 3, 0, 1, 6, 7, 4, 5);
   return twos[0] + twos[1];
 #elif defined(__AVX2__)
-  const Lanes twos = lanes + __builtin_shuffle(lanes, LaneMask{2, 3, 0, 1});
+  const Lanes twos = lanes + __builtin_shufflevector(lanes, lanes, 2, 3, 0, 1);
   return twos[0] + twos[1];
 #else
   return lanes[0] + lanes[1];
@@ -62,6 +78,70 @@ inline double largest_of(const Lanes& lanes) {
   double result = lanes[0];
   for (int k = 1; k < lane_count; ++k) result = lanes[k] > result ? lanes[k] : result;
   return result;
+}
+
+/// A row, or a part of one, in registers.
+template <int registers>
+struct Row {
+  /// Sums of many rows that are taken at once: two that do not wait for each other, where there is room for them.
+  static constexpr int chains = registers == 1 ? 2 : 1;
+  Lanes part[registers];
+  static Row from(const double* memory) {
+    Row row;
+    for (int v = 0; v < registers; ++v) row.part[v] = load(memory + v * lane_count);
+    return row;
+  }
+  void to(double* memory) const {
+    for (int v = 0; v < registers; ++v) store(part[v], memory + v * lane_count);
+  }
+  double entry(int k) const { return part[k / lane_count][k % lane_count]; }
+  /// An entry in all lanes.
+  Lanes splat(int k) const { return all(entry(k)); }
+  template <int number>
+  Lanes splat(Constant<number> /*k*/) const {
+    const Lanes& from = part[number / lane_count];
+    constexpr int at = number % lane_count;
+#if defined(__AVX512F__)
+    return __builtin_shufflevector(from, from, at, at, at, at, at, at, at, at);
+#elif defined(__AVX2__)
+    return __builtin_shufflevector(from, from, at, at, at, at);
+#else
+    return __builtin_shufflevector(from, from, at, at);
+#endif
+  }
+  void add(const Row& other, const Lanes& factor) {
+    for (int v = 0; v < registers; ++v) part[v] += other.part[v] * factor;
+  }
+  void add(const Row& other, double factor) { add(other, all(factor)); }
+  void add(const Row& other) {
+    for (int v = 0; v < registers; ++v) part[v] += other.part[v];
+  }
+  Row first(int count) const {
+    Row row;
+    for (int v = 0; v < registers; ++v) row.part[v] = first_of(part[v], v, count);
+    return row;
+  }
+};
+
+/// As many rows as they have lanes, as a matrix; only where a row of eight is one register.
+inline void transpose([[maybe_unused]] Lanes* rows) {
+#if defined(__AVX512F__)
+  Lanes pairs[8], quads[8];
+  for (int i = 0; i < 8; i += 2) {
+    pairs[i] = __builtin_shufflevector(rows[i], rows[i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+    pairs[i + 1] = __builtin_shufflevector(rows[i], rows[i + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+  }
+  for (int i = 0; i < 8; i += 4) {
+    for (int j = 0; j < 2; ++j) {
+      quads[i + j] = __builtin_shufflevector(pairs[i + j], pairs[i + j + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+      quads[i + j + 2] = __builtin_shufflevector(pairs[i + j], pairs[i + j + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+  }
+  for (int j = 0; j < 4; ++j) {
+    rows[j] = __builtin_shufflevector(quads[j], quads[j + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+    rows[j + 4] = __builtin_shufflevector(quads[j], quads[j + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
+#endif
 }
 
 }  // namespace

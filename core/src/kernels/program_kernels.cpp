@@ -51,10 +51,8 @@ KktParts kkt(const ProgramView& view) {
       rest += b - b;
     }
   }
-  double not_finite = 0.0;
-  for (int k = 0; k < lane_count; ++k) not_finite += rest[k];
-  return {largest_of(stationarity) + not_finite, largest_of(defect), largest_of(violation), largest_of(complementarity),
-          largest_of(term)};
+  return {largest_of(stationarity) + sum_of(rest), largest_of(defect), largest_of(violation),
+          largest_of(complementarity), largest_of(term)};
 }
 
 StepParts check_step(const ProgramView& view, double tolerance) {
@@ -67,6 +65,7 @@ StepParts check_step(const ProgramView& view, double tolerance) {
       const long at = i * stride + v * lane_count;
       const Lanes z = load(view.values + at), lower = load(view.lower + at), upper = load(view.upper + at);
       rest += z - z;
+      rest = (lower == lower) & (upper == upper) ? rest : all(1.0);
       Lanes below = lower - z - tolerance * (1.0 + absolute(lower));
       Lanes above = z - upper - tolerance * (1.0 + absolute(upper));
       if (i == 0 && view.initial_state_is_given) {
@@ -82,9 +81,7 @@ StepParts check_step(const ProgramView& view, double tolerance) {
       rest += costate - costate;
     }
   }
-  double sum = 0.0;
-  for (int k = 0; k < lane_count; ++k) sum += rest[k];
-  return {sum == 0.0, largest_of(excess) > 0.0, largest_of(costates)};
+  return {sum_of(rest) == 0.0, largest_of(excess) > 0.0, largest_of(costates)};
 }
 
 bool mark_bounds(const ProgramView& view, double tolerance, unsigned char* marks) {
@@ -108,9 +105,7 @@ bool mark_bounds(const ProgramView& view, double tolerance, unsigned char* marks
       crossed += is_crossed;
       marked += is_marked;
     }
-    double sum = 0.0;
-    for (int k = 0; k < lane_count; ++k) sum += marked[k];
-    marks[i] = sum != 0.0;
+    marks[i] = sum_of(marked) != 0.0;
   }
   return largest_of(crossed) > 0.0;
 }
@@ -123,58 +118,81 @@ void add(const double* from, const double* step, double* to, long count) {
   for (long k = 0; k < count; k += lane_count) store(load(from + k) + load(step + k), to + k);
 }
 
-void add_squares(const double* J, const double* weights, const double* residuals, int count, int columns, double* H,
-                 double* h, int stride) {
-  const int parts = (columns + lane_count - 1) / lane_count;
+/// H += sum_j weights_j J_j J_j' and h += sum_j pulls_j J_j.
+inline void add_products(const double* J, const double* weights, const double* pulls, int count, int columns,
+                         int stride, double* H, double* h) {
   const long width = padded(columns);
-  for (int v = 0; v < parts; ++v) {
-    Lanes gradient = load(h + v * lane_count);
-    for (int j = 0; j < count; ++j)
-      gradient += load(J + j * width + v * lane_count) * (2.0 * weights[j] * residuals[j]);
-    store(gradient, h + v * lane_count);
-    if (!H) continue;
-    for (int c = 0; c < columns; ++c) {
-      double* column = H + static_cast<long>(c) * stride + v * lane_count;
+  for (int k = 0; k < width; k += lane_count) {
+    if (h) {
+      Lanes gradient = load(h + k);
+      for (int j = 0; j < count; ++j) gradient += load(J + j * width + k) * pulls[j];
+      store(gradient, h + k);
+    }
+    for (int c = 0; H && c < columns; ++c) {
+      double* column = H + static_cast<long>(c) * stride + k;
       Lanes sum = load(column);
-      for (int j = 0; j < count; ++j) {
-        const double* row = J + j * width;
-        sum += load(row + v * lane_count) * (2.0 * weights[j] * row[c]);
-      }
+      for (int j = 0; j < count; ++j) sum += load(J + j * width + k) * (weights[j] * J[j * width + c]);
       store(sum, column);
     }
   }
 }
 
-double add_tracking(const double* z, const double* reference, const double* weights, const double* turn, double* H,
-                    double* h, int columns, int stride) {
+void add_squares(const double* J, const double* weights, const double* residuals, int count, int columns, double* H,
+                 double* h, int stride) {
+  // Few outputs share a loss; more are taken in turns.
+  constexpr int most = 16;
+  double doubled[most], pulls[most];
+  for (int first = 0; first < count; first += most) {
+    const int now = count - first < most ? count - first : most;
+    for (int j = 0; j < now; ++j) {
+      doubled[j] = 2.0 * weights[first + j];
+      pulls[j] = doubled[j] * residuals[first + j];
+    }
+    add_products(J + static_cast<long>(first) * padded(columns), doubled, pulls, now, columns, stride, H, h);
+  }
+}
+
+/// What is left of differences on circles: `error` less the nearest whole number of turns.
+inline Lanes on_circle(const Lanes& error, const Lanes& turn, const Lanes& inverse_turn) {
   constexpr double to_integer = 6755399441055744.0;  // 1.5 * 2^52: what is added to it is rounded to an integer
-  double total = 0.0;
-  for (int first = 0; first < columns; first += lane_count) {
-    const Lanes circle = load(turn + first), weight = load(weights + first);
-    Lanes error = load(z + first) - load(reference + first);
-    const Lanes turns = circle > 0.0 ? error / circle : Lanes{};
-    error -= ((turns + to_integer) - to_integer) * circle;
-    error = weight > 0.0 ? error : Lanes{};  // a reference that nobody set may be anything
-    const Lanes pull = weight * error;
-    store(load(h + first) + 2.0 * pull, h + first);
-    const Lanes cost = pull * error;
-    for (int k = 0; k < lane_count; ++k) total += cost[k];
-    if (!H) continue;
-    for (int k = 0; k < lane_count && first + k < columns; ++k)
-      H[static_cast<long>(first + k) * stride + first + k] += 2.0 * weights[first + k];
+  return error - ((error * inverse_turn + to_integer) - to_integer) * turn;
+}
+
+double write_tracking(const CostView& view, const TrackingView& tracked, int first, int last) {
+  const long stride = view.stride, wide = view.states + view.controls;
+  double total = 0.0;  // stage by stage, so that it is the same however the stages are asked for
+  for (int i = first; i <= last; ++i) {
+    Lanes of_stage{};
+    const bool is_last = i == view.intervals;
+    const double* weights = is_last ? tracked.terminal_weights : tracked.stage_weights;
+    const int columns = view.states + (is_last ? 0 : view.control_counts[i]);
+    for (int k = 0; view.h && k < view.stride; k += lane_count) {
+      const long at = i * stride + k;
+      const Lanes weight = first_of(load(weights + k), 0, columns - k);
+      Lanes error = load(tracked.values + at) - load(tracked.references + at);
+      error = weight > 0.0 ? on_circle(error, load(tracked.turns + k), load(tracked.inverse_turns + k)) : Lanes{};
+      const Lanes pull = weight * error;
+      store(2.0 * pull, view.h + at);
+      of_stage += pull * error;
+    }
+    total += sum_of(of_stage);
+    if (!view.H) continue;
+    double* H = view.H + i * wide * stride;
+    if (is_last || !view.bends)
+      for (int c = 0; c < columns; ++c)
+        for (int k = 0; k < padded(columns); k += lane_count) store(Lanes{}, H + c * stride + k);
+    for (int k = 0; k < columns; ++k) H[k * stride + k] += 2.0 * weights[k];
   }
   return total;
 }
 
 void complete_dynamics(const DynamicsView& view) {
   const long stride = view.stride;
-  const int parts = view.stride / lane_count, state_parts = (view.states + lane_count - 1) / lane_count;
+  const int state_parts = (view.states + lane_count - 1) / lane_count;
   for (int i = view.first; i <= view.last; ++i) {
     double *F = view.F + i * view.states * stride, *b = view.b + i * stride;
     const double *z = view.values + i * stride, *next = z + stride;
     const int* control_of = view.control_of + i * view.channels;
-    for (int r = 0; r < view.vehicle_states; ++r)
-      for (int k = view.written; k < view.stride; k += lane_count) store(Lanes{}, F + r * stride + k);
     for (int v = 0; v < state_parts; ++v) {
       const LaneMask is_vehicle = lane_numbers < static_cast<long long>(view.vehicle_states - v * lane_count);
       const Lanes reached = is_vehicle ? load(b + v * lane_count) : load(z + v * lane_count);
@@ -182,70 +200,130 @@ void complete_dynamics(const DynamicsView& view) {
     }
     for (int c = 0; c < view.channels; ++c) {
       const int row = view.vehicle_states + c, control = control_of[c];
-      const int column = control >= 0 ? view.states + control : row;
-      for (int v = 0; v < parts; ++v) {
-        const LaneMask is_column = lane_numbers == static_cast<long long>(column - v * lane_count);
-        store(is_column ? all(1.0) : Lanes{}, F + row * stride + v * lane_count);
-      }
-      if (control >= 0) b[row] = z[column] - next[row];
+      double* F_row = F + row * stride;
+      for (int k = 0; k < view.stride; k += lane_count) store(Lanes{}, F_row + k);
+      F_row[control >= 0 ? view.states + control : row] = 1.0;
+      if (control >= 0) b[row] = z[view.states + control] - next[row];
     }
   }
 }
 
-void clear_costs(const CostView& view, int first, int last, bool matrices) {
+void clear_costs(const CostView& view, int first, int last) {
   const long stride = view.stride, wide = view.states + view.controls;
   for (int i = first; i <= last; ++i) {
-    const int used = view.states + (i < view.intervals ? view.control_counts[i] : 0);
-    for (int k = 0; k < view.stride; k += lane_count) store(Lanes{}, view.h + i * stride + k);
-    if (!matrices) continue;
-    const int length = padded(used);
+    const int used = view.states + (i < view.intervals ? view.control_counts[i] : 0), length = padded(used);
+    for (int k = 0; view.h && k < view.stride; k += lane_count) store(Lanes{}, view.h + i * stride + k);
+    if (!view.H) continue;
+    double* H = view.H + i * wide * stride;
     for (int c = 0; c < used; ++c)
-      for (int k = 0; k < length; k += lane_count) store(Lanes{}, view.H + (i * wide + c) * stride + k);
+      for (int k = 0; k < length; k += lane_count) store(Lanes{}, H + c * stride + k);
   }
 }
 
-double add_measurements(const CostView& view, const MeasurementView& measured, int first, int last, bool matrices) {
-  constexpr double to_integer = 6755399441055744.0, turn = 6.283185307179586;
-  const long stride = view.stride, wide = view.states + view.controls, width = padded(measured.vehicle_states);
-  double *weights = measured.room, *pulls = weights + measured.output_count;
-  double total = 0.0;
-  for (int i = first; i <= last; ++i) {
-    double *H = view.H + i * wide * stride, *h = view.h + i * stride;
-    const double* y = measured.outputs + static_cast<long>(i) * measured.output_count;
-    const double* predicted = measured.predicted + static_cast<long>(i - first) * measured.output_count;
-    const double* J = measured.jacobians + static_cast<long>(i - first) * measured.output_count * width;
-    for (int j = 0; j < measured.output_count; ++j) {
-      const bool is_missing = y[j] != y[j];
-      double error = is_missing ? 0.0 : predicted[j] - y[j];
-      if (measured.is_angle[j] != 0) error -= ((error / turn + to_integer) - to_integer) * turn;
-      weights[j] = is_missing ? 0.0 : 2.0 * measured.output_weights[j];
-      pulls[j] = weights[j] * error;
-      total += 0.5 * pulls[j] * error;
-    }
-    for (int k = 0; k < width; k += lane_count) {
-      Lanes gradient = load(h + k);
-      for (int j = 0; j < measured.output_count; ++j) gradient += load(J + j * width + k) * pulls[j];
-      store(gradient, h + k);
-      for (int c = 0; matrices && c < measured.vehicle_states; ++c) {
-        Lanes column = load(H + c * stride + k);
-        for (int j = 0; j < measured.output_count; ++j)
-          column += load(J + j * width + k) * (weights[j] * J[j * width + c]);
-        store(column, H + c * stride + k);
-      }
-    }
-    if (i == view.intervals) break;
-    const double* u = measured.values + i * stride + view.states;
-    const double* u_measured = measured.inputs + static_cast<long>(i) * measured.input_count;
-    for (int j = 0; j < measured.input_count; ++j) {
-      if (u_measured[j] != u_measured[j]) continue;
-      const double error = u[j] - u_measured[j], weight = measured.input_weights[j];
-      const int at = view.states + j;
-      total += weight * error * error;
-      h[at] += 2.0 * weight * error;
-      if (matrices) H[at * stride + at] += 2.0 * weight;
-    }
+/// Sizes that fit eight entries, as those of most vehicles do, or any.
+struct OneEight {
+  static constexpr int width = 8;
+  explicit OneEight(int /*size*/) {}
+};
+struct AnyEights {
+  int width;
+  explicit AnyEights(int size) : width(padded(size)) {}
+};
+
+/// What is measured at one node, of which `seen` was. Returns the sum of squares.
+template <bool matrices, bool vectors, class Outputs, class States>
+RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, const double* seen, const double* predicted,
+                                           const double* J, int stride, int used, double* H, double* h) {
+  const Outputs outputs(measured.output_count);
+  const States states(measured.vehicle_states);
+  double *pulls = measured.room, *weights = pulls + outputs.width;
+  Lanes total{};
+  for (int k = 0; k < outputs.width; k += lane_count) {
+    const Lanes y = load(seen + k), weight = y == y ? 2.0 * load(measured.output_weights + k) : Lanes{};
+    if (matrices) store(weight, weights + k);
+    if (!vectors) continue;
+    Lanes error = load(predicted + k) - y;
+    error = y == y ? on_circle(error, load(measured.turns + k), load(measured.inverse_turns + k)) : Lanes{};
+    const Lanes pull = weight * error;
+    store(pull, pulls + k);
+    total += pull * error;
   }
+  if (vectors) {
+    for (int k = 0; k < states.width; k += lane_count) {
+      Lanes sum{};
+      for (int j = 0; j < measured.output_count; ++j) sum += load(J + j * states.width + k) * pulls[j];
+      store(sum, h + k);
+    }
+    for (int k = states.width; k < stride; k += lane_count) store(Lanes{}, h + k);
+  }
+  if (!matrices) return total;
+  const auto clear = [&](double* row, int from) RHEC_ALWAYS_INLINE {
+    if (used <= 8) {
+      for (int k = 0; k < 8; k += lane_count)
+        if (k >= from) store(Lanes{}, row + k);
+    } else {
+      for (int k = from; k < padded(used); k += lane_count) store(Lanes{}, row + k);
+    }
+  };
+  for (int c = 0; c < measured.vehicle_states; ++c) {
+    double* row = H + static_cast<long>(c) * stride;
+    for (int k = 0; k < states.width; k += lane_count) {
+      Lanes sum{};
+      for (int j = 0; j < measured.output_count; ++j)
+        sum += load(J + j * states.width + k) * (weights[j] * J[j * states.width + c]);
+      store(sum, row + k);
+    }
+    clear(row, states.width);
+  }
+  for (int c = measured.vehicle_states; c < used; ++c) clear(H + static_cast<long>(c) * stride, 0);
   return total;
+}
+
+template <bool matrices, bool vectors, class Outputs, class States>
+double write_nodes(const CostView& view, const MeasurementView& measured, int first, int last) {
+  const long stride = view.stride, wide = view.states + view.controls;
+  const long outputs = padded(measured.output_count), J_size = measured.output_count * padded(measured.vehicle_states);
+  const double *y = measured.outputs + first * outputs, *predicted = measured.predicted, *J = measured.jacobians;
+  const double *u = measured.values + first * stride + view.states,
+               *u_measured = measured.inputs + static_cast<long>(first) * measured.input_count;
+  double *H = view.H + first * wide * stride, *h = view.h + first * stride;
+  Lanes total{};
+  double of_inputs = 0.0;
+  for (int i = first; i <= last; ++i) {
+    const bool has_inputs = i < view.intervals;
+    const int used = view.states + (has_inputs ? view.control_counts[i] : 0);
+    total += write_node<matrices, vectors, Outputs, States>(measured, y, predicted, J, view.stride, used, H, h);
+    for (int j = 0; has_inputs && j < measured.input_count; ++j) {
+      const bool is_missing = u_measured[j] != u_measured[j];
+      const double error = is_missing ? 0.0 : u[j] - u_measured[j];
+      const double weight = is_missing ? 0.0 : 2.0 * measured.input_weights[j];
+      const int at = view.states + j;
+      of_inputs += weight * error * error;
+      if (vectors) h[at] += weight * error;
+      if (matrices) H[at * stride + at] = weight;
+    }
+    y += outputs;
+    predicted += outputs;
+    J += J_size;
+    u += stride;
+    u_measured += measured.input_count;
+    H += wide * stride;
+    h += stride;
+  }
+  return 0.5 * (sum_of(total) + of_inputs);
+}
+
+template <bool matrices, bool vectors>
+double write_measurements(const CostView& view, const MeasurementView& measured, int first, int last) {
+  if (measured.output_count <= 8 && measured.vehicle_states <= 8)
+    return write_nodes<matrices, vectors, OneEight, OneEight>(view, measured, first, last);
+  return write_nodes<matrices, vectors, AnyEights, AnyEights>(view, measured, first, last);
+}
+
+double write_measurements(const CostView& view, const MeasurementView& measured, int first, int last) {
+  if (!view.H) return write_measurements<false, true>(view, measured, first, last);
+  if (!view.h) return write_measurements<true, false>(view, measured, first, last);
+  return write_measurements<true, true>(view, measured, first, last);
 }
 
 }  // namespace
@@ -255,8 +333,8 @@ double add_measurements(const CostView& view, const MeasurementView& measured, i
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET);
 constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {
-    &kernels::kkt,         &kernels::check_step,      &kernels::mark_bounds,  &kernels::subtract,
-    &kernels::add,         &kernels::add_squares,     &kernels::add_tracking, &kernels::complete_dynamics,
-    &kernels::clear_costs, &kernels::add_measurements};
+    &kernels::kkt,         &kernels::check_step,        &kernels::mark_bounds,    &kernels::subtract,
+    &kernels::add,         &kernels::add_squares,       &kernels::write_tracking, &kernels::complete_dynamics,
+    &kernels::clear_costs, &kernels::write_measurements};
 
 }  // namespace rhec

@@ -20,8 +20,8 @@ struct KktParts {
 
 /// What a step that solves a program without its inactive bounds does to them.
 struct StepParts {
-  bool is_finite;
-  bool violates;  ///< some bound, by more than the tolerance
+  bool is_finite;  ///< and no bound is not a number
+  bool violates;   ///< some bound, by more than the tolerance
   double largest_costate;
 };
 
@@ -30,27 +30,34 @@ struct DynamicsView {
   int first, last;               ///< intervals
   int states, controls, stride;  ///< of the capacity
   int vehicle_states, channels;  ///< what a state is made of
-  int written;                   ///< entries of each row of F that the model has written
   const int* control_of;         ///< of each interval's channels: the control that starts it, or -1
   const double* values;          ///< rows of the point
   double *F, *b;
 };
 
+/// Where costs go: their matrices, their vectors, or both. What is not wanted is null.
 struct CostView {
   int intervals, states, controls, stride;
   const int* control_counts;
   double *H, *h;
+  bool bends;  ///< H holds the curvature of the intervals' dynamics, to which costs are added
 };
 
-/// An estimator's measurements, NaN where missing, with weights 1 / variance.
+/// An estimator's measurements, NaN where missing, with weights 1 / variance. Rows of outputs are whole eights.
 struct MeasurementView {
   int vehicle_states, output_count, input_count;
-  const double *outputs, *inputs;       ///< rows of all nodes and intervals
+  const double *outputs, *inputs;       ///< rows of all nodes and intervals; those of inputs are dense
   const double *predicted, *jacobians;  ///< of the range's nodes; Jacobians as rows of whole eights
   const double *output_weights, *input_weights;
-  const unsigned char* is_angle;
-  const double* values;  ///< rows of the point
-  double* room;          ///< for two numbers an output
+  const double *turns, *inverse_turns;  ///< a row each: of an angle a full turn and its inverse, else 0
+  const double* values;                 ///< rows of the point
+  double* room;                         ///< for two rows of outputs
+};
+
+/// A controller's references, a row [x; p; u] a stage. A column's reference may be anything where its weight is 0.
+struct TrackingView {
+  const double *values, *references;
+  const double *stage_weights, *terminal_weights, *turns, *inverse_turns;  ///< one row each
 };
 
 /// Inner loops over whole horizons.
@@ -64,20 +71,19 @@ struct ProgramKernels {
   void (*subtract)(const double* a, const double* b, double* out, long count);
   /// to = from + step.
   void (*add)(const double* from, const double* step, double* to, long count);
-  /// H += 2 sum_j w_j J_j J_j' over its first `columns` columns (null: not) and h += 2 sum_j w_j r_j J_j, with the
+  /// H += 2 sum_j w_j J_j J_j' over its first `columns` columns and h += 2 sum_j w_j r_j J_j (null: not), with the
   /// `count` rows J_j of one stage; rows are as long as `columns` needs in multiples of eight.
   void (*add_squares)(const double* J, const double* weights, const double* residuals, int count, int columns,
                       double* H, double* h, int stride);
-  /// Adds weights (z - reference)^2 of one stage: gradient, diagonal of H (null: not); returns the sum. Differences of
-  /// entries whose `turn` is not 0 are taken on a circle of that length.
-  double (*add_tracking)(const double* z, const double* reference, const double* weights, const double* turn, double* H,
-                         double* h, int columns, int stride);
-  /// Rows of carried channels in F, what is beyond the model's columns, and b = F(s, w) - s_next.
+  /// weights (z - reference)^2 of stages first .. last; returns the sum where vectors are wanted. Differences of
+  /// entries whose turn is not 0 are taken on a circle of that length.
+  double (*write_tracking)(const CostView& view, const TrackingView& tracked, int first, int last);
+  /// Rows of carried channels in F, and b = F(s, w) - s_next.
   void (*complete_dynamics)(const DynamicsView& view);
-  /// Zeros to h, and to what is used of H, of stages first .. last.
-  void (*clear_costs)(const CostView& view, int first, int last, bool matrices);
-  /// Squares of measured outputs and inputs; returns their sum.
-  double (*add_measurements)(const CostView& view, const MeasurementView& measured, int first, int last, bool matrices);
+  /// Zeros to what is used of stages first .. last.
+  void (*clear_costs)(const CostView& view, int first, int last);
+  /// Squares of measured outputs and inputs, without the curvature of anything; returns their sum.
+  double (*write_measurements)(const CostView& view, const MeasurementView& measured, int first, int last);
 };
 
 }  // namespace rhec

@@ -10,208 +10,308 @@ namespace {
 // A stage's row may be this long: 32 states and 32 controls.
 constexpr int longest_row = 64;
 
+/// Calls function(first), function(first + 1), ... `count` times, or backwards. What is known when it is compiled
+/// comes as a constant, and no loop is left of it.
+template <int first, class Function, int... k>
+RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants<k...> /*numbers*/) {
+  (function(Constant<first + k>()), ...);
+}
+template <int first, int count, class Function, int... k>
+RHEC_ALWAYS_INLINE inline void each_constant_back(const Function& function, Constants<k...> /*numbers*/) {
+  (function(Constant<first + count - 1 - k>()), ...);
+}
+
 /// What is known of a stage when its kernel is compiled: how many times eight entries a row has, and how many states
-/// and controls (unknown: 0).
-template <int eights, int state_count, int control_count>
+/// and controls (unknown: 0). Its loops are written out where that is asked for.
+template <int eights, int state_count, int control_count, bool is_written_out = true>
 struct Shape {
+  static constexpr bool is_known = state_count > 0;
   static constexpr int most_columns = eights * 8;
   static constexpr int registers = most_columns / lane_count;
-  static constexpr int most_states = state_count > 0 ? state_count : (most_columns < 32 ? most_columns : 32);
-  int states, next_states, offset, controls;
+  static constexpr int most_states = is_known ? state_count : (most_columns < 32 ? most_columns : 32);
+  using R = Row<registers>;
+  /// Next state and control together fill no more than one register: a step is carried on in it.
+  static constexpr bool is_compact = is_known && registers == 1;
+  int states, next_states, offset, columns;
 
   Shape(const RiccatiView& view, int i)
-      : states(state_count > 0 ? state_count : view.state_counts[i]),
-        next_states(state_count > 0 ? state_count : view.state_counts[i + 1]),
-        offset(state_count > 0 ? state_count : view.states),
-        controls(control_count > 0 ? control_count : view.control_counts[i]) {}
-  int columns() const { return offset + controls; }
+      : states(is_known ? state_count : view.state_counts[i]),
+        next_states(is_known ? state_count : view.state_counts[i + 1]),
+        offset(is_known ? state_count : view.states),
+        columns(offset + (is_known ? control_count : view.control_counts[i])) {}
+
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_state(const Function& function) const {
+    if constexpr (is_known && is_written_out)
+      each_constant<0>(function, make_constants<state_count>());
+    else
+      for (int j = 0; j < (is_known ? state_count : states); ++j) function(j);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_next_state(const Function& function) const {
+    if constexpr (is_known && is_written_out)
+      each_constant<0>(function, make_constants<state_count>());
+    else
+      for (int l = 0; l < next_states; ++l) function(l);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_control(const Function& function) const {
+    if constexpr (is_known && is_written_out)
+      each_constant<state_count>(function, make_constants<control_count>());
+    else
+      for (int k = offset; k < columns; ++k) function(k);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_control_back(const Function& function) const {
+    if constexpr (is_known && is_written_out)
+      each_constant_back<state_count, control_count>(function, make_constants<control_count>());
+    else
+      for (int k = columns - 1; k >= offset; --k) function(k);
+  }
+  /// Of the controls before another one.
+  template <class Other, class Function>
+  RHEC_ALWAYS_INLINE void each_control_before(Other k, const Function& function) const {
+    if constexpr (is_known && is_written_out)
+      each_constant<state_count>(function, make_constants<k - state_count>());
+    else
+      for (int j = offset; j < k; ++j) function(j);
+  }
 };
 
-template <int registers>
-struct Row {
-  Lanes part[registers];
-  static Row from(const double* memory) {
-    Row row;
-    for (int v = 0; v < registers; ++v) row.part[v] = load(memory + v * lane_count);
-    return row;
-  }
-  void to(double* memory) const {
-    for (int v = 0; v < registers; ++v) store(part[v], memory + v * lane_count);
-  }
-  void add(const Row& other, double factor) {
-    for (int v = 0; v < registers; ++v) part[v] += other.part[v] * factor;
-  }
-  Row first(int count) const {
-    Row row;
-    for (int v = 0; v < registers; ++v) row.part[v] = first_of(part[v], v, count);
-    return row;
-  }
-};
+inline double bound_of(const RiccatiView& view, int i, int k) {
+  const long at = static_cast<long>(i) * view.stride + k;
+  return (view.sides[at] < 0 ? view.lower : view.upper)[at];
+}
 
-/// Columns of H + F'PF; those of the controls first, since what follows waits for them.
+/// Where a stage's rows are.
 template <class Stage>
-inline void form_columns(const RiccatiView& view, int i, const Stage& stage, Row<Stage::registers>* X) {
-  using R = Row<Stage::registers>;
-  const long stride = view.stride;
-  const double* F = view.F + i * view.states * stride;
-  const double* H = view.H + i * (view.states + view.controls) * stride;
-  const double* P = view.P + (i + 1) * view.states * stride;
-  R W[Stage::most_states];  // rows of P F
-  for (int j = 0; j < stage.next_states; ++j) {
-    R sum{};
-    // P is read from its lower triangle alone, so that it stays symmetric.
-    for (int l = 0; l < j; ++l) sum.add(R::from(F + l * stride), P[l * stride + j]);
-    for (int l = j; l < stage.next_states; ++l) sum.add(R::from(F + l * stride), P[j * stride + l]);
-    W[j] = sum;
+struct Memory {
+  using R = typename Stage::R;
+  long stride;
+  const double *F, *H, *h, *b, *P_next, *p_next;
+  double *P, *U, *V, *T, *inverse, *drift, *g, *p;
+  const std::int8_t* sides;
+
+  Memory(const RiccatiView& view, int i) : stride(view.stride) {
+    const long at = i * stride, states = i * view.states * stride, controls = i * view.controls * stride;
+    F = view.F + states;
+    H = view.H + states + controls;
+    h = view.h + at;
+    b = view.b + at;
+    P = view.P + states;
+    P_next = P + view.states * stride;
+    p = view.p + at;
+    p_next = p + stride;
+    U = view.U + controls;
+    V = view.V + controls;
+    T = view.T + static_cast<long>(i) * 64;
+    inverse = view.inverse + static_cast<long>(i) * view.controls;
+    drift = view.drift + at;
+    g = view.g + at;
+    sides = view.sides + at;
   }
-  const auto form = [&](int k) {
-    R column = R::from(H + k * stride);
-    for (int l = 0; l < stage.next_states; ++l) column.add(W[l], F[l * stride + k]);
-    X[k] = column;
+  RHEC_ALWAYS_INLINE R row(const double* rows, int r) const { return R::from(rows + r * stride); }
+};
+
+/// Rows of H + F'PF; those of the controls first, since what follows waits for them.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at,
+                                         typename Stage::R* X) {
+  using R = typename Stage::R;
+  R W[Stage::most_states];  // rows of P F
+  stage.each_next_state([&](auto j) RHEC_ALWAYS_INLINE {
+    // P is read from its lower triangle alone, so that it stays symmetric.
+    R sums[2] = {};
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
+      sums[l % R::chains].add(at.row(at.F, l), l < j ? at.P_next[l * at.stride + j] : at.P_next[j * at.stride + l]);
+    });
+    W[j] = sums[0];
+    if (R::chains > 1) W[j].add(sums[1]);
+  });
+  const auto form = [&](auto k) RHEC_ALWAYS_INLINE {
+    R sums[2] = {at.row(at.H, k), R{}};
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(W[l], at.F[l * at.stride + k]); });
+    if (R::chains > 1) sums[0].add(sums[1]);
+    if (view.diagonal) sums[0].part[k / lane_count][k % lane_count] += view.diagonal[i * at.stride + k];
+    X[k] = sums[0];
   };
-  for (int k = stage.columns() - 1; k >= stage.offset; --k) form(k);
-  for (int k = 0; k < stage.states; ++k) form(k);
-  if (!view.diagonal) return;
-  const double* extra = view.diagonal + i * stride;
-  const auto add = [&](int k) { X[k].part[k / lane_count][k % lane_count] += extra[k]; };
-  for (int k = 0; k < stage.states; ++k) add(k);
-  for (int k = stage.offset; k < stage.columns(); ++k) add(k);
+  stage.each_control_back(form);
+  stage.each_state(form);
 }
 
 template <class Stage>
-inline bool factor_stage(const RiccatiView& view, int i, double tolerance) {
-  using R = Row<Stage::registers>;
+RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, double tolerance) {
+  using R = typename Stage::R;
   const Stage stage(view, i);
-  const long stride = view.stride;
-  const std::int8_t* sides = view.sides + i * stride;
-  double* U = view.U + i * view.controls * stride;
-  double* inverse = view.inverse + i * view.controls;
-  double* P = view.P + i * view.states * stride;
-  const double* P_next = view.P + (i + 1) * view.states * stride;
-  const double* b = view.b + i * stride;
-  R drift{};
-  for (int l = 0; l < stage.next_states; ++l) drift.add(R::from(P_next + l * stride), b[l]);
-  drift.to(view.drift + i * stride);
-
+  const Memory<Stage> at(view, i);
   R X[Stage::most_columns];
-  form_columns(view, i, stage, X);
+  form_rows(view, i, stage, at, X);
   double diagonal[Stage::most_columns];
-  bool any_fixed = false;
-  for (int k = stage.offset; k < stage.columns(); ++k) {
-    diagonal[k] = X[k].part[k / lane_count][k % lane_count];
-    if (sides[k] == 0) continue;
-    any_fixed = true;
-    X[k].to(U + (k - stage.offset) * stride);
-    inverse[k - stage.offset] = 0.0;
-  }
-  for (int k = stage.columns() - 1; k >= stage.offset; --k) {
-    if (sides[k] != 0) continue;
-    const double pivot = X[k].part[k / lane_count][k % lane_count];
-    if (!(pivot > tolerance * diagonal[k] && pivot > 0.0)) return false;
+  bool any_fixed = false, is_definite = true;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    diagonal[k] = X[k].entry(k);
+    any_fixed |= at.sides[k] != 0;
+  });
+  view.fixes[i] = any_fixed;
+  if (any_fixed)
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+      if (at.sides[k] != 0) X[k].to(at.U + (k - stage.offset) * at.stride);
+    });
+  stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
+    const int control = k - stage.offset;
+    if (any_fixed && at.sides[k] != 0) {
+      at.inverse[control] = 0.0;
+      X[k] = R{};
+      return;
+    }
+    const double pivot = X[k].entry(k);
+    is_definite = is_definite && pivot > tolerance * diagonal[k] && pivot > 0.0;
     const double reciprocal = 1.0 / pivot;
-    R column = X[k].first(k);
+    R row = X[k].first(k);
     if (any_fixed)
-      for (int f = stage.offset; f < k; ++f)
-        if (sides[f] != 0) column.part[f / lane_count][f % lane_count] = 0.0;
-    column.to(U + (k - stage.offset) * stride);
-    inverse[k - stage.offset] = reciprocal;
-    double factors[Stage::most_columns];
+      stage.each_control_before(k, [&](auto f) RHEC_ALWAYS_INLINE {
+        if (at.sides[f] != 0) row.part[f / lane_count][f % lane_count] = 0.0;
+      });
+    row.to(at.U + control * at.stride);
+    at.inverse[control] = reciprocal;
     R scaled{};
-    scaled.add(column, -reciprocal);
-    scaled.to(factors);
-    for (int j = stage.offset; j < k; ++j) X[j].add(column, factors[j]);
-    for (int j = 0; j < stage.states; ++j) X[j].add(column, factors[j]);
+    scaled.add(row, reciprocal);
+    const auto eliminate = [&](auto j) RHEC_ALWAYS_INLINE { X[j].add(row, -scaled.splat(j)); };
+    stage.each_control_before(k, eliminate);
+    stage.each_state(eliminate);
+    X[k] = scaled;
+  });
+  if (!is_definite) return false;
+  // From what each control owes to the state and to the controls before it, to what it owes to the state alone.
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    R policy = X[k].first(stage.states);
+    stage.each_control_before(k, [&](auto j) RHEC_ALWAYS_INLINE { policy.add(X[j], -X[k].splat(j)); });
+    policy.to(at.V + (k - stage.offset) * at.stride);
+    X[k] = policy;
+  });
+  if constexpr (Stage::is_compact) {
+    // Columns of what leads to [next state; control].
+    Lanes columns[8] = {};
+    stage.each_state([&](auto l) RHEC_ALWAYS_INLINE { columns[l] = at.row(at.F, l).part[0]; });
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { columns[k] = -X[k].part[0]; });
+    transpose(columns);
+    for (int k = 0; k < stage.columns; ++k) store(columns[k], at.T + k * 8);
   }
-  for (int j = 0; j < stage.states; ++j) X[j].first(stage.states).to(P + j * stride);
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
+  R drift{};
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
+  drift.to(at.drift);
   return true;
 }
 
+/// Takes p of the next node and leaves p of this one: what was just written to memory takes a while to come back.
 template <class Stage>
-inline void solve_stage_backward(const RiccatiView& view, int i) {
-  using R = Row<Stage::registers>;
+RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int i, typename Stage::R& p) {
+  using R = typename Stage::R;
   const Stage stage(view, i);
-  const long stride = view.stride;
-  const double* F = view.F + i * view.states * stride;
-  const double* U = view.U + i * view.controls * stride;
-  const double* inverse = view.inverse + i * view.controls;
-  const std::int8_t* sides = view.sides + i * stride;
-  double costate[Stage::most_columns];
-  R sum = R::from(view.p + (i + 1) * stride);
-  sum.add(R::from(view.drift + i * stride), 1.0);
-  sum.to(costate);
-  // In two halves, which do not wait for each other.
-  R gradient = R::from(view.h + i * stride), other{};
-  for (int l = 0; l + 1 < stage.next_states; l += 2) {
-    gradient.add(R::from(F + l * stride), costate[l]);
-    other.add(R::from(F + (l + 1) * stride), costate[l + 1]);
+  const Memory<Stage> at(view, i);
+  R costate = p;
+  costate.add(R::from(at.drift));
+  R sums[2] = {R::from(at.h), R{}};
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.F, l), costate.splat(l)); });
+  R gradient = sums[0];
+  if (R::chains > 1) gradient.add(sums[1]);
+  if (view.fixes[i]) {
+    gradient.to(at.g);
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+      if (at.sides[k] != 0) gradient.add(at.row(at.U, k - stage.offset), bound_of(view, i, k));
+    });
   }
-  if (stage.next_states % 2 != 0) {
-    const int l = stage.next_states - 1;
-    gradient.add(R::from(F + l * stride), costate[l]);
-  }
-  gradient.add(other, 1.0);
-  gradient.to(view.g + i * stride);
-  double* p = view.p + i * stride;
-  for (int k = stage.offset; k < stage.columns(); ++k) {
-    if (sides[k] == 0) continue;
-    const double bound = (sides[k] < 0 ? view.lower : view.upper)[i * stride + k];
-    gradient.add(R::from(U + (k - stage.offset) * stride), bound);
-  }
-  for (int k = stage.columns() - 1; k >= stage.offset; --k) {
-    if (sides[k] != 0) continue;
-    const double of_control = gradient.part[k / lane_count][k % lane_count];
-    gradient.add(R::from(U + (k - stage.offset) * stride), -of_control * inverse[k - stage.offset]);
-  }
-  gradient.to(p);
-  for (int k = stage.offset; k < stage.columns(); ++k)
-    if (sides[k] != 0) p[k] = (sides[k] < 0 ? view.lower : view.upper)[i * stride + k];
+  p = gradient;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { p.add(at.row(at.V, k - stage.offset), -gradient.splat(k)); });
+  p.to(at.p);
+  // What the controls do where the state does not step: eliminated from the last to the first, found in their order.
+  double own[Stage::most_columns];
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { own[k] = gradient.entry(k); });
+  stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
+    const double* U = at.U + (k - stage.offset) * at.stride;
+    own[k] *= at.inverse[k - stage.offset];
+    stage.each_control_before(k, [&](auto j) RHEC_ALWAYS_INLINE { own[j] -= U[j] * own[k]; });
+  });
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    const double* U = at.U + (k - stage.offset) * at.stride;
+    double sum = own[k];
+    stage.each_control_before(k,
+                              [&](auto j) RHEC_ALWAYS_INLINE { sum -= U[j] * at.inverse[k - stage.offset] * own[j]; });
+    own[k] = sum;
+    at.p[k] = -sum;
+  });
+  if (view.fixes[i])
+    for (int k = stage.offset; k < stage.columns; ++k)
+      if (at.sides[k] != 0) at.p[k] = bound_of(view, i, k);
 }
 
+/// Multipliers of the bounds at which a stage's controls are held.
 template <class Stage>
-inline void solve_stage_forward(const RiccatiView& view, int i) {
-  using R = Row<Stage::registers>;
-  const Stage stage(view, i);
-  const long stride = view.stride;
-  const double* F = view.F + i * view.states * stride;
-  const double* U = view.U + i * view.controls * stride;
-  const double* inverse = view.inverse + i * view.controls;
-  const double *p = view.p + i * stride, *b = view.b + i * stride;
-  const std::int8_t* sides = view.sides + i * stride;
-  double *z = view.values + i * stride, *next = view.values + (i + 1) * stride;
-  double* bounds = view.bounds + i * stride;
-  bool any_fixed = false;
-  for (int k = stage.offset; k < stage.columns(); ++k) {
-    if (sides[k] != 0) {
-      z[k] = (sides[k] < 0 ? view.lower : view.upper)[i * stride + k];
-      any_fixed = true;
-      continue;
-    }
-    const double* column = U + (k - stage.offset) * stride;
-    double sum = p[k];
-    for (int j = 0; j < stage.states; ++j) sum += column[j] * z[j];
-    for (int j = stage.offset; j < k; ++j) sum += column[j] * z[j];
-    z[k] = -sum * inverse[k - stage.offset];
-  }
-  double next_state[Stage::most_states];
-  for (int l = 0; l < stage.next_states; ++l) {
-    double sum = b[l];
-    for (int j = 0; j < stage.states; ++j) sum += F[l * stride + j] * z[j];
-    for (int k = stage.offset; k < stage.columns(); ++k) sum += F[l * stride + k] * z[k];
-    next_state[l] = next[l] = sum;
-  }
-  R costate = R::from(view.p + (i + 1) * stride).first(stage.next_states);
-  const double* P_next = view.P + (i + 1) * view.states * stride;
-  for (int l = 0; l < stage.next_states; ++l) costate.add(R::from(P_next + l * stride), next_state[l]);
-  costate.to(view.costates + (i + 1) * stride);
-  if (!any_fixed) return;
-  for (int k = stage.offset; k < stage.columns(); ++k) {
-    if (sides[k] == 0) continue;
-    const double* column = U + (k - stage.offset) * stride;
-    double sum = view.g[i * stride + k];
-    for (int j = 0; j < stage.states; ++j) sum += column[j] * z[j];
-    for (int j = stage.offset; j < stage.columns(); ++j) sum += column[j] * z[j];
+inline void write_multipliers(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at) {
+  const double* z = view.values + i * at.stride;
+  double* bounds = view.bounds + i * at.stride;
+  for (int k = stage.offset; k < stage.columns; ++k) {
+    if (at.sides[k] == 0) continue;
+    const double* row = at.U + (k - stage.offset) * at.stride;
+    double sum = at.g[k];
+    for (int j = 0; j < stage.states; ++j) sum += row[j] * z[j];
+    for (int j = stage.offset; j < stage.columns; ++j) sum += row[j] * z[j];
     bounds[k] = -sum;
   }
+}
+
+/// Takes the state's step s and leaves that of the next node.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, double* s) {
+  using R = typename Stage::R;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  double *z = view.values + i * at.stride, *next = z + at.stride;
+  double w[Stage::most_columns], reached[Stage::most_states];
+  // In two sums, which do not wait for each other.
+  const auto dot = [&](const double* row) RHEC_ALWAYS_INLINE {
+    double sums[2] = {0.0, 0.0};
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % 2] += row[j] * s[j]; });
+    return sums[0] + sums[1];
+  };
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    w[k] = at.p[k] - dot(at.V + (k - stage.offset) * at.stride);
+    z[k] = w[k];
+  });
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
+    const double* F = at.F + l * at.stride;
+    double sum = at.b[l] + dot(F);
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { sum += F[k] * w[k]; });
+    reached[l] = next[l] = sum;
+  });
+  R sums[2] = {R::from(at.p_next).first(stage.next_states), R{}};
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.P_next, l), reached[l]); });
+  if (R::chains > 1) sums[0].add(sums[1]);
+  sums[0].to(view.costates + (i + 1) * at.stride);
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { s[l] = reached[l]; });
+  if (view.fixes[i]) write_multipliers(view, i, stage, at);
+}
+
+/// The same in one register: [next state; control] is a sum of columns.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, Row<1>& s) {
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  const LaneMask is_state = lane_numbers < static_cast<long long>(stage.states);
+  Lanes sums[2] = {is_state ? load(at.b) : load(at.p), Lanes{}};
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % 2] += load(at.T + j * 8) * s.splat(j); });
+  Row<1> next{{sums[0] + sums[1]}};
+  double* z = view.values + i * at.stride;
+  store(is_state ? s.part[0] : next.part[0], z);
+  const Row<1> reached = next;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { next.part[0] += load(at.T + k * 8) * reached.splat(k); });
+  s.part[0] = is_state ? next.part[0] : Lanes{};
+  store(s.part[0], z + at.stride);
+  Lanes costates[2] = {Row<1>::from(at.p_next).first(stage.states).part[0], Lanes{}};
+  stage.each_state([&](auto l) RHEC_ALWAYS_INLINE { costates[l % 2] += at.row(at.P_next, l).part[0] * s.splat(l); });
+  store(costates[0] + costates[1], view.costates + (i + 1) * at.stride);
+  if (view.fixes[i]) write_multipliers(view, i, stage, at);
 }
 
 /// One entry of the rows of a batch of responses.
@@ -245,22 +345,22 @@ inline void respond_stage_backward(const RiccatiView& view, int i, double* gradi
     if (with_minimiser) gradient[k].add(unit, view.h[i * stride + k]);
     for (int l = 0; l < stage.next_states; ++l) gradient[k].add(costates[l], F[l * stride + k]);
   };
-  for (int k = stage.offset; k < stage.columns(); ++k) {
+  for (int k = stage.offset; k < stage.columns; ++k) {
     form(k);
     gradient[k].to(own + k * response_batch);
   }
   for (int k = 0; k < stage.states; ++k) form(k);
   if (with_minimiser) {
-    for (int f = stage.offset; f < stage.columns(); ++f) {
+    for (int f = stage.offset; f < stage.columns; ++f) {
       if (sides[f] == 0) continue;
       const double* column = U + (f - stage.offset) * stride;
       const double bound = (sides[f] < 0 ? view.lower : view.upper)[i * stride + f];
-      for (int k = stage.offset; k < stage.columns(); ++k)
+      for (int k = stage.offset; k < stage.columns; ++k)
         if (sides[k] == 0) gradient[k].add(unit, column[k] * bound);
       for (int k = 0; k < stage.states; ++k) gradient[k].add(unit, column[k] * bound);
     }
   }
-  for (int k = stage.columns() - 1; k >= stage.offset; --k) {
+  for (int k = stage.columns - 1; k >= stage.offset; --k) {
     if (sides[k] != 0) continue;
     const double* column = U + (k - stage.offset) * stride;
     Batch of_control{};
@@ -285,7 +385,7 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
   const Batch unit = minimiser_alone();
   Batch z[Stage::most_columns];
   for (int j = 0; j < stage.states; ++j) z[j] = Batch::from(own + j * response_batch);
-  for (int k = stage.offset; k < stage.columns(); ++k) {
+  for (int k = stage.offset; k < stage.columns; ++k) {
     z[k] = {};
     if (sides[k] != 0) {
       if (with_minimiser) z[k].add(unit, (sides[k] < 0 ? view.lower : view.upper)[i * stride + k]);
@@ -302,7 +402,7 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
     Batch sum{};
     if (with_minimiser) sum.add(unit, view.b[i * stride + l]);
     for (int j = 0; j < stage.states; ++j) sum.add(z[j], F[l * stride + j]);
-    for (int k = stage.offset; k < stage.columns(); ++k) sum.add(z[k], F[l * stride + k]);
+    for (int k = stage.offset; k < stage.columns; ++k) sum.add(z[k], F[l * stride + k]);
     next_state[l] = sum;
   }
   if (with_minimiser) {
@@ -314,14 +414,14 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
     }
   }
   for (int l = 0; l < stage.next_states; ++l) next_state[l].to(next + l * response_batch);
-  for (int k = stage.offset; k < stage.columns(); ++k) {
+  for (int k = stage.offset; k < stage.columns; ++k) {
     Batch answer = z[k];
     if (sides[k] != 0) {
       // What a fixed control answers with is its multiplier.
       const double* column = U + (k - stage.offset) * stride;
       Batch sum = Batch::from(own + k * response_batch);
       for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
-      for (int j = stage.offset; j < stage.columns(); ++j) sum.add(z[j], column[j]);
+      for (int j = stage.offset; j < stage.columns; ++j) sum.add(z[j], column[j]);
       answer = {};
       answer.add(sum, -1.0);
     }
@@ -330,50 +430,85 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
 }
 
 /// Calls `function` with the type of a stage's shape: one of the sizes that kernels are compiled for, or any.
-template <class Function>
+template <bool is_written_out, class Function>
 inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
   const int states = view.states, controls = view.control_counts[i];
   const bool is_full = view.state_counts[i] == states && view.state_counts[i + 1] == states;
   if (is_full && states == 6) {
     if (controls == 2) return function.template operator()<Shape<1, 6, 2>>();
-    if (controls == 3) return function.template operator()<Shape<2, 6, 3>>();
-    if (controls == 4) return function.template operator()<Shape<2, 6, 4>>();
+    if (controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out>>();
+    if (controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out>>();
   }
   const int columns = states + controls;
   if (columns <= 8) return function.template operator()<Shape<1, 0, 0>>();
   if (columns <= 16) return function.template operator()<Shape<2, 0, 0>>();
+  if (columns <= 24) return function.template operator()<Shape<3, 0, 0>>();  // rows are no longer than that then
   if (columns <= 32) return function.template operator()<Shape<4, 0, 0>>();
   return function.template operator()<Shape<8, 0, 0>>();
 }
 
+// Whole matrices of long rows fit into the widest registers only; written out for others, they are moved to memory and
+// back.
+constexpr bool matrices_fit = lane_count == 8;
+
+/// Whether stage j can be treated in one go with stage i.
+inline bool is_alike(const RiccatiView& view, int i, int j) {
+  return view.special[j] == 0 && view.control_counts[j] == view.control_counts[i] &&
+         view.state_counts[j] == view.state_counts[i] && view.state_counts[j + 1] == view.state_counts[i + 1];
+}
+
 int factor(const RiccatiView& view, int first, double tolerance) {
-  for (int i = first; i >= 0; --i) {
+  for (int i = first; i >= 0;) {
     if (view.special[i]) return i;
-    const bool done = with_shape(view, i, [&]<class Stage>() { return factor_stage<Stage>(view, i, tolerance); });
+    const bool done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+      const int alike = i;
+      do
+        if (!factor_stage<Stage>(view, i, tolerance)) return false;
+      while (--i >= 0 && is_alike(view, alike, i));
+      return true;
+    });
     if (!done) return i;
   }
   return -1;
 }
 
 int solve_backward(const RiccatiView& view, int first) {
-  for (int i = first; i >= 0; --i) {
+  for (int i = first; i >= 0;) {
     if (view.special[i]) return i;
-    with_shape(view, i, [&]<class Stage>() { solve_stage_backward<Stage>(view, i); });
+    with_shape<true>(view, i, [&]<class Stage>() {
+      const int alike = i;
+      auto p = Stage::R::from(view.p + static_cast<long>(i + 1) * view.stride);
+      do solve_stage_backward<Stage>(view, i, p);
+      while (--i >= 0 && is_alike(view, alike, i));
+    });
   }
   return -1;
 }
 
 int solve_forward(const RiccatiView& view, int first) {
-  for (int i = first; i < view.intervals; ++i) {
+  for (int i = first; i < view.intervals;) {
     if (view.special[i]) return i;
-    with_shape(view, i, [&]<class Stage>() { solve_stage_forward<Stage>(view, i); });
+    with_shape<true>(view, i, [&]<class Stage>() {
+      const int alike = i;
+      const double* first_state = view.values + static_cast<long>(i) * view.stride;
+      if constexpr (Stage::is_compact) {
+        Row<1> s = Row<1>::from(first_state);
+        do solve_stage_forward<Stage>(view, i, s);
+        while (++i < view.intervals && is_alike(view, alike, i));
+      } else {
+        double s[Stage::most_states];
+        for (int j = 0; j < view.state_counts[i]; ++j) s[j] = first_state[j];
+        do solve_stage_forward<Stage>(view, i, s);
+        while (++i < view.intervals && is_alike(view, alike, i));
+      }
+    });
   }
   return view.intervals;
 }
 
 void respond_backward(const RiccatiView& view, int last, double* gradients, bool with_minimiser) {
   for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0; --i) {
-    with_shape(view, i, [&]<class Stage>() {
+    with_shape<true>(view, i, [&]<class Stage>() {
       if (with_minimiser) {
         respond_stage_backward<Stage, true>(view, i, gradients);
       } else {
@@ -385,7 +520,7 @@ void respond_backward(const RiccatiView& view, int last, double* gradients, bool
 
 void respond_forward(const RiccatiView& view, double* responses, double* costates) {
   for (int i = 0; i < view.intervals; ++i) {
-    with_shape(view, i, [&]<class Stage>() {
+    with_shape<true>(view, i, [&]<class Stage>() {
       if (costates) {
         respond_stage_forward<Stage, true>(view, i, responses, costates);
       } else {
@@ -405,12 +540,79 @@ void combine(const double* batch, const double* weights, double* sums, long coun
   }
 }
 
+/// Sigma of the next node from that of stage i: A Sigma A' + B cov(w | s) B', with A the dynamics under the policy.
+template <class Stage>
+inline void carry_stage(const RiccatiView& view, int i, double* covariance) {
+  using R = typename Stage::R;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  R rows[Stage::most_states], closed[Stage::most_states], products[Stage::most_columns] = {};
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { rows[j] = at.row(covariance, j); });
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
+    R row = at.row(at.F, l).first(stage.states);
+    stage.each_control([&](auto k)
+                           RHEC_ALWAYS_INLINE { row.add(at.row(at.V, k - stage.offset), -at.F[l * at.stride + k]); });
+    closed[l] = row;
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { products[l].add(rows[j], row.splat(j)); });
+  });
+  // Of the products, columns are needed.
+  R columns[Stage::most_columns];
+  if constexpr (Stage::is_compact) {
+    Lanes lanes[8];
+    for (int l = 0; l < 8; ++l) lanes[l] = products[l].part[0];
+    transpose(lanes);
+    for (int j = 0; j < 8; ++j) columns[j].part[0] = lanes[j];
+  } else {
+    double transposed[Stage::most_states][Stage::most_columns] = {};
+    for (int l = 0; l < stage.next_states; ++l)
+      for (int j = 0; j < stage.states; ++j) transposed[j][l] = products[l].entry(j);
+    for (int j = 0; j < stage.states; ++j) columns[j] = R::from(transposed[j]);
+  }
+  R next[Stage::most_states] = {};
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { next[l].add(columns[j], closed[l].splat(j)); });
+  });
+  // What is left of a control's variance when those before it are known moves the later ones too.
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    double moved[Stage::most_columns] = {};
+    moved[k] = 1.0;
+    for (int j = k + 1; j < stage.columns; ++j)
+      for (int before = k; before < j; ++before)
+        moved[j] -= at.U[(j - stage.offset) * at.stride + before] * at.inverse[j - stage.offset] * moved[before];
+    R noise{};
+    if constexpr (Stage::is_compact) {
+      for (int j = k; j < stage.columns; ++j) noise.part[0] += load(at.T + j * 8) * moved[j];
+    } else {
+      double entries[Stage::most_columns] = {};
+      for (int l = 0; l < stage.next_states; ++l)
+        for (int j = k; j < stage.columns; ++j) entries[l] += at.F[l * at.stride + j] * moved[j];
+      noise = R::from(entries);
+    }
+    const double variance = 2.0 * at.inverse[k - stage.offset];
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { next[l].add(noise, noise.splat(l) * variance); });
+  });
+  stage.each_next_state([&](auto l)
+                            RHEC_ALWAYS_INLINE { next[l].first(stage.next_states).to(covariance + l * at.stride); });
+}
+
+int carry_covariance(const RiccatiView& view, int first, double* covariance, double* all) {
+  for (int i = first; i < view.intervals; ++i) {
+    if (view.special[i]) return i;
+    with_shape<matrices_fit>(view, i, [&]<class Stage>() { carry_stage<Stage>(view, i, covariance); });
+    if (!all) continue;
+    double* block = all + static_cast<long>(i + 1) * view.states * view.states;
+    for (int c = 0; c < view.states; ++c)
+      for (int r = 0; r < view.states; ++r) block[c * view.states + r] = covariance[c * view.stride + r];
+  }
+  return view.intervals;
+}
+
 void form(const RiccatiView& view, int i, double* out) {
-  with_shape(view, i, [&]<class Stage>() {
-    Row<Stage::registers> X[Stage::most_columns]{};
+  with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+    typename Stage::R X[Stage::most_columns]{};
     const Stage stage(view, i);
-    form_columns(view, i, stage, X);
-    for (int k = 0; k < stage.columns(); ++k) X[k].to(out + static_cast<long>(k) * view.stride);
+    form_rows(view, i, stage, Memory<Stage>(view, i), X);
+    for (int k = 0; k < stage.columns; ++k) X[k].to(out + static_cast<long>(k) * view.stride);
   });
 }
 
@@ -421,7 +623,7 @@ void form(const RiccatiView& view, int i, double* out) {
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET);
 constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {
-    &kernels::factor,          &kernels::solve_backward, &kernels::solve_forward, &kernels::respond_backward,
-    &kernels::respond_forward, &kernels::combine,        &kernels::form};
+    &kernels::factor,          &kernels::solve_backward, &kernels::solve_forward,    &kernels::respond_backward,
+    &kernels::respond_forward, &kernels::combine,        &kernels::carry_covariance, &kernels::form};
 
 }  // namespace rhec

@@ -24,10 +24,13 @@ struct RiccatiView {
 
   double* P = nullptr;        ///< n_s rows a node
   double* U = nullptr;        ///< n_w rows a stage: columns of the reduced Hessian, each as it is eliminated
+  double* V = nullptr;        ///< n_w rows a stage: the policy w = p - V s, p being what stands beside the state's p
+  double* T = nullptr;        ///< 8 x 8 a stage: columns of what leads from s to [next s; w], where that is a register
   double* inverse = nullptr;  ///< n_w a stage: 1 / pivot, 0 where a control is fixed
-  double* drift = nullptr;    ///< a row a stage: P_{i+1} b_i
-  double* g = nullptr;        ///< a row a stage: gradient by z before anything is eliminated
-  double* p = nullptr;        ///< a row a node: gradient of the value function; beside it, of each control at its turn
+  std::uint8_t* fixes = nullptr;  ///< a stage: whether any of its controls is fixed
+  double* drift = nullptr;        ///< a row a stage: P_{i+1} b_i
+  double* g = nullptr;  ///< a row a stage: gradient by z before anything is eliminated, where it fixes a control
+  double* p = nullptr;  ///< a row a node: gradient of the value function; beside it the controls where s is 0
 
   double *values = nullptr, *costates = nullptr, *bounds = nullptr;  ///< rows of the step, an Iterate
 };
@@ -49,6 +52,9 @@ struct RiccatiKernels {
   void (*respond_forward)(const RiccatiView& view, double* responses, double* costates);
   /// The sums of a batch, each response by its weight, over `count` entries.
   void (*combine)(const double* batch, const double* weights, double* sums, long count);
+  /// The covariance (rows of the stride) of node `first` carried on to the special stage that is returned, or to node
+  /// N; on the way those of all nodes go to `all`, blocks of n_s x n_s, if it is not null.
+  int (*carry_covariance)(const RiccatiView& view, int first, double* covariance, double* all);
   /// H + F'PF of one stage, as rows of `out`.
   void (*form)(const RiccatiView& view, int stage, double* out);
 };

@@ -304,7 +304,7 @@ TEST_P(Behaviour, ServesTwoCapacitiesOneAfterTheOther) {
 
 // A setup serves problems up to its own size; estimation needs more scratch than control.
 TEST_P(Behaviour, ServesBothKindsOfOneCapacity) {
-  const Problem control = problem("rhc_near"), estimation = problem("rhe_blocks");
+  const Problem control = problem("rhc_near"), estimation = problem("rhe_full_horizon");
   ASSERT_EQ(control.ocp->capacity(), estimation.ocp->capacity());
   ASSERT_LE(control.ocp->scratch_size(), estimation.ocp->scratch_size());
   const auto solver = make();

@@ -315,7 +315,16 @@ std::vector<Family> make_families() {
   };
 
   // Estimation: block structures.
-  add("rhe_full_horizon", "one value of each parameter", random(RheSpec{})).problems = 5;
+  add("rhe_full_horizon", "one value of each parameter, and room for no more",
+      [](const ModelPointer& model, unsigned seed) {
+        const RheSpec spec = rhe([&](RheSpec& s) {
+          s.adjust = [&](RheProblem::Setup& setup, const Drive&) {
+            for (int j = 0; j < model->parameter_count(); ++j) setup.one_block.push_back(j);
+          };
+        });
+        return random(spec)(model, seed);
+      })
+      .problems = 5;
   add("rhe_blocks", "blocks of four intervals, linked", random(rhe([](RheSpec& s) { s.block = 4; }))).problems = 5;
   add("rhe_blocks_unlinked", "blocks of five intervals without links", random(rhe([](RheSpec& s) {
         s.block = 5;

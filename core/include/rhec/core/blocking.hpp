@@ -38,6 +38,9 @@ class RHEC_EXPORT Blocking {
     return intervals >= 1 ? std::string() : "a horizon has at least one interval";
   }
 
+  /// True where every window is one block: then nothing needs to be set aside for blocks that start within one.
+  virtual bool is_one_block() const noexcept { return false; }
+
   virtual Transition transition() const noexcept { return Transition::step; }
 
   /// Standard deviation per square root of a step of the random walk that links a block to the one before it; none: the

@@ -42,6 +42,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept override;
   double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                    std::span<double> scratch) const noexcept override;
+  void prepare(const Iterate& point, Hessian hessian, StageQp& qp, std::span<double> scratch) const noexcept override;
   void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
 
   /// Length of an interval [s].
@@ -51,6 +52,10 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   /// True where a block of carried channel `channel` starts at an interval.
   bool begins(int interval, int channel) const noexcept { return begins_[interval * channels_ + channel] != 0; }
   int channel_count() const noexcept { return channels_; }
+  /// Index in w_i of a channel that starts at interval i, or -1.
+  int control_of_channel(int interval, int channel) const noexcept {
+    return control_index_[interval * channels_ + channel];
+  }
   /// True where a carried channel's blocks are reached by a ramp.
   bool is_ramp(int channel) const noexcept { return ramp_[channel] != 0; }
 
@@ -68,6 +73,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
     int max_intervals = 0;
     int substeps = 1;
     std::vector<int> blocked_inputs;  ///< inputs that are carried channels
+    bool decides_parameters = false;  ///< blocks of parameters may start within the horizon,
+    std::vector<int> one_block = {};  ///< but for those of these
   };
   HorizonProblem(std::shared_ptr<const Model> model, const Shape& shape);
 
@@ -91,34 +98,37 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   void finish_structure() noexcept;
   /// Carried channel of an input, or -1 where it is free on every interval.
   int channel_of_input(int input) const noexcept { return input_channel_[input]; }
-  /// Index in w_i of a channel that starts at interval i, or -1.
-  int control_of_channel(int interval, int channel) const noexcept {
-    return control_index_[interval * channels_ + channel];
-  }
   int control_of_input(int interval, int input) const noexcept;
 
   /// Bounds of z = [s; w] at every stage, as the rows of StageQp.
   double* lower_row(int stage) noexcept { return row(lower_, stage, stride_); }
   double* upper_row(int stage) noexcept { return row(upper_, stage, stride_); }
-  /// Where the kernels of costs write to.
-  CostView cost_view(StageQp& qp) const noexcept;
+  /// Where the kernels of costs write to: all of a program, or (after the fact) its matrices or vectors alone.
+  enum class Parts { all, matrices, vectors };
+  CostView cost_view(Parts parts, Hessian hessian, StageQp& qp) const noexcept;
+  CostView cost_view() const noexcept;  ///< without a target
   /// Removes all bounds.
   void clear_bounds() noexcept;
   /// Where an input is found in z of an interval: free, or that of its channel.
   int column_of_input(int interval, int input) const noexcept;
+  /// A block starts somewhere within the horizon.
+  bool any_start() const noexcept { return any_start_; }
   /// No input is carried: z begins as the vehicle's [x; p; u].
   bool is_direct() const noexcept { return static_cast<int>(free_inputs_.size()) == nu_; }
 
-  // The cost, which makes the kind. Each adds to what is there.
+  // The cost, which makes the kind.
   virtual double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept = 0;
-  virtual double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  /// Overwrites h, and H but for the curvature of the dynamics; returns the sum of the stages' costs where vectors are
+  /// wanted.
+  virtual double add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                           std::span<double> scratch) const noexcept = 0;
-  virtual void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept = 0;
   virtual std::size_t cost_scratch_size() const noexcept = 0;
 
  private:
   void gather(const Iterate& point, StageRange range, double* x, double* u, double* p, double* p_end) const noexcept;
-  const double* gather_rows(const Iterate& point, StageRange range, double* rows) const noexcept;
+  void gather_rows(const Iterate& point, StageRange range, double* rows) const noexcept;
+  void fill_stages(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+                   std::span<double> scratch) const noexcept;
   void linearise_dynamics(StageRange steps, const Iterate& point, Hessian hessian, StageQp& qp,
                           std::span<double> scratch) const noexcept;
   void place_started_channels(int interval, Hessian hessian, StageQp& qp) const noexcept;
@@ -129,6 +139,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   Capacity capacity_;
   int nx_, nu_, np_, channels_, substeps_, stride_ = 0, row_ = 0, intervals_ = 0;
   bool any_ramp_ = false;
+  bool any_start_ = false;  ///< of a channel, on any interval
   AlignedDoubles lower_, upper_;
   std::vector<int> input_channel_, free_inputs_;
   std::vector<double> durations_;

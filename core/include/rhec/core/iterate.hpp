@@ -4,6 +4,7 @@
 
 #include "rhec/core/aligned.hpp"
 #include "rhec/core/export.hpp"
+#include "rhec/core/padded.hpp"
 
 namespace rhec {
 
@@ -19,7 +20,7 @@ struct Capacity {
   /// beginning, the control at `states`, whatever a stage uses of both.
   int row() const noexcept {
     const int used = states + controls;
-    return used > 32 ? (used + 63) / 64 * 64 : (used + 7) / 8 * 8;
+    return used > 32 ? (used + 63) / 64 * 64 : padded(used);
   }
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "rhec/core/dual.hpp"
+#include "rhec/core/lane_traits.hpp"
 #include "rhec/core/model.hpp"
 #include "rhec/core/runge_kutta.hpp"
 
@@ -14,28 +15,6 @@ struct ModelKernels {
   /// For one Runge-Kutta step an interval, without ramps and with Jacobians. Both are null for a wide model.
   void (*integrate_rows)(const void* formula, const IntervalRows& request);
   void (*observe_rows)(const void* formula, const NodeRows& request);
-};
-
-/// How many stages a number type carries at once, and how their rows of `size` doubles are loaded and stored: lane i of
-/// entry k is rows[i * step + k]. Of `count` rows that do not fill a pack the last one is repeated, so that no lane
-/// computes with rubbish. `store_padded` writes zeros up to the next multiple of eight. A pack specialises this
-/// (pack.hpp).
-template <class Lane>
-struct LaneTraits {
-  static constexpr int width = 1;
-  template <int size>
-  static void load(const double* rows, int /*count*/, std::ptrdiff_t /*step*/, Lane* out) {
-    for (int k = 0; k < size; ++k) out[k] = rows[k];
-  }
-  template <int size>
-  static void store(const Lane* entries, int /*count*/, double* rows) {
-    for (int k = 0; k < size; ++k) rows[k] = entries[k];
-  }
-  template <int size>
-  static void store_padded(const Lane* entries, int /*count*/, double* rows, std::ptrdiff_t /*step*/) {
-    for (int k = 0; k < size; ++k) rows[k] = entries[k];
-    for (int k = size; k < (size + 7) / 8 * 8; ++k) rows[k] = 0.0;
-  }
 };
 
 namespace kernels {

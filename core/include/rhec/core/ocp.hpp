@@ -76,8 +76,14 @@ class RHEC_EXPORT Ocp {
   virtual double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                            std::span<double> scratch) const noexcept = 0;
 
-  /// Fills again what depends on data that may have come since `linearise` (measurements, references, the initial
-  /// state, bounds): q, r, the bounds and the initial step. Matrices stay.
+  /// As much of `linearise` over the whole horizon as is worth doing while data are still to come; `refresh` does the
+  /// rest. F, b, H, the sizes and bounds are there afterwards.
+  virtual void prepare(const Iterate& point, Hessian hessian, StageQp& qp, std::span<double> scratch) const noexcept {
+    linearise({0, intervals()}, point, hessian, qp, scratch);
+  }
+
+  /// Fills again what depends on data that may have come since `linearise` or `prepare` (measurements, references, the
+  /// initial state, bounds): h, the bounds and the initial step. F, b and H stay.
   virtual void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept = 0;
 };
 

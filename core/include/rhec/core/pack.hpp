@@ -13,13 +13,14 @@
 #include <utility>
 #include <xsimd/xsimd.hpp>
 
+#include "rhec/core/pack_functions.hpp"
 #include "rhec/core/row_kernels.hpp"
 
 namespace rhec {
 
 #if defined(__AVX2__)
 /// Four packs of four as a matrix, transposed.
-inline void transpose(xsimd::batch<double, xsimd::fma3<xsimd::avx2>>* a) {
+RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::fma3<xsimd::avx2>>* a) {
   const __m256d low01 = _mm256_unpacklo_pd(a[0], a[1]), high01 = _mm256_unpackhi_pd(a[0], a[1]);
   const __m256d low23 = _mm256_unpacklo_pd(a[2], a[3]), high23 = _mm256_unpackhi_pd(a[2], a[3]);
   a[0] = _mm256_permute2f128_pd(low01, low23, 0x20);
@@ -31,7 +32,7 @@ inline void transpose(xsimd::batch<double, xsimd::fma3<xsimd::avx2>>* a) {
 
 #if defined(__AVX512F__)
 /// Eight packs of eight as a matrix, transposed: pairs of columns, then quarters of the pack, then its halves.
-inline void transpose(xsimd::batch<double, xsimd::avx512dq>* a) {
+RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::avx512dq>* a) {
   __m512d pairs[8], quads[8];
   for (int i = 0; i < 8; i += 2) {
     pairs[i] = _mm512_unpacklo_pd(a[i], a[i + 1]);
@@ -63,13 +64,33 @@ struct LaneTraits<xsimd::batch<double, Arch>> {
     for (int k = 0; k < size; ++k) out[k] = load_entry(k, std::make_integer_sequence<int, width>());
   }
   template <int size>
-  static void store_padded(const Lane* entries, int count, double* rows, std::ptrdiff_t step) {
-    for (int k = 0; k < (size + 7) / 8 * 8; k += width) {
+  RHEC_INLINE static void load_padded(const double* rows, int count, std::ptrdiff_t step, Lane* out) {
+    for_indices<padded(size) / width>([&](auto part) RHEC_INLINE {
       Lane block[width];
-      for (int i = 0; i < width; ++i) block[i] = k + i < size ? entries[k + i] : Lane(0.0);
+      for_indices<width>([&](auto i) RHEC_INLINE {
+        block[i] = Lane::load_unaligned(rows + (i < count ? i : count - 1) * step + part * width);
+      });
       transpose(block);
-      for (int i = 0; i < count; ++i) block[i].store_unaligned(rows + i * step + k);
-    }
+      for_indices<width>([&](auto i) RHEC_INLINE {
+        if constexpr (part * width + i < size) out[part * width + i] = block[i];
+      });
+    });
+  }
+  template <int size>
+  RHEC_INLINE static void store_padded(const Lane* entries, int count, double* rows, std::ptrdiff_t step) {
+    for_indices<padded(size) / width>([&](auto part) RHEC_INLINE {
+      Lane block[width];
+      for_indices<width>([&](auto i) RHEC_INLINE {
+        if constexpr (part * width + i < size)
+          block[i] = entries[part * width + i];
+        else
+          block[i] = Lane(0.0);
+      });
+      transpose(block);
+      for_indices<width>([&](auto i) RHEC_INLINE {
+        if (i < count) block[i].store_unaligned(rows + i * step + part * width);
+      });
+    });
   }
   /// A block of `width` entries of all rows at a time; what is left one entry at a time.
   template <int size>
@@ -97,3 +118,21 @@ using WidestPack = xsimd::batch<double, xsimd::fma3<xsimd::avx2>>;
 #endif
 
 }  // namespace rhec
+
+#if defined(__AVX2__)
+// In the pack's namespace, where formulas find them before xsimd's own.
+namespace xsimd {
+
+[[gnu::always_inline]] inline std::pair<rhec::WidestPack, rhec::WidestPack> sincos(const rhec::WidestPack& angle) {
+  const auto [sine, cosine] = rhec::pack_functions::sine_cosine(angle);
+  return {sine, cosine};
+}
+[[gnu::always_inline]] inline rhec::WidestPack sin(const rhec::WidestPack& angle) { return sincos(angle).first; }
+[[gnu::always_inline]] inline rhec::WidestPack cos(const rhec::WidestPack& angle) { return sincos(angle).second; }
+[[gnu::always_inline]] inline rhec::WidestPack tan(const rhec::WidestPack& angle) {
+  const auto [sine, cosine] = sincos(angle);
+  return sine / cosine;
+}
+
+}  // namespace xsimd
+#endif

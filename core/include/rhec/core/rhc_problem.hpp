@@ -57,17 +57,17 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
 
  private:
   double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept override;
-  double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  double add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                   std::span<double> scratch) const noexcept override;
-  void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
-  std::size_t cost_scratch_size() const noexcept override { return static_cast<std::size_t>(stride()); }
-  double add_stage(int stage, const Iterate& point, double* H, double* h) const noexcept;
+  std::size_t cost_scratch_size() const noexcept override;
+  double write_costs(StageRange range, const Iterate& point, const CostView& view) const noexcept;
   int soften_unreachable_bounds(std::span<double> scratch) noexcept;
 
   Setup setup_;
   std::vector<double> initial_, input_lower_, input_upper_;
-  AlignedDoubles reference_;                                ///< of [x; p; u], a row a stage
-  AlignedDoubles stage_weights_, terminal_weights_, turn_;  ///< rows of [x; p; u]; a full turn where it is an angle
+  AlignedDoubles reference_;  ///< of [x; p; u], a row a stage
+  AlignedDoubles stage_weights_, terminal_weights_, turns_,
+      inverse_turns_;  ///< rows of [x; p; u]; a full turn where it is an angle
 };
 
 }  // namespace rhec

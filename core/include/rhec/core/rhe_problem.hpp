@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -34,6 +35,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
     std::vector<double> output_weights;  ///< n_y, diagonal of Ry = 1 / sigma^2
     std::vector<double> input_weights;   ///< n_u, diagonal of Ru
     std::vector<RobustLoss> robust;
+    std::vector<int> one_block;                            ///< parameters with one value over every horizon
     std::vector<double> state_lower, state_upper;          ///< n_x; empty: the model's own bounds
     std::vector<double> input_lower, input_upper;          ///< n_u; empty: none, since the input was measured
     std::vector<double> parameter_lower, parameter_upper;  ///< n_p; empty: the model's own bounds
@@ -46,15 +48,16 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   Eigen::VectorXd arrival_mean;         ///< n_x + n_p
   Eigen::MatrixXd arrival_information;  ///< symmetric positive semidefinite
 
-  /// y at a node (n_y) and measured u on an interval (n_u), NaN where missing.
-  double* output(int node) noexcept { return row(outputs_, node, ny_); }
+  /// y at a node (n_y) and measured u on an interval (n_u), NaN where missing. Only u's rows follow each other.
+  double* output(int node) noexcept { return row(outputs_, node, output_row_); }
   double* measured_input(int interval) noexcept { return row(measured_inputs_, interval, nu()); }
-  const double* output(int node) const noexcept { return row(outputs_, node, ny_); }
+  const double* output(int node) const noexcept { return row(outputs_, node, output_row_); }
   const double* measured_input(int interval) const noexcept { return row(measured_inputs_, interval, nu()); }
 
   void set_intervals(int intervals) noexcept { HorizonProblem::set_intervals(intervals); }
   /// Marks where a parameter's blocks start. `begins` has an entry an interval; the first interval's block is that of
-  /// node 0's value, so begins[0] matters only for a ramp that starts there.
+  /// node 0's value, so begins[0] matters only for a ramp that starts there. Of a parameter that was set up as one
+  /// block, none counts.
   void set_blocks(int parameter, const std::uint8_t* begins, Transition transition) noexcept;
   /// Links the block that starts at an interval to the one before it; infinite variance: not linked.
   void link(int interval, int parameter, double variance) noexcept;
@@ -74,26 +77,28 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
 
  private:
   double cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept override;
-  double add_cost(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  double add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                   std::span<double> scratch) const noexcept override;
-  void add_gradient(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept override;
   std::size_t cost_scratch_size() const noexcept override;
 
   void residual(int node, const double* predicted, double* difference) const noexcept;
   double losses(const double* difference, double* weight, double* curvature) const noexcept;
-  int padded_states() const noexcept { return (nx() + 7) / 8 * 8; }
-  double add_measurements(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                          std::span<double> scratch) const noexcept;
+  double write_measurements(StageRange range, const Iterate& point, Hessian hessian, const CostView& view,
+                            std::span<double> scratch) const noexcept;
+  double write_bent_measurements(StageRange range, const Iterate& point, Hessian hessian, const CostView& view,
+                                 const double* predicted, const double* jacobians, double* memory) const noexcept;
   double inputs(int interval, const Iterate& point, double* H, double* h) const noexcept;
   double links(int interval, const Iterate& point, double* H, double* h) const noexcept;
   double arrival_term(const Iterate& point, double* q) const noexcept;
 
   Setup setup_;
-  int ny_;
-  std::vector<int> robust_group_;  ///< of an output, or -1
-  std::vector<std::uint8_t> output_is_angle_;
+  int ny_, output_row_;
+  std::vector<std::uint8_t> is_one_block_;        ///< of a parameter
+  std::vector<int> robust_group_;                 ///< of an output, or -1
   AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
-  std::vector<double> outputs_, measured_inputs_, link_information_;
+  AlignedDoubles outputs_;                        ///< a row a node, NaN where nothing was measured
+  AlignedDoubles output_weights_, output_turns_, output_inverse_turns_;  ///< rows; a full turn where it is an angle
+  std::vector<double> measured_inputs_, link_information_;
 };
 
 /// The signed difference a - b on the circle, in (-pi, pi].

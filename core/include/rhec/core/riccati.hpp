@@ -23,6 +23,7 @@ class RHEC_EXPORT ActiveSet {
   /// A stage's states and controls as in a row of StageQp.
   std::int8_t* row(int stage) noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
   const std::int8_t* row(int stage) const noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
+  bool is_empty() const noexcept;
   void clear() noexcept;
   bool operator==(const ActiveSet& other) const noexcept { return sides_ == other.sides_; }
 
@@ -119,7 +120,7 @@ class RHEC_EXPORT Riccati {
     int *pivot_row, *pivot_column, *left_row;
   };
   Special special(int i) noexcept;
-  RiccatiView view_of(const StageQp& qp, const ActiveSet& active) noexcept;
+  RiccatiView view_of(const StageQp& qp, const std::int8_t* sides) noexcept;
   double* P(int node) noexcept { return P_.data() + static_cast<std::ptrdiff_t>(node) * ns_ * stride_; }
   double* p(int node) noexcept { return p_.data() + static_cast<std::ptrdiff_t>(node) * stride_; }
 
@@ -145,13 +146,13 @@ class RHEC_EXPORT Riccati {
   int ns_ = 0, nw_ = 0, stride_ = 0, width_ = 0, max_rows_ = 0;
   bool convexified_ = false;
   const RiccatiKernels* kernels_ = nullptr;
-  AlignedDoubles P_, U_, inverse_, drift_, g_, p_;  // see RiccatiView
+  AlignedDoubles P_, U_, V_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
   std::vector<int> state_counts_, control_counts_;
-  std::vector<std::uint8_t> is_special_;  // N stages
-  std::vector<Reduction> reductions_;     // N stages, then node 0
-  std::vector<double> G_, L_, factor_;    // of special stages: full G and L; Cholesky factor of the reduced G
-  std::vector<double> K_, T_, Y_;         // v = -K s - k, w = T v + Y s + y0
-  std::vector<double> C_, eliminator_;    // rows at each node; row operations of the elimination at each stage
+  std::vector<std::uint8_t> is_special_, fixes_control_;  // N stages
+  std::vector<Reduction> reductions_;                     // N stages, then node 0
+  std::vector<double> G_, L_, factor_;  // of special stages: full G and L; Cholesky factor of the reduced G
+  std::vector<double> K_, T_, Y_;       // v = -K s - k, w = T v + Y s + y0
+  std::vector<double> C_, eliminator_;  // rows at each node; row operations of the elimination at each stage
   std::vector<int> pivot_row_, pivot_column_, left_row_;
   std::vector<double> d_, special_g_, y0_, k_, row_multipliers_, work_;
 };

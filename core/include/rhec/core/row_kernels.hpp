@@ -18,27 +18,50 @@ RHEC_INLINE inline void set_variables(const Lane* entries, Scalar* out) {
 }
 
 template <int size, class Lane>
-inline void store_row(const Lane* entries, Rows rows, double* array, std::ptrdiff_t step) {
+RHEC_INLINE inline void store_row(const Lane* entries, Rows rows, double* array, std::ptrdiff_t step) {
   LaneTraits<Lane>::template store_padded<size>(entries, rows.count, array + rows.first * step, step);
 }
 
-/// One step over z = [x; p; u].
-template <bool with_hessian, class Lane, class Formula>
-inline void integrate_row_pack(const Formula& formula, const IntervalRows& q, Rows rows) {
-  using Step = SensitiveStep<Formula, Lane, with_hessian>;
+template <class Step>
+inline void store_step(const Step& step, const IntervalRows& q, Rows rows) {
   constexpr int nx = Step::nx, nz = Step::nz;
-  Lane z[nz], duration, weights[nx];
-  LaneTraits<Lane>::template load<nz>(q.z + rows.first * q.z_step, rows.count, q.z_step, z);
-  load<1>(q.durations, rows, &duration);
-  if constexpr (with_hessian)
-    LaneTraits<Lane>::template load<nx>(q.multipliers + rows.first * q.multiplier_step, rows.count, q.multiplier_step,
-                                        weights);
-  Step step;
-  step.take(formula, z, duration, weights);
   if (q.next_states) store_row<nx>(step.next, rows, q.next_states, q.next_step);
-  for (int r = 0; r < nx; ++r) store_row<nz>(step.jacobian[r], rows, q.jacobians + r * q.jacobian_row, q.jacobian_step);
-  if constexpr (with_hessian)
-    for (int r = 0; r < nz; ++r) store_row<nz>(step.hessian[r], rows, q.hessians + r * q.hessian_row, q.hessian_step);
+  for_indices<nx>([&](auto r) RHEC_INLINE {
+    store_row<nz>(step.jacobian[r], rows, q.jacobians + r * q.jacobian_row, q.jacobian_step);
+  });
+  if constexpr (Step::has_hessian)
+    for_indices<nz>([&](auto r) RHEC_INLINE {
+      double* row = q.hessians + r * q.hessian_row;
+      if constexpr (Step::Pattern::is_bent(r)) {
+        store_row<nz>(step.hessian[r], rows, row, q.hessian_step);
+      } else {
+        for (int i = rows.first; i < rows.first + rows.count; ++i)
+          for (int j = 0; j < padded(nz); ++j) row[i * q.hessian_step + j] = 0.0;
+      }
+    });
+}
+
+/// One step over z = [x; p; u] from each of the rows, of which two packs are taken at once.
+template <bool with_hessian, class Lane, class Formula>
+inline void integrate_row_packs(const Formula& formula, const IntervalRows& q) {
+  using Step = SensitiveStep<Formula, Lane, with_hessian>;
+  constexpr int nx = Step::nx, nz = Step::nz, width = LaneTraits<Lane>::width, most = with_hessian ? 1 : 2;
+  for (int first = 0; first < q.count; first += most * width) {
+    Step steps[most];
+    Rows rows[most];
+    int count = 0;
+    for (int i = first; i < q.count && count < most; i += width, ++count) {
+      Step& step = steps[count];
+      const Rows& these = rows[count] = {i, q.count - i < width ? q.count - i : width};
+      LaneTraits<Lane>::template load_padded<nz>(q.z + i * q.z_step, these.count, q.z_step, step.z);
+      load<1>(q.durations, these, &step.h);
+      if constexpr (with_hessian)
+        LaneTraits<Lane>::template load_padded<nx>(q.multipliers + i * q.multiplier_step, these.count,
+                                                   q.multiplier_step, step.weights);
+    }
+    Step::take(formula, count, steps);
+    for (int i = 0; i < count; ++i) store_step(steps[i], q, rows[i]);
+  }
 }
 
 template <class Scalar, class Formula>
@@ -46,32 +69,32 @@ template <class Scalar, class Formula>
   using Lane = typename LaneOf<Scalar>::Type;
   constexpr int nx = Formula::state_count, ny = Formula::output_count;
   Lane values[nx];
-  LaneTraits<Lane>::template load<nx>(q.states + rows.first * q.state_step, rows.count, q.state_step, values);
+  LaneTraits<Lane>::template load_padded<nx>(q.states + rows.first * q.state_step, rows.count, q.state_step, values);
   Scalar x[nx], y[ny];
   set_variables<nx, 0>(values, x);
   formula.outputs(static_cast<const Scalar*>(x), y);
   const int count = q.chosen ? q.chosen_count : ny;
-  for (int j = 0; j < count; ++j) {
-    const Scalar& output = y[q.chosen ? q.chosen[j] : j];
-    if (q.outputs) {
-      double spread[LaneTraits<Lane>::width];
-      if constexpr (Differentiable<Scalar>)
-        LaneTraits<Lane>::template store<1>(&output.value, LaneTraits<Lane>::width, spread);
-      else
-        LaneTraits<Lane>::template store<1>(&output, LaneTraits<Lane>::width, spread);
-      for (int i = 0; i < rows.count; ++i) q.outputs[(rows.first + i) * count + j] = spread[i];
+  Lane predicted[ny];
+  for (int j = 0; j < ny; ++j) {
+    if (j >= count) {
+      predicted[j] = Lane(0.0);
+      continue;
     }
-    if constexpr (Differentiable<Scalar>)
+    const Scalar& output = y[q.chosen ? q.chosen[j] : j];
+    if constexpr (Differentiable<Scalar>) {
+      predicted[j] = output.value;
       store_row<nx>(output.d, rows, q.jacobians + j * q.jacobian_row, count * q.jacobian_row);
+    } else {
+      predicted[j] = output;
+    }
   }
+  if (q.outputs) store_row<ny>(predicted, rows, q.outputs, q.output_step);
 }
 
 template <class Formula, class Lane>
 void integrate_rows(const void* formula, const IntervalRows& q) {
   const auto& f = *static_cast<const Formula*>(formula);
-  for_each_pack<Lane>(q.count, [&](Rows rows) {
-    return q.hessians ? integrate_row_pack<true, Lane>(f, q, rows) : integrate_row_pack<false, Lane>(f, q, rows);
-  });
+  return q.hessians ? integrate_row_packs<true, Lane>(f, q) : integrate_row_packs<false, Lane>(f, q);
 }
 
 template <class Formula, class Lane>

@@ -33,24 +33,20 @@ class RHEC_EXPORT GuessShifter {
   bool apply(int steps, const HorizonProblem& to, Iterate& guess) noexcept;
 
  private:
-  int control_of(const HorizonProblem& problem, int interval, int channel) const noexcept;
-  void take_channel(const HorizonProblem& problem, const Iterate& point, int channel) noexcept;
-  void move_decisions(int steps, const HorizonProblem& to, Iterate& guess) noexcept;
-  void move_states(int steps, const HorizonProblem& to, Iterate& guess) noexcept;
-  void move_costates(int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
-  void move_bounds(int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
-  double* row(std::vector<double>& v, int i, int width) const noexcept { return v.data() + i * width; }
-  const double* row(const std::vector<double>& v, int i, int width) const noexcept { return v.data() + i * width; }
+  /// Of the kept horizon: what a channel's interval contributes to the costates of its block.
+  double gradient(int interval, int channel) const noexcept;
+  int kept_control(int interval, int channel) const noexcept { return controls_[interval * channels_ + channel]; }
+  void move_rows(int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
+  void move_channel(int channel, int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
+  void move_channel_bounds(int channel, int steps, const HorizonProblem& to, Iterate& guess) noexcept;
+  void add_intervals(int steps, const HorizonProblem& to, Iterate& guess) noexcept;
 
-  int max_intervals_, nx_, nu_, np_, channels_;
-  std::vector<int> free_inputs_;
-  int intervals_ = 0;                                          ///< of what is kept; 0: nothing
-  std::vector<double> states_, costates_, state_bounds_;       ///< per node; states with the carried channels
-  std::vector<double> inputs_, parameters_;                    ///< per interval
-  std::vector<double> free_bounds_;                            ///< per interval and free input: bound multiplier
-  std::vector<double> channel_bounds_;                         ///< per interval and channel: its share of the block's
-  std::vector<double> channel_gradients_;                      ///< per interval and channel: dL/d(value used there)
-  std::vector<double> next_inputs_, next_parameters_, u_, p_;  ///< workspace
+  int nx_, nu_, channels_, free_count_;
+  int intervals_ = 0;           ///< of what is kept; 0: nothing
+  Iterate kept_;                ///< as it was taken
+  std::vector<int> controls_;   ///< per interval and channel: the control that starts it there, or -1
+  std::vector<double> shares_;  ///< per interval: its share of a block's multiplier
+  std::vector<double> u_, p_;   ///< workspace
 };
 
 }  // namespace rhec

@@ -26,14 +26,15 @@ struct IntervalRows {
   double* scratch = nullptr;
 };
 
-/// The same for `Model::observe_rows`, with rows of states; outputs and multipliers are dense.
+/// The same for `Model::observe_rows`, with rows of states.
 struct NodeRows {
   int count = 0;
   const double* states = nullptr;
   std::ptrdiff_t state_step = 0;
   const int* chosen = nullptr;  ///< which of the model's outputs, or null: all
   int chosen_count = 0;
-  double* outputs = nullptr;    ///< count x (number of outputs)
+  double* outputs = nullptr;  ///< a row for each node, `output_step` apart
+  std::ptrdiff_t output_step = 0;
   double* jacobians = nullptr;  ///< dh/dx: a row for each output, one after the other, `jacobian_row` apart
   std::ptrdiff_t jacobian_row = 0;
   double* scratch = nullptr;

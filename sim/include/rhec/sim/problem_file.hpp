@@ -83,10 +83,14 @@ RHEC_EXPORT ProblemRecord read_problem(std::string_view text, const std::string&
 RHEC_EXPORT std::vector<ProblemRecord> read_problems(std::string_view text, const std::string& file);
 
 /// The problem of a record, ready for a solver: an RheProblem or an RhcProblem with room for `max_intervals` (at least
-/// the record's own, and 1). What has no entry under `bounds` has no bound. Throws Error as above, where names or
+/// the record's own, and 1); of an estimation, `one_block` are parameters that stay one block whatever comes after.
+/// What has no entry under `bounds` has no bound. Throws Error as above, where names or
 /// shapes do not fit the model.
 RHEC_EXPORT std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
-                                                  int max_intervals = 0);
+                                                  int max_intervals = 0, std::vector<int> one_block = {});
+
+/// The parameters that have one value over the horizon in each of these estimations, for `build`.
+RHEC_EXPORT std::vector<int> one_block_parameters(std::span<const ProblemRecord> records, const Model& model);
 
 /// Fills a problem that `build` made for an earlier record anew. False, with the problem left as it was, where it has
 /// no room or differs in what cannot be changed: kind, weights, robust losses, bounds (but for RHC's of inputs),

@@ -1,0 +1,441 @@
+// The kernels of the core for every instruction set that this machine can run: the recursion against dense systems, the
+// loops over programs against the narrowest set.
+#include "kernels/kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+
+#include "kernels/program_kernels.hpp"
+#include "kernels/riccati_kernels.hpp"
+#include "program_view.hpp"
+#include "random_qp.hpp"
+
+namespace rhec {
+namespace {
+
+using testing::DenseQp;
+using testing::RandomQp;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+TEST(Kernels, AreThereForEverySetThatThisMachineRuns) {
+  ASSERT_FALSE(runnable_kernels().empty());
+  EXPECT_STREQ(runnable_kernels().front().instruction_set, "generic");
+#if defined(__x86_64__)
+  EXPECT_EQ(runnable_kernels().size() > 1, __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"));
+#endif
+}
+
+/// What the recursion keeps of a program.
+struct Recursion {
+  AlignedDoubles P, U, V, T, inverse, drift, g, p;
+  std::vector<std::uint8_t> fixes, special;
+  Iterate step;
+  RiccatiView view;
+
+  Recursion(const StageQp& qp, const ActiveSet& active) : step(qp.capacity()) {
+    const Capacity& capacity = qp.capacity();
+    const std::size_t stages = capacity.intervals + 1, row = qp.stride();
+    P.assign(stages * capacity.states * row, 0.0);
+    for (auto* v : {&U, &V}) v->assign(stages * capacity.controls * row, 0.0);
+    T.assign(stages * 64, 0.0);
+    inverse.assign(stages * capacity.controls, 0.0);
+    for (auto* v : {&drift, &g, &p}) v->assign(stages * row, 0.0);
+    for (auto* v : {&fixes, &special}) v->assign(stages, 0);
+    view.intervals = qp.intervals();
+    view.states = capacity.states;
+    view.controls = capacity.controls;
+    view.stride = qp.stride();
+    view.state_counts = qp.state_counts();
+    view.control_counts = qp.control_counts();
+    view.F = qp.F(0);
+    view.H = qp.H(0);
+    view.h = qp.h(0);
+    view.b = qp.b(0);
+    view.lower = qp.lower(0);
+    view.upper = qp.upper(0);
+    view.sides = active.row(0);
+    view.special = special.data();
+    view.P = P.data();
+    view.U = U.data();
+    view.V = V.data();
+    view.T = T.data();
+    view.inverse = inverse.data();
+    view.fixes = fixes.data();
+    view.drift = drift.data();
+    view.g = g.data();
+    view.p = p.data();
+    view.values = step.row(0);
+    view.costates = step.costate(0);
+    view.bounds = step.bound_row(0);
+    const int N = qp.intervals();
+    for (int j = 0; j < qp.states(N); ++j) {
+      std::copy_n(qp.H(N) + j * row, qp.states(N), P.data() + (N * capacity.states + j) * row);
+      p[N * row + j] = qp.q(N)[j];
+    }
+    std::copy_n(qp.initial_step(), qp.states(0), step.state(0));
+  }
+
+  void solve(const RiccatiKernels& kernels) {
+    const int last = view.intervals - 1;
+    ASSERT_EQ(kernels.factor(view, last, 1e-11), -1);
+    ASSERT_EQ(kernels.solve_backward(view, last), -1);
+    ASSERT_EQ(kernels.solve_forward(view, 0), view.intervals);
+  }
+};
+
+/// Holds some controls at bounds of their own.
+ActiveSet some_active_controls(RandomQp& random, StageQp& qp) {
+  ActiveSet active(qp.capacity());
+  for (int i = 0; i < qp.intervals(); ++i) {
+    for (int j = 0; j < qp.controls(i); ++j) {
+      if (random.integer(0, 3) != 0) continue;
+      const bool is_lower = random.integer(0, 1) == 0;
+      active.control(i)[j] = is_lower ? std::int8_t{-1} : std::int8_t{1};
+      (is_lower ? qp.control_lower(i) : qp.control_upper(i))[j] = random.uniform(-0.5, 0.5);
+    }
+  }
+  return active;
+}
+
+TEST(Kernels, OfTheRecursionAgreeWithTheDenseSystem) {
+  RandomQp random(7);
+  for (int trial = 0; trial < 120; ++trial) {
+    // Six states have kernels of their own, with two to four controls; long rows take several registers.
+    const int states = trial % 3 == 0 ? random.integer(1, 14) : 6;
+    const int controls = trial % 3 == 0 ? random.integer(1, 12) : random.integer(2, 4);
+    StageQp qp = random.make(random.integer(1, 7), states, controls, true);
+    const ActiveSet active = some_active_controls(random, qp);
+    const DenseQp dense(qp, active);
+    const Eigen::VectorXd z = dense.solve();
+    for (const KernelSet& set : runnable_kernels()) {
+      Recursion recursion(qp, active);
+      recursion.solve(*set.riccati);
+      const Iterate& step = recursion.step;
+      const auto where = [&](int i) { return std::string(set.instruction_set) + ", stage " + std::to_string(i); };
+      int costate = static_cast<int>(dense.H.rows()), bound = costate + dense.dynamics_rows;
+      for (int i = 0; i <= qp.intervals(); ++i) {
+        for (int j = 0; j < states; ++j)
+          ASSERT_NEAR(step.state(i)[j], z[dense.state_at[i] + j], 1e-8) << where(i) << " of " << states;
+        for (int j = 0; j < qp.controls(i); ++j) {
+          ASSERT_NEAR(step.control(i)[j], z[dense.control_at[i] + j], 1e-8) << where(i) << " of " << states;
+          if (active.control(i)[j] != 0) {
+            ASSERT_NEAR(step.control_bound(i)[j], z[bound++], 1e-7) << where(i);
+          }
+        }
+        for (int j = 0; i > 0 && j < states; ++j) ASSERT_NEAR(step.costate(i)[j], z[costate++], 1e-7) << where(i);
+      }
+    }
+  }
+}
+
+TEST(Kernels, OfResponsesAreWhatAStepDiffersBy) {
+  constexpr int minimiser = response_batch - 1;
+  RandomQp random(13);
+  for (int trial = 0; trial < 40; ++trial) {
+    const int states = trial % 2 == 0 ? 6 : random.integer(1, 12);
+    StageQp qp = random.make(random.integer(1, 6), states, random.integer(2, 4), true);
+    const ActiveSet active = some_active_controls(random, qp);
+    const int N = qp.intervals(), stage = random.integer(0, N), place = random.integer(0, states - 1);
+    for (const KernelSet& set : runnable_kernels()) {
+      Recursion before(qp, active);
+      before.solve(*set.riccati);
+      AlignedDoubles values(static_cast<std::size_t>(N + 1) * qp.stride() * response_batch, 0.0), costates = values;
+      const auto at = [&](int i, int k, int number) -> double& {
+        return values[(static_cast<std::size_t>(i) * qp.stride() + k) * response_batch + number];
+      };
+      at(stage, place, 0) = 1.0;
+      for (int j = 0; j < states; ++j) at(N, j, minimiser) = qp.q(N)[j];
+      set.riccati->respond_backward(before.view, N, values.data(), true);
+      for (int j = 0; j < states; ++j)
+        for (int number = 0; number < response_batch; ++number)
+          at(0, j, number) = number == minimiser ? qp.initial_step()[j] : 0.0;
+      set.riccati->respond_forward(before.view, values.data(), costates.data());
+
+      StageQp moved = qp;
+      moved.h(stage)[place] += 1.0;
+      Recursion after(moved, active);
+      after.solve(*set.riccati);
+      for (int i = 0; i <= N; ++i) {
+        for (int k = 0; k < states + qp.controls(i); ++k) {
+          const bool is_fixed = k >= states && active.row(i)[k] != 0;
+          const auto of = [&](const Recursion& r) { return is_fixed ? r.step.bound_row(i)[k] : r.step.row(i)[k]; };
+          ASSERT_NEAR(at(i, k, minimiser), of(before), 1e-8) << set.instruction_set << ", " << i << ", " << k;
+          ASSERT_NEAR(at(i, k, 0), of(after) - of(before), 1e-8) << set.instruction_set << ", " << i << ", " << k;
+        }
+      }
+    }
+  }
+}
+
+TEST(Kernels, OfTheRecursionStopWhereTheReducedHessianIsNotDefinite) {
+  RandomQp random(8);
+  for (int trial = 0; trial < 20; ++trial) {
+    StageQp qp = random.make(5, trial % 2 == 0 ? 6 : 4, 2, true);
+    int bent = -1;
+    for (int i = 0; i < qp.intervals(); ++i)
+      if (qp.controls(i) > 0) bent = i;
+    if (bent < 0) continue;
+    qp.R_of(bent)(0, 0) = -1e4;
+    const ActiveSet none(qp.capacity());
+    for (const KernelSet& set : runnable_kernels()) {
+      Recursion recursion(qp, none);
+      EXPECT_EQ(set.riccati->factor(recursion.view, qp.intervals() - 1, 1e-11), bent) << set.instruction_set;
+    }
+  }
+}
+
+/// Random rows of an iterate and a program, where some bounds are infinite.
+struct RandomProgram {
+  StageQp qp;
+  Iterate point;
+  ProgramView view;
+
+  explicit RandomProgram(RandomQp& random)
+      : qp(random.make(random.integer(1, 9), random.integer(1, 11), random.integer(1, 9), random.integer(0, 1) == 0)),
+        point(qp.capacity()) {
+    for (int i = 0; i <= qp.intervals(); ++i) {
+      for (int j = 0; j < qp.states(i); ++j) {
+        point.state(i)[j] = random.uniform(-1.0, 1.0);
+        point.costate(i)[j] = random.uniform(-1.0, 1.0);
+        set_bounds(random, qp.state_lower(i)[j], qp.state_upper(i)[j], point.state_bound(i)[j]);
+      }
+      for (int j = 0; j < qp.controls(i); ++j) {
+        point.control(i)[j] = random.uniform(-1.0, 1.0);
+        set_bounds(random, qp.control_lower(i)[j], qp.control_upper(i)[j], point.control_bound(i)[j]);
+      }
+    }
+    view = view_of(qp, point);
+  }
+
+  static void set_bounds(RandomQp& random, double& lower, double& upper, double& multiplier) {
+    lower = random.integer(0, 2) == 0 ? -infinity : random.uniform(-1.5, -0.2);
+    upper = random.integer(0, 2) == 0 ? infinity : random.uniform(0.2, 1.5);
+    if (random.integer(0, 9) == 0) multiplier = random.uniform(-1.0, 1.0);
+  }
+};
+
+void expect_same_rows(const double* a, const double* b, std::ptrdiff_t count, double tolerance, const char* set) {
+  for (std::ptrdiff_t k = 0; k < count; ++k)
+    ASSERT_NEAR(a[k], b[k], tolerance * (1.0 + std::abs(a[k]))) << set << ", " << k;
+}
+
+TEST(Kernels, OverProgramsAgree) {
+  RandomQp random(9);
+  for (int trial = 0; trial < 100; ++trial) {
+    RandomProgram program(random);
+    if (trial % 10 == 3) program.qp.state_lower(1)[0] = std::nan("");
+    if (trial % 10 == 5) program.point.state(1)[0] = infinity;
+    std::vector<unsigned char> marks(program.qp.intervals() + 1), same_marks(marks.size());
+    const ProgramKernels& generic = *runnable_kernels().front().program;
+    const KktParts kkt = generic.kkt(program.view);
+    const StepParts check = generic.check_step(program.view, 1e-10);
+    const bool crosses = generic.mark_bounds(program.view, 1e-10, marks.data());
+    if (trial % 10 == 5) {
+      EXPECT_FALSE(check.is_finite);
+    }
+    for (const KernelSet& set : runnable_kernels()) {
+      const KktParts same = set.program->kkt(program.view);
+      EXPECT_NEAR(same.stationarity, kkt.stationarity, 1e-12) << set.instruction_set;
+      EXPECT_EQ(same.defect, kkt.defect);
+      EXPECT_EQ(same.bound_violation, kkt.bound_violation);
+      EXPECT_EQ(same.complementarity, kkt.complementarity);
+      EXPECT_EQ(same.largest_term, kkt.largest_term);
+      const StepParts same_check = set.program->check_step(program.view, 1e-10);
+      EXPECT_EQ(same_check.is_finite, check.is_finite) << set.instruction_set << ", " << trial;
+      if (check.is_finite) {
+        EXPECT_EQ(same_check.violates, check.violates);
+      }
+      if (check.is_finite) {
+        EXPECT_EQ(same_check.largest_costate, check.largest_costate);
+      }
+      EXPECT_EQ(set.program->mark_bounds(program.view, 1e-10, same_marks.data()), crosses) << set.instruction_set;
+      EXPECT_EQ(same_marks, marks) << set.instruction_set;
+    }
+  }
+}
+
+/// The costs of an estimator or a controller over random rows, once for each set.
+struct RandomCosts {
+  int N, states, controls, vehicle_states, outputs, inputs, stride;
+  std::vector<int> control_counts;
+  AlignedDoubles H, h, values, references, weights, turns, inverse_turns, y, predicted, jacobians;
+  std::vector<double> u, input_weights, room;
+
+  explicit RandomCosts(RandomQp& random)
+      : N(random.integer(1, 8)),
+        vehicle_states(random.integer(1, 10)),
+        outputs(random.integer(1, 10)),
+        inputs(random.integer(1, 3)) {
+    states = vehicle_states + random.integer(0, 3);
+    controls = inputs + random.integer(0, 2);
+    stride = Capacity{N, states, controls}.row();
+    const auto rows = [&](std::size_t count, std::size_t width) {
+      AlignedDoubles v(count * width);
+      for (double& entry : v) entry = random.uniform(-4.0, 4.0);
+      return v;
+    };
+    const std::size_t nodes = N + 1, wide = padded(vehicle_states), seen = padded(outputs);
+    for (int i = 0; i <= N; ++i) control_counts.push_back(random.integer(inputs, controls));
+    H = rows(nodes * (states + controls), stride);
+    h = rows(nodes, stride);
+    values = rows(nodes, stride);
+    references = rows(nodes, stride);
+    const std::size_t longest = std::max<std::size_t>(stride, seen);
+    for (auto* v : {&weights, &turns, &inverse_turns}) v->assign(longest, 0.0);
+    for (std::size_t k = 0; k < longest; ++k) {
+      weights[k] = k % 3 == 2 ? 0.0 : random.uniform(0.1, 2.0);
+      if (k % 4 == 1) turns[k] = 6.25, inverse_turns[k] = 1.0 / 6.25;
+    }
+    y = rows(nodes, seen);
+    for (std::size_t k = 0; k < y.size(); ++k)
+      if (static_cast<int>(k % seen) >= outputs || random.integer(0, 5) == 0) y[k] = std::nan("");
+    predicted = rows(nodes, seen);
+    jacobians = rows(nodes * outputs, wide);
+    for (std::size_t k = 0; k < jacobians.size(); ++k)
+      if (static_cast<int>(k % wide) >= vehicle_states) jacobians[k] = 0.0;
+    for (int k = 0; k < N * inputs; ++k)
+      u.push_back(random.integer(0, 4) == 0 ? std::nan("") : random.uniform(-1., 1.));
+    input_weights.assign(inputs, 0.7);
+    room.assign(2 * seen, 0.0);
+  }
+  CostView view(bool matrices, bool vectors, bool bends) {
+    return {N,
+            states,
+            controls,
+            stride,
+            control_counts.data(),
+            matrices ? H.data() : nullptr,
+            vectors ? h.data() : nullptr,
+            bends};
+  }
+  double measure(const ProgramKernels& kernels, bool matrices, bool vectors) {
+    return kernels.write_measurements(
+        view(matrices, vectors, false),
+        {vehicle_states, outputs, inputs, y.data(), u.data(), predicted.data(), jacobians.data(), weights.data(),
+         input_weights.data(), turns.data(), inverse_turns.data(), values.data(), room.data()},
+        0, N);
+  }
+  double track(const ProgramKernels& kernels, bool matrices, bool vectors, bool bends) {
+    return kernels.write_tracking(
+        view(matrices, vectors, bends),
+        {values.data(), references.data(), weights.data(), weights.data(), turns.data(), inverse_turns.data()}, 0, N);
+  }
+};
+
+/// What is used of H and all of h must agree.
+void expect_same_costs(const RandomCosts& a, const RandomCosts& b, bool matrices, const char* set) {
+  expect_same_rows(a.h.data(), b.h.data(), static_cast<std::ptrdiff_t>(a.h.size()), 1e-12, set);
+  for (int i = 0; matrices && i <= a.N; ++i) {
+    const int used = a.states + (i < a.N ? a.control_counts[i] : 0);
+    for (int c = 0; c < used; ++c) {
+      const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(i * (a.states + a.controls) + c) * a.stride;
+      expect_same_rows(a.H.data() + row, b.H.data() + row, used, 1e-12, set);
+    }
+  }
+}
+
+TEST(Kernels, OfCostsAgree) {
+  RandomQp random(10);
+  for (int trial = 0; trial < 150; ++trial) {
+    const RandomCosts start(random);
+    const bool matrices = trial % 3 != 0, vectors = trial % 3 != 1, tracks = trial % 2 == 0, bends = trial % 5 == 0;
+    const auto evaluate = [&](RandomCosts& costs, const ProgramKernels& kernels) {
+      return tracks ? costs.track(kernels, matrices, vectors, bends) : costs.measure(kernels, matrices, vectors);
+    };
+    RandomCosts generic = start;
+    const double total = evaluate(generic, *runnable_kernels().front().program);
+    for (const KernelSet& set : runnable_kernels()) {
+      RandomCosts wide = start;
+      const double same = evaluate(wide, *set.program);
+      if (vectors) {
+        EXPECT_NEAR(same, total, 1e-10 * (1.0 + total)) << set.instruction_set;
+      }
+      expect_same_costs(generic, wide, matrices, set.instruction_set);
+    }
+  }
+}
+
+TEST(Kernels, OfMeasurementsAreTheSumOfSquares) {
+  RandomQp random(11);
+  for (int trial = 0; trial < 60; ++trial) {
+    RandomCosts costs(random);
+    double expected = 0.0;
+    std::vector<double> gradient(costs.h.size(), 0.0);
+    const int seen = padded(costs.outputs), wide = padded(costs.vehicle_states);
+    for (int i = 0; i <= costs.N; ++i) {
+      for (int j = 0; j < costs.outputs; ++j) {
+        const double y = costs.y[i * seen + j];
+        if (std::isnan(y)) continue;
+        double error = costs.predicted[i * seen + j] - y;
+        if (costs.turns[j] > 0.0) error = std::remainder(error, costs.turns[j]);
+        expected += costs.weights[j] * error * error;
+        for (int c = 0; c < costs.vehicle_states; ++c)
+          gradient[i * costs.stride + c] +=
+              2.0 * costs.weights[j] * error * costs.jacobians[(i * costs.outputs + j) * wide + c];
+      }
+      for (int j = 0; i < costs.N && j < costs.inputs; ++j) {
+        const double measured = costs.u[i * costs.inputs + j];
+        if (std::isnan(measured)) continue;
+        const int at = i * costs.stride + costs.states + j;
+        const double error = costs.values[at] - measured;
+        expected += costs.input_weights[j] * error * error;
+        gradient[at] += 2.0 * costs.input_weights[j] * error;
+      }
+    }
+    for (const KernelSet& set : runnable_kernels()) {
+      EXPECT_NEAR(costs.measure(*set.program, false, true), expected, 1e-10 * (1.0 + expected)) << set.instruction_set;
+      expect_same_rows(gradient.data(), costs.h.data(), static_cast<std::ptrdiff_t>(gradient.size()), 1e-11,
+                       set.instruction_set);
+    }
+  }
+}
+
+TEST(Kernels, CompleteDynamicsWithCarriedChannels) {
+  RandomQp random(12);
+  for (int trial = 0; trial < 60; ++trial) {
+    const int N = random.integer(1, 6), vehicle = random.integer(1, 9), channels = random.integer(1, 4);
+    const int states = vehicle + channels, controls = 2 + channels;
+    const Capacity capacity{N, states, controls};
+    StageQp qp(capacity);
+    Iterate point(capacity);
+    std::vector<int> control_of(static_cast<std::size_t>(N) * channels, -1);
+    for (int i = 0; i <= N; ++i) {
+      for (int j = 0; j < states + controls; ++j) point.row(i)[j] = random.uniform(-1.0, 1.0);
+      for (int j = 0; j < vehicle; ++j) qp.b(i)[j] = random.uniform(-1.0, 1.0);
+      int next = 2;
+      for (int c = 0; i < N && c < channels; ++c)
+        if (random.integer(0, 2) == 0) control_of[i * channels + c] = next++;
+    }
+    const StageQp start = qp;
+    for (const KernelSet& set : runnable_kernels()) {
+      qp = start;
+      DynamicsView view{};
+      view.last = N - 1;
+      view.states = states;
+      view.controls = controls;
+      view.stride = qp.stride();
+      view.vehicle_states = vehicle;
+      view.channels = channels;
+      view.control_of = control_of.data();
+      view.values = point.row(0);
+      view.F = qp.F(0);
+      view.b = qp.b(0);
+      set.program->complete_dynamics(view);
+      for (int i = 0; i < N; ++i) {
+        for (int j = 0; j < vehicle; ++j) EXPECT_EQ(qp.b(i)[j], start.b(i)[j] - point.state(i + 1)[j]);
+        for (int c = 0; c < channels; ++c) {
+          const int control = control_of[i * channels + c], row = vehicle + c;
+          const int column = control >= 0 ? states + control : row;
+          EXPECT_EQ(qp.b(i)[row], point.row(i)[column] - point.state(i + 1)[row]) << set.instruction_set;
+          for (int k = 0; k < qp.stride(); ++k) EXPECT_EQ(qp.F(i)[row * qp.stride() + k], k == column ? 1.0 : 0.0);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rhec
