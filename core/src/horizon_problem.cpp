@@ -307,7 +307,6 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
   dynamics.first = steps.first;
   dynamics.last = steps.last;
   dynamics.states = ns;
-  dynamics.controls = capacity_.controls;
   dynamics.stride = stride_;
   dynamics.vehicle_states = nx_;
   dynamics.channels = channels_;

@@ -289,10 +289,10 @@ double RheProblem::write_bent_measurements(StageRange range, const Iterate& poin
     const double* J = jacobians + static_cast<std::ptrdiff_t>(i) * ny_ * width;
     double* H = H_of(node);
     for (int j = 0; j < ny_; ++j) {
-      w[j] = std::isnan(y[j]) ? 0.0 : weight[j] * setup_.output_weights[j];
-      multipliers[i * ny_ + j] = 2.0 * w[j] * difference[j];
+      w[j] = std::isnan(y[j]) ? 0.0 : 2.0 * weight[j] * setup_.output_weights[j];
+      multipliers[i * ny_ + j] = w[j] * difference[j];
     }
-    program_kernels().add_squares(J, w, difference, ny_, n, H, h_of(node), stride());
+    program_kernels().add_products(J, w, multipliers + i * ny_, ny_, n, stride(), H, h_of(node));
     if (!exact) continue;
     // The loss itself bends: 4 rho'' (J' W r)(J' W r)'.
     for (const RobustLoss& loss : setup_.robust) {

@@ -393,6 +393,47 @@ TEST(Kernels, OfMeasurementsAreTheSumOfSquares) {
   }
 }
 
+TEST(Kernels, OfPlainSumsAgree) {
+  RandomQp random(14);
+  const auto numbers = [&](std::size_t count) {
+    AlignedDoubles v(count);
+    for (double& entry : v) entry = random.uniform(-2.0, 2.0);
+    return v;
+  };
+  for (int trial = 0; trial < 40; ++trial) {
+    const int columns = random.integer(1, 20), count = random.integer(1, 20), width = padded(columns);
+    const AlignedDoubles J = numbers(static_cast<std::size_t>(count) * width), weights = numbers(count),
+                         pulls = numbers(count), batch = numbers(static_cast<std::size_t>(count) * response_batch),
+                         of_batch = numbers(response_batch), a = numbers(width), b = numbers(width);
+    const AlignedDoubles H = numbers(static_cast<std::size_t>(width) * width), h = numbers(width);
+    for (const KernelSet& set : runnable_kernels()) {
+      AlignedDoubles sum_H = H, sum_h = h, out(width), sums(count);
+      set.program->add_products(J.data(), weights.data(), pulls.data(), count, columns, width, sum_H.data(),
+                                sum_h.data());
+      for (int c = 0; c < columns; ++c) {
+        double gradient = h[c];
+        for (int j = 0; j < count; ++j) gradient += pulls[j] * J[j * width + c];
+        EXPECT_NEAR(sum_h[c], gradient, 1e-12) << set.instruction_set;
+        for (int r = 0; r < columns; ++r) {
+          double entry = H[c * width + r];
+          for (int j = 0; j < count; ++j) entry += weights[j] * J[j * width + c] * J[j * width + r];
+          EXPECT_NEAR(sum_H[c * width + r], entry, 1e-12) << set.instruction_set;
+        }
+      }
+      set.program->add(a.data(), b.data(), out.data(), width);
+      for (int k = 0; k < width; ++k) EXPECT_EQ(out[k], a[k] + b[k]) << set.instruction_set;
+      set.program->subtract(a.data(), b.data(), out.data(), width);
+      for (int k = 0; k < width; ++k) EXPECT_EQ(out[k], a[k] - b[k]) << set.instruction_set;
+      set.riccati->combine(batch.data(), of_batch.data(), sums.data(), count);
+      for (int j = 0; j < count; ++j) {
+        double expected = 0.0;
+        for (int k = 0; k < response_batch; ++k) expected += batch[j * response_batch + k] * of_batch[k];
+        EXPECT_NEAR(sums[j], expected, 1e-12) << set.instruction_set;
+      }
+    }
+  }
+}
+
 TEST(Kernels, CompleteDynamicsWithCarriedChannels) {
   RandomQp random(12);
   for (int trial = 0; trial < 60; ++trial) {
@@ -415,7 +456,6 @@ TEST(Kernels, CompleteDynamicsWithCarriedChannels) {
       DynamicsView view{};
       view.last = N - 1;
       view.states = states;
-      view.controls = controls;
       view.stride = qp.stride();
       view.vehicle_states = vehicle;
       view.channels = channels;

@@ -118,9 +118,8 @@ void add(const double* from, const double* step, double* to, long count) {
   for (long k = 0; k < count; k += lane_count) store(load(from + k) + load(step + k), to + k);
 }
 
-/// H += sum_j weights_j J_j J_j' and h += sum_j pulls_j J_j.
-inline void add_products(const double* J, const double* weights, const double* pulls, int count, int columns,
-                         int stride, double* H, double* h) {
+void add_products(const double* J, const double* weights, const double* pulls, int count, int columns, int stride,
+                  double* H, double* h) {
   const long width = padded(columns);
   for (int k = 0; k < width; k += lane_count) {
     if (h) {
@@ -134,21 +133,6 @@ inline void add_products(const double* J, const double* weights, const double* p
       for (int j = 0; j < count; ++j) sum += load(J + j * width + k) * (weights[j] * J[j * width + c]);
       store(sum, column);
     }
-  }
-}
-
-void add_squares(const double* J, const double* weights, const double* residuals, int count, int columns, double* H,
-                 double* h, int stride) {
-  // Few outputs share a loss; more are taken in turns.
-  constexpr int most = 16;
-  double doubled[most], pulls[most];
-  for (int first = 0; first < count; first += most) {
-    const int now = count - first < most ? count - first : most;
-    for (int j = 0; j < now; ++j) {
-      doubled[j] = 2.0 * weights[first + j];
-      pulls[j] = doubled[j] * residuals[first + j];
-    }
-    add_products(J + static_cast<long>(first) * padded(columns), doubled, pulls, now, columns, stride, H, h);
   }
 }
 
@@ -220,25 +204,22 @@ void clear_costs(const CostView& view, int first, int last) {
   }
 }
 
-/// Sizes that fit eight entries, as those of most vehicles do, or any.
+/// Rows of eight entries, which are enough for most vehicles and their sensors, or of as many as it takes.
 struct OneEight {
-  static constexpr int width = 8;
-  explicit OneEight(int /*size*/) {}
+  static constexpr int of(int /*size*/) { return 8; }
 };
 struct AnyEights {
-  int width;
-  explicit AnyEights(int size) : width(padded(size)) {}
+  static constexpr int of(int size) { return padded(size); }
 };
 
 /// What is measured at one node, of which `seen` was. Returns the sum of squares.
-template <bool matrices, bool vectors, class Outputs, class States>
+template <bool matrices, bool vectors, class Width>
 RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, const double* seen, const double* predicted,
                                            const double* J, int stride, int used, double* H, double* h) {
-  const Outputs outputs(measured.output_count);
-  const States states(measured.vehicle_states);
-  double *pulls = measured.room, *weights = pulls + outputs.width;
+  const int outputs = Width::of(measured.output_count), states = Width::of(measured.vehicle_states);
+  double *pulls = measured.room, *weights = pulls + outputs;
   Lanes total{};
-  for (int k = 0; k < outputs.width; k += lane_count) {
+  for (int k = 0; k < outputs; k += lane_count) {
     const Lanes y = load(seen + k), weight = y == y ? 2.0 * load(measured.output_weights + k) : Lanes{};
     if (matrices) store(weight, weights + k);
     if (!vectors) continue;
@@ -249,12 +230,12 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
     total += pull * error;
   }
   if (vectors) {
-    for (int k = 0; k < states.width; k += lane_count) {
+    for (int k = 0; k < states; k += lane_count) {
       Lanes sum{};
-      for (int j = 0; j < measured.output_count; ++j) sum += load(J + j * states.width + k) * pulls[j];
+      for (int j = 0; j < measured.output_count; ++j) sum += load(J + j * states + k) * pulls[j];
       store(sum, h + k);
     }
-    for (int k = states.width; k < stride; k += lane_count) store(Lanes{}, h + k);
+    for (int k = states; k < stride; k += lane_count) store(Lanes{}, h + k);
   }
   if (!matrices) return total;
   const auto clear = [&](double* row, int from) RHEC_ALWAYS_INLINE {
@@ -267,22 +248,23 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
   };
   for (int c = 0; c < measured.vehicle_states; ++c) {
     double* row = H + static_cast<long>(c) * stride;
-    for (int k = 0; k < states.width; k += lane_count) {
+    for (int k = 0; k < states; k += lane_count) {
       Lanes sum{};
       for (int j = 0; j < measured.output_count; ++j)
-        sum += load(J + j * states.width + k) * (weights[j] * J[j * states.width + c]);
+        sum += load(J + j * states + k) * (weights[j] * J[j * states + c]);
       store(sum, row + k);
     }
-    clear(row, states.width);
+    clear(row, states);
   }
   for (int c = measured.vehicle_states; c < used; ++c) clear(H + static_cast<long>(c) * stride, 0);
   return total;
 }
 
-template <bool matrices, bool vectors, class Outputs, class States>
+template <bool matrices, bool vectors, class Width>
 double write_nodes(const CostView& view, const MeasurementView& measured, int first, int last) {
   const long stride = view.stride, wide = view.states + view.controls;
-  const long outputs = padded(measured.output_count), J_size = measured.output_count * padded(measured.vehicle_states);
+  const long outputs = Width::of(measured.output_count),
+             J_size = measured.output_count * Width::of(measured.vehicle_states);
   const double *y = measured.outputs + first * outputs, *predicted = measured.predicted, *J = measured.jacobians;
   const double *u = measured.values + first * stride + view.states,
                *u_measured = measured.inputs + static_cast<long>(first) * measured.input_count;
@@ -292,7 +274,7 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
   for (int i = first; i <= last; ++i) {
     const bool has_inputs = i < view.intervals;
     const int used = view.states + (has_inputs ? view.control_counts[i] : 0);
-    total += write_node<matrices, vectors, Outputs, States>(measured, y, predicted, J, view.stride, used, H, h);
+    total += write_node<matrices, vectors, Width>(measured, y, predicted, J, view.stride, used, H, h);
     for (int j = 0; has_inputs && j < measured.input_count; ++j) {
       const bool is_missing = u_measured[j] != u_measured[j];
       const double error = is_missing ? 0.0 : u[j] - u_measured[j];
@@ -316,8 +298,8 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
 template <bool matrices, bool vectors>
 double write_measurements(const CostView& view, const MeasurementView& measured, int first, int last) {
   if (measured.output_count <= 8 && measured.vehicle_states <= 8)
-    return write_nodes<matrices, vectors, OneEight, OneEight>(view, measured, first, last);
-  return write_nodes<matrices, vectors, AnyEights, AnyEights>(view, measured, first, last);
+    return write_nodes<matrices, vectors, OneEight>(view, measured, first, last);
+  return write_nodes<matrices, vectors, AnyEights>(view, measured, first, last);
 }
 
 double write_measurements(const CostView& view, const MeasurementView& measured, int first, int last) {
@@ -334,7 +316,7 @@ double write_measurements(const CostView& view, const MeasurementView& measured,
 extern const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET);
 constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {
     &kernels::kkt,         &kernels::check_step,        &kernels::mark_bounds,    &kernels::subtract,
-    &kernels::add,         &kernels::add_squares,       &kernels::write_tracking, &kernels::complete_dynamics,
+    &kernels::add,         &kernels::add_products,      &kernels::write_tracking, &kernels::complete_dynamics,
     &kernels::clear_costs, &kernels::write_measurements};
 
 }  // namespace rhec

@@ -28,7 +28,7 @@ struct StepParts {
 /// Where a model has written next states (to b) and its Jacobian's rows (to F): what is left to fill.
 struct DynamicsView {
   int first, last;               ///< intervals
-  int states, controls, stride;  ///< of the capacity
+  int states, stride;            ///< of the capacity
   int vehicle_states, channels;  ///< what a state is made of
   const int* control_of;         ///< of each interval's channels: the control that starts it, or -1
   const double* values;          ///< rows of the point
@@ -71,10 +71,10 @@ struct ProgramKernels {
   void (*subtract)(const double* a, const double* b, double* out, long count);
   /// to = from + step.
   void (*add)(const double* from, const double* step, double* to, long count);
-  /// H += 2 sum_j w_j J_j J_j' over its first `columns` columns and h += 2 sum_j w_j r_j J_j (null: not), with the
+  /// H += sum_j weights_j J_j J_j' over its first `columns` columns and h += sum_j pulls_j J_j (null: not), with the
   /// `count` rows J_j of one stage; rows are as long as `columns` needs in multiples of eight.
-  void (*add_squares)(const double* J, const double* weights, const double* residuals, int count, int columns,
-                      double* H, double* h, int stride);
+  void (*add_products)(const double* J, const double* weights, const double* pulls, int count, int columns, int stride,
+                       double* H, double* h);
   /// weights (z - reference)^2 of stages first .. last; returns the sum where vectors are wanted. Differences of
   /// entries whose turn is not 0 are taken on a circle of that length.
   double (*write_tracking)(const CostView& view, const TrackingView& tracked, int first, int last);

@@ -7,18 +7,10 @@ namespace rhec {
 namespace kernels {
 namespace {
 
-// A stage's row may be this long: 32 states and 32 controls.
-constexpr int longest_row = 64;
-
-/// Calls function(first), function(first + 1), ... `count` times, or backwards. What is known when it is compiled
-/// comes as a constant, and no loop is left of it.
-template <int first, class Function, int... k>
+/// Calls function(first), function(first + step), ... with constants; no loop is left of it.
+template <int first, int step, class Function, int... k>
 RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants<k...> /*numbers*/) {
-  (function(Constant<first + k>()), ...);
-}
-template <int first, int count, class Function, int... k>
-RHEC_ALWAYS_INLINE inline void each_constant_back(const Function& function, Constants<k...> /*numbers*/) {
-  (function(Constant<first + count - 1 - k>()), ...);
+  (function(Constant<first + step * k>()), ...);
 }
 
 /// What is known of a stage when its kernel is compiled: how many times eight entries a row has, and how many states
@@ -42,39 +34,41 @@ struct Shape {
 
   template <class Function>
   RHEC_ALWAYS_INLINE void each_state(const Function& function) const {
-    if constexpr (is_known && is_written_out)
-      each_constant<0>(function, make_constants<state_count>());
-    else
-      for (int j = 0; j < (is_known ? state_count : states); ++j) function(j);
+    each<0, state_count>(0, states, function);
   }
   template <class Function>
   RHEC_ALWAYS_INLINE void each_next_state(const Function& function) const {
-    if constexpr (is_known && is_written_out)
-      each_constant<0>(function, make_constants<state_count>());
-    else
-      for (int l = 0; l < next_states; ++l) function(l);
+    each<0, state_count>(0, next_states, function);
   }
   template <class Function>
   RHEC_ALWAYS_INLINE void each_control(const Function& function) const {
-    if constexpr (is_known && is_written_out)
-      each_constant<state_count>(function, make_constants<control_count>());
+    each<state_count, control_count>(offset, columns, function);
+  }
+  /// Of the controls before another one.
+  template <class Control, class Function>
+  RHEC_ALWAYS_INLINE void each_control_before(Control k, const Function& function) const {
+    if constexpr (is_straight)
+      each<state_count, k - state_count>(offset, k, function);
     else
-      for (int k = offset; k < columns; ++k) function(k);
+      each<0, 0>(offset, k, function);
   }
   template <class Function>
   RHEC_ALWAYS_INLINE void each_control_back(const Function& function) const {
-    if constexpr (is_known && is_written_out)
-      each_constant_back<state_count, control_count>(function, make_constants<control_count>());
+    if constexpr (is_straight)
+      each_constant<state_count + control_count - 1, -1>(function, make_constants<control_count>());
     else
       for (int k = columns - 1; k >= offset; --k) function(k);
   }
-  /// Of the controls before another one.
-  template <class Other, class Function>
-  RHEC_ALWAYS_INLINE void each_control_before(Other k, const Function& function) const {
-    if constexpr (is_known && is_written_out)
-      each_constant<state_count>(function, make_constants<k - state_count>());
+
+ private:
+  static constexpr bool is_straight = is_known && is_written_out;
+  /// function(first), ..., function(end - 1): `known_count` times from `known_first`, where that is written out.
+  template <int known_first, int known_count, class Function>
+  RHEC_ALWAYS_INLINE static void each(int first, int end, const Function& function) {
+    if constexpr (is_straight)
+      each_constant<known_first, 1>(function, make_constants<known_count>());
     else
-      for (int j = offset; j < k; ++j) function(j);
+      for (int k = first; k < end; ++k) function(k);
   }
 };
 
