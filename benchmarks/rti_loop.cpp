@@ -45,7 +45,9 @@ const Report& RtiLoop::step() noexcept {
     if (keep_guess) guess_ = point_;
   }
   set_newest(*sample, *problem_, scratch_);
-  report_ = solver_->solve(*problem_, point_);
+  report_ = solver_->feedback(*problem_, point_, Clock::time_point::max());
+  times_.answered = Ticks::now();
+  solver_->finish(*problem_, point_, report_);
   times_.end = Ticks::now();
   ++next_;
   return report_;

@@ -20,13 +20,14 @@ class RtiLoop {
   /// Begins anew at the first sample, with a solver that has forgotten all.
   void restart() noexcept;
   /// The next sample: what is known of it is set, the guess moved on, the step prepared; then the newest data are set
-  /// and the step is taken. The first one has no solution before it and is solved from its guess.
+  /// and the step is taken and judged. The first one has no solution before it and is solved from its guess.
   const Report& step() noexcept;
 
   struct Times {
-    Ticks::Count begin, prepared, end;
-    double total_us() const noexcept { return Ticks::microseconds(begin, prepared) + feedback_us(); }
-    double feedback_us() const noexcept { return Ticks::microseconds(prepared, end); }
+    Ticks::Count begin, prepared, answered, end;
+    double total_us() const noexcept { return Ticks::microseconds(begin, end); }
+    /// From the newest data to the new point, which is not judged yet.
+    double feedback_us() const noexcept { return Ticks::microseconds(prepared, answered); }
   };
   const Times& times() const noexcept { return times_; }
   const Report& report() const noexcept { return report_; }

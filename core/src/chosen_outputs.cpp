@@ -33,14 +33,10 @@ class ChosenOutputs final : public Model {
   void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
   void integrate_rows(const IntervalRows& request) const noexcept override { model_->integrate_rows(request); }
   void observe_rows(const NodeRows& request) const noexcept override {
+    if (request.chosen) return observe_some(request);
     NodeRows of_all = request;
-    std::array<int, room> chosen;
     of_all.chosen = chosen_.data();
-    of_all.chosen_count = request.chosen ? request.chosen_count : output_count();
-    if (request.chosen) {
-      for (int j = 0; j < request.chosen_count; ++j) chosen[j] = chosen_[request.chosen[j]];
-      of_all.chosen = chosen.data();
-    }
+    of_all.chosen_count = static_cast<int>(chosen_.size());
     model_->observe_rows(of_all);
   }
   std::size_t rows_scratch(int count) const noexcept override { return model_->rows_scratch(count); }
@@ -86,6 +82,14 @@ class ChosenOutputs final : public Model {
  private:
   static constexpr std::size_t room = 4096;  ///< doubles on the stack
 
+  /// Some of the chosen ones.
+  void observe_some(const NodeRows& request) const noexcept {
+    std::array<int, room> chosen;
+    for (int j = 0; j < request.chosen_count; ++j) chosen[j] = chosen_[request.chosen[j]];
+    NodeRows of_all = request;
+    of_all.chosen = chosen.data();
+    model_->observe_rows(of_all);
+  }
   /// Columns of all outputs -> columns of the chosen ones.
   void pick(const double* all, int columns, double* chosen) const noexcept {
     for (int c = 0; c < columns; ++c, all += all_)

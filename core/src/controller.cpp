@@ -70,6 +70,7 @@ void Controller::reset() noexcept {
   shifter_.forget();
   follower_.reset();
   has_plan_ = prepared_ = false;
+  is_finished_ = true;
   fallbacks_ = 0;
 }
 
@@ -142,6 +143,7 @@ void Controller::start_cold() noexcept {
 }
 
 const Controller::Command& Controller::control(const Estimate& estimate, Clock::time_point deadline) noexcept {
+  finish_sample();
   const Roles& roles = problem_.model().description().roles;
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
   follower_.advance(estimate.state[roles.position_x], estimate.state[roles.position_y]);
@@ -157,11 +159,11 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     if (!from_plan) start_cold();
   }
   // An estimate that has jumped is no small step for the plan of the last sample: start it from a simulation instead.
-  command_.report = solver_->solve(problem_, point_, deadline);
+  command_.report = solver_->feedback(problem_, point_, deadline);
   if (!is_usable(command_.report.status) && from_plan) {
     // The plan may have led astray; a fresh start may not.
     start_cold();
-    command_.report = solver_->solve(problem_, point_, deadline);
+    command_.report = solver_->feedback(problem_, point_, deadline);
     command_.report.fallback_used = true;
   }
   command_.fallback = !is_usable(command_.report.status);
@@ -172,11 +174,20 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   for (std::size_t j = 0; j < command_.inputs.size(); ++j)
     command_.inputs[j] = std::min(std::max(command_.inputs[j], problem_.input_lower(0, static_cast<int>(j))),
                                   problem_.input_upper(0, static_cast<int>(j)));
-  shifter_.take(problem_, point_);
+  is_finished_ = false;
   return command_;
 }
 
+/// What the robot need not wait for: the plan is judged and kept, before the problem becomes that of the next sample.
+void Controller::finish_sample() noexcept {
+  if (is_finished_) return;
+  is_finished_ = true;
+  solver_->finish(problem_, point_, command_.report);
+  shifter_.take(problem_, point_);
+}
+
 void Controller::prepare() noexcept {
+  finish_sample();
   if (!has_plan_ || prepared_) return;
   // What the next sample will probably be: the plan's second node, the reference one step further on.
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();

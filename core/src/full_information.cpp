@@ -170,7 +170,7 @@ SmoothedRun FullInformationEstimation::estimate(const NodeLog& log, Clock::time_
   }
   const std::size_t n = static_cast<std::size_t>(nx) + static_cast<std::size_t>(np);
   run.covariances.resize((static_cast<std::size_t>(N) + 1) * n * n);
-  if (!solver_->covariances(problem, point, run.covariances)) run.covariances.clear();
+  if (!solver_->covariances(problem, point, all_stages(problem), run.covariances)) run.covariances.clear();
   return run;
 }
 

@@ -1,12 +1,15 @@
 #include "rhec/core/horizon_problem.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <utility>
 
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
+#include "recollection.hpp"
 #include "rhec/core/error.hpp"
 #include "scratch.hpp"
 
@@ -44,6 +47,9 @@ HorizonProblem::HorizonProblem(std::shared_ptr<const Model> model, const Shape& 
   row_ = Capacity{0, nx_ + np_, nu_ + np_}.row();
   lower_.assign(nodes * stride_, -infinity);
   upper_.assign(nodes * stride_, infinity);
+  for (auto* v : {&foreseen_.z, &foreseen_.next}) v->assign(row_, 0.0);
+  foreseen_.jacobian.assign(static_cast<std::size_t>(nx_) * row_, 0.0);
+  foreseen_.scratch.assign(model_->rows_scratch(1), 0.0);
 }
 
 void HorizonProblem::clear_bounds() noexcept {
@@ -61,7 +67,9 @@ void HorizonProblem::set_ramp(int channel, bool ramp) noexcept {
   any_ramp_ = std::any_of(ramp_.begin(), ramp_.end(), [](std::uint8_t flag) { return flag != 0; });
 }
 
-void HorizonProblem::finish_structure() noexcept {
+bool HorizonProblem::finish_structure() noexcept {
+  if (is_finished_) return false;
+  is_finished_ = true;
   const int free_count = static_cast<int>(free_inputs_.size());
   any_start_ = false;
   for (int i = 0; i < intervals_; ++i) {
@@ -70,6 +78,7 @@ void HorizonProblem::finish_structure() noexcept {
     control_counts_[i] = next;
     any_start_ |= next > free_count;
   }
+  return true;
 }
 
 int HorizonProblem::control_of_input(int interval, int input) const noexcept {
@@ -204,6 +213,10 @@ void HorizonProblem::simulate_interval(int i, Iterate& point, std::span<double> 
   request.substeps = substeps_;
   request.next_states = point.state(i + 1);
   model_->integrate(request);
+  carry_channels(i, point);
+}
+
+void HorizonProblem::carry_channels(int i, Iterate& point) const noexcept {
   for (int c = 0; c < channels_; ++c) {
     const int control = control_of_channel(i, c);
     point.state(i + 1)[nx_ + c] = control >= 0 ? point.control(i)[control] : point.state(i)[nx_ + c];
@@ -219,8 +232,12 @@ double HorizonProblem::linearise(StageRange range, const Iterate& point, Hessian
 
 void HorizonProblem::prepare(const Iterate& point, Hessian hessian, StageQp& qp,
                              std::span<double> scratch) const noexcept {
-  fill_stages({0, intervals_}, point, hessian, qp, scratch);
-  add_cost({0, intervals_}, point, hessian, Parts::matrices, qp, scratch);
+  const StageRange all{0, intervals_};
+  Recollection* known = recollection_in(qp);
+  const bool has_moved = known && move_along(point, hessian, qp, *known, scratch);
+  if (has_moved && hessian == Hessian::exact) return;
+  if (!has_moved) fill_stages(all, point, hessian, qp, scratch);
+  add_cost(all, point, hessian, Parts::matrices, qp, scratch);
 }
 
 void HorizonProblem::refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
@@ -232,15 +249,33 @@ void HorizonProblem::refresh(const Iterate& point, StageQp& qp, std::span<double
 /// Sizes, dynamics with their curvature, and bounds.
 void HorizonProblem::fill_stages(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                                  std::span<double> scratch) const noexcept {
+  const StageRange steps{range.first, std::min(range.last, intervals_ - 1)};
+  Recollection* known = recollection_in(qp);
+  const bool has_channel_rows = known && has_structure(qp, *known);
+  fill_sizes(range, qp);
+  Dynamics how{hessian, has_channel_rows, nullptr};
+  if (known) {
+    known->forget();
+    if (range.first == 0 && range.last == intervals_) {
+      remember(point, qp, *known);
+      known->has_curvature = hessian == Hessian::exact && keeps_curvature();
+      if (known->has_curvature) {
+        look_ahead(*known);
+        how.ahead = known;
+      }
+    }
+  }
+  if (steps.last >= steps.first) linearise_dynamics(steps, point, how, qp, scratch);
+  fill_bounds(point, range, qp);
+}
+
+void HorizonProblem::fill_sizes(StageRange range, StageQp& qp) const noexcept {
   if (range.first == 0) {
     qp.set_intervals(intervals_);
     qp.initial_state_is_given = initial_state() != nullptr;
   }
   for (int i = range.first; i <= range.last; ++i)
     qp.set_sizes(i, capacity_.states, i < intervals_ ? control_counts_[i] : 0);
-  const StageRange steps{range.first, std::min(range.last, intervals_ - 1)};
-  if (steps.last >= steps.first) linearise_dynamics(steps, point, hessian, qp, scratch);
-  fill_bounds(point, range, qp);
 }
 
 /// z = [x; p; u (; p_end)] of each interval, as `Model::integrate_rows` takes it.
@@ -262,7 +297,7 @@ void HorizonProblem::gather_rows(const Iterate& point, StageRange range, double*
   }
 }
 
-void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, Hessian hessian, StageQp& qp,
+void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, const Dynamics& how, StageQp& qp,
                                         std::span<double> scratch) const noexcept {
   const int ns = capacity_.states;
   const std::ptrdiff_t count = steps.last - steps.first + 1;
@@ -271,9 +306,13 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
          *hessians = memory.take(count * row_ * row_);
   // Without carried inputs and ramps the model's rows are those of the program, but for channels that start.
   const bool in_place = is_direct() && !any_ramp_;
+  const bool is_exact = how.hessian == Hessian::exact;
   IntervalRows request;
-  request.count = static_cast<int>(count);
-  if (in_place && !any_start_) {
+  request.count = static_cast<int>(how.ahead ? count + 1 : count);
+  if (how.ahead) {
+    request.z = row(how.ahead->rows, steps.first, stride_);
+    request.z_step = stride_;
+  } else if (in_place && !any_start_) {
     request.z = point.row(steps.first);
     request.z_step = stride_;
   } else {
@@ -282,15 +321,15 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
     request.z_step = row_;
   }
   request.ramp = any_ramp_;
-  request.durations = durations_.data() + steps.first;
+  request.durations = how.ahead ? how.ahead->durations.data() : durations_.data() + steps.first;
   request.substeps = substeps_;
   request.next_states = qp.b(steps.first);
   request.next_step = stride_;
   request.jacobians = in_place ? qp.F(steps.first) : jacobians;
   request.jacobian_row = in_place ? stride_ : row_;
   request.jacobian_step = in_place ? ns * stride_ : nx_ * row_;
-  if (hessian == Hessian::exact) {
-    request.multipliers = point.costate(steps.first + 1);
+  if (is_exact) {
+    request.multipliers = how.ahead ? row(how.ahead->costates, 1, stride_) : point.costate(steps.first + 1);
     request.multiplier_step = stride_;
     request.hessians = in_place ? qp.H(steps.first) : hessians;
     request.hessian_row = in_place ? stride_ : row_;
@@ -301,12 +340,31 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
 
   if (!in_place) {
     std::fill_n(qp.F(steps.first), count * ns * stride_, 0.0);
-    if (hessian == Hessian::exact) std::fill_n(qp.H(steps.first), count * (ns + capacity_.controls) * stride_, 0.0);
+    if (is_exact) std::fill_n(qp.H(steps.first), count * (ns + capacity_.controls) * stride_, 0.0);
   }
+  if (how.ahead) {
+    std::copy_n(qp.H(intervals_), how.ahead->ahead.size(), how.ahead->ahead.data());
+    std::fill_n(qp.H(intervals_), how.ahead->ahead.size(), 0.0);
+  }
+  complete_dynamics(steps, point, how.has_channel_rows, qp);
+  if (in_place && !any_start_) return;
+  for (int i = steps.first; i <= steps.last; ++i) {
+    if (!in_place) {
+      scatter(i, jacobians + (i - steps.first) * nx_ * row_,
+              is_exact ? hessians + (i - steps.first) * row_ * row_ : nullptr, qp);
+    } else if (control_counts_[i] > nu_) {
+      place_started_channels(i, how.hessian, qp);
+    }
+  }
+}
+
+/// What the model does not know of a program: rows of channels, and the next state in b.
+void HorizonProblem::complete_dynamics(StageRange steps, const Iterate& point, bool has_channel_rows,
+                                       StageQp& qp) const noexcept {
   DynamicsView dynamics{};
   dynamics.first = steps.first;
   dynamics.last = steps.last;
-  dynamics.states = ns;
+  dynamics.states = capacity_.states;
   dynamics.stride = stride_;
   dynamics.vehicle_states = nx_;
   dynamics.channels = channels_;
@@ -314,16 +372,8 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
   dynamics.values = point.row(0);
   dynamics.F = qp.F(0);
   dynamics.b = qp.b(0);
+  dynamics.has_channel_rows = has_channel_rows;
   program_kernels().complete_dynamics(dynamics);
-  if (in_place && !any_start_) return;
-  for (int i = steps.first; i <= steps.last; ++i) {
-    if (!in_place) {
-      scatter(i, jacobians + (i - steps.first) * nx_ * row_,
-              hessian == Hessian::exact ? hessians + (i - steps.first) * row_ * row_ : nullptr, qp);
-    } else if (control_counts_[i] > nu_) {
-      place_started_channels(i, hessian, qp);
-    }
-  }
 }
 
 CostView HorizonProblem::cost_view(Parts parts, Hessian hessian, StageQp& qp) const noexcept {

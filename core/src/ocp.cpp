@@ -9,4 +9,6 @@ void Ocp::mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* c
   std::fill_n(control_flags, state_count(interval + 1) * control_count(interval), 1);
 }
 
+void Ocp::remember_in(StageQp& /*qp*/) const {}
+
 }  // namespace rhec

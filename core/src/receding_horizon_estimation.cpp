@@ -323,11 +323,14 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
 /// Of the state of a node and the parameters before it. Where it comes to nothing, the last one stays.
 void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noexcept {
   const int n = static_cast<int>(last_state_.size()), ns = problem_.capacity().states;
-  problem_.prepare(point_, Hessian::gauss_newton, covariance_qp_, scratch_);
-  covariance_riccati_.factor(covariance_qp_, no_active_bounds_);
   const bool is_last = node == window_.intervals;
   double* of_node = covariances_.data() + (is_last ? 0 : static_cast<std::ptrdiff_t>(node) * ns * ns);
-  covariance_riccati_.covariances(covariance_qp_, is_last ? nullptr : covariances_.data(), is_last ? of_node : nullptr);
+  if (!is_last || !solver_->covariances(problem_, point_, {node, node}, covariances_)) {
+    problem_.prepare(point_, Hessian::gauss_newton, covariance_qp_, scratch_);
+    covariance_riccati_.factor(covariance_qp_, no_active_bounds_);
+    covariance_riccati_.covariances(covariance_qp_, is_last ? nullptr : covariances_.data(),
+                                    is_last ? of_node : nullptr);
+  }
   if (!std::all_of(of_node, of_node + ns * ns, [](double value) { return std::isfinite(value); })) return;
   for (int c = 0; c < n; ++c)
     for (int r = 0; r < n; ++r) result.covariance(r, c) = of_node[c * ns + r];

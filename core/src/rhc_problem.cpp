@@ -54,26 +54,37 @@ void RhcProblem::set_blocks(int input, const std::uint8_t* begins) noexcept {
 }
 
 int RhcProblem::finish(std::span<double> scratch) noexcept {
-  finish_structure();
-  const int ns = capacity().states;
+  // Bounds of states stay as they were written, unless one was moved.
+  if (finish_structure() || moved_bounds_ > 0) write_state_bounds();
+  write_input_bounds();
+  moved_bounds_ = soften_unreachable_bounds(scratch);
+  return moved_bounds_;
+}
+
+void RhcProblem::write_state_bounds() noexcept {
   // Node 0 and what the channels carry stay without bounds, as they were made.
-  if (!is_direct()) clear_bounds();
+  clear_bounds();
   for (int i = 1; i <= intervals(); ++i) {
-    double *lower = lower_row(i), *upper = upper_row(i);
-    for (int j = 0; j < nx(); ++j) {
-      lower[j] = setup_.state_lower[j];
-      upper[j] = setup_.state_upper[j];
-    }
+    std::copy_n(setup_.state_lower.begin(), nx(), lower_row(i));
+    std::copy_n(setup_.state_upper.begin(), nx(), upper_row(i));
   }
-  std::fill_n(lower_row(intervals()) + ns, capacity().controls, -infinity);
-  std::fill_n(upper_row(intervals()) + ns, capacity().controls, infinity);
-  for (int i = 0; i < intervals(); ++i) {
-    for (int j = 0; j < nu(); ++j) {
-      if (is_direct()) {
-        lower_row(i)[ns + j] = input_lower(i, j);
-        upper_row(i)[ns + j] = input_upper(i, j);
-        continue;
+}
+
+void RhcProblem::write_input_bounds() noexcept {
+  const int ns = capacity().states, inputs = nu();
+  if (is_direct()) {
+    const double *from_lower = input_lower_.data(), *from_upper = input_upper_.data();
+    double *lower = lower_row(0) + ns, *upper = upper_row(0) + ns;
+    for (int i = 0; i < intervals(); ++i, lower += stride(), upper += stride()) {
+      for (int j = 0; j < inputs; ++j) {
+        lower[j] = *from_lower++;
+        upper[j] = *from_upper++;
       }
+    }
+    return;
+  }
+  for (int i = 0; i < intervals(); ++i) {
+    for (int j = 0; j < inputs; ++j) {
       const int control = control_of_input(i, j);
       if (control < 0) continue;
       // A block keeps the bounds of every interval that it covers.
@@ -86,7 +97,6 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
       upper_row(i)[ns + control] = upper;
     }
   }
-  return soften_unreachable_bounds(scratch);
 }
 
 /// For each state that starts outside its bounds: drive it back as fast as the corners of the input box (and standing

@@ -11,6 +11,7 @@
 #include "checks.hpp"
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
+#include "recollection.hpp"
 #include "rhec/core/error.hpp"
 #include "scratch.hpp"
 
@@ -86,7 +87,7 @@ void RheProblem::link(int interval, int parameter, double variance) noexcept {
 }
 
 void RheProblem::finish() noexcept {
-  finish_structure();
+  if (!finish_structure()) return;
   const int ns = capacity().states;
   for (int i = 0; i <= intervals(); ++i) {
     double *lower = lower_row(i), *upper = upper_row(i);
@@ -195,7 +196,7 @@ double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<dou
 double RheProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                             std::span<double> scratch) const noexcept {
   const bool matrices = parts != Parts::vectors, vectors = parts != Parts::matrices;
-  double total = write_measurements(range, point, hessian, cost_view(parts, hessian, qp), scratch);
+  double total = write_measurements(range, point, hessian, cost_view(parts, hessian, qp), recollection_in(qp), scratch);
   if (range.first == 0) {
     if (vectors) total += arrival_term(point, qp.h(0));
     const int n = nx() + np();
@@ -222,22 +223,53 @@ double RheProblem::arrival_term(const Iterate& point, double* q) const noexcept 
   return total;
 }
 
+void RheProblem::remember_in(StageQp& qp) const {
+  HorizonProblem::remember_in(qp);
+  Recollection& known = *recollection_in(qp);
+  const auto nodes = static_cast<std::size_t>(capacity().intervals) + 1;
+  known.output_size = output_row_;
+  known.output_jacobian_size = static_cast<std::ptrdiff_t>(ny_) * padded(nx());
+  known.outputs.assign(nodes * known.output_size, 0.0);
+  known.output_jacobians.assign(nodes * known.output_jacobian_size, 0.0);
+}
+
+/// Outputs at the nodes of a range and their Jacobians: those that are remembered, or else rows of the caller's.
+RheProblem::Observed RheProblem::observe(StageRange range, const Iterate& point, Recollection* known, double* outputs,
+                                         double* jacobians, double* room) const noexcept {
+  const std::ptrdiff_t jacobian_row = padded(nx());
+  const auto ask = [&](int first, int count, double* to, double* jacobians_to) {
+    NodeRows request;
+    request.count = count;
+    request.states = point.state(first);
+    request.state_step = stride();
+    request.outputs = to;
+    request.output_step = output_row_;
+    request.jacobians = jacobians_to;
+    request.jacobian_row = jacobian_row;
+    request.scratch = room;
+    model().observe_rows(request);
+  };
+  if (!known || known->intervals < 0) {
+    ask(range.first, range.last - range.first + 1, outputs, jacobians);
+    return {outputs, jacobians};
+  }
+  double *all = known->outputs.data(), *all_jacobians = known->output_jacobians.data();
+  for (int i = range.first; i <= range.last; ++i) {
+    if (known->observed[i]) continue;
+    const int first = i;
+    while (i <= range.last && !known->observed[i]) known->observed[i++] = 1;
+    ask(first, i - first, all + first * known->output_size, all_jacobians + first * known->output_jacobian_size);
+  }
+  return {all + range.first * known->output_size, all_jacobians + range.first * known->output_jacobian_size};
+}
+
 double RheProblem::write_measurements(StageRange range, const Iterate& point, Hessian hessian, const CostView& view,
-                                      std::span<double> scratch) const noexcept {
-  const std::ptrdiff_t count = range.last - range.first + 1, width = padded(nx());
+                                      Recollection* known, std::span<double> scratch) const noexcept {
+  const std::ptrdiff_t count = range.last - range.first + 1;
   Scratch memory(scratch.data());
-  double *jacobians = memory.take(count * ny_ * width), *predicted = memory.take(count * output_row_),
+  double *jacobian_rows = memory.take(count * ny_ * padded(nx())), *output_rows = memory.take(count * output_row_),
          *room = memory.take(std::ptrdiff_t{2} * output_row_);
-  NodeRows request;
-  request.count = static_cast<int>(count);
-  request.states = point.state(range.first);
-  request.state_step = stride();
-  request.outputs = predicted;
-  request.output_step = output_row_;
-  request.jacobians = jacobians;
-  request.jacobian_row = width;
-  request.scratch = memory.rest();
-  model().observe_rows(request);
+  const auto [predicted, jacobians] = observe(range, point, known, output_rows, jacobian_rows, memory.rest());
   if (!setup_.robust.empty() || hessian == Hessian::exact)
     return write_bent_measurements(range, point, hessian, view, predicted, jacobians, memory.rest());
   MeasurementView measured{};

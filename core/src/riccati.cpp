@@ -47,6 +47,7 @@ Riccati::Riccati(const Capacity& capacity)
   const auto stages = static_cast<std::size_t>(capacity.intervals) + 1;
   const std::size_t wide = width_, rows = max_rows_, row = stride_;
   P_.assign(stages * ns_ * row, 0.0);
+  initial_inverse_.assign(ns_ * row, 0.0);
   for (auto* v : {&U_, &V_}) v->assign(stages * nw_ * row, 0.0);
   columns_.assign(stages * 64, 0.0);
   inverse_.assign(stages * nw_, 0.0);
@@ -202,6 +203,8 @@ bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* g
     }
     std::fill_n(values, n * size, 0.0);
     for (int j = 0; with_minimiser && j < n; ++j) values[j * size + minimiser] = s0[j];
+  } else if (has_initial_inverse_) {
+    kernels_->answer(initial_inverse_.data(), n, stride_, values);
   } else {
     // -(G G')^-1 of the gradients, with the factor's lower triangle.
     const double* G = special(N).factor;
@@ -279,8 +282,12 @@ void Riccati::covariances(const StageQp& qp, double* covariance, double* last) n
   const Special initial = special(N);
   for (int c = 0; c < n0; ++c) {
     std::fill_n(now + c * stride_, stride_, 0.0);
-    now[c * stride_ + c] = 2.0;
-    small::solve(initial.factor, width_, n0, now + c * stride_);
+    if (has_initial_inverse_) {
+      for (int r = 0; r < n0; ++r) now[c * stride_ + r] = 2.0 * initial_inverse_[c * stride_ + r];
+    } else {
+      now[c * stride_ + c] = 2.0;
+      small::solve(initial.factor, width_, n0, now + c * stride_);
+    }
   }
   const auto store = [&](int node, double* target) {
     if (!target) return;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/kernels.hpp"
+#include "kernels/program_kernels.hpp"
 #include "rhec/core/rhe_problem.hpp"
 
 namespace rhec {
@@ -25,8 +27,7 @@ GuessShifter::GuessShifter(const HorizonProblem& like)
       kept_(like.capacity()),
       controls_(static_cast<std::size_t>(like.capacity().intervals) * channels_, -1),
       shares_(like.capacity().intervals),
-      u_(nu_),
-      p_(like.model().parameter_count()) {}
+      scratch_(like.scratch_size()) {}
 
 void GuessShifter::take(const HorizonProblem& problem, const Iterate& point) noexcept {
   intervals_ = problem.intervals();
@@ -34,15 +35,25 @@ void GuessShifter::take(const HorizonProblem& problem, const Iterate& point) noe
   std::copy_n(point.row(0), entries, kept_.row(0));
   std::copy_n(point.costate(0), entries, kept_.costate(0));
   std::copy_n(point.bound_row(0), entries, kept_.bound_row(0));
+  any_start_ = problem.any_start();
+  if (!any_start_) {
+    std::fill_n(controls_.data(), intervals_ * channels_, -1);
+    return;
+  }
   for (int i = 0, k = 0; i < intervals_; ++i)
     for (int c = 0; c < channels_; ++c) controls_[k++] = problem.control_of_channel(i, c);
 }
 
-bool GuessShifter::apply(int steps, const HorizonProblem& to, Iterate& guess) noexcept {
+bool GuessShifter::apply(int steps, HorizonProblem& to, Iterate& guess) noexcept {
   if (intervals_ == 0 || steps < 0 || steps > intervals_ || to.intervals() > kept_.capacity().intervals) return false;
   move_rows(steps, to, guess);
+  const bool reaches_end = to.intervals() >= intervals_ - steps;
   for (int c = 0; c < channels_; ++c) {
-    move_channel(c, steps, to, guess);
+    if (reaches_end && is_one_block(c, to) && kept_.costate(intervals_)[nx_ + c] == 0.0) {
+      extend_channel(c, steps, to, guess);
+    } else {
+      move_channel(c, steps, to, guess);
+    }
     move_channel_bounds(c, steps, to, guess);
   }
   add_intervals(steps, to, guess);
@@ -52,30 +63,39 @@ bool GuessShifter::apply(int steps, const HorizonProblem& to, Iterate& guess) no
 /// What does not depend on blocks: states, costates, free inputs, and the multipliers of their bounds.
 void GuessShifter::move_rows(int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
   const int N = to.intervals(), ns = kept_.capacity().states, row = kept_.capacity().row();
-  const int moved = std::min(N, intervals_ - steps), beyond = N - moved;
-  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(moved + 1) * row,
-                       rest = static_cast<std::ptrdiff_t>(beyond) * row;
-  std::copy_n(kept_.row(steps), entries, guess.row(0));
-  std::copy_n(kept_.costate(steps), entries, guess.costate(0));
-  std::copy_n(kept_.bound_row(steps), entries, guess.bound_row(0));
+  const int moved = std::min(N, intervals_ - steps);
+  const std::ptrdiff_t rest = static_cast<std::ptrdiff_t>(N - moved) * row;
+  // Blocks may start elsewhere now, and the last node has no controls.
+  const auto adopt = [&](int first, int count, int used) {
+    GuessView from{};
+    from.rows = count;
+    from.stride = row;
+    from.vehicle_states = nx_;
+    from.states = ns;
+    from.used = used;
+    from.values = kept_.row(first + steps);
+    from.multipliers = kept_.bound_row(first + steps);
+    from.lower = to.state_lower(first);
+    from.upper = to.state_upper(first);
+    program_kernels().adopt(from, guess.row(first), guess.bound_row(first));
+  };
+  adopt(0, moved, ns + free_count_);
+  adopt(moved, 1, ns);
   std::fill_n(guess.row(moved) + row, rest, 0.0);
   std::fill_n(guess.bound_row(moved) + row, rest, 0.0);
+  std::copy_n(kept_.costate(steps), static_cast<std::ptrdiff_t>(moved + 1) * row, guess.costate(0));
   // Beyond what was kept an estimator expects to be right, and a controller to be off as it was at the end.
   const bool given = to.initial_state() != nullptr;
   for (int i = moved + 1; i <= N; ++i)
     for (int j = 0; j < row; ++j) guess.costate(i)[j] = given ? kept_.costate(intervals_)[j] : 0.0;
   for (int j = 0; !given && j < ns; ++j) guess.costate(0)[j] = 0.0;
-  for (int i = 0; i <= N; ++i) {
-    double *z = guess.row(i), *bound = guess.bound_row(i);
-    const double *lower = to.state_lower(i), *upper = to.state_upper(i);
-    // Blocks may start elsewhere now.
-    const int used = i < moved ? ns + free_count_ : ns;
-    for (int j = used; j < row; ++j) z[j] = bound[j] = 0.0;
-    for (int j = nx_; j < ns; ++j) bound[j] = 0.0;
-    for (int j = ns; j < used; ++j) z[j] = clipped(z[j], lower[j], upper[j]);
-    for (int j = 0; j < used; ++j)
-      if (bound[j] != 0.0) bound[j] = multiplier_of(bound[j], lower[j], upper[j]);
-  }
+}
+
+bool GuessShifter::is_one_block(int channel, const HorizonProblem& to) const noexcept {
+  bool starts = false;
+  for (int i = 0; any_start_ && i < intervals_; ++i) starts |= kept_control(i, channel) >= 0;
+  for (int i = 0; to.any_start() && i < to.intervals(); ++i) starts |= to.begins(i, channel);
+  return !starts;
 }
 
 double GuessShifter::gradient(int i, int channel) const noexcept {
@@ -85,6 +105,14 @@ double GuessShifter::gradient(int i, int channel) const noexcept {
   // Where the value is carried, the costates' change is what interval i adds; where it is decided, stationarity says
   // it.
   return control >= 0 ? -next - kept_.control_bound(i)[control] : kept_.costate(i)[nx_ + channel] - next;
+}
+
+/// A channel that has one block in both horizons and is pulled at by no end: rows have been moved as the vehicle's.
+void GuessShifter::extend_channel(int channel, int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
+  const int N = to.intervals(), at = nx_ + channel;
+  const double value = kept_.state(std::min(steps, intervals_ - 1))[at];
+  for (int i = 0; i <= N; ++i) guess.state(i)[at] = value;
+  for (int i = std::min(N, intervals_ - steps); i <= N; ++i) guess.costate(i)[at] = 0.0;
 }
 
 /// The values of a channel and their costates.
@@ -154,7 +182,7 @@ void GuessShifter::move_channel_bounds(int channel, int steps, const HorizonProb
 }
 
 /// What the kept horizon does not reach: inputs as measured, or as last; states by integration.
-void GuessShifter::add_intervals(int steps, const HorizonProblem& to, Iterate& guess) noexcept {
+void GuessShifter::add_intervals(int steps, HorizonProblem& to, Iterate& guess) noexcept {
   const auto* estimation = to.kind() == OcpKind::rhe ? static_cast<const RheProblem*>(&to) : nullptr;
   for (int i = intervals_ - steps; i < to.intervals(); ++i) {
     double* w = guess.control(i);
@@ -163,18 +191,12 @@ void GuessShifter::add_intervals(int steps, const HorizonProblem& to, Iterate& g
       w[j] = clipped(std::isnan(measured) ? kept_.control(intervals_ - 1)[j] : measured, to.control_lower(i)[j],
                      to.control_upper(i)[j]);
     }
-    const double seconds = to.duration(i);
-    to.inputs_on(guess, i, u_.data());
-    to.parameters_on(guess, i, p_.data());
-    Model::Intervals request;
-    request.count = 1;
-    request.states = guess.state(i);
-    request.inputs = u_.data();
-    request.parameters = p_.data();
-    request.durations = &seconds;
-    request.substeps = to.substeps();
-    request.next_states = guess.state(i + 1);
-    to.model().integrate(request);
+    // A controller's program has looked ahead.
+    if (to.keeps_curvature()) {
+      to.simulate_interval(i, guess, scratch_);
+    } else {
+      to.foresee_interval(i, guess);
+    }
   }
 }
 

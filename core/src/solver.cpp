@@ -53,6 +53,6 @@ double microseconds_since(Clock::time_point start) noexcept {
   return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
 }
 
-bool Solver::covariances(const Ocp&, const Iterate&, std::span<double>) noexcept { return false; }
+bool Solver::covariances(const Ocp&, const Iterate&, StageRange, std::span<double>) noexcept { return false; }
 
 }  // namespace rhec

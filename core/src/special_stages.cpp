@@ -171,6 +171,7 @@ void Riccati::factor_reduced(double* reduced, int n, double tolerance, double* f
 }
 
 void Riccati::write_convexified(StageQp& qp) noexcept {
+  qp.change();
   for (int i = 0; i < qp.intervals(); ++i) {
     if (is_special_[i] == 0) continue;
     const Special v = special(i);
@@ -282,6 +283,9 @@ void Riccati::factor_initial(const StageQp& qp, const ActiveSet& /*active*/) noe
   double* reduced = work_.data();
   reduction.plain = reduction.rows == 0;
   reduction.free = n;
+  has_initial_inverse_ =
+      reduction.plain && kernels_->invert(P(0), n, stride_, initial_definite_tolerance, initial_inverse_.data());
+  if (has_initial_inverse_) return;
   if (!reduction.plain) {
     double* D = reduced + 3 * width_ * width_;
     double* F = D + max_rows_ * width_;
@@ -396,7 +400,9 @@ bool Riccati::solve_initial(const StageQp& qp, const ActiveSet& active, Iterate&
     const Special v = special(N);
     double free_step[max_width], gradient[max_width], transformed[3 * max_width];
     if (initial.overflow) return false;
-    if (initial.plain) {
+    if (has_initial_inverse_) {
+      kernels_->solve(P(0), initial_inverse_.data(), n0, stride_, p(0), s0);
+    } else if (initial.plain) {
       for (int j = 0; j < n0; ++j) s0[j] = -p(0)[j];
       small::solve(v.factor, width_, n0, s0);
     } else {

@@ -25,10 +25,29 @@ StageQp::StageQp(const Capacity& capacity)
 
 void StageQp::clear(int i) noexcept {
   std::fill_n(F(i), capacity_.states * stride_, 0.0);
+  std::fill_n(b(i), stride_, 0.0);
+  clear_costs(i);
+}
+
+void StageQp::clear_costs(int i) noexcept {
   std::fill_n(H(i), wide_ * stride_, 0.0);
-  for (double* row : {h(i), b(i)}) std::fill_n(row, stride_, 0.0);
+  std::fill_n(h(i), stride_, 0.0);
   std::fill_n(lower(i), stride_, -infinity);
   std::fill_n(upper(i), stride_, infinity);
+}
+
+void StageQp::drop_first(int stages, bool with_curvature) noexcept {
+  const int kept = intervals_ + 1 - stages;
+  std::copy(F(stages), F(intervals_ + 1), F(0));
+  std::copy(b(stages), b(intervals_ + 1), b(0));
+  // The terminal cost stays where it is.
+  if (with_curvature) std::copy(H(stages), H(intervals_), H(0));
+  for (int i = 0; i < kept; ++i) {
+    const int states = state_counts_[i + stages], controls = control_counts_[i + stages];
+    if (!with_curvature && (states < state_counts_[i] || controls < control_counts_[i])) clear_costs(i);
+    state_counts_[i] = states;
+    control_counts_[i] = controls;
+  }
 }
 
 }  // namespace rhec

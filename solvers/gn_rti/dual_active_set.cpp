@@ -57,6 +57,7 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
   h_.assign(nodes * capacity.row(), 0.0);
 }
 
+/// Which variables have bounds; what these are, `take_bounds` says.
 void DualActiveSet::collect(const StageQp& qp, const ActiveSet* claimed) noexcept {
   is_collected_ = true;
   bounded_.clear();
@@ -74,15 +75,13 @@ void DualActiveSet::collect(const StageQp& qp, const ActiveSet* claimed) noexcep
         columns_.push_back(static_cast<int>(bounded_.size()));
       }
     }
-    Bounded v{};
+    Bounded& v = bounded_.emplace_back();
     v.entry = {stage, place};
     v.at = static_cast<std::ptrdiff_t>(stage) * qp.stride() + place;
     v.is_control = is_control;
     v.hold = hold;
     v.side = side;
     v.slot = none;
-    v.set_bounds(lower, upper);
-    bounded_.push_back(v);
   };
   const int first_control = qp.capacity().states;
   for (int i = 0; i <= qp.intervals(); ++i) {
@@ -476,6 +475,7 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
   if (!is_collected_) {
     if (!check.violates) return Found::step;
     collect(qp, nullptr);
+    take_bounds(qp);
   }
   for (std::size_t b = 0; b < bounded_.size(); ++b) {
     const Bounded& v = bounded_[b];
@@ -491,6 +491,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
   if (!take_bounds(qp)) {
     claimed_ = active;
     prepare(qp, riccati, &claimed_);
+    take_bounds(qp);
   }
   changes_ = 0;
   pull_tolerance_ = multiplier_tolerance;

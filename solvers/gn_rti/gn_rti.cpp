@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "rhec/core/point.hpp"
 #include "rhec/core/stage_checks.hpp"
@@ -82,6 +83,7 @@ void GnRti::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'gn_rti': " + reason);
   capacity_ = ocp.capacity();
   qp_ = other_qp_ = StageQp(capacity_);
+  ocp.remember_in(qp_);
   qp_solver_ = StageQpSolver(capacity_);
   for (Iterate* point : {&prepared_point_, &step_, &trial_, &best_, &other_trial_}) *point = Iterate(capacity_);
   scratch_.assign(ocp.scratch_size(), 0.0);
@@ -90,7 +92,9 @@ void GnRti::setup(const Ocp& ocp) {
 }
 
 void GnRti::reset() noexcept {
-  prepared_ = false;
+  prepared_ = is_pending_ = false;
+  preparation_us_ = 0.0;
+  qp_.change();
   qp_solver_.reset();
 }
 
@@ -113,7 +117,7 @@ void GnRti::linearise(const Ocp& ocp, Iterate& point) noexcept {
 
 void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
   const auto start = Clock::now();
-  prepared_ = false;
+  prepared_ = is_pending_ = false;
   use_exact_ = false;
   if (!(ocp.capacity() == capacity_) || !(guess.capacity() == capacity_)) return;
   const Hessian hessian = hessian_for(ocp);
@@ -128,7 +132,7 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
   qp_solver_.guess_from(qp_, guess);
   qp_solver_.prepare(qp_);
   prepared_ = true;
-  preparation_us_ = microseconds_since(start);
+  preparation_us_ += microseconds_since(start);
 }
 
 bool GnRti::is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept {
@@ -179,9 +183,17 @@ double GnRti::merit(const Ocp& ocp, const Iterate& point) noexcept {
 }
 
 Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+  Report report = feedback(ocp, point, deadline);
+  if (!is_pending_) return report;
+  finish(ocp, point, report);
+  report.feedback_us += std::exchange(preparation_us_, 0.0);
+  return report;
+}
+
+Report GnRti::feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
   const auto start = Clock::now();
   Report report;
-  use_exact_ = false;
+  use_exact_ = is_pending_ = false;
   if (ocp.capacity() == capacity_ && point.capacity() == capacity_) {
     // A real-time iteration lives on the sample before; a point without costates has none.
     if (options_.mode == Mode::rti && has_costates(ocp, point)) {
@@ -190,7 +202,7 @@ Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) 
       report = converge(ocp, point, deadline);
     }
   }
-  report.preparation_us = prepared_ ? preparation_us_ : 0.0;
+  report.preparation_us = std::exchange(preparation_us_, 0.0);
   prepared_ = false;
   report.feedback_us = microseconds_since(start);
   return report;
@@ -210,7 +222,8 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
     if (ready) {
       ocp.refresh(from, qp_, scratch_);
     } else {
-      linearise(ocp, from);
+      ocp.prepare(from, hessian_for(ocp), qp_, scratch_);
+      ocp.refresh(from, qp_, scratch_);
       qp_solver_.guess_from(qp_, from);
     }
     ready = false;
@@ -219,28 +232,75 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
       report.status = outcome == StageQpSolver::Outcome::infeasible ? Status::infeasible : Status::deadline;
       break;
     }
-    add_full_step(ocp.intervals(), from, step_, trial_);
-    const double objective = ocp.linearise(all_stages(ocp), trial_, Hessian::none, qp_, scratch_);
-    const KktResidual kkt = kkt_residual(qp_, trial_);
-    if (!std::isfinite(objective) || !std::isfinite(kkt.stationarity)) {
+    // Of the active-set methods' steps all was seen.
+    if (outcome == StageQpSolver::Outcome::interior_point && !is_finite(ocp, step_)) {
       report.status = Status::stalled;
       break;
     }
-    report.objective = objective;
-    report.kkt = kkt;
+    add_full_step(ocp.intervals(), from, step_, trial_);
+    const bool is_last = iteration + 1 == options_.iterations;
+    if (!is_last && !judge_step(ocp, trial_, report)) {
+      report.status = Status::stalled;
+      break;
+    }
+    is_pending_ = is_last;
     std::swap(best_, trial_);
     ++report.iterations;
   }
-  if (report.iterations > 0) {
-    if (report.status == Status::infeasible || report.status == Status::stalled)
-      report.status = Status::iteration_limit;
-    std::swap(point, best_);
-  } else {
-    // What is not a number is seen in the result first.
-    if (!is_sound_start(ocp, point, scratch_)) return {};
-    judge(ocp, point, qp_, scratch_, report);
+  if (report.iterations == 0) {
+    give_up(ocp, point, report);
+    return report;
   }
+  if (report.status == Status::infeasible || report.status == Status::stalled) report.status = Status::iteration_limit;
+  std::swap(point, best_);
   return report;
+}
+
+/// Linearises at a new point, as the next sample will want it; false where the point comes to nothing.
+bool GnRti::judge_step(const Ocp& ocp, const Iterate& point, Report& report) noexcept {
+  const bool is_exact = hessian_for(ocp) == Hessian::exact && ocp.keeps_curvature();
+  const double objective =
+      ocp.linearise(all_stages(ocp), point, is_exact ? Hessian::exact : Hessian::none, qp_, scratch_);
+  const KktResidual kkt = kkt_residual(qp_, point);
+  if (!std::isfinite(objective) || !std::isfinite(kkt.stationarity)) return false;
+  report.objective = objective;
+  report.kkt = kkt;
+  return true;
+}
+
+void GnRti::finish(const Ocp& ocp, Iterate& point, Report& report) noexcept {
+  if (!std::exchange(is_pending_, false)) return;
+  const auto start = Clock::now();
+  if (!judge_step(ocp, point, report)) {
+    --report.iterations;
+    report.status = report.iterations > 0 ? Status::iteration_limit : Status::stalled;
+    // The point before the last step: what came in, or the step before.
+    std::swap(point, report.iterations > 0 ? trial_ : best_);
+    if (report.iterations == 0) give_up(ocp, point, report);
+  }
+  preparation_us_ = microseconds_since(start);
+}
+
+/// Where the point was judged, its linearisation is there already.
+bool GnRti::covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept {
+  const int N = ocp.intervals();
+  const bool is_all = nodes.first == 0, is_last = nodes.first == N;
+  const std::size_t block = static_cast<std::size_t>(capacity_.states) * capacity_.states;
+  if (prepared_ || is_pending_ || !(ocp.capacity() == capacity_) || nodes.last != N || !(is_all || is_last) ||
+      blocks.size() < block * static_cast<std::size_t>(nodes.last - nodes.first + 1))
+    return false;
+  ocp.prepare(point, Hessian::gauss_newton, qp_, scratch_);
+  return qp_solver_.covariances(qp_, is_last ? nullptr : blocks.data(), is_last ? blocks.data() : nullptr);
+}
+
+/// What is left to say of a point that no step has improved.
+void GnRti::give_up(const Ocp& ocp, const Iterate& point, Report& report) noexcept {
+  // What is not a number is seen in the result first.
+  if (is_sound_start(ocp, point, scratch_)) {
+    judge(ocp, point, qp_, scratch_, report);
+  } else {
+    report = {};
+  }
 }
 
 /// Solves the quadratic program in `qp_` at `best_` and searches along its step by the l1 merit; the accepted point
@@ -295,6 +355,7 @@ StageQpSolver::Outcome GnRti::solve_program(Report& report, Clock::time_point de
 /// Powell's relaxation: of all defects and violated bounds, the step is asked to remove only a share of what it was
 /// asked before. Where that share is 0, the program has a solution: no step.
 void GnRti::ask_for_less(double share) noexcept {
+  qp_.change();
   asked_share_ *= share;
   const auto relax = [share](double* lower, double* upper, int count) {
     for (int j = 0; j < count; ++j) {

@@ -30,10 +30,12 @@ struct GnRtiOptions {
 
 /// Sequential quadratic programming on the stages of an Ocp, with a Riccati recursion inside.
 ///
-/// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers claim; `solve` then
-/// needs only vectors, unless the newest data change the active set. Estimation problems have small residuals and take
-/// Gauss-Newton's Hessian; control problems under slip have large ones, on which Gauss-Newton does not even converge
-/// locally, and take the exact one with the guess' costates, convexified inside the recursion.
+/// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers claim; `feedback`
+/// then needs only vectors, unless the newest data change the active set. `finish` linearises at the new point, of
+/// which the next guess is the same a stage later: `prepare` has one interval left to evaluate, or none. Estimation
+/// problems have small residuals and take Gauss-Newton's Hessian; control problems under slip have large ones, on which
+/// Gauss-Newton does not even converge locally, and take the exact one with the guess' costates, convexified inside the
+/// recursion.
 class GnRti final : public Solver {
  public:
   using Options = GnRtiOptions;
@@ -44,6 +46,9 @@ class GnRti final : public Solver {
   void setup(const Ocp& ocp) override;
   void prepare(const Ocp& ocp, const Iterate& guess) noexcept override;
   Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
+  Report feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
+  void finish(const Ocp& ocp, Iterate& point, Report& report) noexcept override;
+  bool covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept override;
   void reset() noexcept override;
 
  private:
@@ -51,6 +56,8 @@ class GnRti final : public Solver {
   void linearise(const Ocp& ocp, Iterate& point) noexcept;
   bool is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept;
   Report real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept;
+  bool judge_step(const Ocp& ocp, const Iterate& point, Report& report) noexcept;
+  void give_up(const Ocp& ocp, const Iterate& point, Report& report) noexcept;
   Report converge(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept;
   void add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept;
   void roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept;
@@ -66,6 +73,7 @@ class GnRti final : public Solver {
   Iterate prepared_point_, step_, trial_, best_, other_trial_;
   std::vector<double> scratch_, defects_;
   bool prepared_ = false;
+  bool is_pending_ = false;  ///< the last step was not judged yet; `best_` is the point before it
   bool use_exact_ = false;
   double preparation_us_ = 0.0;
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;

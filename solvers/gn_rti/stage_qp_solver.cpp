@@ -208,6 +208,14 @@ void StageQpSolver::convexify(StageQp& qp) noexcept {
   bent_ = true;
 }
 
+bool StageQpSolver::covariances(const StageQp& qp, double* all, double* last) noexcept {
+  riccati_.factor(qp, no_bounds_);
+  factored_ = prepared_ = is_dual_ = false;
+  if (riccati_.was_convexified()) return false;
+  riccati_.covariances(qp, all, last);
+  return true;
+}
+
 void StageQpSolver::collect_bounded(const StageQp& qp) noexcept {
   bounded_.clear();
   const auto add = [&](bool is_state, int stage, int component, double lower, double upper) {

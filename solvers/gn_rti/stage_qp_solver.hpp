@@ -53,6 +53,9 @@ class StageQpSolver {
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept {
     riccati_.feedback(qp, i, state_step, control_step);
   }
+  /// Covariances by the program's Hessian without any bounds (Riccati::covariances), of all nodes or the last one;
+  /// false where it is not positive definite.
+  bool covariances(const StageQp& qp, double* all, double* last) noexcept;
   /// True where the last solution is that of a program whose curvature had to be convexified.
   bool was_bent() const noexcept { return bent_ || riccati_.was_convexified(); }
   int factorisations() const noexcept { return factorisations_; }

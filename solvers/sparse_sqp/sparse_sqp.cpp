@@ -425,7 +425,9 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
   return report;
 }
 
-bool SparseSqp::covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept {
+bool SparseSqp::covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept {
+  // It has all or nothing.
+  if (nodes.first != 0 || nodes.last != ocp.intervals()) return false;
   const auto stride = static_cast<std::size_t>(capacity_.states);
   if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_) ||
       blocks.size() < (static_cast<std::size_t>(ocp.intervals()) + 1) * stride * stride)

@@ -39,7 +39,7 @@ class SparseSqp final : public Solver {
   void setup(const Ocp& ocp) override;
   void prepare(const Ocp&, const Iterate&) noexcept override {}
   Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
-  bool covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept override;
+  bool covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept override;
   void reset() noexcept override;
 
  private:

@@ -193,8 +193,10 @@ struct RandomProgram {
   Iterate point;
   ProgramView view;
 
-  explicit RandomProgram(RandomQp& random)
-      : qp(random.make(random.integer(1, 9), random.integer(1, 11), random.integer(1, 9), random.integer(0, 1) == 0)),
+  /// Of sizes that kernels are compiled for, or of any.
+  explicit RandomProgram(RandomQp& random, bool is_usual = false)
+      : qp(random.make(random.integer(1, 9), is_usual ? 6 : random.integer(1, 11), is_usual ? 2 : random.integer(1, 9),
+                       random.integer(0, 1) == 0)),
         point(qp.capacity()) {
     for (int i = 0; i <= qp.intervals(); ++i) {
       for (int j = 0; j < qp.states(i); ++j) {
@@ -224,8 +226,8 @@ void expect_same_rows(const double* a, const double* b, std::ptrdiff_t count, do
 
 TEST(Kernels, OverProgramsAgree) {
   RandomQp random(9);
-  for (int trial = 0; trial < 100; ++trial) {
-    RandomProgram program(random);
+  for (int trial = 0; trial < 150; ++trial) {
+    RandomProgram program(random, trial % 3 == 0);
     if (trial % 10 == 3) program.qp.state_lower(1)[0] = std::nan("");
     if (trial % 10 == 5) program.point.state(1)[0] = infinity;
     std::vector<unsigned char> marks(program.qp.intervals() + 1), same_marks(marks.size());
@@ -473,6 +475,86 @@ TEST(Kernels, CompleteDynamicsWithCarriedChannels) {
           for (int k = 0; k < qp.stride(); ++k) EXPECT_EQ(qp.F(i)[row * qp.stride() + k], k == column ? 1.0 : 0.0);
         }
       }
+    }
+  }
+}
+
+TEST(Kernels, InvertAndSolveSymmetricSystems) {
+  RandomQp random(13);
+  for (int trial = 0; trial < 60; ++trial) {
+    const int n = trial < 20 ? 6 : random.integer(1, 16), stride = trial % 2 == 0 && n <= 8 ? 8 : 16;
+    Eigen::MatrixXd root(n, n), P = Eigen::MatrixXd::Zero(n, n);
+    for (double& entry : root.reshaped()) entry = random.uniform(-1.0, 1.0);
+    P = root * root.transpose() + 0.1 * Eigen::MatrixXd::Identity(n, n);
+    // What rows have beyond the matrix is not theirs.
+    AlignedDoubles matrix(static_cast<std::size_t>(n) * stride, 7.0), inverse(matrix.size(), 0.0), p(stride, 3.0),
+        x(stride, 0.0), batch(static_cast<std::size_t>(n) * response_batch);
+    for (int r = 0; r < n; ++r)
+      for (int c = 0; c < n; ++c) matrix[r * stride + c] = P(r, c);
+    Eigen::VectorXd right(n);
+    for (int j = 0; j < n; ++j) p[j] = right[j] = random.uniform(-1.0, 1.0);
+    for (double& entry : batch) entry = random.uniform(-1.0, 1.0);
+    const Eigen::MatrixXd expected = P.inverse();
+    const Eigen::VectorXd solution = -P.ldlt().solve(right);
+    for (const KernelSet& set : runnable_kernels()) {
+      ASSERT_TRUE(set.riccati->invert(matrix.data(), n, stride, 1e-11, inverse.data())) << set.instruction_set;
+      for (int r = 0; r < n; ++r)
+        for (int c = 0; c < n; ++c)
+          EXPECT_NEAR(inverse[r * stride + c], expected(r, c), 1e-9 * expected.norm()) << set.instruction_set;
+      set.riccati->solve(matrix.data(), inverse.data(), n, stride, p.data(), x.data());
+      for (int j = 0; j < n; ++j) EXPECT_NEAR(x[j], solution[j], 1e-11 * (1.0 + solution.norm()));
+      AlignedDoubles answers = batch;
+      set.riccati->answer(inverse.data(), n, stride, answers.data());
+      for (int r = 0; r < n; ++r) {
+        for (int k = 0; k < response_batch; ++k) {
+          double sum = 0.0;
+          for (int c = 0; c < n; ++c) sum -= inverse[r * stride + c] * batch[c * response_batch + k];
+          EXPECT_NEAR(answers[r * response_batch + k], sum, 1e-11 * (1.0 + expected.norm())) << set.instruction_set;
+        }
+      }
+      // Not positive definite, or hardly so.
+      AlignedDoubles bad = matrix;
+      bad[0] = -1.0;
+      EXPECT_FALSE(set.riccati->invert(bad.data(), n, stride, 1e-11, inverse.data())) << set.instruction_set;
+      bad[0] = std::nan("");
+      EXPECT_FALSE(set.riccati->invert(bad.data(), n, stride, 1e-11, inverse.data())) << set.instruction_set;
+    }
+  }
+}
+
+TEST(Kernels, AdoptWhatBoundsAllowAndMatchRows) {
+  RandomQp random(14);
+  for (int trial = 0; trial < 100; ++trial) {
+    const int rows = random.integer(1, 7), vehicle = random.integer(1, 6), states = vehicle + random.integer(0, 3),
+              used = states + random.integer(0, 4), stride = padded(used + random.integer(0, 3));
+    const std::size_t count = static_cast<std::size_t>(rows) * stride;
+    AlignedDoubles values(count), multipliers(count), lower(count), upper(count), to(count), to_multipliers(count);
+    for (std::size_t k = 0; k < count; ++k) {
+      values[k] = random.uniform(-2.0, 2.0);
+      multipliers[k] = random.integer(0, 1) * random.uniform(-1.0, 1.0);
+      lower[k] = random.integer(0, 1) == 0 ? -infinity : random.uniform(-1.5, -0.2);
+      upper[k] = random.integer(0, 1) == 0 ? infinity : random.uniform(0.2, 1.5);
+    }
+    const GuessView from{rows,         stride,      vehicle, states, used, values.data(), multipliers.data(),
+                         lower.data(), upper.data()};
+    AlignedDoubles other = values;
+    const int changed = random.integer(0, rows - 1), changed_column = random.integer(0, stride - 1);
+    other[static_cast<std::size_t>(changed) * stride + changed_column] += 1e-9;
+    for (const KernelSet& set : runnable_kernels()) {
+      set.program->adopt(from, to.data(), to_multipliers.data());
+      for (std::size_t k = 0; k < count; ++k) {
+        const int column = static_cast<int>(k % stride);
+        const bool is_used = column < used, is_control = is_used && column >= states;
+        const bool has_bound = std::isfinite(multipliers[k] > 0.0 ? upper[k] : lower[k]);
+        const bool is_carried = column >= vehicle && column < states;
+        const double clipped = std::min(std::max(values[k], lower[k]), upper[k]);
+        EXPECT_EQ(to[k], is_control ? clipped : is_used ? values[k] : 0.0) << set.instruction_set << ", " << column;
+        EXPECT_EQ(to_multipliers[k], is_used && !is_carried && has_bound ? multipliers[k] : 0.0) << set.instruction_set;
+      }
+      std::vector<unsigned char> marks(rows, 9);
+      set.program->match(values.data(), other.data(), rows, stride, states, marks.data());
+      for (int i = 0; i < rows; ++i)
+        EXPECT_EQ(marks[i], i != changed ? 2 : changed_column < states ? 0 : 1) << set.instruction_set;
     }
   }
 }

@@ -540,7 +540,7 @@ double covariance_deviation(Solver& solver, const HorizonProblem& problem, const
   const int ns = problem.capacity().states, N = problem.intervals();
   const auto size = (static_cast<std::size_t>(N) + 1) * ns * ns;
   std::vector<double> blocks(size), reference(size), last(static_cast<std::size_t>(ns) * ns);
-  if (!solver.covariances(problem, point, blocks)) return infinity;
+  if (!solver.covariances(problem, point, all_stages(problem), blocks)) return infinity;
   StageQp qp(problem.capacity());
   std::vector<double> scratch(problem.scratch_size());
   problem.linearise(all_stages(problem), point, Hessian::gauss_newton, qp, scratch);
@@ -594,15 +594,15 @@ TEST(SparseSqp, CovariancesOfAGivenStateAreZero) {
   ASSERT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved);
   const int ns = problem->capacity().states;
   std::vector<double> blocks(static_cast<std::size_t>(problem->intervals() + 1) * ns * ns, -1.0);
-  ASSERT_TRUE(solver->covariances(*problem, point, blocks));
+  ASSERT_TRUE(solver->covariances(*problem, point, all_stages(*problem), blocks));
   for (int k = 0; k < ns * ns; ++k) EXPECT_EQ(blocks[k], 0.0);
   EXPECT_GT(blocks[ns * ns], 0.0);
   // Room that is too small, and a point that is none, are refused, and nothing is written.
   std::vector<double> small(blocks.size() - 1, -1.0);
-  EXPECT_FALSE(solver->covariances(*problem, point, small));
+  EXPECT_FALSE(solver->covariances(*problem, point, all_stages(*problem), small));
   point.state(2)[0] = std::nan("");
   std::vector<double> untouched(blocks.size(), -1.0);
-  EXPECT_FALSE(solver->covariances(*problem, point, untouched));
+  EXPECT_FALSE(solver->covariances(*problem, point, all_stages(*problem), untouched));
   EXPECT_THAT(untouched, ::testing::Each(-1.0));
 }
 

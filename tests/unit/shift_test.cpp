@@ -258,7 +258,7 @@ RhcProblem controller(std::vector<int> blocked) {
 }
 
 TEST(Shift, MovesAControllersPlan) {
-  const RhcProblem problem = controller({});
+  RhcProblem problem = controller({});
   const Iterate old = point_of(problem);
   GuessShifter shifter(problem);
   shifter.take(problem, old);
@@ -285,7 +285,7 @@ TEST(Shift, ClipsToBoundsThatHaveMoved) {
 }
 
 TEST(Shift, MovesBlockedInputsThroughBordersThatStay) {
-  const RhcProblem problem = controller({0});
+  RhcProblem problem = controller({0});
   const Iterate old = point_of(problem);
   GuessShifter shifter(problem);
   shifter.take(problem, old);
@@ -299,7 +299,7 @@ TEST(Shift, MovesBlockedInputsThroughBordersThatStay) {
 }
 
 TEST(Shift, SaysWhenNothingIsLeft) {
-  const RhcProblem problem = controller({});
+  RhcProblem problem = controller({});
   GuessShifter shifter(problem);
   Iterate guess(problem.capacity());
   guess.state(0)[0] = 7.0;

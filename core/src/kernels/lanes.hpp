@@ -75,9 +75,15 @@ inline double sum_of(const Lanes& lanes) {
 }
 
 inline double largest_of(const Lanes& lanes) {
-  double result = lanes[0];
-  for (int k = 1; k < lane_count; ++k) result = lanes[k] > result ? lanes[k] : result;
-  return result;
+#if defined(__AVX512F__)
+  const Lanes fours = larger(lanes, __builtin_shufflevector(lanes, lanes, 4, 5, 6, 7, 0, 1, 2, 3));
+  const Lanes twos = larger(fours, __builtin_shufflevector(fours, fours, 2, 3, 0, 1, 6, 7, 4, 5));
+#elif defined(__AVX2__)
+  const Lanes twos = larger(lanes, __builtin_shufflevector(lanes, lanes, 2, 3, 0, 1));
+#else
+  const Lanes& twos = lanes;
+#endif
+  return twos[1] > twos[0] ? twos[1] : twos[0];
 }
 
 /// A row, or a part of one, in registers.
@@ -115,6 +121,14 @@ struct Row {
   void add(const Row& other, double factor) { add(other, all(factor)); }
   void add(const Row& other) {
     for (int v = 0; v < registers; ++v) part[v] += other.part[v];
+  }
+  /// With another entry.
+  Row with(int k, double value) const {
+    Row row = *this;
+    const LaneMask is_it = lane_numbers == static_cast<long long>(k % lane_count);
+    Lanes& changed = row.part[k / lane_count];
+    changed = is_it ? all(value) : changed;
+    return row;
   }
   Row first(int count) const {
     Row row;

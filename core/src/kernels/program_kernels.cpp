@@ -13,21 +13,26 @@ inline int parts_of(const ProgramView& view, int stage) {
   return (view.states + controls + lane_count - 1) / lane_count;
 }
 
-KktParts kkt(const ProgramView& view) {
+/// Of a row, in parts of which a known number is used, or as many as it takes; the same for the rows of F.
+template <int known_parts, int known_states>
+KktParts kkt_of(const ProgramView& view) {
   const long stride = view.stride;
-  const int state_parts = (view.states + lane_count - 1) / lane_count;
+  const int state_parts = known_parts > 0 ? known_parts : (view.states + lane_count - 1) / lane_count;
   Lanes stationarity{}, defect{}, violation{}, complementarity{}, term{},
       rest{};  // rest stays 0 as long as all is finite
   for (int i = 0; i <= view.intervals; ++i) {
     const double* row_F = view.F + i * view.states * stride;
     const double* next_costate = view.costates + (i + 1) * stride;
-    const int next_states = i < view.intervals ? view.state_counts[i + 1] : 0, parts = parts_of(view, i);
-    const int used = view.states + (i < view.intervals ? view.control_counts[i] : 0);
+    const bool is_last = i == view.intervals;
+    const int next_states = is_last ? 0 : known_states > 0 ? known_states : view.state_counts[i + 1];
+    const int parts = known_parts > 0 ? known_parts : parts_of(view, i);
+    const int used = view.states + (is_last ? 0 : view.control_counts[i]);
     for (int v = 0; v < parts; ++v) {
       const long at = i * stride + v * lane_count;
       const Lanes gradient = load(view.h + at), bound = first_of(load(view.bounds + at), v, used);
-      Lanes sum = gradient + bound;
-      for (int l = 0; l < next_states; ++l) sum += load(row_F + l * stride + v * lane_count) * next_costate[l];
+      Lanes sums[2] = {gradient + bound, Lanes{}};
+      for (int l = 0; l < next_states; ++l) sums[l % 2] += load(row_F + l * stride + v * lane_count) * next_costate[l];
+      Lanes sum = sums[0] + sums[1];
       if (v < state_parts) {
         const Lanes costate = first_of(load(view.costates + at), v, view.states);
         sum -= costate;
@@ -44,7 +49,7 @@ KktParts kkt(const ProgramView& view) {
       const Lanes pull = absolute(bound);
       complementarity = larger(complementarity, pull > 0.0 ? pull * smaller(all(1.0), gap) : Lanes{});
     }
-    if (i == view.intervals) break;
+    if (is_last) break;
     for (int v = 0; v < state_parts; ++v) {
       const Lanes b = load(view.b + i * stride + v * lane_count);
       defect = larger(defect, absolute(b));
@@ -53,6 +58,12 @@ KktParts kkt(const ProgramView& view) {
   }
   return {largest_of(stationarity) + sum_of(rest), largest_of(defect), largest_of(violation),
           largest_of(complementarity), largest_of(term)};
+}
+
+KktParts kkt(const ProgramView& view) {
+  bool is_full = view.states == 6 && view.stride == lane_count;
+  for (int i = 0; is_full && i <= view.intervals; ++i) is_full = view.state_counts[i] == 6;
+  return is_full ? kkt_of<1, 6>(view) : kkt_of<0, 0>(view);
 }
 
 StepParts check_step(const ProgramView& view, double tolerance) {
@@ -112,6 +123,37 @@ bool mark_bounds(const ProgramView& view, double tolerance, unsigned char* marks
 
 void subtract(const double* a, const double* b, double* out, long count) {
   for (long k = 0; k < count; k += lane_count) store(load(a + k) - load(b + k), out + k);
+}
+
+void adopt(const GuessView& from, double* values, double* multipliers) {
+  constexpr double largest = 1.7976931348623157e308;
+  for (int v = 0; v < from.stride; v += lane_count) {
+    const auto before = [v](int column) -> LaneMask { return lane_numbers < static_cast<long long>(column - v); };
+    const LaneMask is_used = before(from.used), is_state = before(from.states),
+                   is_vehicle = before(from.vehicle_states);
+    for (int i = 0; i < from.rows; ++i) {
+      const long at = static_cast<long>(i) * from.stride + v;
+      const Lanes value = load(from.values + at), lower = load(from.lower + at), upper = load(from.upper + at);
+      const Lanes clipped = smaller(larger(value, lower), upper), multiplier = load(from.multipliers + at);
+      const Lanes limit = absolute(multiplier > 0.0 ? upper : lower);
+      const Lanes kept = limit <= largest ? multiplier : Lanes{};
+      const Lanes of_used = is_used ? kept : Lanes{};
+      store(is_used ? (is_state ? value : clipped) : Lanes{}, values + at);
+      store(is_state ? (is_vehicle ? kept : Lanes{}) : of_used, multipliers + at);
+    }
+  }
+}
+
+void match(const double* a, const double* b, int count, int stride, int columns, unsigned char* marks) {
+  for (int i = 0; i < count; ++i) {
+    Lanes first{}, differs{};
+    for (int k = 0; k < stride; k += lane_count, a += lane_count, b += lane_count) {
+      const Lanes of_part = load(a) == load(b) ? Lanes{} : all(1.0);
+      first += first_of(of_part, 0, columns - k);
+      differs += of_part;
+    }
+    marks[i] = sum_of(first) != 0.0 ? 0 : sum_of(differs) != 0.0 ? 1 : 2;
+  }
 }
 
 void add(const double* from, const double* step, double* to, long count) {
@@ -184,9 +226,11 @@ void complete_dynamics(const DynamicsView& view) {
     }
     for (int c = 0; c < view.channels; ++c) {
       const int row = view.vehicle_states + c, control = control_of[c];
-      double* F_row = F + row * stride;
-      for (int k = 0; k < view.stride; k += lane_count) store(Lanes{}, F_row + k);
-      F_row[control >= 0 ? view.states + control : row] = 1.0;
+      if (!view.has_channel_rows) {
+        double* F_row = F + row * stride;
+        for (int k = 0; k < view.stride; k += lane_count) store(Lanes{}, F_row + k);
+        F_row[control >= 0 ? view.states + control : row] = 1.0;
+      }
       if (control >= 0) b[row] = z[view.states + control] - next[row];
     }
   }
@@ -314,9 +358,17 @@ double write_measurements(const CostView& view, const MeasurementView& measured,
 #define RHEC_JOIN(a, b) a##b
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET);
-constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {
-    &kernels::kkt,         &kernels::check_step,        &kernels::mark_bounds,    &kernels::subtract,
-    &kernels::add,         &kernels::add_products,      &kernels::write_tracking, &kernels::complete_dynamics,
-    &kernels::clear_costs, &kernels::write_measurements};
+constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {&kernels::kkt,
+                                                                         &kernels::check_step,
+                                                                         &kernels::mark_bounds,
+                                                                         &kernels::subtract,
+                                                                         &kernels::match,
+                                                                         &kernels::adopt,
+                                                                         &kernels::add,
+                                                                         &kernels::add_products,
+                                                                         &kernels::write_tracking,
+                                                                         &kernels::complete_dynamics,
+                                                                         &kernels::clear_costs,
+                                                                         &kernels::write_measurements};
 
 }  // namespace rhec

@@ -33,6 +33,7 @@ struct DynamicsView {
   const int* control_of;         ///< of each interval's channels: the control that starts it, or -1
   const double* values;          ///< rows of the point
   double *F, *b;
+  bool has_channel_rows;  ///< those of carried channels are there already
 };
 
 /// Where costs go: their matrices, their vectors, or both. What is not wanted is null.
@@ -60,6 +61,13 @@ struct TrackingView {
   const double *stage_weights, *terminal_weights, *turns, *inverse_turns;  ///< one row each
 };
 
+/// Rows of a point, their bounds and multipliers.
+struct GuessView {
+  int rows, stride;
+  int vehicle_states, states, used;  ///< columns: those of the vehicle, those of a state, those that are kept
+  const double *values, *multipliers, *lower, *upper;
+};
+
 /// Inner loops over whole horizons.
 struct ProgramKernels {
   KktParts (*kkt)(const ProgramView& view);
@@ -69,6 +77,12 @@ struct ProgramKernels {
   bool (*mark_bounds)(const ProgramView& view, double tolerance, unsigned char* marks);
   /// out = a - b.
   void (*subtract)(const double* a, const double* b, double* out, long count);
+  /// Marks rows of a and b, `count` of them and `stride` long: 2 where they are equal, 1 where their first `columns`
+  /// entries are, 0 otherwise.
+  void (*match)(const double* a, const double* b, int count, int stride, int columns, unsigned char* marks);
+  /// Copies rows: of controls what their bounds allow, of multipliers those whose bound there is; of carried channels
+  /// no multiplier, and nothing of columns that are not used.
+  void (*adopt)(const GuessView& from, double* values, double* multipliers);
   /// to = from + step.
   void (*add)(const double* from, const double* step, double* to, long count);
   /// H += sum_j weights_j J_j J_j' over its first `columns` columns and h += sum_j pulls_j J_j (null: not), with the

@@ -18,6 +18,7 @@ RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants
 template <int eights, int state_count, int control_count, bool is_written_out = true>
 struct Shape {
   static constexpr bool is_known = state_count > 0;
+  static constexpr bool has_pair = is_known && control_count == 2;
   static constexpr int most_columns = eights * 8;
   static constexpr int registers = most_columns / lane_count;
   static constexpr int most_states = is_known ? state_count : (most_columns < 32 ? most_columns : 32);
@@ -31,6 +32,10 @@ struct Shape {
         next_states(is_known ? state_count : view.state_counts[i + 1]),
         offset(is_known ? state_count : view.states),
         columns(offset + (is_known ? control_count : view.control_counts[i])) {}
+
+  /// Of so many states, and nothing else.
+  explicit Shape(int count)
+      : states(is_known ? state_count : count), next_states(states), offset(states), columns(states) {}
 
   template <class Function>
   RHEC_ALWAYS_INLINE void each_state(const Function& function) const {
@@ -151,6 +156,13 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
     stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
       if (at.sides[k] != 0) X[k].to(at.U + (k - stage.offset) * at.stride);
     });
+  // Of two controls, both reciprocals can be taken at once: 1 / (a - b b / c) = c / (a c - b b).
+  double determinant_inverse = 0.0;
+  if constexpr (Stage::has_pair) {
+    constexpr int first = Stage::most_states, second = first + 1;
+    const double b = X[second].entry(first), c = X[second].entry(second);
+    determinant_inverse = c / (X[first].entry(first) * c - b * b);
+  }
   stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
     const int control = k - stage.offset;
     if (any_fixed && at.sides[k] != 0) {
@@ -160,7 +172,7 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
     }
     const double pivot = X[k].entry(k);
     is_definite = is_definite && pivot > tolerance * diagonal[k] && pivot > 0.0;
-    const double reciprocal = 1.0 / pivot;
+    const double reciprocal = Stage::has_pair && !any_fixed && control == 0 ? determinant_inverse : 1.0 / pivot;
     R row = X[k].first(k);
     if (any_fixed)
       stage.each_control_before(k, [&](auto f) RHEC_ALWAYS_INLINE {
@@ -610,14 +622,102 @@ void form(const RiccatiView& view, int i, double* out) {
   });
 }
 
+template <class Stage>
+RHEC_ALWAYS_INLINE inline bool invert_rows(const Stage& stage, const double* matrix, long stride, double tolerance,
+                                           double* inverse) {
+  using R = typename Stage::R;
+  R rows[Stage::most_states];
+  double least[Stage::most_states];
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE {
+    rows[j] = R::from(matrix + j * stride).first(stage.states);
+    least[j] = tolerance * rows[j].entry(j);
+  });
+  bool is_definite = true;
+  stage.each_state([&](auto k) RHEC_ALWAYS_INLINE {
+    const double pivot = rows[k].entry(k);
+    is_definite = is_definite && pivot > least[k] && pivot > 0.0;
+    R scaled{};
+    scaled.add(rows[k].with(k, 1.0), 1.0 / pivot);
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE {
+      if (j == k) return;
+      const double factor = rows[j].entry(k);
+      rows[j] = rows[j].with(k, 0.0);
+      rows[j].add(scaled, -factor);
+    });
+    rows[k] = scaled;
+  });
+  if (!is_definite) return false;
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { rows[j].to(inverse + j * stride); });
+  return true;
+}
+
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void solve_rows(const Stage& stage, const double* matrix, const double* inverse, long stride,
+                                          const double* p, double* x) {
+  using R = typename Stage::R;
+  const auto product = [&](const double* rows, const R& factors, R start) RHEC_ALWAYS_INLINE {
+    R sums[2] = {start, R{}};
+    stage.each_state([&](auto j)
+                         RHEC_ALWAYS_INLINE { sums[j % R::chains].add(R::from(rows + j * stride), factors.splat(j)); });
+    if (R::chains > 1) sums[0].add(sums[1]);
+    return sums[0];
+  };
+  const R right = R::from(p).first(stage.states), first = product(inverse, right, R{});
+  R rest{};  // matrix x + p = p - matrix first
+  rest.add(product(matrix, first, R{}), -1.0);
+  rest.add(right);
+  R solution{};
+  solution.add(product(inverse, rest, first), -1.0);
+  solution.first(stage.states).to(x);
+}
+
+/// Calls `function` with a shape of `count` states, however long their rows are; false where those are too many.
+template <class Function>
+inline bool with_states(int count, const Function& function) {
+  if (count == 6) return function.template operator()<Shape<1, 6, 0>>();
+  if (count <= 8) return function.template operator()<Shape<1, 0, 0>>();
+  if (count <= 16) return function.template operator()<Shape<2, 0, 0>>();
+  return false;
+}
+
+bool invert(const double* matrix, int count, int stride, double tolerance, double* inverse) {
+  return with_states(count,
+                     [&]<class Stage>() { return invert_rows(Stage(count), matrix, stride, tolerance, inverse); });
+}
+
+void answer(const double* inverse, int count, int stride, double* batch) {
+  Batch gradients[32];
+  for (int j = 0; j < count; ++j) gradients[j] = Batch::from(batch + j * response_batch);
+  for (int j = 0; j < count; ++j) {
+    Batch sum{};
+    for (int k = 0; k < count; ++k) sum.add(gradients[k], -inverse[j * stride + k]);
+    sum.to(batch + j * response_batch);
+  }
+}
+
+void solve(const double* matrix, const double* inverse, int count, int stride, const double* p, double* x) {
+  with_states(count, [&]<class Stage>() {
+    solve_rows(Stage(count), matrix, inverse, stride, p, x);
+    return true;
+  });
+}
+
 }  // namespace
 }  // namespace kernels
 
 #define RHEC_JOIN(a, b) a##b
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET);
-constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {
-    &kernels::factor,          &kernels::solve_backward, &kernels::solve_forward,    &kernels::respond_backward,
-    &kernels::respond_forward, &kernels::combine,        &kernels::carry_covariance, &kernels::form};
+constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {&kernels::factor,
+                                                                         &kernels::solve_backward,
+                                                                         &kernels::solve_forward,
+                                                                         &kernels::respond_backward,
+                                                                         &kernels::respond_forward,
+                                                                         &kernels::combine,
+                                                                         &kernels::carry_covariance,
+                                                                         &kernels::form,
+                                                                         &kernels::invert,
+                                                                         &kernels::answer,
+                                                                         &kernels::solve};
 
 }  // namespace rhec

@@ -57,6 +57,13 @@ struct RiccatiKernels {
   int (*carry_covariance)(const RiccatiView& view, int first, double* covariance, double* all);
   /// H + F'PF of one stage, as rows of `out`.
   void (*form)(const RiccatiView& view, int stage, double* out);
+  /// The inverse of a symmetric matrix; both are `count` rows of `stride` entries. False where the matrix is not
+  /// positive definite (as in `factor`) or has more than sixteen rows.
+  bool (*invert)(const double* matrix, int count, int stride, double tolerance, double* inverse);
+  /// batch := -inverse batch, of `count` rows of responses.
+  void (*answer)(const double* inverse, int count, int stride, double* batch);
+  /// The solution x of matrix x = -p, by that inverse and one correction.
+  void (*solve)(const double* matrix, const double* inverse, int count, int stride, const double* p, double* x);
 };
 
 }  // namespace rhec

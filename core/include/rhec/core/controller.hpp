@@ -45,9 +45,9 @@ class RHEC_EXPORT Controller {
   struct Command {
     std::vector<double> inputs;  ///< u_k, n_u: to be applied until the next call
     PathPoint reference;         ///< the closest point of the path
-    Report report;
-    bool fallback = false;  ///< the solver failed: this is the last plan's
-    bool softened = false;  ///< a state bound was out of the estimate's reach and was moved
+    Report report;               ///< its objective and KKT residual need not be there before `prepare`
+    bool fallback = false;       ///< the solver failed: this is the last plan's
+    bool softened = false;       ///< a state bound was out of the estimate's reach and was moved
   };
   /// The input for an estimate. Valid until the next call.
   const Command& control(const Estimate& estimate, Clock::time_point deadline = Clock::time_point::max()) noexcept;
@@ -69,6 +69,7 @@ class RHEC_EXPORT Controller {
   void bound_speed(double most) noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
   void start_cold() noexcept;
+  void finish_sample() noexcept;
 
   Setup setup_;
   Path path_;
@@ -79,6 +80,7 @@ class RHEC_EXPORT Controller {
   Iterate point_;
   Command command_;
   bool has_plan_ = false, prepared_ = false;
+  bool is_finished_ = true;  ///< the last sample's plan was judged and is kept for the next one
   double bounded_speed_ = std::numeric_limits<double>::quiet_NaN();  ///< that the inputs' bounds are made for [m/s]
   int reference_segment_ = 0;                                        ///< of the path, where the last reference began
   std::int64_t fallbacks_ = 0;

@@ -11,6 +11,13 @@
 namespace rhec {
 
 struct CostView;
+struct Recollection;
+
+/// Row `i` of rows of equal width.
+template <class Vector>
+auto row(Vector& v, int i, int width) noexcept {
+  return v.data() + static_cast<std::ptrdiff_t>(i) * width;
+}
 
 /// What the two kinds of problem share: a model over a horizon, with channels (parameters or blocked inputs) whose
 /// values are carried from stage to stage.
@@ -36,10 +43,14 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   std::size_t scratch_size() const noexcept override;
   void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
+  void remember_in(StageQp& qp) const override;
 
   double evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
                          std::span<double> scratch) const noexcept override;
   void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept override;
+  /// The same as `simulate_interval`; with the derivatives, which are kept, so that `prepare` at such a point need not
+  /// ask the model again.
+  void foresee_interval(int interval, Iterate& point) noexcept;
   double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                    std::span<double> scratch) const noexcept override;
   void prepare(const Iterate& point, Hessian hessian, StageQp& qp, std::span<double> scratch) const noexcept override;
@@ -51,6 +62,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
 
   /// True where a block of carried channel `channel` starts at an interval.
   bool begins(int interval, int channel) const noexcept { return begins_[interval * channels_ + channel] != 0; }
+  /// A block of a carried channel starts somewhere within the horizon.
+  bool any_start() const noexcept { return any_start_; }
   int channel_count() const noexcept { return channels_; }
   /// Index in w_i of a channel that starts at interval i, or -1.
   int control_of_channel(int interval, int channel) const noexcept {
@@ -82,20 +95,19 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   int nu() const noexcept { return nu_; }
   int np() const noexcept { return np_; }
   int stride() const noexcept { return stride_; }
-  template <class Doubles>
-  static const double* row(const Doubles& v, int i, int width) noexcept {
-    return v.data() + static_cast<std::ptrdiff_t>(i) * width;
-  }
-  template <class Doubles>
-  static double* row(Doubles& v, int i, int width) noexcept {
-    return v.data() + static_cast<std::ptrdiff_t>(i) * width;
-  }
 
-  void set_intervals(int intervals) noexcept { intervals_ = intervals; }
-  void set_begins(int interval, int channel, bool begins) noexcept { begins_[interval * channels_ + channel] = begins; }
+  void set_intervals(int intervals) noexcept {
+    is_finished_ &= intervals_ == intervals;
+    intervals_ = intervals;
+  }
+  void set_begins(int interval, int channel, bool begins) noexcept {
+    std::uint8_t& before = begins_[interval * channels_ + channel];
+    is_finished_ &= (before != 0) == begins;
+    before = begins;
+  }
   void set_ramp(int channel, bool ramp) noexcept;
-  /// Counts the controls of every interval; call it after the structure has changed.
-  void finish_structure() noexcept;
+  /// Counts the controls of every interval; call it after the structure may have changed. False where it has not.
+  bool finish_structure() noexcept;
   /// Carried channel of an input, or -1 where it is free on every interval.
   int channel_of_input(int input) const noexcept { return input_channel_[input]; }
   int control_of_input(int interval, int input) const noexcept;
@@ -111,8 +123,6 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   void clear_bounds() noexcept;
   /// Where an input is found in z of an interval: free, or that of its channel.
   int column_of_input(int interval, int input) const noexcept;
-  /// A block starts somewhere within the horizon.
-  bool any_start() const noexcept { return any_start_; }
   /// No input is carried: z begins as the vehicle's [x; p; u].
   bool is_direct() const noexcept { return static_cast<int>(free_inputs_.size()) == nu_; }
 
@@ -123,14 +133,32 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   virtual double add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                           std::span<double> scratch) const noexcept = 0;
   virtual std::size_t cost_scratch_size() const noexcept = 0;
+  /// What was remembered in a program of this model's; null where nothing can be.
+  Recollection* recollection_in(StageQp& qp) const noexcept;
 
  private:
   void gather(const Iterate& point, StageRange range, double* x, double* u, double* p, double* p_end) const noexcept;
   void gather_rows(const Iterate& point, StageRange range, double* rows) const noexcept;
   void fill_stages(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                    std::span<double> scratch) const noexcept;
-  void linearise_dynamics(StageRange steps, const Iterate& point, Hessian hessian, StageQp& qp,
+  bool has_structure(const StageQp& qp, const Recollection& known) const noexcept;
+  void remember(const Iterate& point, const StageQp& qp, Recollection& known) const noexcept;
+  bool move_along(const Iterate& point, Hessian hessian, StageQp& qp, Recollection& known,
+                  std::span<double> scratch) const noexcept;
+  void fill_sizes(StageRange range, StageQp& qp) const noexcept;
+  /// What is special about a call of `linearise_dynamics`.
+  struct Dynamics {
+    Hessian hessian = Hessian::gauss_newton;
+    bool has_channel_rows = false;  ///< F has those of carried channels already
+    Recollection* ahead = nullptr;  ///< the point is this one's, and one more interval is wanted
+  };
+  void linearise_dynamics(StageRange steps, const Iterate& point, const Dynamics& how, StageQp& qp,
                           std::span<double> scratch) const noexcept;
+  void complete_dynamics(StageRange steps, const Iterate& point, bool has_channel_rows, StageQp& qp) const noexcept;
+  void look_ahead(Recollection& known) const noexcept;
+  bool has_foreseen(int interval, const Iterate& point, double* row) const noexcept;
+  void take_foreseen(int interval, const Iterate& point, StageQp& qp) const noexcept;
+  void carry_channels(int interval, Iterate& point) const noexcept;
   void place_started_channels(int interval, Hessian hessian, StageQp& qp) const noexcept;
   void scatter(int interval, const double* jacobian, const double* hessian, StageQp& qp) const noexcept;
   void fill_bounds(const Iterate& point, StageRange range, StageQp& qp) const noexcept;
@@ -139,12 +167,19 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   Capacity capacity_;
   int nx_, nu_, np_, channels_, substeps_, stride_ = 0, row_ = 0, intervals_ = 0;
   bool any_ramp_ = false;
-  bool any_start_ = false;  ///< of a channel, on any interval
+  bool any_start_ = false;    ///< of a channel, on any interval
+  bool is_finished_ = false;  ///< nothing of the structure has changed since `finish_structure`
   AlignedDoubles lower_, upper_;
   std::vector<int> input_channel_, free_inputs_;
   std::vector<double> durations_;
   std::vector<std::uint8_t> begins_, ramp_;
   std::vector<int> control_index_, control_counts_;
+  /// One interval that the model was asked about.
+  struct Foreseen {
+    double duration = 0.0;                      ///< 0: none
+    AlignedDoubles z, next, jacobian, scratch;  ///< rows as Model::integrate_rows has them
+  };
+  Foreseen foreseen_;
 };
 
 }  // namespace rhec

@@ -71,10 +71,18 @@ class RHEC_EXPORT Ocp {
     for (int i = 0; i < intervals(); ++i) simulate_interval(i, point, scratch);
   }
 
+  /// Lends a program memory of how it is made: from then on linearising its whole horizon, `prepare` and `refresh` do
+  /// not evaluate again what was evaluated at the same rows of a point before, were it some stages later. Allocates;
+  /// by default nothing is remembered.
+  virtual void remember_in(StageQp& qp) const;
+
   /// Fills the stages of a range of the quadratic program at a point: sizes, dynamics, costs and bounds. Returns the
   /// objective's part of these stages.
   virtual double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                            std::span<double> scratch) const noexcept = 0;
+
+  /// Whether `prepare` can make use of the exact Hessian of a linearisation that it finds in a program's memory.
+  virtual bool keeps_curvature() const noexcept { return false; }
 
   /// As much of `linearise` over the whole horizon as is worth doing while data are still to come; `refresh` does the
   /// rest. F, b, H, the sizes and bounds are there afterwards.

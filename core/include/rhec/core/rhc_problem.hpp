@@ -53,6 +53,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   int finish(std::span<double> scratch) noexcept;
 
   OcpKind kind() const noexcept override { return OcpKind::rhc; }
+  bool keeps_curvature() const noexcept override { return is_direct() && !any_start(); }
   const double* initial_state() const noexcept override { return initial_.data(); }
 
  private:
@@ -61,10 +62,13 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
                   std::span<double> scratch) const noexcept override;
   std::size_t cost_scratch_size() const noexcept override;
   double write_costs(StageRange range, const Iterate& point, const CostView& view) const noexcept;
+  void write_state_bounds() noexcept;
+  void write_input_bounds() noexcept;
   int soften_unreachable_bounds(std::span<double> scratch) noexcept;
 
   Setup setup_;
   std::vector<double> initial_, input_lower_, input_upper_;
+  int moved_bounds_ = 0;      ///< of states, by the last `finish`
   AlignedDoubles reference_;  ///< of [x; p; u], a row a stage
   AlignedDoubles stage_weights_, terminal_weights_, turns_,
       inverse_turns_;  ///< rows of [x; p; u]; a full turn where it is an angle

@@ -73,6 +73,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void robust_weights(const Iterate& point, int node, double* weights, std::span<double> scratch) const noexcept;
 
   OcpKind kind() const noexcept override { return OcpKind::rhe; }
+  void remember_in(StageQp& qp) const override;
   const double* initial_state() const noexcept override { return nullptr; }
 
  private:
@@ -83,8 +84,13 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
 
   void residual(int node, const double* predicted, double* difference) const noexcept;
   double losses(const double* difference, double* weight, double* curvature) const noexcept;
+  struct Observed {
+    const double *outputs, *jacobians;  ///< rows of a range's nodes
+  };
+  Observed observe(StageRange range, const Iterate& point, Recollection* known, double* outputs, double* jacobians,
+                   double* room) const noexcept;
   double write_measurements(StageRange range, const Iterate& point, Hessian hessian, const CostView& view,
-                            std::span<double> scratch) const noexcept;
+                            Recollection* known, std::span<double> scratch) const noexcept;
   double write_bent_measurements(StageRange range, const Iterate& point, Hessian hessian, const CostView& view,
                                  const double* predicted, const double* jacobians, double* memory) const noexcept;
   double inputs(int interval, const Iterate& point, double* H, double* h) const noexcept;

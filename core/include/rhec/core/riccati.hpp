@@ -145,8 +145,10 @@ class RHEC_EXPORT Riccati {
   Capacity capacity_;
   int ns_ = 0, nw_ = 0, stride_ = 0, width_ = 0, max_rows_ = 0;
   bool convexified_ = false;
+  bool has_initial_inverse_ = false;  ///< of P at node 0; otherwise it was factorised as a special stage
   const RiccatiKernels* kernels_ = nullptr;
   AlignedDoubles P_, U_, V_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
+  AlignedDoubles initial_inverse_;
   std::vector<int> state_counts_, control_counts_;
   std::vector<std::uint8_t> is_special_, fixes_control_;  // N stages
   std::vector<Reduction> reductions_;                     // N stages, then node 0

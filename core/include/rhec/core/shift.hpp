@@ -30,23 +30,26 @@ class RHEC_EXPORT GuessShifter {
   /// clipped to their bounds; parameters as last; states by integration; multipliers of bounds zero. Interval 0 of `to`
   /// is interval `steps` of the kept horizon: 0 while an estimator's horizon grows. False, with the guess left as it
   /// was, where nothing of the kept horizon is left, nothing was kept or `to` is too large: start cold.
-  bool apply(int steps, const HorizonProblem& to, Iterate& guess) noexcept;
+  bool apply(int steps, HorizonProblem& to, Iterate& guess) noexcept;
 
  private:
   /// Of the kept horizon: what a channel's interval contributes to the costates of its block.
   double gradient(int interval, int channel) const noexcept;
   int kept_control(int interval, int channel) const noexcept { return controls_[interval * channels_ + channel]; }
   void move_rows(int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
+  bool is_one_block(int channel, const HorizonProblem& to) const noexcept;
+  void extend_channel(int channel, int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
   void move_channel(int channel, int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
   void move_channel_bounds(int channel, int steps, const HorizonProblem& to, Iterate& guess) noexcept;
-  void add_intervals(int steps, const HorizonProblem& to, Iterate& guess) noexcept;
+  void add_intervals(int steps, HorizonProblem& to, Iterate& guess) noexcept;
 
   int nx_, nu_, channels_, free_count_;
   int intervals_ = 0;           ///< of what is kept; 0: nothing
+  bool any_start_ = false;      ///< of a block within what is kept
   Iterate kept_;                ///< as it was taken
   std::vector<int> controls_;   ///< per interval and channel: the control that starts it there, or -1
   std::vector<double> shares_;  ///< per interval: its share of a block's multiplier
-  std::vector<double> u_, p_;   ///< workspace
+  std::vector<double> scratch_;
 };
 
 }  // namespace rhec

@@ -34,8 +34,8 @@ struct Report {
   bool fallback_used = false;   ///< a robust path had to take over from the fast one
   double objective = 0.0;       ///< at the returned point
   KktResidual kkt;              ///< the core's own judgement of the returned point
-  double preparation_us = 0.0;  ///< time spent in prepare [us]
-  double feedback_us = 0.0;     ///< time spent in solve [us]
+  double preparation_us = 0.0;  ///< time spent in prepare, and before it in finish [us]
+  double feedback_us = 0.0;     ///< time spent in solve, or in feedback [us]
 };
 
 /// Writes what the core says of a point that a solver returns: its objective and its KKT residual. `qp` and `scratch`
@@ -67,10 +67,20 @@ class RHEC_EXPORT Solver {
   virtual Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept = 0;
   Report solve(const Ocp& ocp, Iterate& point) noexcept { return solve(ocp, point, Clock::time_point::max()); }
 
-  /// Marginal covariances of all stage states at a point, from the Hessian there with all bounds ignored, when the
-  /// objective is twice a negative log-likelihood (as RheProblem's is): column-major n_s x n_s blocks of the capacity's
-  /// n_s, one a node. False, with nothing written, where the solver has no such factor or the Hessian has no inverse.
-  virtual bool covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept;
+  /// `solve` in two parts, for a robot that waits: `feedback` returns as soon as the new point is known, with a report
+  /// that need not have an objective and a KKT residual yet; `finish`, to be called next with the same problem and
+  /// point, writes them. Should the point come to nothing there, it becomes what it was, and the status says so. As it
+  /// is, `feedback` does it all.
+  virtual Report feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+    return solve(ocp, point, deadline);
+  }
+  virtual void finish(const Ocp& /*ocp*/, Iterate& /*point*/, Report& /*report*/) noexcept {}
+
+  /// Marginal covariances of the stage states of some nodes at a point, from the Hessian there with all bounds ignored,
+  /// when the objective is twice a negative log-likelihood (as RheProblem's is): column-major n_s x n_s blocks of the
+  /// capacity's n_s, one a node. False, with nothing written, where the solver has no such factor or the Hessian has no
+  /// inverse.
+  virtual bool covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept;
 
   /// Forgets all that was learnt; the next solve gives the same bits as one of a new instance.
   virtual void reset() noexcept = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <any>
 #include <cstddef>
 #include <vector>
 
@@ -46,7 +47,13 @@ class RHEC_EXPORT StageQp {
     state_counts_[node] = states;
     control_counts_[node] = controls;
   }
+  /// Moves F, b and sizes towards the front, and H with them if that is asked for; the last stages keep theirs.
+  void drop_first(int stages, bool with_curvature) noexcept;
   bool initial_state_is_given = false;
+  /// For who writes to F, b or H himself: what is remembered of them is void.
+  void change() noexcept { ++changes_; }
+  unsigned changes() const noexcept { return changes_; }
+  std::any memory;  ///< of how F and b were made, for the Ocp that made them (`Ocp::remember_in`)
 
   // Raw access for kernels: pointers to stage i.
   double* F(int i) noexcept { return at(F_, i, capacity_.states); }
@@ -108,9 +115,11 @@ class RHEC_EXPORT StageQp {
     return {first, count, length, Eigen::OuterStride<>(stride_)};
   }
   void clear(int i) noexcept;
+  void clear_costs(int i) noexcept;
 
   Capacity capacity_;
   int stride_ = 0, wide_ = 0, intervals_ = 0;
+  unsigned changes_ = 0;
   std::vector<int> state_counts_, control_counts_;
   AlignedDoubles F_, H_, h_, b_, lower_, upper_, initial_step_;
 };

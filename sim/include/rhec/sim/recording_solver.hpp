@@ -26,8 +26,8 @@ class RHEC_EXPORT RecordingSolver final : public Solver {
   void prepare(const Ocp& ocp, const Iterate& guess) noexcept override { solver_->prepare(ocp, guess); }
   using Solver::solve;
   Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
-  bool covariances(const Ocp& ocp, const Iterate& point, std::span<double> blocks) noexcept override {
-    return solver_->covariances(ocp, point, blocks);
+  bool covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept override {
+    return solver_->covariances(ocp, point, nodes, blocks);
   }
   void reset() noexcept override { solver_->reset(); }
 

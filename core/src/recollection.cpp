@@ -1,0 +1,180 @@
+// How a program of a moving horizon is made of the one that it was before.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+#include "kernels/kernels.hpp"
+#include "kernels/program_kernels.hpp"
+#include "recollection.hpp"
+#include "rhec/core/horizon_problem.hpp"
+
+namespace rhec {
+
+void Recollection::forget() noexcept {
+  intervals = -1;
+  looks_ahead = has_curvature = false;
+  std::fill(observed.begin(), observed.end(), 0);
+}
+
+void Recollection::move_outputs(int steps) noexcept {
+  if (output_size == 0) return;
+  const int kept = intervals + 1 - steps;
+  for (int i = 0; i < kept; ++i) observed[i] = same[i] != 0 && observed[i + steps] != 0;
+  std::fill(observed.begin() + kept, observed.end(), 0);
+  if (steps == 0) return;
+  std::copy_n(outputs.data() + steps * output_size, kept * output_size, outputs.data());
+  std::copy_n(output_jacobians.data() + steps * output_jacobian_size, kept * output_jacobian_size,
+              output_jacobians.data());
+}
+
+void HorizonProblem::foresee_interval(int i, Iterate& point) noexcept {
+  gather_rows(point, {i, i}, foreseen_.z.data());
+  foreseen_.duration = durations_[i];
+  IntervalRows request;
+  request.count = 1;
+  request.z = foreseen_.z.data();
+  request.z_step = row_;
+  request.ramp = any_ramp_;
+  request.durations = &foreseen_.duration;
+  request.substeps = substeps_;
+  request.next_states = foreseen_.next.data();
+  request.next_step = row_;
+  request.jacobians = foreseen_.jacobian.data();
+  request.jacobian_row = row_;
+  request.jacobian_step = nx_ * row_;
+  request.scratch = foreseen_.scratch.data();
+  model_->integrate_rows(request);
+  std::copy_n(foreseen_.next.data(), nx_, point.state(i + 1));
+  carry_channels(i, point);
+}
+
+void HorizonProblem::remember_in(StageQp& qp) const {
+  const auto nodes = static_cast<std::size_t>(capacity_.intervals) + 1;
+  Recollection known;
+  known.model = model_;
+  known.rows.assign(nodes * stride_, 0.0);
+  known.costates.assign((nodes + 1) * stride_, 0.0);
+  known.ahead.assign(static_cast<std::size_t>(capacity_.states + capacity_.controls) * stride_, 0.0);
+  known.durations.assign(nodes, 0.0);
+  known.begins.assign(nodes * channels_, 0);
+  for (auto* marks : {&known.observed, &known.same, &known.same_costate}) marks->assign(nodes, 0);
+  qp.memory = std::move(known);
+}
+
+Recollection* HorizonProblem::recollection_in(StageQp& qp) const noexcept {
+  auto* known = std::any_cast<Recollection>(&qp.memory);
+  return known && known->model == model_ && qp.capacity() == capacity_ ? known : nullptr;
+}
+
+/// Whether a program has what this structure asks for of F's rows of channels.
+bool HorizonProblem::has_structure(const StageQp& qp, const Recollection& known) const noexcept {
+  return is_direct() && !any_ramp_ && known.changes == qp.changes() && known.intervals == intervals_ &&
+         qp.intervals() == intervals_ &&
+         std::equal(known.begins.begin(), known.begins.begin() + static_cast<std::ptrdiff_t>(intervals_) * channels_,
+                    begins_.begin());
+}
+
+/// That F and b were made at this point.
+void HorizonProblem::remember(const Iterate& point, const StageQp& qp, Recollection& known) const noexcept {
+  known.changes = qp.changes();
+  known.substeps = substeps_;
+  known.intervals = intervals_;
+  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(intervals_ + 1) * stride_;
+  std::copy_n(point.row(0), entries, known.rows.data());
+  if (keeps_curvature()) std::copy_n(point.costate(0), entries, known.costates.data());
+  std::copy_n(durations_.data(), intervals_, known.durations.data());
+  std::copy_n(begins_.data(), static_cast<std::ptrdiff_t>(intervals_) * channels_, known.begins.data());
+}
+
+void HorizonProblem::take_foreseen(int i, const Iterate& point, StageQp& qp) const noexcept {
+  std::copy_n(foreseen_.next.data(), nx_, qp.b(i));
+  for (int r = 0; r < nx_; ++r) std::copy_n(foreseen_.jacobian.data() + r * row_, row_, qp.F(i) + r * stride_);
+  complete_dynamics({i, i}, point, false, qp);
+  if (control_counts_[i] > nu_) place_started_channels(i, Hessian::gauss_newton, qp);
+}
+
+/// What is remembered goes on for one interval: with the last inputs, as a controller's plan is moved on.
+void HorizonProblem::look_ahead(Recollection& known) const noexcept {
+  const double* last = row(known.rows, intervals_ - 1, stride_);
+  std::copy_n(last + capacity_.states, capacity_.controls, row(known.rows, intervals_, stride_) + capacity_.states);
+  std::copy_n(row(known.costates, intervals_, stride_), stride_, row(known.costates, intervals_ + 1, stride_));
+  known.durations[intervals_] = durations_[intervals_ - 1];
+  std::fill_n(row(known.begins, intervals_, channels_), channels_, std::uint8_t{0});
+  known.looks_ahead = true;
+}
+
+/// Does what `fill_stages` does, from a linearisation that may have been some stages earlier; only intervals that it
+/// does not know are evaluated. The exact Hessian is complete afterwards, costs and all. False, with nothing done,
+/// where most is not known.
+bool HorizonProblem::move_along(const Iterate& point, Hessian hessian, StageQp& qp, Recollection& known,
+                                std::span<double> scratch) const noexcept {
+  constexpr int most_unknown = 8;
+  const bool is_exact = hessian == Hessian::exact;
+  if (known.changes != qp.changes() || (is_exact && !known.has_curvature)) return false;
+  if (known.substeps != substeps_ || !is_direct() || any_ramp_ || qp.intervals() != known.intervals) return false;
+  const auto is_state_at = [&](int node, int known_node, int size) {
+    return std::memcmp(point.state(node), row(known.rows, known_node, stride_), size * sizeof(double)) == 0;
+  };
+  int steps = 0;
+  while (steps < known.intervals && !is_state_at(0, steps, nx_)) ++steps;
+  const int end = known.intervals - steps, count = std::min(intervals_, known.looks_ahead ? end + 1 : end);
+  std::uint8_t* same = known.same.data();
+  std::fill_n(same, intervals_ + 1, 0);
+  program_kernels().match(point.row(0), row(known.rows, steps, stride_), count, stride_, capacity_.states, same);
+  if (count <= end) same[count] = is_state_at(count, count + steps, capacity_.states);
+  std::uint8_t* same_costate = known.same_costate.data();
+  if (is_exact)
+    program_kernels().match(point.costate(1), row(known.costates, steps + 1, stride_), count, stride_, nx_,
+                            same_costate);
+  // Of the interval ahead, nobody has seen the next state.
+  const auto is_known = [&](int i) {
+    const std::uint8_t *begins = row(begins_, i, channels_), *known_begins = row(known.begins, i + steps, channels_);
+    return i < count && same[i] == 2 && (i == end || same[i + 1] != 0) && (!is_exact || same_costate[i] != 0) &&
+           durations_[i] == known.durations[i + steps] && std::equal(begins, begins + channels_, known_begins);
+  };
+
+  std::array<int, most_unknown> unknown;
+  int unknown_count = 0;
+  for (int i = 0; i < intervals_; ++i) {
+    if (is_known(i)) continue;
+    if (unknown_count == most_unknown) return false;
+    unknown[unknown_count++] = i;
+  }
+  const bool was_ahead = end < intervals_ && is_known(end);
+  if (steps > 0) qp.drop_first(steps, is_exact);
+  fill_sizes({0, intervals_}, qp);
+  if (was_ahead) complete_dynamics({end, end}, point, false, qp);
+  if (was_ahead && is_exact) {
+    std::copy(known.ahead.begin(), known.ahead.end(), qp.H(end));
+    add_cost({end, end}, point, hessian, Parts::matrices, qp, scratch);
+  }
+  for (int k = 0; k < unknown_count;) {
+    StageRange together{unknown[k], unknown[k]};
+    while (++k < unknown_count && unknown[k] == together.last + 1) ++together.last;
+    if (!is_exact && together.first == together.last && has_foreseen(together.first, point, scratch.data())) {
+      take_foreseen(together.first, point, qp);
+      continue;
+    }
+    linearise_dynamics(together, point, {hessian, false, nullptr}, qp, scratch);
+    if (is_exact) add_cost(together, point, hessian, Parts::matrices, qp, scratch);
+  }
+  if (is_exact && intervals_ != known.intervals)
+    add_cost({intervals_, intervals_}, point, hessian, Parts::matrices, qp, scratch);
+  fill_bounds(point, {0, intervals_}, qp);
+  known.move_outputs(steps);
+  remember(point, qp, known);
+  known.looks_ahead = false;
+  known.has_curvature = is_exact;
+  return true;
+}
+
+/// Whether this is the interval that was foreseen; `room` is for a row.
+bool HorizonProblem::has_foreseen(int i, const Iterate& point, double* room) const noexcept {
+  if (foreseen_.duration != durations_[i]) return false;
+  gather_rows(point, {i, i}, room);
+  return std::equal(room, room + nx_ + np_ + nu_, foreseen_.z.begin());
+}
+
+}  // namespace rhec
