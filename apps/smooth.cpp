@@ -27,7 +27,8 @@ void print_table(const std::vector<sim::SmoothedReplay>& results, const sim::Rec
         result.report.factorisations, result.solve_seconds, result.report.kkt.largest());
     if (result.report.status != Status::solved) fmt::print("  {}\n", advice_for(result.report.status));
     if (!result.has_sigmas)
-      fmt::print("  this solver gives no covariances: standard deviations are left empty; sparse_sqp and gn_rti give them\n");
+      fmt::print(
+          "  this solver gives no covariances: standard deviations are left empty; sparse_sqp and gn_rti give them\n");
   }
   if (hold_out.every > 0) {
     fmt::print("\n{:<24} {:>8} {:>8} {:>9}   {:>10} {:>8} {:>9}\n", "ESTIMATE", "WITHHELD", "MEDIAN", "RMSE(5 m)",

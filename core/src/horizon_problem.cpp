@@ -242,7 +242,7 @@ void HorizonProblem::prepare(const Iterate& point, Hessian hessian, StageQp& qp,
 
 void HorizonProblem::refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
   const StageRange all{0, intervals_};
-  fill_bounds(point, all, qp);
+  if (has_late_bounds()) fill_bounds(point, all, qp);
   add_cost(all, point, Hessian::none, Parts::vectors, qp, scratch);
 }
 
@@ -286,6 +286,7 @@ void HorizonProblem::gather_rows(const Iterate& point, StageRange range, double*
     for (int j = 0; j < nx_ + np_; ++j) z[j] = s[j];
     if (is_direct()) {
       for (int j = 0; j < nu_; ++j) z[nx_ + np_ + j] = w[j];
+      if (control_counts_[i] == nu_ && !any_ramp_) continue;
     } else {
       inputs_on(point, i, z + nx_ + np_);
     }

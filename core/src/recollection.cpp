@@ -23,9 +23,15 @@ void Recollection::move_outputs(int steps) noexcept {
   const int kept = intervals + 1 - steps;
   for (int i = 0; i < kept; ++i) observed[i] = same[i] != 0 && observed[i + steps] != 0;
   std::fill(observed.begin() + kept, observed.end(), 0);
-  if (steps == 0) return;
-  std::copy_n(outputs.data() + steps * output_size, kept * output_size, outputs.data());
-  std::copy_n(output_jacobians.data() + steps * output_jacobian_size, kept * output_jacobian_size,
+  const int slots = 2 * static_cast<int>(observed.size());
+  if (first + steps + static_cast<int>(observed.size()) <= slots) {
+    first += steps;
+    return;
+  }
+  const int from = first + steps;
+  first = 0;
+  std::copy_n(outputs.data() + from * output_size, kept * output_size, outputs.data());
+  std::copy_n(output_jacobians.data() + from * output_jacobian_size, kept * output_jacobian_size,
               output_jacobians.data());
 }
 
@@ -142,6 +148,8 @@ bool HorizonProblem::move_along(const Iterate& point, Hessian hessian, StageQp& 
     if (unknown_count == most_unknown) return false;
     unknown[unknown_count++] = i;
   }
+  // As it was made.
+  if (steps == 0 && unknown_count == 0 && intervals_ == known.intervals && !has_late_bounds()) return true;
   const bool was_ahead = end < intervals_ && is_known(end);
   if (steps > 0) qp.drop_first(steps, is_exact);
   fill_sizes({0, intervals_}, qp);

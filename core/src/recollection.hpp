@@ -25,11 +25,16 @@ struct Recollection {
   std::vector<double> durations;     ///< of the intervals
   std::vector<std::uint8_t> begins;  ///< of each interval's channels
   std::ptrdiff_t output_size = 0, output_jacobian_size = 0;  ///< of a node; 0 where outputs are not asked for
-  AlignedDoubles outputs, output_jacobians;
+  AlignedDoubles outputs, output_jacobians;                  ///< twice the nodes, of which node 0 is number `first`
+  int first = 0;
   std::vector<std::uint8_t> observed;  ///< nodes whose outputs are those at `rows`
   /// Of nodes: 2 where the whole row was found again, 1 where the state was; of intervals, the same of their costates.
   std::vector<std::uint8_t> same, same_costate;
 
+  double* outputs_of(int node) noexcept { return outputs.data() + (first + node) * output_size; }
+  double* output_jacobians_of(int node) noexcept {
+    return output_jacobians.data() + (first + node) * output_jacobian_size;
+  }
   void forget() noexcept;
   /// Outputs of nodes that are now `steps` earlier, as far as their rows are the same.
   void move_outputs(int steps) noexcept;

@@ -66,6 +66,7 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   }
   const auto nodes = static_cast<std::size_t>(setup_.max_intervals) + 1;
   const double missing = std::numeric_limits<double>::quiet_NaN();
+  has_block_bounds_.assign(nodes, 0);
   outputs_.assign(nodes * output_row_, missing);
   measured_inputs_.assign(nodes * nu(), missing);
   link_information_.assign(nodes * np(), 0.0);
@@ -88,30 +89,39 @@ void RheProblem::link(int interval, int parameter, double variance) noexcept {
 
 void RheProblem::finish() noexcept {
   if (!finish_structure()) return;
-  const int ns = capacity().states;
+  // Most rows are as they were: bounds of blocks are where those start.
+  const bool is_new = bounded_intervals_ != intervals();
+  bounded_intervals_ = intervals();
   for (int i = 0; i <= intervals(); ++i) {
-    double *lower = lower_row(i), *upper = upper_row(i);
-    for (int k = 0; k < stride(); ++k) {
-      lower[k] = lower_pattern_[k];
-      upper[k] = upper_pattern_[k];
-    }
-    // A block is bounded once, where its value is decided: at node 0 or by the control that starts it.
-    if (i == 0) {
-      std::copy_n(setup_.parameter_lower.data(), np(), lower + nx());
-      std::copy_n(setup_.parameter_upper.data(), np(), upper + nx());
-    }
-    if (i == intervals()) {
-      std::fill_n(lower + ns, capacity().controls, -std::numeric_limits<double>::infinity());
-      std::fill_n(upper + ns, capacity().controls, std::numeric_limits<double>::infinity());
-      break;
-    }
-    if (control_count(i) == nu()) continue;
-    for (int j = 0; j < np(); ++j) {
-      const int control = control_of_channel(i, j);
-      if (control < 0) continue;
-      lower[ns + control] = setup_.parameter_lower[j];
-      upper[ns + control] = setup_.parameter_upper[j];
-    }
+    const bool has_blocks = i == 0 || i == intervals() || control_count(i) > nu();
+    if (is_new || has_blocks || has_block_bounds_[i] != 0) write_bounds(i);
+    has_block_bounds_[i] = has_blocks;
+  }
+}
+
+void RheProblem::write_bounds(int i) noexcept {
+  const int ns = capacity().states;
+  double *lower = lower_row(i), *upper = upper_row(i);
+  for (int k = 0; k < stride(); ++k) {
+    lower[k] = lower_pattern_[k];
+    upper[k] = upper_pattern_[k];
+  }
+  // A block is bounded once, where its value is decided: at node 0 or by the control that starts it.
+  if (i == 0) {
+    std::copy_n(setup_.parameter_lower.data(), np(), lower + nx());
+    std::copy_n(setup_.parameter_upper.data(), np(), upper + nx());
+  }
+  if (i == intervals()) {
+    std::fill_n(lower + ns, capacity().controls, -std::numeric_limits<double>::infinity());
+    std::fill_n(upper + ns, capacity().controls, std::numeric_limits<double>::infinity());
+    return;
+  }
+  if (control_count(i) == nu()) return;
+  for (int j = 0; j < np(); ++j) {
+    const int control = control_of_channel(i, j);
+    if (control < 0) continue;
+    lower[ns + control] = setup_.parameter_lower[j];
+    upper[ns + control] = setup_.parameter_upper[j];
   }
 }
 
@@ -229,8 +239,8 @@ void RheProblem::remember_in(StageQp& qp) const {
   const auto nodes = static_cast<std::size_t>(capacity().intervals) + 1;
   known.output_size = output_row_;
   known.output_jacobian_size = static_cast<std::ptrdiff_t>(ny_) * padded(nx());
-  known.outputs.assign(nodes * known.output_size, 0.0);
-  known.output_jacobians.assign(nodes * known.output_jacobian_size, 0.0);
+  known.outputs.assign(2 * nodes * known.output_size, 0.0);
+  known.output_jacobians.assign(2 * nodes * known.output_jacobian_size, 0.0);
 }
 
 /// Outputs at the nodes of a range and their Jacobians: those that are remembered, or else rows of the caller's.
@@ -253,14 +263,13 @@ RheProblem::Observed RheProblem::observe(StageRange range, const Iterate& point,
     ask(range.first, range.last - range.first + 1, outputs, jacobians);
     return {outputs, jacobians};
   }
-  double *all = known->outputs.data(), *all_jacobians = known->output_jacobians.data();
   for (int i = range.first; i <= range.last; ++i) {
     if (known->observed[i]) continue;
     const int first = i;
     while (i <= range.last && !known->observed[i]) known->observed[i++] = 1;
-    ask(first, i - first, all + first * known->output_size, all_jacobians + first * known->output_jacobian_size);
+    ask(first, i - first, known->outputs_of(first), known->output_jacobians_of(first));
   }
-  return {all + range.first * known->output_size, all_jacobians + range.first * known->output_jacobian_size};
+  return {known->outputs_of(range.first), known->output_jacobians_of(range.first)};
 }
 
 double RheProblem::write_measurements(StageRange range, const Iterate& point, Hessian hessian, const CostView& view,

@@ -178,8 +178,7 @@ bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* g
   const auto is_set = [](std::uint8_t flag) { return flag != 0; };
   if (std::any_of(is_special_.data(), is_special_.data() + N, is_set) || reductions_[N].rows > 0) return false;
   double *values = responses.values.data(), *costates = responses.costates.data();
-  for (int i = 0; i <= N; ++i)
-    std::fill_n(values + static_cast<std::ptrdiff_t>(i) * stride_ * size, (ns_ + qp.controls(i)) * size, 0.0);
+  std::fill_n(values, static_cast<std::ptrdiff_t>(N + 1) * stride_ * size, 0.0);
   int last = 0;
   for (int c = 0; c < count; ++c) {
     const auto [stage, place] = gradients[c];

@@ -409,7 +409,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
   double multiplier = 0.0;
   for (;;) {
     if (++changes_ > max_changes) return Outcome::too_much;
-    if (Clock::now() > deadline) return Outcome::out_of_time;
+    if (is_past(deadline)) return Outcome::out_of_time;
     if (v.slot == none && !find_responses_of_next(qp, riccati, entering)) return Outcome::too_much;
     // How values and multipliers change while that of the entering bound grows and the active ones stay met.
     const int count = column_count();
@@ -512,7 +512,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     }
     if (needs_factor) {
       if (changes_ > max_changes) return Outcome::too_much;
-      if (Clock::now() > deadline) return Outcome::out_of_time;
+      if (is_past(deadline)) return Outcome::out_of_time;
       if (!refactor(qp, riccati)) return Outcome::not_convex;
     }
     for (; !needs_factor && worst != none; worst = most_violated())

@@ -8,6 +8,7 @@
 #include "rhec/core/point.hpp"
 #include "rhec/core/stage_checks.hpp"
 #include "rhec/plugins/sdk.hpp"
+#include "tolerances.hpp"
 
 namespace rhec::gn_rti {
 namespace {
@@ -132,12 +133,13 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
   qp_solver_.guess_from(qp_, guess);
   qp_solver_.prepare(qp_);
   prepared_ = true;
+  prepared_ocp_ = &ocp;
   preparation_us_ += microseconds_since(start);
 }
 
 bool GnRti::is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept {
   const int N = ocp.intervals();
-  if (!prepared_ || qp_.intervals() != N) return false;
+  if (!prepared_ || prepared_ocp_ != &ocp || qp_.intervals() != N) return false;
   for (int i = 0; i <= N; ++i)
     if (qp_.states(i) != ocp.state_count(i) || (i < N && qp_.controls(i) != ocp.control_count(i))) return false;
   const std::size_t bytes = static_cast<std::size_t>(N + 1) * capacity_.row() * sizeof(double);
@@ -183,15 +185,28 @@ double GnRti::merit(const Ocp& ocp, const Iterate& point) noexcept {
 }
 
 Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
-  Report report = feedback(ocp, point, deadline);
-  if (!is_pending_) return report;
-  finish(ocp, point, report);
-  report.feedback_us += std::exchange(preparation_us_, 0.0);
+  const auto start = Clock::now();
+  Report report = respond(ocp, point, deadline);
+  if (is_pending_) settle(ocp, point, report);
+  report.feedback_us = microseconds_since(start);
   return report;
 }
 
 Report GnRti::feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
   const auto start = Clock::now();
+  Report report = respond(ocp, point, deadline);
+  report.feedback_us = microseconds_since(start);
+  return report;
+}
+
+void GnRti::finish(const Ocp& ocp, Iterate& point, Report& report) noexcept {
+  if (!is_pending_) return;
+  const auto start = Clock::now();
+  settle(ocp, point, report);
+  preparation_us_ = microseconds_since(start);
+}
+
+Report GnRti::respond(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
   Report report;
   use_exact_ = is_pending_ = false;
   if (ocp.capacity() == capacity_ && point.capacity() == capacity_) {
@@ -204,7 +219,6 @@ Report GnRti::feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
   }
   report.preparation_us = std::exchange(preparation_us_, 0.0);
   prepared_ = false;
-  report.feedback_us = microseconds_since(start);
   return report;
 }
 
@@ -213,7 +227,7 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
   report.status = Status::step_taken;
   bool ready = is_prepared_for(ocp, point);
   for (int iteration = 0; iteration < options_.iterations; ++iteration) {
-    if (iteration > 0 && Clock::now() > deadline) {
+    if (iteration > 0 && is_past(deadline)) {
       report.status = Status::deadline;
       break;
     }
@@ -268,9 +282,8 @@ bool GnRti::judge_step(const Ocp& ocp, const Iterate& point, Report& report) noe
   return true;
 }
 
-void GnRti::finish(const Ocp& ocp, Iterate& point, Report& report) noexcept {
-  if (!std::exchange(is_pending_, false)) return;
-  const auto start = Clock::now();
+void GnRti::settle(const Ocp& ocp, Iterate& point, Report& report) noexcept {
+  is_pending_ = false;
   if (!judge_step(ocp, point, report)) {
     --report.iterations;
     report.status = report.iterations > 0 ? Status::iteration_limit : Status::stalled;
@@ -278,7 +291,6 @@ void GnRti::finish(const Ocp& ocp, Iterate& point, Report& report) noexcept {
     std::swap(point, report.iterations > 0 ? trial_ : best_);
     if (report.iterations == 0) give_up(ocp, point, report);
   }
-  preparation_us_ = microseconds_since(start);
 }
 
 /// Where the point was judged, its linearisation is there already.
@@ -389,7 +401,7 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
       break;
     }
     if (report.iterations == options_.max_iterations) break;
-    if (Clock::now() > deadline) {
+    if (is_past(deadline)) {
       report.status = Status::deadline;
       break;
     }

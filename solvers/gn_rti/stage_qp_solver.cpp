@@ -119,7 +119,7 @@ StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, c
 
 bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds, Clock::time_point deadline) noexcept {
   for (int round = 0; round < rounds; ++round) {
-    out_of_time_ = round > 0 && Clock::now() > deadline;
+    out_of_time_ = round > 0 && is_past(deadline);
     if (out_of_time_) return false;
     if (!factored_) factor(qp);
     if (riccati_.solve(qp, active_, step) != Riccati::Outcome::done) return false;
@@ -140,7 +140,7 @@ StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step, Clock::t
   if (factored_) {
     if (try_active_sets(qp, step, 1, deadline)) return Outcome::active_set;
     factored_ = false;
-    if (Clock::now() > deadline) return Outcome::out_of_time;
+    if (is_past(deadline)) return Outcome::out_of_time;
   }
   auto outcome = solve_from_guess(qp, step, deadline);
   if (outcome != DualActiveSet::Outcome::solved && !has_claims && mark_bounds(qp, step, bound_tolerance, marks_.data()))
@@ -323,7 +323,7 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accur
   };
 
   for (int iteration = 0; iteration < max_interior_iterations; ++iteration) {
-    out_of_time_ = Clock::now() > deadline;
+    out_of_time_ = is_past(deadline);
     if (out_of_time_) return false;
     each_side([](const Bounded&, Side& s) { s.slack_step = s.multiplier_step = s.correction = 0.0; });
     const double complementarity = mean_complementarity(0.0);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rhec/core/solver.hpp"
+
 namespace rhec::gn_rti {
 
 /// A bound b counts as violated beyond this times 1 + |b|.
@@ -11,6 +13,11 @@ constexpr double multiplier_tolerance = 1e-9;
 
 inline bool is_equality(double lower, double upper) {
   return std::isfinite(lower) && upper - lower <= 1e-14 * (1.0 + std::abs(lower));
+}
+
+/// Without asking the clock where there is no deadline.
+inline bool is_past(Clock::time_point deadline) {
+  return deadline != Clock::time_point::max() && Clock::now() > deadline;
 }
 
 }  // namespace rhec::gn_rti

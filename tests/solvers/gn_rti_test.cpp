@@ -5,10 +5,12 @@
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <new>
 
 #include "../core/random_problem.hpp"
 #include "rhec/core/receding_horizon_estimation.hpp"
+#include "rhec/core/riccati.hpp"
 #include "rhec/core/shift.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
@@ -122,6 +124,150 @@ TEST(GnRti, PreparesControlForAnotherInitialState) {
   converged->solve(*problem, exact);
   EXPECT_NEAR(problem->evaluate(point, nullptr, scratch), problem->evaluate(exact, nullptr, scratch),
               1e-4 * (1.0 + problem->evaluate(exact, nullptr, scratch)));
+}
+
+/// Asks another model, and once in a while gets no number.
+class UnsureModel final : public Model {
+ public:
+  explicit UnsureModel(std::shared_ptr<const Model> model) : model_(std::move(model)) {}
+  const ModelDescription& description() const noexcept override { return model_->description(); }
+  void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
+  void observe(const Nodes& request) const noexcept override { model_->observe(request); }
+  void integrate_rows(const IntervalRows& request) const noexcept override {
+    model_->integrate_rows(request);
+    if (calls_until_nan-- == 0) request.next_states[0] = std::numeric_limits<double>::quiet_NaN();
+  }
+  void observe_rows(const NodeRows& request) const noexcept override { model_->observe_rows(request); }
+  std::size_t rows_scratch(int count) const noexcept override { return model_->rows_scratch(count); }
+  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
+    model_->rates(x, u, p, dxdt);
+  }
+  bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
+  mutable int calls_until_nan = -1;
+
+ private:
+  std::shared_ptr<const Model> model_;
+};
+
+void expect_same_bits(const Ocp& ocp, const Iterate& a, const Iterate& b, const std::string& where) {
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    for (int j = 0; j < ocp.state_count(i); ++j) {
+      ASSERT_EQ(a.state(i)[j], b.state(i)[j]) << where << ": state " << i;
+      ASSERT_EQ(a.costate(i)[j], b.costate(i)[j]) << where << ": costate " << i;
+    }
+    if (i == ocp.intervals()) break;
+    for (int j = 0; j < ocp.control_count(i); ++j)
+      ASSERT_EQ(a.control(i)[j], b.control(i)[j]) << where << ": control " << i;
+  }
+}
+
+TEST(GnRti, AnswersFirstAndJudgesAfterwards) {
+  for (const std::string options : {"{mode: rti}", "{mode: rti, iterations: 3}", "{mode: converge}"}) {
+    for (const bool control : {false, true}) {
+      RandomProblem random(bicycle(), 21);
+      std::unique_ptr<HorizonProblem> problem;
+      if (control) {
+        problem = random.rhc(off_by(0.05));
+      } else {
+        problem = random.rhe(blocks_of(4));
+      }
+      const auto at_once = gn_rti(options), in_parts = gn_rti(options), without_finish = gn_rti(options),
+                 converged = gn_rti("{mode: converge}");
+      for (const auto& solver : {at_once, in_parts, without_finish, converged}) solver->setup(*problem);
+      Iterate start = RandomProblem::cold_start(*problem);
+      converged->solve(*problem, start);
+      GuessShifter shifters[] = {GuessShifter(*problem), GuessShifter(*problem), GuessShifter(*problem)};
+      Iterate whole = start, parts = start, unfinished = start;
+      for (int sample = 0; sample < 6; ++sample) {
+        const std::string where = options + ", sample " + std::to_string(sample);
+        shifters[0].take(*problem, whole);
+        shifters[1].take(*problem, parts);
+        shifters[2].take(*problem, unfinished);
+        if (control) {
+          static_cast<RhcProblem&>(*problem).given_state()[1] += 0.002;
+        } else {
+          static_cast<RheProblem&>(*problem).output(problem->intervals())[0] += 0.002;
+        }
+        shifters[0].apply(1, *problem, whole);
+        shifters[1].apply(1, *problem, parts);
+        shifters[2].apply(1, *problem, unfinished);
+        at_once->prepare(*problem, whole);
+        in_parts->prepare(*problem, parts);
+        without_finish->prepare(*problem, unfinished);
+        const Report expected = at_once->solve(*problem, whole);
+        Report report = in_parts->feedback(*problem, parts, Clock::time_point::max());
+        expect_same_bits(*problem, parts, whole, where + ", answered");
+        in_parts->finish(*problem, parts, report);
+        expect_same_bits(*problem, parts, whole, where + ", judged");
+        EXPECT_EQ(report.status, expected.status) << where;
+        EXPECT_EQ(report.iterations, expected.iterations) << where;
+        EXPECT_EQ(report.objective, expected.objective) << where;
+        EXPECT_EQ(report.kkt.largest(), expected.kkt.largest()) << where;
+        // It costs time to leave it out, and nothing else.
+        without_finish->feedback(*problem, unfinished, Clock::time_point::max());
+        expect_same_bits(*problem, unfinished, whole, where + ", not judged");
+        if (HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
+TEST(GnRti, TakesAStepBackThatComesToNothing) {
+  for (const int iterations : {1, 2}) {
+    const auto model = std::make_shared<UnsureModel>(bicycle());
+    RandomProblem random(model, 8);
+    const auto problem = random.rhc(off_by(0.1));
+    const auto solver = gn_rti("{mode: rti, iterations: " + std::to_string(iterations) + "}"),
+               one_less = gn_rti("{mode: rti}"), converged = gn_rti("{mode: converge}");
+    for (const auto& each : {solver, one_less, converged}) each->setup(*problem);
+    Iterate point = RandomProblem::cold_start(*problem);
+    converged->solve(*problem, point);
+    problem->given_state()[0] += 0.01;
+    Iterate before = point;
+    if (iterations > 1) one_less->solve(*problem, before);
+    Report report = solver->feedback(*problem, point, Clock::time_point::max());
+    ASSERT_EQ(report.status, Status::step_taken);
+    EXPECT_TRUE(point.is_finite());
+    model->calls_until_nan = 0;
+    solver->finish(*problem, point, report);
+    expect_same_bits(*problem, point, before, "taken back");
+    EXPECT_EQ(report.status, iterations > 1 ? Status::iteration_limit : Status::stalled);
+    EXPECT_EQ(report.iterations, iterations - 1);
+    EXPECT_TRUE(std::isfinite(report.objective));
+    EXPECT_TRUE(std::isfinite(report.kkt.largest()));
+    // And goes on from there.
+    EXPECT_EQ(solver->solve(*problem, point).status, Status::step_taken);
+  }
+}
+
+TEST(GnRti, GivesTheCovariancesOfItsLinearisation) {
+  RandomProblem random(bicycle(), 9);
+  for (const int block : {0, 4}) {
+    const auto problem = random.rhe(blocks_of(block));
+    const auto solver = gn_rti("{mode: converge}");
+    solver->setup(*problem);
+    Iterate point = RandomProblem::cold_start(*problem);
+    ASSERT_EQ(solver->solve(*problem, point).status, Status::solved);
+    const int N = problem->intervals(), ns = problem->capacity().states;
+    std::vector<double> scratch(problem->scratch_size()), expected((N + 1) * ns * ns), all(expected), last(ns * ns);
+    StageQp qp(problem->capacity());
+    Riccati riccati(problem->capacity());
+    problem->linearise(all_stages(*problem), point, Hessian::gauss_newton, qp, scratch);
+    riccati.factor(qp, ActiveSet(problem->capacity()));
+    riccati.covariances(qp, expected.data(), nullptr);
+    ASSERT_TRUE(solver->covariances(*problem, point, all_stages(*problem), all));
+    ASSERT_TRUE(solver->covariances(*problem, point, {N, N}, last));
+    for (std::size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(all[k], expected[k], 1e-12 * (1 + std::abs(all[k])));
+    for (std::size_t k = 0; k < last.size(); ++k) {
+      const double of_all = all[all.size() - last.size() + k];
+      EXPECT_NEAR(last[k], of_all, 1e-12 * (1 + std::abs(of_all)));
+    }
+    EXPECT_FALSE(solver->covariances(*problem, point, {1, 2}, all)) << "it has all or the last one";
+    EXPECT_FALSE(solver->covariances(*problem, point, all_stages(*problem), last)) << "there is no room for all";
+    // What was prepared for the next sample is not to be disturbed.
+    solver->prepare(*problem, point);
+    EXPECT_FALSE(solver->covariances(*problem, point, {N, N}, last));
+  }
 }
 
 TEST(GnRti, GivesUpOnNothingButSaysSoAtTheIterationLimit) {

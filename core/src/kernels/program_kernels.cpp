@@ -144,16 +144,17 @@ void adopt(const GuessView& from, double* values, double* multipliers) {
   }
 }
 
+/// Whether the first `columns` entries of two rows are equal.
+inline bool are_equal(const double* a, const double* b, int columns) {
+  Lanes differs{};
+  for (int k = 0; k < columns; k += lane_count)
+    differs += first_of(load(a + k) == load(b + k) ? Lanes{} : all(1.0), 0, columns - k);
+  return sum_of(differs) == 0.0;
+}
+
 void match(const double* a, const double* b, int count, int stride, int columns, unsigned char* marks) {
-  for (int i = 0; i < count; ++i) {
-    Lanes first{}, differs{};
-    for (int k = 0; k < stride; k += lane_count, a += lane_count, b += lane_count) {
-      const Lanes of_part = load(a) == load(b) ? Lanes{} : all(1.0);
-      first += first_of(of_part, 0, columns - k);
-      differs += of_part;
-    }
-    marks[i] = sum_of(first) != 0.0 ? 0 : sum_of(differs) != 0.0 ? 1 : 2;
-  }
+  for (int i = 0; i < count; ++i, a += stride, b += stride)
+    marks[i] = are_equal(a, b, stride) ? 2 : are_equal(a, b, columns) ? 1 : 0;
 }
 
 void add(const double* from, const double* step, double* to, long count) {
@@ -206,8 +207,9 @@ double write_tracking(const CostView& view, const TrackingView& tracked, int fir
     double* H = view.H + i * wide * stride;
     if (is_last || !view.bends)
       for (int c = 0; c < columns; ++c)
-        for (int k = 0; k < padded(columns); k += lane_count) store(Lanes{}, H + c * stride + k);
-    for (int k = 0; k < columns; ++k) H[k * stride + k] += 2.0 * weights[k];
+        for (int k = 0; k < stride; k += lane_count) store(Lanes{}, H + c * stride + k);
+    for (int k = 0; k < columns; ++k)
+      if (weights[k] != 0.0) H[k * stride + k] += 2.0 * weights[k];
   }
   return total;
 }
@@ -239,12 +241,12 @@ void complete_dynamics(const DynamicsView& view) {
 void clear_costs(const CostView& view, int first, int last) {
   const long stride = view.stride, wide = view.states + view.controls;
   for (int i = first; i <= last; ++i) {
-    const int used = view.states + (i < view.intervals ? view.control_counts[i] : 0), length = padded(used);
+    const int used = view.states + (i < view.intervals ? view.control_counts[i] : 0);
     for (int k = 0; view.h && k < view.stride; k += lane_count) store(Lanes{}, view.h + i * stride + k);
     if (!view.H) continue;
     double* H = view.H + i * wide * stride;
     for (int c = 0; c < used; ++c)
-      for (int k = 0; k < length; k += lane_count) store(Lanes{}, H + c * stride + k);
+      for (int k = 0; k < stride; k += lane_count) store(Lanes{}, H + c * stride + k);
   }
 }
 
@@ -283,11 +285,11 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
   }
   if (!matrices) return total;
   const auto clear = [&](double* row, int from) RHEC_ALWAYS_INLINE {
-    if (used <= 8) {
+    if (stride == 8) {
       for (int k = 0; k < 8; k += lane_count)
         if (k >= from) store(Lanes{}, row + k);
     } else {
-      for (int k = from; k < padded(used); k += lane_count) store(Lanes{}, row + k);
+      for (int k = from; k < stride; k += lane_count) store(Lanes{}, row + k);
     }
   };
   for (int c = 0; c < measured.vehicle_states; ++c) {

@@ -133,6 +133,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   virtual double add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                           std::span<double> scratch) const noexcept = 0;
   virtual std::size_t cost_scratch_size() const noexcept = 0;
+  /// Whether bounds are data that may come between `prepare` and `refresh`.
+  virtual bool has_late_bounds() const noexcept = 0;
   /// What was remembered in a program of this model's; null where nothing can be.
   Recollection* recollection_in(StageQp& qp) const noexcept;
 

@@ -61,6 +61,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   double add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                   std::span<double> scratch) const noexcept override;
   std::size_t cost_scratch_size() const noexcept override;
+  bool has_late_bounds() const noexcept override { return true; }
   double write_costs(StageRange range, const Iterate& point, const CostView& view) const noexcept;
   void write_state_bounds() noexcept;
   void write_input_bounds() noexcept;

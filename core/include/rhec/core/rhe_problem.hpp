@@ -81,6 +81,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   double add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                   std::span<double> scratch) const noexcept override;
   std::size_t cost_scratch_size() const noexcept override;
+  bool has_late_bounds() const noexcept override { return false; }
 
   void residual(int node, const double* predicted, double* difference) const noexcept;
   double losses(const double* difference, double* weight, double* curvature) const noexcept;
@@ -95,10 +96,13 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
                                  const double* predicted, const double* jacobians, double* memory) const noexcept;
   double inputs(int interval, const Iterate& point, double* H, double* h) const noexcept;
   double links(int interval, const Iterate& point, double* H, double* h) const noexcept;
+  void write_bounds(int stage) noexcept;
   double arrival_term(const Iterate& point, double* q) const noexcept;
 
   Setup setup_;
   int ny_, output_row_;
+  int bounded_intervals_ = -1;                    ///< that bounds were written for
+  std::vector<std::uint8_t> has_block_bounds_;    ///< of a stage
   std::vector<std::uint8_t> is_one_block_;        ///< of a parameter
   std::vector<int> robust_group_;                 ///< of an output, or -1
   AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage

@@ -18,9 +18,10 @@ namespace rhec {
 ///
 /// and with the blocks  F = [A B],  H = [Q S'; S R],  h = [q; r].
 ///
-/// Sizes are per stage and at run time; storage never moves. All rows have the length `stride` = capacity().row():
-/// a stage's F is n_s such rows (row r: what next state r depends on), its H is symmetric and as many rows (or columns)
-/// as z has entries, both halves filled. What a stage does not use of a row is zero, and free of bounds.
+/// Sizes are per stage and at run time; storage never moves, but for `drop_first`. All rows have the length `stride` =
+/// capacity().row(): a stage's F is n_s such rows (row r: what next state r depends on), its H is symmetric and as many
+/// rows (or columns) as z has entries, both halves filled. What a stage does not use of a row is zero, and free of
+/// bounds.
 class RHEC_EXPORT StageQp {
  public:
   using Rows =
@@ -47,7 +48,8 @@ class RHEC_EXPORT StageQp {
     state_counts_[node] = states;
     control_counts_[node] = controls;
   }
-  /// Moves F, b and sizes towards the front, and H with them if that is asked for; the last stages keep theirs.
+  /// Moves F, b and sizes towards the front; the last stages are left with zeros. With curvature, those of H between
+  /// the first and the terminal stage move too; otherwise H is to be written anew, in whole rows.
   void drop_first(int stages, bool with_curvature) noexcept;
   bool initial_state_is_given = false;
   /// For who writes to F, b or H himself: what is remembered of them is void.
@@ -56,10 +58,10 @@ class RHEC_EXPORT StageQp {
   std::any memory;  ///< of how F and b were made, for the Ocp that made them (`Ocp::remember_in`)
 
   // Raw access for kernels: pointers to stage i.
-  double* F(int i) noexcept { return at(F_, i, capacity_.states); }
-  double* H(int i) noexcept { return at(H_, i, wide_); }
+  double* F(int i) noexcept { return at(F_, first_F_ + i, capacity_.states); }
+  double* H(int i) noexcept { return at(H_, first_H_ + i, wide_); }
   double* h(int i) noexcept { return at(h_, i, 1); }
-  double* b(int i) noexcept { return at(b_, i, 1); }
+  double* b(int i) noexcept { return at(b_, first_b_ + i, 1); }
   double* lower(int i) noexcept { return at(lower_, i, 1); }
   double* upper(int i) noexcept { return at(upper_, i, 1); }
   double* q(int i) noexcept { return h(i); }
@@ -69,10 +71,10 @@ class RHEC_EXPORT StageQp {
   double* control_lower(int i) noexcept { return lower(i) + capacity_.states; }
   double* control_upper(int i) noexcept { return upper(i) + capacity_.states; }
   double* initial_step() noexcept { return initial_step_.data(); }
-  const double* F(int i) const noexcept { return at(F_, i, capacity_.states); }
-  const double* H(int i) const noexcept { return at(H_, i, wide_); }
+  const double* F(int i) const noexcept { return at(F_, first_F_ + i, capacity_.states); }
+  const double* H(int i) const noexcept { return at(H_, first_H_ + i, wide_); }
   const double* h(int i) const noexcept { return at(h_, i, 1); }
-  const double* b(int i) const noexcept { return at(b_, i, 1); }
+  const double* b(int i) const noexcept { return at(b_, first_b_ + i, 1); }
   const double* lower(int i) const noexcept { return at(lower_, i, 1); }
   const double* upper(int i) const noexcept { return at(upper_, i, 1); }
   const double* q(int i) const noexcept { return h(i); }
@@ -115,10 +117,11 @@ class RHEC_EXPORT StageQp {
     return {first, count, length, Eigen::OuterStride<>(stride_)};
   }
   void clear(int i) noexcept;
-  void clear_costs(int i) noexcept;
+  void advance(AlignedDoubles& v, int& first, int rows, int stages) const noexcept;
 
   Capacity capacity_;
   int stride_ = 0, wide_ = 0, intervals_ = 0;
+  int first_F_ = 0, first_b_ = 0, first_H_ = 0;  ///< slots of stage 0: what moves towards the front is not copied
   unsigned changes_ = 0;
   std::vector<int> state_counts_, control_counts_;
   AlignedDoubles F_, H_, h_, b_, lower_, upper_, initial_step_;
