@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "rhec/core/padded.hpp"
 #include "rhec/core/rhe_problem.hpp"
 #include "with_size.hpp"
 
@@ -25,6 +26,10 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   next_.assign(nx_, 0.0);
   jacobian_.assign(static_cast<std::size_t>(nx_) * (nx_ + nu_ + 2 * np_), 0.0);
   input_.assign(nu_, 0.0);
+  const std::size_t width = padded(nx_ + np_ + nu_);
+  for (auto* v : {&row_, &next_row_}) v->assign(width, 0.0);
+  jacobian_rows_.assign(nx_ * width, 0.0);
+  scratch_.assign(model_->rows_scratch(1), 0.0);
   work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
   gain_ = image_ = zeros_ = correction_ = Eigen::VectorXd::Zero(n);
 }
@@ -111,17 +116,20 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
                            const double* ramp_variances) noexcept {
   const int n = nx_ + np_;
   for (int j = 0; j < nu_; ++j) input_[j] = std::isfinite(measured_input[j]) ? measured_input[j] : input_guess[j];
-  Model::Intervals request;
-  request.count = 1;
-  request.states = mean.data();
-  request.inputs = input_.data();
-  request.parameters = mean.data() + nx_;
-  request.parameters_end = ramp_variances ? request.parameters : nullptr;
-  request.durations = &duration;
-  request.substeps = substeps_;
-  request.next_states = next_.data();
-  request.jacobians = jacobian_.data();
-  model_->integrate(request);
+  if (ramp_variances) {
+    Model::Intervals request;
+    request.count = 1;
+    request.states = mean.data();
+    request.inputs = input_.data();
+    request.parameters = request.parameters_end = mean.data() + nx_;
+    request.durations = &duration;
+    request.substeps = substeps_;
+    request.next_states = next_.data();
+    request.jacobians = jacobian_.data();
+    model_->integrate(request);
+  } else {
+    differentiate(duration);
+  }
   // Of the transition [F_x F_p; 0 I] only the vehicle's rows are worth a product.
   if (ramp_variances)
     for (int c = 0; c < np_; ++c)
@@ -169,6 +177,34 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   if (!finite || !next_covariance_.allFinite()) return;
   make_symmetric();
   std::copy(next_.begin(), next_.end(), mean.data());
+}
+
+/// Next state and its Jacobian where parameters stay what they are, by the faster of the model's functions.
+void KalmanFilter::differentiate(double duration) noexcept {
+  std::copy_n(mean.data(), nx_ + np_, row_.data());
+  std::copy_n(input_.data(), nu_, row_.data() + nx_ + np_);
+  const std::ptrdiff_t width = padded(nx_ + np_ + nu_);
+  IntervalRows request;
+  request.count = 1;
+  request.z = row_.data();
+  request.z_step = width;
+  request.durations = &duration;
+  request.substeps = substeps_;
+  request.next_states = next_row_.data();
+  request.next_step = width;
+  request.jacobians = jacobian_rows_.data();
+  request.jacobian_row = width;
+  request.jacobian_step = nx_ * width;
+  request.scratch = scratch_.data();
+  model_->integrate_rows(request);
+  std::copy_n(next_row_.data(), nx_, next_.data());
+  // From rows by [x; p; u] to columns by [x; u; p].
+  for (int r = 0; r < nx_; ++r) {
+    const double* row = jacobian_rows_.data() + r * width;
+    for (int c = 0; c < nx_; ++c) jacobian_[c * nx_ + r] = row[c];
+    for (int c = 0; c < nu_; ++c) jacobian_[(nx_ + c) * nx_ + r] = row[nx_ + np_ + c];
+    for (int c = 0; c < np_; ++c) jacobian_[(nx_ + nu_ + c) * nx_ + r] = row[nx_ + c];
+  }
 }
 
 void KalmanFilter::add_parameter_variance(int parameter, double variance) noexcept {

@@ -11,4 +11,6 @@ void Ocp::mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* c
 
 void Ocp::remember_in(StageQp& /*qp*/) const {}
 
+bool Ocp::is_made_at(const Iterate& /*point*/, const StageQp& /*qp*/) const noexcept { return false; }
+
 }  // namespace rhec

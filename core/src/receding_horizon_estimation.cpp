@@ -332,8 +332,8 @@ void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noe
                                     is_last ? of_node : nullptr);
   }
   if (!std::all_of(of_node, of_node + ns * ns, [](double value) { return std::isfinite(value); })) return;
-  for (int c = 0; c < n; ++c)
-    for (int r = 0; r < n; ++r) result.covariance(r, c) = of_node[c * ns + r];
+  result.covariance =
+      Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(of_node, n, n, Eigen::OuterStride<>(ns));
 }
 
 }  // namespace rhec

@@ -69,9 +69,31 @@ void HorizonProblem::remember_in(StageQp& qp) const {
   qp.memory = std::move(known);
 }
 
-Recollection* HorizonProblem::recollection_in(StageQp& qp) const noexcept {
+namespace {
+
+/// In a program or a constant one.
+template <class Program>
+auto* find_recollection(Program& qp, const std::shared_ptr<const Model>& model, const Capacity& capacity) noexcept {
   auto* known = std::any_cast<Recollection>(&qp.memory);
-  return known && known->model == model_ && qp.capacity() == capacity_ ? known : nullptr;
+  return known && known->model == model && qp.capacity() == capacity ? known : nullptr;
+}
+
+}  // namespace
+
+Recollection* HorizonProblem::recollection_in(StageQp& qp) const noexcept {
+  return find_recollection(qp, model_, capacity_);
+}
+
+const Recollection* HorizonProblem::recollection_in(const StageQp& qp) const noexcept {
+  return find_recollection(qp, model_, capacity_);
+}
+
+bool HorizonProblem::is_made_at(const Iterate& point, const StageQp& qp) const noexcept {
+  const Recollection* known = recollection_in(qp);
+  // Behind the last state there may be inputs of an interval that was looked at ahead.
+  const std::size_t bytes = (static_cast<std::size_t>(intervals_) * stride_ + capacity_.states) * sizeof(double);
+  return known && known->changes == qp.changes() && known->intervals == intervals_ &&
+         std::memcmp(known->rows.data(), point.row(0), bytes) == 0;
 }
 
 /// Whether a program has what this structure asks for of F's rows of channels.

@@ -85,6 +85,7 @@ void GnRti::setup(const Ocp& ocp) {
   capacity_ = ocp.capacity();
   qp_ = other_qp_ = StageQp(capacity_);
   ocp.remember_in(qp_);
+  remembers_ = qp_.memory.has_value();
   qp_solver_ = StageQpSolver(capacity_);
   for (Iterate* point : {&prepared_point_, &step_, &trial_, &best_, &other_trial_}) *point = Iterate(capacity_);
   scratch_.assign(ocp.scratch_size(), 0.0);
@@ -126,8 +127,9 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
     prepared_point_ = guess;
     linearise(ocp, prepared_point_);
   } else {
-    std::copy_n(guess.row(0), static_cast<std::ptrdiff_t>(ocp.intervals() + 1) * capacity_.row(),
-                prepared_point_.row(0));
+    if (!remembers_)
+      std::copy_n(guess.row(0), static_cast<std::ptrdiff_t>(ocp.intervals() + 1) * capacity_.row(),
+                  prepared_point_.row(0));
     ocp.prepare(guess, hessian, qp_, scratch_);
   }
   qp_solver_.guess_from(qp_, guess);
@@ -142,6 +144,7 @@ bool GnRti::is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept
   if (!prepared_ || prepared_ocp_ != &ocp || qp_.intervals() != N) return false;
   for (int i = 0; i <= N; ++i)
     if (qp_.states(i) != ocp.state_count(i) || (i < N && qp_.controls(i) != ocp.control_count(i))) return false;
+  if (remembers_) return ocp.is_made_at(point, qp_);
   const std::size_t bytes = static_cast<std::size_t>(N + 1) * capacity_.row() * sizeof(double);
   return std::memcmp(prepared_point_.row(0), point.row(0), bytes) == 0;
 }

@@ -74,6 +74,7 @@ class GnRti final : public Solver {
   StageQpSolver qp_solver_;
   Iterate prepared_point_, step_, trial_, best_, other_trial_;
   std::vector<double> scratch_, defects_;
+  bool remembers_ = false;  ///< `qp_` does, at which point it was made; otherwise `prepared_point_` is that
   bool prepared_ = false;
   const Ocp* prepared_ocp_ = nullptr;  ///< looked at no more, only compared with
   bool is_pending_ = false;            ///< the last step was not judged yet; `best_` is the point before it

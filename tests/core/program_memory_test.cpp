@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "../solvers/other_model.hpp"
 #include "random_problem.hpp"
 #include "rhec/core/shift.hpp"
 #include "rhec/plugins/host.hpp"
@@ -16,29 +17,18 @@ namespace {
 using testing::RandomProblem;
 
 /// Counts the intervals and nodes that it is asked for.
-class CountingModel final : public Model {
+class CountingModel final : public testing::OtherModel {
  public:
-  explicit CountingModel(std::shared_ptr<const Model> model) : model_(std::move(model)) {}
-  const ModelDescription& description() const noexcept override { return model_->description(); }
-  void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
-  void observe(const Nodes& request) const noexcept override { model_->observe(request); }
+  using OtherModel::OtherModel;
   void integrate_rows(const IntervalRows& request) const noexcept override {
     intervals += request.count;
-    model_->integrate_rows(request);
+    OtherModel::integrate_rows(request);
   }
   void observe_rows(const NodeRows& request) const noexcept override {
     nodes += request.count;
-    model_->observe_rows(request);
+    OtherModel::observe_rows(request);
   }
-  std::size_t rows_scratch(int count) const noexcept override { return model_->rows_scratch(count); }
-  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
-    model_->rates(x, u, p, dxdt);
-  }
-  bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   mutable std::atomic<int> intervals{0}, nodes{0};
-
- private:
-  std::shared_ptr<const Model> model_;
 };
 
 /// All that a stage of a program is made of.

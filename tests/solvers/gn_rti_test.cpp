@@ -9,6 +9,7 @@
 #include <new>
 
 #include "../core/random_problem.hpp"
+#include "other_model.hpp"
 #include "rhec/core/receding_horizon_estimation.hpp"
 #include "rhec/core/riccati.hpp"
 #include "rhec/core/shift.hpp"
@@ -127,26 +128,14 @@ TEST(GnRti, PreparesControlForAnotherInitialState) {
 }
 
 /// Asks another model, and once in a while gets no number.
-class UnsureModel final : public Model {
+class UnsureModel final : public testing::OtherModel {
  public:
-  explicit UnsureModel(std::shared_ptr<const Model> model) : model_(std::move(model)) {}
-  const ModelDescription& description() const noexcept override { return model_->description(); }
-  void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
-  void observe(const Nodes& request) const noexcept override { model_->observe(request); }
+  using OtherModel::OtherModel;
   void integrate_rows(const IntervalRows& request) const noexcept override {
-    model_->integrate_rows(request);
+    OtherModel::integrate_rows(request);
     if (calls_until_nan-- == 0) request.next_states[0] = std::numeric_limits<double>::quiet_NaN();
   }
-  void observe_rows(const NodeRows& request) const noexcept override { model_->observe_rows(request); }
-  std::size_t rows_scratch(int count) const noexcept override { return model_->rows_scratch(count); }
-  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
-    model_->rates(x, u, p, dxdt);
-  }
-  bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   mutable int calls_until_nan = -1;
-
- private:
-  std::shared_ptr<const Model> model_;
 };
 
 void expect_same_bits(const Ocp& ocp, const Iterate& a, const Iterate& b, const std::string& where) {

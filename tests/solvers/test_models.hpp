@@ -1,9 +1,6 @@
 #pragma once
 
-#include <memory>
-#include <utility>
-
-#include "rhec/core/model.hpp"
+#include "other_model.hpp"
 
 namespace rhec::testing {
 
@@ -21,19 +18,10 @@ struct Integrator {
 };
 
 /// Another model without its second derivatives.
-class WithoutSecondDerivatives final : public Model {
+class WithoutSecondDerivatives final : public OtherModel {
  public:
-  explicit WithoutSecondDerivatives(std::shared_ptr<const Model> model) : model_(std::move(model)) {}
-  const ModelDescription& description() const noexcept override { return model_->description(); }
-  void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
-  void observe(const Nodes& request) const noexcept override { model_->observe(request); }
-  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
-    model_->rates(x, u, p, dxdt);
-  }
+  using OtherModel::OtherModel;
   bool has_second_derivatives() const noexcept override { return false; }
-
- private:
-  std::shared_ptr<const Model> model_;
 };
 
 }  // namespace rhec::testing

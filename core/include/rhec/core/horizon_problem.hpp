@@ -44,6 +44,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   std::size_t scratch_size() const noexcept override;
   void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
   void remember_in(StageQp& qp) const override;
+  bool is_made_at(const Iterate& point, const StageQp& qp) const noexcept override;
 
   double evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
                          std::span<double> scratch) const noexcept override;
@@ -137,6 +138,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   virtual bool has_late_bounds() const noexcept = 0;
   /// What was remembered in a program of this model's; null where nothing can be.
   Recollection* recollection_in(StageQp& qp) const noexcept;
+  const Recollection* recollection_in(const StageQp& qp) const noexcept;
 
  private:
   void gather(const Iterate& point, StageRange range, double* x, double* u, double* p, double* p_end) const noexcept;

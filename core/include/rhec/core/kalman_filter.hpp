@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "rhec/core/aligned.hpp"
 #include "rhec/core/model.hpp"
 
 namespace rhec {
@@ -44,6 +45,7 @@ class RHEC_EXPORT KalmanFilter {
   const Noise& noise() const noexcept { return noise_; }
 
  private:
+  void differentiate(double duration) noexcept;
   void take_output(int output, double measured, double variance) noexcept;
   void make_symmetric() noexcept;
   void clip() noexcept;
@@ -52,6 +54,7 @@ class RHEC_EXPORT KalmanFilter {
   Noise noise_;
   int substeps_, nx_, nu_, np_, ny_;
   std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
+  AlignedDoubles row_, next_row_, jacobian_rows_, scratch_;  ///< for Model::integrate_rows
   Eigen::MatrixXd work_, next_covariance_;
   Eigen::VectorXd gain_, image_, zeros_, correction_;
 };
