@@ -254,11 +254,13 @@ void HorizonProblem::fill_stages(StageRange range, const Iterate& point, Hessian
   const bool has_channel_rows = known && has_structure(qp, *known);
   fill_sizes(range, qp);
   Dynamics how{hessian, has_channel_rows, nullptr};
+  // Memory that is not for this model's programs must not take this one for its own.
+  if (!known) qp.change();
   if (known) {
     known->forget();
     if (range.first == 0 && range.last == intervals_) {
       remember(point, qp, *known);
-      known->has_curvature = hessian == Hessian::exact && keeps_curvature();
+      known->has_curvature = hessian == Hessian::exact && keeps_curvature() && intervals_ > 0;
       if (known->has_curvature) {
         look_ahead(*known);
         how.ahead = known;

@@ -9,6 +9,7 @@
 #include "kernels/program_kernels.hpp"
 #include "recollection.hpp"
 #include "rhec/core/horizon_problem.hpp"
+#include "rhec/core/padded.hpp"
 
 namespace rhec {
 
@@ -37,13 +38,14 @@ void Recollection::move_outputs(int steps) noexcept {
 
 void HorizonProblem::foresee_interval(int i, Iterate& point) noexcept {
   gather_rows(point, {i, i}, foreseen_.z.data());
-  foreseen_.duration = durations_[i];
+  // With a ramp, derivatives are by both its ends: `prepare` makes no use of those.
+  foreseen_.duration = any_ramp_ ? 0.0 : durations_[i];
   IntervalRows request;
   request.count = 1;
   request.z = foreseen_.z.data();
   request.z_step = row_;
   request.ramp = any_ramp_;
-  request.durations = &foreseen_.duration;
+  request.durations = &durations_[i];
   request.substeps = substeps_;
   request.next_states = foreseen_.next.data();
   request.next_step = row_;
@@ -81,11 +83,17 @@ auto* find_recollection(Program& qp, const std::shared_ptr<const Model>& model, 
 }  // namespace
 
 Recollection* HorizonProblem::recollection_in(StageQp& qp) const noexcept {
-  return find_recollection(qp, model_, capacity_);
+  Recollection* known = find_recollection(qp, model_, capacity_);
+  if (known && known->of != identity_) {
+    known->forget();
+    known->of = identity_;
+  }
+  return known;
 }
 
 const Recollection* HorizonProblem::recollection_in(const StageQp& qp) const noexcept {
-  return find_recollection(qp, model_, capacity_);
+  const Recollection* known = find_recollection(qp, model_, capacity_);
+  return known && known->of == identity_ ? known : nullptr;
 }
 
 bool HorizonProblem::is_made_at(const Iterate& point, const StageQp& qp) const noexcept {
@@ -118,7 +126,8 @@ void HorizonProblem::remember(const Iterate& point, const StageQp& qp, Recollect
 
 void HorizonProblem::take_foreseen(int i, const Iterate& point, StageQp& qp) const noexcept {
   std::copy_n(foreseen_.next.data(), nx_, qp.b(i));
-  for (int r = 0; r < nx_; ++r) std::copy_n(foreseen_.jacobian.data() + r * row_, row_, qp.F(i) + r * stride_);
+  for (int r = 0; r < nx_; ++r)
+    std::copy_n(foreseen_.jacobian.data() + r * row_, padded(nx_ + np_ + nu_), qp.F(i) + r * stride_);
   complete_dynamics({i, i}, point, false, qp);
   if (control_counts_[i] > nu_) place_started_channels(i, Hessian::gauss_newton, qp);
 }

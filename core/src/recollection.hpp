@@ -14,6 +14,7 @@ namespace rhec {
 /// one sample to the next most rows of the point are those of before, a stage earlier.
 struct Recollection {
   std::shared_ptr<const Model> model;  ///< that was asked; others are not remembered
+  std::shared_ptr<const char> of;      ///< whose problem's
   unsigned changes = 0;                ///< of the program, when it was made
   int substeps = 1;
   int intervals = -1;  ///< of the linearisation; -1: nothing is remembered

@@ -259,7 +259,8 @@ RheProblem::Observed RheProblem::observe(StageRange range, const Iterate& point,
     request.scratch = room;
     model().observe_rows(request);
   };
-  if (!known || known->intervals < 0) {
+  // A controller's memory has no room for outputs.
+  if (!known || known->intervals < 0 || known->output_size == 0) {
     ask(range.first, range.last - range.first + 1, outputs, jacobians);
     return {outputs, jacobians};
   }

@@ -261,6 +261,75 @@ TEST(ProgramMemory, IsThatOfOneModel) {
   other.refresh(point, remembering, scratch);
   other.linearise(all_stages(other), point, Hessian::gauss_newton, plain, scratch);
   expect_same(remembering, plain, "of another model");
+  // And the first one's has been written over.
+  problem->prepare(point, Hessian::gauss_newton, remembering, scratch);
+  problem->refresh(point, remembering, scratch);
+  problem->linearise(all_stages(*problem), point, Hessian::gauss_newton, plain, scratch);
+  expect_same(remembering, plain, "of the first model");
+}
+
+/// Problems of one capacity in turns, at one point, with the memory of the first.
+void expect_alternating(const std::vector<const HorizonProblem*>& problems, Hessian hessian, const Iterate& point) {
+  std::size_t room = 0;
+  for (const HorizonProblem* problem : problems) room = std::max(room, problem->scratch_size());
+  std::vector<double> scratch(room);
+  StageQp remembering(problems[0]->capacity()), plain(problems[0]->capacity());
+  problems[0]->remember_in(remembering);
+  for (int turn = 0; turn < 3; ++turn) {
+    for (std::size_t k = 0; k < problems.size(); ++k) {
+      const HorizonProblem& problem = *problems[k];
+      ASSERT_EQ(problem.capacity(), plain.capacity());
+      for (const bool judges : {false, true}) {
+        problem.prepare(point, hessian, remembering, scratch);
+        problem.refresh(point, remembering, scratch);
+        problem.linearise(all_stages(problem), point, hessian, plain, scratch);
+        expect_same(remembering, plain, "turn " + std::to_string(turn) + ", problem " + std::to_string(k));
+        if (judges) problem.linearise(all_stages(problem), point, hessian, remembering, scratch);
+      }
+    }
+  }
+}
+
+TEST(ProgramMemory, IsThatOfOneProblem) {
+  const Host host;
+  const auto model = host.make_model("bicycle_slip");
+  const auto make_rhc = [&](double weight) {
+    RandomProblem random(model, 6);
+    RandomProblem::RhcSpec spec;
+    spec.adjust = [weight](RhcProblem::Setup& setup, const RandomProblem::Drive&) { setup.state_weights[0] *= weight; };
+    return random.rhc(spec);
+  };
+  const auto make_rhe = [&](double lower) {
+    RandomProblem random(model, 6);
+    RandomProblem::RheSpec spec;
+    spec.adjust = [lower](RheProblem::Setup& setup, const RandomProblem::Drive&) {
+      setup.one_block = {0, 1};
+      setup.parameter_lower = {lower, 0.1};
+    };
+    return random.rhe(spec);
+  };
+  const auto light = make_rhc(1.0), heavy = make_rhc(4.0);
+  const auto wide = make_rhe(0.1), narrow = make_rhe(0.2);
+  Iterate point = RandomProblem::cold_start(*light);
+  for (int i = 0; i <= light->intervals(); ++i) point.costate(i)[2] = 0.1 * i;
+  for (const Hessian hessian : {Hessian::gauss_newton, Hessian::exact}) {
+    expect_alternating({light.get(), heavy.get()}, hessian, point);
+    expect_alternating({wide.get(), narrow.get()}, hessian, point);
+    // A controller lends no room for outputs, an estimator no costs of control.
+    expect_alternating({light.get(), wide.get()}, hessian, point);
+    expect_alternating({wide.get(), heavy.get()}, hessian, point);
+  }
+}
+
+TEST(ProgramMemory, OfAHorizonWithoutIntervals) {
+  const Host host;
+  RandomProblem random(host.make_model("bicycle_slip"), 7);
+  const auto problem = random.rhc({});
+  Iterate point = RandomProblem::cold_start(*problem);
+  problem->set_intervals(0);
+  std::vector<double> scratch(problem->scratch_size());
+  problem->finish(scratch);
+  expect_alternating({problem.get()}, Hessian::exact, point);
 }
 
 }  // namespace

@@ -136,7 +136,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   virtual std::size_t cost_scratch_size() const noexcept = 0;
   /// Whether bounds are data that may come between `prepare` and `refresh`.
   virtual bool has_late_bounds() const noexcept = 0;
-  /// What was remembered in a program of this model's; null where nothing can be.
+  /// What was remembered in a program that has memory for this model; null where it has not. What another problem left
+  /// there is forgotten.
   Recollection* recollection_in(StageQp& qp) const noexcept;
   const Recollection* recollection_in(const StageQp& qp) const noexcept;
 
@@ -168,6 +169,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   void fill_bounds(const Iterate& point, StageRange range, StageQp& qp) const noexcept;
 
   std::shared_ptr<const Model> model_;
+  /// Of this problem and its copies alone: all that was set up once, such as weights, is the same in them.
+  std::shared_ptr<const char> identity_ = std::make_shared<const char>();
   Capacity capacity_;
   int nx_, nu_, np_, channels_, substeps_, stride_ = 0, row_ = 0, intervals_ = 0;
   bool any_ramp_ = false;
