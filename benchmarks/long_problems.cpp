@@ -96,7 +96,7 @@ Sequence long_estimation(const Host& host, int intervals, int samples, int block
     problem->arrival_information.setIdentity();
     problem->arrival_information *= 10.0;
     for (int i = 0; i <= intervals; ++i) std::copy_n(outputs[first + i].data(), 3, problem->output(i));
-    std::copy_n(inputs[first].data(), 2 * intervals, problem->measured_input(0));
+    for (int i = 0; i < intervals; ++i) std::copy_n(inputs[first + i].data(), 2, problem->measured_input(i));
     std::vector<std::uint8_t> begins(intervals, 0), never(intervals, 0);
     for (int i = 0; i < intervals; ++i) {
       problem->set_duration(i, step);

@@ -30,21 +30,21 @@ void RtiLoop::restart() noexcept {
 }
 
 const Report& RtiLoop::step() noexcept {
-  const auto& [sample, steps] = sequence_->samples[next_];
+  const Sequence::Sample& sample = sequence_->samples[next_];
   times_.begin = Ticks::now();
   if (next_ == 0) {
-    set_known(*sample, *problem_);
+    set_known(sample, *problem_);
     point_ = sequence_->start;
     times_.prepared = Ticks::now();
   } else {
-    shifter_.take(*problem_, point_);
-    set_known(*sample, *problem_);
-    shifter_.apply(steps, *problem_, point_);
+    shifter_.take(*problem_, std::move(point_));
+    set_known(sample, *problem_);
+    shifter_.apply(sample.steps, *problem_, point_);
     solver_->prepare(*problem_, point_);
     times_.prepared = Ticks::now();
     if (keep_guess) guess_ = point_;
   }
-  set_newest(*sample, *problem_, scratch_);
+  set_newest(*sample.problem, *problem_, scratch_);
   report_ = solver_->feedback(*problem_, point_, Clock::time_point::max());
   times_.answered = Ticks::now();
   solver_->finish(*problem_, point_, report_);

@@ -25,7 +25,9 @@ class RtiLoop {
 
   struct Times {
     Ticks::Count begin, prepared, answered, end;
-    double total_us() const noexcept { return Ticks::microseconds(begin, end); }
+    double total_us() const noexcept {
+      return Ticks::microseconds(begin, prepared) + feedback_us() + Ticks::microseconds(answered, end);
+    }
     /// From the newest data to the new point, which is not judged yet.
     double feedback_us() const noexcept { return Ticks::microseconds(prepared, answered); }
   };

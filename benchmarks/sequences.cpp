@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -49,15 +50,17 @@ void set_blocks(const RheProblem& from, RheProblem& to) noexcept {
   }
 }
 
-void set_known(const RheProblem& from, RheProblem& to) noexcept {
+void set_known(const RheProblem& from, bool slides, RheProblem& to) noexcept {
   const int N = from.intervals(), ny = from.model().output_count(), nu = from.model().input_count();
   to.set_intervals(N);
   to.arrival_mean = from.arrival_mean;
   to.arrival_information = from.arrival_information;
-  for (int i = 0; i < N; ++i)
-    for (int j = 0; j < ny; ++j) to.output(i)[j] = from.output(i)[j];
-  std::copy_n(from.measured_input(0), N * nu, to.measured_input(0));
-  for (int i = 0; i < N; ++i) to.set_duration(i, from.duration(i));
+  if (slides) to.drop_first_interval();
+  for (int i = slides ? N - 1 : 0; i < N; ++i) {
+    std::copy_n(from.output(i), ny, to.output(i));
+    std::copy_n(from.measured_input(i), nu, to.measured_input(i));
+    to.set_duration(i, from.duration(i));
+  }
   set_blocks(from, to);
   to.finish();
   // What the newest node will say stays open; that it will say something is known.
@@ -79,11 +82,29 @@ void set_newest(const RhcProblem& from, RhcProblem& to, std::span<double> scratc
   to.finish(scratch);
 }
 
+/// See Sequence::Sample.
+bool slides(const HorizonProblem& before, const HorizonProblem& after) {
+  const auto* from = dynamic_cast<const RheProblem*>(&before);
+  const auto* to = dynamic_cast<const RheProblem*>(&after);
+  if (!from || !to || from->intervals() != to->intervals()) return false;
+  const int N = from->intervals(), ny = from->model().output_count(), nu = from->model().input_count();
+  const auto same = [](const double* a, const double* b, int count) {
+    return std::memcmp(a, b, static_cast<std::size_t>(count) * sizeof(double)) == 0;
+  };
+  for (int i = 0; i < N; ++i)
+    if (!same(from->output(i + 1), to->output(i), ny)) return false;
+  for (int i = 0; i + 1 < N; ++i)
+    if (!same(from->measured_input(i + 1), to->measured_input(i), nu) || from->duration(i + 1) != to->duration(i))
+      return false;
+  return true;
+}
+
 }  // namespace
 
-void set_known(const HorizonProblem& from, HorizonProblem& to) noexcept {
+void set_known(const Sequence::Sample& sample, HorizonProblem& to) noexcept {
+  const HorizonProblem& from = *sample.problem;
   if (from.kind() == OcpKind::rhe) {
-    set_known(static_cast<const RheProblem&>(from), static_cast<RheProblem&>(to));
+    set_known(static_cast<const RheProblem&>(from), sample.slides, static_cast<RheProblem&>(to));
     return;
   }
   // A controller that looks ahead keeps its references until it knows where the vehicle is.
@@ -112,7 +133,9 @@ Sequence sequence_of(const std::vector<ProblemRecord>& records, const std::share
   std::int64_t before = records.front().first_interval();
   for (const ProblemRecord& record : records) {
     const std::int64_t first = record.first_interval();
-    made.samples.push_back({sim::build(record, model, longest), static_cast<int>(first - before)});
+    Sequence::Sample next{sim::build(record, model, longest), static_cast<int>(first - before)};
+    if (!made.samples.empty()) next.slides = next.steps == 1 && slides(*made.samples.back().problem, *next.problem);
+    made.samples.push_back(std::move(next));
     before = first;
   }
   made.workspace = sim::build(records.front(), model, longest, sim::one_block_parameters(records, *model));

@@ -19,6 +19,8 @@ struct Sequence {
   struct Sample {
     std::unique_ptr<const HorizonProblem> problem;
     int steps = 0;  ///< intervals that its window starts later than the one before
+    /// Its window is an estimator's of the same length an interval later, with the same data where both have any.
+    bool slides = false;
   };
   std::vector<Sample> samples = {};
   std::unique_ptr<HorizonProblem> workspace = {};  ///< with room for any of the samples
@@ -50,9 +52,9 @@ std::vector<Sequence> drive(const Host& host, const Drive& how);
 /// parameters on a path that is easy, and on one whose turns are as tight as the steering allows.
 const std::vector<Drive>& usual_drives();
 
-/// Copies the data of a problem into another one of the same set-up, in place, as a loop would set them: all but what
-/// the newest sample brings ...
-void set_known(const HorizonProblem& from, HorizonProblem& to) noexcept;
+/// Copies the data of a sample into a problem of the same set-up, in place, as a loop would set them: all but what the
+/// newest measurement brings ...
+void set_known(const Sequence::Sample& sample, HorizonProblem& to) noexcept;
 /// ... and that.
 void set_newest(const HorizonProblem& from, HorizonProblem& to, std::span<double> scratch) noexcept;
 

@@ -152,7 +152,9 @@ SmoothedRun FullInformationEstimation::estimate(const NodeLog& log, Clock::time_
 
   Iterate point = guess_from(log, problem);
   SmoothedRun run;
+  const auto start = Clock::now();
   run.report = solver_->solve(problem, point, deadline);
+  run.solve_seconds = 1e-6 * microseconds_since(start);
   run.times.assign(1, 0.0);
   run.inputs.resize(static_cast<std::size_t>(N) * nu);
   run.parameters.resize(static_cast<std::size_t>(N) * np);

@@ -252,14 +252,15 @@ void HorizonProblem::fill_stages(StageRange range, const Iterate& point, Hessian
   const StageRange steps{range.first, std::min(range.last, intervals_ - 1)};
   Recollection* known = recollection_in(qp);
   const bool has_channel_rows = known && has_structure(qp, *known);
-  fill_sizes(range, qp);
-  Dynamics how{hessian, has_channel_rows, nullptr};
   // Memory that is not for this model's programs must not take this one for its own.
   if (!known) qp.change();
+  if (!has_channel_rows) fill_sizes(range, qp);
+  Dynamics how{hessian, has_channel_rows, nullptr};
   if (known) {
+    if (known->changes != qp.changes()) std::fill(known->is_clean.begin(), known->is_clean.end(), std::uint8_t{0});
     known->forget();
     if (range.first == 0 && range.last == intervals_) {
-      remember(point, qp, *known);
+      remember(point, 0, qp, *known);
       known->has_curvature = hessian == Hessian::exact && keeps_curvature() && intervals_ > 0;
       if (known->has_curvature) {
         look_ahead(*known);
@@ -272,12 +273,17 @@ void HorizonProblem::fill_stages(StageRange range, const Iterate& point, Hessian
 }
 
 void HorizonProblem::fill_sizes(StageRange range, StageQp& qp) const noexcept {
-  if (range.first == 0) {
-    qp.set_intervals(intervals_);
-    qp.initial_state_is_given = initial_state() != nullptr;
+  qp.set_intervals(intervals_);
+  qp.initial_state_is_given = initial_state() != nullptr;
+  const int free_count = static_cast<int>(free_inputs_.size());
+  for (int i = range.first; i <= range.last; ++i) {
+    if (i == intervals_) {
+      qp.set_sizes(i, capacity_.states, 0);
+    } else {
+      const bool any_starts = control_counts_[i] > free_count;
+      qp.set_sizes(i, capacity_.states, control_counts_[i], any_starts ? 0 : channels_);
+    }
   }
-  for (int i = range.first; i <= range.last; ++i)
-    qp.set_sizes(i, capacity_.states, i < intervals_ ? control_counts_[i] : 0);
 }
 
 /// z = [x; p; u (; p_end)] of each interval, as `Model::integrate_rows` takes it.
@@ -376,6 +382,7 @@ void HorizonProblem::complete_dynamics(StageRange steps, const Iterate& point, b
   dynamics.F = qp.F(0);
   dynamics.b = qp.b(0);
   dynamics.has_channel_rows = has_channel_rows;
+  dynamics.any_start = any_start_;
   program_kernels().complete_dynamics(dynamics);
 }
 

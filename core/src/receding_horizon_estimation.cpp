@@ -170,9 +170,9 @@ void RecedingHorizonEstimation::slide_arrival() noexcept {
 void RecedingHorizonEstimation::advance_window(double duration, const double* inputs, const double* outputs) noexcept {
   const bool full = window_.intervals == setup_.problem.max_intervals;
   const bool was_empty = window_.intervals == 0;
+  if (full) slide_arrival();
   if (!was_empty) shifter_.take(problem_, point_);
   if (full) {
-    slide_arrival();
     problem_.drop_first_interval();
     ++window_.first;
   } else {

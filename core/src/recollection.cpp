@@ -16,14 +16,18 @@ namespace rhec {
 void Recollection::forget() noexcept {
   intervals = -1;
   looks_ahead = has_curvature = false;
-  std::fill(observed.begin(), observed.end(), 0);
+  std::fill(observed.begin(), observed.end(), std::uint8_t{0});
 }
 
 void Recollection::move_outputs(int steps) noexcept {
   if (output_size == 0) return;
   const int kept = intervals + 1 - steps;
-  for (int i = 0; i < kept; ++i) observed[i] = same[i] != 0 && observed[i + steps] != 0;
-  std::fill(observed.begin() + kept, observed.end(), 0);
+  for (int i = 0; i < kept; ++i) {
+    observed[i] = same[i] != 0 && observed[i + steps] != 0;
+    is_clean[i] = is_clean[i + steps];
+  }
+  for (auto* marks : {&observed, &is_clean}) std::fill(marks->begin() + kept, marks->end(), std::uint8_t{0});
+  if (steps == 0) return;
   const int slots = 2 * static_cast<int>(observed.size());
   if (first + steps + static_cast<int>(observed.size()) <= slots) {
     first += steps;
@@ -67,7 +71,7 @@ void HorizonProblem::remember_in(StageQp& qp) const {
   known.ahead.assign(static_cast<std::size_t>(capacity_.states + capacity_.controls) * stride_, 0.0);
   known.durations.assign(nodes, 0.0);
   known.begins.assign(nodes * channels_, 0);
-  for (auto* marks : {&known.observed, &known.same, &known.same_costate}) marks->assign(nodes, 0);
+  for (auto* marks : {&known.observed, &known.same, &known.same_costate, &known.is_clean}) marks->assign(nodes, 0);
   qp.memory = std::move(known);
 }
 
@@ -86,6 +90,7 @@ Recollection* HorizonProblem::recollection_in(StageQp& qp) const noexcept {
   Recollection* known = find_recollection(qp, model_, capacity_);
   if (known && known->of != identity_) {
     known->forget();
+    std::fill(known->is_clean.begin(), known->is_clean.end(), std::uint8_t{0});
     known->of = identity_;
   }
   return known;
@@ -112,14 +117,15 @@ bool HorizonProblem::has_structure(const StageQp& qp, const Recollection& known)
                     begins_.begin());
 }
 
-/// That F and b were made at this point.
-void HorizonProblem::remember(const Iterate& point, const StageQp& qp, Recollection& known) const noexcept {
+/// That F and b were made at this point, whose first rows are known.
+void HorizonProblem::remember(const Iterate& point, int first, const StageQp& qp, Recollection& known) const noexcept {
   known.changes = qp.changes();
   known.substeps = substeps_;
   known.intervals = intervals_;
-  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(intervals_ + 1) * stride_;
-  std::copy_n(point.row(0), entries, known.rows.data());
-  if (keeps_curvature()) std::copy_n(point.costate(0), entries, known.costates.data());
+  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(intervals_ + 1 - first) * stride_;
+  std::copy_n(point.row(first), entries, row(known.rows, first, stride_));
+  if (keeps_curvature())
+    std::copy_n(point.costate(0), static_cast<std::ptrdiff_t>(intervals_ + 1) * stride_, known.costates.data());
   std::copy_n(durations_.data(), intervals_, known.durations.data());
   std::copy_n(begins_.data(), static_cast<std::ptrdiff_t>(intervals_) * channels_, known.begins.data());
 }
@@ -159,12 +165,13 @@ bool HorizonProblem::move_along(const Iterate& point, Hessian hessian, StageQp& 
   const int end = known.intervals - steps, count = std::min(intervals_, known.looks_ahead ? end + 1 : end);
   std::uint8_t* same = known.same.data();
   std::fill_n(same, intervals_ + 1, 0);
-  program_kernels().match(point.row(0), row(known.rows, steps, stride_), count, stride_, capacity_.states, same);
+  program_kernels().match(point.row(0), row(known.rows, steps, stride_), known.rows.data(), count, stride_,
+                          capacity_.states, same);
   if (count <= end) same[count] = is_state_at(count, count + steps, capacity_.states);
   std::uint8_t* same_costate = known.same_costate.data();
   if (is_exact)
-    program_kernels().match(point.costate(1), row(known.costates, steps + 1, stride_), count, stride_, nx_,
-                            same_costate);
+    program_kernels().match(point.costate(1), row(known.costates, steps + 1, stride_), row(known.costates, 1, stride_),
+                            count, stride_, nx_, same_costate);
   // Of the interval ahead, nobody has seen the next state.
   const auto is_known = [&](int i) {
     const std::uint8_t *begins = row(begins_, i, channels_), *known_begins = row(known.begins, i + steps, channels_);
@@ -182,8 +189,13 @@ bool HorizonProblem::move_along(const Iterate& point, Hessian hessian, StageQp& 
   // As it was made.
   if (steps == 0 && unknown_count == 0 && intervals_ == known.intervals && !has_late_bounds()) return true;
   const bool was_ahead = end < intervals_ && is_known(end);
-  if (steps > 0) qp.drop_first(steps, is_exact);
-  fill_sizes({0, intervals_}, qp);
+  if (steps > 0) qp.drop_first(steps);
+  // The last node stays the last one.
+  if (steps > 0 && is_exact) std::copy_n(qp.H(end), known.ahead.size(), qp.H(known.intervals));
+  // Stages that are known have their sizes.
+  fill_sizes({intervals_, intervals_}, qp);
+  for (int k = 0; k < unknown_count; ++k) fill_sizes({unknown[k], unknown[k]}, qp);
+  if (was_ahead) fill_sizes({end, end}, qp);
   if (was_ahead) complete_dynamics({end, end}, point, false, qp);
   if (was_ahead && is_exact) {
     std::copy(known.ahead.begin(), known.ahead.end(), qp.H(end));
@@ -203,7 +215,7 @@ bool HorizonProblem::move_along(const Iterate& point, Hessian hessian, StageQp& 
     add_cost({intervals_, intervals_}, point, hessian, Parts::matrices, qp, scratch);
   fill_bounds(point, {0, intervals_}, qp);
   known.move_outputs(steps);
-  remember(point, qp, known);
+  remember(point, count, qp, known);
   known.looks_ahead = false;
   known.has_curvature = is_exact;
   return true;

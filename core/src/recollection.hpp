@@ -29,6 +29,7 @@ struct Recollection {
   AlignedDoubles outputs, output_jacobians;                  ///< twice the nodes, of which node 0 is number `first`
   int first = 0;
   std::vector<std::uint8_t> observed;  ///< nodes whose outputs are those at `rows`
+  std::vector<std::uint8_t> is_clean;  ///< stages where all of H that measurements do not write to is zero
   /// Of nodes: 2 where the whole row was found again, 1 where the state was; of intervals, the same of their costates.
   std::vector<std::uint8_t> same, same_costate;
 
@@ -37,7 +38,7 @@ struct Recollection {
     return output_jacobians.data() + (first + node) * output_jacobian_size;
   }
   void forget() noexcept;
-  /// Outputs of nodes that are now `steps` earlier, as far as their rows are the same.
+  /// What is kept of nodes that are now `steps` earlier: of outputs, as far as the states are the same.
   void move_outputs(int steps) noexcept;
 };
 

@@ -68,7 +68,9 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   const double missing = std::numeric_limits<double>::quiet_NaN();
   has_block_bounds_.assign(nodes, 0);
   outputs_.assign(nodes * output_row_, missing);
-  measured_inputs_.assign(nodes * nu(), missing);
+  measured_inputs_.assign(nodes * stride(), missing);
+  input_weights_.assign(stride(), 0.0);
+  std::copy(setup_.input_weights.begin(), setup_.input_weights.end(), input_weights_.begin() + capacity().states);
   link_information_.assign(nodes * np(), 0.0);
   arrival_mean = Eigen::VectorXd::Zero(nx() + np());
   arrival_information = Eigen::MatrixXd::Zero(nx() + np(), nx() + np());
@@ -78,8 +80,9 @@ void RheProblem::set_blocks(int parameter, const std::uint8_t* begins, Transitio
   const bool is_one_block = is_one_block_[parameter] != 0;
   const bool ramp = transition == Transition::ramp && !is_one_block;
   set_ramp(parameter, ramp);
+  if (is_one_block) return;  // no interval was ever marked
   // Node 0 carries the first block's value, so the first interval has nothing to decide, unless a ramp starts there.
-  for (int i = 0; i < intervals(); ++i) set_begins(i, parameter, !is_one_block && begins[i] && (i > 0 || ramp));
+  for (int i = 0; i < intervals(); ++i) set_begins(i, parameter, begins[i] && (i > 0 || ramp));
   for (int i = 0; i < intervals(); ++i) link_information_[i * np() + parameter] = 0.0;
 }
 
@@ -128,7 +131,7 @@ void RheProblem::write_bounds(int i) noexcept {
 void RheProblem::drop_first_interval() noexcept {
   for (int i = 0; i + 1 < intervals(); ++i) set_duration(i, duration(i + 1));
   std::copy(outputs_.begin() + output_row_, outputs_.end(), outputs_.begin());
-  std::copy(measured_inputs_.begin() + nu(), measured_inputs_.end(), measured_inputs_.begin());
+  std::copy(measured_inputs_.begin() + stride(), measured_inputs_.end(), measured_inputs_.begin());
 }
 
 std::size_t RheProblem::cost_scratch_size() const noexcept {
@@ -206,16 +209,28 @@ double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<dou
 double RheProblem::add_cost(StageRange range, const Iterate& point, Hessian hessian, Parts parts, StageQp& qp,
                             std::span<double> scratch) const noexcept {
   const bool matrices = parts != Parts::vectors, vectors = parts != Parts::matrices;
-  double total = write_measurements(range, point, hessian, cost_view(parts, hessian, qp), recollection_in(qp), scratch);
+  Recollection* known = recollection_in(qp);
+  // A controller's memory has no room for outputs.
+  if (known && (known->intervals < 0 || known->output_size == 0 || known->changes != qp.changes())) {
+    for (int i = range.first; i <= range.last; ++i) known->is_clean[i] = 0;
+    known = nullptr;
+  }
+  double total = write_measurements(range, point, hessian, cost_view(parts, hessian, qp), known, scratch);
   if (range.first == 0) {
+    if (known && matrices) known->is_clean[0] = 0;
     if (vectors) total += arrival_term(point, qp.h(0));
     const int n = nx() + np();
     for (int c = 0; matrices && c < n; ++c)
       for (int r = 0; r < n; ++r) qp.H(0)[c * stride() + r] += 2.0 * arrival_information(r, c);
   }
   if (any_start())
-    for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
-      if (control_count(i) > nu()) total += links(i, point, matrices ? qp.H(i) : nullptr, vectors ? qp.h(i) : nullptr);
+    for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i) {
+      const double* information = link_information_.data() + static_cast<std::ptrdiff_t>(i) * np();
+      const auto is_link = [](double value) { return value != 0.0; };
+      if (control_count(i) == nu() || std::none_of(information, information + np(), is_link)) continue;
+      if (known && matrices) known->is_clean[i] = 0;
+      total += links(i, point, matrices ? qp.H(i) : nullptr, vectors ? qp.h(i) : nullptr);
+    }
   return total;
 }
 
@@ -259,8 +274,7 @@ RheProblem::Observed RheProblem::observe(StageRange range, const Iterate& point,
     request.scratch = room;
     model().observe_rows(request);
   };
-  // A controller's memory has no room for outputs.
-  if (!known || known->intervals < 0 || known->output_size == 0) {
+  if (!known) {
     ask(range.first, range.last - range.first + 1, outputs, jacobians);
     return {outputs, jacobians};
   }
@@ -280,8 +294,10 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
   double *jacobian_rows = memory.take(count * ny_ * padded(nx())), *output_rows = memory.take(count * output_row_),
          *room = memory.take(std::ptrdiff_t{2} * output_row_);
   const auto [predicted, jacobians] = observe(range, point, known, output_rows, jacobian_rows, memory.rest());
-  if (!setup_.robust.empty() || hessian == Hessian::exact)
+  if (!setup_.robust.empty() || hessian == Hessian::exact) {
+    for (int i = range.first; known && i <= range.last; ++i) known->is_clean[i] = 0;
     return write_bent_measurements(range, point, hessian, view, predicted, jacobians, memory.rest());
+  }
   MeasurementView measured{};
   measured.vehicle_states = nx();
   measured.output_count = ny_;
@@ -291,12 +307,16 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
   measured.predicted = predicted;
   measured.jacobians = jacobians;
   measured.output_weights = output_weights_.data();
-  measured.input_weights = setup_.input_weights.data();
+  measured.input_weights = input_weights_.data();
   measured.turns = output_turns_.data();
   measured.inverse_turns = output_inverse_turns_.data();
   measured.values = point.row(0);
   measured.room = room;
-  return program_kernels().write_measurements(view, measured, range.first, range.last);
+  if (known) measured.is_clean = known->is_clean.data();
+  const double total = program_kernels().write_measurements(view, measured, range.first, range.last);
+  // Of the last node, only the rows of states were cleared.
+  for (int i = range.first; known && view.H && i <= range.last; ++i) known->is_clean[i] = i < intervals();
+  return total;
 }
 
 /// The same with losses that bend, or with the curvature of the outputs.

@@ -54,7 +54,7 @@ Riccati::Riccati(const Capacity& capacity)
   for (auto* v : {&drift_, &g_, &p_}) v->assign(stages * row, 0.0);
   state_counts_.assign(stages, 0);
   control_counts_.assign(stages, 0);
-  for (auto* v : {&is_special_, &fixes_control_}) v->assign(stages, 0);
+  for (auto* v : {&is_special_, &fixes_control_, &has_gradient_}) v->assign(stages, 0);
   reductions_.resize(stages);
   for (auto* v : {&G_, &factor_, &T_}) v->assign(stages * wide * wide, 0.0);
   for (auto* v : {&L_, &K_, &Y_}) v->assign(stages * wide * ns_, 0.0);
@@ -84,6 +84,7 @@ RiccatiView Riccati::view_of(const StageQp& qp, const std::int8_t* sides) noexce
   view.stride = stride_;
   view.state_counts = state_counts_.data();
   view.control_counts = control_counts_.data();
+  view.carried_counts = qp.carried_counts();
   view.F = qp.F(0);
   view.H = qp.H(0);
   view.h = qp.h(0);
@@ -116,11 +117,9 @@ void Riccati::factor(const StageQp& qp, const ActiveSet& active, const double* d
     for (int i = 0; i < N; ++i) is_special_[i] = holds_any(active.state(i + 1), ns_);
   RiccatiView view = view_of(qp, active.row(0));
   view.diagonal = diagonal;
-  for (int c = 0; c < n; ++c) {
-    double* row = P(N) + c * stride_;
-    for (int k = 0; k < stride_; ++k) row[k] = k < n ? qp.H(N)[c * stride_ + k] : 0.0;
-    if (diagonal) row[c] += diagonal[static_cast<std::ptrdiff_t>(N) * stride_ + c];
-  }
+  std::copy_n(qp.H(N), n * stride_, P(N));
+  for (int c = 0; diagonal && c < n; ++c)
+    P(N)[c * stride_ + c] += diagonal[static_cast<std::ptrdiff_t>(N) * stride_ + c];
   int left = 0;
   for (int i = kernels_->factor(view, N - 1, definite_tolerance); i >= 0;
        i = kernels_->factor(view, i - 1, definite_tolerance)) {
@@ -150,7 +149,7 @@ Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iter
   view.costates = step.costate(0);
   view.bounds = step.bound_row(0);
   const double* last = h + static_cast<std::ptrdiff_t>(N) * stride_;
-  for (int k = 0; k < stride_; ++k) p(N)[k] = k < qp.states(N) ? last[k] : 0.0;
+  std::copy_n(last, stride_, p(N));
   for (int i = kernels_->solve_backward(view, N - 1); i >= 0; i = kernels_->solve_backward(view, i - 1)) {
     write_active_bounds(qp, active, i + 1);
     if (!solve_special_backward(qp, active, h, i)) return Outcome::inconsistent;
@@ -168,41 +167,42 @@ Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iter
 Riccati::Responses::Responses(const Capacity& capacity) {
   for (auto* v : {&values, &costates})
     v->assign(static_cast<std::size_t>(capacity.intervals + 1) * capacity.row() * size, 0.0);
+  control_counts.assign(capacity.intervals, 0);
 }
 
 bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
-                      bool with_minimiser, Responses& responses) noexcept {
-  constexpr int size = Responses::size, minimiser = size - 1;
+                      Responses& responses) noexcept {
+  constexpr int size = Responses::size;
   static_assert(size == response_batch);
   const int N = qp.intervals(), n = qp.states(0);
   const auto is_set = [](std::uint8_t flag) { return flag != 0; };
   if (std::any_of(is_special_.data(), is_special_.data() + N, is_set) || reductions_[N].rows > 0) return false;
   double *values = responses.values.data(), *costates = responses.costates.data();
-  std::fill_n(values, static_cast<std::ptrdiff_t>(N + 1) * stride_ * size, 0.0);
+  // What stages do not use stays zero.
+  if (!std::equal(qp.control_counts(), qp.control_counts() + N, responses.control_counts.begin())) {
+    for (auto* v : {&responses.values, &responses.costates}) std::fill(v->begin(), v->end(), 0.0);
+    std::copy_n(qp.control_counts(), N, responses.control_counts.begin());
+  }
   int last = 0;
+  for (int c = 0; c < count; ++c) last = std::max(last, gradients[c].stage);
+  std::fill_n(has_gradient_.data(), N + 1, std::uint8_t{0});
+  const auto clear = [&](int stage) {
+    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(stage) * stride_ * size;
+    std::fill_n(values + first, (ns_ + qp.controls(stage)) * size, 0.0);
+  };
+  for (int i = std::min(last + 1, N); i <= N; ++i) clear(i);
   for (int c = 0; c < count; ++c) {
     const auto [stage, place] = gradients[c];
+    if (has_gradient_[stage] == 0) clear(stage);
+    has_gradient_[stage] = 1;
     values[(static_cast<std::ptrdiff_t>(stage) * stride_ + place) * size + c] = 1.0;
-    last = std::max(last, stage);
-  }
-  if (with_minimiser) {
-    last = N;
-    for (int j = 0; j < qp.states(N); ++j)
-      values[(static_cast<std::ptrdiff_t>(N) * stride_ + j) * size + minimiser] = qp.q(N)[j];
   }
   const RiccatiView view = view_of(qp, active.row(0));
-  kernels_->respond_backward(view, last, values, with_minimiser);
-  std::fill_n(costates, with_minimiser ? stride_ * size : 0, 0.0);
+  kernels_->respond_backward(view, last, has_gradient_.data(), values);
   if (qp.initial_state_is_given) {
-    const double* s0 = qp.initial_step();
-    if (with_minimiser) {
-      std::copy_n(values, n * size, costates);
-      for (int j = 0; j < n; ++j)
-        for (int l = 0; l < n; ++l) costates[j * size + minimiser] += P(0)[l * stride_ + j] * s0[l];
-    }
+    std::copy_n(values, n * size, costates);
     std::fill_n(values, n * size, 0.0);
-    for (int j = 0; with_minimiser && j < n; ++j) values[j * size + minimiser] = s0[j];
-  } else if (has_initial_inverse_) {
+  } else if (std::fill_n(costates, n * size, 0.0); has_initial_inverse_) {
     kernels_->answer(initial_inverse_.data(), n, stride_, values);
   } else {
     // -(G G')^-1 of the gradients, with the factor's lower triangle.
@@ -223,27 +223,32 @@ bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* g
       scale(j, -1.0 / G[j * width_ + j]);
     }
   }
-  kernels_->respond_forward(view, values, with_minimiser ? costates : nullptr);
+  kernels_->respond_forward(view, values, costates);
   return true;
 }
 
 void Riccati::combine(const StageQp& qp, const ActiveSet& active, const Responses& responses, const double* weights,
                       Iterate& step) noexcept {
-  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(qp.intervals() + 1) * stride_;
-  for (double* rows : {step.row(0), step.costate(0), step.bound_row(0)}) std::fill_n(rows, entries, 0.0);
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(i) * stride_ * Responses::size;
-    kernels_->combine(responses.values.data() + first, weights, step.row(i), ns_ + qp.controls(i));
-    kernels_->combine(responses.costates.data() + first, weights, step.costate(i), qp.states(i));
-  }
-  for (int i = 0; i < qp.intervals(); ++i) {
-    for (int j = 0; j < qp.controls(i); ++j) {
-      const std::int8_t side = active.control(i)[j];
-      if (side == 0) continue;
-      step.control_bound(i)[j] = step.control(i)[j];
-      step.control(i)[j] = (side < 0 ? qp.control_lower(i) : qp.control_upper(i))[j];
+  const long entries = static_cast<long>(qp.intervals() + 1) * stride_;
+  const auto each_fixed = [&](const auto& function) {
+    for (int i = 0; i < qp.intervals(); ++i) {
+      if (fixes_control_[i] == 0) continue;
+      for (int j = 0; j < qp.controls(i); ++j)
+        if (const std::int8_t side = active.control(i)[j]; side != 0) function(i, j, side);
     }
-  }
+  };
+  // There the responses are those of multipliers.
+  each_fixed([&](int i, int j, std::int8_t /*side*/) { step.control(i)[j] = step.control_bound(i)[j]; });
+  kernels_->combine(responses.values.data(), weights, step.row(0), entries);
+  kernels_->combine(responses.costates.data(), weights, step.costate(0), entries);
+  each_fixed([&](int i, int j, std::int8_t side) {
+    step.control_bound(i)[j] = step.control(i)[j];
+    step.control(i)[j] = (side < 0 ? qp.control_lower(i) : qp.control_upper(i))[j];
+  });
+}
+
+void Riccati::add_values(const Responses& responses, const double* weights, int places, double* sums) const noexcept {
+  kernels_->combine(responses.values.data(), weights, sums, places);
 }
 
 void Riccati::feedback(const StageQp& qp, int i, const double* s, double* w) noexcept {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
@@ -30,11 +31,20 @@ GuessShifter::GuessShifter(const HorizonProblem& like)
       scratch_(like.scratch_size()) {}
 
 void GuessShifter::take(const HorizonProblem& problem, const Iterate& point) noexcept {
-  intervals_ = problem.intervals();
-  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(intervals_ + 1) * kept_.capacity().row();
+  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(problem.intervals() + 1) * kept_.capacity().row();
   std::copy_n(point.row(0), entries, kept_.row(0));
   std::copy_n(point.costate(0), entries, kept_.costate(0));
   std::copy_n(point.bound_row(0), entries, kept_.bound_row(0));
+  take_structure(problem);
+}
+
+void GuessShifter::take(const HorizonProblem& problem, Iterate&& point) noexcept {
+  std::swap(kept_, point);
+  take_structure(problem);
+}
+
+void GuessShifter::take_structure(const HorizonProblem& problem) noexcept {
+  intervals_ = problem.intervals();
   any_start_ = problem.any_start();
   if (!any_start_) {
     std::fill_n(controls_.data(), intervals_ * channels_, -1);

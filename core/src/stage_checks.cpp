@@ -17,6 +17,12 @@ bool mark_bounds(const StageQp& qp, const Iterate& point, double tolerance, std:
   return program_kernels().mark_bounds(view_of(qp, point), tolerance, marks);
 }
 
+ViolatedBounds find_violations(const double* values, const double* least, const double* most, int count,
+                               double* violations) noexcept {
+  const auto [largest, violated] = program_kernels().find_violations(values, least, most, count, violations);
+  return {.largest = largest, .count = violated};
+}
+
 void add_full_step(int intervals, const Iterate& from, const Iterate& step, Iterate& to) noexcept {
   const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(intervals + 1) * from.capacity().row();
   program_kernels().add(from.row(0), step.row(0), to.row(0), count);

@@ -44,7 +44,6 @@ class PlainSqp : public rhec::Solver {
   void reset() noexcept override {}
 
   rhec::Report solve(const rhec::Ocp& ocp, rhec::Iterate& point, rhec::Clock::time_point deadline) noexcept override {
-    const auto start = rhec::Clock::now();
     rhec::Report report;  // of status bad_input
     if (ocp.capacity() == newton_.qp.capacity() && is_sound_start(ocp, point, newton_.merit.scratch)) {
       newton_.best = point;
@@ -53,7 +52,6 @@ class PlainSqp : public rhec::Solver {
       if (report.status != rhec::Status::infeasible) point = newton_.best;
       judge(ocp, point, newton_.qp, newton_.merit.scratch, report);  // the core says what the point is worth
     }
-    report.feedback_us = rhec::microseconds_since(start);
     return report;
   }
 

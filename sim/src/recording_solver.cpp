@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "rhec/core/timed_solver.hpp"
+
 namespace rhec::sim {
 
 RecordingSolver::RecordingSolver(std::shared_ptr<Solver> solver, Callback callback)
@@ -23,6 +25,9 @@ Report RecordingSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point 
 }
 
 Robot with_hooks(Robot robot, const LoopHooks& hooks, std::function<std::int64_t()> step) {
+  robot.wrap_solvers([](OcpKind, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
+    return std::make_shared<TimedSolver>(std::move(solver));
+  });
   if (!hooks.solved) return robot;
   robot.wrap_solvers([solved = hooks.solved, step = std::move(step)](
                          OcpKind, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {

@@ -44,7 +44,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
                                          : Clock::time_point::max();
   const SmoothedRun run = robot.make_smoother().estimate(*nodes, deadline);
   result.smoothed.seconds = Seconds(Clock::now() - start).count();
-  result.solve_seconds = run.report.feedback_us * 1e-6;
+  result.solve_seconds = run.solve_seconds;
   result.report = run.report;
   result.intervals = run.intervals();
   result.has_sigmas = !run.covariances.empty();
@@ -64,7 +64,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
   result.smoothed.counts.estimates = 1;
   result.smoothed.counts.fallbacks = is_usable(run.report.status) ? 0 : 1;
   result.smoothed.unpredicted = result.causal.unpredicted;
-  result.smoothed.solve_us = {run.report.feedback_us};
+  result.smoothed.solve_us = {1e6 * run.solve_seconds};
   for (const LoggedEstimate& causal : result.causal.estimates) {
     LoggedEstimate entry;
     entry.time = causal.time;

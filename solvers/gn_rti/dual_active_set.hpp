@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -21,7 +20,10 @@ namespace rhec::gn_rti {
 /// A change of the set costs no factorisation, in general. Claimed bounds of controls are held inside the Riccati
 /// factorisation, at no cost. Every other active bound is a multiplier in the gradient: with the responses W of the
 /// minimiser to the gradients A of these bounds, the multipliers solve the small dense system S = -A'W, whose Cholesky
-/// factor grows and shrinks with the set. Only where a held bound is dropped is the program factorised anew.
+/// factor grows and shrinks with the set. Only where a held bound is dropped is the program factorised anew. Responses
+/// come in batches, at once those of the bounds that may be next; where there is a claim, before the vectors are known.
+///
+/// A variable is known by its place in the rows of all stages, as those of an Iterate.
 class DualActiveSet {
  public:
   enum class Outcome {
@@ -37,7 +39,7 @@ class DualActiveSet {
   DualActiveSet() = default;
   explicit DualActiveSet(const Capacity& capacity);
 
-  /// What needs the program's matrices only: the factorisation with the claimed set (null: none), and the responses.
+  /// What needs the program's matrices only: the factorisation with the claimed set (null: none), and responses.
   void prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed) noexcept;
   /// After `prepare`, with the program's vectors as they are now. Where solved, the set goes to `active` and the
   /// minimiser, its costates and multipliers to `step`. The deadline is looked at before every change of the set.
@@ -51,33 +53,46 @@ class DualActiveSet {
  private:
   enum class Hold : std::uint8_t { free, held, column };
   enum class Found { nothing, values, step };
-  /// A variable with a bound.
-  struct Bounded {
-    Riccati::Entry entry;
-    std::ptrdiff_t at;  ///< in the rows of all stages
-    bool is_control, is_equality;
-    Hold hold;
-    std::int8_t side;  ///< of the active bound
-    double lower, upper;
-    double least, most;  ///< the bounds with their tolerance
-    int slot;            ///< where its responses are, or none
-    double bound() const noexcept { return side < 0 ? lower : upper; }
-    /// Positive outside the bounds and their tolerance.
-    double violation(double value) const noexcept { return std::max(least - value, value - most); }
-    void set_bounds(double new_lower, double new_upper) noexcept;
+  static constexpr int none = -1, batch_size = Riccati::Responses::size;
+  /// Room for all columns and for those that may be next.
+  static constexpr int batch_count = max_columns / batch_size + 1;
+  struct Batch {
+    Riccati::Responses responses;
+    std::array<int, batch_size> of{};  ///< places
+    int count = 0;
   };
-  static constexpr int none = -1, slots = max_columns + 2 * Riccati::Responses::size;
+  struct Violations {
+    int worst = none, count = 0;
+  };
+  using Weights = std::array<std::array<double, batch_size>, batch_count>;
 
-  void collect(const StageQp& qp, const ActiveSet* claimed) noexcept;
+  void take_claims(const StageQp& qp, const ActiveSet& claimed) noexcept;
   bool take_bounds(const StageQp& qp) noexcept;
   void factor(const StageQp& qp, Riccati& riccati) noexcept;
   bool refactor(const StageQp& qp, Riccati& riccati) noexcept;
-  bool find_responses(const StageQp& qp, Riccati& riccati, const int* which, int count, bool with_minimiser) noexcept;
-  bool find_responses_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept;
-  bool find_responses_of_next(const StageQp& qp, Riccati& riccati, int entering) noexcept;
-  const double* responses(int which) const noexcept {
-    return responses_.data() + static_cast<std::ptrdiff_t>(bounded_[which].slot) * width_;
+  void let_go(int place) noexcept;
+  bool is_control(int place) const noexcept { return place % stride_ >= states_; }
+  double bound(int place) const noexcept { return (side_[place] < 0 ? lower_ : upper_)[place]; }
+  bool is_equality_bound(int place) const noexcept;
+  double violation(int place) const noexcept {
+    return std::max(least_[place] - value_[place], value_[place] - most_[place]);
   }
+
+  bool find_responses(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept;
+  bool is_needed(int batch, const int* places, int count) const noexcept;
+  void forget(int batch) noexcept;
+  bool find_responses_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept;
+  bool find_responses_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count) noexcept;
+  /// What the variable at one place answers to the gradient of another, which has responses.
+  double response(int of, int at) const noexcept {
+    const int number = number_[of];
+    return batches_[number / batch_size]
+        .responses.values[static_cast<std::ptrdiff_t>(at) * batch_size + number % batch_size];
+  }
+  double& weight_of(int place, Weights& weights) const noexcept {
+    return weights[number_[place] / batch_size][number_[place] % batch_size];
+  }
+  void add_responses(const Riccati& riccati, const Weights& weights, std::vector<double>& sums) const noexcept;
   double* factor_row(int k) noexcept { return factor_.data() + static_cast<std::ptrdiff_t>(k) * max_columns; }
   const double* factor_row(int k) const noexcept {
     return factor_.data() + static_cast<std::ptrdiff_t>(k) * max_columns;
@@ -89,38 +104,41 @@ class DualActiveSet {
   bool factor_columns(int first, bool may_leave_out) noexcept;
   void drop_column(int k) noexcept;
 
-  bool begin_with_columns(const StageQp& qp, Riccati& riccati) noexcept;
-  bool combine_batch(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
+  bool combine(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
   bool solve_with_multipliers(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
   double largest_miss() const noexcept;
-  void return_to_bounds() noexcept;
-  bool drop_wrong_columns() noexcept;
+  void return_to_bounds(const Riccati& riccati) noexcept;
+  bool drop_wrong_columns(const Riccati& riccati) noexcept;
   bool release_wrong_held() noexcept;
-  bool drop_wrong() noexcept;
-  int most_violated() const noexcept;
-  int count_violated() const noexcept;
+  bool drop_wrong(const Riccati& riccati) noexcept;
+  Violations find_violations() noexcept;
   bool add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept;
-  void append_column(int which, double square, double multiplier) noexcept;
+  void append_column(int place, double square, double multiplier) noexcept;
   Outcome add(const StageQp& qp, Riccati& riccati, int entering, Clock::time_point deadline) noexcept;
-  Found find_values(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
+  Found find_values(const StageQp& qp, Riccati& riccati, bool may_combine, Iterate& step) noexcept;
   void write(ActiveSet& active, Iterate& step) const noexcept;
 
   int factorisations_ = 0, changes_ = 0;
-  std::ptrdiff_t width_ = 0;  ///< of a slot: as many bounds as there can be
-  bool is_convex_ = false, is_collected_ = false, has_policy_ = false;
+  int states_ = 0, stride_ = 0, places_ = 0;  ///< as many places as the program has
+  bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
   double pull_tolerance_ = 0.0;
+  const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the program that is being solved
   ActiveSet held_, claimed_;
-  std::vector<Bounded> bounded_;
-  // By bounded variable. The value of a held one is its multiplier: that is what changes of it.
-  std::vector<double> value_, direction_;
-  std::vector<double> responses_;  ///< slots: the change of all values with a gradient of one
-  std::vector<int> owner_;         ///< of each slot, or none
-  std::vector<int> columns_;       ///< active bounds that are not held, in the order of the factor
+  // By place. The value of a held variable is its multiplier: that is what changes of it.
+  std::vector<double> value_, direction_, violation_;
+  /// The bounds with their tolerance; of variables that are not free there are none.
+  std::vector<double> least_, most_;
+  std::vector<Hold> hold_;
+  std::vector<std::int8_t> side_;  ///< of the active bound
+  std::vector<int> number_;        ///< among the responses, or none
+  std::vector<int> held_places_;
+  std::vector<Batch> batches_;
+  std::vector<int> columns_;  ///< active bounds that are not held, in the order of the factor
   std::vector<double> multipliers_, factor_;
+  /// Which multipliers the step was found with.
+  std::vector<int> base_places_;
+  std::vector<double> base_multipliers_;
   std::vector<double> h_;  ///< the program's gradient with the multipliers of the columns
-  Riccati::Responses batch_;
-  std::array<int, Riccati::Responses::size - 1> of_batch_;  ///< whose responses `batch_` has beside the minimiser
-  int in_batch_ = 0;                                        ///< how many of them; 0: it is without the minimiser
   Iterate policy_step_;
 };
 

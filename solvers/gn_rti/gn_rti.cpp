@@ -95,7 +95,6 @@ void GnRti::setup(const Ocp& ocp) {
 
 void GnRti::reset() noexcept {
   prepared_ = is_pending_ = false;
-  preparation_us_ = 0.0;
   qp_.change();
   qp_solver_.reset();
 }
@@ -118,7 +117,6 @@ void GnRti::linearise(const Ocp& ocp, Iterate& point) noexcept {
 }
 
 void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
-  const auto start = Clock::now();
   prepared_ = is_pending_ = false;
   use_exact_ = false;
   if (!(ocp.capacity() == capacity_) || !(guess.capacity() == capacity_)) return;
@@ -136,7 +134,6 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
   qp_solver_.prepare(qp_);
   prepared_ = true;
   prepared_ocp_ = &ocp;
-  preparation_us_ += microseconds_since(start);
 }
 
 bool GnRti::is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept {
@@ -188,28 +185,16 @@ double GnRti::merit(const Ocp& ocp, const Iterate& point) noexcept {
 }
 
 Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
-  const auto start = Clock::now();
-  Report report = respond(ocp, point, deadline);
-  if (is_pending_) settle(ocp, point, report);
-  report.feedback_us = microseconds_since(start);
-  return report;
-}
-
-Report GnRti::feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
-  const auto start = Clock::now();
-  Report report = respond(ocp, point, deadline);
-  report.feedback_us = microseconds_since(start);
+  Report report = feedback(ocp, point, deadline);
+  finish(ocp, point, report);
   return report;
 }
 
 void GnRti::finish(const Ocp& ocp, Iterate& point, Report& report) noexcept {
-  if (!is_pending_) return;
-  const auto start = Clock::now();
-  settle(ocp, point, report);
-  preparation_us_ = microseconds_since(start);
+  if (is_pending_) settle(ocp, point, report);
 }
 
-Report GnRti::respond(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+Report GnRti::feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
   Report report;
   use_exact_ = is_pending_ = false;
   if (ocp.capacity() == capacity_ && point.capacity() == capacity_) {
@@ -220,7 +205,6 @@ Report GnRti::respond(const Ocp& ocp, Iterate& point, Clock::time_point deadline
       report = converge(ocp, point, deadline);
     }
   }
-  report.preparation_us = std::exchange(preparation_us_, 0.0);
   prepared_ = false;
   return report;
 }

@@ -55,7 +55,6 @@ class GnRti final : public Solver {
   Hessian hessian_for(const Ocp& ocp) const noexcept;
   void linearise(const Ocp& ocp, Iterate& point) noexcept;
   bool is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept;
-  Report respond(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept;
   void settle(const Ocp& ocp, Iterate& point, Report& report) noexcept;
   Report real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept;
   bool judge_step(const Ocp& ocp, const Iterate& point, Report& report) noexcept;
@@ -79,7 +78,6 @@ class GnRti final : public Solver {
   const Ocp* prepared_ocp_ = nullptr;  ///< looked at no more, only compared with
   bool is_pending_ = false;            ///< the last step was not judged yet; `best_` is the point before it
   bool use_exact_ = false;
-  double preparation_us_ = 0.0;
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
   double asked_share_ = 1.0;  ///< of the defects and violations that the step is asked to remove
 };

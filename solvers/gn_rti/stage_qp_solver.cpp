@@ -132,18 +132,17 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
 }
 
 StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept {
-  // An active set takes one side of bounds that cross and does not see that the other is violated.
-  const bool has_claims = any_active_;
-  if (has_claims && mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
   is_dual_ = false;
   if (!factored_ && !prepared_) prepare(qp);
   if (factored_) {
+    // An active set takes one side of bounds that cross and does not see that the other is violated.
+    if (any_active_ && mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
     if (try_active_sets(qp, step, 1, deadline)) return Outcome::active_set;
     factored_ = false;
     if (is_past(deadline)) return Outcome::out_of_time;
   }
   auto outcome = solve_from_guess(qp, step, deadline);
-  if (outcome != DualActiveSet::Outcome::solved && !has_claims && mark_bounds(qp, step, bound_tolerance, marks_.data()))
+  if (outcome != DualActiveSet::Outcome::solved && mark_bounds(qp, step, bound_tolerance, marks_.data()))
     return Outcome::infeasible;
   if (outcome == DualActiveSet::Outcome::not_convex) {
     // State bounds may hold what has no minimiser without them.

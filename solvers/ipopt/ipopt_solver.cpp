@@ -310,12 +310,8 @@ void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
 }
 
 Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
-  const auto start = Clock::now();
   Report report;
-  if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_)) {
-    report.feedback_us = microseconds_since(start);
-    return report;
-  }
+  if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_)) return report;
   deadline_ = deadline;
   iterations_ = 0;
   backend_us_ = 0.0;
@@ -341,7 +337,6 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
   }
   report.iterations = iterations_;
   if (report.status != Status::bad_input) judge(ocp, point, judge_, scratch_, report);
-  report.feedback_us = microseconds_since(start);
   return report;
 }
 

@@ -126,7 +126,6 @@ void NloptSolver::prepare(const Ocp&, const Iterate&) noexcept {}
 void NloptSolver::reset() noexcept {}
 
 Report NloptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
-  const auto start = Clock::now();
   Report report;
   if (ocp.capacity() == capacity_ && is_sound_start(ocp, point, scratch_)) {
     factorisations_ = 0;
@@ -142,7 +141,6 @@ Report NloptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     report.factorisations = factorisations_;
     report.fallback_used = fallback_used_;
   }
-  report.feedback_us = microseconds_since(start);
   return report;
 }
 

@@ -391,7 +391,6 @@ Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point dead
 }
 
 Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
-  const auto start = Clock::now();
   Report report;
   if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_)) return report;
   current_ = point;
@@ -407,7 +406,6 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
     if (bounds_cross) {
       report.status = Status::infeasible;
       judge(ocp, point, stages_, scratch_, report);
-      report.feedback_us = microseconds_since(start);
       return report;
     }
     nlp_.read(ocp, point, z_.data(), multipliers_.data(), bound_multipliers_.data());
@@ -421,7 +419,6 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
   report.factorisations = qp_.factorisations() - factorisations_before;
   if (report.status != Status::infeasible && is_sound_start(ocp, current_, scratch_)) std::swap(point, current_);
   judge(ocp, point, stages_, scratch_, report);
-  report.feedback_us = microseconds_since(start);
   return report;
 }
 

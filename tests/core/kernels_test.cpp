@@ -50,6 +50,7 @@ struct Recursion {
     view.stride = qp.stride();
     view.state_counts = qp.state_counts();
     view.control_counts = qp.control_counts();
+    view.carried_counts = qp.carried_counts();
     view.F = qp.F(0);
     view.H = qp.H(0);
     view.h = qp.h(0);
@@ -107,6 +108,7 @@ TEST(Kernels, OfTheRecursionAgreeWithTheDenseSystem) {
     const int states = trial % 3 == 0 ? random.integer(1, 14) : 6;
     const int controls = trial % 3 == 0 ? random.integer(1, 12) : random.integer(2, 4);
     StageQp qp = random.make(random.integer(1, 7), states, controls, true);
+    if (trial % 2 == 0) random.carry(qp);
     const ActiveSet active = some_active_controls(random, qp);
     const DenseQp dense(qp, active);
     const Eigen::VectorXd z = dense.solve();
@@ -132,26 +134,29 @@ TEST(Kernels, OfTheRecursionAgreeWithTheDenseSystem) {
 }
 
 TEST(Kernels, OfResponsesAreWhatAStepDiffersBy) {
-  constexpr int minimiser = response_batch - 1;
   RandomQp random(13);
   for (int trial = 0; trial < 40; ++trial) {
     const int states = trial % 2 == 0 ? 6 : random.integer(1, 12);
     StageQp qp = random.make(random.integer(1, 6), states, random.integer(2, 4), true);
+    if (trial % 4 < 2) random.carry(qp);
     const ActiveSet active = some_active_controls(random, qp);
-    const int N = qp.intervals(), stage = random.integer(0, N), place = random.integer(0, states - 1);
+    const int N = qp.intervals(), stage = random.integer(0, N), place = random.integer(0, states - 1),
+              number = random.integer(0, response_batch - 1);
     for (const KernelSet& set : runnable_kernels()) {
       Recursion before(qp, active);
       before.solve(*set.riccati);
       AlignedDoubles values(static_cast<std::size_t>(N + 1) * qp.stride() * response_batch, 0.0), costates = values;
-      const auto at = [&](int i, int k, int number) -> double& {
-        return values[(static_cast<std::size_t>(i) * qp.stride() + k) * response_batch + number];
+      const auto at = [&](int i, int k, int lane) -> double& {
+        return values[(static_cast<std::size_t>(i) * qp.stride() + k) * response_batch + lane];
       };
-      at(stage, place, 0) = 1.0;
-      for (int j = 0; j < states; ++j) at(N, j, minimiser) = qp.q(N)[j];
-      set.riccati->respond_backward(before.view, N, values.data(), true);
+      at(stage, place, number) = 1.0;
+      // Where there are no gradients, what is in their place is not looked at.
+      std::vector<unsigned char> has_gradient(N + 1, 0);
+      has_gradient[stage] = 1;
+      for (int i = 0; i < std::min(stage, N); ++i) at(i, 0, number) = 3.0;
+      set.riccati->respond_backward(before.view, stage, has_gradient.data(), values.data());
       for (int j = 0; j < states; ++j)
-        for (int number = 0; number < response_batch; ++number)
-          at(0, j, number) = number == minimiser ? qp.initial_step()[j] : 0.0;
+        for (int other = 0; other < response_batch; ++other) at(0, j, other) = 0.0;
       set.riccati->respond_forward(before.view, values.data(), costates.data());
 
       StageQp moved = qp;
@@ -162,9 +167,12 @@ TEST(Kernels, OfResponsesAreWhatAStepDiffersBy) {
         for (int k = 0; k < states + qp.controls(i); ++k) {
           const bool is_fixed = k >= states && active.row(i)[k] != 0;
           const auto of = [&](const Recursion& r) { return is_fixed ? r.step.bound_row(i)[k] : r.step.row(i)[k]; };
-          ASSERT_NEAR(at(i, k, minimiser), of(before), 1e-8) << set.instruction_set << ", " << i << ", " << k;
-          ASSERT_NEAR(at(i, k, 0), of(after) - of(before), 1e-8) << set.instruction_set << ", " << i << ", " << k;
+          ASSERT_NEAR(at(i, k, number), of(after) - of(before), 1e-8) << set.instruction_set << ", " << i << ", " << k;
         }
+        for (int j = 0; i > 0 && j < states; ++j)
+          ASSERT_NEAR(costates[(static_cast<std::size_t>(i) * qp.stride() + j) * response_batch + number],
+                      after.step.costate(i)[j] - before.step.costate(i)[j], 1e-8)
+              << set.instruction_set << ", " << i << ", " << j;
       }
     }
   }
@@ -264,7 +272,9 @@ struct RandomCosts {
   int N, states, controls, vehicle_states, outputs, inputs, stride;
   std::vector<int> control_counts;
   AlignedDoubles H, h, values, references, weights, turns, inverse_turns, y, predicted, jacobians;
-  std::vector<double> u, input_weights, room;
+  AlignedDoubles u, input_weights;
+  std::vector<double> room;
+  std::vector<unsigned char> clean;  ///< empty: of no stage
 
   explicit RandomCosts(RandomQp& random)
       : N(random.integer(1, 8)),
@@ -298,9 +308,13 @@ struct RandomCosts {
     jacobians = rows(nodes * outputs, wide);
     for (std::size_t k = 0; k < jacobians.size(); ++k)
       if (static_cast<int>(k % wide) >= vehicle_states) jacobians[k] = 0.0;
-    for (int k = 0; k < N * inputs; ++k)
-      u.push_back(random.integer(0, 4) == 0 ? std::nan("") : random.uniform(-1., 1.));
-    input_weights.assign(inputs, 0.7);
+    u.assign(nodes * stride, std::nan(""));
+    input_weights.assign(stride, 0.0);
+    for (int j = 0; j < inputs; ++j) {
+      input_weights[states + j] = 0.7;
+      for (int i = 0; i < N; ++i)
+        if (random.integer(0, 4) > 0) u[i * stride + states + j] = random.uniform(-1., 1.);
+    }
     room.assign(2 * seen, 0.0);
   }
   CostView view(bool matrices, bool vectors, bool bends) {
@@ -317,7 +331,8 @@ struct RandomCosts {
     return kernels.write_measurements(
         view(matrices, vectors, false),
         {vehicle_states, outputs, inputs, y.data(), u.data(), predicted.data(), jacobians.data(), weights.data(),
-         input_weights.data(), turns.data(), inverse_turns.data(), values.data(), room.data()},
+         input_weights.data(), turns.data(), inverse_turns.data(), values.data(), room.data(),
+         clean.empty() ? nullptr : clean.data()},
         0, N);
   }
   double track(const ProgramKernels& kernels, bool matrices, bool vectors, bool bends) {
@@ -356,6 +371,12 @@ TEST(Kernels, OfCostsAgree) {
         EXPECT_NEAR(same, total, 1e-10 * (1.0 + total)) << set.instruction_set;
       }
       expect_same_costs(generic, wide, matrices, set.instruction_set);
+      if (tracks) continue;
+      // Where H is zero already, but for what measurements write to, it comes to the same.
+      RandomCosts again = wide;
+      again.clean.assign(again.N + 1, matrices ? 1 : 0);
+      evaluate(again, *set.program);
+      expect_same_costs(generic, again, matrices, set.instruction_set);
     }
   }
 }
@@ -379,12 +400,12 @@ TEST(Kernels, OfMeasurementsAreTheSumOfSquares) {
               2.0 * costs.weights[j] * error * costs.jacobians[(i * costs.outputs + j) * wide + c];
       }
       for (int j = 0; i < costs.N && j < costs.inputs; ++j) {
-        const double measured = costs.u[i * costs.inputs + j];
-        if (std::isnan(measured)) continue;
         const int at = i * costs.stride + costs.states + j;
+        const double measured = costs.u[at];
+        if (std::isnan(measured)) continue;
         const double error = costs.values[at] - measured;
-        expected += costs.input_weights[j] * error * error;
-        gradient[at] += 2.0 * costs.input_weights[j] * error;
+        expected += costs.input_weights[costs.states + j] * error * error;
+        gradient[at] += 2.0 * costs.input_weights[costs.states + j] * error;
       }
     }
     for (const KernelSet& set : runnable_kernels()) {
@@ -405,11 +426,12 @@ TEST(Kernels, OfPlainSumsAgree) {
   for (int trial = 0; trial < 40; ++trial) {
     const int columns = random.integer(1, 20), count = random.integer(1, 20), width = padded(columns);
     const AlignedDoubles J = numbers(static_cast<std::size_t>(count) * width), weights = numbers(count),
-                         pulls = numbers(count), batch = numbers(static_cast<std::size_t>(count) * response_batch),
+                         pulls = numbers(count),
+                         batch = numbers(static_cast<std::size_t>(padded(count)) * response_batch),
                          of_batch = numbers(response_batch), a = numbers(width), b = numbers(width);
     const AlignedDoubles H = numbers(static_cast<std::size_t>(width) * width), h = numbers(width);
     for (const KernelSet& set : runnable_kernels()) {
-      AlignedDoubles sum_H = H, sum_h = h, out(width), sums(count);
+      AlignedDoubles sum_H = H, sum_h = h, out(width), sums(padded(count), 0.5);
       set.program->add_products(J.data(), weights.data(), pulls.data(), count, columns, width, sum_H.data(),
                                 sum_h.data());
       for (int c = 0; c < columns; ++c) {
@@ -426,9 +448,19 @@ TEST(Kernels, OfPlainSumsAgree) {
       for (int k = 0; k < width; ++k) EXPECT_EQ(out[k], a[k] + b[k]) << set.instruction_set;
       set.program->subtract(a.data(), b.data(), out.data(), width);
       for (int k = 0; k < width; ++k) EXPECT_EQ(out[k], a[k] - b[k]) << set.instruction_set;
-      set.riccati->combine(batch.data(), of_batch.data(), sums.data(), count);
+      const ViolationParts found = set.program->find_violations(a.data(), b.data(), sum_h.data(), width, out.data());
+      int violated = 0;
+      double worst = 0.0;
+      for (int k = 0; k < width; ++k) {
+        EXPECT_EQ(out[k], std::max(b[k] - a[k], a[k] - sum_h[k])) << set.instruction_set;
+        violated += out[k] > 0.0;
+        worst = std::max(worst, out[k]);
+      }
+      EXPECT_EQ(found.count, violated) << set.instruction_set;
+      EXPECT_EQ(found.largest, worst) << set.instruction_set;
+      set.riccati->combine(batch.data(), of_batch.data(), sums.data(), padded(count));
       for (int j = 0; j < count; ++j) {
-        double expected = 0.0;
+        double expected = 0.5;
         for (int k = 0; k < response_batch; ++k) expected += batch[j * response_batch + k] * of_batch[k];
         EXPECT_NEAR(sums[j], expected, 1e-12) << set.instruction_set;
       }
@@ -552,9 +584,11 @@ TEST(Kernels, AdoptWhatBoundsAllowAndMatchRows) {
         EXPECT_EQ(to_multipliers[k], is_used && !is_carried && has_bound ? multipliers[k] : 0.0) << set.instruction_set;
       }
       std::vector<unsigned char> marks(rows, 9);
-      set.program->match(values.data(), other.data(), rows, stride, states, marks.data());
+      AlignedDoubles kept = other;  // what is compared with is what is kept before
+      set.program->match(values.data(), kept.data(), kept.data(), rows, stride, states, marks.data());
       for (int i = 0; i < rows; ++i)
         EXPECT_EQ(marks[i], i != changed ? 2 : changed_column < states ? 0 : 1) << set.instruction_set;
+      EXPECT_EQ(kept, values) << set.instruction_set;
     }
   }
 }

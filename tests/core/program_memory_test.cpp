@@ -75,6 +75,14 @@ class Journey {
     point_ = RandomProblem::cold_start(problem);
     judge();
   }
+  /// The window is another one, of the same problem and program. Before, that held the exact Hessian for a while.
+  void begin_again(const std::function<void()>& set_window) {
+    if (problem_->has_second_derivatives())
+      problem_->linearise(all_stages(*problem_), point_, Hessian::exact, remembering_, scratch_);
+    set_window();
+    point_ = RandomProblem::cold_start(*problem_);
+    judge();
+  }
   /// As a solver does with its new point: linearises there, somewhere near the guess.
   void judge() {
     const HorizonProblem& problem = *problem_;
@@ -177,6 +185,9 @@ TEST_P(ProgramMemoryTest, AnEstimatorsProgramMovesWithItsWindow) {
       journey.begin(problem, Hessian::gauss_newton);
       int first = 0, count = 4;
       for (int sample = 0; first + count < drive - 2; ++sample) {
+        if (sample == 10) {
+          journey.begin_again([&] { set_window(problem, *all, first, count = 4, blocks); });
+        }
         // The window grows, then moves on, and once by two intervals.
         const int steps = count < window ? 0 : sample == 12 ? 2 : 1;
         first += steps;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <random>
 
 #include <Eigen/Dense>
@@ -53,6 +54,19 @@ class RandomQp {
     }
     for (int k = 0; k < states; ++k) qp.initial_step()[k] = uniform(-1.0, 1.0);
     return qp;
+  }
+
+  /// Lets most intervals hand on some of their last states as they are, and says so or not.
+  void carry(StageQp& qp, bool says_so = true) {
+    for (int i = 0; i < qp.intervals(); ++i) {
+      const int states = qp.states(i), carried = integer(0, 3) == 0 ? 0 : integer(1, std::min(2, states));
+      for (int r = states - carried; r < states; ++r) {
+        double* F = qp.F(i) + r * qp.stride();
+        std::fill_n(F, qp.stride(), 0.0);
+        F[r] = 1.0;
+      }
+      if (says_so) qp.set_sizes(i, states, qp.controls(i), carried);
+    }
   }
 
  private:

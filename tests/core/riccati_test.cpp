@@ -41,7 +41,8 @@ void expect_same_as_dense(const StageQp& qp, const ActiveSet& active, const Iter
 TEST(Riccati, AgreesWithTheDenseSystemWithoutActiveBounds) {
   RandomQp random(1);
   for (int trial = 0; trial < 60; ++trial) {
-    const StageQp qp = random.make(random.integer(1, 8), random.integer(1, 5), random.integer(1, 4), trial % 2 == 0);
+    StageQp qp = random.make(random.integer(1, 8), random.integer(1, 5), random.integer(1, 4), trial % 2 == 0);
+    if (trial % 3 == 0) random.carry(qp);
     Riccati riccati(qp.capacity());
     const ActiveSet active(qp.capacity());
     Iterate step(qp.capacity());
@@ -108,9 +109,8 @@ TEST(Riccati, RespondsToAGradientAsTheSolutionChangesWithIt) {
     for (int c = random.integer(1, Riccati::Responses::size); c > 0; --c)
       gradients.push_back(places[random.integer(0, static_cast<int>(places.size()) - 1)]);
     const int count = static_cast<int>(gradients.size());
-    const bool with_minimiser = count < Riccati::Responses::size;
     Riccati::Responses responses(qp.capacity());
-    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), count, with_minimiser, responses));
+    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), count, responses));
     for (int c = 0; c < count; ++c) {
       StageQp changed = qp;
       changed.h(gradients[c].stage)[gradients[c].place] += 1.0;
@@ -133,6 +133,7 @@ TEST(Riccati, CombinesResponsesToTheSolutionWithTheirGradients) {
   RandomQp random(10);
   for (int trial = 0; trial < 60; ++trial) {
     StageQp qp = random.make(random.integer(1, 8), random.integer(1, 7), random.integer(1, 11), trial % 2 == 0);
+    if (trial % 4 < 2) random.carry(qp);
     ActiveSet active(qp.capacity());
     for (int i = 0; i < qp.intervals(); ++i) {
       for (int j = 0; j < qp.controls(i); ++j) {
@@ -144,22 +145,26 @@ TEST(Riccati, CombinesResponsesToTheSolutionWithTheirGradients) {
     riccati.factor(qp, active);
     Riccati::Responses responses(qp.capacity());
     alignas(64) double weights[Riccati::Responses::size] = {};
-    weights[Riccati::Responses::size - 1] = 1.0;
     StageQp changed = qp;
     std::vector<Riccati::Entry> gradients;
-    for (int c = 0; c < trial % Riccati::Responses::size; ++c) {
+    for (int c = 0; c < trial % (Riccati::Responses::size + 1); ++c) {
       const int stage = random.integer(0, qp.intervals());
       gradients.push_back({stage, random.integer(0, qp.states(stage) - 1)});
       weights[c] = random.uniform(-2.0, 2.0);
       changed.h(stage)[gradients[c].place] += weights[c];
     }
-    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), static_cast<int>(gradients.size()), true, responses));
+    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), static_cast<int>(gradients.size()), responses));
     Iterate expected(qp.capacity()), step(qp.capacity());
+    ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
+    std::vector<double> values(step.row(0),
+                               step.row(0) + static_cast<std::ptrdiff_t>(qp.intervals() + 1) * qp.stride());
+    riccati.add_values(responses, weights, static_cast<int>(values.size()), values.data());
     riccati.combine(qp, active, responses, weights, step);
     ASSERT_EQ(riccati.solve(changed, active, expected), Riccati::Outcome::done);
     for (int i = 0; i <= qp.intervals(); ++i) {
       for (int j = 0; j < qp.states(i); ++j) {
         ASSERT_NEAR(step.state(i)[j], expected.state(i)[j], 1e-9);
+        ASSERT_EQ(values[i * qp.stride() + j], step.state(i)[j]);
         ASSERT_NEAR(step.costate(i)[j], expected.costate(i)[j], 1e-9) << "trial " << trial << ", node " << i;
         ASSERT_EQ(step.state_bound(i)[j], 0.0);
       }
@@ -180,7 +185,7 @@ TEST(Riccati, HasNoResponsesWhereStateBoundsHold) {
   riccati.factor(qp, active);
   Riccati::Responses responses(qp.capacity());
   const Riccati::Entry gradient{1, 0};
-  EXPECT_FALSE(riccati.respond(qp, active, &gradient, 1, false, responses));
+  EXPECT_FALSE(riccati.respond(qp, active, &gradient, 1, responses));
 }
 
 TEST(Riccati, RefusesActiveBoundsThatContradictEachOther) {
@@ -202,8 +207,12 @@ TEST(Riccati, RefusesActiveBoundsThatContradictEachOther) {
 
 TEST(Riccati, TheCovarianceIsThatOfTheDenseInverse) {
   RandomQp random(4);
-  for (int trial = 0; trial < 20; ++trial) {
-    const StageQp qp = random.make(random.integer(1, 6), random.integer(1, 4), random.integer(1, 3), false);
+  for (int trial = 0; trial < 60; ++trial) {
+    // Six states have kernels of their own, with two to four controls.
+    const bool is_usual = trial % 2 == 0;
+    StageQp qp = random.make(random.integer(1, 6), is_usual ? 6 : random.integer(1, 4),
+                             is_usual ? random.integer(2, 4) : random.integer(1, 3), false);
+    if (trial % 3 != 0) random.carry(qp);
     const int ns = qp.capacity().states;
     Riccati riccati(qp.capacity());
     const ActiveSet none(qp.capacity());

@@ -95,8 +95,27 @@ StepParts check_step(const ProgramView& view, double tolerance) {
   return {sum_of(rest) == 0.0, largest_of(excess) > 0.0, largest_of(costates)};
 }
 
+/// Whether there is nothing to mark: all multipliers are 0, all bounds apart.
+inline bool is_unmarked(const ProgramView& view) {
+  Lanes found{};
+  for (int i = 0; i <= view.intervals; ++i) {
+    const int parts = parts_of(view, i);
+    for (int v = 0; v < parts; ++v) {
+      const long at = static_cast<long>(i) * view.stride + v * lane_count;
+      const Lanes lower = load(view.lower + at), gap = load(view.upper + at) - lower;
+      const Lanes least = smaller(1e-14 * (1.0 + absolute(lower)), all(1e300));
+      found = (load(view.bounds + at) == 0.0) & (gap > least) ? found : all(1.0);
+    }
+  }
+  return sum_of(found) == 0.0;
+}
+
 bool mark_bounds(const ProgramView& view, double tolerance, unsigned char* marks) {
   const long stride = view.stride;
+  if (is_unmarked(view)) {
+    for (int i = 0; i <= view.intervals; ++i) marks[i] = 0;
+    return false;
+  }
   Lanes crossed{};
   for (int i = 0; i <= view.intervals; ++i) {
     const int parts = parts_of(view, i);
@@ -119,6 +138,18 @@ bool mark_bounds(const ProgramView& view, double tolerance, unsigned char* marks
     marks[i] = sum_of(marked) != 0.0;
   }
   return largest_of(crossed) > 0.0;
+}
+
+ViolationParts find_violations(const double* values, const double* least, const double* most, long count,
+                               double* violations) {
+  Lanes largest{}, counts{};
+  for (long k = 0; k < count; k += lane_count) {
+    const Lanes value = load(values + k), violation = larger(load(least + k) - value, value - load(most + k));
+    store(violation, violations + k);
+    largest = larger(largest, violation);
+    counts += violation > 0.0 ? all(1.0) : Lanes{};
+  }
+  return {largest_of(largest), static_cast<int>(sum_of(counts))};
 }
 
 void subtract(const double* a, const double* b, double* out, long count) {
@@ -152,9 +183,11 @@ inline bool are_equal(const double* a, const double* b, int columns) {
   return sum_of(differs) == 0.0;
 }
 
-void match(const double* a, const double* b, int count, int stride, int columns, unsigned char* marks) {
-  for (int i = 0; i < count; ++i, a += stride, b += stride)
+void match(const double* a, const double* b, double* kept, int count, int stride, int columns, unsigned char* marks) {
+  for (int i = 0; i < count; ++i, a += stride, b += stride, kept += stride) {
     marks[i] = are_equal(a, b, stride) ? 2 : are_equal(a, b, columns) ? 1 : 0;
+    for (int k = 0; k < stride; k += lane_count) store(load(a + k), kept + k);
+  }
 }
 
 void add(const double* from, const double* step, double* to, long count) {
@@ -226,6 +259,7 @@ void complete_dynamics(const DynamicsView& view) {
       const Lanes reached = is_vehicle ? load(b + v * lane_count) : load(z + v * lane_count);
       store(first_of(reached - load(next + v * lane_count), v, view.states), b + v * lane_count);
     }
+    if (view.has_channel_rows && !view.any_start) continue;
     for (int c = 0; c < view.channels; ++c) {
       const int row = view.vehicle_states + c, control = control_of[c];
       if (!view.has_channel_rows) {
@@ -250,19 +284,26 @@ void clear_costs(const CostView& view, int first, int last) {
   }
 }
 
-/// Rows of eight entries, which are enough for most vehicles and their sensors, or of as many as it takes.
+/// Rows of eight entries, which are enough for most vehicles and their sensors, with a number of outputs that may be
+/// known (else 0); or rows of as many as it takes.
+template <int known_outputs>
 struct OneEight {
-  static constexpr int of(int /*size*/) { return 8; }
+  static constexpr bool is_known = true;
+  static int of(int /*size*/) { return 8; }
+  static int count(int outputs) { return known_outputs > 0 ? known_outputs : outputs; }
 };
 struct AnyEights {
-  static constexpr int of(int size) { return padded(size); }
+  static constexpr bool is_known = false;
+  static int of(int size) { return padded(size); }
+  static int count(int outputs) { return outputs; }
 };
 
 /// What is measured at one node, of which `seen` was. Returns the sum of squares.
 template <bool matrices, bool vectors, class Width>
 RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, const double* seen, const double* predicted,
-                                           const double* J, int stride, int used, double* H, double* h) {
-  const int outputs = Width::of(measured.output_count), states = Width::of(measured.vehicle_states);
+                                           const double* J, int stride, int used, bool is_clean, double* H, double* h) {
+  const int count = Width::count(measured.output_count), outputs = Width::of(count),
+            states = Width::of(measured.vehicle_states);
   double *pulls = measured.room, *weights = pulls + outputs;
   Lanes total{};
   for (int k = 0; k < outputs; k += lane_count) {
@@ -278,12 +319,24 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
   if (vectors) {
     for (int k = 0; k < states; k += lane_count) {
       Lanes sum{};
-      for (int j = 0; j < measured.output_count; ++j) sum += load(J + j * states + k) * pulls[j];
+      for (int j = 0; j < count; ++j) sum += load(J + j * states + k) * pulls[j];
       store(sum, h + k);
     }
     for (int k = states; k < stride; k += lane_count) store(Lanes{}, h + k);
   }
   if (!matrices) return total;
+  // Rows by weight, of which single entries come from memory at no cost.
+  constexpr int most_known = Width::is_known ? 8 : 1;
+  double weighted[most_known][8];
+  if (Width::is_known)
+    for (int j = 0; j < count; ++j)
+      for (int k = 0; k < 8; k += lane_count) store(load(J + j * 8 + k) * weights[j], weighted[j] + k);
+  const auto factor = [&](int j, int c) RHEC_ALWAYS_INLINE {
+    if constexpr (Width::is_known)
+      return weighted[j][c];
+    else
+      return weights[j] * J[j * states + c];
+  };
   const auto clear = [&](double* row, int from) RHEC_ALWAYS_INLINE {
     if (stride == 8) {
       for (int k = 0; k < 8; k += lane_count)
@@ -296,55 +349,65 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
     double* row = H + static_cast<long>(c) * stride;
     for (int k = 0; k < states; k += lane_count) {
       Lanes sum{};
-      for (int j = 0; j < measured.output_count; ++j)
-        sum += load(J + j * states + k) * (weights[j] * J[j * states + c]);
+      for (int j = 0; j < count; ++j) sum += load(J + j * states + k) * factor(j, c);
       store(sum, row + k);
     }
-    clear(row, states);
+    if (!is_clean) clear(row, states);
   }
-  for (int c = measured.vehicle_states; c < used; ++c) clear(H + static_cast<long>(c) * stride, 0);
+  for (int c = measured.vehicle_states; c < used && !is_clean; ++c) clear(H + static_cast<long>(c) * stride, 0);
   return total;
 }
 
 template <bool matrices, bool vectors, class Width>
 double write_nodes(const CostView& view, const MeasurementView& measured, int first, int last) {
   const long stride = view.stride, wide = view.states + view.controls;
-  const long outputs = Width::of(measured.output_count),
-             J_size = measured.output_count * Width::of(measured.vehicle_states);
+  const int count = Width::count(measured.output_count);
+  const long outputs = Width::of(count), J_size = static_cast<long>(count) * Width::of(measured.vehicle_states);
   const double *y = measured.outputs + first * outputs, *predicted = measured.predicted, *J = measured.jacobians;
-  const double *u = measured.values + first * stride + view.states,
-               *u_measured = measured.inputs + static_cast<long>(first) * measured.input_count;
+  const double *z = measured.values + first * stride, *inputs = measured.inputs + first * stride;
+  const int first_input = view.states, end_of_inputs = view.states + measured.input_count;
   double *H = view.H + first * wide * stride, *h = view.h + first * stride;
   Lanes total{};
-  double of_inputs = 0.0;
   for (int i = first; i <= last; ++i) {
     const bool has_inputs = i < view.intervals;
     const int used = view.states + (has_inputs ? view.control_counts[i] : 0);
-    total += write_node<matrices, vectors, Width>(measured, y, predicted, J, view.stride, used, H, h);
-    for (int j = 0; has_inputs && j < measured.input_count; ++j) {
-      const bool is_missing = u_measured[j] != u_measured[j];
-      const double error = is_missing ? 0.0 : u[j] - u_measured[j];
-      const double weight = is_missing ? 0.0 : 2.0 * measured.input_weights[j];
-      const int at = view.states + j;
-      of_inputs += weight * error * error;
-      if (vectors) h[at] += weight * error;
-      if (matrices) H[at * stride + at] = weight;
+    const bool is_clean = measured.is_clean && measured.is_clean[i] != 0;
+    total += write_node<matrices, vectors, Width>(measured, y, predicted, J, view.stride, used, is_clean, H, h);
+    if (vectors && has_inputs) {
+      for (int k = first_input / lane_count * lane_count; k < end_of_inputs; k += lane_count) {
+        const Lanes seen = load(inputs + k), weight = seen == seen ? 2.0 * load(measured.input_weights + k) : Lanes{};
+        const Lanes error = seen == seen ? load(z + k) - seen : Lanes{}, pull = weight * error;
+        store(load(h + k) + pull, h + k);
+        total += pull * error;
+      }
     }
+    for (int k = first_input; matrices && has_inputs && k < end_of_inputs; ++k)
+      H[k * stride + k] = inputs[k] == inputs[k] ? 2.0 * measured.input_weights[k] : 0.0;
     y += outputs;
     predicted += outputs;
     J += J_size;
-    u += stride;
-    u_measured += measured.input_count;
+    z += stride;
+    inputs += stride;
     H += wide * stride;
     h += stride;
   }
-  return 0.5 * (sum_of(total) + of_inputs);
+  return 0.5 * sum_of(total);
 }
 
 template <bool matrices, bool vectors>
 double write_measurements(const CostView& view, const MeasurementView& measured, int first, int last) {
-  if (measured.output_count <= 8 && measured.vehicle_states <= 8)
-    return write_nodes<matrices, vectors, OneEight>(view, measured, first, last);
+  if (measured.output_count <= 8 && measured.vehicle_states <= 8) {
+    switch (measured.output_count) {
+      case 2:  // a position
+        return write_nodes<matrices, vectors, OneEight<2>>(view, measured, first, last);
+      case 3:  // and a heading or a speed
+        return write_nodes<matrices, vectors, OneEight<3>>(view, measured, first, last);
+      case 4:
+        return write_nodes<matrices, vectors, OneEight<4>>(view, measured, first, last);
+      default:
+        return write_nodes<matrices, vectors, OneEight<0>>(view, measured, first, last);
+    }
+  }
   return write_nodes<matrices, vectors, AnyEights>(view, measured, first, last);
 }
 
@@ -363,6 +426,7 @@ extern const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET);
 constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {&kernels::kkt,
                                                                          &kernels::check_step,
                                                                          &kernels::mark_bounds,
+                                                                         &kernels::find_violations,
                                                                          &kernels::subtract,
                                                                          &kernels::match,
                                                                          &kernels::adopt,

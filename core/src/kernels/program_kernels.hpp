@@ -25,6 +25,12 @@ struct StepParts {
   double largest_costate;
 };
 
+/// The largest of some violations, if it is above 0, and how many are.
+struct ViolationParts {
+  double largest;
+  int count;
+};
+
 /// Where a model has written next states (to b) and its Jacobian's rows (to F): what is left to fill.
 struct DynamicsView {
   int first, last;               ///< intervals
@@ -34,6 +40,7 @@ struct DynamicsView {
   const double* values;          ///< rows of the point
   double *F, *b;
   bool has_channel_rows;  ///< those of carried channels are there already
+  bool any_start;         ///< some channel starts somewhere
 };
 
 /// Where costs go: their matrices, their vectors, or both. What is not wanted is null.
@@ -44,15 +51,18 @@ struct CostView {
   bool bends;  ///< H holds the curvature of the intervals' dynamics, to which costs are added
 };
 
-/// An estimator's measurements, NaN where missing, with weights 1 / variance. Rows of outputs are whole eights.
+/// An estimator's measurements, NaN where missing, with weights 1 / variance. Rows of outputs are whole eights, those
+/// of inputs are a stage's, with inputs where its controls begin.
 struct MeasurementView {
   int vehicle_states, output_count, input_count;
-  const double *outputs, *inputs;       ///< rows of all nodes and intervals; those of inputs are dense
+  const double *outputs, *inputs;       ///< rows of all nodes and intervals
   const double *predicted, *jacobians;  ///< of the range's nodes; Jacobians as rows of whole eights
   const double *output_weights, *input_weights;
   const double *turns, *inverse_turns;  ///< a row each: of an angle a full turn and its inverse, else 0
   const double* values;                 ///< rows of the point
   double* room;                         ///< for two rows of outputs
+  /// Of all stages: 1 where H is zero but for what measurements write to. Null: of none.
+  const unsigned char* is_clean;
 };
 
 /// A controller's references, a row [x; p; u] a stage. A column's reference may be anything where its weight is 0.
@@ -75,11 +85,15 @@ struct ProgramKernels {
   /// Marks with 1 the stages of which a multiplier is not zero or bounds coincide; true where a lower bound is above
   /// its upper one by more than the tolerance, or one of them is not a number.
   bool (*mark_bounds)(const ProgramView& view, double tolerance, unsigned char* marks);
+  /// violations = max(least - values, values - most), of `count` entries, which are whole eights.
+  ViolationParts (*find_violations)(const double* values, const double* least, const double* most, long count,
+                                    double* violations);
   /// out = a - b.
   void (*subtract)(const double* a, const double* b, double* out, long count);
   /// Marks rows of a and b, `count` of them and `stride` long: 2 where they are equal, 1 where their first `columns`
-  /// entries are, 0 otherwise.
-  void (*match)(const double* a, const double* b, int count, int stride, int columns, unsigned char* marks);
+  /// entries are, 0 otherwise. Rows of a go to `kept`, which may begin with, or before, those of b.
+  void (*match)(const double* a, const double* b, double* kept, int count, int stride, int columns,
+                unsigned char* marks);
   /// Copies rows: of controls what their bounds allow, of multipliers those whose bound there is; of carried channels
   /// no multiplier, and nothing of columns that are not used.
   void (*adopt)(const GuessView& from, double* values, double* multipliers);

@@ -13,29 +13,32 @@ RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants
   (function(Constant<first + step * k>()), ...);
 }
 
-/// What is known of a stage when its kernel is compiled: how many times eight entries a row has, and how many states
-/// and controls (unknown: 0). Its loops are written out where that is asked for.
-template <int eights, int state_count, int control_count, bool is_written_out = true>
+/// What is known of a stage when its kernel is compiled: how many times eight entries a row has, how many states and
+/// controls (unknown: 0), and how many of the states are carried. Its loops are written out where that is asked for.
+template <int eights, int state_count, int control_count, bool is_written_out = true, int carried_count = 0>
 struct Shape {
   static constexpr bool is_known = state_count > 0;
   static constexpr bool has_pair = is_known && control_count == 2;
   static constexpr int most_columns = eights * 8;
   static constexpr int registers = most_columns / lane_count;
+  static constexpr int state_registers = is_known ? (state_count + lane_count - 1) / lane_count : registers;
   static constexpr int most_states = is_known ? state_count : (most_columns < 32 ? most_columns : 32);
   using R = Row<registers>;
   /// Next state and control together fill no more than one register: a step is carried on in it.
   static constexpr bool is_compact = is_known && registers == 1;
   int states, next_states, offset, columns;
+  int moved;  ///< next states that are more than carried: of the others F has rows of the identity
 
   Shape(const RiccatiView& view, int i)
       : states(is_known ? state_count : view.state_counts[i]),
         next_states(is_known ? state_count : view.state_counts[i + 1]),
         offset(is_known ? state_count : view.states),
-        columns(offset + (is_known ? control_count : view.control_counts[i])) {}
+        columns(offset + (is_known ? control_count : view.control_counts[i])),
+        moved(next_states - (is_known ? carried_count : view.carried_counts[i])) {}
 
   /// Of so many states, and nothing else.
   explicit Shape(int count)
-      : states(is_known ? state_count : count), next_states(states), offset(states), columns(states) {}
+      : states(is_known ? state_count : count), next_states(states), offset(states), columns(states), moved(states) {}
 
   template <class Function>
   RHEC_ALWAYS_INLINE void each_state(const Function& function) const {
@@ -44,6 +47,14 @@ struct Shape {
   template <class Function>
   RHEC_ALWAYS_INLINE void each_next_state(const Function& function) const {
     each<0, state_count>(0, next_states, function);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_moved(const Function& function) const {
+    each<0, state_count - carried_count>(0, moved, function);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_carried(const Function& function) const {
+    each<state_count - carried_count, carried_count>(moved, next_states, function);
   }
   template <class Function>
   RHEC_ALWAYS_INLINE void each_control(const Function& function) const {
@@ -119,18 +130,21 @@ RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const S
   using R = typename Stage::R;
   R W[Stage::most_states];  // rows of P F
   stage.each_next_state([&](auto j) RHEC_ALWAYS_INLINE {
-    // P is read from its lower triangle alone, so that it stays symmetric.
-    R sums[2] = {};
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
-      sums[l % R::chains].add(at.row(at.F, l), l < j ? at.P_next[l * at.stride + j] : at.P_next[j * at.stride + l]);
+    // Of what is moved, P is read from its lower triangle alone, and of what is carried beside it from its upper one,
+    // so that it stays symmetric.
+    R sums[2] = {at.row(at.P_next, j).between(stage.moved, stage.next_states), R{}};
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
+      const bool is_above = l < j || j >= stage.moved;
+      sums[l % R::chains].add(at.row(at.F, l), is_above ? at.P_next[l * at.stride + j] : at.P_next[j * at.stride + l]);
     });
     W[j] = sums[0];
     if (R::chains > 1) W[j].add(sums[1]);
   });
   const auto form = [&](auto k) RHEC_ALWAYS_INLINE {
     R sums[2] = {at.row(at.H, k), R{}};
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(W[l], at.F[l * at.stride + k]); });
-    if (R::chains > 1) sums[0].add(sums[1]);
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(W[l], at.F[l * at.stride + k]); });
+    if (k >= stage.moved && k < stage.next_states) sums[1].add(W[k]);
+    if (R::chains > 1 || stage.moved < stage.next_states) sums[0].add(sums[1]);
     if (view.diagonal) sums[0].part[k / lane_count][k % lane_count] += view.diagonal[i * at.stride + k];
     X[k] = sums[0];
   };
@@ -218,10 +232,10 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
   const Memory<Stage> at(view, i);
   R costate = p;
   costate.add(R::from(at.drift));
-  R sums[2] = {R::from(at.h), R{}};
-  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.F, l), costate.splat(l)); });
+  R sums[2] = {R::from(at.h), costate.between(stage.moved, stage.next_states)};
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.F, l), costate.splat(l)); });
   R gradient = sums[0];
-  if (R::chains > 1) gradient.add(sums[1]);
+  if (R::chains > 1 || stage.moved < stage.next_states) gradient.add(sums[1]);
   if (view.fixes[i]) {
     gradient.to(at.g);
     stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
@@ -323,15 +337,8 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
 /// One entry of the rows of a batch of responses.
 using Batch = Row<response_batch / lane_count>;
 
-/// What stands before the program's own vectors: 1 for the minimiser, which is the last of a batch, 0 for the others.
-inline Batch minimiser_alone() {
-  Batch unit{};
-  unit.part[response_batch / lane_count - 1][lane_count - 1] = 1.0;
-  return unit;
-}
-
-template <class Stage, bool with_minimiser>
-inline void respond_stage_backward(const RiccatiView& view, int i, double* gradients) {
+template <class Stage>
+inline void respond_stage_backward(const RiccatiView& view, int i, bool has_gradient, double* gradients) {
   const Stage stage(view, i);
   const long stride = view.stride;
   const double* F = view.F + i * view.states * stride;
@@ -340,32 +347,18 @@ inline void respond_stage_backward(const RiccatiView& view, int i, double* gradi
   const std::int8_t* sides = view.sides + i * stride;
   double* own = gradients + i * stride * response_batch;
   const double* next = own + stride * response_batch;
-  const Batch unit = minimiser_alone();
   Batch costates[Stage::most_states], gradient[Stage::most_columns];
-  for (int l = 0; l < stage.next_states; ++l) {
-    costates[l] = Batch::from(next + l * response_batch);
-    if (with_minimiser) costates[l].add(unit, view.drift[i * stride + l]);
-  }
+  for (int l = 0; l < stage.next_states; ++l) costates[l] = Batch::from(next + l * response_batch);
   const auto form = [&](int k) {
-    gradient[k] = Batch::from(own + k * response_batch);
-    if (with_minimiser) gradient[k].add(unit, view.h[i * stride + k]);
-    for (int l = 0; l < stage.next_states; ++l) gradient[k].add(costates[l], F[l * stride + k]);
+    gradient[k] = has_gradient ? Batch::from(own + k * response_batch) : Batch{};
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { gradient[k].add(costates[l], F[l * stride + k]); });
+    if (k >= stage.moved && k < stage.next_states) gradient[k].add(costates[k]);
   };
   for (int k = stage.offset; k < stage.columns; ++k) {
     form(k);
     gradient[k].to(own + k * response_batch);
   }
   for (int k = 0; k < stage.states; ++k) form(k);
-  if (with_minimiser) {
-    for (int f = stage.offset; f < stage.columns; ++f) {
-      if (sides[f] == 0) continue;
-      const double* column = U + (f - stage.offset) * stride;
-      const double bound = (sides[f] < 0 ? view.lower : view.upper)[i * stride + f];
-      for (int k = stage.offset; k < stage.columns; ++k)
-        if (sides[k] == 0) gradient[k].add(unit, column[k] * bound);
-      for (int k = 0; k < stage.states; ++k) gradient[k].add(unit, column[k] * bound);
-    }
-  }
   for (int k = stage.columns - 1; k >= stage.offset; --k) {
     if (sides[k] != 0) continue;
     const double* column = U + (k - stage.offset) * stride;
@@ -378,7 +371,7 @@ inline void respond_stage_backward(const RiccatiView& view, int i, double* gradi
   for (int k = 0; k < stage.states; ++k) gradient[k].to(own + k * response_batch);
 }
 
-template <class Stage, bool with_minimiser>
+template <class Stage>
 inline void respond_stage_forward(const RiccatiView& view, int i, double* responses, double* costates) {
   const Stage stage(view, i);
   const long stride = view.stride;
@@ -388,15 +381,11 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
   const std::int8_t* sides = view.sides + i * stride;
   double* own = responses + i * stride * response_batch;
   double* next = own + stride * response_batch;
-  const Batch unit = minimiser_alone();
   Batch z[Stage::most_columns];
   for (int j = 0; j < stage.states; ++j) z[j] = Batch::from(own + j * response_batch);
   for (int k = stage.offset; k < stage.columns; ++k) {
     z[k] = {};
-    if (sides[k] != 0) {
-      if (with_minimiser) z[k].add(unit, (sides[k] < 0 ? view.lower : view.upper)[i * stride + k]);
-      continue;
-    }
+    if (sides[k] != 0) continue;
     const double* column = U + (k - stage.offset) * stride;
     Batch sum = Batch::from(own + k * response_batch);
     for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
@@ -405,19 +394,19 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
   }
   Batch next_state[Stage::most_states];
   for (int l = 0; l < stage.next_states; ++l) {
-    Batch sum{};
-    if (with_minimiser) sum.add(unit, view.b[i * stride + l]);
-    for (int j = 0; j < stage.states; ++j) sum.add(z[j], F[l * stride + j]);
-    for (int k = stage.offset; k < stage.columns; ++k) sum.add(z[k], F[l * stride + k]);
-    next_state[l] = sum;
-  }
-  if (with_minimiser) {
-    const double* P_next = view.P + (i + 1) * view.states * stride;
-    for (int l = 0; l < stage.next_states; ++l) {
-      Batch sum = Batch::from(next + l * response_batch);
-      for (int j = 0; j < stage.next_states; ++j) sum.add(next_state[j], P_next[l * stride + j]);
-      sum.to(costates + ((i + 1) * stride + l) * response_batch);
+    next_state[l] = {};
+    if (l >= stage.moved) {
+      next_state[l] = z[l];
+      continue;
     }
+    for (int j = 0; j < stage.states; ++j) next_state[l].add(z[j], F[l * stride + j]);
+    for (int k = stage.offset; k < stage.columns; ++k) next_state[l].add(z[k], F[l * stride + k]);
+  }
+  const double* P_next = view.P + (i + 1) * view.states * stride;
+  for (int l = 0; l < stage.next_states; ++l) {
+    Batch sum = Batch::from(next + l * response_batch);
+    for (int j = 0; j < stage.next_states; ++j) sum.add(next_state[j], P_next[l * stride + j]);
+    sum.to(costates + ((i + 1) * stride + l) * response_batch);
   }
   for (int l = 0; l < stage.next_states; ++l) next_state[l].to(next + l * response_batch);
   for (int k = stage.offset; k < stage.columns; ++k) {
@@ -441,6 +430,8 @@ inline auto with_shape(const RiccatiView& view, int i, const Function& function)
   const int states = view.states, controls = view.control_counts[i];
   const bool is_full = view.state_counts[i] == states && view.state_counts[i + 1] == states;
   if (is_full && states == 6) {
+    // An estimator's or a controller's between the starts of blocks: four states of the vehicle, two parameters.
+    if (controls == 2 && view.carried_counts[i] == 2) return function.template operator()<Shape<1, 6, 2, true, 2>>();
     if (controls == 2) return function.template operator()<Shape<1, 6, 2>>();
     if (controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out>>();
     if (controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out>>();
@@ -460,7 +451,8 @@ constexpr bool matrices_fit = lane_count == 8;
 /// Whether stage j can be treated in one go with stage i.
 inline bool is_alike(const RiccatiView& view, int i, int j) {
   return view.special[j] == 0 && view.control_counts[j] == view.control_counts[i] &&
-         view.state_counts[j] == view.state_counts[i] && view.state_counts[j + 1] == view.state_counts[i + 1];
+         view.carried_counts[j] == view.carried_counts[i] && view.state_counts[j] == view.state_counts[i] &&
+         view.state_counts[j + 1] == view.state_counts[i + 1];
 }
 
 int factor(const RiccatiView& view, int first, double tolerance) {
@@ -512,58 +504,52 @@ int solve_forward(const RiccatiView& view, int first) {
   return view.intervals;
 }
 
-void respond_backward(const RiccatiView& view, int last, double* gradients, bool with_minimiser) {
-  for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0; --i) {
-    with_shape<true>(view, i, [&]<class Stage>() {
-      if (with_minimiser) {
-        respond_stage_backward<Stage, true>(view, i, gradients);
-      } else {
-        respond_stage_backward<Stage, false>(view, i, gradients);
-      }
-    });
-  }
+void respond_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
+  for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0; --i)
+    with_shape<true>(view, i,
+                     [&]<class Stage>() { respond_stage_backward<Stage>(view, i, has_gradient[i] != 0, gradients); });
 }
 
 void respond_forward(const RiccatiView& view, double* responses, double* costates) {
-  for (int i = 0; i < view.intervals; ++i) {
-    with_shape<true>(view, i, [&]<class Stage>() {
-      if (costates) {
-        respond_stage_forward<Stage, true>(view, i, responses, costates);
-      } else {
-        respond_stage_forward<Stage, false>(view, i, responses, costates);
-      }
-    });
-  }
+  for (int i = 0; i < view.intervals; ++i)
+    with_shape<true>(view, i, [&]<class Stage>() { respond_stage_forward<Stage>(view, i, responses, costates); });
 }
 
 void combine(const double* batch, const double* weights, double* sums, long count) {
+  static_assert(response_batch == 8);
   const Batch weight = Batch::from(weights);
-  for (long k = 0; k < count; ++k) {
-    const Batch entry = Batch::from(batch + k * response_batch);
-    Lanes sum = entry.part[0] * weight.part[0];
-    for (int v = 1; v < response_batch / lane_count; ++v) sum += entry.part[v] * weight.part[v];
-    sums[k] = sum_of(sum);
+  for (long k = 0; k < count; k += 8, batch += 8 * response_batch) {
+    Lanes of_entry[8];
+    for (int j = 0; j < 8; ++j) {
+      const Batch entry = Batch::from(batch + j * response_batch);
+      of_entry[j] = entry.part[0] * weight.part[0];
+      for (int v = 1; v < response_batch / lane_count; ++v) of_entry[j] += entry.part[v] * weight.part[v];
+    }
+    add_sums_of(of_entry, sums + k);
   }
 }
 
 /// Sigma of the next node from that of stage i: A Sigma A' + B cov(w | s) B', with A the dynamics under the policy.
 template <class Stage>
 inline void carry_stage(const RiccatiView& view, int i, double* covariance) {
-  using R = typename Stage::R;
+  using R = Row<Stage::state_registers>;  // of rows, what belongs to states
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
   R rows[Stage::most_states], closed[Stage::most_states], products[Stage::most_columns] = {};
-  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { rows[j] = at.row(covariance, j); });
-  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
-    R row = at.row(at.F, l).first(stage.states);
-    stage.each_control([&](auto k)
-                           RHEC_ALWAYS_INLINE { row.add(at.row(at.V, k - stage.offset), -at.F[l * at.stride + k]); });
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { rows[j] = R::from(covariance + j * at.stride); });
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
+    R row = R::from(at.F + l * at.stride).first(stage.states);
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+      row.add(R::from(at.V + (k - stage.offset) * at.stride), -at.F[l * at.stride + k]);
+    });
     closed[l] = row;
     stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { products[l].add(rows[j], row.splat(j)); });
   });
+  stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { products[l] = rows[l]; });
   // Of the products, columns are needed.
+  constexpr bool is_one_register = Stage::state_registers == 1 && lane_count == 8;
   R columns[Stage::most_columns];
-  if constexpr (Stage::is_compact) {
+  if constexpr (is_one_register) {
     Lanes lanes[8];
     for (int l = 0; l < 8; ++l) lanes[l] = products[l].part[0];
     transpose(lanes);
@@ -575,27 +561,36 @@ inline void carry_stage(const RiccatiView& view, int i, double* covariance) {
     for (int j = 0; j < stage.states; ++j) columns[j] = R::from(transposed[j]);
   }
   R next[Stage::most_states] = {};
-  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
     stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { next[l].add(columns[j], closed[l].splat(j)); });
+  });
+  stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { next[l] = columns[l]; });
+  R effects[Stage::most_columns];  // columns of B
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    if constexpr (Stage::is_compact && is_one_register) {
+      effects[k] = R::from(at.T + k * 8);
+    } else if constexpr (Stage::is_known) {
+      effects[k] = R{};
+      stage.each_next_state([&](auto l)
+                                RHEC_ALWAYS_INLINE { effects[k] = effects[k].with(l, at.F[l * at.stride + k]); });
+    } else {
+      double column[Stage::most_columns] = {};
+      for (int l = 0; l < stage.next_states; ++l) column[l] = at.F[l * at.stride + k];
+      effects[k] = R::from(column);
+    }
   });
   // What is left of a control's variance when those before it are known moves the later ones too.
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     double moved[Stage::most_columns] = {};
     moved[k] = 1.0;
-    for (int j = k + 1; j < stage.columns; ++j)
+    R noise = effects[k];
+    for (int j = k + 1; j < stage.columns; ++j) {
       for (int before = k; before < j; ++before)
         moved[j] -= at.U[(j - stage.offset) * at.stride + before] * at.inverse[j - stage.offset] * moved[before];
-    R noise{};
-    if constexpr (Stage::is_compact) {
-      for (int j = k; j < stage.columns; ++j) noise.part[0] += load(at.T + j * 8) * moved[j];
-    } else {
-      double entries[Stage::most_columns] = {};
-      for (int l = 0; l < stage.next_states; ++l)
-        for (int j = k; j < stage.columns; ++j) entries[l] += at.F[l * at.stride + j] * moved[j];
-      noise = R::from(entries);
+      noise.add(effects[j], moved[j]);
     }
     const double variance = 2.0 * at.inverse[k - stage.offset];
-    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { next[l].add(noise, noise.splat(l) * variance); });
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l].add(noise, noise.splat(l) * variance); });
   });
   stage.each_next_state([&](auto l)
                             RHEC_ALWAYS_INLINE { next[l].first(stage.next_states).to(covariance + l * at.stride); });

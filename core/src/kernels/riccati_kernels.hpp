@@ -15,6 +15,7 @@ struct RiccatiView {
   int stride = 0;
   const int* state_counts = nullptr;
   const int* control_counts = nullptr;
+  const int* carried_counts = nullptr;
 
   const double *F = nullptr, *H = nullptr, *h = nullptr, *b = nullptr;
   const double *lower = nullptr, *upper = nullptr;
@@ -45,12 +46,11 @@ struct RiccatiKernels {
   /// Control, next state and costate of stages first, first + 1, ...; returns the special one, or N.
   int (*solve_forward)(const RiccatiView& view, int first);
   /// Responses to `response_batch` gradients at once, each entry of a row beside those of the others: from gradients of
-  /// the stages up to `last` to the value functions' gradients (in place), and from those and the initial states to the
-  /// responses (in place). There must be no special stage. If `costates` is not null, the last of the batch is the
-  /// minimiser itself, and the costates of all go there.
-  void (*respond_backward)(const RiccatiView& view, int last, double* gradients, bool with_minimiser);
+  /// the stages up to `last` (0 where `has_gradient` is) to the value functions' gradients (in place), and from those
+  /// and the initial states to the responses (in place) and their costates. There must be no special stage.
+  void (*respond_backward)(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients);
   void (*respond_forward)(const RiccatiView& view, double* responses, double* costates);
-  /// The sums of a batch, each response by its weight, over `count` entries.
+  /// sums += those of a batch, each response by its weight, over `count` entries, which are whole eights.
   void (*combine)(const double* batch, const double* weights, double* sums, long count);
   /// The covariance (rows of the stride) of node `first` carried on to the special stage that is returned, or to node
   /// N; on the way those of all nodes go to `all`, blocks of n_s x n_s, if it is not null.

@@ -155,8 +155,10 @@ Judged solve_and_judge(Solver& solver, const HorizonProblem& problem, const Iter
                        Clock::time_point deadline) {
   Judged judged;
   judged.point = guess;
+  const auto start = Clock::now();
   solver.prepare(problem, judged.point);
   judged.report = solver.solve(problem, judged.point, deadline);
+  judged.milliseconds = 1e-3 * microseconds_since(start);
   const Report& report = judged.report;
   std::vector<std::string>& complaints = judged.complaints;
   std::vector<double> scratch(problem.scratch_size());

@@ -12,6 +12,7 @@ namespace rhec::conformance {
 
 struct Judged {
   Report report;
+  double milliseconds = 0.0;
   Iterate point;
   KktResidual kkt;         ///< by the core
   double objective = 0.0;  ///< by the core

@@ -47,6 +47,7 @@ class RHEC_EXPORT NodeRecorder final : public EstimationMethod {
 /// Estimates of a whole run from all of its measurements.
 struct SmoothedRun {
   Report report;
+  double solve_seconds = 0.0;            ///< of all that `estimate` took, the solver's part
   std::vector<double> times;             ///< of the nodes, from the first [s], N+1
   std::vector<double> states;            ///< N+1 x n_x
   std::vector<double> inputs;            ///< N x n_u

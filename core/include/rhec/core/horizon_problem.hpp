@@ -11,6 +11,7 @@
 namespace rhec {
 
 struct CostView;
+struct MeasurementView;
 struct Recollection;
 
 /// Row `i` of rows of equal width.
@@ -147,7 +148,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   void fill_stages(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                    std::span<double> scratch) const noexcept;
   bool has_structure(const StageQp& qp, const Recollection& known) const noexcept;
-  void remember(const Iterate& point, const StageQp& qp, Recollection& known) const noexcept;
+  void remember(const Iterate& point, int first, const StageQp& qp, Recollection& known) const noexcept;
   bool move_along(const Iterate& point, Hessian hessian, StageQp& qp, Recollection& known,
                   std::span<double> scratch) const noexcept;
   void fill_sizes(StageRange range, StageQp& qp) const noexcept;

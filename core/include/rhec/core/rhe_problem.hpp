@@ -48,11 +48,15 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   Eigen::VectorXd arrival_mean;         ///< n_x + n_p
   Eigen::MatrixXd arrival_information;  ///< symmetric positive semidefinite
 
-  /// y at a node (n_y) and measured u on an interval (n_u), NaN where missing. Only u's rows follow each other.
+  /// y at a node (n_y) and measured u on an interval (n_u), NaN where missing.
   double* output(int node) noexcept { return row(outputs_, node, output_row_); }
-  double* measured_input(int interval) noexcept { return row(measured_inputs_, interval, nu()); }
+  double* measured_input(int interval) noexcept {
+    return row(measured_inputs_, interval, stride()) + capacity().states;
+  }
   const double* output(int node) const noexcept { return row(outputs_, node, output_row_); }
-  const double* measured_input(int interval) const noexcept { return row(measured_inputs_, interval, nu()); }
+  const double* measured_input(int interval) const noexcept {
+    return row(measured_inputs_, interval, stride()) + capacity().states;
+  }
 
   void set_intervals(int intervals) noexcept { HorizonProblem::set_intervals(intervals); }
   /// Marks where a parameter's blocks start. `begins` has an entry an interval; the first interval's block is that of
@@ -108,7 +112,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
   AlignedDoubles outputs_;                        ///< a row a node, NaN where nothing was measured
   AlignedDoubles output_weights_, output_turns_, output_inverse_turns_;  ///< rows; a full turn where it is an angle
-  std::vector<double> measured_inputs_, link_information_;
+  AlignedDoubles measured_inputs_, input_weights_;  ///< rows as those of an Iterate, NaN and 0 but for the inputs
+  std::vector<double> link_information_;
 };
 
 /// The signed difference a - b on the circle, in (-pi, pi].

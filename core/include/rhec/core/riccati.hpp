@@ -76,20 +76,25 @@ class RHEC_EXPORT Riccati {
   struct Responses {
     static constexpr int size = 8;
     AlignedDoubles values, costates;
+    std::vector<int> control_counts;  ///< of the program that they are for
     Responses() = default;
     explicit Responses(const Capacity& capacity);
   };
   struct Entry {
     int stage, place;
   };
-  /// With the minimiser, that is number size - 1, and `count` at most that. False where the last factorisation holds
-  /// state bounds or was convexified: those have no responses here.
-  bool respond(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count, bool with_minimiser,
+  /// Of at most Responses::size gradients. False where the last factorisation holds state bounds or was convexified:
+  /// those have no responses here.
+  bool respond(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
                Responses& responses) noexcept;
-  /// The same as `solve`, but for `feedback`, with each gradient by its weight (the minimiser's is 1), from responses
-  /// with the minimiser.
+  /// Adds the responses, each by its weight (there are Responses::size), to a minimiser that `solve` has found: as if
+  /// it had been asked with those gradients, but for `feedback`.
   void combine(const StageQp& qp, const ActiveSet& active, const Responses& responses, const double* weights,
                Iterate& step) noexcept;
+
+  /// sums += the values of the responses, each by its weight, over the first `places` entries of the rows of all
+  /// stages.
+  void add_values(const Responses& responses, const double* weights, int places, double* sums) const noexcept;
 
   /// The control of stage i as the last `solve` would choose it for any stage-state step: w = T v(s) + Y s + y0.
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
@@ -150,8 +155,8 @@ class RHEC_EXPORT Riccati {
   AlignedDoubles P_, U_, V_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
   AlignedDoubles initial_inverse_;
   std::vector<int> state_counts_, control_counts_;
-  std::vector<std::uint8_t> is_special_, fixes_control_;  // N stages
-  std::vector<Reduction> reductions_;                     // N stages, then node 0
+  std::vector<std::uint8_t> is_special_, fixes_control_, has_gradient_;  // N stages
+  std::vector<Reduction> reductions_;                                    // N stages, then node 0
   std::vector<double> G_, L_, factor_;  // of special stages: full G and L; Cholesky factor of the reduced G
   std::vector<double> K_, T_, Y_;       // v = -K s - k, w = T v + Y s + y0
   std::vector<double> C_, eliminator_;  // rows at each node; row operations of the elimination at each stage

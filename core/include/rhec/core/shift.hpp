@@ -23,6 +23,8 @@ class RHEC_EXPORT GuessShifter {
   explicit GuessShifter(const HorizonProblem& like);
 
   void take(const HorizonProblem& problem, const Iterate& point) noexcept;
+  /// The same without a copy: what is left in the point is of no use until `apply` has written to it.
+  void take(const HorizonProblem& problem, Iterate&& point) noexcept;
   void forget() noexcept { intervals_ = 0; }
 
   /// Writes into `guess` (which may be the point that was taken) the kept solution, seen from `steps` intervals further
@@ -33,6 +35,7 @@ class RHEC_EXPORT GuessShifter {
   bool apply(int steps, HorizonProblem& to, Iterate& guess) noexcept;
 
  private:
+  void take_structure(const HorizonProblem& problem) noexcept;
   /// Of the kept horizon: what a channel's interval contributes to the costates of its block.
   double gradient(int interval, int channel) const noexcept;
   int kept_control(int interval, int channel) const noexcept { return controls_[interval * channels_ + channel]; }

@@ -34,8 +34,8 @@ struct Report {
   bool fallback_used = false;   ///< a robust path had to take over from the fast one
   double objective = 0.0;       ///< at the returned point
   KktResidual kkt;              ///< the core's own judgement of the returned point
-  double preparation_us = 0.0;  ///< time spent in prepare, and before it in finish [us]
-  double feedback_us = 0.0;     ///< time spent in solve, or in feedback [us]
+  double preparation_us = 0.0;  ///< time spent in prepare, and before it in finish [us]; for TimedSolver to say
+  double feedback_us = 0.0;     ///< time spent in solve, or in feedback [us]; for TimedSolver to say
 };
 
 /// Writes what the core says of a point that a solver returns: its objective and its KKT residual. `qp` and `scratch`

@@ -22,6 +22,14 @@ RHEC_EXPORT StepCheck check_step(const StageQp& qp, const Iterate& step, double 
 /// |bound|), or one of them is not a number.
 RHEC_EXPORT bool mark_bounds(const StageQp& qp, const Iterate& point, double tolerance, std::uint8_t* marks) noexcept;
 
+struct ViolatedBounds {
+  double largest = 0.0;  ///< violation, if it is above 0
+  int count = 0;         ///< of those that are above 0
+};
+/// Writes violations = max(least - values, values - most), of `count` entries, which are whole eights.
+RHEC_EXPORT ViolatedBounds find_violations(const double* values, const double* least, const double* most, int count,
+                                           double* violations) noexcept;
+
 /// The point that a full step leads to: values are added, and multipliers taken over. All are of one capacity.
 RHEC_EXPORT void add_full_step(int intervals, const Iterate& from, const Iterate& step, Iterate& to) noexcept;
 

@@ -41,27 +41,29 @@ class RHEC_EXPORT StageQp {
   int controls(int interval) const noexcept { return interval < intervals_ ? control_counts_[interval] : 0; }
   const int* state_counts() const noexcept { return state_counts_.data(); }
   const int* control_counts() const noexcept { return control_counts_.data(); }  ///< of intervals 0 .. N - 1
+  const int* carried_counts() const noexcept { return carried_counts_.data(); }
   void set_intervals(int intervals) noexcept { intervals_ = intervals; }
-  /// Clears what a stage that has become smaller does not use any more.
-  void set_sizes(int node, int states, int controls) noexcept {
+  /// Clears what a stage that has become smaller does not use any more. The last `carried` states are those that the
+  /// interval hands on as they are: their rows of F are, or will be, those of the identity, which solvers may rely on.
+  void set_sizes(int node, int states, int controls, int carried = 0) noexcept {
     if (states < state_counts_[node] || controls < control_counts_[node]) clear(node);
     state_counts_[node] = states;
     control_counts_[node] = controls;
+    carried_counts_[node] = carried;
   }
-  /// Moves F, b and sizes towards the front; the last stages are left with zeros. With curvature, those of H between
-  /// the first and the terminal stage move too; otherwise H is to be written anew, in whole rows.
-  void drop_first(int stages, bool with_curvature) noexcept;
+  /// Moves F, b, H, h and sizes towards the front; behind them are zeros.
+  void drop_first(int stages) noexcept;
   bool initial_state_is_given = false;
-  /// For who writes to F, b or H himself: what is remembered of them is void.
-  void change() noexcept { ++changes_; }
+  /// For who writes to F, b or H himself: what is remembered of them, and which states are carried, is void.
+  void change() noexcept;
   unsigned changes() const noexcept { return changes_; }
   std::any memory;  ///< of how F and b were made, for the Ocp that made them (`Ocp::remember_in`)
 
   // Raw access for kernels: pointers to stage i.
-  double* F(int i) noexcept { return at(F_, first_F_ + i, capacity_.states); }
-  double* H(int i) noexcept { return at(H_, first_H_ + i, wide_); }
-  double* h(int i) noexcept { return at(h_, i, 1); }
-  double* b(int i) noexcept { return at(b_, first_b_ + i, 1); }
+  double* F(int i) noexcept { return at(F_, first_ + i, capacity_.states); }
+  double* H(int i) noexcept { return at(H_, first_ + i, wide_); }
+  double* h(int i) noexcept { return at(h_, first_ + i, 1); }
+  double* b(int i) noexcept { return at(b_, first_ + i, 1); }
   double* lower(int i) noexcept { return at(lower_, i, 1); }
   double* upper(int i) noexcept { return at(upper_, i, 1); }
   double* q(int i) noexcept { return h(i); }
@@ -71,10 +73,10 @@ class RHEC_EXPORT StageQp {
   double* control_lower(int i) noexcept { return lower(i) + capacity_.states; }
   double* control_upper(int i) noexcept { return upper(i) + capacity_.states; }
   double* initial_step() noexcept { return initial_step_.data(); }
-  const double* F(int i) const noexcept { return at(F_, first_F_ + i, capacity_.states); }
-  const double* H(int i) const noexcept { return at(H_, first_H_ + i, wide_); }
-  const double* h(int i) const noexcept { return at(h_, i, 1); }
-  const double* b(int i) const noexcept { return at(b_, first_b_ + i, 1); }
+  const double* F(int i) const noexcept { return at(F_, first_ + i, capacity_.states); }
+  const double* H(int i) const noexcept { return at(H_, first_ + i, wide_); }
+  const double* h(int i) const noexcept { return at(h_, first_ + i, 1); }
+  const double* b(int i) const noexcept { return at(b_, first_ + i, 1); }
   const double* lower(int i) const noexcept { return at(lower_, i, 1); }
   const double* upper(int i) const noexcept { return at(upper_, i, 1); }
   const double* q(int i) const noexcept { return h(i); }
@@ -117,13 +119,12 @@ class RHEC_EXPORT StageQp {
     return {first, count, length, Eigen::OuterStride<>(stride_)};
   }
   void clear(int i) noexcept;
-  void advance(AlignedDoubles& v, int& first, int rows, int stages) const noexcept;
 
   Capacity capacity_;
   int stride_ = 0, wide_ = 0, intervals_ = 0;
-  int first_F_ = 0, first_b_ = 0, first_H_ = 0;  ///< slots of stage 0: what moves towards the front is not copied
+  int first_ = 0;  ///< slot of stage 0 in F, b, H and h: what moves towards the front is not copied
   unsigned changes_ = 0;
-  std::vector<int> state_counts_, control_counts_;
+  std::vector<int> state_counts_, control_counts_, carried_counts_;
   AlignedDoubles F_, H_, h_, b_, lower_, upper_, initial_step_;
 };
 

@@ -61,8 +61,9 @@ struct LoopHooks {
   std::function<void(LoopPart part)> begins = {};
 };
 
-/// A copy of a robot whose solvers tell `hooks.solved`; `step` is asked at each solve. The robot alone, where nobody
-/// wants to be told. What the hooks and `step` refer to must outlive the estimators and controllers made of it.
+/// A copy of a robot whose solvers' times are taken, and that tell `hooks.solved`, where somebody wants to be told;
+/// `step` is asked at each solve. What the hooks and `step` refer to must outlive the estimators and controllers made
+/// of it.
 RHEC_EXPORT Robot with_hooks(Robot robot, const LoopHooks& hooks, std::function<std::int64_t()> step);
 
 }  // namespace rhec::sim
