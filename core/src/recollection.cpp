@@ -157,6 +157,10 @@ bool HorizonProblem::move_along(const Iterate& point, Hessian hessian, StageQp& 
   const bool is_exact = hessian == Hessian::exact;
   if (known.changes != qp.changes() || (is_exact && !known.has_curvature)) return false;
   if (known.substeps != substeps_ || !is_direct() || any_ramp_ || qp.intervals() != known.intervals) return false;
+  // As it was made.
+  if (!is_exact && !has_late_bounds() && is_made_at(point, qp) && has_structure(qp, known) &&
+      std::equal(durations_.begin(), durations_.begin() + intervals_, known.durations.begin()))
+    return true;
   const auto is_state_at = [&](int node, int known_node, int size) {
     return std::memcmp(point.state(node), row(known.rows, known_node, stride_), size * sizeof(double)) == 0;
   };
@@ -186,8 +190,6 @@ bool HorizonProblem::move_along(const Iterate& point, Hessian hessian, StageQp& 
     if (unknown_count == most_unknown) return false;
     unknown[unknown_count++] = i;
   }
-  // As it was made.
-  if (steps == 0 && unknown_count == 0 && intervals_ == known.intervals && !has_late_bounds()) return true;
   const bool was_ahead = end < intervals_ && is_known(end);
   if (steps > 0) qp.drop_first(steps);
   // The last node stays the last one.
