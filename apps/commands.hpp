@@ -32,6 +32,7 @@ void add_estimate(CLI::App& program, Action& chosen);
 void add_run(CLI::App& program, Action& chosen);
 void add_smooth(CLI::App& program, Action& chosen);
 void add_solve(CLI::App& program, Action& chosen);
+void add_sweep(CLI::App& program, Action& chosen);
 void add_options(CLI::App& program, Action& chosen);
 void add_plugins(CLI::App& program, Action& chosen);
 

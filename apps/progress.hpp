@@ -4,6 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <string>
 #include <utility>
@@ -36,6 +39,58 @@ class ProgressBar {
   std::string title_;
   bool terminal_;
   int shown_ = -1;
+};
+
+/// How far many runs are, at which rate, and the time left: a line that is drawn anew on a terminal, a line a minute
+/// where the output is read by a program.
+class RateLine {
+ public:
+  struct State {
+    std::int64_t total = 0, there = 0, made = 0;  ///< `there` from before, `made` since the start
+    double seconds = 0.0;                         ///< since the start
+    bool ends = false;                            ///< only what is under way is finished
+  };
+
+  explicit RateLine(std::string title) : title_(std::move(title)), terminal_(isatty(STDERR_FILENO) != 0) {}
+  ~RateLine() { finish(); }
+  RateLine(const RateLine&) = delete;
+  RateLine& operator=(const RateLine&) = delete;
+
+  void show(const State& state) {
+    const auto now = Clock::now();
+    if (now < next_) return;
+    next_ = now + (terminal_ ? std::chrono::milliseconds(200) : std::chrono::milliseconds(60000));
+    const double share =
+        state.total > 0 ? static_cast<double>(state.there + state.made) / static_cast<double>(state.total) : 1.0;
+    const double rate = state.seconds > 0.0 ? static_cast<double>(state.made) / state.seconds : 0.0;
+    const std::int64_t left = std::max<std::int64_t>(0, state.total - state.there - state.made);
+    const std::string text = fmt::format("{}: {:.1f} %, {} of {} runs, {:.1f} a second, {}", title_, 100.0 * share,
+                                         state.there + state.made, state.total, rate,
+                                         state.ends    ? "the last ones are finished (again: ends at once)"
+                                         : rate == 0.0 ? "time left unknown"
+                                                       : duration(static_cast<double>(left) / rate) + " left");
+    fmt::print(stderr, "{}{}{}", terminal_ ? "\r" : "", text, terminal_ ? "\033[K" : "\n");
+    std::fflush(stderr);
+    shown_ = true;
+  }
+  void finish() {
+    if (shown_ && terminal_) fmt::print(stderr, "\r\033[K");
+    shown_ = false;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  static std::string duration(double seconds) {
+    if (seconds < 60.0) return fmt::format("{:.0f} s", seconds);
+    if (seconds < 3600.0) return fmt::format("{:.0f} min", seconds / 60.0);
+    return fmt::format("{:.1f} h", seconds / 3600.0);
+  }
+
+  std::string title_;
+  bool terminal_;
+  Clock::time_point next_ = Clock::now() + (terminal_ ? std::chrono::seconds(0) : std::chrono::seconds(60));
+  bool shown_ = false;
 };
 
 }  // namespace rhec::apps

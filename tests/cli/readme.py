@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What the documentation shows is what is there: readme.py <rhec>
 
-A block of README.md below a line `<!-- file: ... -->` is that file, word for word. Commands of the README, of docs/ and of
+A block of a page below a line `<!-- file: ... -->` is that file, word for word. Commands of the README, of docs/ and of
 the pages of models that begin with `rhec run`, `rhec check`, `rhec compare`, `rhec options` or `rhec plugins` work (with shorter paths);
 those below a line `<!-- run: <test> -->` are that test's to run. Links lead to files.
 """
@@ -32,13 +32,14 @@ def main():
     readme = (cli.ROOT / "README.md").read_text()
     shown = SHOWN.findall(readme)
     findings.expect(len(shown) >= 4, "README.md", f"shows {len(shown)} files")
-    for name, text in shown:
-        findings.expect((cli.ROOT / name).read_text() == text, "README.md", f"what it shows of {name} is not what is there")
     pages = [cli.ROOT / "README.md", cli.ROOT / "CHANGELOG.md", *sorted((cli.ROOT / "docs").rglob("*.md")),
              *sorted((cli.ROOT / "models").rglob("*.md"))]
     with tempfile.TemporaryDirectory(prefix="rhec-readme-") as work:
         for page in pages:
             text = page.read_text()
+            for name, shown in SHOWN.findall(text):
+                findings.expect((cli.ROOT / name).read_text() == shown, str(page.relative_to(cli.ROOT)),
+                                f"what it shows of {name} is not what is there")
             for link in LINK.findall(text):
                 findings.expect((page.parent / link).exists(), str(page.relative_to(cli.ROOT)), f"leads to {link}, which is not there")
             for command in commands(text):

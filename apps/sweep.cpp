@@ -1,0 +1,168 @@
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/plugins/host.hpp"
+#include "rhec/sim/sweep.hpp"
+#include "rhec/sim/sweep_runner.hpp"
+#include "rhec/sim/sweep_store.hpp"
+
+namespace rhec::apps {
+namespace {
+
+struct SweepArguments {
+  std::string sweep, out;
+  int threads = 0;
+  bool yes = false, dry_run = false;
+  std::vector<std::filesystem::path> plugin_path;
+};
+
+/// A grid of more runs is asked about, and looked through for equal runs only while it is made.
+constexpr std::int64_t many_runs = 1'000'000;
+
+/// While there is one, the first Ctrl-C (or a request to end) asks to stop; the second ends the program as usual.
+class StopRequest {
+ public:
+  StopRequest() {
+    asked_ = false;
+    struct sigaction action {};
+    action.sa_handler = [](int) { asked_ = true; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, &interrupt_);
+    sigaction(SIGTERM, &action, &terminate_);
+  }
+  ~StopRequest() {
+    sigaction(SIGINT, &interrupt_, nullptr);
+    sigaction(SIGTERM, &terminate_, nullptr);
+  }
+  StopRequest(const StopRequest&) = delete;
+  StopRequest& operator=(const StopRequest&) = delete;
+
+  static bool asked() { return asked_; }
+
+ private:
+  static std::atomic<bool> asked_;  // without locks, as a handler needs it
+  static_assert(std::atomic<bool>::is_always_lock_free);
+  struct sigaction interrupt_ {};
+  struct sigaction terminate_ {};
+};
+std::atomic<bool> StopRequest::asked_ = false;
+
+/// Asks on a terminal; without one, or with another answer than yes, the grid is refused.
+void confirm(const sim::Sweep& sweep, const std::string& file, bool yes) {
+  if (yes || sweep.count() <= many_runs) return;
+  if (isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0) {
+    fmt::print(stderr, "{}: the grid has {} runs. Begin? [y/N] ", file, sweep.count());
+    std::fflush(stderr);
+    std::string answer;
+    std::getline(std::cin, answer);
+    if (answer == "y" || answer == "Y" || answer == "yes") return;
+  }
+  throw Error(fmt::format("{}: the grid has {} runs, more than {}; make it smaller, or begin it with --yes", file,
+                          sweep.count(), many_runs));
+}
+
+std::string counted(std::int64_t count, const std::string& word) {
+  return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
+}
+
+/// What was done, and the exit code; `there` is how many runs of the grid the database had.
+int tell(const sim::Sweep& sweep, const sim::SweepProgress& done, std::int64_t there,
+         const std::filesystem::path& file) {
+  fmt::print("{}: {} made in {:.1f} s", sweep.name(), counted(done.made, "run"), done.seconds);
+  if (done.made > 0) fmt::print(" ({:.1f} a second)", static_cast<double>(done.made) / done.seconds);
+  if (there > 0) fmt::print(", {} there before", there);
+  fmt::print("\n");
+  for (const auto& [status, count] : done.statuses) fmt::print("  {:>9} {}\n", count, name_of(status));
+  const std::int64_t left = done.total - there - done.made;
+  if (left > 0) fmt::print("stopped with {} still to make; the same command goes on there\n", counted(left, "run"));
+  fmt::print("database: {}\n", file.string());
+  const bool all_completed = std::all_of(done.statuses.begin(), done.statuses.end(),
+                                         [](const auto& entry) { return entry.first == sim::RunStatus::completed; });
+  return left > 0 || !all_completed ? exit_not_solved : exit_fine;
+}
+
+int sweep(const SweepArguments& arguments) {
+  const sim::Sweep sweep = sim::Sweep::from_file(arguments.sweep);
+  const Host host(arguments.plugin_path);
+  sweep.check_values(host);
+  if (!arguments.dry_run) confirm(sweep, arguments.sweep, arguments.yes);
+  // All of them before there is a file; where they are too many, each is looked up when its turn comes.
+  const std::vector<sim::RunIdentity> runs =
+      sweep.count() <= many_runs ? sweep.identities() : std::vector<sim::RunIdentity>();
+  if (arguments.dry_run) {
+    fmt::print("{}: {}; the first is {}\n", sweep.name(), counted(sweep.count(), "run"), sweep.assignments(0));
+    return exit_fine;
+  }
+  const std::filesystem::path file =
+      arguments.out.empty()
+          ? std::filesystem::path("out") / std::filesystem::path(arguments.sweep).stem().concat(".sqlite")
+          : std::filesystem::path(arguments.out);
+  sim::SweepStore store(file, "rhec " RHEC_PROJECT_VERSION);
+  const std::int64_t there =
+      std::count_if(runs.begin(), runs.end(), [&](const sim::RunIdentity& run) { return store.find(run).has_value(); });
+  const int threads =
+      arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+
+  RateLine line(sweep.name());
+  const StopRequest stop;
+  sim::SweepProgress done;
+  {
+    sim::ThreadWorkers workers(host, sweep, threads);
+    const auto show = [&](const sim::SweepProgress& now) {
+      line.show({.total = now.total,
+                 .there = std::max(there, now.there),
+                 .made = now.made,
+                 .seconds = now.seconds,
+                 .ends = now.stopped});
+    };
+    done = sim::run_sweep(sweep, store, workers, {.progress = show, .stop = [] { return StopRequest::asked(); }});
+  }
+  line.finish();
+  return tell(sweep, done, std::max(there, done.there), file);
+}
+
+}  // namespace
+
+void add_sweep(CLI::App& program, Action& chosen) {
+  auto arguments = std::make_shared<SweepArguments>();
+  CLI::App* command = program.add_subcommand("sweep", "Runs a scenario over a grid of its keys, on all cores.");
+  command->footer(
+      "A sweep is a YAML file that names a scenario and gives some of its keys lists or ranges of values; "
+      "docs/sweep.md\n"
+      "describes it, and the SQLite database that the runs go to. A run is written as soon as it is finished, and one\n"
+      "that is there already is not made again: after a crash, or Ctrl-C, the same command goes on.\n\n"
+      "The exit code is 3 where a run of the grid did not reach the end of its path, or where it was stopped.\n\n"
+      "Examples:\n"
+      "  rhec sweep scenarios/sweep_blocks.yaml --out out/blocks.sqlite\n"
+      "  rhec sweep scenarios/sweep_blocks.yaml --dry-run");
+  command->add_option("sweep", arguments->sweep, "a YAML file")->required();
+  command->add_option("--out", arguments->out, "database of the runs; otherwise out/ and the sweep's name")
+      ->type_name("FILE");
+  command->add_option("--threads", arguments->threads, "runs at the same time; otherwise as many as there are cores")
+      ->type_name("N")
+      ->check(CLI::Range(1, 4096));
+  command->add_flag("--yes", arguments->yes, "begin a grid of more than a million runs without being asked");
+  command->add_flag("--dry-run", arguments->dry_run, "check the sweep and count its runs, no more");
+  add_plugin_path(*command, arguments->plugin_path);
+  command->callback([&chosen, arguments] { chosen = [arguments] { return sweep(*arguments); }; });
+}
+
+}  // namespace rhec::apps
