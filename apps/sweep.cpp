@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,6 +23,7 @@
 #include "rhec/sim/sweep.hpp"
 #include "rhec/sim/sweep_runner.hpp"
 #include "rhec/sim/sweep_store.hpp"
+#include "sweep_ranks.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -99,9 +101,29 @@ int tell(const sim::Sweep& sweep, const sim::SweepProgress& done, std::int64_t t
   return left > 0 || !all_completed ? exit_not_solved : exit_fine;
 }
 
+/// What ranks other than the first do.
+int serve(const SweepArguments& arguments, const Host& host, SweepRanks& ranks, int threads) {
+  std::optional<sim::Sweep> sweep;
+  std::string problem;
+  try {
+    sweep.emplace(sim::Sweep::from_file(arguments.sweep));
+  } catch (const Error& mistake) {  // is told by rank 0, once
+    problem = mistake.what();
+  }
+  ranks.serve(host, sweep, problem, threads);
+  return exit_fine;
+}
+
 int sweep(const SweepArguments& arguments) {
-  const sim::Sweep sweep = sim::Sweep::from_file(arguments.sweep);
   const Host host(arguments.plugin_path);
+  const int rank_count = started_ranks();
+  const std::unique_ptr<SweepRanks> ranks = rank_count > 1 ? start_ranks(host, rank_count) : nullptr;
+  // Several processes are meant to have a core each, where nothing else is said.
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int threads = arguments.threads > 0 ? arguments.threads : ranks ? 1 : cores;
+  if (ranks && ranks->rank() > 0) return serve(arguments, host, *ranks, threads);
+
+  const sim::Sweep sweep = sim::Sweep::from_file(arguments.sweep);
   sweep.check_values(host);
   if (!arguments.dry_run) confirm(sweep, arguments.sweep, arguments.yes);
   // All of them before there is a file; where they are too many, each is looked up when its turn comes.
@@ -118,14 +140,13 @@ int sweep(const SweepArguments& arguments) {
   sim::SweepStore store(file, "rhec " RHEC_PROJECT_VERSION);
   const std::int64_t there =
       std::count_if(runs.begin(), runs.end(), [&](const sim::RunIdentity& run) { return store.find(run).has_value(); });
-  const int threads =
-      arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 
   RateLine line(sweep.name());
   const StopRequest stop;
   sim::SweepProgress done;
   {
-    sim::ThreadWorkers workers(host, sweep, threads);
+    const std::unique_ptr<sim::SweepWorkers> workers =
+        ranks ? ranks->workers(host, sweep, threads) : std::make_unique<sim::ThreadWorkers>(host, sweep, threads);
     const auto show = [&](const sim::SweepProgress& now) {
       line.show({.total = now.total,
                  .there = std::max(there, now.there),
@@ -133,7 +154,7 @@ int sweep(const SweepArguments& arguments) {
                  .seconds = now.seconds,
                  .ends = now.stopped});
     };
-    done = sim::run_sweep(sweep, store, workers, {.progress = show, .stop = [] { return StopRequest::asked(); }});
+    done = sim::run_sweep(sweep, store, *workers, {.progress = show, .stop = [] { return StopRequest::asked(); }});
   }
   line.finish();
   return tell(sweep, done, std::max(there, done.there), file);
@@ -149,6 +170,7 @@ void add_sweep(CLI::App& program, Action& chosen) {
       "docs/sweep.md\n"
       "describes it, and the SQLite database that the runs go to. A run is written as soon as it is finished, and one\n"
       "that is there already is not made again: after a crash, or Ctrl-C, the same command goes on.\n\n"
+      "Under mpirun, or srun of Slurm, all processes share the runs: mpirun -n 16 rhec sweep SWEEP.yaml\n\n"
       "The exit code is 3 where a run of the grid did not reach the end of its path, or where it was stopped.\n\n"
       "Examples:\n"
       "  rhec sweep scenarios/sweep_blocks.yaml --out out/blocks.sqlite\n"
@@ -156,7 +178,9 @@ void add_sweep(CLI::App& program, Action& chosen) {
   command->add_option("sweep", arguments->sweep, "a YAML file")->required();
   command->add_option("--out", arguments->out, "database of the runs; otherwise out/ and the sweep's name")
       ->type_name("FILE");
-  command->add_option("--threads", arguments->threads, "runs at the same time; otherwise as many as there are cores")
+  command
+      ->add_option("--threads", arguments->threads,
+                   "runs at the same time; otherwise as many as there are cores, or 1 in each process of mpirun")
       ->type_name("N")
       ->check(CLI::Range(1, 4096));
   command->add_flag("--yes", arguments->yes, "begin a grid of more than a million runs without being asked");

@@ -10,6 +10,9 @@ if(TARGET rhec_cli)
   install(TARGETS rhec_cli RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
   # Everything that a user runs, and nothing that only developers run.
   add_custom_target(product DEPENDS rhec_cli ${RHEC_PLUGIN_TARGETS})
+  if(TARGET sweep_mpi)
+    add_dependencies(product sweep_mpi)
+  endif()
 endif()
 
 set(RHEC_PACKAGE_DIRECTORY "${CMAKE_INSTALL_LIBDIR}/cmake/rhec")

@@ -102,6 +102,9 @@ Sweep::Sweep(const Settings& description) {
   if (blocks_.empty())
     throw(description.find("grid") ? read.grid : description)
         .error("the grid is empty; expected 'grid:' with keys and their values, e.g. grid: {speed: [2, 4]}");
+  std::string texts = canonical_text(description);
+  for (const auto& [scenario, base] : bases_) texts += scenario + canonical_text(base);
+  fingerprint_ = identity_of(texts);
 }
 
 void Sweep::read_scenarios(const Values& values) {

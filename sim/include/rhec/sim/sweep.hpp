@@ -43,6 +43,8 @@ class RHEC_EXPORT Sweep {
 
   const std::string& name() const noexcept { return name_; }
   std::int64_t count() const noexcept { return count_; }
+  /// The same for two sweeps that were read from the same texts, and scenarios too.
+  const RunIdentity& fingerprint() const noexcept { return fingerprint_; }
 
   /// The whole configuration of a run.
   Settings settings(std::int64_t run) const;
@@ -96,6 +98,7 @@ class RHEC_EXPORT Sweep {
   std::map<std::string, Settings> bases_;  // by the scenario's name in the sweep, with `set_` over them
   std::vector<Block> blocks_;
   std::int64_t count_ = 0;
+  RunIdentity fingerprint_;
 };
 
 }  // namespace rhec::sim
