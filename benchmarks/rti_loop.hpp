@@ -25,10 +25,8 @@ class RtiLoop {
 
   struct Times {
     Ticks::Count begin, prepared, answered, end;
-    double total_us() const noexcept {
-      return Ticks::microseconds(begin, prepared) + feedback_us() + Ticks::microseconds(answered, end);
-    }
-    /// From the newest data to the new point, which is not judged yet.
+    double total_us() const noexcept { return Ticks::microseconds(begin, end); }
+    /// From the newest data to the new point, which is not judged yet; where the loop looks inside.
     double feedback_us() const noexcept { return Ticks::microseconds(prepared, answered); }
   };
   const Times& times() const noexcept { return times_; }
@@ -39,6 +37,8 @@ class RtiLoop {
   const Iterate& point() const noexcept { return point_; }
   Solver& solver() noexcept { return *solver_; }
   bool keep_guess = false;
+  /// At the clock within a step too: the processor has to finish all that it has begun first, which takes longer.
+  bool looks_inside = false;
 
  private:
   const Sequence* sequence_;
