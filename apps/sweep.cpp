@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -38,14 +39,25 @@ struct SweepArguments {
 /// A grid of more runs is asked about, and looked through for equal runs only while it is made.
 constexpr std::int64_t many_runs = 1'000'000;
 
-/// While there is one, the first Ctrl-C (or a request to end) asks to stop; the second ends the program as usual.
+/// While there is one, the first Ctrl-C (or a request to end) asks to stop; one that comes a second later or more ends
+/// the program as usual. Not at once, since some who end programs (timeout, for one) send the same signal twice.
 class StopRequest {
  public:
   StopRequest() {
     asked_ = false;
     struct sigaction action {};
-    action.sa_handler = [](int) { asked_ = true; };
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    action.sa_handler = [](int number) {
+      struct timespec now {};
+      clock_gettime(CLOCK_MONOTONIC, &now);
+      if (!asked_) {
+        asked_at_ = now.tv_sec;
+        asked_ = true;
+      } else if (now.tv_sec - asked_at_ > 1) {
+        std::signal(number, SIG_DFL);
+        std::raise(number);
+      }
+    };
+    action.sa_flags = SA_RESTART;
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, &interrupt_);
     sigaction(SIGTERM, &action, &terminate_);
@@ -60,12 +72,14 @@ class StopRequest {
   static bool asked() { return asked_; }
 
  private:
-  static std::atomic<bool> asked_;  // without locks, as a handler needs it
-  static_assert(std::atomic<bool>::is_always_lock_free);
+  static std::atomic<bool> asked_;             // without locks, as a handler needs it
+  static std::atomic<std::int64_t> asked_at_;  // [s]
+  static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<std::int64_t>::is_always_lock_free);
   struct sigaction interrupt_ {};
   struct sigaction terminate_ {};
 };
 std::atomic<bool> StopRequest::asked_ = false;
+std::atomic<std::int64_t> StopRequest::asked_at_ = 0;
 
 /// Asks on a terminal; without one, or with another answer than yes, the grid is refused.
 void confirm(const sim::Sweep& sweep, const std::string& file, bool yes) {

@@ -133,6 +133,7 @@ SweepProgress run_sweep(const Sweep& sweep, SweepStore& store, SweepWorkers& wor
   SweepProgress progress;
   progress.total = sweep.count();
   std::int64_t next = 0, under_way = 0;
+  // Returns whether there is more to look up before anybody has to wait.
   const auto give = [&] {
     std::int64_t room = workers.room();
     for (int looked_up = 0; room > 0 && next < progress.total && looked_up < most_looked_up; ++looked_up, ++next) {
@@ -144,11 +145,12 @@ SweepProgress run_sweep(const Sweep& sweep, SweepStore& store, SweepWorkers& wor
       workers.give(next);
       ++under_way, --room;
     }
+    return room > 0 && next < progress.total;
   };
   for (;;) {
-    if (!progress.stopped) give();
+    const bool has_more = !progress.stopped && give();
     if (under_way > 0) {
-      const std::vector<SweepRow> rows = workers.take(patience);
+      const std::vector<SweepRow> rows = workers.take(has_more ? std::chrono::milliseconds(0) : patience);
       store.write(rows);
       under_way -= std::ssize(rows);
       progress.made += std::ssize(rows);

@@ -10,6 +10,7 @@ import pathlib
 import pty
 import random
 import re
+import resource
 import signal
 import sqlite3
 import subprocess
@@ -137,6 +138,7 @@ class Test(cli.Findings):
                 self.expect(second.returncode == ERROR and "another sweep writes to it" in second.stderr, "second",
                             f"{second.returncode}: {second.stderr}")
                 process.send_signal(number)
+                process.send_signal(number)  # as timeout does
                 printed, errors = process.communicate(timeout=30)
             self.expect(process.returncode == NOT_SOLVED and not errors, "stopped", f"{process.returncode}: {errors}")
             made = re.search(r"(\d+) runs made", printed)
@@ -207,6 +209,24 @@ class Test(cli.Findings):
         result = self.rhec("sweep", good, "--out", out)
         self.expect(result.returncode == ERROR and "has version 7 of the schema" in result.stderr, "version", result.stderr)
 
+    def full_disk(self):
+        """A file that cannot grow ends the sweep; what was written stays, and the rest is made once it can."""
+        text = self.sweep(SHORT + "grid: {seed: {from: 1, to: 60}}\n")
+        whole, out = self.out(), self.out()
+        self.rhec("sweep", text, "--out", whole)
+
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (60000, 60000))
+
+        result = self.rhec("sweep", text, "--out", out, preexec_fn=limit, restore_signals=False)
+        self.expect(result.returncode == ERROR and "start again" in result.stderr, "full", f"{result.returncode}: {result.stderr}")
+        written = len(self.rows(out))
+        self.expect(0 < written < 60, "full", f"{written} rows")
+        result = self.rhec("sweep", text, "--out", out)
+        self.expect(result.returncode == FINE and f"{60 - written} runs made" in result.stdout, "after", result.stdout)
+        self.expect(self.rows(out) == self.rows(whole), "after", "other rows than without")
+
     def read_only(self):
         """A file, or a folder, that whoever calls may not write; root becomes somebody else for that."""
         someone = {"user": 65534, "cwd": "/"} if os.geteuid() == 0 else {}
@@ -237,7 +257,7 @@ class Test(cli.Findings):
 def main():
     with tempfile.TemporaryDirectory(prefix="rhec-cli-") as work:
         test = Test(Program(sys.argv[1]), pathlib.Path(work).resolve())
-        for part in (test.good, test.killed, test.stopped, test.terminal, test.mistakes, test.read_only):
+        for part in (test.good, test.killed, test.stopped, test.terminal, test.mistakes, test.full_disk, test.read_only):
             start = time.monotonic()
             part()
             print(f"{part.__name__}: {time.monotonic() - start:.1f} s")
