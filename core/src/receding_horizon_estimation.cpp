@@ -171,7 +171,7 @@ void RecedingHorizonEstimation::advance_window(double duration, const double* in
   const bool full = window_.intervals == setup_.problem.max_intervals;
   const bool was_empty = window_.intervals == 0;
   if (full) slide_arrival();
-  if (!was_empty) shifter_.take(problem_, point_);
+  if (!was_empty) shifter_.take(problem_, std::move(point_));
   if (full) {
     problem_.drop_first_interval();
     ++window_.first;
