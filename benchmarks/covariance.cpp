@@ -22,9 +22,10 @@ struct Times {
   std::vector<double> add_node, solve, covariance, rest_of_estimate;
 };
 
-class TimedSolver final : public Solver {
+/// Unlike the core's TimedSolver, on a clock for single microseconds, and of covariances too.
+class TickedSolver final : public Solver {
  public:
-  TimedSolver(std::shared_ptr<Solver> solver, std::shared_ptr<Times> times)
+  TickedSolver(std::shared_ptr<Solver> solver, std::shared_ptr<Times> times)
       : solver_(std::move(solver)), times_(std::move(times)) {}
   std::string why_not(const Ocp& ocp) const override { return solver_->why_not(ocp); }
   void setup(const Ocp& ocp) override { solver_->setup(ocp); }
@@ -80,7 +81,7 @@ void run(benchmark::State& state, Robot robot) {
   constexpr int settling = 30, steps = 200;
   const auto times = std::make_shared<Times>();
   robot.wrap_solvers([times](OcpKind, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
-    return std::make_shared<TimedSolver>(std::move(solver), times);
+    return std::make_shared<TickedSolver>(std::move(solver), times);
   });
   robot.wrap_methods([times](std::unique_ptr<EstimationMethod> method) {
     return std::make_unique<TimedMethod>(std::move(method), times);

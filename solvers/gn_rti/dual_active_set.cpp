@@ -32,6 +32,14 @@ double dot(const double* a, const double* b, int count) noexcept {
   return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
+/// Calls function(number) for the batches of which something is wanted.
+template <class Weights, class Function>
+void for_each_weighted(const Weights& weights, const Function& function) {
+  const auto is_zero = [](double weight) { return weight == 0.0; };
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    if (!std::all_of(weights[k].begin(), weights[k].end(), is_zero)) function(static_cast<int>(k));
+}
+
 }  // namespace
 
 DualActiveSet::DualActiveSet(const Capacity& capacity)
@@ -237,11 +245,8 @@ bool DualActiveSet::find_responses_of_next(const StageQp& qp, Riccati& riccati, 
 /// Adds to values the responses, each by its weight.
 void DualActiveSet::add_responses(const Riccati& riccati, const Weights& weights,
                                   std::vector<double>& sums) const noexcept {
-  for (int k = 0; k < batch_count; ++k) {
-    const auto& of_batch = weights[k];
-    if (std::all_of(of_batch.begin(), of_batch.end(), [](double weight) { return weight == 0.0; })) continue;
-    riccati.add_values(batches_[k].responses, of_batch.data(), places_, sums.data());
-  }
+  for_each_weighted(weights,
+                    [&](int k) { riccati.add_values(batches_[k].responses, weights[k].data(), places_, sums.data()); });
 }
 
 /// The row of the factor that a bound would add below `count` others; returns the square of its diagonal entry, or 0
@@ -304,8 +309,8 @@ bool DualActiveSet::combine(const StageQp& qp, Riccati& riccati, Iterate& step) 
   Weights weights{};
   for (int k = 0; k < column_count(); ++k) weight_of(columns_[k], weights) += multipliers_[k];
   for (std::size_t k = 0; k < base_places_.size(); ++k) weight_of(base_places_[k], weights) -= base_multipliers_[k];
-  for (int k = 0; k < batch_count; ++k)
-    if (batches_[k].count > 0) riccati.combine(qp, held_, batches_[k].responses, weights[k].data(), step);
+  for_each_weighted(weights,
+                    [&](int k) { riccati.combine(qp, held_, batches_[k].responses, weights[k].data(), step); });
   has_policy_ = false;
   return true;
 }
