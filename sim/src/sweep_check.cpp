@@ -2,16 +2,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <numeric>
 
+#include <openssl/evp.h>
 #include <nlohmann/json.hpp>
 
 #include "rhec/core/error.hpp"
 #include "rhec/sim/scenario.hpp"
 #include "rhec/sim/sweep.hpp"
-#include "sha256.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -86,9 +87,15 @@ std::string canonical_text(const Settings& settings) {
 }
 
 RunIdentity identity_of(std::string_view configuration) {
-  const auto digest = sha256(configuration);
-  const auto pair = [&](int i) { return static_cast<std::uint64_t>(digest[i]) << 32 | digest[i + 1]; };
-  return {pair(0), pair(2)};
+  std::array<unsigned char, 32> digest{};
+  if (EVP_Digest(configuration.data(), configuration.size(), digest.data(), nullptr, EVP_sha256(), nullptr) != 1)
+    throw Error("sweep: OpenSSL's library has no SHA-256; install libssl3 anew");
+  const auto word = [&](std::size_t first) {
+    std::uint64_t bits = 0;
+    for (std::size_t i = first; i < first + 8; ++i) bits = bits << 8 | digest[i];
+    return bits;
+  };
+  return {word(0), word(8)};
 }
 
 std::string RunIdentity::text() const { return fmt::format("{:016x}{:016x}", high, low); }

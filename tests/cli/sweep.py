@@ -19,10 +19,9 @@ import tempfile
 import time
 
 import cli
-from cli import CLEAN, ERROR, FIGURE8, FINE, NOT_SOLVED, USAGE, Program
+from cli import CLEAN, ERROR, FINE, NOT_SOLVED, USAGE, Program
+from sweeps import SHORT, rows
 
-TIMES = {"solve_time_us", "seconds", "finished"}
-SHORT = f"scenario: {FIGURE8}\nset: {{path.laps: 1, path.radius: 8, speed: 10}}\n"
 LINE = re.compile(r"\d+(\.\d+)? %, \d+ of \d+ runs, \d+\.\d a second, .* left")
 
 
@@ -41,19 +40,15 @@ class Test(cli.Findings):
         return self.work / f"runs-{self.files}.sqlite"
 
     def rows(self, file):
-        """The rows by identity, without times."""
-        with sqlite3.connect(file) as database:  # with the right to write, to undo what was under way when it was killed
+        """Those of a database that is sound, whose identities are those of their configurations."""
+        with sqlite3.connect(file) as database:
             self.expect(database.execute("PRAGMA integrity_check").fetchone() == ("ok",), "database", "is not sound")
-            if not database.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]:
-                return {}  # killed before it had its tables
-            answer = database.execute("SELECT * FROM runs")
-            names = [column[0] for column in answer.description]
-            rows = [dict(zip(names, row)) for row in answer]
         database.close()
-        for row in rows:
+        found = rows(file)
+        for row in found.values():
             digest = hashlib.sha256(row["configuration"].encode()).hexdigest()
             self.expect(row["identity"] == digest[:32], "identity", row["identity"])
-        return {row["identity"]: {key: value for key, value in row.items() if key not in TIMES} for row in rows}
+        return found
 
     def good(self):
         out = self.out()

@@ -9,34 +9,20 @@ import pathlib
 import random
 import shutil
 import signal
-import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
 
 import cli
-from cli import CLEAN, ERROR, FIGURE8, FINE, NOT_SOLVED, Program
+from cli import CLEAN, ERROR, FINE, NOT_SOLVED, Program
+from sweeps import SHORT, rows
 
-TIMES = {"solve_time_us", "seconds", "finished"}
-SHORT = f"scenario: {FIGURE8}\nset: {{path.laps: 1, path.radius: 8, speed: 10}}\n"
 # mpirun itself does not like to be run by root, as tests in containers are, nor to have more ranks than cores.
 # What it leaves behind when it ends is its own business, not that of a build with AddressSanitizer.
 MPI = CLEAN | {"ASAN_OPTIONS": "detect_leaks=0", "OMPI_ALLOW_RUN_AS_ROOT": "1",
                "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
 FLAGS = ("--oversubscribe", "--bind-to", "none")
-
-
-def rows(file):
-    """By identity, without times."""
-    with sqlite3.connect(file) as database:
-        if not database.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]:
-            return {}  # killed before it had its tables
-        answer = database.execute("SELECT * FROM runs")
-        names = [column[0] for column in answer.description]
-        found = [dict(zip(names, row)) for row in answer]
-    database.close()
-    return {row["identity"]: {key: value for key, value in row.items() if key not in TIMES} for row in found}
 
 
 def children(pid):
