@@ -443,8 +443,8 @@ void HorizonProblem::scatter(int i, const double* jacobian, const double* hessia
 void HorizonProblem::fill_bounds(const Iterate& point, StageRange range, StageQp& qp) const noexcept {
   const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(range.first) * stride_,
                        count = static_cast<std::ptrdiff_t>(range.last - range.first + 1) * stride_;
-  program_kernels().subtract(lower_.data() + first, point.row(range.first), qp.lower(range.first), count);
-  program_kernels().subtract(upper_.data() + first, point.row(range.first), qp.upper(range.first), count);
+  program_kernels().write_bounds(lower_.data() + first, upper_.data() + first, point.row(range.first),
+                                 qp.lower(range.first), qp.upper(range.first), count);
   if (range.first == 0 && initial_state())
     for (int j = 0; j < capacity_.states; ++j) qp.initial_step()[j] = initial_state()[j] - point.state(0)[j];
 }

@@ -24,17 +24,38 @@ double pull_of(const StageQp& qp, int i, int c, const double* costate) noexcept 
 
 }  // namespace
 
+void KktTerms::add(const KktTerms& others) noexcept {
+  // What is no number must not get lost.
+  const auto take = [](double& largest, double value) {
+    if (!std::isnan(largest) && !(value <= largest)) largest = value;
+  };
+  take(stationarity, others.stationarity);
+  take(defect, others.defect);
+  take(bound_violation, others.bound_violation);
+  take(complementarity, others.complementarity);
+  take(largest_term, others.largest_term);
+}
+
+void KktTerms::add(const StageQp& qp, const Iterate& point, StageRange range) noexcept {
+  ProgramView view = view_of(qp, point);
+  view.first = range.first;
+  view.last = range.last;
+  const KktParts parts = program_kernels().kkt(view);
+  KktTerms found{parts.stationarity, parts.defect, parts.bound_violation, parts.complementarity, parts.largest_term};
+  if (range.first == 0 && qp.initial_state_is_given)
+    for (int j = 0; j < qp.states(0); ++j) found.defect = std::max(found.defect, std::abs(qp.initial_step()[j]));
+  add(found);
+}
+
+KktResidual KktTerms::residual() const noexcept {
+  const double size = 1.0 + largest_term;
+  return {stationarity / size, defect, bound_violation, complementarity / size};
+}
+
 KktResidual kkt_residual(const StageQp& qp, const Iterate& point) noexcept {
-  const KktParts parts = program_kernels().kkt(view_of(qp, point));
-  KktResidual kkt;
-  const double size = 1.0 + parts.largest_term;
-  kkt.stationarity = parts.stationarity / size;
-  kkt.complementarity = parts.complementarity / size;
-  kkt.bound_violation = parts.bound_violation;
-  kkt.defect = parts.defect;
-  if (qp.initial_state_is_given)
-    for (int j = 0; j < qp.states(0); ++j) kkt.defect = std::max(kkt.defect, std::abs(qp.initial_step()[j]));
-  return kkt;
+  KktTerms terms;
+  terms.add(qp, point, {0, qp.intervals()});
+  return terms.residual();
 }
 
 KktResidual kkt_residual(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch) noexcept {

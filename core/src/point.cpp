@@ -6,16 +6,16 @@
 namespace rhec {
 
 bool is_finite(const Ocp& ocp, const Iterate& point) noexcept {
-  bool finite = true;
+  double rest = 0.0;  // stays 0 as long as all is finite
   const auto check = [&](const double* row, int n) {
-    for (int j = 0; j < n; ++j) finite = finite && std::isfinite(row[j]);
+    for (int j = 0; j < n; ++j) rest += 0.0 * row[j];
   };
   for (int i = 0; i <= ocp.intervals(); ++i) {
     for (const double* row : {point.state(i), point.costate(i), point.state_bound(i)}) check(row, ocp.state_count(i));
     if (i < ocp.intervals())
       for (const double* row : {point.control(i), point.control_bound(i)}) check(row, ocp.control_count(i));
   }
-  return finite;
+  return rest == 0.0;
 }
 
 namespace {
@@ -35,9 +35,12 @@ bool bounds_are_numbers(const Ocp& ocp) noexcept {
 
 }  // namespace
 
+bool has_sound_numbers(const Ocp& ocp, const Iterate& point) noexcept {
+  return point.capacity() == ocp.capacity() && is_finite(ocp, point) && bounds_are_numbers(ocp);
+}
+
 bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept {
-  return point.capacity() == ocp.capacity() && is_finite(ocp, point) && bounds_are_numbers(ocp) &&
-         std::isfinite(ocp.evaluate(point, nullptr, scratch));
+  return has_sound_numbers(ocp, point) && std::isfinite(ocp.evaluate(point, nullptr, scratch));
 }
 
 double largest_costate(const Ocp& ocp, const Iterate& point) noexcept {

@@ -7,7 +7,7 @@ namespace rhec {
 
 inline ProgramView view_of(const StageQp& qp, const Iterate& point) noexcept {
   ProgramView view;
-  view.intervals = qp.intervals();
+  view.intervals = view.last = qp.intervals();
   view.states = qp.capacity().states;
   view.controls = qp.capacity().controls;
   view.stride = qp.stride();

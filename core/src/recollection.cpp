@@ -22,11 +22,12 @@ void Recollection::forget() noexcept {
 void Recollection::move_outputs(int steps) noexcept {
   if (output_size == 0) return;
   const int kept = intervals + 1 - steps;
-  for (int i = 0; i < kept; ++i) {
-    observed[i] = same[i] != 0 && observed[i + steps] != 0;
-    is_clean[i] = is_clean[i + steps];
+  for (auto* marks : {&observed, &is_clean}) {
+    std::copy_n(marks->begin() + steps, kept, marks->begin());
+    std::fill(marks->begin() + kept, marks->end(), std::uint8_t{0});
   }
-  for (auto* marks : {&observed, &is_clean}) std::fill(marks->begin() + kept, marks->end(), std::uint8_t{0});
+  for (int i = 0; i < kept; ++i)
+    if (same[i] == 0) observed[i] = 0;
   if (steps == 0) return;
   const int slots = 2 * static_cast<int>(observed.size());
   if (first + steps + static_cast<int>(observed.size()) <= slots) {
@@ -105,16 +106,18 @@ bool HorizonProblem::is_made_at(const Iterate& point, const StageQp& qp) const n
   const Recollection* known = recollection_in(qp);
   // Behind the last state there may be inputs of an interval that was looked at ahead.
   const std::size_t bytes = (static_cast<std::size_t>(intervals_) * stride_ + capacity_.states) * sizeof(double);
-  return known && known->changes == qp.changes() && known->intervals == intervals_ &&
-         std::memcmp(known->rows.data(), point.row(0), bytes) == 0;
+  return known && is_of_structure(qp, *known) && std::memcmp(known->rows.data(), point.row(0), bytes) == 0;
+}
+
+/// Whether a program was made of this structure, and nobody has written to it since.
+bool HorizonProblem::is_of_structure(const StageQp& qp, const Recollection& known) const noexcept {
+  return known.changes == qp.changes() && known.intervals == intervals_ && qp.intervals() == intervals_ &&
+         std::memcmp(known.begins.data(), begins_.data(), static_cast<std::size_t>(intervals_) * channels_) == 0;
 }
 
 /// Whether a program has what this structure asks for of F's rows of channels.
 bool HorizonProblem::has_structure(const StageQp& qp, const Recollection& known) const noexcept {
-  return is_direct() && !any_ramp_ && known.changes == qp.changes() && known.intervals == intervals_ &&
-         qp.intervals() == intervals_ &&
-         std::equal(known.begins.begin(), known.begins.begin() + static_cast<std::ptrdiff_t>(intervals_) * channels_,
-                    begins_.begin());
+  return is_direct() && !any_ramp_ && is_of_structure(qp, known);
 }
 
 /// That F and b were made at this point, whose first rows are known.
@@ -178,9 +181,13 @@ bool HorizonProblem::move_along(const Iterate& point, Hessian hessian, StageQp& 
                             count, stride_, nx_, same_costate);
   // Of the interval ahead, nobody has seen the next state.
   const auto is_known = [&](int i) {
+    if (i >= count || same[i] != 2 || (i != end && same[i + 1] == 0) || (is_exact && same_costate[i] == 0))
+      return false;
+    if (durations_[i] != known.durations[i + steps]) return false;
     const std::uint8_t *begins = row(begins_, i, channels_), *known_begins = row(known.begins, i + steps, channels_);
-    return i < count && same[i] == 2 && (i == end || same[i + 1] != 0) && (!is_exact || same_costate[i] != 0) &&
-           durations_[i] == known.durations[i + steps] && std::equal(begins, begins + channels_, known_begins);
+    for (int c = 0; c < channels_; ++c)
+      if (begins[c] != known_begins[c]) return false;
+    return true;
   };
 
   std::array<int, most_unknown> unknown;

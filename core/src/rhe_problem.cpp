@@ -278,11 +278,11 @@ RheProblem::Observed RheProblem::observe(StageRange range, const Iterate& point,
     ask(range.first, range.last - range.first + 1, outputs, jacobians);
     return {outputs, jacobians};
   }
-  for (int i = range.first; i <= range.last; ++i) {
-    if (known->observed[i]) continue;
-    const int first = i;
-    while (i <= range.last && !known->observed[i]) known->observed[i++] = 1;
-    ask(first, i - first, known->outputs_of(first), known->output_jacobians_of(first));
+  const auto marks = known->observed.begin(), end = marks + range.last + 1;
+  for (auto mark = std::find(marks + range.first, end, 0); mark != end; mark = std::find(mark, end, 0)) {
+    const int first = static_cast<int>(mark - marks);
+    while (mark != end && *mark == 0) *mark++ = 1;
+    ask(first, static_cast<int>(mark - marks) - first, known->outputs_of(first), known->output_jacobians_of(first));
   }
   return {known->outputs_of(range.first), known->output_jacobians_of(range.first)};
 }
@@ -314,8 +314,11 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
   measured.room = room;
   if (known) measured.is_clean = known->is_clean.data();
   const double total = program_kernels().write_measurements(view, measured, range.first, range.last);
-  // Of the last node, only the rows of states were cleared.
-  for (int i = range.first; known && view.H && i <= range.last; ++i) known->is_clean[i] = i < intervals();
+  if (known && view.H) {
+    std::fill_n(known->is_clean.begin() + range.first, count, std::uint8_t{1});
+    // Of the last node, only the rows of states were cleared.
+    known->is_clean[intervals()] = 0;
+  }
   return total;
 }
 

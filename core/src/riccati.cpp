@@ -49,7 +49,7 @@ Riccati::Riccati(const Capacity& capacity)
   P_.assign(stages * ns_ * row, 0.0);
   initial_inverse_.assign(ns_ * row, 0.0);
   for (auto* v : {&U_, &V_}) v->assign(stages * nw_ * row, 0.0);
-  columns_.assign(stages * 64, 0.0);
+  for (auto* v : {&closed_, &columns_}) v->assign(stages * 64, 0.0);
   inverse_.assign(stages * nw_, 0.0);
   for (auto* v : {&drift_, &g_, &p_}) v->assign(stages * row, 0.0);
   state_counts_.assign(stages, 0);
@@ -96,6 +96,7 @@ RiccatiView Riccati::view_of(const StageQp& qp, const std::int8_t* sides) noexce
   view.P = P_.data();
   view.U = U_.data();
   view.V = V_.data();
+  view.closed = closed_.data();
   view.T = columns_.data();
   view.inverse = inverse_.data();
   view.fixes = fixes_control_.data();

@@ -162,8 +162,8 @@ void GuessShifter::move_channel_bounds(int channel, int steps, const HorizonProb
     if (control >= 0) return kept_.control_bound(first)[control];
     return first == 0 ? kept_.state_bound(0)[nx_ + channel] : 0.0;
   };
-  bool any = false;
-  for (int i = 0; i < intervals_; ++i) any |= bound_at(i) != 0.0;
+  bool any = bound_at(0) != 0.0;
+  for (int i = 1; any_start_ && i < intervals_; ++i) any |= bound_at(i) != 0.0;
   if (!any) return;
   for (int first = 0; first < intervals_;) {
     int end = first + 1;

@@ -1,5 +1,7 @@
 #include "rhec/core/solver.hpp"
 
+#include <algorithm>
+
 namespace rhec {
 
 const char* name_of(Status status) noexcept {
@@ -45,8 +47,23 @@ const char* advice_for(Status status) noexcept {
 bool is_usable(Status status) noexcept { return status != Status::infeasible && status != Status::bad_input; }
 
 void judge(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch, Report& report) noexcept {
-  report.objective = ocp.linearise(all_stages(ocp), point, Hessian::none, qp, scratch);
-  report.kkt = kkt_residual(qp, point);
+  const int N = ocp.intervals();
+  if (qp.window() == 0) {
+    report.objective = ocp.linearise(all_stages(ocp), point, Hessian::none, qp, scratch);
+    report.kkt = kkt_residual(qp, point);
+    return;
+  }
+  report.objective = 0.0;
+  KktTerms terms;
+  for (StageRange piece{0, 0}; piece.first <= N; piece.first = piece.last + 1) {
+    // With the sizes of the stage behind it, which its equations lead to.
+    piece.last = piece.first + qp.window() > N ? N : piece.first + qp.window() - 2;
+    qp.look_at(piece.first);
+    report.objective += ocp.linearise(piece, point, Hessian::none, qp, scratch);
+    if (piece.last < N) qp.set_sizes(piece.last + 1, ocp.state_count(piece.last + 1), 0);
+    terms.add(qp, point, piece);
+  }
+  report.kkt = terms.residual();
 }
 
 double microseconds_since(Clock::time_point start) noexcept {

@@ -25,6 +25,30 @@ StageQp::StageQp(const Capacity& capacity)
   initial_step_.assign(stride_, 0.0);
 }
 
+StageQp::StageQp(const Capacity& capacity, int stages)
+    : capacity_(capacity),
+      stride_(capacity.row()),
+      wide_(capacity.states + capacity.controls),
+      window_(std::min(stages, capacity.intervals + 1)) {
+  const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1, held = static_cast<std::size_t>(window_);
+  for (auto* counts : {&state_counts_, &control_counts_, &carried_counts_}) counts->assign(nodes, 0);
+  F_.assign(held * capacity.states * stride_, 0.0);
+  H_.assign(held * wide_ * stride_, 0.0);
+  for (auto* v : {&h_, &b_}) v->assign(held * stride_, 0.0);
+  lower_.assign(held * stride_, -infinity);
+  upper_.assign(held * stride_, infinity);
+  initial_step_.assign(stride_, 0.0);
+}
+
+void StageQp::look_at(int first) noexcept {
+  for (auto* v : {&F_, &H_, &h_, &b_}) std::fill(v->begin(), v->end(), 0.0);
+  std::fill(lower_.begin(), lower_.end(), -infinity);
+  std::fill(upper_.begin(), upper_.end(), infinity);
+  first_ = first_bounds_ = -first;
+  const int end = std::min(first + window_, capacity_.intervals + 1);
+  for (auto* counts : {&state_counts_, &control_counts_}) std::fill(counts->begin() + first, counts->begin() + end, 0);
+}
+
 void StageQp::change() noexcept {
   ++changes_;
   std::fill(carried_counts_.begin(), carried_counts_.end(), 0);

@@ -137,11 +137,12 @@ void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
 }
 
 bool GnRti::is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept {
+  if (!prepared_ || prepared_ocp_ != &ocp) return false;
+  if (remembers_) return ocp.is_made_at(point, qp_);
   const int N = ocp.intervals();
-  if (!prepared_ || prepared_ocp_ != &ocp || qp_.intervals() != N) return false;
+  if (qp_.intervals() != N) return false;
   for (int i = 0; i <= N; ++i)
     if (qp_.states(i) != ocp.state_count(i) || (i < N && qp_.controls(i) != ocp.control_count(i))) return false;
-  if (remembers_) return ocp.is_made_at(point, qp_);
   const std::size_t bytes = static_cast<std::size_t>(N + 1) * capacity_.row() * sizeof(double);
   return std::memcmp(prepared_point_.row(0), point.row(0), bytes) == 0;
 }

@@ -26,6 +26,8 @@ constexpr int most_polishes = 2;
 /// Iterations of a run after which another way of starting promises more. Interior points that take longer are most
 /// often those that wander with negative curvature.
 constexpr int patience = 150;
+/// Stages of a long horizon, as many as a processor's cache has room for.
+constexpr int judged_at_once = 16;
 /// A violation of the dynamics that no rounding explains.
 constexpr double clear_violation = 1e-6;
 /// Where the barrier of a warm start begins, as a part of the guess' residual, and its limits.
@@ -148,8 +150,8 @@ void IpoptSolver::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'ipopt': " + reason);
   capacity_ = ocp.capacity();
   scratch_.assign(ocp.scratch_size(), 0.0);
-  judge_ = StageQp(capacity_);
-  best_ = seen_ = Iterate(capacity_);
+  judge_ = StageQp(capacity_, judged_at_once);
+  guess_ = best_ = seen_ = Iterate(capacity_);
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);
 }
@@ -253,17 +255,19 @@ void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
   nlp_->take(ocp);
   if (!nlp_->has_sound_bounds()) return;
   // The guess is the first candidate, with the initial state that is given.
-  best_ = point;
-  if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), best_.state(0));
-  if (!is_sound_start(ocp, best_, scratch_)) return;
-  const Iterate guess = best_;
-  best_kkt_ = nlp_->judge(best_);
+  guess_ = point;
+  if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), guess_.state(0));
+  Report of_guess;
+  judge(ocp, guess_, judge_, scratch_, of_guess);
+  if (!std::isfinite(of_guess.objective)) return;
+  best_ = guess_;
+  best_kkt_ = of_guess.kkt;
   if (nlp_->has_empty_bounds()) {
     report.status = Status::infeasible;
     return;
   }
   const bool warm =
-      options_.warm_start && (largest_costate(ocp, guess) > 0.0 || largest_bound_multiplier(ocp, guess) > 0.0);
+      options_.warm_start && (largest_costate(ocp, guess_) > 0.0 || largest_bound_multiplier(ocp, guess_) > 0.0);
   Ending ending = best_kkt_.largest() <= options_.tolerance ? Ending::converged : Ending::lost;
   if (nlp_->variables() == 0 || ending == Ending::converged) {
     // Nothing to vary, or nothing to improve.
@@ -273,7 +277,7 @@ void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
     bool claimed_infeasible = false;
     Start begun = warm ? Start::warm : Start::cold;
     for (Start start = begun;;) {
-      ending = run(start, start == Start::polish ? Iterate(best_) : guess);
+      ending = run(start, start == Start::polish ? best_ : guess_);
       claimed_infeasible |= ending == Ending::infeasible && start != Start::warm;
       if (ending == Ending::near && polishes++ < most_polishes) {
         start = Start::polish;
@@ -300,18 +304,18 @@ void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
       break;
     case Ending::infeasible:
       report.status = Status::infeasible;
-      return;
+      break;
     case Ending::near:
     case Ending::lost:
       report.status = Status::stalled;
       break;
   }
-  if (is_finite(ocp, best_)) std::swap(point, best_);
+  if (report.status != Status::infeasible && is_finite(ocp, best_)) std::swap(point, best_);
 }
 
 Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
   Report report;
-  if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_)) return report;
+  if (!(ocp.capacity() == capacity_) || !has_sound_numbers(ocp, point)) return report;
   deadline_ = deadline;
   iterations_ = 0;
   backend_us_ = 0.0;
@@ -327,6 +331,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
       nlp_->set_spectator(this);
       improve(ocp, point, report);
       nlp_->release();
+      if (report.status == Status::bad_input) return report;
     }
   } catch (const std::exception&) {
     // Memory that ran out: the point is the guess still.
@@ -336,8 +341,8 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     report.status = Status::stalled;
   }
   report.iterations = iterations_;
-  if (report.status != Status::bad_input) judge(ocp, point, judge_, scratch_, report);
-  return report;
+  judge(ocp, point, judge_, scratch_, report);
+  return std::isfinite(report.objective) ? report : Report{};
 }
 
 }  // namespace rhec::ipopt

@@ -18,10 +18,27 @@ namespace {
 constexpr double no_bound = 1e300;
 /// Weights of the objective below this are not divided by.
 constexpr double smallest_divisor = 1e-3;
-constexpr int stages_at_once = 64;
+/// Of a long horizon, as many as a processor's cache has room for.
+constexpr int stages_at_once = 16;
+
+/// Whether all of so many values are finite.
+template <class Value>
+bool all_finite(std::size_t count, const Value& value) {
+  double rests[4] = {};  // stay 0 as long as all is finite
+  std::size_t k = 0;
+  for (; k + 4 <= count; k += 4)
+    for (int j = 0; j < 4; ++j) rests[j] += 0.0 * value(k + j);
+  for (; k < count; ++k) rests[0] += 0.0 * value(k);
+  return (rests[0] + rests[1]) + (rests[2] + rests[3]) == 0.0;
+}
 
 bool all_finite(std::span<const double> values) {
-  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  return all_finite(values.size(), [&](std::size_t k) { return values[k]; });
+}
+
+/// Copies values times a factor; whether all of them are finite.
+bool copy_finite(std::span<const double> from, double factor, double* __restrict to) {
+  return all_finite(from.size(), [&](std::size_t k) { return to[k] = factor * from[k]; });
 }
 
 void write_pattern(const SparseNlp::Pattern& pattern, int* rows, int* columns) {
@@ -37,20 +54,21 @@ OcpNlp::OcpNlp(const Ocp& ocp, Curvature curvature)
       scratch_(ocp.scratch_size()),
       defects_(static_cast<std::size_t>(ocp.capacity().intervals) * ocp.capacity().states),
       work_(ocp.capacity()),
-      linear_(ocp.capacity()),
-      other_(ocp.capacity()) {}
+      pieces_(ocp.capacity(), stages_at_once) {}
 
 void OcpNlp::take(const Ocp& ocp) {
   ocp_ = &ocp;
-  is_evaluated_ = is_linear_ = false;
+  evaluated_.is_known = linearised_.is_known = false;
   if (nlp_.take_structure(ocp)) {
-    for (auto* vector : {&lower_, &upper_, &start_, &start_lower_, &start_upper_, &seen_, &seen_lower_, &seen_upper_,
-                         &evaluated_z_, &linear_z_, &gradient_, &clipped_, &bound_multipliers_})
+    for (auto* vector :
+         {&lower_, &upper_, &start_, &start_lower_, &start_upper_, &seen_, &seen_lower_, &seen_upper_, &evaluated_.z,
+          &linearised_.z, &gradient_, &clipped_, &bound_multipliers_, &lagrangian_gradient_})
       vector->assign(nlp_.variables(), 0.0);
-    for (auto* vector : {&start_multipliers_, &seen_multipliers_, &constraints_, &weighted_, &linear_multipliers_})
+    for (auto* vector : {&start_multipliers_, &seen_multipliers_, &constraints_, &weighted_, &linear_multipliers_,
+                         &linear_constraints_})
       vector->assign(nlp_.constraints(), 0.0);
     jacobian_.assign(nlp_.jacobian().entries(), 0.0);
-    hessian_part_.assign(nlp_.hessian().entries(), 0.0);
+    for (auto* vector : {&hessian_, &hessian_part_}) vector->assign(nlp_.hessian().entries(), 0.0);
   }
   nlp_.bounds(ocp, lower_.data(), upper_.data());
   any_fixed_ = false;
@@ -71,7 +89,7 @@ bool OcpNlp::has_empty_bounds() const noexcept {
 }
 
 void OcpNlp::set_curvature(Curvature curvature) noexcept {
-  is_linear_ = is_linear_ && curvature == curvature_;
+  linearised_.is_known = linearised_.is_known && curvature == curvature_;
   curvature_ = curvature;
 }
 
@@ -97,31 +115,40 @@ void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
   }
 }
 
-bool OcpNlp::evaluate_at(const double* z) noexcept {
-  if (is_evaluated_ && std::equal(evaluated_z_.begin(), evaluated_z_.end(), z)) return is_evaluated_sound_;
-  std::copy_n(z, evaluated_z_.size(), evaluated_z_.begin());
+bool OcpNlp::Place::is_at(const double* at, unsigned now) noexcept {
+  if (!is_known || !((now != elsewhere && visit == now) || std::equal(z.begin(), z.end(), at))) return false;
+  if (now != elsewhere) visit = now;
+  return true;
+}
+
+void OcpNlp::Place::move_to(const double* at, unsigned now) noexcept {
+  std::copy_n(at, z.size(), z.begin());
+  visit = now;
+  is_known = true;
+}
+
+bool OcpNlp::evaluate_at(const double* z, unsigned visit) noexcept {
+  if (evaluated_.is_at(z, visit)) return evaluated_.is_sound;
+  evaluated_.move_to(z, visit);
   nlp_.write(*ocp_, z, nullptr, nullptr, work_);
   objective_ = ocp_->evaluate(work_, defects_.data(), scratch_);
   nlp_.constraints(*ocp_, defects_.data(), constraints_.data());
-  is_evaluated_ = true;
-  is_evaluated_sound_ = std::isfinite(objective_) && all_finite(constraints_);
-  return is_evaluated_sound_;
+  evaluated_.is_sound = std::isfinite(objective_) && all_finite(constraints_);
+  return evaluated_.is_sound;
 }
 
-bool OcpNlp::linearise_at(const double* z, const double* multipliers) {
-  if (is_linear_ && std::equal(linear_z_.begin(), linear_z_.end(), z)) return is_linear_sound_;
-  std::copy_n(z, linear_z_.size(), linear_z_.begin());
+bool OcpNlp::linearise_at(const double* z, const double* multipliers, unsigned visit) {
+  if (linearised_.is_at(z, visit)) return linearised_.is_sound;
+  linearised_.move_to(z, visit);
   // Ipopt asks for the Hessian later, most often with the multipliers that it has already.
   is_linear_exact_ = curvature_ == Curvature::exact && (multipliers || guess_multipliers());
   if (multipliers) std::copy_n(multipliers, linear_multipliers_.size(), linear_multipliers_.begin());
   const Hessian hessian = is_linear_exact_                        ? Hessian::exact
                           : curvature_ == Curvature::gauss_newton ? Hessian::gauss_newton
                                                                   : Hessian::none;
-  linearise(z, linear_multipliers_.data(), 1.0, hessian, linear_);
-  nlp_.gradient(linear_, gradient_.data());
-  is_linear_ = true;
-  is_linear_sound_ = all_finite(gradient_);
-  return is_linear_sound_;
+  linearise(z, linear_multipliers_.data(), 1.0, hessian, Kept::all, hessian_.data());
+  linearised_.is_sound = all_finite(gradient_);
+  return linearised_.is_sound;
 }
 
 /// The multipliers of Ipopt's iterate to `linear_multipliers_`. False where there are none yet.
@@ -135,14 +162,21 @@ bool OcpNlp::guess_multipliers() {
 }
 
 /// At costates that are `factor` times the multipliers, or zero where there are none.
-void OcpNlp::linearise(const double* z, const double* multipliers, double factor, Hessian hessian,
-                       StageQp& qp) noexcept {
+void OcpNlp::linearise(const double* z, const double* multipliers, double factor, Hessian hessian, Kept kept,
+                       double* hessian_values) noexcept {
   for (std::size_t row = 0; row < weighted_.size(); ++row)
     weighted_[row] = multipliers ? factor * multipliers[row] : 0.0;
   nlp_.write(*ocp_, z, hessian == Hessian::exact ? weighted_.data() : nullptr, nullptr, work_);
-  // Piece by piece, each small enough for a processor's cache.
-  for (int first = 0; first <= ocp_->intervals(); first += stages_at_once)
-    ocp_->linearise({first, std::min(first + stages_at_once - 1, ocp_->intervals())}, work_, hessian, qp, scratch_);
+  for (int first = 0; first <= ocp_->intervals(); first += stages_at_once) {
+    const StageRange piece{first, std::min(first + stages_at_once - 1, ocp_->intervals())};
+    pieces_.look_at(first);
+    ocp_->linearise(piece, work_, hessian, pieces_, scratch_);
+    if (hessian != Hessian::none) nlp_.hessian(pieces_, piece, hessian_values);
+    if (kept == Kept::hessian) continue;
+    nlp_.constraints(pieces_, piece, linear_constraints_.data());
+    nlp_.gradient(pieces_, piece, gradient_.data());
+    nlp_.jacobian(pieces_, piece, jacobian_.data());
+  }
 }
 
 KktResidual OcpNlp::write_and_judge(const PrimalDual& from, Iterate& point) noexcept {
@@ -151,18 +185,26 @@ KktResidual OcpNlp::write_and_judge(const PrimalDual& from, Iterate& point) noex
     bound_multipliers_[j] = from.upper_multipliers[j] - from.lower_multipliers[j];
   }
   linearise_at(clipped_.data(), from.multipliers);
-  const SparseNlp::Pattern& pattern = nlp_.jacobian();
-  if (any_fixed_) nlp_.jacobian(linear_, jacobian_.data());
-  for (int j = 0; any_fixed_ && j < pattern.columns; ++j) {
-    if (lower_[j] != upper_[j]) continue;
-    double sum = gradient_[j];
-    for (int entry = pattern.starts[j]; entry < pattern.starts[j + 1]; ++entry)
-      sum += jacobian_[entry] * from.multipliers[pattern.row_indices[entry]];
-    bound_multipliers_[j] = -sum;
-  }
+  nlp_.lagrangian_gradient(gradient_.data(), jacobian_.data(), from.multipliers, lagrangian_gradient_.data());
+  for (std::size_t j = 0; any_fixed_ && j < lower_.size(); ++j)
+    if (lower_[j] == upper_[j]) bound_multipliers_[j] = -lagrangian_gradient_[j];
   nlp_.write(*ocp_, clipped_.data(), from.multipliers, bound_multipliers_.data(), point);
-  SparseNlp::set_costate_0(linear_, point);
-  return kkt_residual(linear_, point);
+  KktTerms terms;
+  nlp_.add_kkt({clipped_.data(), lower_.data(), upper_.data(), linear_constraints_.data(), gradient_.data(),
+                lagrangian_gradient_.data(), from.multipliers, bound_multipliers_.data()},
+               terms);
+  pieces_.look_at(0);
+  ocp_->linearise({0, 0}, point, Hessian::none, pieces_, scratch_);
+  if (ocp_->intervals() > 0) pieces_.set_sizes(1, ocp_->state_count(1), 0);
+  SparseNlp::set_costate_0(pieces_, point);
+  terms.add(pieces_, point, {0, 0});
+  return terms.residual();
+}
+
+double OcpNlp::objective(const Iterate& point) noexcept {
+  nlp_.read(*ocp_, point, clipped_.data(), nullptr, nullptr);
+  evaluate_at(clipped_.data());
+  return objective_;
 }
 
 double OcpNlp::complementarity_gap(const Iterate& point) noexcept {
@@ -210,40 +252,43 @@ bool OcpNlp::get_starting_point(Ipopt::Index, bool init_z, double* z, bool init_
   return true;
 }
 
-bool OcpNlp::eval_f(Ipopt::Index, const double* z, bool, double& objective) {
+bool OcpNlp::eval_f(Ipopt::Index, const double* z, bool new_z, double& objective) {
   const Timer timer(microseconds_);
-  if (!evaluate_at(z)) return false;
+  visit(new_z);
+  if (!evaluate_at(z, visit_)) return false;
   objective = objective_;
   return true;
 }
 
-bool OcpNlp::eval_g(Ipopt::Index, const double* z, bool, Ipopt::Index, double* constraints) {
+bool OcpNlp::eval_g(Ipopt::Index, const double* z, bool new_z, Ipopt::Index, double* constraints) {
   const Timer timer(microseconds_);
-  if (!evaluate_at(z)) return false;
+  visit(new_z);
+  if (!evaluate_at(z, visit_)) return false;
   std::copy(constraints_.begin(), constraints_.end(), constraints);
   return true;
 }
 
-bool OcpNlp::eval_grad_f(Ipopt::Index, const double* z, bool, double* gradient) {
+bool OcpNlp::eval_grad_f(Ipopt::Index, const double* z, bool new_z, double* gradient) {
   const Timer timer(microseconds_);
-  if (!linearise_at(z)) return false;
+  visit(new_z);
+  if (!linearise_at(z, nullptr, visit_)) return false;
   std::copy(gradient_.begin(), gradient_.end(), gradient);
   return true;
 }
 
-bool OcpNlp::eval_jac_g(Ipopt::Index, const double* z, bool, Ipopt::Index, Ipopt::Index entries, Ipopt::Index* rows,
+bool OcpNlp::eval_jac_g(Ipopt::Index, const double* z, bool new_z, Ipopt::Index, Ipopt::Index, Ipopt::Index* rows,
                         Ipopt::Index* columns, double* values) {
   const Timer timer(microseconds_);
   if (!values) {
     write_pattern(nlp_.jacobian(), rows, columns);
     return true;
   }
-  if (!linearise_at(z)) return false;
-  nlp_.jacobian(linear_, values);
-  return all_finite({values, static_cast<std::size_t>(entries)});
+  visit(new_z);
+  if (!linearise_at(z, nullptr, visit_)) return false;
+  return copy_finite(jacobian_, 1.0, values);
 }
 
-bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool, double objective_factor, Ipopt::Index,
+bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_factor, Ipopt::Index,
                     const double* multipliers, bool, Ipopt::Index entries, Ipopt::Index* rows, Ipopt::Index* columns,
                     double* values) {
   const Timer timer(microseconds_);
@@ -251,25 +296,23 @@ bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool, double objective_factor
     write_pattern(nlp_.hessian(), rows, columns);
     return true;
   }
+  visit(new_z);
   const std::span<double> all(values, entries);
   if (curvature_ == Curvature::gauss_newton) {
-    linearise_at(z);
-    nlp_.hessian(linear_, values);
-    for (double& value : all) value *= objective_factor;
-  } else if (objective_factor == 1.0 && is_linear_exact_ && is_linear_ &&
-             std::equal(linear_z_.begin(), linear_z_.end(), z) &&
-             std::equal(linear_multipliers_.begin(), linear_multipliers_.end(), multipliers)) {
-    nlp_.hessian(linear_, values);
-  } else if (objective_factor >= smallest_divisor) {
-    linearise(z, multipliers, 1.0 / objective_factor, Hessian::exact, other_);
-    nlp_.hessian(other_, values);
+    linearise_at(z, nullptr, visit_);
+    return copy_finite(hessian_, objective_factor, values);
+  }
+  if (objective_factor == 1.0 && is_linear_exact_ && linearised_.is_at(z, visit_) &&
+      std::equal(linear_multipliers_.begin(), linear_multipliers_.end(), multipliers)) {
+    return copy_finite(hessian_, 1.0, values);
+  }
+  if (objective_factor >= smallest_divisor) {
+    linearise(z, multipliers, 1.0 / objective_factor, Hessian::exact, Kept::hessian, values);
     for (double& value : all) value *= objective_factor;
   } else {
     // The Ocp's Lagrangian always holds the whole objective: what is too much of it is taken away.
-    linearise(z, multipliers, 1.0, Hessian::exact, other_);
-    nlp_.hessian(other_, values);
-    linearise(z, nullptr, 0.0, Hessian::exact, other_);
-    nlp_.hessian(other_, hessian_part_.data());
+    linearise(z, multipliers, 1.0, Hessian::exact, Kept::hessian, values);
+    linearise(z, nullptr, 0.0, Hessian::exact, Kept::hessian, hessian_part_.data());
     for (Ipopt::Index entry = 0; entry < entries; ++entry)
       values[entry] += (objective_factor - 1.0) * hessian_part_[entry];
   }

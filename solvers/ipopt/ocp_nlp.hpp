@@ -68,8 +68,7 @@ class OcpNlp final : public Ipopt::TNLP {
   KktResidual write_and_judge(const PrimalDual& from, Iterate& point) noexcept;
   /// Sum of |bound multiplier| x distance from the bound: what the barrier still adds to the objective.
   double complementarity_gap(const Iterate& point) noexcept;
-  double objective(const Iterate& point) noexcept { return ocp_->evaluate(point, nullptr, scratch_); }
-  KktResidual judge(const Iterate& point) noexcept { return kkt_residual(*ocp_, point, other_, scratch_); }
+  double objective(const Iterate& point) noexcept;
   /// The time that Ipopt's calls of this object have taken since it was made [us].
   double microseconds() const noexcept { return microseconds_; }
 
@@ -111,11 +110,23 @@ class OcpNlp final : public Ipopt::TNLP {
     double* microseconds_;
     Clock::time_point start_ = Clock::now();
   };
-  bool evaluate_at(const double* z) noexcept;
-  bool linearise_at(const double* z, const double* multipliers = nullptr);
+  /// Where something was evaluated.
+  struct Place {
+    std::vector<double> z;
+    unsigned visit = 0;  ///< of Ipopt's, in which it was last asked for
+    bool is_known = false, is_sound = false;
+    /// Whether it is here, at `at`; what Ipopt says to be the same point need not be compared.
+    bool is_at(const double* at, unsigned now) noexcept;
+    void move_to(const double* at, unsigned now) noexcept;
+  };
+  void visit(bool is_new) noexcept { visit_ += is_new; }
+  bool evaluate_at(const double* z, unsigned visit = elsewhere) noexcept;
+  bool linearise_at(const double* z, const double* multipliers = nullptr, unsigned visit = elsewhere);
   bool guess_multipliers();
   void read_multipliers(double* multipliers);
-  void linearise(const double* z, const double* multipliers, double factor, Hessian hessian, StageQp& qp) noexcept;
+  enum class Kept { all, hessian };
+  void linearise(const double* z, const double* multipliers, double factor, Hessian hessian, Kept kept,
+                 double* hessian_values) noexcept;
 
   const Ocp* ocp_ = nullptr;
   Curvature curvature_;
@@ -127,8 +138,12 @@ class OcpNlp final : public Ipopt::TNLP {
 
   std::vector<double> scratch_, defects_;
   Iterate work_;
-  StageQp linear_, other_;
-  std::vector<double> evaluated_z_, linear_z_, linear_multipliers_, constraints_, gradient_, jacobian_;
+  StageQp pieces_;  ///< of the linearisation under way; only the vectors are kept
+  static constexpr unsigned elsewhere = 0;
+  unsigned visit_ = 1;
+  Place evaluated_, linearised_;
+  std::vector<double> constraints_;                                                              ///< at `evaluated_`
+  std::vector<double> linear_multipliers_, linear_constraints_, gradient_, jacobian_, hessian_;  ///< at `linearised_`
   /// Where Ipopt has its iterates, from the first that it shows to its end.
   struct {
     const Ipopt::IpoptData* data = nullptr;
@@ -136,11 +151,9 @@ class OcpNlp final : public Ipopt::TNLP {
     Ipopt::TNLPAdapter* adapter = nullptr;
   } iterates_;
   bool starts_with_multipliers_ = false, any_fixed_ = false;
-  bool is_evaluated_ = false, is_linear_ = false;              ///< what is held belongs to the z beside it
-  bool is_evaluated_sound_ = false, is_linear_sound_ = false;  ///< and is finite
-  bool is_linear_exact_ = false;                               ///< with the multipliers beside it
+  bool is_linear_exact_ = false;  ///< the linearisation has the Hessian for `linear_multipliers_`
   double objective_ = 0.0;
-  std::vector<double> weighted_, clipped_, bound_multipliers_, hessian_part_;
+  std::vector<double> weighted_, clipped_, bound_multipliers_, lagrangian_gradient_, hessian_part_;
   double microseconds_ = 0.0;
 };
 

@@ -30,7 +30,7 @@ TEST(Kernels, AreThereForEverySetThatThisMachineRuns) {
 
 /// What the recursion keeps of a program.
 struct Recursion {
-  AlignedDoubles P, U, V, T, inverse, drift, g, p;
+  AlignedDoubles P, U, V, closed, T, inverse, drift, g, p;
   std::vector<std::uint8_t> fixes, special;
   Iterate step;
   RiccatiView view;
@@ -40,7 +40,7 @@ struct Recursion {
     const std::size_t stages = capacity.intervals + 1, row = qp.stride();
     P.assign(stages * capacity.states * row, 0.0);
     for (auto* v : {&U, &V}) v->assign(stages * capacity.controls * row, 0.0);
-    T.assign(stages * 64, 0.0);
+    for (auto* v : {&closed, &T}) v->assign(stages * 64, 0.0);
     inverse.assign(stages * capacity.controls, 0.0);
     for (auto* v : {&drift, &g, &p}) v->assign(stages * row, 0.0);
     for (auto* v : {&fixes, &special}) v->assign(stages, 0);
@@ -62,6 +62,7 @@ struct Recursion {
     view.P = P.data();
     view.U = U.data();
     view.V = V.data();
+    view.closed = closed.data();
     view.T = T.data();
     view.inverse = inverse.data();
     view.fixes = fixes.data();
@@ -446,8 +447,11 @@ TEST(Kernels, OfPlainSumsAgree) {
       }
       set.program->add(a.data(), b.data(), out.data(), width);
       for (int k = 0; k < width; ++k) EXPECT_EQ(out[k], a[k] + b[k]) << set.instruction_set;
-      set.program->subtract(a.data(), b.data(), out.data(), width);
-      for (int k = 0; k < width; ++k) EXPECT_EQ(out[k], a[k] - b[k]) << set.instruction_set;
+      set.program->write_bounds(a.data(), h.data(), b.data(), out.data(), sum_h.data(), width);
+      for (int k = 0; k < width; ++k) {
+        EXPECT_EQ(out[k], a[k] - b[k]) << set.instruction_set;
+        EXPECT_EQ(sum_h[k], h[k] - b[k]) << set.instruction_set;
+      }
       const ViolationParts found = set.program->find_violations(a.data(), b.data(), sum_h.data(), width, out.data());
       int violated = 0;
       double worst = 0.0;

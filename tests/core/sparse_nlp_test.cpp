@@ -5,8 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
 
 #include "random_problem.hpp"
+#include "rhec/core/solver.hpp"
 #include "rhec/plugins/host.hpp"
 
 namespace rhec {
@@ -189,6 +194,122 @@ TEST(SparseNlp, PointsGoThereAndBack) {
     double expected = view.qp.q(0)[j];
     for (int r = 0; r < problem->state_count(1); ++r) expected += view.qp.A_of(0)(r, j) * back.costate(1)[r];
     EXPECT_NEAR(back.costate(0)[j], expected, 1e-12 * (1.0 + std::abs(expected)));
+  }
+}
+
+/// Estimation with blocks and a controller, each at points of all kinds: within bounds and beyond, with multipliers.
+std::vector<std::unique_ptr<HorizonProblem>> problems_to_judge(RandomProblem& random) {
+  std::vector<std::unique_ptr<HorizonProblem>> problems;
+  for (const int block : {0, 3}) {
+    RandomProblem::RheSpec estimation;
+    estimation.intervals = 11;
+    estimation.block = block;
+    estimation.robust = block > 0;
+    problems.push_back(random.rhe(estimation));
+  }
+  problems.push_back(random.rhc({}));
+  return problems;
+}
+
+Iterate random_point(const HorizonProblem& problem, RandomProblem& random) {
+  Iterate point = RandomProblem::cold_start(problem);
+  for (int i = 0; i <= problem.intervals(); ++i) {
+    const bool is_given = i == 0 && problem.initial_state();
+    for (int j = 0; j < problem.state_count(i) && !is_given; ++j) {
+      point.state(i)[j] += 0.3 * random.normal();
+      if (i > 0) point.costate(i)[j] = random.normal();
+      point.state_bound(i)[j] = random.normal();
+    }
+    for (int j = 0; i < problem.intervals() && j < problem.control_count(i); ++j) {
+      point.control(i)[j] += 0.3 * random.normal();
+      point.control_bound(i)[j] = random.normal();
+    }
+  }
+  return point;
+}
+
+void expect_same(const KktResidual& one, const KktResidual& other) {
+  const auto near = [](double a, double b, const char* what) { EXPECT_NEAR(a, b, 1e-12 * (1.0 + a)) << what; };
+  near(one.stationarity, other.stationarity, "stationarity");
+  near(one.defect, other.defect, "defect");
+  near(one.bound_violation, other.bound_violation, "bound violation");
+  near(one.complementarity, other.complementarity, "complementarity");
+}
+
+TEST(SparseNlp, JudgesAsTheCoreDoes) {
+  RandomProblem random(bicycle(), 8);
+  for (const auto& problem : problems_to_judge(random)) {
+    View view(*problem);
+    for (int trial = 0; trial < 10; ++trial) {
+      Iterate point = random_point(*problem, random);
+      problem->linearise(all_stages(*problem), point, Hessian::none, view.qp, view.scratch);
+      SparseNlp::set_costate_0(view.qp, point);
+      Eigen::VectorXd z(view.n), multipliers(view.m), bounds(view.n), lower(view.n), upper(view.n), gradient(view.n),
+          pull(view.n), constraints(view.m);
+      view.nlp.read(*problem, point, z.data(), multipliers.data(), bounds.data());
+      view.nlp.bounds(*problem, lower.data(), upper.data());
+      view.nlp.gradient(view.qp, gradient.data());
+      view.nlp.constraints(view.qp, constraints.data());
+      std::vector<double> jacobian(view.nlp.jacobian().entries());
+      view.nlp.jacobian(view.qp, jacobian.data());
+      view.nlp.lagrangian_gradient(gradient.data(), jacobian.data(), multipliers.data(), pull.data());
+      KktTerms terms;
+      view.nlp.add_kkt({z.data(), lower.data(), upper.data(), constraints.data(), gradient.data(), pull.data(),
+                        multipliers.data(), bounds.data()},
+                       terms);
+      terms.add(view.qp, point, {0, 0});  // for an initial state that is given
+      const KktResidual whole = kkt_residual(view.qp, point);
+      EXPECT_GT(whole.largest(), 1e-3);
+      expect_same(terms.residual(), whole);
+    }
+    // What is no number is seen.
+    KktTerms broken;
+    Eigen::VectorXd zeros = Eigen::VectorXd::Zero(view.n), bad = zeros, rows = Eigen::VectorXd::Zero(view.m);
+    bad[view.n / 2] = std::nan("");
+    view.nlp.add_kkt(
+        {zeros.data(), zeros.data(), zeros.data(), rows.data(), zeros.data(), bad.data(), rows.data(), zeros.data()},
+        broken);
+    EXPECT_TRUE(std::isnan(broken.residual().stationarity));
+  }
+}
+
+TEST(SparseNlp, PiecesOfALinearisationAreThoseOfTheWhole) {
+  RandomProblem random(bicycle(), 9);
+  for (const auto& problem : problems_to_judge(random)) {
+    View view(*problem);
+    const Iterate point = random_point(*problem, random);
+    const double objective = problem->linearise(all_stages(*problem), point, Hessian::exact, view.qp, view.scratch);
+    const int N = problem->intervals(), entries = view.nlp.jacobian().entries(), bent = view.nlp.hessian().entries();
+    std::vector<double> gradient(view.n), constraints(view.m), jacobian(entries), hessian(bent);
+    view.nlp.gradient(view.qp, gradient.data());
+    view.nlp.constraints(view.qp, constraints.data());
+    view.nlp.jacobian(view.qp, jacobian.data());
+    view.nlp.hessian(view.qp, hessian.data());
+    const KktResidual kkt = kkt_residual(view.qp, point);
+    for (const int size : {2, 3, 5, N, N + 1, N + 9}) {
+      StageQp pieces(problem->capacity(), size);
+      EXPECT_EQ(pieces.window(), std::min(size, problem->capacity().intervals + 1));
+      std::vector<double> g(view.n, 9.0), c(view.m, 9.0), J(entries, 9.0), H(bent, 9.0);
+      double sum = 0.0;
+      for (int first = 0; first <= N; first += pieces.window()) {
+        const StageRange piece{first, std::min(first + pieces.window() - 1, N)};
+        pieces.look_at(first);
+        sum += problem->linearise(piece, point, Hessian::exact, pieces, view.scratch);
+        view.nlp.gradient(pieces, piece, g.data());
+        view.nlp.constraints(pieces, piece, c.data());
+        view.nlp.jacobian(pieces, piece, J.data());
+        view.nlp.hessian(pieces, piece, H.data());
+      }
+      EXPECT_NEAR(sum, objective, 1e-12 * std::abs(objective)) << size;
+      EXPECT_EQ(g, gradient) << size;
+      EXPECT_EQ(c, constraints) << size;
+      EXPECT_EQ(J, jacobian) << size;
+      EXPECT_EQ(H, hessian) << size;
+      Report report;
+      judge(*problem, point, pieces, view.scratch, report);
+      EXPECT_NEAR(report.objective, objective, 1e-12 * std::abs(objective)) << size;
+      expect_same(report.kkt, kkt);
+    }
   }
 }
 

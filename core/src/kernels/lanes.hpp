@@ -56,7 +56,10 @@ inline Lanes first_of(const Lanes& lanes, int part, int count) {
   return keep ? lanes : Lanes{};
 }
 
-inline Lanes absolute(const Lanes& lanes) { return lanes < 0.0 ? -lanes : lanes; }
+inline Lanes absolute(const Lanes& lanes) {
+  constexpr long long but_sign = 0x7fff'ffff'ffff'ffff;
+  return reinterpret_cast<Lanes>(reinterpret_cast<LaneMask>(lanes) & but_sign);
+}
 /// The larger of each two; the first where they cannot be compared.
 inline Lanes larger(const Lanes& a, const Lanes& b) { return b > a ? b : a; }
 inline Lanes smaller(const Lanes& a, const Lanes& b) { return b < a ? b : a; }

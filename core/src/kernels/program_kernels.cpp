@@ -18,9 +18,9 @@ template <int known_parts, int known_states>
 KktParts kkt_of(const ProgramView& view) {
   const long stride = view.stride;
   const int state_parts = known_parts > 0 ? known_parts : (view.states + lane_count - 1) / lane_count;
-  Lanes stationarity{}, defect{}, violation{}, complementarity{}, term{},
-      rest{};  // rest stays 0 as long as all is finite
-  for (int i = 0; i <= view.intervals; ++i) {
+  Lanes stationarity{}, defect{}, complementarity{}, highest_lower{}, lowest_upper{};
+  Lanes gradients{}, bounds{}, costates{}, rest{};  // rest stays 0 as long as all is finite
+  for (int i = view.first; i <= view.last; ++i) {
     const double* row_F = view.F + i * view.states * stride;
     const double* next_costate = view.costates + (i + 1) * stride;
     const bool is_last = i == view.intervals;
@@ -36,49 +36,53 @@ KktParts kkt_of(const ProgramView& view) {
       if (v < state_parts) {
         const Lanes costate = first_of(load(view.costates + at), v, view.states);
         sum -= costate;
-        term = larger(term, absolute(costate));
+        costates = larger(costates, absolute(costate));
         if (i == 0 && !view.initial_state_is_given) stationarity = larger(stationarity, absolute(costate));
       }
       stationarity = larger(stationarity, absolute(sum));
-      rest += sum - sum;
-      term = larger(term, larger(absolute(gradient), absolute(bound)));
-      const Lanes lower = load(view.lower + at), upper = load(view.upper + at);
-      violation = larger(violation, larger(lower, -upper));
+      rest += 0.0 * sum;
+      const Lanes pull = absolute(bound), lower = load(view.lower + at), upper = load(view.upper + at);
+      gradients = larger(gradients, absolute(gradient));
+      bounds = larger(bounds, pull);
+      highest_lower = larger(highest_lower, lower);
+      lowest_upper = smaller(lowest_upper, upper);
       // A multiplier at a bound that does not exist is as wrong as it is large.
-      const Lanes gap = bound > 0.0 ? absolute(upper) : absolute(lower);
-      const Lanes pull = absolute(bound);
-      complementarity = larger(complementarity, pull > 0.0 ? pull * smaller(all(1.0), gap) : Lanes{});
+      const Lanes gap = absolute(bound > 0.0 ? upper : lower);
+      complementarity = larger(complementarity, pull * smaller(all(1.0), gap));
     }
     if (is_last) break;
     for (int v = 0; v < state_parts; ++v) {
       const Lanes b = load(view.b + i * stride + v * lane_count);
       defect = larger(defect, absolute(b));
-      rest += b - b;
+      rest += 0.0 * b;
     }
   }
-  return {largest_of(stationarity) + sum_of(rest), largest_of(defect), largest_of(violation),
-          largest_of(complementarity), largest_of(term)};
+  return {largest_of(stationarity) + sum_of(rest), largest_of(defect), largest_of(larger(highest_lower, -lowest_upper)),
+          largest_of(complementarity), largest_of(larger(larger(gradients, bounds), costates))};
 }
 
 KktParts kkt(const ProgramView& view) {
   bool is_full = view.states == 6 && view.stride == lane_count;
-  for (int i = 0; is_full && i <= view.intervals; ++i) is_full = view.state_counts[i] == 6;
+  const int end = view.last < view.intervals ? view.last + 1 : view.last;
+  for (int i = view.first; is_full && i <= end; ++i) is_full = view.state_counts[i] == 6;
   return is_full ? kkt_of<1, 6>(view) : kkt_of<0, 0>(view);
 }
 
-StepParts check_step(const ProgramView& view, double tolerance) {
+/// Rows in parts of which one is all there is, or as many as it takes.
+template <bool is_one_part>
+StepParts check_step_of(const ProgramView& view, double tolerance) {
   const long stride = view.stride;
-  const int state_parts = (view.states + lane_count - 1) / lane_count;
-  Lanes excess = all(-1.0), costates{}, rest{};  // rest stays 0 as long as all is finite
+  const int state_parts = is_one_part ? 1 : (view.states + lane_count - 1) / lane_count;
+  Lanes excess = all(-1.0), costates{}, rest{}, unordered{};  // the last two stay 0 as long as all is finite
   for (int i = 0; i <= view.intervals; ++i) {
-    const int parts = parts_of(view, i);
+    const int parts = is_one_part ? 1 : parts_of(view, i);
     for (int v = 0; v < parts; ++v) {
       const long at = i * stride + v * lane_count;
       const Lanes z = load(view.values + at), lower = load(view.lower + at), upper = load(view.upper + at);
-      rest += z - z;
-      rest = (lower == lower) & (upper == upper) ? rest : all(1.0);
-      Lanes below = lower - z - tolerance * (1.0 + absolute(lower));
-      Lanes above = z - upper - tolerance * (1.0 + absolute(upper));
+      rest += 0.0 * z;
+      unordered = (lower == lower) & (upper == upper) ? unordered : all(1.0);
+      Lanes below = lower - tolerance * (1.0 + absolute(lower)) - z;
+      Lanes above = z - tolerance * (1.0 + absolute(upper)) - upper;
       if (i == 0 && view.initial_state_is_given) {
         const LaneMask controls = lane_numbers >= static_cast<long long>(view.states - v * lane_count);
         below = controls ? below : all(-1.0);
@@ -89,17 +93,22 @@ StepParts check_step(const ProgramView& view, double tolerance) {
     for (int v = 0; v < state_parts; ++v) {
       const Lanes costate = first_of(load(view.costates + i * stride + v * lane_count), v, view.states);
       costates = larger(costates, absolute(costate));
-      rest += costate - costate;
+      rest += 0.0 * costate;
     }
   }
-  return {sum_of(rest) == 0.0, largest_of(excess) > 0.0, largest_of(costates)};
+  return {sum_of(rest) + sum_of(unordered) == 0.0, largest_of(excess) > 0.0, largest_of(costates)};
+}
+
+StepParts check_step(const ProgramView& view, double tolerance) {
+  return view.stride == lane_count ? check_step_of<true>(view, tolerance) : check_step_of<false>(view, tolerance);
 }
 
 /// Whether there is nothing to mark: all multipliers are 0, all bounds apart.
+template <bool is_one_part>
 inline bool is_unmarked(const ProgramView& view) {
   Lanes found{};
   for (int i = 0; i <= view.intervals; ++i) {
-    const int parts = parts_of(view, i);
+    const int parts = is_one_part ? 1 : parts_of(view, i);
     for (int v = 0; v < parts; ++v) {
       const long at = static_cast<long>(i) * view.stride + v * lane_count;
       const Lanes lower = load(view.lower + at), gap = load(view.upper + at) - lower;
@@ -112,7 +121,7 @@ inline bool is_unmarked(const ProgramView& view) {
 
 bool mark_bounds(const ProgramView& view, double tolerance, unsigned char* marks) {
   const long stride = view.stride;
-  if (is_unmarked(view)) {
+  if (stride == lane_count ? is_unmarked<true>(view) : is_unmarked<false>(view)) {
     for (int i = 0; i <= view.intervals; ++i) marks[i] = 0;
     return false;
   }
@@ -152,8 +161,13 @@ ViolationParts find_violations(const double* values, const double* least, const 
   return {largest_of(largest), static_cast<int>(sum_of(counts))};
 }
 
-void subtract(const double* a, const double* b, double* out, long count) {
-  for (long k = 0; k < count; k += lane_count) store(load(a + k) - load(b + k), out + k);
+void write_bounds(const double* lower, const double* upper, const double* point, double* step_lower, double* step_upper,
+                  long count) {
+  for (long k = 0; k < count; k += lane_count) {
+    const Lanes at = load(point + k), below = load(lower + k) - at, above = load(upper + k) - at;
+    store(below, step_lower + k);
+    store(above, step_upper + k);
+  }
 }
 
 void adopt(const GuessView& from, double* values, double* multipliers) {
@@ -325,17 +339,17 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
     for (int k = states; k < stride; k += lane_count) store(Lanes{}, h + k);
   }
   if (!matrices) return total;
-  // Rows by weight, of which single entries come from memory at no cost.
+  // Rows by weight, to which single entries come from memory at no cost.
   constexpr int most_known = Width::is_known ? 8 : 1;
-  double weighted[most_known][8];
+  Lanes weighted[most_known][8 / lane_count];
   if (Width::is_known)
     for (int j = 0; j < count; ++j)
-      for (int k = 0; k < 8; k += lane_count) store(load(J + j * 8 + k) * weights[j], weighted[j] + k);
-  const auto factor = [&](int j, int c) RHEC_ALWAYS_INLINE {
+      for (int k = 0; k < 8; k += lane_count) weighted[j][k / lane_count] = load(J + j * 8 + k) * weights[j];
+  const auto product = [&](int j, int k, int c) RHEC_ALWAYS_INLINE {
     if constexpr (Width::is_known)
-      return weighted[j][c];
+      return weighted[j][k / lane_count] * J[j * 8 + c];
     else
-      return weights[j] * J[j * states + c];
+      return load(J + j * states + k) * (weights[j] * J[j * states + c]);
   };
   const auto clear = [&](double* row, int from) RHEC_ALWAYS_INLINE {
     if (stride == 8) {
@@ -349,7 +363,7 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
     double* row = H + static_cast<long>(c) * stride;
     for (int k = 0; k < states; k += lane_count) {
       Lanes sum{};
-      for (int j = 0; j < count; ++j) sum += load(J + j * states + k) * factor(j, c);
+      for (int j = 0; j < count; ++j) sum += product(j, k, c);
       store(sum, row + k);
     }
     if (!is_clean) clear(row, states);
@@ -427,7 +441,7 @@ constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {&kernel
                                                                          &kernels::check_step,
                                                                          &kernels::mark_bounds,
                                                                          &kernels::find_violations,
-                                                                         &kernels::subtract,
+                                                                         &kernels::write_bounds,
                                                                          &kernels::match,
                                                                          &kernels::adopt,
                                                                          &kernels::add,

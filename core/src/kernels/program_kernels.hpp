@@ -5,6 +5,7 @@ namespace rhec {
 /// What the kernels over stage programs and iterates work on: rows of `stride` entries, one a stage, 0 .. N.
 struct ProgramView {
   int intervals = 0;
+  int first = 0, last = 0;                   ///< stages to be looked at
   int states = 0, controls = 0, stride = 0;  ///< of the capacity
   const int* state_counts = nullptr;
   const int* control_counts = nullptr;
@@ -88,8 +89,9 @@ struct ProgramKernels {
   /// violations = max(least - values, values - most), of `count` entries, which are whole eights.
   ViolationParts (*find_violations)(const double* values, const double* least, const double* most, long count,
                                     double* violations);
-  /// out = a - b.
-  void (*subtract)(const double* a, const double* b, double* out, long count);
+  /// Bounds of steps from a point: lower - point and upper - point.
+  void (*write_bounds)(const double* lower, const double* upper, const double* point, double* step_lower,
+                       double* step_upper, long count);
   /// Marks rows of a and b, `count` of them and `stride` long: 2 where they are equal, 1 where their first `columns`
   /// entries are, 0 otherwise. Rows of a go to `kept`, which may begin with, or before, those of b.
   void (*match)(const double* a, const double* b, double* kept, int count, int stride, int columns,

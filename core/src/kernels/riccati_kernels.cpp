@@ -99,7 +99,7 @@ struct Memory {
   using R = typename Stage::R;
   long stride;
   const double *F, *H, *h, *b, *P_next, *p_next;
-  double *P, *U, *V, *T, *inverse, *drift, *g, *p;
+  double *P, *U, *V, *closed, *T, *inverse, *drift, *g, *p;
   const std::int8_t* sides;
 
   Memory(const RiccatiView& view, int i) : stride(view.stride) {
@@ -114,6 +114,7 @@ struct Memory {
     p_next = p + stride;
     U = view.U + controls;
     V = view.V + controls;
+    closed = view.closed + static_cast<long>(i) * 64;
     T = view.T + static_cast<long>(i) * 64;
     inverse = view.inverse + static_cast<long>(i) * view.controls;
     drift = view.drift + at;
@@ -150,6 +151,25 @@ RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const S
   };
   stage.each_control_back(form);
   stage.each_state(form);
+}
+
+/// What a solution needs of a stage, in an order in which one stage need not wait long for another: rows of the closed
+/// loop for gradients, columns of the dynamics and of the policy for steps. (Steps by the closed loop would be faster
+/// still, but where a policy is strong, next states would differ from what the dynamics make of state and control.)
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void close_loop(const Stage& stage, const Memory<Stage>& at,
+                                          const typename Stage::R* policy) {
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
+    const double* F = at.F + l * at.stride;
+    Lanes row = load(F);
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { row -= policy[k].part[0] * F[k]; });
+    store(row, at.closed + l * 8);
+  });
+  Lanes columns[8] = {};
+  stage.each_state([&](auto l) RHEC_ALWAYS_INLINE { columns[l] = at.row(at.F, l).part[0]; });
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { columns[k] = -policy[k].part[0]; });
+  transpose(columns);
+  for (int k = 0; k < stage.columns; ++k) store(columns[k], at.T + k * 8);
 }
 
 template <class Stage>
@@ -209,18 +229,11 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
     policy.to(at.V + (k - stage.offset) * at.stride);
     X[k] = policy;
   });
-  if constexpr (Stage::is_compact) {
-    // Columns of what leads to [next state; control].
-    Lanes columns[8] = {};
-    stage.each_state([&](auto l) RHEC_ALWAYS_INLINE { columns[l] = at.row(at.F, l).part[0]; });
-    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { columns[k] = -X[k].part[0]; });
-    transpose(columns);
-    for (int k = 0; k < stage.columns; ++k) store(columns[k], at.T + k * 8);
-  }
   stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
   R drift{};
   stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
   drift.to(at.drift);
+  if constexpr (Stage::is_compact) close_loop(stage, at, X);
   return true;
 }
 
@@ -230,20 +243,34 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
   using R = typename Stage::R;
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
+  const auto subtract_policy = [&](R& sum, const R& gradient) RHEC_ALWAYS_INLINE {
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { sum.add(at.row(at.V, k - stage.offset), -gradient.splat(k)); });
+  };
   R costate = p;
   costate.add(R::from(at.drift));
-  R sums[2] = {R::from(at.h), costate.between(stage.moved, stage.next_states)};
-  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.F, l), costate.splat(l)); });
-  R gradient = sums[0];
-  if (R::chains > 1 || stage.moved < stage.next_states) gradient.add(sums[1]);
-  if (view.fixes[i]) {
-    gradient.to(at.g);
-    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
-      if (at.sides[k] != 0) gradient.add(at.row(at.U, k - stage.offset), bound_of(view, i, k));
-    });
+  R gradient;  // by the state (but in a closed loop) and the controls
+  if (Stage::is_compact && !view.fixes[i]) {
+    const R h = R::from(at.h);
+    R sums[2] = {h, costate.between(stage.moved, stage.next_states)};
+    subtract_policy(sums[0], h);
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % 2].add(R::from(at.closed + l * 8), costate.splat(l)); });
+    gradient = sums[0];
+    gradient.add(sums[1]);
+    p = gradient;
+  } else {
+    R sums[2] = {R::from(at.h), costate.between(stage.moved, stage.next_states)};
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.F, l), costate.splat(l)); });
+    gradient = sums[0];
+    if (R::chains > 1 || stage.moved < stage.next_states) gradient.add(sums[1]);
+    if (view.fixes[i]) {
+      gradient.to(at.g);
+      stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+        if (at.sides[k] != 0) gradient.add(at.row(at.U, k - stage.offset), bound_of(view, i, k));
+      });
+    }
+    p = gradient;
+    subtract_policy(p, gradient);
   }
-  p = gradient;
-  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { p.add(at.row(at.V, k - stage.offset), -gradient.splat(k)); });
   p.to(at.p);
   // What the controls do where the state does not step: eliminated from the last to the first, found in their order.
   double own[Stage::most_columns];
@@ -313,20 +340,23 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
   if (view.fixes[i]) write_multipliers(view, i, stage, at);
 }
 
-/// The same in one register: [next state; control] is a sum of columns.
+/// The same in one register: [next state; control] is a sum of columns. What is carried is in a register of its own,
+/// too, for which nothing else has to wait.
 template <class Stage>
-RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, Row<1>& s) {
+RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, Row<1>& carried, Row<1>& s) {
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
   const LaneMask is_state = lane_numbers < static_cast<long long>(stage.states);
   Lanes sums[2] = {is_state ? load(at.b) : load(at.p), Lanes{}};
-  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % 2] += load(at.T + j * 8) * s.splat(j); });
+  stage.each_carried([&](auto j) RHEC_ALWAYS_INLINE { sums[1] += load(at.T + j * 8) * carried.splat(j); });
+  stage.each_moved([&](auto j) RHEC_ALWAYS_INLINE { sums[j % 2] += load(at.T + j * 8) * s.splat(j); });
   Row<1> next{{sums[0] + sums[1]}};
   double* z = view.values + i * at.stride;
   store(is_state ? s.part[0] : next.part[0], z);
   const Row<1> reached = next;
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { next.part[0] += load(at.T + k * 8) * reached.splat(k); });
   s.part[0] = is_state ? next.part[0] : Lanes{};
+  carried.part[0] += load(at.b);
   store(s.part[0], z + at.stride);
   Lanes costates[2] = {Row<1>::from(at.p_next).first(stage.states).part[0], Lanes{}};
   stage.each_state([&](auto l) RHEC_ALWAYS_INLINE { costates[l % 2] += at.row(at.P_next, l).part[0] * s.splat(l); });
@@ -490,8 +520,8 @@ int solve_forward(const RiccatiView& view, int first) {
       const int alike = i;
       const double* first_state = view.values + static_cast<long>(i) * view.stride;
       if constexpr (Stage::is_compact) {
-        Row<1> s = Row<1>::from(first_state);
-        do solve_stage_forward<Stage>(view, i, s);
+        Row<1> s = Row<1>::from(first_state), carried = s;
+        do solve_stage_forward<Stage>(view, i, carried, s);
         while (++i < view.intervals && is_alike(view, alike, i));
       } else {
         double s[Stage::most_states];

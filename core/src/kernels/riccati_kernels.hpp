@@ -23,11 +23,13 @@ struct RiccatiView {
   const std::int8_t* sides = nullptr;     ///< a row a stage: which bounds hold
   const std::uint8_t* special = nullptr;  ///< stages that are not for the kernels
 
-  double* P = nullptr;        ///< n_s rows a node
-  double* U = nullptr;        ///< n_w rows a stage: columns of the reduced Hessian, each as it is eliminated
-  double* V = nullptr;        ///< n_w rows a stage: the policy w = p - V s, p being what stands beside the state's p
-  double* T = nullptr;        ///< 8 x 8 a stage: columns of what leads from s to [next s; w], where that is a register
-  double* inverse = nullptr;  ///< n_w a stage: 1 / pivot, 0 where a control is fixed
+  double* P = nullptr;  ///< n_s rows a node
+  double* U = nullptr;  ///< n_w rows a stage: columns of the reduced Hessian, each as it is eliminated
+  double* V = nullptr;  ///< n_w rows a stage: the policy w = p - V s, p being what stands beside the state's p
+  /// 8 x 8 a stage, where a row is a register: rows [A - B V, B] of the next states that are moved; and columns of what
+  /// leads from s to [next s; w].
+  double *closed = nullptr, *T = nullptr;
+  double* inverse = nullptr;      ///< n_w a stage: 1 / pivot, 0 where a control is fixed
   std::uint8_t* fixes = nullptr;  ///< a stage: whether any of its controls is fixed
   double* drift = nullptr;        ///< a row a stage: P_{i+1} b_i
   double* g = nullptr;  ///< a row a stage: gradient by z before anything is eliminated, where it fixes a control

@@ -147,6 +147,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   void gather_rows(const Iterate& point, StageRange range, double* rows) const noexcept;
   void fill_stages(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
                    std::span<double> scratch) const noexcept;
+  bool is_of_structure(const StageQp& qp, const Recollection& known) const noexcept;
   bool has_structure(const StageQp& qp, const Recollection& known) const noexcept;
   void remember(const Iterate& point, int first, const StageQp& qp, Recollection& known) const noexcept;
   bool move_along(const Iterate& point, Hessian hessian, StageQp& qp, Recollection& known,

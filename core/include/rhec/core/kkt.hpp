@@ -27,6 +27,18 @@ RHEC_EXPORT KktResidual kkt_residual(const Ocp& ocp, const Iterate& point, Stage
 /// The same from a linearisation at the point that the caller already has.
 RHEC_EXPORT KktResidual kkt_residual(const StageQp& linearisation, const Iterate& point) noexcept;
 
+/// What a residual is made of, for who goes through a long horizon piece by piece: largest absolute values.
+struct RHEC_EXPORT KktTerms {
+  double stationarity = 0.0, defect = 0.0, bound_violation = 0.0, complementarity = 0.0;
+  double largest_term = 0.0;  ///< of the Lagrangian's gradient
+
+  /// Those of the stages of a range, where the program holds the linearisation at the point. Of the stage behind a
+  /// range that does not reach the end its sizes must be known.
+  void add(const StageQp& linearisation, const Iterate& point, StageRange range) noexcept;
+  void add(const KktTerms& others) noexcept;
+  KktResidual residual() const noexcept;
+};
+
 /// Costates that make the point stationary in all states, by one backward sweep; bound multipliers are taken as they
 /// are.
 RHEC_EXPORT void set_costates(const StageQp& linearisation, Iterate& point) noexcept;

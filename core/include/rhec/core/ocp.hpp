@@ -75,8 +75,8 @@ class RHEC_EXPORT Ocp {
   /// not evaluate again what was evaluated at the same rows of a point before, were it some stages later. Allocates;
   /// by default nothing is remembered.
   virtual void remember_in(StageQp& qp) const;
-  /// Whether a program remembers that it was made at this very point, and nobody has written to it since. False where
-  /// nothing is remembered.
+  /// Whether a program remembers that it was made at this very point, of stages of these sizes, and nobody has written
+  /// to it since. False where nothing is remembered.
   virtual bool is_made_at(const Iterate& point, const StageQp& qp) const noexcept;
 
   /// Fills the stages of a range of the quadratic program at a point: sizes, dynamics, costs and bounds. Returns the

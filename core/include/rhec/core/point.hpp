@@ -10,6 +10,8 @@ namespace rhec {
 
 /// Every state, control and multiplier is finite.
 RHEC_EXPORT bool is_finite(const Ocp& ocp, const Iterate& point) noexcept;
+/// What `is_sound_start` asks for but for the objective, for who is about to evaluate that anyway.
+RHEC_EXPORT bool has_sound_numbers(const Ocp& ocp, const Iterate& point) noexcept;
 /// A solver can start here: point and objective are finite, the capacities are the same, and no bound is NaN. `scratch`
 /// is of the Ocp's `scratch_size()`.
 RHEC_EXPORT bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept;

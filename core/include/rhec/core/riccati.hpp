@@ -152,7 +152,7 @@ class RHEC_EXPORT Riccati {
   bool convexified_ = false;
   bool has_initial_inverse_ = false;  ///< of P at node 0; otherwise it was factorised as a special stage
   const RiccatiKernels* kernels_ = nullptr;
-  AlignedDoubles P_, U_, V_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
+  AlignedDoubles P_, U_, V_, closed_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
   AlignedDoubles initial_inverse_;
   std::vector<int> state_counts_, control_counts_;
   std::vector<std::uint8_t> is_special_, fixes_control_, has_gradient_;  // N stages

@@ -39,7 +39,7 @@ struct Report {
 };
 
 /// Writes what the core says of a point that a solver returns: its objective and its KKT residual. `qp` and `scratch`
-/// (of the Ocp's `scratch_size()`) are workspace.
+/// (of the Ocp's `scratch_size()`) are workspace; of the former a window of two stages will do.
 RHEC_EXPORT void judge(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch,
                        Report& report) noexcept;
 /// Wall-clock time since a start [us].

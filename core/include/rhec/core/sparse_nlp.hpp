@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "rhec/core/ocp.hpp"
+#include "rhec/core/kkt.hpp"
 
 namespace rhec {
 
@@ -54,19 +54,42 @@ class RHEC_EXPORT SparseNlp {
   /// c from the defects that Ocp::evaluate gives (rows of the capacity's states).
   void constraints(const Ocp& ocp, const double* defects, double* c) const noexcept;
 
-  // Values at the point of a linearisation. The Hessian is that of the Lagrangian if the linearisation was made with
-  // Hessian::exact and the point's costates.
-  void constraints(const StageQp& linearisation, double* c) const noexcept;
-  void gradient(const StageQp& linearisation, double* g) const noexcept;
-  void jacobian(const StageQp& linearisation, double* values) const noexcept;
-  void hessian(const StageQp& linearisation, double* values) const noexcept;
+  // Values at the point of a linearisation, of all stages or of those of a range, to their places in the whole vectors.
+  // The Hessian is that of the Lagrangian if the linearisation was made with Hessian::exact and the point's costates.
+  void constraints(const StageQp& linearisation, StageRange range, double* c) const noexcept;
+  void gradient(const StageQp& linearisation, StageRange range, double* g) const noexcept;
+  void jacobian(const StageQp& linearisation, StageRange range, double* values) const noexcept;
+  void hessian(const StageQp& linearisation, StageRange range, double* values) const noexcept;
+  void constraints(const StageQp& linearisation, double* c) const noexcept {
+    constraints(linearisation, {0, linearisation.intervals()}, c);
+  }
+  void gradient(const StageQp& linearisation, double* g) const noexcept {
+    gradient(linearisation, {0, linearisation.intervals()}, g);
+  }
+  void jacobian(const StageQp& linearisation, double* values) const noexcept {
+    jacobian(linearisation, {0, linearisation.intervals()}, values);
+  }
+  void hessian(const StageQp& linearisation, double* values) const noexcept {
+    hessian(linearisation, {0, linearisation.intervals()}, values);
+  }
+
+  /// gradient + jacobian' multipliers.
+  void lagrangian_gradient(const double* gradient, const double* jacobian, const double* multipliers,
+                           double* sum) const noexcept;
+  /// A point as vectors, with what `lagrangian_gradient` says of it.
+  struct Judged {
+    const double *z, *lower, *upper, *constraints, *gradient, *lagrangian_gradient, *multipliers, *bound_multipliers;
+  };
+  /// Adds what the core's residual (kkt_residual) is made of, but for an initial state that is given.
+  void add_kkt(const Judged& point, KktTerms& terms) const noexcept;
 
  private:
   std::vector<std::int32_t> signature_, next_signature_;
   std::vector<std::uint8_t> state_flags_, control_flags_;  ///< of the interval being marked
   std::vector<int> state_starts_, control_starts_, constraint_starts_, state_counts_, control_counts_;
   Pattern jacobian_, hessian_;
-  /// Of each entry of the Jacobian: its offset in the stage's A or B; -1 for the -1 of s_{i+1} itself.
+  /// Of each entry of the Jacobian: its offset in the stage's A or B; -1 for the -1 of s_{i+1} itself, with which the
+  /// columns of states begin, but for those of node 0.
   std::vector<int> jacobian_sources_;
 };
 

@@ -33,6 +33,12 @@ class RHEC_EXPORT StageQp {
 
   StageQp() = default;
   explicit StageQp(const Capacity& capacity);
+  /// A window: of a program of the capacity so many stages at a time, for who goes through it piece by piece and wants
+  /// it to stay in the processor's cache. Other stages than those from `look_at` on must not be touched.
+  StageQp(const Capacity& capacity, int stages);
+  /// Stages `first`, first + 1, ... are looked at next, which hold nothing yet.
+  void look_at(int first) noexcept;
+  int window() const noexcept { return window_; }  ///< how many stages that are; 0: all are there
 
   const Capacity& capacity() const noexcept { return capacity_; }
   int stride() const noexcept { return stride_; }
@@ -64,8 +70,8 @@ class RHEC_EXPORT StageQp {
   double* H(int i) noexcept { return at(H_, first_ + i, wide_); }
   double* h(int i) noexcept { return at(h_, first_ + i, 1); }
   double* b(int i) noexcept { return at(b_, first_ + i, 1); }
-  double* lower(int i) noexcept { return at(lower_, i, 1); }
-  double* upper(int i) noexcept { return at(upper_, i, 1); }
+  double* lower(int i) noexcept { return at(lower_, first_bounds_ + i, 1); }
+  double* upper(int i) noexcept { return at(upper_, first_bounds_ + i, 1); }
   double* q(int i) noexcept { return h(i); }
   double* r(int i) noexcept { return h(i) + capacity_.states; }
   double* state_lower(int i) noexcept { return lower(i); }
@@ -77,8 +83,8 @@ class RHEC_EXPORT StageQp {
   const double* H(int i) const noexcept { return at(H_, first_ + i, wide_); }
   const double* h(int i) const noexcept { return at(h_, first_ + i, 1); }
   const double* b(int i) const noexcept { return at(b_, first_ + i, 1); }
-  const double* lower(int i) const noexcept { return at(lower_, i, 1); }
-  const double* upper(int i) const noexcept { return at(upper_, i, 1); }
+  const double* lower(int i) const noexcept { return at(lower_, first_bounds_ + i, 1); }
+  const double* upper(int i) const noexcept { return at(upper_, first_bounds_ + i, 1); }
   const double* q(int i) const noexcept { return h(i); }
   const double* r(int i) const noexcept { return h(i) + capacity_.states; }
   const double* state_lower(int i) const noexcept { return lower(i); }
@@ -122,7 +128,9 @@ class RHEC_EXPORT StageQp {
 
   Capacity capacity_;
   int stride_ = 0, wide_ = 0, intervals_ = 0;
-  int first_ = 0;  ///< slot of stage 0 in F, b, H and h: what moves towards the front is not copied
+  int window_ = 0;
+  int first_ = 0;         ///< slot of stage 0 in F, b, H and h: what moves towards the front is not copied
+  int first_bounds_ = 0;  ///< the same of the bounds
   unsigned changes_ = 0;
   std::vector<int> state_counts_, control_counts_, carried_counts_;
   AlignedDoubles F_, H_, h_, b_, lower_, upper_, initial_step_;
