@@ -262,7 +262,7 @@ def together(slices, claim):
 
 
 def conditions_of(study, claim):
-    """All speeds of the base together, each of them, and every other setting at its speeds."""
+    """All speeds of the base together, which is the main one; each of them; and every other setting at its speeds."""
     slices = [Slice(setting, speed, paths) for (setting, speed), paths in
               sorted(study.runs.items(), key=lambda item: (item[0][0] != BASE, repr(item[0][0]), item[0][1]))]
     base = [at for at in slices if at.setting == BASE]

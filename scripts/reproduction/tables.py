@@ -5,10 +5,11 @@ import statistics
 
 from database import BASE, FHB, IGNORED, PATHS, TRUTH, UNBLOCKED, rate, setting_name
 from slices import Slice, mean
-from verdicts import HELD, PARTLY, describe
+from verdicts import PARTLY, describe
 
 Judged = collections.namedtuple("Judged", "claim verdict conditions")
 SHOWN_SIZES, SHOWN_OVERLAPS = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30), (0, 2, 3, 4, 6, 8, 10, 12, 15)
+SHORT_BLOCKS = ((1, 0), (1, 2), (2, 0), (2, 2), (3, 0), (3, 2))
 STEP = 0.2  # dt [s]
 
 
@@ -23,11 +24,15 @@ def short(value):
     """Three digits, without an exponent."""
     if value is None or not math.isfinite(value):
         return "-"
-    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}" if abs(value) >= 0.01 else f"{value:.3f}"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}" if value else "0"
+
+
+def percent(share):
+    return f"{round(100 * share) + 0:d}" if math.isfinite(share) else "-"
 
 
 def estimate(part):
-    shown = [f"{100 * value:.0f}" if part.scale == "share" and math.isfinite(value) else short(value) for value in part.estimate()]
+    shown = [percent(value) if part.scale == "share" else short(value) for value in part.estimate()]
     return f"{shown[0]}{' %' if part.scale == 'share' else ''}", f"{shown[1]} to {shown[2]}"
 
 
@@ -93,12 +98,13 @@ def verdicts(study, judged):
     for claim, verdict, conditions in judged:
         main = next((each for each in conditions if each.speed is None), conditions[0])
         parts = distinct(main.parts)
-        confirmed = sum(condition.confirmed for condition in conditions)
+        confirmed, alone = (sum(found) for found in zip(*((each.confirmed, each.claimed_side()) for each in conditions)))
         where = describe(conditions, BASE, setting_name, rate) if verdict == PARTLY else ""
         rows.append((claim.key, claim.text, f"**{verdict}**", "; ".join(f"{part.name}: {estimate(part)[0]}" for part in parts),
                      "; ".join(estimate(part)[1] for part in parts), f"{len(parts[0].known())}", f"{main.runs:,}",
-                     f"{confirmed} of {len(conditions)}", where))
-    return table(("", "claim", "verdict", "effect, base, all speeds", "95 % interval", "seeds", "runs", "confirmed in", "holds when"), rows)
+                     f"{confirmed}, {alone} of {len(conditions)}", where))
+    return table(("", "claim", "verdict", "effect, base, all speeds", "95 % interval", "seeds", "runs",
+                  "conditions: confirmed, by interval alone", "holds when"), rows)
 
 
 def tests(study, judged):
@@ -141,7 +147,7 @@ def rates(study, judged):
         best = min(known, key=known.get)
         rows.append((f"{rate(at.setting, at.speed):.2f}", f"{at.setting[0]:g}", f"{at.speed:g}", f"{average(at, 'kappa', FHB, PATHS):.3f}",
                      *(text for quantity in ("kappa", "position") for text in (
-                         f"{100 * mean([float(ratio is not None and ratio < 1) for ratio in ratios[quantity].values()]):.0f} %",
+                         f"{percent(mean([float(ratio is not None and ratio < 1) for ratio in ratios[quantity].values()]))} %",
                          short(math.exp(mean([math.log(ratio) for ratio in ratios[quantity].values() if ratio]))))),
                      f"({best[0]}, {best[1]}): {short(known[best])}"))
     return table(("v N_e dt / L", "L [m]", "v [m/s]", "kappa, FHB", "kappa: (S, o) better", "ratio", "position: (S, o) better", "ratio",
@@ -194,7 +200,7 @@ def shares(study, judged):
             points = one.points(kind)
             for quantity in quantities:
                 ratios = [one.log_ratio(quantity, (kind, *point), FHB, seed) for point in points]
-                cells.append(f"{100 * mean([float(ratio is not None and ratio < 0) for ratio in ratios]):.0f} %")
+                cells.append(f"{percent(mean([float(ratio is not None and ratio < 0) for ratio in ratios]))} %")
             cells.append(len(points))
         rows.append((f"{speed:g}", *cells))
     return table(("v [m/s]", "SB-O on kappa: kappa", "position", "tracking", "(S, o)", "SB-O on both: kappa", "position", "mu", "tracking",
@@ -220,14 +226,13 @@ def convergence(study, judged):
         for speed in speeds_of(study, setting):
             at = slice_of(study, speed, setting)
             cells = []
-            for point in ((1, 0), (1, 1), (2, 0), (2, 1), (3, 0), (3, 1), (1, 2), (2, 2), (3, 2)):
+            for point in SHORT_BLOCKS:
                 method = ("both", *point)
                 runs = [at.paths[path][method][seed] for path in PATHS for seed in at.seeds] if at.has(method) else []
                 bad = sum(not run.completed or run.fallbacks > 0 for run in runs)
                 cells.append(f"{bad} of {len(runs)}" if runs else "")
             rows.append((setting_name(setting), f"{speed:g}", *cells))
-    return table(("setting", "v [m/s]", *(f"({s}, {o})" for s, o in ((1, 0), (1, 1), (2, 0), (2, 1), (3, 0), (3, 1), (1, 2), (2, 2), (3, 2)))),
-                 rows)
+    return table(("setting", "v [m/s]", *(f"({size}, {overlap})" for size, overlap in SHORT_BLOCKS)), rows)
 
 
 def times(study, judged):

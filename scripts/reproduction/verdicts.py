@@ -1,8 +1,8 @@
 """From figures by seed to a verdict. Pure functions: nothing here reads a file or knows a claim.
 
 A part of a claim says that a mean over seeds lies on one side of a bound that was fixed beforehand. A condition (setting and
-speed) confirms the claim if all of its parts are significant; over the conditions of a claim Holm's procedure keeps the chance
-of a single false confirmation at the level that it is given.
+speed) confirms the claim if all of its parts are significant. The first condition is the claim's main one and tested by itself; over
+the others Holm's procedure keeps the chance of a single false confirmation at the level that it is given.
 """
 import dataclasses
 import math
@@ -11,7 +11,7 @@ import student
 from slices import MOST_LEFT_OUT
 
 HELD, PARTLY, FAILED = "held", "holds when", "did not hold"
-PAGE_LEVEL = 0.01  # chance of any false confirmation on the page, shared evenly by its claims
+PAGE_LEVEL = 0.01  # chance of any false confirmation on the page, of main conditions and of others; shared evenly by its claims
 
 
 @dataclasses.dataclass
@@ -31,6 +31,13 @@ class Part:
         """Never below the chance that all seeds lie on one side by luck alone, so that equal values do not prove too much."""
         signed = [self.direction * value for value in self.known()]
         return max(student.p_above(signed, self.direction * self.bound), 0.5 ** len(signed))
+
+    def claimed_side(self):
+        """Whether the 95 % interval lies wholly on the claimed side of the bound."""
+        if len(self.known()) < 2:
+            return False
+        _, low, high = student.interval(self.known())
+        return low > self.bound if self.direction > 0 else high < self.bound
 
     def estimate(self):
         """Mean and 95 % interval, as they are shown."""
@@ -56,10 +63,15 @@ class Condition:
             return 1.0
         return max(part.p() for part in self.parts if part.bound is not None)
 
+    def claimed_side(self):
+        """By the intervals alone, whatever else is compared."""
+        return all(part.claimed_side() for part in self.parts if part.bound is not None)
+
 
 def judge(conditions, level):
     """Marks the conditions that confirm the claim, and returns held, holds when or did not hold."""
-    for condition, confirmed in zip(conditions, student.holm([condition.p() for condition in conditions], level)):
+    p_values = [condition.p() for condition in conditions]
+    for condition, confirmed in zip(conditions, student.holm(p_values[:1], level) + student.holm(p_values[1:], level)):
         condition.confirmed = confirmed
     count = sum(condition.confirmed for condition in conditions)
     return HELD if conditions and count == len(conditions) else PARTLY if count else FAILED
@@ -106,12 +118,12 @@ def best_border(points):
 def describe(conditions, base, name_of, rate_of):
     """Where a claim that holds in part does, in words: by speed, by v N_e dt / L, and by what else was changed."""
     single = [condition for condition in conditions if condition.speed is not None]
-    words = []
+    words = ["all speeds together"] if any(condition.confirmed and condition.speed is None for condition in conditions) else []
     at_base = [condition for condition in single if condition.setting == base]
     if at_base:
         yes = [condition.speed for condition in at_base if condition.confirmed]
         looked = numbers([condition.speed for condition in at_base])
-        words.append(f"base: {'at no speed' if not yes else 'at all speeds' if len(yes) == len(at_base) else f'at {numbers(yes)} m/s'}"
+        words.append(f"base: {'at no single speed' if not yes else 'at all speeds' if len(yes) == len(at_base) else f'at {numbers(yes)} m/s'}"
                      + (f" of {looked}" if len(at_base) > 1 and len(yes) < len(at_base) else ""))
     lengths = [condition for condition in single if condition.setting[1:] == base[1:]]
     if len({condition.setting[0] for condition in lengths}) > 1:

@@ -135,6 +135,17 @@ class Rules(unittest.TestCase):
         condition = Condition(database.BASE, 8, [Part("a", good, 1, 0.0), Part("b", bad, -1, 0.5)], 40)
         self.assertEqual(verdicts.judge([condition], 0.01), HELD)
 
+    def test_levels(self):
+        """The first by itself, the others by Holm's procedure: a p-value of 1/128 passes a level of 0.01, but not half of it."""
+        values = [0.9, 1.1, 1.0, 1.0, 1.1, 0.9, 1.2]
+        condition = lambda: Condition(database.BASE, 8, [Part("a", values, 1, 0.0)], 14)
+        self.assertEqual(condition().p(), 0.5 ** 7)  # 0.0078
+        three = [condition(), condition(), condition()]
+        self.assertEqual(verdicts.judge(three, 0.01), PARTLY)
+        self.assertEqual([each.confirmed for each in three], [True, False, False])
+        self.assertEqual(verdicts.judge(three, 0.016), HELD)
+        self.assertEqual(verdicts.judge(three, 0.007), FAILED)
+
     def test_no_conditions(self):
         self.assertEqual(verdicts.judge([], 0.01), FAILED)
 
