@@ -68,6 +68,12 @@ def geometric_ratio(at, quantity, one, other, paths=PATHS):
     return None if logs is None else math.exp(logs)
 
 
+def geometric_mean(ratios):
+    """Of those that are there; None without any."""
+    logs = mean([math.log(ratio) for ratio in ratios if ratio is not None])
+    return None if logs is None else math.exp(logs)
+
+
 def average(at, quantity, method, paths):
     found = [at.figure(quantity, method, path, seed) for path in paths for seed in at.seeds] if at.has(method) else []
     known = [figure for figure in found if figure is not None]
@@ -148,7 +154,7 @@ def rates(study, judged):
         rows.append((f"{rate(at.setting, at.speed):.2f}", f"{at.setting[0]:g}", f"{at.speed:g}", f"{average(at, 'kappa', FHB, PATHS):.3f}",
                      *(text for quantity in ("kappa", "position") for text in (
                          f"{percent(mean([float(ratio is not None and ratio < 1) for ratio in ratios[quantity].values()]))} %",
-                         short(math.exp(mean([math.log(ratio) for ratio in ratios[quantity].values() if ratio]))))),
+                         short(geometric_mean(ratios[quantity].values())))),
                      f"({best[0]}, {best[1]}): {short(known[best])}"))
     return table(("v N_e dt / L", "L [m]", "v [m/s]", "kappa, FHB", "kappa: (S, o) better", "ratio", "position: (S, o) better", "ratio",
                   "least kappa at (S, o)"), rows)
@@ -167,8 +173,8 @@ def block_rates(study, judged):
             ratio = geometric_ratio(at, "kappa", ("kappa", size, overlap), FHB)
             bins.setdefault(place, {}).setdefault(overlap, []).append(ratio)
     rows = [(f"{2.0 ** place:.3g} to {2.0 ** (place + 1):.3g}",
-             *(short(math.exp(mean([math.log(ratio) for ratio in bins[place].get(overlap, ()) if ratio] or [math.nan]))) for overlap in overlaps),
-             len(bins[place][overlaps[0]])) for place in sorted(bins)]
+             *(short(geometric_mean(bins[place].get(overlap, ()))) for overlap in overlaps), len(bins[place][overlaps[0]]))
+            for place in sorted(bins)]
     return table(("v S dt / L", *(f"o = {overlap}" for overlap in overlaps), "conditions and S"), rows)
 
 
@@ -183,7 +189,8 @@ def map_of(study, judged):
         if not {(4, 3), (30, 15)} <= points:
             continue
         rows = [(size, *(short(geometric_ratio(at, "kappa", ("kappa", size, overlap), FHB)) for overlap in overlaps)) for size in sizes]
-        texts.append(f"{speed:g} m/s, {len(at.seeds)} seeds, {len(points)} (S, o):\n\n" + table(("S", *(f"o = {o}" for o in overlaps)), rows))
+        texts.append(f"{speed:g} m/s, {len(at.seeds)} seeds, {len(points)} (S, o):\n\n"
+                     + table(("S", *(f"o = {overlap}" for overlap in overlaps)), rows))
     return "\n\n".join(texts) or table((), [])
 
 
@@ -217,7 +224,8 @@ def tracking(study, judged):
             for path in PATHS:
                 rows.append((setting[2], f"{speed:g}", path, *(short(average(at, "tracking", method, (path,)))
                                                                for method in (IGNORED, FHB, ("kappa", 2, 4), UNBLOCKED, TRUTH))))
-    return table(("reference speed", "v [m/s]", "path", "no slip estimation", "FHB", "SB-O (2, 4)", "unblocked", "slip and state known"), rows)
+    return table(("reference speed", "v [m/s]", "path", "no slip estimation", "FHB", "SB-O (2, 4)", "unblocked", "slip and state known"),
+                 rows)
 
 
 def convergence(study, judged):

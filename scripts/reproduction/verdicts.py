@@ -123,8 +123,8 @@ def describe(conditions, base, name_of, rate_of):
     if at_base:
         yes = [condition.speed for condition in at_base if condition.confirmed]
         looked = numbers([condition.speed for condition in at_base])
-        words.append(f"base: {'at no single speed' if not yes else 'at all speeds' if len(yes) == len(at_base) else f'at {numbers(yes)} m/s'}"
-                     + (f" of {looked}" if len(at_base) > 1 and len(yes) < len(at_base) else ""))
+        which = "at no single speed" if not yes else "at all speeds" if len(yes) == len(at_base) else f"at {numbers(yes)} m/s"
+        words.append(f"base: {which}" + (f" of {looked}" if len(at_base) > 1 and len(yes) < len(at_base) else ""))
     lengths = [condition for condition in single if condition.setting[1:] == base[1:]]
     if len({condition.setting[0] for condition in lengths}) > 1:
         points = [(rate_of(condition.setting, condition.speed), condition.confirmed) for condition in lengths]

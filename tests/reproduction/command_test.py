@@ -75,8 +75,8 @@ class Test(cli.Findings):
           WITH r AS (SELECT configuration ->> '$.path.name' AS path, seed, status, {figure} AS figure,
                             configuration ->> '$.blocking.kappa.name' AS name, configuration ->> '$.blocking.kappa.size' AS size,
                             configuration ->> '$.blocking.kappa.overlap' AS overlap FROM runs
-                     WHERE configuration ->> '$.terrain.correlation_length' = 10 AND configuration ->> '$.controller.reference_speed' = 'ground'
-                       AND configuration ->> '$.blocking.mu.name' = 'full_horizon' AND configuration ->> '$.estimator.name' = 'rhe'
+                     WHERE configuration ->> '$.terrain.correlation_length' = 10
+                       AND configuration ->> '$.controller.reference_speed' = 'ground' AND configuration ->> '$.blocking.mu.name' = 'full_horizon' AND configuration ->> '$.estimator.name' = 'rhe'
                        AND configuration ->> '$.bounds.kappa' = '[0,1]')
           SELECT a.seed, avg(ln(a.figure / b.figure)) FROM r AS a JOIN r AS b USING (path, seed)
           WHERE a.name = 'structured' AND b.name = 'full_horizon' {and_where} GROUP BY 1 ORDER BY 1"""
@@ -136,13 +136,15 @@ class Test(cli.Findings):
                      changed("fhb", "DELETE FROM runs WHERE configuration ->> '$.blocking.kappa.name' = 'full_horizon' AND "
                              "configuration ->> '$.path.name' = 'zigzag'"), "--partial")
         self.refused("another key", 1, ["differs from others in a key that the study does not vary"],
-                     changed("key", "UPDATE runs SET configuration = json_set(configuration, '$.vehicle', 'other') WHERE seed = 4"), "--partial")
-        self.refused("another method", 1, ["is no method of the study"],
-                     changed("method2", "UPDATE runs SET configuration = json_set(configuration, '$.blocking.mu.name', 'pattern') WHERE seed = 4"),
+                     changed("key", "UPDATE runs SET configuration = json_set(configuration, '$.vehicle', 'other') WHERE seed = 4"),
                      "--partial")
-        self.refused("no JSON", 1, ["is not as `rhec sweep` writes it"], changed("json", "UPDATE runs SET mae = '{' WHERE seed = 4"), "--partial")
-        self.refused("not whole", 1, ["the study is not whole", "base at 1 m/s: 0 of 20 seeds", "arrival cost off at 5 m/s", "the map of SB-O on kappa",
-                                      "--partial"], whole)
+        self.refused("another method", 1, ["is no method of the study"],
+                     changed("method2", "UPDATE runs SET configuration = json_set(configuration, '$.blocking.mu.name', 'pattern') "
+                             "WHERE seed = 4"), "--partial")
+        self.refused("no JSON", 1, ["is not as `rhec sweep` writes it"], changed("json", "UPDATE runs SET mae = '{' WHERE seed = 4"),
+                     "--partial")
+        self.refused("not whole", 1, ["the study is not whole", "base at 1 m/s: 0 of 20 seeds", "arrival cost off at 5 m/s",
+                                      "the map of SB-O on kappa", "--partial"], whole)
         template = self.work / "template.md"
         template.write_text(PAGE.read_text().replace("<!-- table: rates -->", ""))
         self.refused("template", 1, ["template.md: has no place for the table 'rates'"], whole, "--partial", "--template", template)

@@ -11,7 +11,7 @@ statuses TEXT, solve_time_us TEXT, seconds REAL NOT NULL, finished TEXT NOT NULL
 PRAGMA application_id = 1919444323; PRAGMA user_version = 1;"""
 SIZES, OVERLAPS = (1, 2, 3, 5, 10, 20), (0, 2, 4, 8)
 POINTS = [(size, overlap) for size in SIZES for overlap in OVERLAPS]
-METHODS = [("fhb",), ("unblocked",), ("ignored",), ("truth",), *(("kappa", *point) for point in POINTS), *(("both", *point) for point in POINTS)]
+METHODS = [("fhb",), ("unblocked",), ("ignored",), ("truth",), *((kind, *point) for kind in ("kappa", "both") for point in POINTS)]
 BASE = {}
 
 
@@ -60,8 +60,8 @@ def write(file, figures, seeds=20, conditions=((BASE, 8),), spread=0.05, noise_s
                             mae.update(kappa=0.0, mu=0.0, position=0.0, heading=0.0)
                         times = {"rhe": {"median": median, "p99": 2 * median, "max": 3 * median}} if method != ("truth",) else {}
                         after = {"kappa": figures("after_start", method, path, changes, speed)}
-                        database.execute("INSERT INTO runs VALUES (?, ?, ?, 'completed', 'the end', 300, 600, 0, 6.0, ?, ?, ?, '{}', ?, 0.01, "
-                                         "'2026-01-01T00:00:00Z', 'synthetic')",
+                        database.execute("INSERT INTO runs VALUES (?, ?, ?, 'completed', 'the end', 300, 600, 0, 6.0, ?, ?, ?, "
+                                         "'{}', ?, 0.01, '2026-01-01T00:00:00Z', 'synthetic')",
                                          (hashlib.sha256(text.encode()).hexdigest()[:32], text, seed, json.dumps(mae), json.dumps(mae),
                                           json.dumps(after), json.dumps(times)))
     database.close()
