@@ -132,7 +132,9 @@ class Study:
     """runs[setting, speed][path][method][seed], and where they came from."""
 
     def __init__(self):
-        self.runs, self.programs, self.count, self.seconds, self.days = {}, set(), 0, 0.0, set()
+        self.runs, self.programs, self.days = {}, set(), set()
+        self.count, self.bytes, self.seconds = 0, 0, 0.0
+        self.remarks = []  # what whoever reads a page of it must know
 
     def put(self, setting, speed, path, method, seed, run):
         methods = self.runs.setdefault((setting, speed), {}).setdefault(path, {})
@@ -146,6 +148,7 @@ class Study:
         if not study.runs:
             raise Mistake(f"{file}: has no runs; {AGAIN}")
         study.borrow()
+        study.bytes = pathlib.Path(file).stat().st_size
         return study
 
     def take(self, row, where, rests):
@@ -188,7 +191,9 @@ class Study:
         """The same runs with the methods permuted at random within each path, speed, seed and setting. What knows the truth is
         no method that is compared, and stays."""
         chance, other = random.Random(seed), Study()
-        other.programs, other.count, other.seconds, other.days = self.programs, self.count, self.seconds, self.days
+        other.programs, other.days = self.programs, self.days
+        other.count, other.bytes, other.seconds = self.count, self.bytes, self.seconds
+        other.remarks = [*self.remarks, f"methods shuffled at random ({seed}): nothing here says anything about them"]
         for (setting, speed), paths in sorted(self.runs.items(), key=repr):
             for path, methods in sorted(paths.items()):
                 by_seed = {}

@@ -86,8 +86,8 @@ def study(study, judged):
     every = [run for paths in study.runs.values() for methods in paths.values() for runs in methods.values() for run in runs.values()]
     seeds = [len(Slice(setting, speed, paths).seeds) for (setting, speed), paths in study.runs.items()]
     unique = {id(run): run for run in every}.values()
-    return table(("what", "how many"), [
-        ("runs in the database", f"{study.count:,}"),
+    return table(("what", "how many"), [*((remark, "") for remark in study.remarks),
+        ("runs in the database", f"{study.count:,}, {study.bytes / 2 ** 20:,.0f} MiB"),
         ("settings", len({setting for setting, _ in study.runs})),
         ("conditions: settings at speeds", len(study.runs)),
         ("paired seeds of a condition", f"{min(seeds)}" if min(seeds) == max(seeds) else f"{min(seeds)} to {max(seeds)}"),
@@ -150,12 +150,12 @@ def rates(study, judged):
         ratios = {quantity: {point: geometric_ratio(at, quantity, ("kappa", *point), FHB) for point in common}
                   for quantity in ("kappa", "position")}
         known = {point: ratio for point, ratio in ratios["kappa"].items() if ratio is not None}
-        best = min(known, key=known.get)
-        rows.append((f"{rate(at.setting, at.speed):.2f}", f"{at.setting[0]:g}", f"{at.speed:g}", f"{average(at, 'kappa', FHB, PATHS):.3f}",
+        best = min(known, key=known.get, default=None)
+        rows.append((f"{rate(at.setting, at.speed):.2f}", f"{at.setting[0]:g}", f"{at.speed:g}", short(average(at, "kappa", FHB, PATHS)),
                      *(text for quantity in ("kappa", "position") for text in (
                          f"{percent(mean([float(ratio is not None and ratio < 1) for ratio in ratios[quantity].values()]))} %",
                          short(geometric_mean(ratios[quantity].values())))),
-                     f"({best[0]}, {best[1]}): {short(known[best])}"))
+                     f"({best[0]}, {best[1]}): {short(known[best])}" if best else "-"))
     return table(("v N_e dt / L", "L [m]", "v [m/s]", "kappa, FHB", "kappa: (S, o) better", "ratio", "position: (S, o) better", "ratio",
                   "least kappa at (S, o)"), rows)
 
@@ -252,8 +252,8 @@ def times(study, judged):
         for name, method in methods:
             if speed in (2, 8) and at.has(method):
                 runs = [at.paths[path][method][seed] for path in PATHS for seed in at.seeds]
-                rows.append((f"{speed:g}", name, short(statistics.median(run.median for run in runs)),
-                             short(statistics.median(run.p99 for run in runs)), short(max(run.p99 for run in runs)),
+                middle, late = ([getattr(run, name) for run in runs if getattr(run, name) is not None] for name in ("median", "p99"))
+                rows.append((f"{speed:g}", name, short(statistics.median(middle)), short(statistics.median(late)), short(max(late)),
                              short(geometric_ratio(at, "median", method, FHB)) if method != FHB else "1"))
     return table(("v [m/s]", "method", "median solve [us]", "99th percentile [us]", "... of the worst run [us]", "median / FHB"), rows)
 
@@ -267,7 +267,7 @@ def ratios(study, judged):
             at = slice_of(study, speed, setting)
             if setting == BASE and speed not in (2, 5, 8):
                 continue
-            rows.append((setting_name(setting), f"{speed:g}", f"{average(at, 'kappa', FHB, PATHS):.3f}",
+            rows.append((setting_name(setting), f"{speed:g}", short(average(at, "kappa", FHB, PATHS)),
                          *(short(geometric_ratio(at, "kappa", ("kappa", *point), FHB)) if at.has(("kappa", *point)) else ""
                            for point, _ in places)))
     return table(("setting", "v [m/s]", "FHB, absolute", *(name for _, name in places)), rows)

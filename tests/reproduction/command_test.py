@@ -5,6 +5,7 @@
 """
 import json
 import pathlib
+import random
 import re
 import shutil
 import sqlite3
@@ -16,6 +17,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path[:0] = [str(ROOT / "tests" / "cli"), str(HERE), str(ROOT / "scripts" / "reproduction")]
 
+import claims     # noqa: E402
 import cli        # noqa: E402
 import synthetic  # noqa: E402
 import tables     # noqa: E402
@@ -149,6 +151,27 @@ class Test(cli.Findings):
         template.write_text(PAGE.read_text().replace("<!-- table: rates -->", ""))
         self.refused("template", 1, ["template.md: has no place for the table 'rates'"], whole, "--partial", "--template", template)
 
+    def shuffled_by_hand(self):
+        """What came out is dealt anew among the methods of a path and seed, in the database itself and whatever the method."""
+        file, page, chance = self.work / "dealt.sqlite", self.work / "dealt.md", random.Random(2)
+        synthetic.write(file, synthetic.as_claimed)
+        columns = "status, steps, solves, fallbacks, mae, rmse, mae_after_start, solve_time_us"
+        with sqlite3.connect(file) as database:
+            groups = {}
+            for identity, path, seed, *results in database.execute(
+                    f"SELECT identity, configuration ->> '$.path.name', seed, {columns} FROM runs").fetchall():
+                groups.setdefault((path, seed), []).append((identity, results))
+            for group in groups.values():
+                dealt = [results for _, results in group]
+                chance.shuffle(dealt)
+                for (identity, _), results in zip(group, dealt):
+                    database.execute("UPDATE runs SET " + ", ".join(f"{name} = ?" for name in columns.split(", ")) + " WHERE identity = ?",
+                                     (*results, identity))
+        database.close()
+        result = call(JUDGE, file, "--partial", "--page", page)
+        self.expect(result.returncode == 0, "dealt", result.stderr)
+        self.expect(page.read_text().count("**did not hold**") == len(claims.CLAIMS) and page.read_text().count("**held**") == 0, "dealt", result.stdout)
+
     def bad_arguments(self):
         for words in ([REPRODUCE, "--quick", "--page", PAGE], [REPRODUCE, "--threads", "0"], [REPRODUCE, "--quik"]):
             result = call(*words)
@@ -170,7 +193,7 @@ class Test(cli.Findings):
 def main():
     with tempfile.TemporaryDirectory(prefix="rhec-reproduction-") as work:
         test = Test(sys.argv[1], pathlib.Path(work).resolve())
-        for part in (test.bad_databases, test.bad_arguments, test.whole_grids, test.quick):
+        for part in (test.bad_databases, test.shuffled_by_hand, test.bad_arguments, test.whole_grids, test.quick):
             part()
         test.tell()
 
