@@ -29,6 +29,7 @@ class Claim:
     parts: Callable
     kinds: tuple    # of blocking that it looks at: kappa, both
     paths: tuple = ("figure8", "zigzag")
+    over_map: bool = True  # whether it is about (S, o) at large, and so about the whole map where that is there
 
 
 def per_seed(at, function):
@@ -210,7 +211,7 @@ CLAIMS = (
           f"SB-O on both: {MOST}", better_for_most("position", "both"), ON_BOTH),
     Claim("4", "overlap helps small S most",
           "error of kappa, o = 4 against o = 0: ratio below 1 at S = 1, 2, 3, and less there than at S = 10, 20",
-          overlap_helps_small, ON_KAPPA),
+          overlap_helps_small, ON_KAPPA, over_map=False),
     Claim("5", "mu is hurt when it is blocked too, and best left to FHB",
           "error of mu, both against kappa alone at the same (S, o): ratio above 1; and at less than half of (S, o) below FHB's",
           mu_hurt, EITHER),
@@ -221,26 +222,26 @@ CLAIMS = (
     Claim("5c", "leaving mu to FHB improves the estimate of the position",
           "error of the position, kappa alone against both: ratio below 1", mu_free_improves("position"), EITHER),
     Claim("6", "tracking improves with estimation on the zig-zag",
-          f"{TRACKED} FHB: ratio below 1", tracking(FHB, False), ON_KAPPA, ZIGZAG),
+          f"{TRACKED} FHB: ratio below 1", tracking(FHB, False), ON_KAPPA, ZIGZAG, over_map=False),
     Claim("6a", "... for most (S, o)",
           "share of (S, o) whose tracking error is below FHB's is above 1/2", tracking_over_map(False), ON_KAPPA, ZIGZAG),
     Claim("6b", "... against no slip estimation",
-          f"{TRACKED} kappa = mu = 1: ratio below 1", tracking(IGNORED, False), ON_KAPPA, ZIGZAG),
+          f"{TRACKED} kappa = mu = 1: ratio below 1", tracking(IGNORED, False), ON_KAPPA, ZIGZAG, over_map=False),
     Claim("6c", "small S and o go with a larger tracking error",
           "tracking error at S = 1, 2, 3 without overlap against S = 5, 10, 20 with o = 4: ratio above 1",
-          small_blocks_track_worse, ON_KAPPA),
+          small_blocks_track_worse, ON_KAPPA, over_map=False),
     Claim("7", "tracking is about equal, slightly worse, on the figure-8",
-          f"{TRACKED} FHB: ratio above 1 and below 1.10", tracking(FHB, True), ON_KAPPA, EIGHT),
+          f"{TRACKED} FHB: ratio above 1 and below 1.10", tracking(FHB, True), ON_KAPPA, EIGHT, over_map=False),
     Claim("7a", "... for most (S, o)",
           "that share is below 1/2, and the mean ratio below 1.10", tracking_over_map(True), ON_KAPPA, EIGHT),
     Claim("7b", "... against no slip estimation",
-          f"{TRACKED} kappa = mu = 1: ratio above 1 and below 1.10", tracking(IGNORED, True), ON_KAPPA, EIGHT),
+          f"{TRACKED} kappa = mu = 1: ratio above 1 and below 1.10", tracking(IGNORED, True), ON_KAPPA, EIGHT, over_map=False),
     Claim("8", "with both blocked, S = 1 with o < 2 does not converge",
           "share of runs without an end, with a fallback, or with kappa no better than the initial guess: above 1/2 there, and more "
           "than at the other (S, o)", does_not_converge(1), ON_BOTH),
     Claim("8a", "... and S = 3 with o < 2 neither", "the same for S = 3", does_not_converge(3), ON_BOTH),
     Claim("9", "on the figure-8 SB-O (2, 4) improves kappa and keeps heading and mu",
-          "errors against FHB: kappa below 1, heading and mu below 1.10", state_kept, ON_KAPPA, EIGHT),
+          "errors against FHB: kappa below 1, heading and mu below 1.10", state_kept, ON_KAPPA, EIGHT, over_map=False),
 )
 
 
@@ -252,15 +253,14 @@ def points_of(at, claim):
     return points
 
 
-def condition(at, claim, points):
+def condition(at, claim, points, is_map=False):
     at.used, at.lost = set(), set()
     parts = claim.parts(at, points, claim.paths)
-    return Condition(at.setting, at.speed, parts, len(at.used), len(at.lost))
+    return Condition(at.setting, at.speed, parts, len(at.used), len(at.lost), len(points), is_map)
 
 
-def together(slices, claim):
-    """All speeds of the base: means within a seed over the speeds, at the (S, o) that all speeds have."""
-    points = sorted(set.intersection(*(set(points_of(at, claim)) for at in slices)))
+def together(slices, claim, points):
+    """All speeds of the base: means within a seed over the speeds."""
     seeds = set.intersection(*(set(at.seeds) for at in slices))
     found = []
     for at in slices:
@@ -270,15 +270,23 @@ def together(slices, claim):
     parts = []
     for group in zip(*(each.parts for each in found)):
         parts.append(dataclasses.replace(group[0], values=[mean(values) for values in zip(*(part.values for part in group))]))
-    return Condition(BASE, None, parts, sum(each.runs for each in found), sum(each.lost for each in found))
+    return Condition(BASE, None, parts, sum(each.runs for each in found), sum(each.lost for each in found), len(points))
 
 
 def conditions_of(study, claim):
-    """All speeds of the base together, which is the main one; each of them; and every other setting at its speeds."""
+    """All speeds of the base together, which is the main one; each of them, and every other setting at its speeds, at the (S, o) that
+    all speeds of the base have; and the whole map where there is one."""
     slices = [Slice(setting, speed, paths) for (setting, speed), paths in
               sorted(study.runs.items(), key=lambda item: (item[0][0] != BASE, repr(item[0][0]), item[0][1]))]
     base = [at for at in slices if at.setting == BASE]
     if not base:
         raise Mistake("the database has no run of the base settings; scripts/reproduce makes what is missing")
-    single = [condition(at, claim, points_of(at, claim)) for at in slices]
-    return ([together(base, claim)] if len(base) > 1 else []) + single
+    known = {at: points_of(at, claim) for at in slices}
+    common = sorted(set.intersection(*(set(known[at]) for at in base)))
+    conditions = [together(base, claim, common)] if len(base) > 1 else []
+    for at in slices:
+        shared = [point for point in known[at] if point in common]
+        if not shared:
+            raise Mistake(f"{at}: none of the (S, o) {common} of the base; scripts/reproduce makes what is missing")
+        conditions.append(condition(at, claim, shared))
+    return conditions + [condition(at, claim, known[at], True) for at in base if claim.over_map and len(known[at]) > len(common)]

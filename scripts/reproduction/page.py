@@ -31,8 +31,9 @@ def as_json(judged):
                 "effect": known(shown), "interval": [known(low), known(high)]}
     return [{"claim": claim.key, "text": claim.text, "test": claim.test, "paths": claim.paths, "verdict": verdict,
              "conditions": [{"setting": setting_name(each.setting), **{axis.name: str(value) for axis, value in zip(AXES, each.setting)},
-                             "speed": each.speed, "runs": each.runs, "without_end": each.lost, "p": each.p(),
-                             "confirmed": each.confirmed, "parts": [part(one) for one in each.parts]} for each in conditions]}
+                             "speed": each.speed, "points": each.points, "whole_map": each.is_map, "runs": each.runs,
+                             "without_end": each.lost, "p": each.p(), "confirmed": each.confirmed,
+                             "parts": [part(one) for one in each.parts]} for each in conditions]}
             for claim, verdict, conditions in judged]
 
 

@@ -122,9 +122,12 @@ def speeds(study, judged):
     speeds = speeds_of(study)
     rows = []
     for claim, _, conditions in judged:
-        found = {condition.speed: condition for condition in conditions if condition.setting == BASE}
-        rows.append((claim.key, *(cell(found[speed]) if speed in found else "" for speed in speeds)))
-    return table(("", *(f"{speed:g} m/s" for speed in speeds)), rows)
+        for is_map in (False, True):
+            found = {each.speed: each for each in conditions if each.setting == BASE and each.is_map == is_map and each.speed}
+            if found:
+                rows.append((claim.key, f"{max(each.points for each in found.values())}",
+                             *(cell(found[speed]) if speed in found else "" for speed in speeds)))
+    return table(("", "(S, o)", *(f"{speed:g} m/s" for speed in speeds)), rows)
 
 
 def settings(study, judged):
@@ -132,7 +135,7 @@ def settings(study, judged):
     speeds = sorted({speed for setting, speed in study.runs if setting != BASE}) or speeds_of(study)
     rows = []
     for claim, _, conditions in judged:
-        found = {(condition.setting, condition.speed): condition for condition in conditions}
+        found = {(condition.setting, condition.speed): condition for condition in conditions if not condition.is_map}
         for setting in others:
             rows.append((claim.key, setting_name(setting), *(cell(found[setting, speed]) if (setting, speed) in found else ""
                                                               for speed in speeds)))

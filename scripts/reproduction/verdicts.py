@@ -55,6 +55,8 @@ class Condition:
     parts: list
     runs: int  # that were compared
     lost: int = 0  # of these without an end
+    points: int = 0  # (S, o)
+    is_map: bool = False  # the whole map rather than the (S, o) that all conditions have
     confirmed: bool = False
 
     def p(self):
@@ -117,7 +119,7 @@ def best_border(points):
 
 def describe(conditions, base, name_of, rate_of):
     """Where a claim that holds in part does, in words: by speed, by v N_e dt / L, and by what else was changed."""
-    single = [condition for condition in conditions if condition.speed is not None]
+    single = [condition for condition in conditions if condition.speed is not None and not condition.is_map]
     words = ["all speeds together"] if any(condition.confirmed and condition.speed is None for condition in conditions) else []
     at_base = [condition for condition in single if condition.setting == base]
     if at_base:
@@ -125,6 +127,10 @@ def describe(conditions, base, name_of, rate_of):
         looked = numbers([condition.speed for condition in at_base])
         which = "at no single speed" if not yes else "at all speeds" if len(yes) == len(at_base) else f"at {numbers(yes)} m/s"
         words.append(f"base: {which}" + (f" of {looked}" if len(at_base) > 1 and len(yes) < len(at_base) else ""))
+    maps = [condition for condition in conditions if condition.is_map]
+    if maps:
+        yes = [condition.speed for condition in maps if condition.confirmed]
+        words.append(f"whole map: {f'at {numbers(yes)} m/s' if yes else 'at no speed'} of {numbers([each.speed for each in maps])}")
     lengths = [condition for condition in single if condition.setting[1:] == base[1:]]
     if len({condition.setting[0] for condition in lengths}) > 1:
         points = [(rate_of(condition.setting, condition.speed), condition.confirmed) for condition in lengths]

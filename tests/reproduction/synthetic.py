@@ -41,15 +41,21 @@ def configuration(path, speed, seed, method, changes):
     return tree
 
 
-def write(file, figures, seeds=20, conditions=((BASE, 8),), spread=0.05, noise_seed=1, methods=METHODS):
+def write(file, figures, **options):
+    with sqlite3.connect(file) as database:
+        database.executescript(SCHEMA)
+    database.close()
+    add(file, figures, **options)
+
+
+def add(file, figures, seeds=20, conditions=((BASE, 8),), spread=0.05, noise_seed=1, methods=METHODS):
     """`figures(quantity, method, path, changes, speed)` is a run's figure before noise; a seed's ground scales all alike."""
     chance = random.Random(noise_seed)
     with sqlite3.connect(file) as database:
-        database.executescript(SCHEMA)
         for changes, speed in conditions:
             for path in ("figure8", "zigzag"):
                 for seed in range(1, seeds + 1):
-                    ground = math.exp(chance.gauss(0.0, 0.3))
+                    ground = math.exp(random.Random(f"{path} {seed} {noise_seed}").gauss(0.0, 0.3))
                     for method in methods:
                         def of(quantity, scale=ground):
                             return figures(quantity, method, path, changes, speed) * scale * math.exp(chance.gauss(0.0, spread))

@@ -93,6 +93,24 @@ class Databases(unittest.TestCase):
         self.assertIn("base: at 5, 8 m/s of 1, 2, 5, 8", words)
         self.assertIn("v N_e dt / L is 1.2 or more (not at 0.6 or less)", words)
 
+    def test_the_map_is_a_condition_of_its_own(self):
+        """At one speed there are more (S, o), where FHB is better; elsewhere nothing changes."""
+        more = [("kappa", 4, overlap) for overlap in range(16)] + [("kappa", 7, overlap) for overlap in range(16)]
+
+        def figures(quantity, method, path, changes, speed):
+            return synthetic.as_claimed(quantity, method, path, changes, speed) * (4.0 if method in more and quantity == "kappa" else 1.0)
+        lattice = self.judged(synthetic.as_claimed, conditions=CONDITIONS[:2])
+        self.file.unlink()
+        synthetic.write(self.file, figures, conditions=CONDITIONS[:2])
+        synthetic.add(self.file, figures, conditions=CONDITIONS[1:2], methods=more)
+        found = {each.claim.key: each for each in page.judge_all(database.Study.read(self.file))}
+        self.assertEqual([(each.speed, each.points, each.is_map, each.confirmed) for each in found["2"].conditions],
+                         [(None, 24, False, True), (2, 24, False, True), (8, 24, False, True), (8, 56, True, False)])
+        self.assertEqual(found["2"].conditions[3].parts[0].estimate()[0], 24 / 56)
+        self.assertEqual(found["2"].verdict, PARTLY)
+        self.assertEqual(len(found["6"].conditions), 3)
+        self.assertEqual(len(lattice["2"].conditions), 3)
+
     def test_few_seeds_confirm_nothing(self):
         for key, each in self.judged(synthetic.as_claimed, seeds=4).items():
             self.assertEqual(each.verdict, FAILED, key)
