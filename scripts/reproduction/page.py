@@ -64,7 +64,7 @@ def write_json(path, judged):
     write_aside(path, json.dumps(as_json(judged), indent=1) + "\n")
 
 
-EXPECTED_SPEEDS, SETTING_SPEEDS, EXPECTED_SEEDS = range(1, 11), (2, 5, 8), 20
+EXPECTED_SPEEDS, SETTING_SPEEDS, MAP_SPEEDS, EXPECTED_SEEDS = range(1, 11), (2, 5, 8), (5, 8), 20
 CHANGES = {"correlation length": (5, 20, 40), "arrival cost": ("smoothing", "constant", "off"), "reference speed": ("literal",),
            "intervals": (14,), "block_sigma": (0.25,), "transition": ("ramp",), "neighbour_sigma": (0.04,)}  # scenarios/paper/settings.yaml
 
@@ -80,7 +80,7 @@ def require_whole(study):
         seeds = study.runs.get((setting, speed), {}).get("figure8", {}).get(("fhb",), {})
         if len(seeds) < EXPECTED_SEEDS:
             absent.append(f"{setting_name(setting)} at {speed:g} m/s: {len(seeds)} of {EXPECTED_SEEDS} seeds")
-    for speed in SETTING_SPEEDS:
+    for speed in MAP_SPEEDS:
         methods = study.runs.get((BASE, speed), {}).get("figure8", {})
         whole = [method for method, runs in methods.items() if method[0] == "kappa" and len(runs) >= EXPECTED_SEEDS]
         if len(whole) < 30 * 16:
