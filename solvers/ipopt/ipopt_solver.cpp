@@ -26,8 +26,6 @@ constexpr int most_polishes = 2;
 /// Iterations of a run after which another way of starting promises more. Interior points that take longer are most
 /// often those that wander with negative curvature.
 constexpr int patience = 150;
-/// Stages of a long horizon, as many as a processor's cache has room for.
-constexpr int judged_at_once = 16;
 /// A violation of the dynamics that no rounding explains.
 constexpr double clear_violation = 1e-6;
 /// Where the barrier of a warm start begins, as a part of the guess' residual, and its limits.
@@ -150,7 +148,7 @@ void IpoptSolver::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'ipopt': " + reason);
   capacity_ = ocp.capacity();
   scratch_.assign(ocp.scratch_size(), 0.0);
-  judge_ = StageQp(capacity_, judged_at_once);
+  judge_ = StageQp(capacity_, OcpNlp::stages_at_once);
   guess_ = best_ = seen_ = Iterate(capacity_);
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);

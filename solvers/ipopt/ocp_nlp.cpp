@@ -18,8 +18,6 @@ namespace {
 constexpr double no_bound = 1e300;
 /// Weights of the objective below this are not divided by.
 constexpr double smallest_divisor = 1e-3;
-/// Of a long horizon, as many as a processor's cache has room for.
-constexpr int stages_at_once = 16;
 
 /// Whether all of so many values are finite.
 template <class Value>

@@ -43,6 +43,9 @@ class Spectator {
 /// which also judges the iterate.
 class OcpNlp final : public Ipopt::TNLP {
  public:
+  /// Of a long horizon, as many as a processor's cache has room for.
+  static constexpr int stages_at_once = 16;
+
   OcpNlp(const Ocp& ocp, Curvature curvature);
 
   /// Takes over a problem of the capacity at construction, with its present structure and data.
