@@ -10,19 +10,10 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-StageQp::StageQp(const Capacity& capacity)
-    : capacity_(capacity), stride_(capacity.row()), wide_(capacity.states + capacity.controls) {
-  const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1;
-  state_counts_.assign(nodes, 0);
-  control_counts_.assign(nodes, 0);
-  carried_counts_.assign(nodes, 0);
+StageQp::StageQp(const Capacity& capacity) : StageQp(capacity, capacity.intervals + 1) {
+  window_ = 0;
   // Room for twice the stages, so that they move back to the front once in so many drops only.
-  F_.assign(2 * nodes * capacity.states * stride_, 0.0);
-  H_.assign(2 * nodes * wide_ * stride_, 0.0);
-  for (auto* v : {&h_, &b_}) v->assign(2 * nodes * stride_, 0.0);
-  lower_.assign(nodes * stride_, -infinity);
-  upper_.assign(nodes * stride_, infinity);
-  initial_step_.assign(stride_, 0.0);
+  for (auto* v : {&F_, &H_, &h_, &b_}) v->resize(2 * v->size(), 0.0);
 }
 
 StageQp::StageQp(const Capacity& capacity, int stages)
