@@ -13,6 +13,7 @@ inline ProgramView view_of(const StageQp& qp, const Iterate& point) noexcept {
   view.stride = qp.stride();
   view.state_counts = qp.state_counts();
   view.control_counts = qp.control_counts();
+  view.carried_counts = qp.carried_counts();
   view.initial_state_is_given = qp.initial_state_is_given;
   view.F = qp.F(0);
   view.h = qp.h(0);

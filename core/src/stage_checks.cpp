@@ -1,7 +1,5 @@
 #include "rhec/core/stage_checks.hpp"
 
-#include <cstring>
-
 #include "kernels/kernels.hpp"
 #include "kernels/program_kernels.hpp"
 #include "program_view.hpp"
@@ -23,11 +21,9 @@ ViolatedBounds find_violations(const double* values, const double* least, const 
   return {.largest = largest, .count = violated};
 }
 
-void add_full_step(int intervals, const Iterate& from, const Iterate& step, Iterate& to) noexcept {
+void add_to_step(int intervals, const Iterate& from, Iterate& step) noexcept {
   const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(intervals + 1) * from.capacity().row();
-  program_kernels().add(from.row(0), step.row(0), to.row(0), count);
-  std::memcpy(to.costate(0), step.costate(0), count * sizeof(double));
-  std::memcpy(to.bound_row(0), step.bound_row(0), count * sizeof(double));
+  program_kernels().add(from.row(0), step.row(0), count);
 }
 
 }  // namespace rhec

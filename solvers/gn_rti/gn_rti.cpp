@@ -219,14 +219,12 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
       report.status = Status::deadline;
       break;
     }
-    // The caller's point stays as it is until there is a better one.
-    Iterate& from = iteration == 0 ? point : best_;
     if (ready) {
-      ocp.refresh(from, qp_, scratch_);
+      ocp.refresh(point, qp_, scratch_);
     } else {
-      ocp.prepare(from, hessian_for(ocp), qp_, scratch_);
-      ocp.refresh(from, qp_, scratch_);
-      qp_solver_.guess_from(qp_, from);
+      ocp.prepare(point, hessian_for(ocp), qp_, scratch_);
+      ocp.refresh(point, qp_, scratch_);
+      qp_solver_.guess_from(qp_, point);
     }
     ready = false;
     const auto outcome = solve_program(report, deadline);
@@ -239,14 +237,16 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
       report.status = Status::stalled;
       break;
     }
-    add_full_step(ocp.intervals(), from, step_, trial_);
+    // The step becomes the point that it leads to, and the point that it came from is kept in its place: of a horizon,
+    // the processor's cache holds only so many.
+    add_to_step(ocp.intervals(), point, step_);
     const bool is_last = iteration + 1 == options_.iterations;
-    if (!is_last && !judge_step(ocp, trial_, report)) {
+    if (!is_last && !judge_step(ocp, step_, report)) {
       report.status = Status::stalled;
       break;
     }
     is_pending_ = is_last;
-    std::swap(best_, trial_);
+    std::swap(point, step_);
     ++report.iterations;
   }
   if (report.iterations == 0) {
@@ -254,7 +254,6 @@ Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadli
     return report;
   }
   if (report.status == Status::infeasible || report.status == Status::stalled) report.status = Status::iteration_limit;
-  std::swap(point, best_);
   return report;
 }
 
@@ -275,8 +274,7 @@ void GnRti::settle(const Ocp& ocp, Iterate& point, Report& report) noexcept {
   if (!judge_step(ocp, point, report)) {
     --report.iterations;
     report.status = report.iterations > 0 ? Status::iteration_limit : Status::stalled;
-    // The point before the last step: what came in, or the step before.
-    std::swap(point, report.iterations > 0 ? trial_ : best_);
+    std::swap(point, step_);  // the point before the last step
     if (report.iterations == 0) give_up(ocp, point, report);
   }
 }

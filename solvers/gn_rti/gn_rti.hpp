@@ -76,7 +76,7 @@ class GnRti final : public Solver {
   bool remembers_ = false;  ///< `qp_` does, at which point it was made; otherwise `prepared_point_` is that
   bool prepared_ = false;
   const Ocp* prepared_ocp_ = nullptr;  ///< looked at no more, only compared with
-  bool is_pending_ = false;            ///< the last step was not judged yet; `best_` is the point before it
+  bool is_pending_ = false;            ///< the last step was not judged yet; `step_` is the point before it
   bool use_exact_ = false;
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
   double asked_share_ = 1.0;  ///< of the defects and violations that the step is asked to remove

@@ -56,6 +56,12 @@ inline Lanes first_of(const Lanes& lanes, int part, int count) {
   return keep ? lanes : Lanes{};
 }
 
+/// The same of the entries from .. end - 1.
+inline Lanes between(const Lanes& lanes, int part, int from, int end) {
+  const LaneMask is_left_out = lane_numbers < static_cast<long long>(from - part * lane_count);
+  return is_left_out ? Lanes{} : first_of(lanes, part, end);
+}
+
 inline Lanes absolute(const Lanes& lanes) {
   constexpr long long but_sign = 0x7fff'ffff'ffff'ffff;
   return reinterpret_cast<Lanes>(reinterpret_cast<LaneMask>(lanes) & but_sign);
@@ -154,10 +160,7 @@ struct Row {
   /// The entries from .. end - 1, and zeros.
   Row between(int from, int end) const {
     Row row;
-    for (int v = 0; v < registers; ++v) {
-      const LaneMask is_left_out = lane_numbers < static_cast<long long>(from - v * lane_count);
-      row.part[v] = is_left_out ? Lanes{} : first_of(part[v], v, end);
-    }
+    for (int v = 0; v < registers; ++v) row.part[v] = kernels::between(part[v], v, from, end);
     return row;
   }
   Row first(int count) const {

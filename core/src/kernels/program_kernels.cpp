@@ -13,8 +13,9 @@ inline int parts_of(const ProgramView& view, int stage) {
   return (view.states + controls + lane_count - 1) / lane_count;
 }
 
-/// Of a row, in parts of which a known number is used, or as many as it takes; the same for the rows of F.
-template <int known_parts, int known_states>
+/// Of a row, in parts of which a known number is used, or as many as it takes; the same for the rows of F, of which at
+/// least a known number is not carried.
+template <int known_parts, int known_states, int known_moved>
 KktParts kkt_of(const ProgramView& view) {
   const long stride = view.stride;
   const int state_parts = known_parts > 0 ? known_parts : (view.states + lane_count - 1) / lane_count;
@@ -25,13 +26,21 @@ KktParts kkt_of(const ProgramView& view) {
     const double* next_costate = view.costates + (i + 1) * stride;
     const bool is_last = i == view.intervals;
     const int next_states = is_last ? 0 : known_states > 0 ? known_states : view.state_counts[i + 1];
+    const int moved = next_states - (is_last ? 0 : view.carried_counts[i]);
     const int parts = known_parts > 0 ? known_parts : parts_of(view, i);
     const int used = view.states + (is_last ? 0 : view.control_counts[i]);
     for (int v = 0; v < parts; ++v) {
       const long at = i * stride + v * lane_count;
       const Lanes gradient = load(view.h + at), bound = first_of(load(view.bounds + at), v, used);
       Lanes sums[2] = {gradient + bound, Lanes{}};
-      for (int l = 0; l < next_states; ++l) sums[l % 2] += load(row_F + l * stride + v * lane_count) * next_costate[l];
+      const auto add = [&](int l) RHEC_ALWAYS_INLINE {
+        sums[l % 2] += load(row_F + l * stride + v * lane_count) * next_costate[l];
+      };
+      for (int l = 0; l < known_moved && !is_last; ++l) add(l);
+      for (int l = known_moved; l < moved; ++l) add(l);
+      // Of what is carried, F has rows of the identity.
+      if (v < state_parts && moved < next_states)
+        sums[0] += between(load(next_costate + v * lane_count), v, moved, next_states);
       Lanes sum = sums[0] + sums[1];
       if (v < state_parts) {
         const Lanes costate = first_of(load(view.costates + at), v, view.states);
@@ -64,8 +73,8 @@ KktParts kkt_of(const ProgramView& view) {
 KktParts kkt(const ProgramView& view) {
   bool is_full = view.states == 6 && view.stride == lane_count;
   const int end = view.last < view.intervals ? view.last + 1 : view.last;
-  for (int i = view.first; is_full && i <= end; ++i) is_full = view.state_counts[i] == 6;
-  return is_full ? kkt_of<1, 6>(view) : kkt_of<0, 0>(view);
+  for (int i = view.first; is_full && i <= end; ++i) is_full = view.state_counts[i] == 6 && view.carried_counts[i] <= 2;
+  return is_full ? kkt_of<1, 6, 4>(view) : kkt_of<0, 0, 0>(view);
 }
 
 /// Rows in parts of which one is all there is, or as many as it takes.
@@ -204,8 +213,8 @@ void match(const double* a, const double* b, double* kept, int count, int stride
   }
 }
 
-void add(const double* from, const double* step, double* to, long count) {
-  for (long k = 0; k < count; k += lane_count) store(load(from + k) + load(step + k), to + k);
+void add(const double* from, double* to, long count) {
+  for (long k = 0; k < count; k += lane_count) store(load(from + k) + load(to + k), to + k);
 }
 
 void add_products(const double* J, const double* weights, const double* pulls, int count, int columns, int stride,

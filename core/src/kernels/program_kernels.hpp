@@ -9,6 +9,7 @@ struct ProgramView {
   int states = 0, controls = 0, stride = 0;  ///< of the capacity
   const int* state_counts = nullptr;
   const int* control_counts = nullptr;
+  const int* carried_counts = nullptr;
   bool initial_state_is_given = false;
   const double *F = nullptr, *h = nullptr, *b = nullptr, *lower = nullptr, *upper = nullptr;
   const double *values = nullptr, *costates = nullptr, *bounds = nullptr;  ///< rows of an Iterate
@@ -99,8 +100,8 @@ struct ProgramKernels {
   /// Copies rows: of controls what their bounds allow, of multipliers those whose bound there is; of carried channels
   /// no multiplier, and nothing of columns that are not used.
   void (*adopt)(const GuessView& from, double* values, double* multipliers);
-  /// to = from + step.
-  void (*add)(const double* from, const double* step, double* to, long count);
+  /// to += from.
+  void (*add)(const double* from, double* to, long count);
   /// H += sum_j weights_j J_j J_j' over its first `columns` columns and h += sum_j pulls_j J_j (null: not), with the
   /// `count` rows J_j of one stage; rows are as long as `columns` needs in multiples of eight.
   void (*add_products)(const double* J, const double* weights, const double* pulls, int count, int columns, int stride,

@@ -38,9 +38,13 @@ class SensitiveStep {
                 h * (Lane(1.0 / 6.0) * (rates_[0][r] + rates_[3][r]) + Lane(1.0 / 3.0) * (rates_[1][r] + rates_[2][r]));
       for_indices<nz>([&](auto j) RHEC_INLINE {
         Lane sum(0.0);
-        for_indices<4>([&](auto k) RHEC_INLINE {
-          if constexpr (Pattern::template rate_depends<k>(r, j)) sum = sum + Lane(share[k]) * slopes_[k][r][j];
-        });
+        if constexpr (!with_hessian) {
+          if constexpr (Pattern::rates_depend(r) >> j & 1) sum = jacobian[r][j];
+        } else {
+          for_indices<4>([&](auto k) RHEC_INLINE {
+            if constexpr (Pattern::template rate_depends<k>(r, j)) sum = sum + Lane(share[k]) * slopes_[k][r][j];
+          });
+        }
         jacobian[r][j] = h * sum + Lane(r == j ? 1.0 : 0.0);
       });
     });
@@ -50,6 +54,22 @@ class SensitiveStep {
   static constexpr double reach[4] = {0.0, 0.5, 0.5, 1.0}, share[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   using Number = SecondOrder<Lane, Pattern::pattern.directions, with_hessian ? Pattern::pattern.curved : 0>;
 
+  /// Where derivatives of f_k are kept. Without a Hessian nobody asks for them once the next stage is through, and what
+  /// they add to the Jacobian is added at once: a step that stays small leaves the processor's cache to the rest.
+  static constexpr int slot(int k) { return with_hessian ? k : k % 2; }
+  static constexpr int slots = with_hessian ? 4 : 2;
+  /// Adds the share of what has been found of f_k.
+  template <int k, int r, int j>
+  RHEC_INLINE void add_share(const Lane& slope) {
+    if constexpr (with_hessian || Pattern::is_argument(r)) slopes_[slot(k)][r][j] = slope;
+    if constexpr (!with_hessian) {
+      if constexpr (k > 0 && Pattern::template rate_depends<k - (k > 0)>(r, j))
+        jacobian[r][j] = jacobian[r][j] + Lane(share[k]) * slope;
+      else
+        jacobian[r][j] = Lane(share[k]) * slope;
+    }
+  }
+
   /// d(argument a of f_k)/dz_j, where it can be other than zero.
   template <int k, int a, int j>
   RHEC_INLINE Lane sensitivity() const {
@@ -58,7 +78,7 @@ class SensitiveStep {
     } else {
       Lane value(a == j ? 1.0 : 0.0);
       if constexpr (Pattern::template rate_depends<k - 1>(a, j))
-        value = value + h * Lane(reach[k]) * slopes_[k - 1][a][j];
+        value = value + h * Lane(reach[k]) * slopes_[slot(k - 1)][a][j];
       return value;
     }
   }
@@ -86,7 +106,7 @@ class SensitiveStep {
       rates_[k][r] = f[r].value;
       for_indices<nz>([&](auto a) RHEC_INLINE {
         if constexpr (Pattern::pattern.first[r] >> a & 1)
-          first_[k][Pattern::first_place(r, a)] = f[r].d[Pattern::pattern.direction_of[a]];
+          first_[slot(k)][Pattern::first_place(r, a)] = f[r].d[Pattern::pattern.direction_of[a]];
         for_indices<a + 1>([&](auto b) RHEC_INLINE {
           if constexpr (with_hessian && Pattern::bends(r, a, b))
             second_[k][Pattern::second_place(r, a, b)] = f[r].dd[Pattern::pair_of_directions(a, b)];
@@ -99,9 +119,9 @@ class SensitiveStep {
           Lane sum(0.0);
           for_indices<nz>([&](auto a) RHEC_INLINE {
             if constexpr ((Pattern::pattern.first[r] >> a & 1) && Pattern::template argument_depends<k>(a, j))
-              sum = sum + first_[k][Pattern::first_place(r, a)] * sensitivity<k, a, j>();
+              sum = sum + first_[slot(k)][Pattern::first_place(r, a)] * sensitivity<k, a, j>();
           });
-          slopes_[k][r][j] = sum;
+          add_share<k, r, j>(sum);
         }
       });
     });
@@ -120,7 +140,7 @@ class SensitiveStep {
           Lane pulled(0.0);
           for_indices<nx>([&](auto r) RHEC_INLINE {
             if constexpr (Pattern::pattern.first[r] >> c & 1)
-              pulled = pulled + first_[k + 1][Pattern::first_place(r, c)] * mu[r];
+              pulled = pulled + first_[slot(k + 1)][Pattern::first_place(r, c)] * mu[r];
           });
           now[c] = now[c] + h * Lane(reach[k + 1]) * pulled;
         }
@@ -173,10 +193,10 @@ class SensitiveStep {
 
   static constexpr int first_count = Pattern::first_place(nx, 0);
   static constexpr int second_count = with_hessian ? Pattern::second_place(nx, 0, 0) : 0;
-  Lane rates_[4][nx];                                    ///< f_k
-  Lane first_[4][first_count > 0 ? first_count : 1];     ///< df_k/d(x, p, u)
-  Lane second_[4][second_count > 0 ? second_count : 1];  ///< d2f_k/d(x, p, u)2, each pair once
-  Lane slopes_[4][nx][nz];                               ///< df_k/dz
+  Lane rates_[4][nx];                                                       ///< f_k
+  Lane first_[slots][first_count > 0 ? first_count : 1];                    ///< df_k/d(x, p, u)
+  Lane second_[with_hessian ? 4 : 1][second_count > 0 ? second_count : 1];  ///< d2f_k/d(x, p, u)2, each pair once
+  Lane slopes_[slots][nx][nz];                                              ///< df_k/dz
 };
 
 }  // namespace rhec::kernels

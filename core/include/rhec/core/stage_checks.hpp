@@ -30,7 +30,8 @@ struct ViolatedBounds {
 RHEC_EXPORT ViolatedBounds find_violations(const double* values, const double* least, const double* most, int count,
                                            double* violations) noexcept;
 
-/// The point that a full step leads to: values are added, and multipliers taken over. All are of one capacity.
-RHEC_EXPORT void add_full_step(int intervals, const Iterate& from, const Iterate& step, Iterate& to) noexcept;
+/// Makes of a step the point that it leads to, all of it: values are added, its multipliers are those of the point
+/// already. Both are of one capacity.
+RHEC_EXPORT void add_to_step(int intervals, const Iterate& from, Iterate& step) noexcept;
 
 }  // namespace rhec

@@ -37,6 +37,12 @@ struct StepPattern {
     if constexpr (k > 0) return a < nx && rate_depends<k - 1>(a, j);
     return false;
   }
+  /// Whether any rate depends on argument a, so that its sensitivity is asked for.
+  static constexpr bool is_argument(int a) {
+    for (int r = 0; r < nx; ++r)
+      if (pattern.first[r] >> a & 1) return true;
+    return false;
+  }
   static constexpr bool curves(int a, int b) { return (pattern.second[a] >> b & 1) != 0; }
   /// Whether d2f_r/(da db) can be other than zero.
   static constexpr bool bends(int r, int a, int b) {
