@@ -1,10 +1,17 @@
 #include "rhec/core/sparse_nlp.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 namespace rhec {
+namespace {
+
+/// Of rows, which are short.
+void copy(const double* from, int count, double* to) noexcept {
+  for (int j = 0; j < count; ++j) to[j] = from[j];
+}
+
+}  // namespace
 
 bool SparseNlp::take_structure(const Ocp& ocp) {
   const int N = ocp.intervals();
@@ -61,12 +68,13 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
     pattern->row_indices.clear();
   }
   jacobian_sources_.clear();
+  hessian_sources_.clear();
   const auto end_column = [](Pattern& pattern) {
     pattern.starts.push_back(static_cast<int>(pattern.row_indices.size()));
   };
   const auto add = [&](int to_row, int source) {
     jacobian_.row_indices.push_back(to_row);
-    jacobian_sources_.push_back(source);
+    jacobian_sources_.offsets.push_back(source);
   };
   const int ns = capacity.states, stride = capacity.row();
   for (int i = 0; i <= N; ++i) {
@@ -79,7 +87,7 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
         if (flags[column * next + r]) add(constraint_starts_[i] + r, r * stride + first + column);
     };
     for (int c = 0; c < n; ++c) {
-      if (i > 0) add(constraint_starts_[i - 1] + c, -1);
+      if (i > 0) add(constraint_starts_[i - 1] + c, itself);
       add_dynamics(state_flags_.data(), c, 0);
       end_column(jacobian_);
     }
@@ -87,47 +95,76 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
       add_dynamics(control_flags_.data(), c, ns);
       end_column(jacobian_);
     }
+    const auto place = [&](int k) { return k < n ? k : ns + k - n; };  // among the stage's rows
     for (int c = 0; c < n + m; ++c) {
-      for (int r = c; r < n + m; ++r) hessian_.row_indices.push_back(stage + r);
+      for (int r = c; r < n + m; ++r) {
+        hessian_.row_indices.push_back(stage + r);
+        hessian_sources_.offsets.push_back(place(c) * stride + place(r));
+      }
       end_column(hessian_);
     }
+    jacobian_sources_.end_stage(jacobian_.starts.back());
+    hessian_sources_.end_stage(hessian_.starts.back());
   }
   return true;
 }
 
+void SparseNlp::Sources::clear() noexcept {
+  offsets.clear();
+  firsts.clear();
+  starts.assign(1, 0);
+}
+
+/// The entries of another stage are complete, up to that number of all.
+void SparseNlp::Sources::end_stage(int end) {
+  const int count = end - starts.back();
+  const auto own = offsets.end() - count;
+  const int before = firsts.empty() ? 0 : firsts.back();
+  const bool is_like_before = !firsts.empty() && starts.back() - starts[starts.size() - 2] == count &&
+                              std::equal(own, offsets.end(), offsets.begin() + before);
+  firsts.push_back(is_like_before ? before : static_cast<int>(own - offsets.begin()));
+  if (is_like_before) offsets.erase(own, offsets.end());
+  starts.push_back(end);
+}
+
+void SparseNlp::Sources::gather(const double* rows, int stage, double* __restrict values) const noexcept {
+  const int* const from = offsets.data() + firsts[stage];
+  const int count = starts[stage + 1] - starts[stage];
+  values += starts[stage];
+  for (int k = 0; k < count; ++k) values[k] = from[k] == itself ? -1.0 : rows[from[k]];
+}
+
 void SparseNlp::read(const Ocp& ocp, const Iterate& point, double* z, double* multipliers,
                      double* bound_multipliers) const noexcept {
-  const auto copy = [](const double* from, int count, double* to, int start) {
-    if (!to || start < 0) return;
-    for (int j = 0; j < count; ++j) to[start + j] = from[j];
+  const auto take = [](const double* from, int count, double* to, int start) {
+    if (to && start >= 0) copy(from, count, to + start);
   };
   for (int i = 0; i <= ocp.intervals(); ++i) {
-    copy(point.state(i), state_counts_[i], z, state_starts_[i]);
-    copy(point.state_bound(i), state_counts_[i], bound_multipliers, state_starts_[i]);
+    take(point.state(i), state_counts_[i], z, state_starts_[i]);
+    take(point.state_bound(i), state_counts_[i], bound_multipliers, state_starts_[i]);
     if (i == ocp.intervals()) break;
-    copy(point.control(i), control_counts_[i], z, control_starts_[i]);
-    copy(point.control_bound(i), control_counts_[i], bound_multipliers, control_starts_[i]);
-    copy(point.costate(i + 1), state_counts_[i + 1], multipliers, constraint_starts_[i]);
+    take(point.control(i), control_counts_[i], z, control_starts_[i]);
+    take(point.control_bound(i), control_counts_[i], bound_multipliers, control_starts_[i]);
+    take(point.costate(i + 1), state_counts_[i + 1], multipliers, constraint_starts_[i]);
   }
 }
 
-void SparseNlp::write(const Ocp& ocp, const double* z, const double* multipliers, const double* bound_multipliers,
-                      Iterate& point) const noexcept {
-  const auto copy = [](const double* from, int start, int count, double* to) {
-    if (!from || start < 0) return;
-    for (int j = 0; j < count; ++j) to[j] = from[start + j];
+void SparseNlp::write(const Ocp& ocp, StageRange range, const double* z, const double* multipliers,
+                      const double* bound_multipliers, Iterate& point) const noexcept {
+  const auto put = [](const double* from, int start, int count, double* to) {
+    if (from && start >= 0) copy(from + start, count, to);
   };
-  if (ocp.initial_state()) {
-    std::copy_n(ocp.initial_state(), state_counts_[0], point.state(0));
+  if (range.first == 0 && ocp.initial_state()) {
+    copy(ocp.initial_state(), state_counts_[0], point.state(0));
     if (bound_multipliers) std::fill_n(point.state_bound(0), state_counts_[0], 0.0);
   }
-  for (int i = 0; i <= ocp.intervals(); ++i) {
-    copy(z, state_starts_[i], state_counts_[i], point.state(i));
-    copy(bound_multipliers, state_starts_[i], state_counts_[i], point.state_bound(i));
+  for (int i = range.first; i <= range.last; ++i) {
+    put(z, state_starts_[i], state_counts_[i], point.state(i));
+    put(bound_multipliers, state_starts_[i], state_counts_[i], point.state_bound(i));
+    if (i > 0) put(multipliers, constraint_starts_[i - 1], state_counts_[i], point.costate(i));
     if (i == ocp.intervals()) break;
-    copy(z, control_starts_[i], control_counts_[i], point.control(i));
-    copy(bound_multipliers, control_starts_[i], control_counts_[i], point.control_bound(i));
-    copy(multipliers, constraint_starts_[i], state_counts_[i + 1], point.costate(i + 1));
+    put(z, control_starts_[i], control_counts_[i], point.control(i));
+    put(bound_multipliers, control_starts_[i], control_counts_[i], point.control_bound(i));
   }
 }
 
@@ -146,113 +183,38 @@ void SparseNlp::set_costate_0(const StageQp& qp, Iterate& point) noexcept {
 void SparseNlp::bounds(const Ocp& ocp, double* lower, double* upper) const noexcept {
   for (int i = 0; i <= ocp.intervals(); ++i) {
     if (state_starts_[i] >= 0) {
-      std::copy_n(ocp.state_lower(i), state_counts_[i], lower + state_starts_[i]);
-      std::copy_n(ocp.state_upper(i), state_counts_[i], upper + state_starts_[i]);
+      copy(ocp.state_lower(i), state_counts_[i], lower + state_starts_[i]);
+      copy(ocp.state_upper(i), state_counts_[i], upper + state_starts_[i]);
     }
     if (i == ocp.intervals()) break;
-    std::copy_n(ocp.control_lower(i), control_counts_[i], lower + control_starts_[i]);
-    std::copy_n(ocp.control_upper(i), control_counts_[i], upper + control_starts_[i]);
+    copy(ocp.control_lower(i), control_counts_[i], lower + control_starts_[i]);
+    copy(ocp.control_upper(i), control_counts_[i], upper + control_starts_[i]);
   }
 }
 
 void SparseNlp::constraints(const Ocp& ocp, const double* defects, double* c) const noexcept {
-  for (int i = 0; i < ocp.intervals(); ++i)
-    std::copy_n(defects + static_cast<std::ptrdiff_t>(i) * ocp.capacity().states, state_counts_[i + 1],
-                c + constraint_starts_[i]);
+  for (int i = 0; i < ocp.intervals(); ++i, defects += ocp.capacity().states)
+    copy(defects, state_counts_[i + 1], c + constraint_starts_[i]);
 }
 
 void SparseNlp::constraints(const StageQp& qp, StageRange range, double* c) const noexcept {
   for (int i = range.first; i < std::min(range.last + 1, qp.intervals()); ++i)
-    std::copy_n(qp.b(i), state_counts_[i + 1], c + constraint_starts_[i]);
+    copy(qp.b(i), state_counts_[i + 1], c + constraint_starts_[i]);
 }
 
 void SparseNlp::gradient(const StageQp& qp, StageRange range, double* g) const noexcept {
   for (int i = range.first; i <= range.last; ++i) {
-    if (state_starts_[i] >= 0) std::copy_n(qp.q(i), state_counts_[i], g + state_starts_[i]);
-    if (i < qp.intervals()) std::copy_n(qp.r(i), control_counts_[i], g + control_starts_[i]);
+    if (state_starts_[i] >= 0) copy(qp.q(i), state_counts_[i], g + state_starts_[i]);
+    if (i < qp.intervals()) copy(qp.r(i), control_counts_[i], g + control_starts_[i]);
   }
 }
 
 void SparseNlp::jacobian(const StageQp& qp, StageRange range, double* values) const noexcept {
-  const auto gather = [&](const double* F, int column, int columns, bool begin_with_themselves) {
-    const int* const sources = jacobian_sources_.data();
-    for (const int end = column + columns; column < end; ++column) {
-      int entry = jacobian_.starts[column];
-      if (begin_with_themselves) values[entry++] = -1.0;
-      for (const int last = jacobian_.starts[column + 1]; entry < last; ++entry) values[entry] = F[sources[entry]];
-    }
-  };
-  for (int i = range.first; i <= range.last; ++i) {
-    if (state_starts_[i] >= 0) gather(qp.F(i), state_starts_[i], state_counts_[i], i > 0);
-    if (i < qp.intervals()) gather(qp.F(i), control_starts_[i], control_counts_[i], false);
-  }
+  for (int i = range.first; i <= range.last; ++i) jacobian_sources_.gather(qp.F(i), i, values);
 }
 
 void SparseNlp::hessian(const StageQp& qp, StageRange range, double* values) const noexcept {
-  const int ns = qp.capacity().states;
-  const auto copy = [](const double* from, int count, double* to) {
-    for (int j = 0; j < count; ++j) to[j] = from[j];
-    return to + count;
-  };
-  for (int i = range.first; i <= range.last; ++i) {
-    const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < qp.intervals() ? control_counts_[i] : 0;
-    if (n + m == 0) continue;
-    const double* H = qp.H(i);
-    double* to = values + hessian_.starts[n > 0 ? state_starts_[i] : control_starts_[i]];
-    for (int c = 0; c < n; ++c) {
-      to = copy(H + c * qp.stride() + c, n - c, to);
-      to = copy(H + c * qp.stride() + ns, m, to);
-    }
-    for (int c = 0; c < m; ++c) to = copy(H + (ns + c) * qp.stride() + ns + c, m - c, to);
-  }
-}
-
-void SparseNlp::lagrangian_gradient(const double* gradient, const double* jacobian, const double* multipliers,
-                                    double* sum) const noexcept {
-  const int* const rows = jacobian_.row_indices.data();
-  for (int column = 0, entry = 0; column < jacobian_.columns; ++column) {
-    double pull = gradient[column];
-    for (const int end = jacobian_.starts[column + 1]; entry < end; ++entry)
-      pull += jacobian[entry] * multipliers[rows[entry]];
-    sum[column] = pull;
-  }
-}
-
-void SparseNlp::add_kkt(const Judged& point, KktTerms& terms) const noexcept {
-  // Each largest value and each sum in parts, of which none waits for the others.
-  constexpr int parts = 4;
-  struct Part {
-    double stationarity = 0.0, gradient = 0.0, bound_violation = 0.0, complementarity = 0.0;
-    double rest = 0.0;  // stays 0 as long as all is finite
-  };
-  Part found[parts];
-  const auto take = [](double& largest, double value) { largest = value > largest ? value : largest; };
-  const auto look_at = [&](Part& part, int j) {
-    const double bound = point.bound_multipliers[j], sum = point.lagrangian_gradient[j] + bound;
-    part.rest += 0.0 * sum;
-    take(part.stationarity, std::abs(sum));
-    take(part.gradient, std::abs(point.gradient[j]));
-    take(part.gradient, std::abs(bound));
-    const double below = point.lower[j] - point.z[j], above = point.upper[j] - point.z[j];
-    take(part.bound_violation, below);
-    take(part.bound_violation, -above);
-    // A multiplier at a bound that does not exist is as wrong as it is large.
-    const double gap = std::abs(bound > 0.0 ? above : below);
-    take(part.complementarity, std::abs(bound) * (gap < 1.0 ? gap : 1.0));
-  };
-  int j = 0;
-  for (; j + parts <= variables(); j += parts)
-    for (int k = 0; k < parts; ++k) look_at(found[k], j + k);
-  for (; j < variables(); ++j) look_at(found[0], j);
-  double defect = 0.0, costate = 0.0, rest = 0.0;
-  for (int row = 0; row < constraints(); ++row) {
-    rest += 0.0 * point.constraints[row];
-    take(defect, std::abs(point.constraints[row]));
-    take(costate, std::abs(point.multipliers[row]));
-  }
-  terms.add({rest, defect, 0.0, 0.0, costate});
-  for (const Part& part : found)
-    terms.add({part.stationarity + part.rest, 0.0, part.bound_violation, part.complementarity, part.gradient});
+  for (int i = range.first; i <= range.last; ++i) hessian_sources_.gather(qp.H(i), i, values);
 }
 
 }  // namespace rhec

@@ -149,7 +149,7 @@ void IpoptSolver::setup(const Ocp& ocp) {
   capacity_ = ocp.capacity();
   scratch_.assign(ocp.scratch_size(), 0.0);
   judge_ = StageQp(capacity_, OcpNlp::stages_at_once);
-  guess_ = best_ = seen_ = Iterate(capacity_);
+  guess_ = best_ = Iterate(capacity_);
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);
 }
@@ -201,11 +201,11 @@ void IpoptSolver::set_run_options(Start start, double barrier) {
 
 /// The best iterate is that of the least residual; among those within the tolerance, the last, whose barrier is least.
 void IpoptSolver::keep_if_better(const PrimalDual& iterate) noexcept {
-  seen_kkt_ = nlp_->write_and_judge(iterate, seen_);
+  seen_kkt_ = nlp_->judge(iterate);
   const double residual = seen_kkt_.largest();
   if (!(residual <= options_.tolerance || residual < best_kkt_.largest())) return;
   best_kkt_ = seen_kkt_;
-  std::swap(best_, seen_);
+  nlp_->exchange_judged(best_);
 }
 
 bool IpoptSolver::see(int iteration, const PrimalDual* iterate) noexcept {
@@ -213,8 +213,8 @@ bool IpoptSolver::see(int iteration, const PrimalDual* iterate) noexcept {
   if (iterate) {
     keep_if_better(*iterate);
     if (seen_kkt_.largest() <= options_.tolerance) {
-      const double gap = nlp_->complementarity_gap(best_);
-      if (gap <= negligible_gap * options_.tolerance * std::abs(nlp_->objective(best_))) return false;
+      if (nlp_->complementarity_gap() <= negligible_gap * options_.tolerance * std::abs(nlp_->objective()))
+        return false;
       if (--spare_iterations_ <= 0) return false;
     }
   }

@@ -92,7 +92,7 @@ class IpoptSolver final : public Solver, private Spectator {
 
   // Of the solve under way.
   Clock::time_point deadline_;
-  Iterate guess_, best_, seen_;
+  Iterate guess_, best_;
   KktResidual best_kkt_, seen_kkt_;
   double backend_us_ = 0.0;
   bool stopped_late_ = false;

@@ -50,20 +50,21 @@ void write_pattern(const SparseNlp::Pattern& pattern, int* rows, int* columns) {
 OcpNlp::OcpNlp(const Ocp& ocp, Curvature curvature)
     : curvature_(curvature),
       scratch_(ocp.scratch_size()),
+      trial_(ocp.capacity()),
       defects_(static_cast<std::size_t>(ocp.capacity().intervals) * ocp.capacity().states),
-      work_(ocp.capacity()),
-      pieces_(ocp.capacity(), stages_at_once) {}
+      pieces_(ocp.capacity(), stages_at_once + 1),
+      linear_(ocp.capacity()) {}
 
 void OcpNlp::take(const Ocp& ocp) {
   ocp_ = &ocp;
   evaluated_.is_known = linearised_.is_known = false;
   if (nlp_.take_structure(ocp)) {
-    for (auto* vector :
-         {&lower_, &upper_, &start_, &start_lower_, &start_upper_, &seen_, &seen_lower_, &seen_upper_, &evaluated_.z,
-          &linearised_.z, &gradient_, &clipped_, &bound_multipliers_, &lagrangian_gradient_})
+    for (auto* vector : {&lower_, &upper_, &start_.z, &start_.multipliers.of_bounds, &start_lower_, &start_upper_,
+                         &seen_.z, &seen_.multipliers.of_bounds, &evaluated_.z, &linearised_.z,
+                         &linear_multipliers_.of_bounds, &gradient_, &clipped_})
       vector->assign(nlp_.variables(), 0.0);
-    for (auto* vector : {&start_multipliers_, &seen_multipliers_, &constraints_, &weighted_, &linear_multipliers_,
-                         &linear_constraints_})
+    for (auto* vector : {&start_.multipliers.of_constraints, &seen_.multipliers.of_constraints, &constraints_,
+                         &linear_multipliers_.of_constraints, &weighted_})
       vector->assign(nlp_.constraints(), 0.0);
     jacobian_.assign(nlp_.jacobian().entries(), 0.0);
     for (auto* vector : {&hessian_, &hessian_part_}) vector->assign(nlp_.hessian().entries(), 0.0);
@@ -71,7 +72,7 @@ void OcpNlp::take(const Ocp& ocp) {
   nlp_.bounds(ocp, lower_.data(), upper_.data());
   any_fixed_ = false;
   for (std::size_t j = 0; j < lower_.size(); ++j) any_fixed_ = any_fixed_ || lower_[j] == upper_[j];
-  work_.clear_multipliers();
+  for (auto* vector : {&seen_lower_, &seen_upper_}) vector->assign(nlp_.variables(), 0.0);
 }
 
 bool OcpNlp::has_sound_bounds() const noexcept {
@@ -93,9 +94,11 @@ void OcpNlp::set_curvature(Curvature curvature) noexcept {
 
 void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
   iterates_ = {};
+  seen_tag_ = {};
   starts_with_multipliers_ = barrier > 0.0;
-  nlp_.read(*ocp_, point, start_.data(), start_multipliers_.data(), bound_multipliers_.data());
-  for (std::size_t j = 0; j < start_.size(); ++j) {
+  auto& [z, multipliers] = start_;
+  nlp_.read(*ocp_, point, z.data(), multipliers.of_constraints.data(), multipliers.of_bounds.data());
+  for (std::size_t j = 0; j < z.size(); ++j) {
     start_lower_[j] = start_upper_[j] = 1.0;
     if (barrier <= 0.0) continue;
     // A bound claimed as active stays close, the multiplier of one that is far is small: both on the central path.
@@ -105,11 +108,12 @@ void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
       const double wanted = std::max(slack, barrier / std::max(multiplier, std::sqrt(barrier)));
       return has_lower && has_upper ? std::min(wanted, 0.5 * room) : wanted;
     };
-    const double multiplier = bound_multipliers_[j];
-    if (has_lower) start_[j] = lower_[j] + distance(-multiplier, start_[j] - lower_[j]);
-    if (has_upper) start_[j] = upper_[j] - distance(multiplier, upper_[j] - start_[j]);
-    if (has_lower) start_lower_[j] = std::max(-multiplier, barrier / (start_[j] - lower_[j]));
-    if (has_upper) start_upper_[j] = std::max(multiplier, barrier / (upper_[j] - start_[j]));
+    double& multiplier = multipliers.of_bounds[j];
+    if (has_lower) z[j] = lower_[j] + distance(-multiplier, z[j] - lower_[j]);
+    if (has_upper) z[j] = upper_[j] - distance(multiplier, upper_[j] - z[j]);
+    if (has_lower) start_lower_[j] = std::max(-multiplier, barrier / (z[j] - lower_[j]));
+    if (has_upper) start_upper_[j] = std::max(multiplier, barrier / (upper_[j] - z[j]));
+    multiplier = (has_upper ? start_upper_[j] : 0.0) - (has_lower ? start_lower_[j] : 0.0);
   }
 }
 
@@ -128,89 +132,122 @@ void OcpNlp::Place::move_to(const double* at, unsigned now) noexcept {
 bool OcpNlp::evaluate_at(const double* z, unsigned visit) noexcept {
   if (evaluated_.is_at(z, visit)) return evaluated_.is_sound;
   evaluated_.move_to(z, visit);
-  nlp_.write(*ocp_, z, nullptr, nullptr, work_);
-  objective_ = ocp_->evaluate(work_, defects_.data(), scratch_);
+  nlp_.write(*ocp_, z, nullptr, nullptr, trial_);
+  objective_ = ocp_->evaluate(trial_, defects_.data(), scratch_);
   nlp_.constraints(*ocp_, defects_.data(), constraints_.data());
   evaluated_.is_sound = std::isfinite(objective_) && all_finite(constraints_);
   return evaluated_.is_sound;
 }
 
-bool OcpNlp::linearise_at(const double* z, const double* multipliers, unsigned visit) {
+bool OcpNlp::linearise_at(const double* z, unsigned visit) {
   if (linearised_.is_at(z, visit)) return linearised_.is_sound;
+  // Ipopt asks for the Hessian later, and shows its iterate after that: with the multipliers that it has already.
+  const Multipliers* multipliers = guess_multipliers();
   linearised_.move_to(z, visit);
-  // Ipopt asks for the Hessian later, most often with the multipliers that it has already.
-  is_linear_exact_ = curvature_ == Curvature::exact && (multipliers || guess_multipliers());
-  if (multipliers) std::copy_n(multipliers, linear_multipliers_.size(), linear_multipliers_.begin());
-  const Hessian hessian = is_linear_exact_                        ? Hessian::exact
-                          : curvature_ == Curvature::gauss_newton ? Hessian::gauss_newton
-                                                                  : Hessian::none;
-  linearise(z, linear_multipliers_.data(), 1.0, hessian, Kept::all, hessian_.data());
-  linearised_.is_sound = all_finite(gradient_);
+  linearise_all(multipliers ? *multipliers : start_.multipliers, multipliers != nullptr);
   return linearised_.is_sound;
 }
 
-/// The multipliers of Ipopt's iterate to `linear_multipliers_`. False where there are none yet.
-bool OcpNlp::guess_multipliers() {
-  if (iterates_.data) {
-    read_multipliers(linear_multipliers_.data());
-  } else {
-    std::copy(start_multipliers_.begin(), start_multipliers_.end(), linear_multipliers_.begin());
+/// The multipliers of Ipopt's iterate; null where there are none yet.
+const Multipliers* OcpNlp::guess_multipliers() {
+  if (!iterates_.data) return starts_with_multipliers_ ? &start_.multipliers : nullptr;
+  read_iterate();
+  return &seen_.multipliers;
+}
+
+/// Goes through the stages at a point, from one piece to the next, and lets `take` have each; returns the objective.
+template <class Take>
+double OcpNlp::linearise(const double* z, const double* multipliers, const double* bound_multipliers, Hessian hessian,
+                         const Take& take) noexcept {
+  const int N = ocp_->intervals();
+  double objective = 0.0;
+  is_judged_ = false;
+  for (int first = 0; first <= N; first += stages_at_once) {
+    const StageRange piece{first, std::min(first + stages_at_once - 1, N)};
+    pieces_.look_at(first);
+    // With the stage behind them, which their equations lead to.
+    nlp_.write(*ocp_, {first, std::min(piece.last + 1, N)}, z, multipliers, bound_multipliers, linear_);
+    objective += ocp_->linearise(piece, linear_, hessian, pieces_, scratch_);
+    if (piece.last < N) pieces_.set_sizes(piece.last + 1, ocp_->state_count(piece.last + 1), 0);
+    take(piece);
   }
-  return iterates_.data || starts_with_multipliers_;
+  return objective;
+}
+
+/// All that is wanted at `linearised_`.
+void OcpNlp::linearise_all(const Multipliers& multipliers, bool are_known) noexcept {
+  const auto& [of_constraints, of_bounds] = multipliers;
+  is_linear_exact_ = curvature_ == Curvature::exact && are_known;
+  const Hessian hessian = is_linear_exact_                        ? Hessian::exact
+                          : curvature_ == Curvature::gauss_newton ? Hessian::gauss_newton
+                                                                  : Hessian::none;
+  KktTerms terms;
+  const auto take = [&](StageRange piece) {
+    if (hessian != Hessian::none) nlp_.hessian(pieces_, piece, hessian_.data());
+    nlp_.gradient(pieces_, piece, gradient_.data());
+    nlp_.jacobian(pieces_, piece, jacobian_.data());
+    if (any_fixed_) set_fixed_multipliers(piece);
+    if (piece.first == 0) SparseNlp::set_costate_0(pieces_, linear_);
+    terms.add(pieces_, linear_, piece);
+  };
+  linear_objective_ = linearise(linearised_.z.data(), of_constraints.data(), of_bounds.data(), hessian, take);
+  linear_multipliers_ = multipliers;
+  linear_kkt_ = terms.residual();
+  linearised_.is_sound = all_finite(gradient_);
+  is_judged_ = true;
+}
+
+/// What makes a piece of the linearisation stationary where variables have one value only.
+void OcpNlp::set_fixed_multipliers(StageRange piece) noexcept {
+  const auto set = [&](int i, const double* lower, const double* upper, int first, int count) {
+    for (int k = first; k < first + count; ++k) {
+      if (lower[k - first] != upper[k - first]) continue;
+      double pull = pieces_.h(i)[k];
+      if (i < ocp_->intervals())
+        for (int r = 0; r < ocp_->state_count(i + 1); ++r)
+          pull += pieces_.F(i)[r * pieces_.stride() + k] * linear_.costate(i + 1)[r];
+      if (k < ocp_->state_count(i)) pull -= linear_.costate(i)[k];
+      linear_.bound_row(i)[k] = -pull;
+    }
+  };
+  for (int i = piece.first; i <= piece.last; ++i) {
+    if (nlp_.state_start(i) >= 0) set(i, ocp_->state_lower(i), ocp_->state_upper(i), 0, ocp_->state_count(i));
+    if (i < ocp_->intervals())
+      set(i, ocp_->control_lower(i), ocp_->control_upper(i), ocp_->capacity().states, ocp_->control_count(i));
+  }
 }
 
 /// At costates that are `factor` times the multipliers, or zero where there are none.
-void OcpNlp::linearise(const double* z, const double* multipliers, double factor, Hessian hessian, Kept kept,
-                       double* hessian_values) noexcept {
+void OcpNlp::write_hessian(const double* z, const double* multipliers, double factor, double* values) noexcept {
   for (std::size_t row = 0; row < weighted_.size(); ++row)
     weighted_[row] = multipliers ? factor * multipliers[row] : 0.0;
-  nlp_.write(*ocp_, z, hessian == Hessian::exact ? weighted_.data() : nullptr, nullptr, work_);
-  for (int first = 0; first <= ocp_->intervals(); first += stages_at_once) {
-    const StageRange piece{first, std::min(first + stages_at_once - 1, ocp_->intervals())};
-    pieces_.look_at(first);
-    ocp_->linearise(piece, work_, hessian, pieces_, scratch_);
-    if (hessian != Hessian::none) nlp_.hessian(pieces_, piece, hessian_values);
-    if (kept == Kept::hessian) continue;
-    nlp_.constraints(pieces_, piece, linear_constraints_.data());
-    nlp_.gradient(pieces_, piece, gradient_.data());
-    nlp_.jacobian(pieces_, piece, jacobian_.data());
-  }
+  linearise(z, weighted_.data(), nullptr, Hessian::exact,
+            [&](StageRange piece) { nlp_.hessian(pieces_, piece, values); });
 }
 
-KktResidual OcpNlp::write_and_judge(const PrimalDual& from, Iterate& point) noexcept {
-  for (std::size_t j = 0; j < clipped_.size(); ++j) {
-    clipped_[j] = std::min(std::max(from.z[j], lower_[j]), upper_[j]);
-    bound_multipliers_[j] = from.upper_multipliers[j] - from.lower_multipliers[j];
-  }
-  linearise_at(clipped_.data(), from.multipliers);
-  nlp_.lagrangian_gradient(gradient_.data(), jacobian_.data(), from.multipliers, lagrangian_gradient_.data());
-  for (std::size_t j = 0; any_fixed_ && j < lower_.size(); ++j)
-    if (lower_[j] == upper_[j]) bound_multipliers_[j] = -lagrangian_gradient_[j];
-  nlp_.write(*ocp_, clipped_.data(), from.multipliers, bound_multipliers_.data(), point);
-  KktTerms terms;
-  nlp_.add_kkt({clipped_.data(), lower_.data(), upper_.data(), linear_constraints_.data(), gradient_.data(),
-                lagrangian_gradient_.data(), from.multipliers, bound_multipliers_.data()},
-               terms);
-  pieces_.look_at(0);
-  ocp_->linearise({0, 0}, point, Hessian::none, pieces_, scratch_);
-  if (ocp_->intervals() > 0) pieces_.set_sizes(1, ocp_->state_count(1), 0);
-  SparseNlp::set_costate_0(pieces_, point);
-  terms.add(pieces_, point, {0, 0});
-  return terms.residual();
+KktResidual OcpNlp::judge(const PrimalDual& iterate) noexcept {
+  for (std::size_t j = 0; j < clipped_.size(); ++j)
+    clipped_[j] = std::min(std::max(iterate.z[j], lower_[j]), upper_[j]);
+  const auto& [of_constraints, of_bounds] = iterate.multipliers;
+  if (is_judged_ && linearised_.is_at(clipped_.data(), elsewhere) &&
+      of_constraints == linear_multipliers_.of_constraints && of_bounds == linear_multipliers_.of_bounds)
+    return linear_kkt_;
+  linearised_.move_to(clipped_.data(), elsewhere);
+  linearise_all(iterate.multipliers, true);
+  return linear_kkt_;
 }
 
-double OcpNlp::objective(const Iterate& point) noexcept {
-  nlp_.read(*ocp_, point, clipped_.data(), nullptr, nullptr);
-  evaluate_at(clipped_.data());
-  return objective_;
+void OcpNlp::exchange_judged(Iterate& point) noexcept {
+  std::swap(linear_, point);
+  is_judged_ = false;
 }
 
-double OcpNlp::complementarity_gap(const Iterate& point) noexcept {
-  nlp_.read(*ocp_, point, clipped_.data(), nullptr, bound_multipliers_.data());
+double OcpNlp::complementarity_gap() const noexcept {
+  const std::vector<double>&z = linearised_.z, &multipliers = linear_multipliers_.of_bounds;
   double gap = 0.0;
-  for (std::size_t j = 0; j < clipped_.size(); ++j) {
-    if (bound_multipliers_[j] > 0.0) gap += bound_multipliers_[j] * (upper_[j] - clipped_[j]);
-    if (bound_multipliers_[j] < 0.0) gap += bound_multipliers_[j] * (lower_[j] - clipped_[j]);
+  for (std::size_t j = 0; j < z.size(); ++j) {
+    if (multipliers[j] > 0.0) gap += multipliers[j] * (upper_[j] - z[j]);
+    if (multipliers[j] < 0.0) gap += multipliers[j] * (lower_[j] - z[j]);
   }
   return gap;
 }
@@ -241,12 +278,13 @@ bool OcpNlp::get_bounds_info(Ipopt::Index n, double* lower, double* upper, Ipopt
 bool OcpNlp::get_starting_point(Ipopt::Index, bool init_z, double* z, bool init_bounds, double* lower_multipliers,
                                 double* upper_multipliers, Ipopt::Index, bool init_multipliers, double* multipliers) {
   const Timer timer(microseconds_);
-  if (init_z) std::copy(start_.begin(), start_.end(), z);
+  if (init_z) std::copy(start_.z.begin(), start_.z.end(), z);
   if (init_bounds) {
     std::copy(start_lower_.begin(), start_lower_.end(), lower_multipliers);
     std::copy(start_upper_.begin(), start_upper_.end(), upper_multipliers);
   }
-  if (init_multipliers) std::copy(start_multipliers_.begin(), start_multipliers_.end(), multipliers);
+  const std::vector<double>& of_constraints = start_.multipliers.of_constraints;
+  if (init_multipliers) std::copy(of_constraints.begin(), of_constraints.end(), multipliers);
   return true;
 }
 
@@ -269,7 +307,7 @@ bool OcpNlp::eval_g(Ipopt::Index, const double* z, bool new_z, Ipopt::Index, dou
 bool OcpNlp::eval_grad_f(Ipopt::Index, const double* z, bool new_z, double* gradient) {
   const Timer timer(microseconds_);
   visit(new_z);
-  if (!linearise_at(z, nullptr, visit_)) return false;
+  if (!linearise_at(z, visit_)) return false;
   std::copy(gradient_.begin(), gradient_.end(), gradient);
   return true;
 }
@@ -282,7 +320,7 @@ bool OcpNlp::eval_jac_g(Ipopt::Index, const double* z, bool new_z, Ipopt::Index,
     return true;
   }
   visit(new_z);
-  if (!linearise_at(z, nullptr, visit_)) return false;
+  if (!linearise_at(z, visit_)) return false;
   return copy_finite(jacobian_, 1.0, values);
 }
 
@@ -297,20 +335,20 @@ bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_
   visit(new_z);
   const std::span<double> all(values, entries);
   if (curvature_ == Curvature::gauss_newton) {
-    linearise_at(z, nullptr, visit_);
+    linearise_at(z, visit_);
     return copy_finite(hessian_, objective_factor, values);
   }
   if (objective_factor == 1.0 && is_linear_exact_ && linearised_.is_at(z, visit_) &&
-      std::equal(linear_multipliers_.begin(), linear_multipliers_.end(), multipliers)) {
+      std::equal(multipliers, multipliers + constraints(), linear_multipliers_.of_constraints.begin())) {
     return copy_finite(hessian_, 1.0, values);
   }
   if (objective_factor >= smallest_divisor) {
-    linearise(z, multipliers, 1.0 / objective_factor, Hessian::exact, Kept::hessian, values);
+    write_hessian(z, multipliers, 1.0 / objective_factor, values);
     for (double& value : all) value *= objective_factor;
   } else {
     // The Ocp's Lagrangian always holds the whole objective: what is too much of it is taken away.
-    linearise(z, multipliers, 1.0, Hessian::exact, Kept::hessian, values);
-    linearise(z, nullptr, 0.0, Hessian::exact, Kept::hessian, hessian_part_.data());
+    write_hessian(z, multipliers, 1.0, values);
+    write_hessian(z, nullptr, 0.0, hessian_part_.data());
     for (Ipopt::Index entry = 0; entry < entries; ++entry)
       values[entry] += (objective_factor - 1.0) * hessian_part_[entry];
   }
@@ -322,20 +360,34 @@ void OcpNlp::finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double* 
                                double, const Ipopt::IpoptData*, Ipopt::IpoptCalculatedQuantities*) {
   const Timer timer(microseconds_);
   iterates_ = {};
-  if (spectator_) spectator_->see_last({z, multipliers, lower_multipliers, upper_multipliers});
+  if (!spectator_) return;
+  std::copy_n(z, variables(), seen_.z.begin());
+  std::copy_n(multipliers, constraints(), seen_.multipliers.of_constraints.begin());
+  for (int j = 0; j < variables(); ++j) seen_.multipliers.of_bounds[j] = upper_multipliers[j] - lower_multipliers[j];
+  spectator_->see_last(seen_);
 }
 
-void OcpNlp::read_multipliers(double* multipliers) {
+/// Ipopt's present iterate to `seen_`. Ipopt 3.11 has it only in its own layout: scaled, and without variables that
+/// have one value only.
+void OcpNlp::read_iterate() {
   const auto& [data, scaled, adapter] = iterates_;
   const Ipopt::SmartPtr<const Ipopt::IteratesVector> now = data->curr();
+  if (seen_tag_ == now->GetTag()) return;
   const Ipopt::SmartPtr<Ipopt::NLPScalingObject> scaling = scaled->NLP_scaling();
+  const Ipopt::SmartPtr<const Ipopt::VectorSpace> space = now->x()->OwnerSpace();
   const double factor = scaling->unapply_obj_scaling(1.0);
   const auto y_c = scaling->apply_vector_scaling_c_NonConst(now->y_c());
   const auto y_d = scaling->apply_vector_scaling_d_NonConst(now->y_d());
-  y_c->Scal(factor);
-  y_d->Scal(factor);
-  std::fill_n(multipliers, nlp_.constraints(), 0.0);
-  adapter->ResortG(*y_c, *y_d, multipliers);
+  const auto z_L = scaling->apply_vector_scaling_x_LU_NonConst(*scaled->Px_L(), now->z_L(), *space);
+  const auto z_U = scaling->apply_vector_scaling_x_LU_NonConst(*scaled->Px_U(), now->z_U(), *space);
+  for (Ipopt::Vector* vector : {GetRawPtr(y_c), GetRawPtr(y_d), GetRawPtr(z_L), GetRawPtr(z_U)}) vector->Scal(factor);
+  auto& [of_constraints, of_bounds] = seen_.multipliers;
+  std::fill(of_constraints.begin(), of_constraints.end(), 0.0);
+  adapter->ResortX(*scaling->unapply_vector_scaling_x(now->x()), seen_.z.data());
+  adapter->ResortG(*y_c, *y_d, of_constraints.data());
+  adapter->ResortBnds(*z_L, seen_lower_.data(), *z_U, seen_upper_.data());
+  for (std::size_t j = 0; j < of_bounds.size(); ++j) of_bounds[j] = seen_upper_[j] - seen_lower_[j];
+  seen_tag_ = now->GetTag();
 }
 
 bool OcpNlp::intermediate_callback(Ipopt::AlgorithmMode mode, Ipopt::Index iteration, double, double, double, double,
@@ -344,26 +396,12 @@ bool OcpNlp::intermediate_callback(Ipopt::AlgorithmMode mode, Ipopt::Index itera
   const Timer timer(microseconds_);
   if (!spectator_) return true;
   if (mode == Ipopt::RestorationPhaseMode) return spectator_->see(iteration, nullptr);
-  // Ipopt 3.11 shows its iterate only in its own layout: scaled, and without variables that have one value only.
   auto* scaled = dynamic_cast<Ipopt::OrigIpoptNLP*>(Ipopt::GetRawPtr(quantities->GetIpoptNLP()));
   auto* adapter = scaled ? dynamic_cast<Ipopt::TNLPAdapter*>(Ipopt::GetRawPtr(scaled->nlp())) : nullptr;
   if (!adapter) return spectator_->see(iteration, nullptr);
   iterates_ = {data, scaled, adapter};
-  read_multipliers(seen_multipliers_.data());
-  const Ipopt::SmartPtr<const Ipopt::IteratesVector> now = data->curr();
-  const Ipopt::SmartPtr<Ipopt::NLPScalingObject> scaling = scaled->NLP_scaling();
-  const double factor = scaling->unapply_obj_scaling(1.0);
-  const Ipopt::SmartPtr<const Ipopt::VectorSpace> space = now->x()->OwnerSpace();
-  const auto z_L = scaling->apply_vector_scaling_x_LU_NonConst(*scaled->Px_L(), now->z_L(), *space);
-  const auto z_U = scaling->apply_vector_scaling_x_LU_NonConst(*scaled->Px_U(), now->z_U(), *space);
-  z_L->Scal(factor);
-  z_U->Scal(factor);
-  std::fill(seen_lower_.begin(), seen_lower_.end(), 0.0);
-  std::fill(seen_upper_.begin(), seen_upper_.end(), 0.0);
-  adapter->ResortX(*scaling->unapply_vector_scaling_x(now->x()), seen_.data());
-  adapter->ResortBnds(*z_L, seen_lower_.data(), *z_U, seen_upper_.data());
-  const PrimalDual iterate{seen_.data(), seen_multipliers_.data(), seen_lower_.data(), seen_upper_.data()};
-  return spectator_->see(iteration, &iterate);
+  read_iterate();
+  return spectator_->see(iteration, &seen_);
 }
 
 }  // namespace rhec::ipopt
