@@ -134,37 +134,43 @@ void SparseNlp::Sources::gather(const double* rows, int stage, double* __restric
   for (int k = 0; k < count; ++k) values[k] = from[k] == itself ? -1.0 : rows[from[k]];
 }
 
+// State and control of a stage follow each other in z, and in a row where the state is of the capacity's size.
+
 void SparseNlp::read(const Ocp& ocp, const Iterate& point, double* z, double* multipliers,
                      double* bound_multipliers) const noexcept {
-  const auto take = [](const double* from, int count, double* to, int start) {
-    if (to && start >= 0) copy(from, count, to + start);
-  };
+  const int ns = ocp.capacity().states;
   for (int i = 0; i <= ocp.intervals(); ++i) {
-    take(point.state(i), state_counts_[i], z, state_starts_[i]);
-    take(point.state_bound(i), state_counts_[i], bound_multipliers, state_starts_[i]);
-    if (i == ocp.intervals()) break;
-    take(point.control(i), control_counts_[i], z, control_starts_[i]);
-    take(point.control_bound(i), control_counts_[i], bound_multipliers, control_starts_[i]);
-    take(point.costate(i + 1), state_counts_[i + 1], multipliers, constraint_starts_[i]);
+    const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < ocp.intervals() ? control_counts_[i] : 0;
+    const int start = n > 0 ? state_starts_[i] : m > 0 ? control_starts_[i] : 0;
+    const auto take = [&](const double* row, double* to) {
+      if (!to) return;
+      copy(row, n == ns ? n + m : n, to + start);
+      if (n != ns) copy(row + ns, m, to + start + n);
+    };
+    take(point.row(i), z);
+    take(point.bound_row(i), bound_multipliers);
+    if (multipliers && i > 0) copy(point.costate(i), state_counts_[i], multipliers + constraint_starts_[i - 1]);
   }
 }
 
 void SparseNlp::write(const Ocp& ocp, StageRange range, const double* z, const double* multipliers,
                       const double* bound_multipliers, Iterate& point) const noexcept {
-  const auto put = [](const double* from, int start, int count, double* to) {
-    if (from && start >= 0) copy(from + start, count, to);
-  };
+  const int ns = ocp.capacity().states;
   if (range.first == 0 && ocp.initial_state()) {
     copy(ocp.initial_state(), state_counts_[0], point.state(0));
     if (bound_multipliers) std::fill_n(point.state_bound(0), state_counts_[0], 0.0);
   }
   for (int i = range.first; i <= range.last; ++i) {
-    put(z, state_starts_[i], state_counts_[i], point.state(i));
-    put(bound_multipliers, state_starts_[i], state_counts_[i], point.state_bound(i));
-    if (i > 0) put(multipliers, constraint_starts_[i - 1], state_counts_[i], point.costate(i));
-    if (i == ocp.intervals()) break;
-    put(z, control_starts_[i], control_counts_[i], point.control(i));
-    put(bound_multipliers, control_starts_[i], control_counts_[i], point.control_bound(i));
+    const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < ocp.intervals() ? control_counts_[i] : 0;
+    const int start = n > 0 ? state_starts_[i] : m > 0 ? control_starts_[i] : 0;
+    const auto put = [&](const double* from, double* row) {
+      if (!from) return;
+      copy(from + start, n == ns ? n + m : n, row);
+      if (n != ns) copy(from + start + n, m, row + ns);
+    };
+    put(z, point.row(i));
+    put(bound_multipliers, point.bound_row(i));
+    if (multipliers && i > 0) copy(multipliers + constraint_starts_[i - 1], state_counts_[i], point.costate(i));
   }
 }
 

@@ -46,7 +46,10 @@ void StageQp::look_at(int first) noexcept {
 
 void StageQp::change() noexcept {
   ++changes_;
-  std::fill(carried_counts_.begin(), carried_counts_.end(), 0);
+  if (window_ > 0)
+    std::fill_n(carried_counts_.begin() - first_, window_, 0);
+  else
+    std::fill(carried_counts_.begin(), carried_counts_.end(), 0);
 }
 
 void StageQp::clear(int i) noexcept {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include <IpIpoptCalculatedQuantities.hpp>
@@ -39,6 +40,11 @@ bool copy_finite(std::span<const double> from, double factor, double* __restrict
   return all_finite(from.size(), [&](std::size_t k) { return to[k] = factor * from[k]; });
 }
 
+/// To the bit.
+bool are_equal(std::span<const double> one, const double* other) {
+  return std::memcmp(one.data(), other, one.size_bytes()) == 0;
+}
+
 void write_pattern(const SparseNlp::Pattern& pattern, int* rows, int* columns) {
   std::copy(pattern.row_indices.begin(), pattern.row_indices.end(), rows);
   for (int column = 0; column < pattern.columns; ++column)
@@ -62,12 +68,12 @@ void OcpNlp::take(const Ocp& ocp) {
     for (auto* vector : {&lower_, &upper_, &start_.z, &start_.multipliers.of_bounds, &start_lower_, &start_upper_,
                          &seen_.z, &seen_.multipliers.of_bounds, &evaluated_.z, &linearised_.z,
                          &linear_multipliers_.of_bounds, &gradient_, &clipped_})
-      vector->assign(nlp_.variables(), 0.0);
+      vector->resize(nlp_.variables());
     for (auto* vector : {&start_.multipliers.of_constraints, &seen_.multipliers.of_constraints, &constraints_,
                          &linear_multipliers_.of_constraints, &weighted_})
-      vector->assign(nlp_.constraints(), 0.0);
-    jacobian_.assign(nlp_.jacobian().entries(), 0.0);
-    for (auto* vector : {&hessian_, &hessian_part_}) vector->assign(nlp_.hessian().entries(), 0.0);
+      vector->resize(nlp_.constraints());
+    jacobian_.resize(nlp_.jacobian().entries());
+    for (auto* vector : {&hessian_, &hessian_part_}) vector->resize(nlp_.hessian().entries());
   }
   nlp_.bounds(ocp, lower_.data(), upper_.data());
   any_fixed_ = false;
@@ -94,9 +100,10 @@ void OcpNlp::set_curvature(Curvature curvature) noexcept {
 
 void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
   iterates_ = {};
-  seen_tag_ = {};
+  seen_.tag = 0;
   starts_with_multipliers_ = barrier > 0.0;
-  auto& [z, multipliers] = start_;
+  std::vector<double>& z = start_.z;
+  Multipliers& multipliers = start_.multipliers;
   nlp_.read(*ocp_, point, z.data(), multipliers.of_constraints.data(), multipliers.of_bounds.data());
   for (std::size_t j = 0; j < z.size(); ++j) {
     start_lower_[j] = start_upper_[j] = 1.0;
@@ -118,7 +125,7 @@ void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
 }
 
 bool OcpNlp::Place::is_at(const double* at, unsigned now) noexcept {
-  if (!is_known || !((now != elsewhere && visit == now) || std::equal(z.begin(), z.end(), at))) return false;
+  if (!is_known || !((now != elsewhere && visit == now) || are_equal(z, at))) return false;
   if (now != elsewhere) visit = now;
   return true;
 }
@@ -141,18 +148,15 @@ bool OcpNlp::evaluate_at(const double* z, unsigned visit) noexcept {
 
 bool OcpNlp::linearise_at(const double* z, unsigned visit) {
   if (linearised_.is_at(z, visit)) return linearised_.is_sound;
-  // Ipopt asks for the Hessian later, and shows its iterate after that: with the multipliers that it has already.
-  const Multipliers* multipliers = guess_multipliers();
   linearised_.move_to(z, visit);
-  linearise_all(multipliers ? *multipliers : start_.multipliers, multipliers != nullptr);
+  // Ipopt asks for the Hessian later, and shows its iterate after that: with the multipliers that it has already.
+  if (iterates_.data) {
+    read_iterate();
+    linearise_all(seen_, true);
+  } else {
+    linearise_all(start_, starts_with_multipliers_);
+  }
   return linearised_.is_sound;
-}
-
-/// The multipliers of Ipopt's iterate; null where there are none yet.
-const Multipliers* OcpNlp::guess_multipliers() {
-  if (!iterates_.data) return starts_with_multipliers_ ? &start_.multipliers : nullptr;
-  read_iterate();
-  return &seen_.multipliers;
 }
 
 /// Goes through the stages at a point, from one piece to the next, and lets `take` have each; returns the objective.
@@ -174,10 +178,10 @@ double OcpNlp::linearise(const double* z, const double* multipliers, const doubl
   return objective;
 }
 
-/// All that is wanted at `linearised_`.
-void OcpNlp::linearise_all(const Multipliers& multipliers, bool are_known) noexcept {
-  const auto& [of_constraints, of_bounds] = multipliers;
-  is_linear_exact_ = curvature_ == Curvature::exact && are_known;
+/// All that is wanted at `linearised_`, which is the iterate's place unless Ipopt tries another.
+void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noexcept {
+  const auto& [of_constraints, of_bounds] = iterate.multipliers;
+  is_linear_exact_ = curvature_ == Curvature::exact && has_multipliers;
   const Hessian hessian = is_linear_exact_                        ? Hessian::exact
                           : curvature_ == Curvature::gauss_newton ? Hessian::gauss_newton
                                                                   : Hessian::none;
@@ -191,7 +195,8 @@ void OcpNlp::linearise_all(const Multipliers& multipliers, bool are_known) noexc
     terms.add(pieces_, linear_, piece);
   };
   linear_objective_ = linearise(linearised_.z.data(), of_constraints.data(), of_bounds.data(), hessian, take);
-  linear_multipliers_ = multipliers;
+  linear_multipliers_ = iterate.multipliers;
+  linear_tag_ = are_equal(linearised_.z, iterate.z.data()) ? iterate.tag : 0;
   linear_kkt_ = terms.residual();
   linearised_.is_sound = all_finite(gradient_);
   is_judged_ = true;
@@ -225,15 +230,22 @@ void OcpNlp::write_hessian(const double* z, const double* multipliers, double fa
             [&](StageRange piece) { nlp_.hessian(pieces_, piece, values); });
 }
 
+/// Whether the linearisation is that of an iterate within its bounds.
+bool OcpNlp::has_judged(const PrimalDual& iterate) const noexcept {
+  if (!is_judged_ || !linearised_.is_known || linear_kkt_.bound_violation > 0.0) return false;
+  if (linear_tag_ != 0 && linear_tag_ == iterate.tag) return true;
+  const auto& [of_constraints, of_bounds] = iterate.multipliers;
+  return are_equal(linearised_.z, iterate.z.data()) &&
+         are_equal(linear_multipliers_.of_constraints, of_constraints.data()) &&
+         are_equal(linear_multipliers_.of_bounds, of_bounds.data());
+}
+
 KktResidual OcpNlp::judge(const PrimalDual& iterate) noexcept {
+  if (has_judged(iterate)) return linear_kkt_;
   for (std::size_t j = 0; j < clipped_.size(); ++j)
     clipped_[j] = std::min(std::max(iterate.z[j], lower_[j]), upper_[j]);
-  const auto& [of_constraints, of_bounds] = iterate.multipliers;
-  if (is_judged_ && linearised_.is_at(clipped_.data(), elsewhere) &&
-      of_constraints == linear_multipliers_.of_constraints && of_bounds == linear_multipliers_.of_bounds)
-    return linear_kkt_;
   linearised_.move_to(clipped_.data(), elsewhere);
-  linearise_all(iterate.multipliers, true);
+  linearise_all(iterate, true);
   return linear_kkt_;
 }
 
@@ -339,7 +351,7 @@ bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_
     return copy_finite(hessian_, objective_factor, values);
   }
   if (objective_factor == 1.0 && is_linear_exact_ && linearised_.is_at(z, visit_) &&
-      std::equal(multipliers, multipliers + constraints(), linear_multipliers_.of_constraints.begin())) {
+      are_equal(linear_multipliers_.of_constraints, multipliers)) {
     return copy_finite(hessian_, 1.0, values);
   }
   if (objective_factor >= smallest_divisor) {
@@ -361,6 +373,7 @@ void OcpNlp::finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double* 
   const Timer timer(microseconds_);
   iterates_ = {};
   if (!spectator_) return;
+  seen_.tag = 0;
   std::copy_n(z, variables(), seen_.z.begin());
   std::copy_n(multipliers, constraints(), seen_.multipliers.of_constraints.begin());
   for (int j = 0; j < variables(); ++j) seen_.multipliers.of_bounds[j] = upper_multipliers[j] - lower_multipliers[j];
@@ -372,7 +385,7 @@ void OcpNlp::finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double* 
 void OcpNlp::read_iterate() {
   const auto& [data, scaled, adapter] = iterates_;
   const Ipopt::SmartPtr<const Ipopt::IteratesVector> now = data->curr();
-  if (seen_tag_ == now->GetTag()) return;
+  if (seen_.tag == now->GetTag()) return;
   const Ipopt::SmartPtr<Ipopt::NLPScalingObject> scaling = scaled->NLP_scaling();
   const Ipopt::SmartPtr<const Ipopt::VectorSpace> space = now->x()->OwnerSpace();
   const double factor = scaling->unapply_obj_scaling(1.0);
@@ -387,7 +400,7 @@ void OcpNlp::read_iterate() {
   adapter->ResortG(*y_c, *y_d, of_constraints.data());
   adapter->ResortBnds(*z_L, seen_lower_.data(), *z_U, seen_upper_.data());
   for (std::size_t j = 0; j < of_bounds.size(); ++j) of_bounds[j] = seen_upper_[j] - seen_lower_[j];
-  seen_tag_ = now->GetTag();
+  seen_.tag = now->GetTag();
 }
 
 bool OcpNlp::intermediate_callback(Ipopt::AlgorithmMode mode, Ipopt::Index iteration, double, double, double, double,

@@ -28,6 +28,7 @@ struct Multipliers {
 struct PrimalDual {
   std::vector<double> z;
   Multipliers multipliers;
+  Ipopt::TaggedObject::Tag tag = 0;  ///< Ipopt's number for it; 0: it has none
 };
 
 /// Is shown the iterates of Ipopt.
@@ -131,13 +132,13 @@ class OcpNlp final : public Ipopt::TNLP {
   void visit(bool is_new) noexcept { visit_ += is_new; }
   bool evaluate_at(const double* z, unsigned visit) noexcept;
   bool linearise_at(const double* z, unsigned visit);
-  void linearise_all(const Multipliers& multipliers, bool are_known) noexcept;
+  void linearise_all(const PrimalDual& iterate, bool has_multipliers) noexcept;
   void write_hessian(const double* z, const double* multipliers, double factor, double* values) noexcept;
   template <class Take>
   double linearise(const double* z, const double* multipliers, const double* bound_multipliers, Hessian hessian,
                    const Take& take) noexcept;
   void set_fixed_multipliers(StageRange piece) noexcept;
-  const Multipliers* guess_multipliers();
+  bool has_judged(const PrimalDual& iterate) const noexcept;
   void read_iterate();
 
   const Ocp* ocp_ = nullptr;
@@ -154,7 +155,6 @@ class OcpNlp final : public Ipopt::TNLP {
     Ipopt::TNLPAdapter* adapter = nullptr;
   } iterates_;
   PrimalDual seen_;                              ///< one of them
-  Ipopt::TaggedObject::Tag seen_tag_{};          ///< Ipopt's number for it
   std::vector<double> seen_lower_, seen_upper_;  ///< always zero where there is no bound
 
   static constexpr unsigned elsewhere = 0;
@@ -168,6 +168,7 @@ class OcpNlp final : public Ipopt::TNLP {
   // At `linearised_`.
   Place linearised_;
   Multipliers linear_multipliers_;
+  Ipopt::TaggedObject::Tag linear_tag_ = 0;  ///< of the iterate that it is
   StageQp pieces_;   ///< of the passage under way; only the vectors are kept
   Iterate linear_;   ///< the point; with its multipliers as long as it is judged
   std::vector<double> gradient_, jacobian_, hessian_;
