@@ -312,13 +312,14 @@ struct AnyEights {
   static int count(int outputs) { return outputs; }
 };
 
-/// What is measured at one node, of which `seen` was. Returns the sum of squares.
+/// What is measured at one node of the range, of which `seen` was. Returns the sum of squares.
 template <bool matrices, bool vectors, class Width>
-RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, const double* seen, const double* predicted,
-                                           const double* J, int stride, int used, bool is_clean, double* H, double* h) {
+RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, long node, const double* seen,
+                                           const double* predicted, const double* J, int stride, int used,
+                                           bool is_clean, double* H, double* h) {
   const int count = Width::count(measured.output_count), outputs = Width::of(count),
             states = Width::of(measured.vehicle_states);
-  double *pulls = measured.room, *weights = pulls + outputs;
+  double *weights = measured.room, *pulls = measured.pulls ? measured.pulls + node * outputs : weights + outputs;
   Lanes total{};
   for (int k = 0; k < outputs; k += lane_count) {
     const Lanes y = load(seen + k), weight = y == y ? 2.0 * load(measured.output_weights + k) : Lanes{};
@@ -339,6 +340,10 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
     for (int k = states; k < stride; k += lane_count) store(Lanes{}, h + k);
   }
   if (!matrices) return total;
+  if (measured.pulls) {
+    add_products(J, weights, nullptr, count, measured.vehicle_states, stride, H, nullptr);
+    return total;
+  }
   // Rows by weight, to which single entries come from memory at no cost.
   constexpr int most_known = Width::is_known ? 8 : 1;
   Lanes weighted[most_known][8 / lane_count];
@@ -386,7 +391,8 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
     const bool has_inputs = i < view.intervals;
     const int used = view.states + (has_inputs ? view.control_counts[i] : 0);
     const bool is_clean = measured.is_clean && measured.is_clean[i] != 0;
-    total += write_node<matrices, vectors, Width>(measured, y, predicted, J, view.stride, used, is_clean, H, h);
+    total += write_node<matrices, vectors, Width>(measured, i - first, y, predicted, J, view.stride, used, is_clean, H,
+                                                  h);
     if (vectors && has_inputs) {
       for (int k = first_input / lane_count * lane_count; k < end_of_inputs; k += lane_count) {
         const Lanes seen = load(inputs + k), weight = seen == seen ? 2.0 * load(measured.input_weights + k) : Lanes{};
@@ -395,8 +401,10 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
         total += pull * error;
       }
     }
-    for (int k = first_input; matrices && has_inputs && k < end_of_inputs; ++k)
-      H[k * stride + k] = inputs[k] == inputs[k] ? 2.0 * measured.input_weights[k] : 0.0;
+    for (int k = first_input; matrices && has_inputs && k < end_of_inputs; ++k) {
+      const double curvature = inputs[k] == inputs[k] ? 2.0 * measured.input_weights[k] : 0.0;
+      H[k * stride + k] = measured.pulls ? H[k * stride + k] + curvature : curvature;
+    }
     y += outputs;
     predicted += outputs;
     J += J_size;
