@@ -146,11 +146,17 @@ void HorizonProblem::set_decisions(Iterate& point, const double* inputs, const d
 void HorizonProblem::gather(const Iterate& point, StageRange range, double* x, double* u, double* p,
                             double* p_end) const noexcept {
   for (int i = range.first; i <= range.last; ++i) {
-    const double* s = point.state(i);
-    std::copy(s, s + nx_, x);
-    inputs_on(point, i, u);
-    parameters_on(point, i, p_end);
-    for (int j = 0; j < np_; ++j) p[j] = ramp_[j] ? s[nx_ + j] : p_end[j];
+    const double *s = point.state(i), *w = point.control(i);
+    for (int j = 0; j < nx_; ++j) x[j] = s[j];
+    if (is_direct())
+      for (int j = 0; j < nu_; ++j) u[j] = w[j];
+    else
+      inputs_on(point, i, u);
+    for (int j = 0; j < np_; ++j) {
+      const int control = control_of_channel(i, j);
+      p_end[j] = control >= 0 ? w[control] : s[nx_ + j];
+      p[j] = ramp_[j] ? s[nx_ + j] : p_end[j];
+    }
     x += nx_;
     u += nu_;
     p += np_;

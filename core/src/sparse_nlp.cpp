@@ -7,8 +7,16 @@ namespace rhec {
 namespace {
 
 /// Of rows, which are short.
-void copy(const double* from, int count, double* to) noexcept {
+void copy(const double* from, int count, double* __restrict to) noexcept {
   for (int j = 0; j < count; ++j) to[j] = from[j];
+}
+
+/// Adds the columns of another stage, which are those of the stage before in rows further down.
+void repeat_columns(SparseNlp::Pattern& pattern, int columns, int rows) {
+  const auto first = static_cast<std::ptrdiff_t>(pattern.starts.size()) - 1 - columns;
+  const int begin = pattern.starts[first], end = pattern.starts.back();
+  for (int entry = begin; entry < end; ++entry) pattern.row_indices.push_back(pattern.row_indices[entry] + rows);
+  for (int c = 1; c <= columns; ++c) pattern.starts.push_back(pattern.starts[first + c] + end - begin);
 }
 
 }  // namespace
@@ -32,13 +40,16 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
       next_signature_.push_back(static_cast<std::int32_t>((eight * 0x0102'0408'1020'4080U) >> 56));
     }
   };
+  words_.clear();
   for (int i = 0; i < N; ++i) {
     const int n = ocp.state_count(i), m = ocp.control_count(i), next = ocp.state_count(i + 1);
+    words_.push_back(static_cast<int>(next_signature_.size()));
     next_signature_.insert(next_signature_.end(), {m, next});
     ocp.mark_dynamics(i, state_flags_.data(), control_flags_.data());
     pack(state_flags_.data(), next * n);
     pack(control_flags_.data(), next * m);
   }
+  words_.push_back(static_cast<int>(next_signature_.size()));
   if (next_signature_ == signature_) return false;
   std::swap(signature_, next_signature_);
 
@@ -80,6 +91,13 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
   for (int i = 0; i <= N; ++i) {
     const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < N ? control_counts_[i] : 0;
     const int next = i < N ? state_counts_[i + 1] : 0;
+    if (is_like_before(i)) {
+      repeat_columns(jacobian_, n + m, n);
+      repeat_columns(hessian_, n + m, n + m);
+      jacobian_sources_.repeat_stage();
+      hessian_sources_.repeat_stage();
+      continue;
+    }
     const int stage = n > 0 ? state_starts_[i] : (i < N ? control_starts_[i] : variable);
     if (i < N) ocp.mark_dynamics(i, state_flags_.data(), control_flags_.data());
     const auto add_dynamics = [&](const std::uint8_t* flags, int column, int first) {
@@ -87,7 +105,7 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
         if (flags[column * next + r]) add(constraint_starts_[i] + r, r * stride + first + column);
     };
     for (int c = 0; c < n; ++c) {
-      if (i > 0) add(constraint_starts_[i - 1] + c, itself);
+      if (i > 0) add(constraint_starts_[i - 1] + c, 0);  // s_i itself: `jacobian` knows
       add_dynamics(state_flags_.data(), c, 0);
       end_column(jacobian_);
     }
@@ -103,10 +121,20 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
       }
       end_column(hessian_);
     }
-    jacobian_sources_.end_stage(jacobian_.starts.back());
-    hessian_sources_.end_stage(hessian_.starts.back());
+    jacobian_sources_.end_stage();
+    hessian_sources_.end_stage();
   }
   return true;
+}
+
+/// Whether a stage's columns are those of the stage before, further down: of equal stages, to and from equal ones.
+bool SparseNlp::is_like_before(int i) const noexcept {
+  const int N = static_cast<int>(control_counts_.size());
+  if (i < 2 || i == N) return false;
+  const int n = state_counts_[i];
+  if (state_counts_[i - 2] != n || state_counts_[i - 1] != n || state_counts_[i + 1] != n) return false;
+  const auto words = signature_.begin();
+  return std::equal(words + words_[i - 1], words + words_[i], words + words_[i], words + words_[i + 1]);
 }
 
 void SparseNlp::Sources::clear() noexcept {
@@ -115,23 +143,24 @@ void SparseNlp::Sources::clear() noexcept {
   starts.assign(1, 0);
 }
 
-/// The entries of another stage are complete, up to that number of all.
-void SparseNlp::Sources::end_stage(int end) {
-  const int count = end - starts.back();
-  const auto own = offsets.end() - count;
-  const int before = firsts.empty() ? 0 : firsts.back();
-  const bool is_like_before = !firsts.empty() && starts.back() - starts[starts.size() - 2] == count &&
-                              std::equal(own, offsets.end(), offsets.begin() + before);
-  firsts.push_back(is_like_before ? before : static_cast<int>(own - offsets.begin()));
-  if (is_like_before) offsets.erase(own, offsets.end());
-  starts.push_back(end);
+/// What was added to the list is that of another stage.
+void SparseNlp::Sources::end_stage() {
+  const int shared = firsts.empty() ? 0 : firsts.back() + starts.back() - starts[starts.size() - 2];
+  firsts.push_back(shared);
+  starts.push_back(starts.back() + static_cast<int>(offsets.size()) - shared);
+}
+
+/// Another stage like the one before.
+void SparseNlp::Sources::repeat_stage() {
+  firsts.push_back(firsts.back());
+  starts.push_back(2 * starts.back() - starts[starts.size() - 2]);
 }
 
 void SparseNlp::Sources::gather(const double* rows, int stage, double* __restrict values) const noexcept {
   const int* const from = offsets.data() + firsts[stage];
   const int count = starts[stage + 1] - starts[stage];
   values += starts[stage];
-  for (int k = 0; k < count; ++k) values[k] = from[k] == itself ? -1.0 : rows[from[k]];
+  for (int k = 0; k < count; ++k) values[k] = rows[from[k]];
 }
 
 // State and control of a stage follow each other in z, and in a row where the state is of the capacity's size.
@@ -216,7 +245,12 @@ void SparseNlp::gradient(const StageQp& qp, StageRange range, double* g) const n
 }
 
 void SparseNlp::jacobian(const StageQp& qp, StageRange range, double* values) const noexcept {
-  for (int i = range.first; i <= range.last; ++i) jacobian_sources_.gather(qp.F(i), i, values);
+  for (int i = range.first; i <= range.last; ++i) {
+    jacobian_sources_.gather(qp.F(i), i, values);
+    // Columns of states begin with s_i itself, in the equation that leads to it.
+    const int* const starts = jacobian_.starts.data() + state_starts_[i];
+    for (int c = 0; i > 0 && c < state_counts_[i]; ++c) values[starts[c]] = -1.0;
+  }
 }
 
 void SparseNlp::hessian(const StageQp& qp, StageRange range, double* values) const noexcept {

@@ -66,11 +66,10 @@ void OcpNlp::take(const Ocp& ocp) {
   evaluated_.is_known = linearised_.is_known = false;
   if (nlp_.take_structure(ocp)) {
     for (auto* vector : {&lower_, &upper_, &start_.z, &start_.multipliers.of_bounds, &start_lower_, &start_upper_,
-                         &seen_.z, &seen_.multipliers.of_bounds, &evaluated_.z, &linearised_.z,
-                         &linear_multipliers_.of_bounds, &gradient_, &clipped_})
+                         &seen_.z, &seen_.multipliers.of_bounds, &evaluated_.z, &linearised_.z, &gradient_, &clipped_})
       vector->resize(nlp_.variables());
     for (auto* vector : {&start_.multipliers.of_constraints, &seen_.multipliers.of_constraints, &constraints_,
-                         &linear_multipliers_.of_constraints, &weighted_})
+                         &weighted_})
       vector->resize(nlp_.constraints());
     jacobian_.resize(nlp_.jacobian().entries());
     for (auto* vector : {&hessian_, &hessian_part_}) vector->resize(nlp_.hessian().entries());
@@ -100,19 +99,20 @@ void OcpNlp::set_curvature(Curvature curvature) noexcept {
 
 void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
   iterates_ = {};
-  seen_.tag = 0;
+  forget_seen();
   starts_with_multipliers_ = barrier > 0.0;
+  const double least_multiplier = std::sqrt(barrier);
   std::vector<double>& z = start_.z;
   Multipliers& multipliers = start_.multipliers;
   nlp_.read(*ocp_, point, z.data(), multipliers.of_constraints.data(), multipliers.of_bounds.data());
   for (std::size_t j = 0; j < z.size(); ++j) {
     start_lower_[j] = start_upper_[j] = 1.0;
     if (barrier <= 0.0) continue;
-    // A bound claimed as active stays close, the multiplier of one that is far is small: both on the central path.
     const bool has_lower = std::isfinite(lower_[j]), has_upper = std::isfinite(upper_[j]);
+    // A bound claimed as active stays close, the multiplier of one that is far is small: both on the central path.
     const double room = upper_[j] - lower_[j];
     const auto distance = [&](double multiplier, double slack) {
-      const double wanted = std::max(slack, barrier / std::max(multiplier, std::sqrt(barrier)));
+      const double wanted = std::max(slack, barrier / std::max(multiplier, least_multiplier));
       return has_lower && has_upper ? std::min(wanted, 0.5 * room) : wanted;
     };
     double& multiplier = multipliers.of_bounds[j];
@@ -195,7 +195,7 @@ void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noex
     terms.add(pieces_, linear_, piece);
   };
   linear_objective_ = linearise(linearised_.z.data(), of_constraints.data(), of_bounds.data(), hessian, take);
-  linear_multipliers_ = iterate.multipliers;
+  linear_iterate_ = &iterate;
   linear_tag_ = are_equal(linearised_.z, iterate.z.data()) ? iterate.tag : 0;
   linear_kkt_ = terms.residual();
   linearised_.is_sound = all_finite(gradient_);
@@ -236,8 +236,8 @@ bool OcpNlp::has_judged(const PrimalDual& iterate) const noexcept {
   if (linear_tag_ != 0 && linear_tag_ == iterate.tag) return true;
   const auto& [of_constraints, of_bounds] = iterate.multipliers;
   return are_equal(linearised_.z, iterate.z.data()) &&
-         are_equal(linear_multipliers_.of_constraints, of_constraints.data()) &&
-         are_equal(linear_multipliers_.of_bounds, of_bounds.data());
+         are_equal(linear_iterate_->multipliers.of_constraints, of_constraints.data()) &&
+         are_equal(linear_iterate_->multipliers.of_bounds, of_bounds.data());
 }
 
 KktResidual OcpNlp::judge(const PrimalDual& iterate) noexcept {
@@ -255,7 +255,7 @@ void OcpNlp::exchange_judged(Iterate& point) noexcept {
 }
 
 double OcpNlp::complementarity_gap() const noexcept {
-  const std::vector<double>&z = linearised_.z, &multipliers = linear_multipliers_.of_bounds;
+  const std::vector<double>&z = linearised_.z, &multipliers = linear_iterate_->multipliers.of_bounds;
   double gap = 0.0;
   for (std::size_t j = 0; j < z.size(); ++j) {
     if (multipliers[j] > 0.0) gap += multipliers[j] * (upper_[j] - z[j]);
@@ -351,7 +351,7 @@ bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_
     return copy_finite(hessian_, objective_factor, values);
   }
   if (objective_factor == 1.0 && is_linear_exact_ && linearised_.is_at(z, visit_) &&
-      are_equal(linear_multipliers_.of_constraints, multipliers)) {
+      are_equal(linear_iterate_->multipliers.of_constraints, multipliers)) {
     return copy_finite(hessian_, 1.0, values);
   }
   if (objective_factor >= smallest_divisor) {
@@ -373,11 +373,17 @@ void OcpNlp::finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double* 
   const Timer timer(microseconds_);
   iterates_ = {};
   if (!spectator_) return;
-  seen_.tag = 0;
+  forget_seen();
   std::copy_n(z, variables(), seen_.z.begin());
   std::copy_n(multipliers, constraints(), seen_.multipliers.of_constraints.begin());
   for (int j = 0; j < variables(); ++j) seen_.multipliers.of_bounds[j] = upper_multipliers[j] - lower_multipliers[j];
   spectator_->see_last(seen_);
+}
+
+/// What was made of its multipliers has none any more.
+void OcpNlp::forget_seen() noexcept {
+  seen_.tag = 0;
+  if (linear_iterate_ == &seen_) is_judged_ = is_linear_exact_ = false;
 }
 
 /// Ipopt's present iterate to `seen_`. Ipopt 3.11 has it only in its own layout: scaled, and without variables that
@@ -386,20 +392,21 @@ void OcpNlp::read_iterate() {
   const auto& [data, scaled, adapter] = iterates_;
   const Ipopt::SmartPtr<const Ipopt::IteratesVector> now = data->curr();
   if (seen_.tag == now->GetTag()) return;
+  forget_seen();
   const Ipopt::SmartPtr<Ipopt::NLPScalingObject> scaling = scaled->NLP_scaling();
   const Ipopt::SmartPtr<const Ipopt::VectorSpace> space = now->x()->OwnerSpace();
-  const double factor = scaling->unapply_obj_scaling(1.0);
-  const auto y_c = scaling->apply_vector_scaling_c_NonConst(now->y_c());
-  const auto y_d = scaling->apply_vector_scaling_d_NonConst(now->y_d());
-  const auto z_L = scaling->apply_vector_scaling_x_LU_NonConst(*scaled->Px_L(), now->z_L(), *space);
-  const auto z_U = scaling->apply_vector_scaling_x_LU_NonConst(*scaled->Px_U(), now->z_U(), *space);
-  for (Ipopt::Vector* vector : {GetRawPtr(y_c), GetRawPtr(y_d), GetRawPtr(z_L), GetRawPtr(z_U)}) vector->Scal(factor);
+  const auto x = scaling->unapply_vector_scaling_x(now->x());
+  const auto y_c = scaling->apply_vector_scaling_c(now->y_c()), y_d = scaling->apply_vector_scaling_d(now->y_d());
+  const auto z_L = scaling->apply_vector_scaling_x_LU(*scaled->Px_L(), now->z_L(), *space);
+  const auto z_U = scaling->apply_vector_scaling_x_LU(*scaled->Px_U(), now->z_U(), *space);
   auto& [of_constraints, of_bounds] = seen_.multipliers;
   std::fill(of_constraints.begin(), of_constraints.end(), 0.0);
-  adapter->ResortX(*scaling->unapply_vector_scaling_x(now->x()), seen_.z.data());
+  adapter->ResortX(*x, seen_.z.data());
   adapter->ResortG(*y_c, *y_d, of_constraints.data());
   adapter->ResortBnds(*z_L, seen_lower_.data(), *z_U, seen_upper_.data());
-  for (std::size_t j = 0; j < of_bounds.size(); ++j) of_bounds[j] = seen_upper_[j] - seen_lower_[j];
+  const double factor = scaling->unapply_obj_scaling(1.0);
+  for (double& multiplier : of_constraints) multiplier *= factor;
+  for (std::size_t j = 0; j < of_bounds.size(); ++j) of_bounds[j] = factor * (seen_upper_[j] - seen_lower_[j]);
   seen_.tag = now->GetTag();
 }
 

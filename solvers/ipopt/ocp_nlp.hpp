@@ -139,6 +139,7 @@ class OcpNlp final : public Ipopt::TNLP {
                    const Take& take) noexcept;
   void set_fixed_multipliers(StageRange piece) noexcept;
   bool has_judged(const PrimalDual& iterate) const noexcept;
+  void forget_seen() noexcept;
   void read_iterate();
 
   const Ocp* ocp_ = nullptr;
@@ -167,15 +168,15 @@ class OcpNlp final : public Ipopt::TNLP {
   double objective_ = 0.0;
   // At `linearised_`.
   Place linearised_;
-  Multipliers linear_multipliers_;
-  Ipopt::TaggedObject::Tag linear_tag_ = 0;  ///< of the iterate that it is
+  const PrimalDual* linear_iterate_ = nullptr;  ///< whose multipliers were taken
+  Ipopt::TaggedObject::Tag linear_tag_ = 0;     ///< its number, where it is at this place itself
   StageQp pieces_;   ///< of the passage under way; only the vectors are kept
   Iterate linear_;   ///< the point; with its multipliers as long as it is judged
   std::vector<double> gradient_, jacobian_, hessian_;
   KktResidual linear_kkt_;
   double linear_objective_ = 0.0;
   bool is_judged_ = false;
-  bool is_linear_exact_ = false;  ///< the Hessian is that for `linear_multipliers_`
+  bool is_linear_exact_ = false;  ///< the Hessian is that for these multipliers
 
   bool starts_with_multipliers_ = false, any_fixed_ = false;
   std::vector<double> weighted_, clipped_, hessian_part_;

@@ -80,21 +80,23 @@ class RHEC_EXPORT SparseNlp {
 
  private:
   std::vector<std::int32_t> signature_, next_signature_;
+  std::vector<int> words_;                               ///< where in the signature each interval begins
   std::vector<std::uint8_t> state_flags_, control_flags_;  ///< of the interval being marked
   std::vector<int> state_starts_, control_starts_, constraint_starts_, state_counts_, control_counts_;
   Pattern jacobian_, hessian_;
-  /// Where the entries of each stage, which are one after the other, come from: offsets in its F or H, or `itself` for
-  /// the -1 of s_i in its own equation. Stages like the one before share its list.
+  /// Where the entries of each stage, which are one after the other, come from. Stages that are alike share a list.
   struct Sources {
-    std::vector<int> offsets;
-    std::vector<int> firsts;  ///< of each stage, in `offsets`
-    std::vector<int> starts;  ///< of each stage, among the entries; and where the last one's end
+    std::vector<int> offsets;  ///< in the stage's F or H
+    std::vector<int> firsts;   ///< of each stage, in `offsets`
+    std::vector<int> starts;   ///< of each stage, among the entries; and where the last one's end
     void clear() noexcept;
-    void end_stage(int end);
+    void end_stage();
+    void repeat_stage();
     void gather(const double* rows, int stage, double* values) const noexcept;
   };
-  static constexpr int itself = -1;
   Sources jacobian_sources_, hessian_sources_;
+
+  bool is_like_before(int stage) const noexcept;
 };
 
 }  // namespace rhec
