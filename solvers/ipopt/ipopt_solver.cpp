@@ -251,7 +251,6 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
 
 void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
   nlp_->take(ocp);
-  if (!nlp_->has_sound_bounds()) return;
   // The guess is the first candidate, with the initial state that is given.
   guess_ = point;
   if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), guess_.state(0));

@@ -80,12 +80,6 @@ void OcpNlp::take(const Ocp& ocp) {
   for (auto* vector : {&seen_lower_, &seen_upper_}) vector->assign(nlp_.variables(), 0.0);
 }
 
-bool OcpNlp::has_sound_bounds() const noexcept {
-  for (std::size_t j = 0; j < lower_.size(); ++j)
-    if (std::isnan(lower_[j]) || std::isnan(upper_[j])) return false;
-  return true;
-}
-
 bool OcpNlp::has_empty_bounds() const noexcept {
   for (std::size_t j = 0; j < lower_.size(); ++j)
     if (lower_[j] > upper_[j]) return true;
@@ -198,7 +192,8 @@ void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noex
   linear_iterate_ = &iterate;
   linear_tag_ = are_equal(linearised_.z, iterate.z.data()) ? iterate.tag : 0;
   linear_kkt_ = terms.residual();
-  linearised_.is_sound = all_finite(gradient_);
+  // A number that is not finite, in the gradient or the Jacobian, makes the stationarity one too.
+  linearised_.is_sound = std::isfinite(linear_kkt_.stationarity);
   is_judged_ = true;
 }
 
@@ -333,7 +328,8 @@ bool OcpNlp::eval_jac_g(Ipopt::Index, const double* z, bool new_z, Ipopt::Index,
   }
   visit(new_z);
   if (!linearise_at(z, visit_)) return false;
-  return copy_finite(jacobian_, 1.0, values);
+  std::copy(jacobian_.begin(), jacobian_.end(), values);
+  return true;
 }
 
 bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_factor, Ipopt::Index,

@@ -60,7 +60,6 @@ class OcpNlp final : public Ipopt::TNLP {
   int variables() const noexcept { return nlp_.variables(); }
   int constraints() const noexcept { return nlp_.constraints(); }
   bool has_empty_bounds() const noexcept;
-  bool has_sound_bounds() const noexcept;
 
   /// Where Ipopt starts. With a barrier parameter above zero the point's multipliers count too: each variable and the
   /// multiplier of its bound are moved until their product is that parameter or more, as little as that takes.

@@ -17,7 +17,7 @@ inline int parts_of(const ProgramView& view, int stage) {
 template <int known_parts, int known_states>
 KktParts kkt_of(const ProgramView& view) {
   const long stride = view.stride;
-  const int state_parts = known_parts > 0 ? known_parts : (view.states + lane_count - 1) / lane_count;
+  const int state_parts = ((known_states > 0 ? known_states : view.states) + lane_count - 1) / lane_count;
   Lanes stationarity{}, defect{}, complementarity{}, highest_lower{}, lowest_upper{};
   Lanes gradients{}, bounds{}, costates{}, rest{};  // rest stays 0 as long as all is finite
   for (int i = view.first; i <= view.last; ++i) {
@@ -62,10 +62,12 @@ KktParts kkt_of(const ProgramView& view) {
 }
 
 KktParts kkt(const ProgramView& view) {
-  bool is_full = view.states == 6 && view.stride == lane_count;
+  bool is_full = view.states == 6;
   const int end = view.last < view.intervals ? view.last + 1 : view.last;
   for (int i = view.first; is_full && i <= end; ++i) is_full = view.state_counts[i] == 6;
-  return is_full ? kkt_of<1, 6>(view) : kkt_of<0, 0>(view);
+  if (is_full && view.stride == lane_count) return kkt_of<1, 6>(view);
+  if (is_full && view.stride == 2 * lane_count) return kkt_of<2, 6>(view);
+  return kkt_of<0, 0>(view);
 }
 
 /// Rows in parts of which one is all there is, or as many as it takes.
