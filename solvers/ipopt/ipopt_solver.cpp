@@ -148,7 +148,7 @@ void IpoptSolver::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'ipopt': " + reason);
   capacity_ = ocp.capacity();
   scratch_.assign(ocp.scratch_size(), 0.0);
-  judge_ = StageQp(capacity_, OcpNlp::stages_at_once);
+  judge_ = StageQp(capacity_, OcpNlp::window);
   guess_ = best_ = Iterate(capacity_);
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);
@@ -205,6 +205,7 @@ void IpoptSolver::keep_if_better(const PrimalDual& iterate) noexcept {
   const double residual = seen_kkt_.largest();
   if (!(residual <= options_.tolerance || residual < best_kkt_.largest())) return;
   best_kkt_ = seen_kkt_;
+  best_objective_ = nlp_->objective();
   nlp_->exchange_judged(best_);
 }
 
@@ -249,19 +250,21 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   return best_kkt_.largest() <= near_solution ? Ending::near : Ending::lost;
 }
 
-void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
+/// True where the point is the best iterate, with the report of that.
+bool IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
   nlp_->take(ocp);
   // The guess is the first candidate, with the initial state that is given.
   guess_ = point;
   if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), guess_.state(0));
   Report of_guess;
   judge(ocp, guess_, judge_, scratch_, of_guess);
-  if (!std::isfinite(of_guess.objective)) return;
+  if (!std::isfinite(of_guess.objective)) return false;
   best_ = guess_;
   best_kkt_ = of_guess.kkt;
+  best_objective_ = of_guess.objective;
   if (nlp_->has_empty_bounds()) {
     report.status = Status::infeasible;
-    return;
+    return false;
   }
   const bool warm =
       options_.warm_start && (largest_costate(ocp, guess_) > 0.0 || largest_bound_multiplier(ocp, guess_) > 0.0);
@@ -307,7 +310,11 @@ void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
       report.status = Status::stalled;
       break;
   }
-  if (report.status != Status::infeasible && is_finite(ocp, best_)) std::swap(point, best_);
+  if (report.status == Status::infeasible || !is_finite(ocp, best_)) return false;
+  std::swap(point, best_);
+  report.objective = best_objective_;
+  report.kkt = best_kkt_;
+  return true;
 }
 
 Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
@@ -317,6 +324,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
   iterations_ = 0;
   backend_us_ = 0.0;
   stopped_late_ = false;
+  bool is_judged = false;
   try {
     std::unique_lock hold(backend_lock(), std::defer_lock);
     if (deadline == Clock::time_point::max()) {
@@ -326,7 +334,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     }
     if (hold.owns_lock()) {
       nlp_->set_spectator(this);
-      improve(ocp, point, report);
+      is_judged = improve(ocp, point, report);
       nlp_->release();
       if (report.status == Status::bad_input) return report;
     }
@@ -338,7 +346,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     report.status = Status::stalled;
   }
   report.iterations = iterations_;
-  judge(ocp, point, judge_, scratch_, report);
+  if (!is_judged) judge(ocp, point, judge_, scratch_, report);
   return std::isfinite(report.objective) ? report : Report{};
 }
 

@@ -58,15 +58,15 @@ OcpNlp::OcpNlp(const Ocp& ocp, Curvature curvature)
       scratch_(ocp.scratch_size()),
       trial_(ocp.capacity()),
       defects_(static_cast<std::size_t>(ocp.capacity().intervals) * ocp.capacity().states),
-      pieces_(ocp.capacity(), stages_at_once + 1),
+      pieces_(ocp.capacity(), window),
       linear_(ocp.capacity()) {}
 
 void OcpNlp::take(const Ocp& ocp) {
   ocp_ = &ocp;
   evaluated_.is_known = linearised_.is_known = false;
   if (nlp_.take_structure(ocp)) {
-    for (auto* vector : {&lower_, &upper_, &start_.z, &start_.multipliers.of_bounds, &start_lower_, &start_upper_,
-                         &seen_.z, &seen_.multipliers.of_bounds, &evaluated_.z, &linearised_.z, &gradient_, &clipped_})
+    for (auto* vector : {&lower_, &upper_, &start_.z, &start_lower_, &start_upper_, &seen_.z, &evaluated_.z,
+                         &linearised_.z, &gradient_, &clipped_})
       vector->resize(nlp_.variables());
     for (auto* vector : {&start_.multipliers.of_constraints, &seen_.multipliers.of_constraints, &constraints_,
                          &weighted_})
@@ -76,8 +76,14 @@ void OcpNlp::take(const Ocp& ocp) {
   }
   nlp_.bounds(ocp, lower_.data(), upper_.data());
   any_fixed_ = false;
-  for (std::size_t j = 0; j < lower_.size(); ++j) any_fixed_ = any_fixed_ || lower_[j] == upper_[j];
-  for (auto* vector : {&seen_lower_, &seen_upper_}) vector->assign(nlp_.variables(), 0.0);
+  bounded_.clear();
+  for (int j = 0; j < variables(); ++j) {
+    if (!std::isfinite(lower_[j]) && !std::isfinite(upper_[j])) continue;
+    bounded_.push_back(j);
+    any_fixed_ |= lower_[j] == upper_[j];
+  }
+  for (auto* vector : {&seen_lower_, &seen_upper_, &seen_.multipliers.of_bounds, &start_.multipliers.of_bounds})
+    vector->assign(variables(), 0.0);
 }
 
 bool OcpNlp::has_empty_bounds() const noexcept {
@@ -99,9 +105,9 @@ void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
   std::vector<double>& z = start_.z;
   Multipliers& multipliers = start_.multipliers;
   nlp_.read(*ocp_, point, z.data(), multipliers.of_constraints.data(), multipliers.of_bounds.data());
-  for (std::size_t j = 0; j < z.size(); ++j) {
-    start_lower_[j] = start_upper_[j] = 1.0;
-    if (barrier <= 0.0) continue;
+  for (auto* vector : {&start_lower_, &start_upper_}) std::fill(vector->begin(), vector->end(), 1.0);
+  if (barrier <= 0.0) return;
+  for (const int j : bounded_) {
     const bool has_lower = std::isfinite(lower_[j]), has_upper = std::isfinite(upper_[j]);
     // A bound claimed as active stays close, the multiplier of one that is far is small: both on the central path.
     const double room = upper_[j] - lower_[j];
@@ -134,8 +140,11 @@ bool OcpNlp::evaluate_at(const double* z, unsigned visit) noexcept {
   if (evaluated_.is_at(z, visit)) return evaluated_.is_sound;
   evaluated_.move_to(z, visit);
   nlp_.write(*ocp_, z, nullptr, nullptr, trial_);
-  objective_ = ocp_->evaluate(trial_, defects_.data(), scratch_);
-  nlp_.constraints(*ocp_, defects_.data(), constraints_.data());
+  // Where all states are as many as there is room for, the defects are the constraints.
+  const bool is_full = constraints() == ocp_->intervals() * ocp_->capacity().states;
+  double* const defects = is_full ? constraints_.data() : defects_.data();
+  objective_ = ocp_->evaluate(trial_, defects, scratch_);
+  if (!is_full) nlp_.constraints(*ocp_, defects, constraints_.data());
   evaluated_.is_sound = std::isfinite(objective_) && all_finite(constraints_);
   return evaluated_.is_sound;
 }
@@ -160,13 +169,14 @@ double OcpNlp::linearise(const double* z, const double* multipliers, const doubl
   const int N = ocp_->intervals();
   double objective = 0.0;
   is_judged_ = false;
-  for (int first = 0; first <= N; first += stages_at_once) {
-    const StageRange piece{first, std::min(first + stages_at_once - 1, N)};
-    pieces_.look_at(first);
+  for (StageRange piece{0, 0}; piece.first <= N; piece.first = piece.last + 1) {
     // With the stage behind them, which their equations lead to.
-    nlp_.write(*ocp_, {first, std::min(piece.last + 1, N)}, z, multipliers, bound_multipliers, linear_);
+    const int behind = std::min(piece.first + pieces_.window() - 1, N);
+    piece.last = behind < N ? behind - 1 : N;
+    pieces_.look_at(piece.first);
+    nlp_.write(*ocp_, {piece.first, behind}, z, multipliers, bound_multipliers, linear_);
     objective += ocp_->linearise(piece, linear_, hessian, pieces_, scratch_);
-    if (piece.last < N) pieces_.set_sizes(piece.last + 1, ocp_->state_count(piece.last + 1), 0);
+    if (piece.last < N) pieces_.set_sizes(behind, ocp_->state_count(behind), 0);
     take(piece);
   }
   return objective;
@@ -252,7 +262,7 @@ void OcpNlp::exchange_judged(Iterate& point) noexcept {
 double OcpNlp::complementarity_gap() const noexcept {
   const std::vector<double>&z = linearised_.z, &multipliers = linear_iterate_->multipliers.of_bounds;
   double gap = 0.0;
-  for (std::size_t j = 0; j < z.size(); ++j) {
+  for (const int j : bounded_) {
     if (multipliers[j] > 0.0) gap += multipliers[j] * (upper_[j] - z[j]);
     if (multipliers[j] < 0.0) gap += multipliers[j] * (lower_[j] - z[j]);
   }
@@ -372,7 +382,7 @@ void OcpNlp::finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double* 
   forget_seen();
   std::copy_n(z, variables(), seen_.z.begin());
   std::copy_n(multipliers, constraints(), seen_.multipliers.of_constraints.begin());
-  for (int j = 0; j < variables(); ++j) seen_.multipliers.of_bounds[j] = upper_multipliers[j] - lower_multipliers[j];
+  for (const int j : bounded_) seen_.multipliers.of_bounds[j] = upper_multipliers[j] - lower_multipliers[j];
   spectator_->see_last(seen_);
 }
 
@@ -396,14 +406,14 @@ void OcpNlp::read_iterate() {
   const auto z_L = scaling->apply_vector_scaling_x_LU(*scaled->Px_L(), now->z_L(), *space);
   const auto z_U = scaling->apply_vector_scaling_x_LU(*scaled->Px_U(), now->z_U(), *space);
   auto& [of_constraints, of_bounds] = seen_.multipliers;
-  std::fill(of_constraints.begin(), of_constraints.end(), 0.0);
+  seen_.tag = now->GetTag();
   adapter->ResortX(*x, seen_.z.data());
   adapter->ResortG(*y_c, *y_d, of_constraints.data());
   adapter->ResortBnds(*z_L, seen_lower_.data(), *z_U, seen_upper_.data());
   const double factor = scaling->unapply_obj_scaling(1.0);
+  for (const int j : bounded_) of_bounds[j] = factor * (seen_upper_[j] - seen_lower_[j]);
+  if (factor == 1.0) return;
   for (double& multiplier : of_constraints) multiplier *= factor;
-  for (std::size_t j = 0; j < of_bounds.size(); ++j) of_bounds[j] = factor * (seen_upper_[j] - seen_lower_[j]);
-  seen_.tag = now->GetTag();
 }
 
 bool OcpNlp::intermediate_callback(Ipopt::AlgorithmMode mode, Ipopt::Index iteration, double, double, double, double,

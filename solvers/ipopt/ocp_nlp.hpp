@@ -47,8 +47,9 @@ class Spectator {
 /// multipliers and the judgement of the iterate.
 class OcpNlp final : public Ipopt::TNLP {
  public:
-  /// Of a long horizon, as many as a processor's cache has room for.
-  static constexpr int stages_at_once = 16;
+  /// Of a long horizon, as many stages as a processor's cache has room for, the one behind a piece among them: pieces
+  /// are those of the core's `judge`, and so are their sums.
+  static constexpr int window = 16;
 
   OcpNlp(const Ocp& ocp, Curvature curvature);
 
@@ -146,6 +147,7 @@ class OcpNlp final : public Ipopt::TNLP {
   Spectator* spectator_ = nullptr;
   SparseNlp nlp_;
   std::vector<double> lower_, upper_;
+  std::vector<int> bounded_;  ///< variables that have a bound
   PrimalDual start_;
   std::vector<double> start_lower_, start_upper_;  ///< multipliers of bounds as Ipopt has them, none of them negative
   /// Where Ipopt has its iterates, from the first that it shows to its end.
