@@ -162,8 +162,8 @@ void RheProblem::drop_first_interval() noexcept {
 std::size_t RheProblem::cost_scratch_size() const noexcept {
   const std::size_t nodes = static_cast<std::size_t>(capacity().intervals) + 1, outputs = output_row_, ny = ny_,
                     width = padded(nx());
-  // Of all nodes Jacobians, outputs and their pulls, multipliers, states and Hessians, and what the model needs; of one,
-  // the kernels' room and three rows of outputs.
+  // Of all nodes Jacobians, outputs and their pulls, multipliers, states and Hessians, and what the model needs; of
+  // one, the kernels' room and three rows of outputs.
   return nodes * (ny * width + 2 * outputs + ny + nx() + static_cast<std::size_t>(nx()) * nx()) +
          model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 16;
 }

@@ -68,8 +68,8 @@ void OcpNlp::take(const Ocp& ocp) {
     for (auto* vector : {&lower_, &upper_, &start_.z, &start_lower_, &start_upper_, &seen_.z, &evaluated_.z,
                          &linearised_.z, &gradient_, &clipped_})
       vector->resize(nlp_.variables());
-    for (auto* vector : {&start_.multipliers.of_constraints, &seen_.multipliers.of_constraints, &constraints_,
-                         &weighted_})
+    for (auto* vector :
+         {&start_.multipliers.of_constraints, &seen_.multipliers.of_constraints, &constraints_, &weighted_})
       vector->resize(nlp_.constraints());
     jacobian_.resize(nlp_.jacobian().entries());
     for (auto* vector : {&hessian_, &hessian_part_}) vector->resize(nlp_.hessian().entries());

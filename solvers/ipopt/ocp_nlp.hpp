@@ -171,8 +171,8 @@ class OcpNlp final : public Ipopt::TNLP {
   Place linearised_;
   const PrimalDual* linear_iterate_ = nullptr;  ///< whose multipliers were taken
   Ipopt::TaggedObject::Tag linear_tag_ = 0;     ///< its number, where it is at this place itself
-  StageQp pieces_;   ///< of the passage under way; only the vectors are kept
-  Iterate linear_;   ///< the point; with its multipliers as long as it is judged
+  StageQp pieces_;                              ///< of the passage under way; only the vectors are kept
+  Iterate linear_;                              ///< the point; with its multipliers as long as it is judged
   std::vector<double> gradient_, jacobian_, hessian_;
   KktResidual linear_kkt_;
   double linear_objective_ = 0.0;

@@ -274,7 +274,7 @@ struct RandomCosts {
   std::vector<int> control_counts;
   AlignedDoubles H, h, values, references, weights, turns, inverse_turns, y, predicted, jacobians;
   AlignedDoubles u, input_weights;
-  std::vector<double> room, pulls;  ///< of the latter none: H holds nothing yet
+  std::vector<double> room, pulls;   ///< of the latter none: H holds nothing yet
   std::vector<unsigned char> clean;  ///< empty: of no stage
 
   explicit RandomCosts(RandomQp& random)
@@ -333,7 +333,7 @@ struct RandomCosts {
         view(matrices, vectors, false),
         {vehicle_states, outputs, inputs, y.data(), u.data(), predicted.data(), jacobians.data(), weights.data(),
          input_weights.data(), turns.data(), inverse_turns.data(), values.data(), room.data(),
-         clean.empty() ? nullptr : clean.data(), pulls.empty() ? nullptr : pulls.data()},
+         pulls.empty() ? nullptr : pulls.data(), clean.empty() ? nullptr : clean.data()},
         0, N);
   }
   double track(const ProgramKernels& kernels, bool matrices, bool vectors, bool bends) {

@@ -393,8 +393,8 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
     const bool has_inputs = i < view.intervals;
     const int used = view.states + (has_inputs ? view.control_counts[i] : 0);
     const bool is_clean = measured.is_clean && measured.is_clean[i] != 0;
-    total += write_node<matrices, vectors, Width>(measured, i - first, y, predicted, J, view.stride, used, is_clean, H,
-                                                  h);
+    total +=
+        write_node<matrices, vectors, Width>(measured, i - first, y, predicted, J, view.stride, used, is_clean, H, h);
     if (vectors && has_inputs) {
       for (int k = first_input / lane_count * lane_count; k < end_of_inputs; k += lane_count) {
         const Lanes seen = load(inputs + k), weight = seen == seen ? 2.0 * load(measured.input_weights + k) : Lanes{};

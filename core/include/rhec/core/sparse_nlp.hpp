@@ -80,7 +80,7 @@ class RHEC_EXPORT SparseNlp {
 
  private:
   std::vector<std::int32_t> signature_, next_signature_;
-  std::vector<int> words_;                               ///< where in the signature each interval begins
+  std::vector<int> words_;                                 ///< where in the signature each interval begins
   std::vector<std::uint8_t> state_flags_, control_flags_;  ///< of the interval being marked
   std::vector<int> state_starts_, control_starts_, constraint_starts_, state_counts_, control_counts_;
   Pattern jacobian_, hessian_;
