@@ -17,6 +17,8 @@ namespace rhec {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+/// Intervals that are integrated at once, and whose rows stay in the processor's cache until their defects are known.
+constexpr int evaluated_at_once = 64;
 
 }  // namespace
 
@@ -144,11 +146,17 @@ void HorizonProblem::set_decisions(Iterate& point, const double* inputs, const d
 void HorizonProblem::gather(const Iterate& point, StageRange range, double* x, double* u, double* p,
                             double* p_end) const noexcept {
   for (int i = range.first; i <= range.last; ++i) {
-    const double* s = point.state(i);
-    std::copy(s, s + nx_, x);
-    inputs_on(point, i, u);
-    parameters_on(point, i, p_end);
-    for (int j = 0; j < np_; ++j) p[j] = ramp_[j] ? s[nx_ + j] : p_end[j];
+    const double *s = point.state(i), *w = point.control(i);
+    for (int j = 0; j < nx_; ++j) x[j] = s[j];
+    if (is_direct())
+      for (int j = 0; j < nu_; ++j) u[j] = w[j];
+    else
+      inputs_on(point, i, u);
+    for (int j = 0; j < np_; ++j) {
+      const int control = control_of_channel(i, j);
+      p_end[j] = control >= 0 ? w[control] : s[nx_ + j];
+      p[j] = ramp_[j] ? s[nx_ + j] : p_end[j];
+    }
     x += nx_;
     u += nu_;
     p += np_;
@@ -173,27 +181,29 @@ struct Rows {
 
 double HorizonProblem::evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
                                        std::span<double> scratch) const noexcept {
-  if (defects) {
-    const Rows rows(Scratch(scratch.data()), intervals_, nx_, nu_, np_);
-    gather(point, {0, intervals_ - 1}, rows.x, rows.u, rows.p, rows.p_end);
+  for (int first = 0; defects && first < intervals_; first += evaluated_at_once) {
+    const StageRange piece{first, std::min(first + evaluated_at_once, intervals_) - 1};
+    const int count = piece.last - first + 1;
+    const Rows rows(Scratch(scratch.data()), count, nx_, nu_, np_);
+    gather(point, piece, rows.x, rows.u, rows.p, rows.p_end);
     Model::Intervals request;
-    request.count = intervals_;
+    request.count = count;
     request.states = rows.x;
     request.inputs = rows.u;
     request.parameters = rows.p;
     request.parameters_end = any_ramp_ ? rows.p_end : nullptr;
-    request.durations = durations_.data();
+    request.durations = durations_.data() + first;
     request.substeps = substeps_;
     request.next_states = rows.next;
     model_->integrate(request);
-    for (int i = 0; i < intervals_; ++i) {
-      double* defect = defects + i * capacity_.states;
-      const double* s_next = point.state(i + 1);
-      for (int j = 0; j < nx_; ++j) defect[j] = rows.next[i * nx_ + j] - s_next[j];
-      for (int c = 0; c < channels_; ++c) {
-        const int control = control_of_channel(i, c);
-        defect[nx_ + c] = (control >= 0 ? point.control(i)[control] : point.state(i)[nx_ + c]) - s_next[nx_ + c];
-      }
+    const double* next = rows.next;
+    for (int i = first; i <= piece.last; ++i, next += nx_) {
+      double* defect = defects + static_cast<std::ptrdiff_t>(i) * capacity_.states;
+      const double *s = point.state(i), *w = point.control(i), *s_next = point.state(i + 1);
+      const int* control_of = control_index_.data() + static_cast<std::ptrdiff_t>(i) * channels_;
+      for (int j = 0; j < nx_; ++j) defect[j] = next[j] - s_next[j];
+      for (int c = 0; c < channels_; ++c)
+        defect[nx_ + c] = (control_of[c] >= 0 ? w[control_of[c]] : s[nx_ + c]) - s_next[nx_ + c];
     }
   }
   if (stage_costs) std::fill_n(stage_costs, intervals_ + 1, 0.0);

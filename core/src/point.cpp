@@ -8,12 +8,15 @@ namespace rhec {
 bool is_finite(const Ocp& ocp, const Iterate& point) noexcept {
   double rest = 0.0;  // stays 0 as long as all is finite
   const auto check = [&](const double* row, int n) {
-    for (int j = 0; j < n; ++j) rest += 0.0 * row[j];
+    double of_row = 0.0;  // no row waits for another
+    for (int j = 0; j < n; ++j) of_row += 0.0 * row[j];
+    rest += of_row;
   };
   for (int i = 0; i <= ocp.intervals(); ++i) {
-    for (const double* row : {point.state(i), point.costate(i), point.state_bound(i)}) check(row, ocp.state_count(i));
-    if (i < ocp.intervals())
-      for (const double* row : {point.control(i), point.control_bound(i)}) check(row, ocp.control_count(i));
+    const int n = ocp.state_count(i), m = i < ocp.intervals() ? ocp.control_count(i) : 0;
+    for (const double* row : {point.state(i), point.costate(i), point.state_bound(i)}) check(row, n);
+    if (m == 0) continue;
+    for (const double* row : {point.control(i), point.control_bound(i)}) check(row, m);
   }
   return rest == 0.0;
 }
@@ -46,16 +49,16 @@ bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scra
 double largest_costate(const Ocp& ocp, const Iterate& point) noexcept {
   double largest = 0.0;
   for (int i = 1; i <= ocp.intervals(); ++i)
-    for (int j = 0; j < ocp.state_count(i); ++j) largest = std::max(largest, std::abs(point.costate(i)[j]));
+    for (int j = 0, n = ocp.state_count(i); j < n; ++j) largest = std::max(largest, std::abs(point.costate(i)[j]));
   return largest;
 }
 
 double largest_bound_multiplier(const Ocp& ocp, const Iterate& point) noexcept {
   double largest = 0.0;
   for (int i = 0; i <= ocp.intervals(); ++i) {
-    for (int j = 0; j < ocp.state_count(i); ++j) largest = std::max(largest, std::abs(point.state_bound(i)[j]));
-    if (i < ocp.intervals())
-      for (int j = 0; j < ocp.control_count(i); ++j) largest = std::max(largest, std::abs(point.control_bound(i)[j]));
+    const int n = ocp.state_count(i), m = i < ocp.intervals() ? ocp.control_count(i) : 0;
+    for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(point.state_bound(i)[j]));
+    for (int j = 0; j < m; ++j) largest = std::max(largest, std::abs(point.control_bound(i)[j]));
   }
   return largest;
 }

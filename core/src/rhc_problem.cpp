@@ -185,6 +185,7 @@ std::size_t RhcProblem::cost_scratch_size() const noexcept {
 double RhcProblem::cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept {
   CostView view = cost_view();
   view.h = Scratch(scratch.data()).rest();  // gradients that nobody asks for
+  if (is_direct() && !stage_costs) return write_costs({0, intervals()}, point, view);
   double total = 0.0;
   for (int i = 0; i <= intervals(); ++i) {
     const double part = write_costs({i, i}, point, view);

@@ -17,6 +17,31 @@
 
 namespace rhec {
 
+namespace {
+
+/// Of the outputs at the nodes of a range, each weighted by its multiplier.
+void add_curvature_of_outputs(const Model& model, StageRange range, const Iterate& point, const double* multipliers,
+                              const CostView& view, double* rest) noexcept {
+  const std::ptrdiff_t count = range.last - range.first + 1, n = model.state_count(), stride = view.stride,
+                       wide = view.states + view.controls;
+  Scratch memory(rest);
+  double *states = memory.take(count * n), *hessians = memory.take(count * n * n);
+  for (std::ptrdiff_t i = 0; i < count; ++i)
+    for (int j = 0; j < n; ++j) states[i * n + j] = point.state(range.first)[i * stride + j];
+  Model::Nodes request;
+  request.count = static_cast<int>(count);
+  request.states = states;
+  request.multipliers = multipliers;
+  request.hessians = hessians;
+  model.observe(request);
+  double* H = view.H + range.first * wide * stride;
+  for (std::ptrdiff_t i = 0; i < count; ++i, H += wide * stride)
+    for (int c = 0; c < n; ++c)
+      for (int r = 0; r < n; ++r) H[c * stride + r] += *hessians++;
+}
+
+}  // namespace
+
 double angle_difference(double a, double b) noexcept {
   const double difference = a - b;
   return std::abs(difference) <= std::numbers::pi ? difference : std::remainder(difference, 2.0 * std::numbers::pi);
@@ -137,10 +162,10 @@ void RheProblem::drop_first_interval() noexcept {
 std::size_t RheProblem::cost_scratch_size() const noexcept {
   const std::size_t nodes = static_cast<std::size_t>(capacity().intervals) + 1, outputs = output_row_, ny = ny_,
                     width = padded(nx());
-  // Of all nodes Jacobians, outputs, multipliers, states and Hessians, and what the model needs; of one, the kernels'
-  // room and three rows of outputs.
-  return nodes * (ny * width + outputs + ny + nx() + static_cast<std::size_t>(nx()) * nx()) +
-         model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 8;
+  // Of all nodes Jacobians, outputs and their pulls, multipliers, states and Hessians, and what the model needs; of
+  // one, the kernels' room and three rows of outputs.
+  return nodes * (ny * width + 2 * outputs + ny + nx() + static_cast<std::size_t>(nx()) * nx()) +
+         model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 16;
 }
 
 void RheProblem::residual(int node, const double* predicted, double* difference) const noexcept {
@@ -294,10 +319,10 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
   double *jacobian_rows = memory.take(count * ny_ * padded(nx())), *output_rows = memory.take(count * output_row_),
          *room = memory.take(std::ptrdiff_t{2} * output_row_);
   const auto [predicted, jacobians] = observe(range, point, known, output_rows, jacobian_rows, memory.rest());
-  if (!setup_.robust.empty() || hessian == Hessian::exact) {
-    for (int i = range.first; known && i <= range.last; ++i) known->is_clean[i] = 0;
+  const bool is_exact = hessian == Hessian::exact && view.H, is_robust = !setup_.robust.empty();
+  if (known && (is_exact || is_robust)) std::fill_n(known->is_clean.begin() + range.first, count, std::uint8_t{0});
+  if (is_robust || (is_exact && !view.h))
     return write_bent_measurements(range, point, hessian, view, predicted, jacobians, memory.rest());
-  }
   MeasurementView measured{};
   measured.vehicle_states = nx();
   measured.output_count = ny_;
@@ -313,8 +338,17 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
   measured.values = point.row(0);
   measured.room = room;
   if (known) measured.is_clean = known->is_clean.data();
+  if (is_exact) {
+    measured.pulls = memory.take(count * output_row_);
+    if (range.last == intervals()) program_kernels().clear_costs(view, range.last, range.last);
+  }
   const double total = program_kernels().write_measurements(view, measured, range.first, range.last);
-  if (known && view.H) {
+  if (is_exact) {
+    double* const multipliers = memory.take(count * ny_);
+    for (std::ptrdiff_t i = 0; i < count; ++i)
+      for (int j = 0; j < ny_; ++j) multipliers[i * ny_ + j] = measured.pulls[i * output_row_ + j];
+    add_curvature_of_outputs(model(), range, point, multipliers, view, memory.rest());
+  } else if (known && view.H) {
     std::fill_n(known->is_clean.begin() + range.first, count, std::uint8_t{1});
     // Of the last node, only the rows of states were cleared.
     known->is_clean[intervals()] = 0;
@@ -322,7 +356,7 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
   return total;
 }
 
-/// The same with losses that bend, or with the curvature of the outputs.
+/// The same with losses that bend.
 double RheProblem::write_bent_measurements(StageRange range, const Iterate& point, Hessian hessian,
                                            const CostView& view, const double* predicted, const double* jacobians,
                                            double* rest) const noexcept {
@@ -336,9 +370,7 @@ double RheProblem::write_bent_measurements(StageRange range, const Iterate& poin
   Scratch memory(rest);
   double *difference = memory.take(output_row_), *weight = memory.take(output_row_),
          *curvature = memory.take(output_row_), *w = memory.take(output_row_),
-         *multipliers = memory.take(static_cast<std::ptrdiff_t>(count) * ny_),
-         *states = memory.take(static_cast<std::ptrdiff_t>(count) * n),
-         *hessians = memory.take(static_cast<std::ptrdiff_t>(count) * n * n);
+         *multipliers = memory.take(static_cast<std::ptrdiff_t>(count) * ny_);
   const auto H_of = [&](int i) {
     return view.H ? view.H + static_cast<std::ptrdiff_t>(i) * (ns + capacity().controls) * stride() : nullptr;
   };
@@ -373,17 +405,7 @@ double RheProblem::write_bent_measurements(StageRange range, const Iterate& poin
       }
     }
   }
-  if (!exact) return total;
-  for (int i = 0; i < count; ++i) std::copy_n(point.state(range.first + i), n, states + i * n);
-  Model::Nodes bent;
-  bent.count = count;
-  bent.states = states;
-  bent.multipliers = multipliers;
-  bent.hessians = hessians;
-  model().observe(bent);
-  for (int i = 0; i < count; ++i)
-    for (int c = 0; c < n; ++c)
-      for (int r = 0; r < n; ++r) H_of(range.first + i)[c * stride() + r] += hessians[(i * n + c) * n + r];
+  if (exact) add_curvature_of_outputs(model(), range, point, multipliers, view, memory.rest());
   return total;
 }
 

@@ -1,10 +1,23 @@
 #include "rhec/core/sparse_nlp.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 namespace rhec {
+namespace {
+
+/// Of rows, which are short.
+void copy(const double* from, int count, double* to) noexcept { std::memcpy(to, from, count * sizeof(double)); }
+
+/// Adds the columns of another stage, which are those of the stage before in rows further down.
+void repeat_columns(SparseNlp::Pattern& pattern, int columns, int rows) {
+  const auto first = static_cast<std::ptrdiff_t>(pattern.starts.size()) - 1 - columns;
+  const int begin = pattern.starts[first], end = pattern.starts.back();
+  for (int entry = begin; entry < end; ++entry) pattern.row_indices.push_back(pattern.row_indices[entry] + rows);
+  for (int c = 1; c <= columns; ++c) pattern.starts.push_back(pattern.starts[first + c] + end - begin);
+}
+
+}  // namespace
 
 bool SparseNlp::take_structure(const Ocp& ocp) {
   const int N = ocp.intervals();
@@ -25,13 +38,16 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
       next_signature_.push_back(static_cast<std::int32_t>((eight * 0x0102'0408'1020'4080U) >> 56));
     }
   };
+  words_.clear();
   for (int i = 0; i < N; ++i) {
     const int n = ocp.state_count(i), m = ocp.control_count(i), next = ocp.state_count(i + 1);
+    words_.push_back(static_cast<int>(next_signature_.size()));
     next_signature_.insert(next_signature_.end(), {m, next});
     ocp.mark_dynamics(i, state_flags_.data(), control_flags_.data());
     pack(state_flags_.data(), next * n);
     pack(control_flags_.data(), next * m);
   }
+  words_.push_back(static_cast<int>(next_signature_.size()));
   if (next_signature_ == signature_) return false;
   std::swap(signature_, next_signature_);
 
@@ -61,17 +77,25 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
     pattern->row_indices.clear();
   }
   jacobian_sources_.clear();
+  hessian_sources_.clear();
   const auto end_column = [](Pattern& pattern) {
     pattern.starts.push_back(static_cast<int>(pattern.row_indices.size()));
   };
   const auto add = [&](int to_row, int source) {
     jacobian_.row_indices.push_back(to_row);
-    jacobian_sources_.push_back(source);
+    jacobian_sources_.offsets.push_back(source);
   };
   const int ns = capacity.states, stride = capacity.row();
   for (int i = 0; i <= N; ++i) {
     const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < N ? control_counts_[i] : 0;
     const int next = i < N ? state_counts_[i + 1] : 0;
+    if (is_like_before(i)) {
+      repeat_columns(jacobian_, n + m, n);
+      repeat_columns(hessian_, n + m, n + m);
+      jacobian_sources_.repeat_stage();
+      hessian_sources_.repeat_stage();
+      continue;
+    }
     const int stage = n > 0 ? state_starts_[i] : (i < N ? control_starts_[i] : variable);
     if (i < N) ocp.mark_dynamics(i, state_flags_.data(), control_flags_.data());
     const auto add_dynamics = [&](const std::uint8_t* flags, int column, int first) {
@@ -79,7 +103,7 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
         if (flags[column * next + r]) add(constraint_starts_[i] + r, r * stride + first + column);
     };
     for (int c = 0; c < n; ++c) {
-      if (i > 0) add(constraint_starts_[i - 1] + c, -1);
+      if (i > 0) add(constraint_starts_[i - 1] + c, 0);  // s_i itself: `jacobian` knows
       add_dynamics(state_flags_.data(), c, 0);
       end_column(jacobian_);
     }
@@ -87,47 +111,93 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
       add_dynamics(control_flags_.data(), c, ns);
       end_column(jacobian_);
     }
+    const auto place = [&](int k) { return k < n ? k : ns + k - n; };  // among the stage's rows
     for (int c = 0; c < n + m; ++c) {
-      for (int r = c; r < n + m; ++r) hessian_.row_indices.push_back(stage + r);
+      for (int r = c; r < n + m; ++r) {
+        hessian_.row_indices.push_back(stage + r);
+        hessian_sources_.offsets.push_back(place(c) * stride + place(r));
+      }
       end_column(hessian_);
     }
+    jacobian_sources_.end_stage();
+    hessian_sources_.end_stage();
   }
   return true;
 }
 
+/// Whether a stage's columns are those of the stage before, further down: of equal stages, to and from equal ones.
+bool SparseNlp::is_like_before(int i) const noexcept {
+  const int N = static_cast<int>(control_counts_.size());
+  if (i < 2 || i == N) return false;
+  const int n = state_counts_[i];
+  if (state_counts_[i - 2] != n || state_counts_[i - 1] != n || state_counts_[i + 1] != n) return false;
+  const auto words = signature_.begin();
+  return std::equal(words + words_[i - 1], words + words_[i], words + words_[i], words + words_[i + 1]);
+}
+
+void SparseNlp::Sources::clear() noexcept {
+  offsets.clear();
+  firsts.clear();
+  starts.assign(1, 0);
+}
+
+/// What was added to the list is that of another stage.
+void SparseNlp::Sources::end_stage() {
+  const int shared = firsts.empty() ? 0 : firsts.back() + starts.back() - starts[starts.size() - 2];
+  firsts.push_back(shared);
+  starts.push_back(starts.back() + static_cast<int>(offsets.size()) - shared);
+}
+
+/// Another stage like the one before.
+void SparseNlp::Sources::repeat_stage() {
+  firsts.push_back(firsts.back());
+  starts.push_back(2 * starts.back() - starts[starts.size() - 2]);
+}
+
+void SparseNlp::Sources::gather(const double* rows, int stage, double* __restrict values) const noexcept {
+  const int* const from = offsets.data() + firsts[stage];
+  const int count = starts[stage + 1] - starts[stage];
+  values += starts[stage];
+  for (int k = 0; k < count; ++k) values[k] = rows[from[k]];
+}
+
+// State and control of a stage follow each other in z, and in a row where the state is of the capacity's size.
+
 void SparseNlp::read(const Ocp& ocp, const Iterate& point, double* z, double* multipliers,
                      double* bound_multipliers) const noexcept {
-  const auto copy = [](const double* from, int count, double* to, int start) {
-    if (!to || start < 0) return;
-    for (int j = 0; j < count; ++j) to[start + j] = from[j];
-  };
+  const int ns = ocp.capacity().states;
   for (int i = 0; i <= ocp.intervals(); ++i) {
-    copy(point.state(i), state_counts_[i], z, state_starts_[i]);
-    copy(point.state_bound(i), state_counts_[i], bound_multipliers, state_starts_[i]);
-    if (i == ocp.intervals()) break;
-    copy(point.control(i), control_counts_[i], z, control_starts_[i]);
-    copy(point.control_bound(i), control_counts_[i], bound_multipliers, control_starts_[i]);
-    copy(point.costate(i + 1), state_counts_[i + 1], multipliers, constraint_starts_[i]);
+    const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < ocp.intervals() ? control_counts_[i] : 0;
+    const int start = n > 0 ? state_starts_[i] : m > 0 ? control_starts_[i] : 0;
+    const auto take = [&](const double* row, double* to) {
+      if (!to) return;
+      copy(row, n == ns ? n + m : n, to + start);
+      if (n != ns) copy(row + ns, m, to + start + n);
+    };
+    take(point.row(i), z);
+    take(point.bound_row(i), bound_multipliers);
+    if (multipliers && i > 0) copy(point.costate(i), state_counts_[i], multipliers + constraint_starts_[i - 1]);
   }
 }
 
-void SparseNlp::write(const Ocp& ocp, const double* z, const double* multipliers, const double* bound_multipliers,
-                      Iterate& point) const noexcept {
-  const auto copy = [](const double* from, int start, int count, double* to) {
-    if (!from || start < 0) return;
-    for (int j = 0; j < count; ++j) to[j] = from[start + j];
-  };
-  if (ocp.initial_state()) {
-    std::copy_n(ocp.initial_state(), state_counts_[0], point.state(0));
+void SparseNlp::write(const Ocp& ocp, StageRange range, const double* z, const double* multipliers,
+                      const double* bound_multipliers, Iterate& point) const noexcept {
+  const int ns = ocp.capacity().states;
+  if (range.first == 0 && ocp.initial_state()) {
+    copy(ocp.initial_state(), state_counts_[0], point.state(0));
     if (bound_multipliers) std::fill_n(point.state_bound(0), state_counts_[0], 0.0);
   }
-  for (int i = 0; i <= ocp.intervals(); ++i) {
-    copy(z, state_starts_[i], state_counts_[i], point.state(i));
-    copy(bound_multipliers, state_starts_[i], state_counts_[i], point.state_bound(i));
-    if (i == ocp.intervals()) break;
-    copy(z, control_starts_[i], control_counts_[i], point.control(i));
-    copy(bound_multipliers, control_starts_[i], control_counts_[i], point.control_bound(i));
-    copy(multipliers, constraint_starts_[i], state_counts_[i + 1], point.costate(i + 1));
+  for (int i = range.first; i <= range.last; ++i) {
+    const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < ocp.intervals() ? control_counts_[i] : 0;
+    const int start = n > 0 ? state_starts_[i] : m > 0 ? control_starts_[i] : 0;
+    const auto put = [&](const double* from, double* row) {
+      if (!from) return;
+      copy(from + start, n == ns ? n + m : n, row);
+      if (n != ns) copy(from + start + n, m, row + ns);
+    };
+    put(z, point.row(i));
+    put(bound_multipliers, point.bound_row(i));
+    if (multipliers && i > 0) copy(multipliers + constraint_starts_[i - 1], state_counts_[i], point.costate(i));
   }
 }
 
@@ -146,113 +216,43 @@ void SparseNlp::set_costate_0(const StageQp& qp, Iterate& point) noexcept {
 void SparseNlp::bounds(const Ocp& ocp, double* lower, double* upper) const noexcept {
   for (int i = 0; i <= ocp.intervals(); ++i) {
     if (state_starts_[i] >= 0) {
-      std::copy_n(ocp.state_lower(i), state_counts_[i], lower + state_starts_[i]);
-      std::copy_n(ocp.state_upper(i), state_counts_[i], upper + state_starts_[i]);
+      copy(ocp.state_lower(i), state_counts_[i], lower + state_starts_[i]);
+      copy(ocp.state_upper(i), state_counts_[i], upper + state_starts_[i]);
     }
     if (i == ocp.intervals()) break;
-    std::copy_n(ocp.control_lower(i), control_counts_[i], lower + control_starts_[i]);
-    std::copy_n(ocp.control_upper(i), control_counts_[i], upper + control_starts_[i]);
+    copy(ocp.control_lower(i), control_counts_[i], lower + control_starts_[i]);
+    copy(ocp.control_upper(i), control_counts_[i], upper + control_starts_[i]);
   }
 }
 
 void SparseNlp::constraints(const Ocp& ocp, const double* defects, double* c) const noexcept {
-  for (int i = 0; i < ocp.intervals(); ++i)
-    std::copy_n(defects + static_cast<std::ptrdiff_t>(i) * ocp.capacity().states, state_counts_[i + 1],
-                c + constraint_starts_[i]);
+  for (int i = 0; i < ocp.intervals(); ++i, defects += ocp.capacity().states)
+    copy(defects, state_counts_[i + 1], c + constraint_starts_[i]);
 }
 
 void SparseNlp::constraints(const StageQp& qp, StageRange range, double* c) const noexcept {
   for (int i = range.first; i < std::min(range.last + 1, qp.intervals()); ++i)
-    std::copy_n(qp.b(i), state_counts_[i + 1], c + constraint_starts_[i]);
+    copy(qp.b(i), state_counts_[i + 1], c + constraint_starts_[i]);
 }
 
 void SparseNlp::gradient(const StageQp& qp, StageRange range, double* g) const noexcept {
   for (int i = range.first; i <= range.last; ++i) {
-    if (state_starts_[i] >= 0) std::copy_n(qp.q(i), state_counts_[i], g + state_starts_[i]);
-    if (i < qp.intervals()) std::copy_n(qp.r(i), control_counts_[i], g + control_starts_[i]);
+    if (state_starts_[i] >= 0) copy(qp.q(i), state_counts_[i], g + state_starts_[i]);
+    if (i < qp.intervals()) copy(qp.r(i), control_counts_[i], g + control_starts_[i]);
   }
 }
 
 void SparseNlp::jacobian(const StageQp& qp, StageRange range, double* values) const noexcept {
-  const auto gather = [&](const double* F, int column, int columns, bool begin_with_themselves) {
-    const int* const sources = jacobian_sources_.data();
-    for (const int end = column + columns; column < end; ++column) {
-      int entry = jacobian_.starts[column];
-      if (begin_with_themselves) values[entry++] = -1.0;
-      for (const int last = jacobian_.starts[column + 1]; entry < last; ++entry) values[entry] = F[sources[entry]];
-    }
-  };
   for (int i = range.first; i <= range.last; ++i) {
-    if (state_starts_[i] >= 0) gather(qp.F(i), state_starts_[i], state_counts_[i], i > 0);
-    if (i < qp.intervals()) gather(qp.F(i), control_starts_[i], control_counts_[i], false);
+    jacobian_sources_.gather(qp.F(i), i, values);
+    // Columns of states begin with s_i itself, in the equation that leads to it.
+    const int* const starts = jacobian_.starts.data() + state_starts_[i];
+    for (int c = 0; i > 0 && c < state_counts_[i]; ++c) values[starts[c]] = -1.0;
   }
 }
 
 void SparseNlp::hessian(const StageQp& qp, StageRange range, double* values) const noexcept {
-  const int ns = qp.capacity().states;
-  const auto copy = [](const double* from, int count, double* to) {
-    for (int j = 0; j < count; ++j) to[j] = from[j];
-    return to + count;
-  };
-  for (int i = range.first; i <= range.last; ++i) {
-    const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < qp.intervals() ? control_counts_[i] : 0;
-    if (n + m == 0) continue;
-    const double* H = qp.H(i);
-    double* to = values + hessian_.starts[n > 0 ? state_starts_[i] : control_starts_[i]];
-    for (int c = 0; c < n; ++c) {
-      to = copy(H + c * qp.stride() + c, n - c, to);
-      to = copy(H + c * qp.stride() + ns, m, to);
-    }
-    for (int c = 0; c < m; ++c) to = copy(H + (ns + c) * qp.stride() + ns + c, m - c, to);
-  }
-}
-
-void SparseNlp::lagrangian_gradient(const double* gradient, const double* jacobian, const double* multipliers,
-                                    double* sum) const noexcept {
-  const int* const rows = jacobian_.row_indices.data();
-  for (int column = 0, entry = 0; column < jacobian_.columns; ++column) {
-    double pull = gradient[column];
-    for (const int end = jacobian_.starts[column + 1]; entry < end; ++entry)
-      pull += jacobian[entry] * multipliers[rows[entry]];
-    sum[column] = pull;
-  }
-}
-
-void SparseNlp::add_kkt(const Judged& point, KktTerms& terms) const noexcept {
-  // Each largest value and each sum in parts, of which none waits for the others.
-  constexpr int parts = 4;
-  struct Part {
-    double stationarity = 0.0, gradient = 0.0, bound_violation = 0.0, complementarity = 0.0;
-    double rest = 0.0;  // stays 0 as long as all is finite
-  };
-  Part found[parts];
-  const auto take = [](double& largest, double value) { largest = value > largest ? value : largest; };
-  const auto look_at = [&](Part& part, int j) {
-    const double bound = point.bound_multipliers[j], sum = point.lagrangian_gradient[j] + bound;
-    part.rest += 0.0 * sum;
-    take(part.stationarity, std::abs(sum));
-    take(part.gradient, std::abs(point.gradient[j]));
-    take(part.gradient, std::abs(bound));
-    const double below = point.lower[j] - point.z[j], above = point.upper[j] - point.z[j];
-    take(part.bound_violation, below);
-    take(part.bound_violation, -above);
-    // A multiplier at a bound that does not exist is as wrong as it is large.
-    const double gap = std::abs(bound > 0.0 ? above : below);
-    take(part.complementarity, std::abs(bound) * (gap < 1.0 ? gap : 1.0));
-  };
-  int j = 0;
-  for (; j + parts <= variables(); j += parts)
-    for (int k = 0; k < parts; ++k) look_at(found[k], j + k);
-  for (; j < variables(); ++j) look_at(found[0], j);
-  double defect = 0.0, costate = 0.0, rest = 0.0;
-  for (int row = 0; row < constraints(); ++row) {
-    rest += 0.0 * point.constraints[row];
-    take(defect, std::abs(point.constraints[row]));
-    take(costate, std::abs(point.multipliers[row]));
-  }
-  terms.add({rest, defect, 0.0, 0.0, costate});
-  for (const Part& part : found)
-    terms.add({part.stationarity + part.rest, 0.0, part.bound_violation, part.complementarity, part.gradient});
+  for (int i = range.first; i <= range.last; ++i) hessian_sources_.gather(qp.H(i), i, values);
 }
 
 }  // namespace rhec

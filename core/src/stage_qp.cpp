@@ -22,7 +22,8 @@ StageQp::StageQp(const Capacity& capacity, int stages)
       wide_(capacity.states + capacity.controls),
       window_(std::min(stages, capacity.intervals + 1)) {
   const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1, held = static_cast<std::size_t>(window_);
-  for (auto* counts : {&state_counts_, &control_counts_, &carried_counts_}) counts->assign(nodes, 0);
+  // With those of places behind the last stage, which a window that ends there has.
+  for (auto* counts : {&state_counts_, &control_counts_, &carried_counts_}) counts->assign(nodes + held, 0);
   F_.assign(held * capacity.states * stride_, 0.0);
   H_.assign(held * wide_ * stride_, 0.0);
   for (auto* v : {&h_, &b_}) v->assign(held * stride_, 0.0);
@@ -32,17 +33,23 @@ StageQp::StageQp(const Capacity& capacity, int stages)
 }
 
 void StageQp::look_at(int first) noexcept {
-  for (auto* v : {&F_, &H_, &h_, &b_}) std::fill(v->begin(), v->end(), 0.0);
-  std::fill(lower_.begin(), lower_.end(), -infinity);
-  std::fill(upper_.begin(), upper_.end(), infinity);
+  // Each place keeps its contents, and the sizes of the stage that they were of: `set_sizes` clears what is too much.
+  for (auto* counts : {&state_counts_, &control_counts_}) {
+    const auto held = counts->begin() - first_, end = held + window_;
+    if (first > -first_)
+      std::copy_backward(held, end, counts->begin() + first + window_);
+    else
+      std::copy(held, end, counts->begin() + first);
+  }
   first_ = first_bounds_ = -first;
-  const int end = std::min(first + window_, capacity_.intervals + 1);
-  for (auto* counts : {&state_counts_, &control_counts_}) std::fill(counts->begin() + first, counts->begin() + end, 0);
 }
 
 void StageQp::change() noexcept {
   ++changes_;
-  std::fill(carried_counts_.begin(), carried_counts_.end(), 0);
+  if (window_ > 0)
+    std::fill_n(carried_counts_.begin() - first_, window_, 0);
+  else
+    std::fill(carried_counts_.begin(), carried_counts_.end(), 0);
 }
 
 void StageQp::clear(int i) noexcept {

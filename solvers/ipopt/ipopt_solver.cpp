@@ -148,8 +148,8 @@ void IpoptSolver::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'ipopt': " + reason);
   capacity_ = ocp.capacity();
   scratch_.assign(ocp.scratch_size(), 0.0);
-  judge_ = StageQp(capacity_, OcpNlp::stages_at_once);
-  guess_ = best_ = seen_ = Iterate(capacity_);
+  judge_ = StageQp(capacity_, OcpNlp::window);
+  guess_ = best_ = Iterate(capacity_);
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);
 }
@@ -201,11 +201,12 @@ void IpoptSolver::set_run_options(Start start, double barrier) {
 
 /// The best iterate is that of the least residual; among those within the tolerance, the last, whose barrier is least.
 void IpoptSolver::keep_if_better(const PrimalDual& iterate) noexcept {
-  seen_kkt_ = nlp_->write_and_judge(iterate, seen_);
+  seen_kkt_ = nlp_->judge(iterate);
   const double residual = seen_kkt_.largest();
   if (!(residual <= options_.tolerance || residual < best_kkt_.largest())) return;
   best_kkt_ = seen_kkt_;
-  std::swap(best_, seen_);
+  best_objective_ = nlp_->objective();
+  nlp_->exchange_judged(best_);
 }
 
 bool IpoptSolver::see(int iteration, const PrimalDual* iterate) noexcept {
@@ -213,8 +214,8 @@ bool IpoptSolver::see(int iteration, const PrimalDual* iterate) noexcept {
   if (iterate) {
     keep_if_better(*iterate);
     if (seen_kkt_.largest() <= options_.tolerance) {
-      const double gap = nlp_->complementarity_gap(best_);
-      if (gap <= negligible_gap * options_.tolerance * std::abs(nlp_->objective(best_))) return false;
+      if (nlp_->complementarity_gap() <= negligible_gap * options_.tolerance * std::abs(nlp_->objective()))
+        return false;
       if (--spare_iterations_ <= 0) return false;
     }
   }
@@ -249,20 +250,21 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   return best_kkt_.largest() <= near_solution ? Ending::near : Ending::lost;
 }
 
-void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
+/// True where the point is the best iterate, with the report of that.
+bool IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
   nlp_->take(ocp);
-  if (!nlp_->has_sound_bounds()) return;
   // The guess is the first candidate, with the initial state that is given.
   guess_ = point;
   if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), guess_.state(0));
   Report of_guess;
   judge(ocp, guess_, judge_, scratch_, of_guess);
-  if (!std::isfinite(of_guess.objective)) return;
+  if (!std::isfinite(of_guess.objective)) return false;
   best_ = guess_;
   best_kkt_ = of_guess.kkt;
+  best_objective_ = of_guess.objective;
   if (nlp_->has_empty_bounds()) {
     report.status = Status::infeasible;
-    return;
+    return false;
   }
   const bool warm =
       options_.warm_start && (largest_costate(ocp, guess_) > 0.0 || largest_bound_multiplier(ocp, guess_) > 0.0);
@@ -308,7 +310,11 @@ void IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
       report.status = Status::stalled;
       break;
   }
-  if (report.status != Status::infeasible && is_finite(ocp, best_)) std::swap(point, best_);
+  if (report.status == Status::infeasible || !is_finite(ocp, best_)) return false;
+  std::swap(point, best_);
+  report.objective = best_objective_;
+  report.kkt = best_kkt_;
+  return true;
 }
 
 Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
@@ -318,6 +324,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
   iterations_ = 0;
   backend_us_ = 0.0;
   stopped_late_ = false;
+  bool is_judged = false;
   try {
     std::unique_lock hold(backend_lock(), std::defer_lock);
     if (deadline == Clock::time_point::max()) {
@@ -327,7 +334,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     }
     if (hold.owns_lock()) {
       nlp_->set_spectator(this);
-      improve(ocp, point, report);
+      is_judged = improve(ocp, point, report);
       nlp_->release();
       if (report.status == Status::bad_input) return report;
     }
@@ -339,7 +346,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     report.status = Status::stalled;
   }
   report.iterations = iterations_;
-  judge(ocp, point, judge_, scratch_, report);
+  if (!is_judged) judge(ocp, point, judge_, scratch_, report);
   return std::isfinite(report.objective) ? report : Report{};
 }
 

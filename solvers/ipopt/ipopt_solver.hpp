@@ -67,7 +67,7 @@ class IpoptSolver final : public Solver, private Spectator {
   };
   enum class Ending { converged, out_of_time, out_of_iterations, infeasible, near, lost };
 
-  void improve(const Ocp& ocp, Iterate& point, Report& report);
+  bool improve(const Ocp& ocp, Iterate& point, Report& report);
   Ending run(Start start, const Iterate& from);
   Start start_after(Start start, Ending ending) const noexcept;
   int iterations_of(Start start) const noexcept;
@@ -92,9 +92,9 @@ class IpoptSolver final : public Solver, private Spectator {
 
   // Of the solve under way.
   Clock::time_point deadline_;
-  Iterate guess_, best_, seen_;
+  Iterate guess_, best_;
   KktResidual best_kkt_, seen_kkt_;
-  double backend_us_ = 0.0;
+  double best_objective_ = 0.0, backend_us_ = 0.0;
   bool stopped_late_ = false;
   int iterations_ = 0;
   int spare_iterations_ = 0;  ///< left for the barrier to become negligible once the residual is within the tolerance

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include <IpIpoptCalculatedQuantities.hpp>
@@ -39,6 +40,11 @@ bool copy_finite(std::span<const double> from, double factor, double* __restrict
   return all_finite(from.size(), [&](std::size_t k) { return to[k] = factor * from[k]; });
 }
 
+/// To the bit.
+bool are_equal(std::span<const double> one, const double* other) {
+  return std::memcmp(one.data(), other, one.size_bytes()) == 0;
+}
+
 void write_pattern(const SparseNlp::Pattern& pattern, int* rows, int* columns) {
   std::copy(pattern.row_indices.begin(), pattern.row_indices.end(), rows);
   for (int column = 0; column < pattern.columns; ++column)
@@ -50,34 +56,34 @@ void write_pattern(const SparseNlp::Pattern& pattern, int* rows, int* columns) {
 OcpNlp::OcpNlp(const Ocp& ocp, Curvature curvature)
     : curvature_(curvature),
       scratch_(ocp.scratch_size()),
+      trial_(ocp.capacity()),
       defects_(static_cast<std::size_t>(ocp.capacity().intervals) * ocp.capacity().states),
-      work_(ocp.capacity()),
-      pieces_(ocp.capacity(), stages_at_once) {}
+      pieces_(ocp.capacity(), window),
+      linear_(ocp.capacity()) {}
 
 void OcpNlp::take(const Ocp& ocp) {
   ocp_ = &ocp;
   evaluated_.is_known = linearised_.is_known = false;
   if (nlp_.take_structure(ocp)) {
+    for (auto* vector : {&lower_, &upper_, &start_.z, &start_lower_, &start_upper_, &seen_.z, &evaluated_.z,
+                         &linearised_.z, &gradient_, &clipped_})
+      vector->resize(nlp_.variables());
     for (auto* vector :
-         {&lower_, &upper_, &start_, &start_lower_, &start_upper_, &seen_, &seen_lower_, &seen_upper_, &evaluated_.z,
-          &linearised_.z, &gradient_, &clipped_, &bound_multipliers_, &lagrangian_gradient_})
-      vector->assign(nlp_.variables(), 0.0);
-    for (auto* vector : {&start_multipliers_, &seen_multipliers_, &constraints_, &weighted_, &linear_multipliers_,
-                         &linear_constraints_})
-      vector->assign(nlp_.constraints(), 0.0);
-    jacobian_.assign(nlp_.jacobian().entries(), 0.0);
-    for (auto* vector : {&hessian_, &hessian_part_}) vector->assign(nlp_.hessian().entries(), 0.0);
+         {&start_.multipliers.of_constraints, &seen_.multipliers.of_constraints, &constraints_, &weighted_})
+      vector->resize(nlp_.constraints());
+    jacobian_.resize(nlp_.jacobian().entries());
+    for (auto* vector : {&hessian_, &hessian_part_}) vector->resize(nlp_.hessian().entries());
   }
   nlp_.bounds(ocp, lower_.data(), upper_.data());
   any_fixed_ = false;
-  for (std::size_t j = 0; j < lower_.size(); ++j) any_fixed_ = any_fixed_ || lower_[j] == upper_[j];
-  work_.clear_multipliers();
-}
-
-bool OcpNlp::has_sound_bounds() const noexcept {
-  for (std::size_t j = 0; j < lower_.size(); ++j)
-    if (std::isnan(lower_[j]) || std::isnan(upper_[j])) return false;
-  return true;
+  bounded_.clear();
+  for (int j = 0; j < variables(); ++j) {
+    if (!std::isfinite(lower_[j]) && !std::isfinite(upper_[j])) continue;
+    bounded_.push_back(j);
+    any_fixed_ |= lower_[j] == upper_[j];
+  }
+  for (auto* vector : {&seen_lower_, &seen_upper_, &seen_.multipliers.of_bounds, &start_.multipliers.of_bounds})
+    vector->assign(variables(), 0.0);
 }
 
 bool OcpNlp::has_empty_bounds() const noexcept {
@@ -93,28 +99,33 @@ void OcpNlp::set_curvature(Curvature curvature) noexcept {
 
 void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
   iterates_ = {};
+  forget_seen();
   starts_with_multipliers_ = barrier > 0.0;
-  nlp_.read(*ocp_, point, start_.data(), start_multipliers_.data(), bound_multipliers_.data());
-  for (std::size_t j = 0; j < start_.size(); ++j) {
-    start_lower_[j] = start_upper_[j] = 1.0;
-    if (barrier <= 0.0) continue;
-    // A bound claimed as active stays close, the multiplier of one that is far is small: both on the central path.
+  const double least_multiplier = std::sqrt(barrier);
+  std::vector<double>& z = start_.z;
+  Multipliers& multipliers = start_.multipliers;
+  nlp_.read(*ocp_, point, z.data(), multipliers.of_constraints.data(), multipliers.of_bounds.data());
+  for (auto* vector : {&start_lower_, &start_upper_}) std::fill(vector->begin(), vector->end(), 1.0);
+  if (barrier <= 0.0) return;
+  for (const int j : bounded_) {
     const bool has_lower = std::isfinite(lower_[j]), has_upper = std::isfinite(upper_[j]);
+    // A bound claimed as active stays close, the multiplier of one that is far is small: both on the central path.
     const double room = upper_[j] - lower_[j];
     const auto distance = [&](double multiplier, double slack) {
-      const double wanted = std::max(slack, barrier / std::max(multiplier, std::sqrt(barrier)));
+      const double wanted = std::max(slack, barrier / std::max(multiplier, least_multiplier));
       return has_lower && has_upper ? std::min(wanted, 0.5 * room) : wanted;
     };
-    const double multiplier = bound_multipliers_[j];
-    if (has_lower) start_[j] = lower_[j] + distance(-multiplier, start_[j] - lower_[j]);
-    if (has_upper) start_[j] = upper_[j] - distance(multiplier, upper_[j] - start_[j]);
-    if (has_lower) start_lower_[j] = std::max(-multiplier, barrier / (start_[j] - lower_[j]));
-    if (has_upper) start_upper_[j] = std::max(multiplier, barrier / (upper_[j] - start_[j]));
+    double& multiplier = multipliers.of_bounds[j];
+    if (has_lower) z[j] = lower_[j] + distance(-multiplier, z[j] - lower_[j]);
+    if (has_upper) z[j] = upper_[j] - distance(multiplier, upper_[j] - z[j]);
+    if (has_lower) start_lower_[j] = std::max(-multiplier, barrier / (z[j] - lower_[j]));
+    if (has_upper) start_upper_[j] = std::max(multiplier, barrier / (upper_[j] - z[j]));
+    multiplier = (has_upper ? start_upper_[j] : 0.0) - (has_lower ? start_lower_[j] : 0.0);
   }
 }
 
 bool OcpNlp::Place::is_at(const double* at, unsigned now) noexcept {
-  if (!is_known || !((now != elsewhere && visit == now) || std::equal(z.begin(), z.end(), at))) return false;
+  if (!is_known || !((now != elsewhere && visit == now) || are_equal(z, at))) return false;
   if (now != elsewhere) visit = now;
   return true;
 }
@@ -128,89 +139,132 @@ void OcpNlp::Place::move_to(const double* at, unsigned now) noexcept {
 bool OcpNlp::evaluate_at(const double* z, unsigned visit) noexcept {
   if (evaluated_.is_at(z, visit)) return evaluated_.is_sound;
   evaluated_.move_to(z, visit);
-  nlp_.write(*ocp_, z, nullptr, nullptr, work_);
-  objective_ = ocp_->evaluate(work_, defects_.data(), scratch_);
-  nlp_.constraints(*ocp_, defects_.data(), constraints_.data());
+  nlp_.write(*ocp_, z, nullptr, nullptr, trial_);
+  // Where all states are as many as there is room for, the defects are the constraints.
+  const bool is_full = constraints() == ocp_->intervals() * ocp_->capacity().states;
+  double* const defects = is_full ? constraints_.data() : defects_.data();
+  objective_ = ocp_->evaluate(trial_, defects, scratch_);
+  if (!is_full) nlp_.constraints(*ocp_, defects, constraints_.data());
   evaluated_.is_sound = std::isfinite(objective_) && all_finite(constraints_);
   return evaluated_.is_sound;
 }
 
-bool OcpNlp::linearise_at(const double* z, const double* multipliers, unsigned visit) {
+bool OcpNlp::linearise_at(const double* z, unsigned visit) {
   if (linearised_.is_at(z, visit)) return linearised_.is_sound;
   linearised_.move_to(z, visit);
-  // Ipopt asks for the Hessian later, most often with the multipliers that it has already.
-  is_linear_exact_ = curvature_ == Curvature::exact && (multipliers || guess_multipliers());
-  if (multipliers) std::copy_n(multipliers, linear_multipliers_.size(), linear_multipliers_.begin());
-  const Hessian hessian = is_linear_exact_                        ? Hessian::exact
-                          : curvature_ == Curvature::gauss_newton ? Hessian::gauss_newton
-                                                                  : Hessian::none;
-  linearise(z, linear_multipliers_.data(), 1.0, hessian, Kept::all, hessian_.data());
-  linearised_.is_sound = all_finite(gradient_);
+  // Ipopt asks for the Hessian later, and shows its iterate after that: with the multipliers that it has already.
+  if (iterates_.data) {
+    read_iterate();
+    linearise_all(seen_, true);
+  } else {
+    linearise_all(start_, starts_with_multipliers_);
+  }
   return linearised_.is_sound;
 }
 
-/// The multipliers of Ipopt's iterate to `linear_multipliers_`. False where there are none yet.
-bool OcpNlp::guess_multipliers() {
-  if (iterates_.data) {
-    read_multipliers(linear_multipliers_.data());
-  } else {
-    std::copy(start_multipliers_.begin(), start_multipliers_.end(), linear_multipliers_.begin());
+/// Goes through the stages at a point, from one piece to the next, and lets `take` have each; returns the objective.
+template <class Take>
+double OcpNlp::linearise(const double* z, const double* multipliers, const double* bound_multipliers, Hessian hessian,
+                         const Take& take) noexcept {
+  const int N = ocp_->intervals();
+  double objective = 0.0;
+  is_judged_ = false;
+  for (StageRange piece{0, 0}; piece.first <= N; piece.first = piece.last + 1) {
+    // With the stage behind them, which their equations lead to.
+    const int behind = std::min(piece.first + pieces_.window() - 1, N);
+    piece.last = behind < N ? behind - 1 : N;
+    pieces_.look_at(piece.first);
+    nlp_.write(*ocp_, {piece.first, behind}, z, multipliers, bound_multipliers, linear_);
+    objective += ocp_->linearise(piece, linear_, hessian, pieces_, scratch_);
+    if (piece.last < N) pieces_.set_sizes(behind, ocp_->state_count(behind), 0);
+    take(piece);
   }
-  return iterates_.data || starts_with_multipliers_;
+  return objective;
+}
+
+/// All that is wanted at `linearised_`, which is the iterate's place unless Ipopt tries another.
+void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noexcept {
+  const auto& [of_constraints, of_bounds] = iterate.multipliers;
+  is_linear_exact_ = curvature_ == Curvature::exact && has_multipliers;
+  const Hessian hessian = is_linear_exact_                        ? Hessian::exact
+                          : curvature_ == Curvature::gauss_newton ? Hessian::gauss_newton
+                                                                  : Hessian::none;
+  KktTerms terms;
+  const auto take = [&](StageRange piece) {
+    if (hessian != Hessian::none) nlp_.hessian(pieces_, piece, hessian_.data());
+    nlp_.gradient(pieces_, piece, gradient_.data());
+    nlp_.jacobian(pieces_, piece, jacobian_.data());
+    if (any_fixed_) set_fixed_multipliers(piece);
+    if (piece.first == 0) SparseNlp::set_costate_0(pieces_, linear_);
+    terms.add(pieces_, linear_, piece);
+  };
+  linear_objective_ = linearise(linearised_.z.data(), of_constraints.data(), of_bounds.data(), hessian, take);
+  linear_iterate_ = &iterate;
+  linear_tag_ = are_equal(linearised_.z, iterate.z.data()) ? iterate.tag : 0;
+  linear_kkt_ = terms.residual();
+  // A number that is not finite, in the gradient or the Jacobian, makes the stationarity one too.
+  linearised_.is_sound = std::isfinite(linear_kkt_.stationarity);
+  is_judged_ = true;
+}
+
+/// What makes a piece of the linearisation stationary where variables have one value only.
+void OcpNlp::set_fixed_multipliers(StageRange piece) noexcept {
+  const auto set = [&](int i, const double* lower, const double* upper, int first, int count) {
+    for (int k = first; k < first + count; ++k) {
+      if (lower[k - first] != upper[k - first]) continue;
+      double pull = pieces_.h(i)[k];
+      if (i < ocp_->intervals())
+        for (int r = 0; r < ocp_->state_count(i + 1); ++r)
+          pull += pieces_.F(i)[r * pieces_.stride() + k] * linear_.costate(i + 1)[r];
+      if (k < ocp_->state_count(i)) pull -= linear_.costate(i)[k];
+      linear_.bound_row(i)[k] = -pull;
+    }
+  };
+  for (int i = piece.first; i <= piece.last; ++i) {
+    if (nlp_.state_start(i) >= 0) set(i, ocp_->state_lower(i), ocp_->state_upper(i), 0, ocp_->state_count(i));
+    if (i < ocp_->intervals())
+      set(i, ocp_->control_lower(i), ocp_->control_upper(i), ocp_->capacity().states, ocp_->control_count(i));
+  }
 }
 
 /// At costates that are `factor` times the multipliers, or zero where there are none.
-void OcpNlp::linearise(const double* z, const double* multipliers, double factor, Hessian hessian, Kept kept,
-                       double* hessian_values) noexcept {
+void OcpNlp::write_hessian(const double* z, const double* multipliers, double factor, double* values) noexcept {
   for (std::size_t row = 0; row < weighted_.size(); ++row)
     weighted_[row] = multipliers ? factor * multipliers[row] : 0.0;
-  nlp_.write(*ocp_, z, hessian == Hessian::exact ? weighted_.data() : nullptr, nullptr, work_);
-  for (int first = 0; first <= ocp_->intervals(); first += stages_at_once) {
-    const StageRange piece{first, std::min(first + stages_at_once - 1, ocp_->intervals())};
-    pieces_.look_at(first);
-    ocp_->linearise(piece, work_, hessian, pieces_, scratch_);
-    if (hessian != Hessian::none) nlp_.hessian(pieces_, piece, hessian_values);
-    if (kept == Kept::hessian) continue;
-    nlp_.constraints(pieces_, piece, linear_constraints_.data());
-    nlp_.gradient(pieces_, piece, gradient_.data());
-    nlp_.jacobian(pieces_, piece, jacobian_.data());
-  }
+  linearise(z, weighted_.data(), nullptr, Hessian::exact,
+            [&](StageRange piece) { nlp_.hessian(pieces_, piece, values); });
 }
 
-KktResidual OcpNlp::write_and_judge(const PrimalDual& from, Iterate& point) noexcept {
-  for (std::size_t j = 0; j < clipped_.size(); ++j) {
-    clipped_[j] = std::min(std::max(from.z[j], lower_[j]), upper_[j]);
-    bound_multipliers_[j] = from.upper_multipliers[j] - from.lower_multipliers[j];
-  }
-  linearise_at(clipped_.data(), from.multipliers);
-  nlp_.lagrangian_gradient(gradient_.data(), jacobian_.data(), from.multipliers, lagrangian_gradient_.data());
-  for (std::size_t j = 0; any_fixed_ && j < lower_.size(); ++j)
-    if (lower_[j] == upper_[j]) bound_multipliers_[j] = -lagrangian_gradient_[j];
-  nlp_.write(*ocp_, clipped_.data(), from.multipliers, bound_multipliers_.data(), point);
-  KktTerms terms;
-  nlp_.add_kkt({clipped_.data(), lower_.data(), upper_.data(), linear_constraints_.data(), gradient_.data(),
-                lagrangian_gradient_.data(), from.multipliers, bound_multipliers_.data()},
-               terms);
-  pieces_.look_at(0);
-  ocp_->linearise({0, 0}, point, Hessian::none, pieces_, scratch_);
-  if (ocp_->intervals() > 0) pieces_.set_sizes(1, ocp_->state_count(1), 0);
-  SparseNlp::set_costate_0(pieces_, point);
-  terms.add(pieces_, point, {0, 0});
-  return terms.residual();
+/// Whether the linearisation is that of an iterate within its bounds.
+bool OcpNlp::has_judged(const PrimalDual& iterate) const noexcept {
+  if (!is_judged_ || !linearised_.is_known || linear_kkt_.bound_violation > 0.0) return false;
+  if (linear_tag_ != 0 && linear_tag_ == iterate.tag) return true;
+  const auto& [of_constraints, of_bounds] = iterate.multipliers;
+  return are_equal(linearised_.z, iterate.z.data()) &&
+         are_equal(linear_iterate_->multipliers.of_constraints, of_constraints.data()) &&
+         are_equal(linear_iterate_->multipliers.of_bounds, of_bounds.data());
 }
 
-double OcpNlp::objective(const Iterate& point) noexcept {
-  nlp_.read(*ocp_, point, clipped_.data(), nullptr, nullptr);
-  evaluate_at(clipped_.data());
-  return objective_;
+KktResidual OcpNlp::judge(const PrimalDual& iterate) noexcept {
+  if (has_judged(iterate)) return linear_kkt_;
+  for (std::size_t j = 0; j < clipped_.size(); ++j)
+    clipped_[j] = std::min(std::max(iterate.z[j], lower_[j]), upper_[j]);
+  linearised_.move_to(clipped_.data(), elsewhere);
+  linearise_all(iterate, true);
+  return linear_kkt_;
 }
 
-double OcpNlp::complementarity_gap(const Iterate& point) noexcept {
-  nlp_.read(*ocp_, point, clipped_.data(), nullptr, bound_multipliers_.data());
+void OcpNlp::exchange_judged(Iterate& point) noexcept {
+  std::swap(linear_, point);
+  is_judged_ = false;
+}
+
+double OcpNlp::complementarity_gap() const noexcept {
+  const std::vector<double>&z = linearised_.z, &multipliers = linear_iterate_->multipliers.of_bounds;
   double gap = 0.0;
-  for (std::size_t j = 0; j < clipped_.size(); ++j) {
-    if (bound_multipliers_[j] > 0.0) gap += bound_multipliers_[j] * (upper_[j] - clipped_[j]);
-    if (bound_multipliers_[j] < 0.0) gap += bound_multipliers_[j] * (lower_[j] - clipped_[j]);
+  for (const int j : bounded_) {
+    if (multipliers[j] > 0.0) gap += multipliers[j] * (upper_[j] - z[j]);
+    if (multipliers[j] < 0.0) gap += multipliers[j] * (lower_[j] - z[j]);
   }
   return gap;
 }
@@ -241,12 +295,13 @@ bool OcpNlp::get_bounds_info(Ipopt::Index n, double* lower, double* upper, Ipopt
 bool OcpNlp::get_starting_point(Ipopt::Index, bool init_z, double* z, bool init_bounds, double* lower_multipliers,
                                 double* upper_multipliers, Ipopt::Index, bool init_multipliers, double* multipliers) {
   const Timer timer(microseconds_);
-  if (init_z) std::copy(start_.begin(), start_.end(), z);
+  if (init_z) std::copy(start_.z.begin(), start_.z.end(), z);
   if (init_bounds) {
     std::copy(start_lower_.begin(), start_lower_.end(), lower_multipliers);
     std::copy(start_upper_.begin(), start_upper_.end(), upper_multipliers);
   }
-  if (init_multipliers) std::copy(start_multipliers_.begin(), start_multipliers_.end(), multipliers);
+  const std::vector<double>& of_constraints = start_.multipliers.of_constraints;
+  if (init_multipliers) std::copy(of_constraints.begin(), of_constraints.end(), multipliers);
   return true;
 }
 
@@ -269,7 +324,7 @@ bool OcpNlp::eval_g(Ipopt::Index, const double* z, bool new_z, Ipopt::Index, dou
 bool OcpNlp::eval_grad_f(Ipopt::Index, const double* z, bool new_z, double* gradient) {
   const Timer timer(microseconds_);
   visit(new_z);
-  if (!linearise_at(z, nullptr, visit_)) return false;
+  if (!linearise_at(z, visit_)) return false;
   std::copy(gradient_.begin(), gradient_.end(), gradient);
   return true;
 }
@@ -282,8 +337,9 @@ bool OcpNlp::eval_jac_g(Ipopt::Index, const double* z, bool new_z, Ipopt::Index,
     return true;
   }
   visit(new_z);
-  if (!linearise_at(z, nullptr, visit_)) return false;
-  return copy_finite(jacobian_, 1.0, values);
+  if (!linearise_at(z, visit_)) return false;
+  std::copy(jacobian_.begin(), jacobian_.end(), values);
+  return true;
 }
 
 bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_factor, Ipopt::Index,
@@ -297,20 +353,20 @@ bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_
   visit(new_z);
   const std::span<double> all(values, entries);
   if (curvature_ == Curvature::gauss_newton) {
-    linearise_at(z, nullptr, visit_);
+    linearise_at(z, visit_);
     return copy_finite(hessian_, objective_factor, values);
   }
   if (objective_factor == 1.0 && is_linear_exact_ && linearised_.is_at(z, visit_) &&
-      std::equal(linear_multipliers_.begin(), linear_multipliers_.end(), multipliers)) {
+      are_equal(linear_iterate_->multipliers.of_constraints, multipliers)) {
     return copy_finite(hessian_, 1.0, values);
   }
   if (objective_factor >= smallest_divisor) {
-    linearise(z, multipliers, 1.0 / objective_factor, Hessian::exact, Kept::hessian, values);
+    write_hessian(z, multipliers, 1.0 / objective_factor, values);
     for (double& value : all) value *= objective_factor;
   } else {
     // The Ocp's Lagrangian always holds the whole objective: what is too much of it is taken away.
-    linearise(z, multipliers, 1.0, Hessian::exact, Kept::hessian, values);
-    linearise(z, nullptr, 0.0, Hessian::exact, Kept::hessian, hessian_part_.data());
+    write_hessian(z, multipliers, 1.0, values);
+    write_hessian(z, nullptr, 0.0, hessian_part_.data());
     for (Ipopt::Index entry = 0; entry < entries; ++entry)
       values[entry] += (objective_factor - 1.0) * hessian_part_[entry];
   }
@@ -322,20 +378,42 @@ void OcpNlp::finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double* 
                                double, const Ipopt::IpoptData*, Ipopt::IpoptCalculatedQuantities*) {
   const Timer timer(microseconds_);
   iterates_ = {};
-  if (spectator_) spectator_->see_last({z, multipliers, lower_multipliers, upper_multipliers});
+  if (!spectator_) return;
+  forget_seen();
+  std::copy_n(z, variables(), seen_.z.begin());
+  std::copy_n(multipliers, constraints(), seen_.multipliers.of_constraints.begin());
+  for (const int j : bounded_) seen_.multipliers.of_bounds[j] = upper_multipliers[j] - lower_multipliers[j];
+  spectator_->see_last(seen_);
 }
 
-void OcpNlp::read_multipliers(double* multipliers) {
+/// What was made of its multipliers has none any more.
+void OcpNlp::forget_seen() noexcept {
+  seen_.tag = 0;
+  if (linear_iterate_ == &seen_) is_judged_ = is_linear_exact_ = false;
+}
+
+/// Ipopt's present iterate to `seen_`. Ipopt 3.11 has it only in its own layout: scaled, and without variables that
+/// have one value only.
+void OcpNlp::read_iterate() {
   const auto& [data, scaled, adapter] = iterates_;
   const Ipopt::SmartPtr<const Ipopt::IteratesVector> now = data->curr();
+  if (seen_.tag == now->GetTag()) return;
+  forget_seen();
   const Ipopt::SmartPtr<Ipopt::NLPScalingObject> scaling = scaled->NLP_scaling();
+  const Ipopt::SmartPtr<const Ipopt::VectorSpace> space = now->x()->OwnerSpace();
+  const auto x = scaling->unapply_vector_scaling_x(now->x());
+  const auto y_c = scaling->apply_vector_scaling_c(now->y_c()), y_d = scaling->apply_vector_scaling_d(now->y_d());
+  const auto z_L = scaling->apply_vector_scaling_x_LU(*scaled->Px_L(), now->z_L(), *space);
+  const auto z_U = scaling->apply_vector_scaling_x_LU(*scaled->Px_U(), now->z_U(), *space);
+  auto& [of_constraints, of_bounds] = seen_.multipliers;
+  seen_.tag = now->GetTag();
+  adapter->ResortX(*x, seen_.z.data());
+  adapter->ResortG(*y_c, *y_d, of_constraints.data());
+  adapter->ResortBnds(*z_L, seen_lower_.data(), *z_U, seen_upper_.data());
   const double factor = scaling->unapply_obj_scaling(1.0);
-  const auto y_c = scaling->apply_vector_scaling_c_NonConst(now->y_c());
-  const auto y_d = scaling->apply_vector_scaling_d_NonConst(now->y_d());
-  y_c->Scal(factor);
-  y_d->Scal(factor);
-  std::fill_n(multipliers, nlp_.constraints(), 0.0);
-  adapter->ResortG(*y_c, *y_d, multipliers);
+  for (const int j : bounded_) of_bounds[j] = factor * (seen_upper_[j] - seen_lower_[j]);
+  if (factor == 1.0) return;
+  for (double& multiplier : of_constraints) multiplier *= factor;
 }
 
 bool OcpNlp::intermediate_callback(Ipopt::AlgorithmMode mode, Ipopt::Index iteration, double, double, double, double,
@@ -344,26 +422,12 @@ bool OcpNlp::intermediate_callback(Ipopt::AlgorithmMode mode, Ipopt::Index itera
   const Timer timer(microseconds_);
   if (!spectator_) return true;
   if (mode == Ipopt::RestorationPhaseMode) return spectator_->see(iteration, nullptr);
-  // Ipopt 3.11 shows its iterate only in its own layout: scaled, and without variables that have one value only.
   auto* scaled = dynamic_cast<Ipopt::OrigIpoptNLP*>(Ipopt::GetRawPtr(quantities->GetIpoptNLP()));
   auto* adapter = scaled ? dynamic_cast<Ipopt::TNLPAdapter*>(Ipopt::GetRawPtr(scaled->nlp())) : nullptr;
   if (!adapter) return spectator_->see(iteration, nullptr);
   iterates_ = {data, scaled, adapter};
-  read_multipliers(seen_multipliers_.data());
-  const Ipopt::SmartPtr<const Ipopt::IteratesVector> now = data->curr();
-  const Ipopt::SmartPtr<Ipopt::NLPScalingObject> scaling = scaled->NLP_scaling();
-  const double factor = scaling->unapply_obj_scaling(1.0);
-  const Ipopt::SmartPtr<const Ipopt::VectorSpace> space = now->x()->OwnerSpace();
-  const auto z_L = scaling->apply_vector_scaling_x_LU_NonConst(*scaled->Px_L(), now->z_L(), *space);
-  const auto z_U = scaling->apply_vector_scaling_x_LU_NonConst(*scaled->Px_U(), now->z_U(), *space);
-  z_L->Scal(factor);
-  z_U->Scal(factor);
-  std::fill(seen_lower_.begin(), seen_lower_.end(), 0.0);
-  std::fill(seen_upper_.begin(), seen_upper_.end(), 0.0);
-  adapter->ResortX(*scaling->unapply_vector_scaling_x(now->x()), seen_.data());
-  adapter->ResortBnds(*z_L, seen_lower_.data(), *z_U, seen_upper_.data());
-  const PrimalDual iterate{seen_.data(), seen_multipliers_.data(), seen_lower_.data(), seen_upper_.data()};
-  return spectator_->see(iteration, &iterate);
+  read_iterate();
+  return spectator_->see(iteration, &seen_);
 }
 
 }  // namespace rhec::ipopt

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <IpTNLP.hpp>
+#include <IpTaggedObject.hpp>
 
 #include "rhec/core/kkt.hpp"
 #include "rhec/core/ocp.hpp"
@@ -19,12 +20,15 @@ namespace rhec::ipopt {
 
 enum class Curvature { exact, gauss_newton, limited_memory };
 
+/// What belongs to constraints and bounds, with the signs of Iterate's.
+struct Multipliers {
+  std::vector<double> of_constraints, of_bounds;
+};
 /// An iterate of Ipopt in the problem's own units.
 struct PrimalDual {
-  const double* z;
-  const double* multipliers;
-  const double* lower_multipliers;  ///< of lower bounds; not negative
-  const double* upper_multipliers;  ///< of upper bounds; not negative
+  std::vector<double> z;
+  Multipliers multipliers;
+  Ipopt::TaggedObject::Tag tag = 0;  ///< Ipopt's number for it; 0: it has none
 };
 
 /// Is shown the iterates of Ipopt.
@@ -39,12 +43,13 @@ class Spectator {
 };
 
 /// An Ocp as the sparse nonlinear program that Ipopt solves. Every point is evaluated once, whoever asks: objective and
-/// constraints together, then gradient, Jacobian and the Hessian for the iterate's multipliers from one linearisation,
-/// which also judges the iterate.
+/// constraints together; then, in one passage through the stages, gradient, Jacobian, the Hessian for the iterate's
+/// multipliers and the judgement of the iterate.
 class OcpNlp final : public Ipopt::TNLP {
  public:
-  /// Of a long horizon, as many as a processor's cache has room for.
-  static constexpr int stages_at_once = 16;
+  /// Of a long horizon, as many stages as a processor's cache has room for, the one behind a piece among them: pieces
+  /// are those of the core's `judge`, and so are their sums.
+  static constexpr int window = 16;
 
   OcpNlp(const Ocp& ocp, Curvature curvature);
 
@@ -56,7 +61,6 @@ class OcpNlp final : public Ipopt::TNLP {
   int variables() const noexcept { return nlp_.variables(); }
   int constraints() const noexcept { return nlp_.constraints(); }
   bool has_empty_bounds() const noexcept;
-  bool has_sound_bounds() const noexcept;
 
   /// Where Ipopt starts. With a barrier parameter above zero the point's multipliers count too: each variable and the
   /// multiplier of its bound are moved until their product is that parameter or more, as little as that takes.
@@ -66,12 +70,15 @@ class OcpNlp final : public Ipopt::TNLP {
   /// For the length of a solve.
   void set_spectator(Spectator* spectator) noexcept { spectator_ = spectator; }
 
-  /// Writes a primal-dual point into an Iterate, with its states and controls clipped to their bounds, and judges it.
-  /// Multipliers of variables that have one value only follow from stationarity: Ipopt does not see such variables.
-  KktResidual write_and_judge(const PrimalDual& from, Iterate& point) noexcept;
+  /// Judges an iterate, with its states and controls clipped to their bounds. Multipliers of variables that have one
+  /// value only follow from stationarity: Ipopt does not see such variables.
+  KktResidual judge(const PrimalDual& iterate) noexcept;
+  // Of the iterate that was judged last:
+  /// Gives it away, once, and gets a point of the same capacity for it.
+  void exchange_judged(Iterate& point) noexcept;
   /// Sum of |bound multiplier| x distance from the bound: what the barrier still adds to the objective.
-  double complementarity_gap(const Iterate& point) noexcept;
-  double objective(const Iterate& point) noexcept;
+  double complementarity_gap() const noexcept;
+  double objective() const noexcept { return linear_objective_; }
   /// The time that Ipopt's calls of this object have taken since it was made [us].
   double microseconds() const noexcept { return microseconds_; }
 
@@ -123,40 +130,57 @@ class OcpNlp final : public Ipopt::TNLP {
     void move_to(const double* at, unsigned now) noexcept;
   };
   void visit(bool is_new) noexcept { visit_ += is_new; }
-  bool evaluate_at(const double* z, unsigned visit = elsewhere) noexcept;
-  bool linearise_at(const double* z, const double* multipliers = nullptr, unsigned visit = elsewhere);
-  bool guess_multipliers();
-  void read_multipliers(double* multipliers);
-  enum class Kept { all, hessian };
-  void linearise(const double* z, const double* multipliers, double factor, Hessian hessian, Kept kept,
-                 double* hessian_values) noexcept;
+  bool evaluate_at(const double* z, unsigned visit) noexcept;
+  bool linearise_at(const double* z, unsigned visit);
+  void linearise_all(const PrimalDual& iterate, bool has_multipliers) noexcept;
+  void write_hessian(const double* z, const double* multipliers, double factor, double* values) noexcept;
+  template <class Take>
+  double linearise(const double* z, const double* multipliers, const double* bound_multipliers, Hessian hessian,
+                   const Take& take) noexcept;
+  void set_fixed_multipliers(StageRange piece) noexcept;
+  bool has_judged(const PrimalDual& iterate) const noexcept;
+  void forget_seen() noexcept;
+  void read_iterate();
 
   const Ocp* ocp_ = nullptr;
   Curvature curvature_;
   Spectator* spectator_ = nullptr;
   SparseNlp nlp_;
   std::vector<double> lower_, upper_;
-  std::vector<double> start_, start_multipliers_, start_lower_, start_upper_;
-  std::vector<double> seen_, seen_multipliers_, seen_lower_, seen_upper_;  ///< an iterate in the problem's units
-
-  std::vector<double> scratch_, defects_;
-  Iterate work_;
-  StageQp pieces_;  ///< of the linearisation under way; only the vectors are kept
-  static constexpr unsigned elsewhere = 0;
-  unsigned visit_ = 1;
-  Place evaluated_, linearised_;
-  std::vector<double> constraints_;                                                              ///< at `evaluated_`
-  std::vector<double> linear_multipliers_, linear_constraints_, gradient_, jacobian_, hessian_;  ///< at `linearised_`
+  std::vector<int> bounded_;  ///< variables that have a bound
+  PrimalDual start_;
+  std::vector<double> start_lower_, start_upper_;  ///< multipliers of bounds as Ipopt has them, none of them negative
   /// Where Ipopt has its iterates, from the first that it shows to its end.
   struct {
     const Ipopt::IpoptData* data = nullptr;
     Ipopt::OrigIpoptNLP* scaled = nullptr;
     Ipopt::TNLPAdapter* adapter = nullptr;
   } iterates_;
-  bool starts_with_multipliers_ = false, any_fixed_ = false;
-  bool is_linear_exact_ = false;  ///< the linearisation has the Hessian for `linear_multipliers_`
+  PrimalDual seen_;                              ///< one of them
+  std::vector<double> seen_lower_, seen_upper_;  ///< always zero where there is no bound
+
+  static constexpr unsigned elsewhere = 0;
+  unsigned visit_ = 1;
+  std::vector<double> scratch_;
+  // At `evaluated_`.
+  Place evaluated_;
+  Iterate trial_;
+  std::vector<double> defects_, constraints_;
   double objective_ = 0.0;
-  std::vector<double> weighted_, clipped_, bound_multipliers_, lagrangian_gradient_, hessian_part_;
+  // At `linearised_`.
+  Place linearised_;
+  const PrimalDual* linear_iterate_ = nullptr;  ///< whose multipliers were taken
+  Ipopt::TaggedObject::Tag linear_tag_ = 0;     ///< its number, where it is at this place itself
+  StageQp pieces_;                              ///< of the passage under way; only the vectors are kept
+  Iterate linear_;                              ///< the point; with its multipliers as long as it is judged
+  std::vector<double> gradient_, jacobian_, hessian_;
+  KktResidual linear_kkt_;
+  double linear_objective_ = 0.0;
+  bool is_judged_ = false;
+  bool is_linear_exact_ = false;  ///< the Hessian is that for these multipliers
+
+  bool starts_with_multipliers_ = false, any_fixed_ = false;
+  std::vector<double> weighted_, clipped_, hessian_part_;
   double microseconds_ = 0.0;
 };
 

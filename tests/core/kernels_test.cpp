@@ -274,7 +274,7 @@ struct RandomCosts {
   std::vector<int> control_counts;
   AlignedDoubles H, h, values, references, weights, turns, inverse_turns, y, predicted, jacobians;
   AlignedDoubles u, input_weights;
-  std::vector<double> room;
+  std::vector<double> room, pulls;   ///< of the latter none: H holds nothing yet
   std::vector<unsigned char> clean;  ///< empty: of no stage
 
   explicit RandomCosts(RandomQp& random)
@@ -333,7 +333,7 @@ struct RandomCosts {
         view(matrices, vectors, false),
         {vehicle_states, outputs, inputs, y.data(), u.data(), predicted.data(), jacobians.data(), weights.data(),
          input_weights.data(), turns.data(), inverse_turns.data(), values.data(), room.data(),
-         clean.empty() ? nullptr : clean.data()},
+         pulls.empty() ? nullptr : pulls.data(), clean.empty() ? nullptr : clean.data()},
         0, N);
   }
   double track(const ProgramKernels& kernels, bool matrices, bool vectors, bool bends) {
@@ -413,6 +413,37 @@ TEST(Kernels, OfMeasurementsAreTheSumOfSquares) {
       EXPECT_NEAR(costs.measure(*set.program, false, true), expected, 1e-10 * (1.0 + expected)) << set.instruction_set;
       expect_same_rows(gradient.data(), costs.h.data(), static_cast<std::ptrdiff_t>(gradient.size()), 1e-11,
                        set.instruction_set);
+    }
+  }
+}
+
+TEST(Kernels, SquaresOfMeasurementsAreAddedToWhatBends) {
+  RandomQp random(15);
+  for (int trial = 0; trial < 60; ++trial) {
+    const RandomCosts start(random);
+    const int seen = padded(start.outputs);
+    for (const KernelSet& set : runnable_kernels()) {
+      RandomCosts alone = start, added = start;
+      const double total = alone.measure(*set.program, true, true);
+      added.pulls.assign((added.N + 1) * seen, 0.0);
+      EXPECT_NEAR(added.measure(*set.program, true, true), total, 1e-12 * (1.0 + total)) << set.instruction_set;
+      // Of the squares alone, what is not used of H is not written.
+      for (int i = 0; i <= start.N; ++i) {
+        const int used = start.states + (i < start.N ? start.control_counts[i] : 0);
+        for (int c = 0; c < used; ++c)
+          for (int r = 0; r < used; ++r) {
+            const std::ptrdiff_t at = (i * (start.states + start.controls) + c) * start.stride + r;
+            alone.H[at] += start.H[at];
+          }
+      }
+      expect_same_costs(alone, added, true, set.instruction_set);
+      for (int i = 0; i <= start.N; ++i)
+        for (int j = 0; j < start.outputs; ++j) {
+          const double y = start.y[i * seen + j];
+          double error = std::isnan(y) ? 0.0 : start.predicted[i * seen + j] - y;
+          if (start.turns[j] > 0.0) error = std::remainder(error, start.turns[j]);
+          EXPECT_NEAR(added.pulls[i * seen + j], 2.0 * start.weights[j] * error, 1e-12) << set.instruction_set;
+        }
     }
   }
 }

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "random_problem.hpp"
@@ -236,42 +237,27 @@ void expect_same(const KktResidual& one, const KktResidual& other) {
   near(one.complementarity, other.complementarity, "complementarity");
 }
 
-TEST(SparseNlp, JudgesAsTheCoreDoes) {
-  RandomProblem random(bicycle(), 8);
-  for (const auto& problem : problems_to_judge(random)) {
-    View view(*problem);
-    for (int trial = 0; trial < 10; ++trial) {
-      Iterate point = random_point(*problem, random);
-      problem->linearise(all_stages(*problem), point, Hessian::none, view.qp, view.scratch);
-      SparseNlp::set_costate_0(view.qp, point);
-      Eigen::VectorXd z(view.n), multipliers(view.m), bounds(view.n), lower(view.n), upper(view.n), gradient(view.n),
-          pull(view.n), constraints(view.m);
-      view.nlp.read(*problem, point, z.data(), multipliers.data(), bounds.data());
-      view.nlp.bounds(*problem, lower.data(), upper.data());
-      view.nlp.gradient(view.qp, gradient.data());
-      view.nlp.constraints(view.qp, constraints.data());
-      std::vector<double> jacobian(view.nlp.jacobian().entries());
-      view.nlp.jacobian(view.qp, jacobian.data());
-      view.nlp.lagrangian_gradient(gradient.data(), jacobian.data(), multipliers.data(), pull.data());
-      KktTerms terms;
-      view.nlp.add_kkt({z.data(), lower.data(), upper.data(), constraints.data(), gradient.data(), pull.data(),
-                        multipliers.data(), bounds.data()},
-                       terms);
-      terms.add(view.qp, point, {0, 0});  // for an initial state that is given
-      const KktResidual whole = kkt_residual(view.qp, point);
-      EXPECT_GT(whole.largest(), 1e-3);
-      expect_same(terms.residual(), whole);
+/// Goes through a problem in a window; gives the values of the whole, with 9 where nobody writes.
+struct InPieces {
+  InPieces(const View& view, const Iterate& point, StageQp& window) {
+    std::vector<double> scratch(view.problem.scratch_size());
+    for (auto [vector, size] : {std::pair{&gradient, view.n}, {&constraints, view.m}}) vector->assign(size, 9.0);
+    jacobian.assign(view.nlp.jacobian().entries(), 9.0);
+    hessian.assign(view.nlp.hessian().entries(), 9.0);
+    const int N = view.problem.intervals();
+    for (int first = 0; first <= N; first += window.window()) {
+      const StageRange piece{first, std::min(first + window.window() - 1, N)};
+      window.look_at(first);
+      objective += view.problem.linearise(piece, point, Hessian::exact, window, scratch);
+      view.nlp.gradient(window, piece, gradient.data());
+      view.nlp.constraints(window, piece, constraints.data());
+      view.nlp.jacobian(window, piece, jacobian.data());
+      view.nlp.hessian(window, piece, hessian.data());
     }
-    // What is no number is seen.
-    KktTerms broken;
-    Eigen::VectorXd zeros = Eigen::VectorXd::Zero(view.n), bad = zeros, rows = Eigen::VectorXd::Zero(view.m);
-    bad[view.n / 2] = std::nan("");
-    view.nlp.add_kkt(
-        {zeros.data(), zeros.data(), zeros.data(), rows.data(), zeros.data(), bad.data(), rows.data(), zeros.data()},
-        broken);
-    EXPECT_TRUE(std::isnan(broken.residual().stationarity));
   }
-}
+  double objective = 0.0;
+  std::vector<double> gradient, constraints, jacobian, hessian;
+};
 
 TEST(SparseNlp, PiecesOfALinearisationAreThoseOfTheWhole) {
   RandomProblem random(bicycle(), 9);
@@ -287,28 +273,68 @@ TEST(SparseNlp, PiecesOfALinearisationAreThoseOfTheWhole) {
     view.nlp.hessian(view.qp, hessian.data());
     const KktResidual kkt = kkt_residual(view.qp, point);
     for (const int size : {2, 3, 5, N, N + 1, N + 9}) {
-      StageQp pieces(problem->capacity(), size);
-      EXPECT_EQ(pieces.window(), std::min(size, problem->capacity().intervals + 1));
-      std::vector<double> g(view.n, 9.0), c(view.m, 9.0), J(entries, 9.0), H(bent, 9.0);
-      double sum = 0.0;
-      for (int first = 0; first <= N; first += pieces.window()) {
-        const StageRange piece{first, std::min(first + pieces.window() - 1, N)};
-        pieces.look_at(first);
-        sum += problem->linearise(piece, point, Hessian::exact, pieces, view.scratch);
-        view.nlp.gradient(pieces, piece, g.data());
-        view.nlp.constraints(pieces, piece, c.data());
-        view.nlp.jacobian(pieces, piece, J.data());
-        view.nlp.hessian(pieces, piece, H.data());
-      }
-      EXPECT_NEAR(sum, objective, 1e-12 * std::abs(objective)) << size;
-      EXPECT_EQ(g, gradient) << size;
-      EXPECT_EQ(c, constraints) << size;
-      EXPECT_EQ(J, jacobian) << size;
-      EXPECT_EQ(H, hessian) << size;
+      StageQp window(problem->capacity(), size);
+      EXPECT_EQ(window.window(), std::min(size, problem->capacity().intervals + 1));
+      const InPieces pieces(view, point, window);
+      EXPECT_NEAR(pieces.objective, objective, 1e-12 * std::abs(objective)) << size;
+      EXPECT_EQ(pieces.gradient, gradient) << size;
+      EXPECT_EQ(pieces.constraints, constraints) << size;
+      EXPECT_EQ(pieces.jacobian, jacobian) << size;
+      EXPECT_EQ(pieces.hessian, hessian) << size;
       Report report;
-      judge(*problem, point, pieces, view.scratch, report);
+      judge(*problem, point, window, view.scratch, report);
       EXPECT_NEAR(report.objective, objective, 1e-12 * std::abs(objective)) << size;
       expect_same(report.kkt, kkt);
+    }
+  }
+}
+
+TEST(SparseNlp, AWindowHasNothingLeftOfWhatItHeldBefore) {
+  // The same window over problems of one capacity, whose blocks start elsewhere: stages of other sizes follow in its
+  // places, and what they do not use must be zero and free of bounds.
+  RandomProblem random(bicycle(), 11);
+  std::vector<std::unique_ptr<HorizonProblem>> problems;
+  for (const int block : {0, 3, 2, 5, 1}) {
+    RandomProblem::RheSpec spec;
+    spec.intervals = 11;
+    spec.block = block;
+    spec.robust = block == 2;
+    problems.push_back(random.rhe(spec));
+  }
+  for (const int size : {2, 3, 5}) {
+    StageQp window(problems.front()->capacity(), size);
+    for (const auto& problem : problems) {
+      const View view(*problem);
+      const Iterate point = random_point(*problem, random);
+      StageQp unused(problem->capacity(), size);
+      const InPieces again(view, point, window), once(view, point, unused);
+      EXPECT_EQ(again.objective, once.objective) << size;
+      EXPECT_EQ(again.gradient, once.gradient) << size;
+      EXPECT_EQ(again.constraints, once.constraints) << size;
+      EXPECT_EQ(again.jacobian, once.jacobian) << size;
+      EXPECT_EQ(again.hessian, once.hessian) << size;
+      std::vector<double> scratch(problem->scratch_size());
+      Report of_window, of_unused;
+      judge(*problem, point, window, scratch, of_window);
+      judge(*problem, point, unused, scratch, of_unused);
+      EXPECT_EQ(of_window.objective, of_unused.objective) << size;
+      EXPECT_EQ(of_window.kkt.largest(), of_unused.kkt.largest()) << size;
+      // All of the first stages' rows, used or not.
+      for (StageQp* qp : {&window, &unused}) {
+        qp->look_at(0);
+        problem->linearise({0, size - 1}, point, Hessian::exact, *qp, scratch);
+      }
+      const std::ptrdiff_t stride = window.stride(), states = problem->capacity().states,
+                           wide = states + problem->capacity().controls;
+      const auto same = [&](const double* one, const double* other, std::ptrdiff_t rows) {
+        return std::equal(one, one + size * rows * stride, other);
+      };
+      EXPECT_TRUE(same(window.F(0), unused.F(0), states)) << size;
+      EXPECT_TRUE(same(window.H(0), unused.H(0), wide)) << size;
+      EXPECT_TRUE(same(window.h(0), unused.h(0), 1)) << size;
+      EXPECT_TRUE(same(window.b(0), unused.b(0), 1)) << size;
+      EXPECT_TRUE(same(window.lower(0), unused.lower(0), 1)) << size;
+      EXPECT_TRUE(same(window.upper(0), unused.upper(0), 1)) << size;
     }
   }
 }

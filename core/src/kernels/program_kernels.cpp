@@ -18,7 +18,7 @@ inline int parts_of(const ProgramView& view, int stage) {
 template <int known_parts, int known_states, int known_moved>
 KktParts kkt_of(const ProgramView& view) {
   const long stride = view.stride;
-  const int state_parts = known_parts > 0 ? known_parts : (view.states + lane_count - 1) / lane_count;
+  const int state_parts = ((known_states > 0 ? known_states : view.states) + lane_count - 1) / lane_count;
   Lanes stationarity{}, defect{}, complementarity{}, highest_lower{}, lowest_upper{};
   Lanes gradients{}, bounds{}, costates{}, rest{};  // rest stays 0 as long as all is finite
   for (int i = view.first; i <= view.last; ++i) {
@@ -71,10 +71,12 @@ KktParts kkt_of(const ProgramView& view) {
 }
 
 KktParts kkt(const ProgramView& view) {
-  bool is_full = view.states == 6 && view.stride == lane_count;
+  bool is_full = view.states == 6;
   const int end = view.last < view.intervals ? view.last + 1 : view.last;
   for (int i = view.first; is_full && i <= end; ++i) is_full = view.state_counts[i] == 6 && view.carried_counts[i] <= 2;
-  return is_full ? kkt_of<1, 6, 4>(view) : kkt_of<0, 0, 0>(view);
+  if (is_full && view.stride == lane_count) return kkt_of<1, 6, 4>(view);
+  if (is_full && view.stride == 2 * lane_count) return kkt_of<2, 6, 4>(view);
+  return kkt_of<0, 0, 0>(view);
 }
 
 /// Rows in parts of which one is all there is, or as many as it takes.
@@ -321,13 +323,14 @@ struct AnyEights {
   static int count(int outputs) { return outputs; }
 };
 
-/// What is measured at one node, of which `seen` was. Returns the sum of squares.
+/// What is measured at one node of the range, of which `seen` was. Returns the sum of squares.
 template <bool matrices, bool vectors, class Width>
-RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, const double* seen, const double* predicted,
-                                           const double* J, int stride, int used, bool is_clean, double* H, double* h) {
+RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, long node, const double* seen,
+                                           const double* predicted, const double* J, int stride, int used,
+                                           bool is_clean, double* H, double* h) {
   const int count = Width::count(measured.output_count), outputs = Width::of(count),
             states = Width::of(measured.vehicle_states);
-  double *pulls = measured.room, *weights = pulls + outputs;
+  double *weights = measured.room, *pulls = measured.pulls ? measured.pulls + node * outputs : weights + outputs;
   Lanes total{};
   for (int k = 0; k < outputs; k += lane_count) {
     const Lanes y = load(seen + k), weight = y == y ? 2.0 * load(measured.output_weights + k) : Lanes{};
@@ -348,6 +351,10 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, cons
     for (int k = states; k < stride; k += lane_count) store(Lanes{}, h + k);
   }
   if (!matrices) return total;
+  if (measured.pulls) {
+    add_products(J, weights, nullptr, count, measured.vehicle_states, stride, H, nullptr);
+    return total;
+  }
   // Rows by weight, to which single entries come from memory at no cost.
   constexpr int most_known = Width::is_known ? 8 : 1;
   Lanes weighted[most_known][8 / lane_count];
@@ -395,7 +402,8 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
     const bool has_inputs = i < view.intervals;
     const int used = view.states + (has_inputs ? view.control_counts[i] : 0);
     const bool is_clean = measured.is_clean && measured.is_clean[i] != 0;
-    total += write_node<matrices, vectors, Width>(measured, y, predicted, J, view.stride, used, is_clean, H, h);
+    total +=
+        write_node<matrices, vectors, Width>(measured, i - first, y, predicted, J, view.stride, used, is_clean, H, h);
     if (vectors && has_inputs) {
       for (int k = first_input / lane_count * lane_count; k < end_of_inputs; k += lane_count) {
         const Lanes seen = load(inputs + k), weight = seen == seen ? 2.0 * load(measured.input_weights + k) : Lanes{};
@@ -404,8 +412,10 @@ double write_nodes(const CostView& view, const MeasurementView& measured, int fi
         total += pull * error;
       }
     }
-    for (int k = first_input; matrices && has_inputs && k < end_of_inputs; ++k)
-      H[k * stride + k] = inputs[k] == inputs[k] ? 2.0 * measured.input_weights[k] : 0.0;
+    for (int k = first_input; matrices && has_inputs && k < end_of_inputs; ++k) {
+      const double curvature = inputs[k] == inputs[k] ? 2.0 * measured.input_weights[k] : 0.0;
+      H[k * stride + k] = measured.pulls ? H[k * stride + k] + curvature : curvature;
+    }
     y += outputs;
     predicted += outputs;
     J += J_size;

@@ -63,6 +63,9 @@ struct MeasurementView {
   const double *turns, *inverse_turns;  ///< a row each: of an angle a full turn and its inverse, else 0
   const double* values;                 ///< rows of the point
   double* room;                         ///< for two rows of outputs
+  /// Where H holds curvature already: what to add the squares to, and not to clear. Their pulls 2 weight (predicted -
+  /// measured) go to rows of outputs of the range's nodes. Null: it does not.
+  double* pulls;
   /// Of all stages: 1 where H is zero but for what measurements write to. Null: of none.
   const unsigned char* is_clean;
 };

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "rhec/core/kkt.hpp"
+#include "rhec/core/ocp.hpp"
 
 namespace rhec {
 
@@ -43,9 +43,14 @@ class RHEC_EXPORT SparseNlp {
   // Between points and vectors. Multipliers and bound multipliers may be null.
   void read(const Ocp& ocp, const Iterate& point, double* z, double* multipliers,
             double* bound_multipliers) const noexcept;
-  /// A given s_0 is written too. costate_0 is left as it is: it follows from the stationarity in s_0 (`set_costate_0`).
+  /// All stages, or those of a range: their states, controls and costates. A given s_0 is written too. costate_0 is
+  /// left as it is: it follows from the stationarity in s_0 (`set_costate_0`).
+  void write(const Ocp& ocp, StageRange range, const double* z, const double* multipliers,
+             const double* bound_multipliers, Iterate& point) const noexcept;
   void write(const Ocp& ocp, const double* z, const double* multipliers, const double* bound_multipliers,
-             Iterate& point) const noexcept;
+             Iterate& point) const noexcept {
+    write(ocp, all_stages(ocp), z, multipliers, bound_multipliers, point);
+  }
   /// The costate of a given initial state, from a linearisation at the point; zero where the initial state is free.
   static void set_costate_0(const StageQp& linearisation, Iterate& point) noexcept;
 
@@ -73,24 +78,25 @@ class RHEC_EXPORT SparseNlp {
     hessian(linearisation, {0, linearisation.intervals()}, values);
   }
 
-  /// gradient + jacobian' multipliers.
-  void lagrangian_gradient(const double* gradient, const double* jacobian, const double* multipliers,
-                           double* sum) const noexcept;
-  /// A point as vectors, with what `lagrangian_gradient` says of it.
-  struct Judged {
-    const double *z, *lower, *upper, *constraints, *gradient, *lagrangian_gradient, *multipliers, *bound_multipliers;
-  };
-  /// Adds what the core's residual (kkt_residual) is made of, but for an initial state that is given.
-  void add_kkt(const Judged& point, KktTerms& terms) const noexcept;
-
  private:
   std::vector<std::int32_t> signature_, next_signature_;
+  std::vector<int> words_;                                 ///< where in the signature each interval begins
   std::vector<std::uint8_t> state_flags_, control_flags_;  ///< of the interval being marked
   std::vector<int> state_starts_, control_starts_, constraint_starts_, state_counts_, control_counts_;
   Pattern jacobian_, hessian_;
-  /// Of each entry of the Jacobian: its offset in the stage's A or B; -1 for the -1 of s_{i+1} itself, with which the
-  /// columns of states begin, but for those of node 0.
-  std::vector<int> jacobian_sources_;
+  /// Where the entries of each stage, which are one after the other, come from. Stages that are alike share a list.
+  struct Sources {
+    std::vector<int> offsets;  ///< in the stage's F or H
+    std::vector<int> firsts;   ///< of each stage, in `offsets`
+    std::vector<int> starts;   ///< of each stage, among the entries; and where the last one's end
+    void clear() noexcept;
+    void end_stage();
+    void repeat_stage();
+    void gather(const double* rows, int stage, double* values) const noexcept;
+  };
+  Sources jacobian_sources_, hessian_sources_;
+
+  bool is_like_before(int stage) const noexcept;
 };
 
 }  // namespace rhec

@@ -36,7 +36,7 @@ class RHEC_EXPORT StageQp {
   /// A window: of a program of the capacity so many stages at a time, for who goes through it piece by piece and wants
   /// it to stay in the processor's cache. Other stages than those from `look_at` on must not be touched.
   StageQp(const Capacity& capacity, int stages);
-  /// Stages `first`, first + 1, ... are looked at next, which hold nothing yet.
+  /// Stages `first`, first + 1, ... are looked at next, which hold nothing of use yet.
   void look_at(int first) noexcept;
   int window() const noexcept { return window_; }  ///< how many stages that are; 0: all are there
 
