@@ -1,14 +1,26 @@
-// Of figures that a reader can move, which views become files: all settings of a sweep, one sample of a run.
+// Of figures that a reader can move, which views become files: one sample of a run; of a sweep the richest map, and the
+// maps that differ from it in one of the main choices (path, speed, what is blocked).
+import {mainChoices, mapAt, richestMap} from "./figures/sweep.js";
+import {stem} from "./text.js";
+
+const everySetting = ["surfaces", "surfaces-relative", "curves"];
 
 /// [{name, state}] of a figure.
 export function variantsForPaper(document, figure, state) {
-  if (document.kind !== "sweep") return [{name: figure.name, state}];
-  const many = figure.name === "surfaces" || figure.name === "surfaces-relative" || figure.name === "curves";
-  const settings = many ? document.maps.map((map) => map.setting) : [state.setting];
-  return settings.map((setting) => ({name: many && settings.length > 1 ? `${figure.name}-${settingStem(document, setting)}` : figure.name,
-                                     state: {...state, setting}}));
+  if (document.kind !== "sweep" || everySetting.indexOf(figure.name) < 0) return [{name: figure.name, state}];
+  return settingsForPaper(document).map((setting, i) => ({name: i === 0 ? figure.name : `${figure.name}-${difference(document, setting)}`, state: {...state, setting}}));
 }
 
-const settingStem = (document, setting) => document.choices
-  .map((choice, i) => (choice.values.length > 1 ? `${choice.label}-${choice.values[setting[i]]}` : null)).filter(Boolean)
-  .join("-").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-+|-+$/g, "");
+function settingsForPaper(document) {
+  const usual = richestMap(document).setting, settings = [usual];
+  for (const choice of mainChoices(document))
+    document.choices[choice].values.forEach((_, value) => {
+      const setting = usual.slice();
+      setting[choice] = value;
+      if (value !== usual[choice] && mapAt(document, setting)) settings.push(setting);
+    });
+  return settings;
+}
+
+const difference = (document, setting) => document.choices
+  .map((choice, i) => (setting[i] === richestMap(document).setting[i] ? null : `${choice.label}-${choice.values[setting[i]]}`)).filter(Boolean).map(stem).join("-");

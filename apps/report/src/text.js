@@ -17,6 +17,9 @@ export function exact(value) {
   return typeof value === "number" ? String(value).replace("-", "−") : String(value);
 }
 
+/// A time to the hundredth, without zeros that say nothing.
+export const seconds = (time) => String(Math.round(time * 100) / 100).replace("-", "−");
+
 export const count = (value) => (value === null || value === undefined ? "–" : grouped(String(Math.round(value))));
 
 function grouped(text) {

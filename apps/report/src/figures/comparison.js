@@ -1,6 +1,6 @@
 // Solvers side by side: on the same problems, and each driving by itself. `comparison` is compare.json.
 import {capital, count, listed, number, withUnit} from "../text.js";
-import {addFrame, addShapes, axisRange, base, extentOf, isKnown, legend} from "./parts.js";
+import {addFrame, addLegend, addShapes, axisRange, base, extentOf, isKnown} from "./parts.js";
 
 const problemNames = {rhe: "estimation (RHE)", rhc: "control (RHC)"};
 const ROW = 34;
@@ -103,7 +103,7 @@ function statusFigure(comparison, problems) {
           return {type: "rect", shape: {x: x1, y: y - 9, width: own ? Math.max(x2 - x1, 1) : 0, height: 18}, style: {fill: look.kinds[n % look.kinds.length]}};
         }), {itemStyle: {color: look.kinds[n % look.kinds.length]}}));
       });
-      option.legend = legend(look, names);
+      addLegend(option, look, names);
       option.tooltip = {show: false};
       return option;
     },

@@ -30,7 +30,7 @@ function runSections(document) {
   const {states, parameters} = estimateFigures(document);
   return [
     {id: "window", title: "The horizons, sample by sample", figures: windowFigures(document), isScrubber: true},
-    {id: "map", title: "Path and ground", figures: mapFigures(document)},
+    {id: "map", title: "Path and ground", figures: mapFigures(document), inPairs: true},
     {id: "parameters", title: "Slip: estimate and truth", figures: parameters},
     {id: "states", title: "States: estimate and truth", figures: states},
     {id: "errors", title: "Errors", figures: errorFigures(document)},
@@ -43,14 +43,14 @@ function logSections(document) {
   const sections = [{id: "window", title: "The horizon, sample by sample", figures: windowFigures(document), isScrubber: true},
                     {id: "map", title: "Track and fixes", figures: [trackFigure(document)]}];
   document.variants.forEach((variant, v) => {
-    const prefix = document.variants.length > 1 ? `${stem(variant.name)}-` : "", of = document.variants.length > 1 ? `: ${variant.name}` : "";
+    const prefix = document.variants.length > 1 ? `${stem(variant.name)}-` : "", of = document.variants.length > 1 ? ` (${variant.name})` : "";
     const source = {...variant, times: document.times};
     const {states, parameters} = estimateFigures(document, source, prefix);
     const residuals = variant.residuals && columnFigure(document, {
       name: `${prefix}residuals`, title: `Distance of the antenna from each fix${of}`, caption: "By the estimate; of a fix that was withheld, by the prediction of it.",
-      about: ["fixes"], label: "distance", unit: "m", time: columnOf(document, variant.residuals.time), values: variant.residuals.values, zero: true, dots: true, colour: "measured"});
+      about: ["fixes"], label: "distance", unit: "m", time: columnOf(document, variant.residuals.time), values: variant.residuals.values, log: true, dots: true, colour: "measured"});
     const named = (figure) => figure && {...figure, title: `${figure.title}${of}`};
-    sections.push({id: `variant-${v}`, title: document.variants.length > 1 ? `Estimator ${variant.name}` : "Estimates", isFolded: v > 0,
+    sections.push({id: `variant-${v}`, title: document.variants.length > 1 ? `Estimator ${variant.name}` : "Estimates", isFolded: v > 0, ofVariant: variant.name,
       figures: [...parameters.map(named), ...states.map(named), residuals, named(solveTimeFigure(document, source, prefix)), named(statusFigure(document, source, prefix))]});
   });
   return sections;

@@ -1,5 +1,5 @@
 // The track of a recorded drive, beside the fixes that it was estimated from.
-import {addDots, addFrame, addLine, base, equalAxes, extentOf, legend, pairs} from "./parts.js";
+import {addDots, addFrame, addLegend, addLine, base, equalAxes, extentOf, pairs} from "./parts.js";
 
 const margins = {left: 62, right: 16, top: 50, bottom: 46};
 const inside = (share, low, high) => Math.min(Math.max(share, low), high);
@@ -43,7 +43,7 @@ export function trackFigure(document) {
         const index = tracks.indexOf(variant);
         addLine(option, frame, variant.name, pairs(variant.track.x, variant.track.y), {color: colours[index % 5], type: types[index % 5], width: index === 0 ? 1.8 : 1.2}, {z: 5 - Math.min(index, 3)});
       });
-      option.legend = legend(look, names.concat(tracks.map((variant) => variant.name)));
+      addLegend(option, look, names.concat(tracks.map((variant) => variant.name)));
       option.tooltip = {show: false};
       return option;
     },

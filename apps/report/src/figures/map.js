@@ -2,7 +2,7 @@
 import {colourAt, css, scales} from "../look.js";
 import {pngUrl} from "../png.js";
 import {number, withUnit} from "../text.js";
-import {addFrame, addLine, addShapes, base, equalAxes, extentOf, legend, pairs} from "./parts.js";
+import {addFrame, addLegend, addLine, addShapes, base, equalAxes, extentOf, pairs} from "./parts.js";
 
 const SHADES = 128;
 const pictures = [];  // {raster, url}: drawn once and placed often
@@ -81,8 +81,8 @@ const margins = {left: 62, right: 16, top: 58, bottom: 46};
 function mapHeight(map, width) {
   const [x, y] = extent(map);
   const inner = width - margins.left - margins.right;
-  const share = Math.min(Math.max((y[1] - y[0]) / Math.max(x[1] - x[0], 1e-9), 0.25), 1);
-  return Math.round(inner * Math.min(share * 1.06, width < 500 ? 1.15 : 0.72) + margins.top + margins.bottom);
+  const share = Math.min(Math.max((y[1] - y[0]) / Math.max(x[1] - x[0], 1e-9), 0.25), 1.1);
+  return Math.round(Math.min(inner * Math.min(share * 1.06, 1.15), 640) + margins.top + margins.bottom);
 }
 
 function mapOption(look, {width, height}, map, raster) {
@@ -111,7 +111,7 @@ function mapOption(look, {width, height}, map, raster) {
   }
   addTrack(option, look, frame, "estimated track", map.estimated.x, map.estimated.y, {color: look.estimate, width: 1.6});
   names.push("estimated track");
-  option.legend = legend(look, names);
+  addLegend(option, look, names);
   option.tooltip = {show: false};
   return option;
 }

@@ -15,16 +15,24 @@ export function addFrame(option, look, {top, height, width, left = 62, right = 1
   const index = option.grid.length;
   const text = {color: look.faint, fontSize: look.fontSize - 1, fontFamily: look.font, hideOverlap: true};
   const common = {
-    gridIndex: index, type: "value", nameLocation: "middle",
+    gridIndex: index, type: "value", nameLocation: "middle", nameMoveOverlap: false,
     nameTextStyle: {color: look.text, fontSize: look.fontSize, fontFamily: look.font},
     axisLine: {show: true, onZero: false, lineStyle: {color: look.line}},
     axisTick: {show: !bare, lineStyle: {color: look.line}}, splitLine: {lineStyle: {color: look.grid}},
   };
   option.grid.push({left, top, height, width: width - left - right, containLabel: false, outerBoundsMode: "none"});
   option.xAxis.push({...common, nameGap: 26, ...x, axisLabel: {...text, formatter: tick, ...(x && x.axisLabel)}});
-  option.yAxis.push({...common, nameGap: 44, splitNumber: Math.max(2, Math.round(height / 40)), ...y,
-                     axisLabel: {...text, formatter: tick, ...(y && y.axisLabel)}});
+  const steps = evenSteps(y, Math.max(2, Math.round(height / 40)));
+  option.yAxis.push({...common, nameGap: 42, ...steps, ...y, axisLabel: {...text, ...steps.axisLabel, formatter: tick, ...(y && y.axisLabel)}});
   return index;
+}
+
+/// Steps of an axis whose ends are given; an end that is no multiple of them has no number.
+function evenSteps({type, min, max} = {}, about) {
+  if (type || !isKnown(min) || !isKnown(max)) return {splitNumber: about};
+  const interval = niceStep((max - min) / about), fits = (value) => Math.abs(value / interval - Math.round(value / interval)) < 1e-6;
+  if (!fits(min)) return {splitNumber: about, axisLabel: {showMinLabel: false, showMaxLabel: false}};  // ECharts counts from the least
+  return {interval, axisLabel: {showMaxLabel: fits(max)}};
 }
 
 /// A number at an axis: no noise of binary fractions, a proper minus.
@@ -38,7 +46,7 @@ export const pairs = (x, y) => x.map((value, i) => [value, y[i]]);
 
 export function addLine(option, frame, name, data, style, more = {}) {
   option.series.push({
-    type: "line", name, data, xAxisIndex: frame, yAxisIndex: frame, showSymbol: false, symbol: "circle", connectNulls: false,
+    type: "line", name, data, xAxisIndex: frame, yAxisIndex: frame, showSymbol: false, symbol: more.showSymbol ? "circle" : "none", connectNulls: false,
     emphasis: {disabled: true}, lineStyle: {width: 1.4, ...style}, itemStyle: {color: style.color}, clip: true, ...more,
   });
 }
@@ -127,11 +135,30 @@ export function niceStep(about) {
 }
 const clean = (value) => Number(value.toPrecision(12));
 
-export function legend(look, names, more = {}) {
-  return {
-    data: names, top: 0, left: 56, right: 8, itemWidth: 20, itemHeight: 9, itemGap: 14, selectedMode: false, icon: undefined,
-    textStyle: {color: look.text, fontSize: look.fontSize, fontFamily: look.font}, ...more,
-  };
+/// How high a legend is: it has more lines where the figure is narrow.
+export function legendHeight(look, names, width) {
+  const lengths = names.map((name) => 38 + name.length * look.fontSize * 0.62);
+  let lines = names.length ? 1 : 0, used = 0;
+  for (const length of lengths) {
+    if (used > 0 && used + length > width - 64) {
+      ++lines;
+      used = 0;
+    }
+    used += length;
+  }
+  return lines * (look.fontSize + 12);
+}
+
+const strokes = {solid: "path://M0,4h30v3h-30z", dashed: "path://M0,4h8v3h-8zM11,4h8v3h-8zM22,4h8v3h-8z", dotted: "path://M0,4h3v3h-3zM7,4h3v3h-3zM14,4h3v3h-3zM21,4h3v3h-3zM27,4h3v3h-3z"};
+
+/// A legend of the series with these names; lines look there as they do in the figure.
+export function addLegend(option, look, names) {
+  const data = names.map((name) => {
+    const series = option.series.find((each) => each.name === name);
+    return series && series.type === "line" && !series.showSymbol ? {name, icon: strokes[series.lineStyle.type || "solid"], itemStyle: {borderWidth: 0}} : {name};
+  });
+  option.legend = {data, top: 0, left: 56, right: 8, itemWidth: 22, itemHeight: 9, itemGap: 14, selectedMode: false,
+                   textStyle: {color: look.text, fontSize: look.fontSize, fontFamily: look.font}};
 }
 
 /// The box with numbers beside the pointer.

@@ -1,6 +1,6 @@
 // Columns over time: states and parameters with their bands, errors, inputs within their bounds, statuses.
 import {capital, percent, withUnit} from "../text.js";
-import {addBand, addDots, addFrame, addLine, addShapes, addStripes, axisRange, base, extentOf, isKnown, legend, pairs, tooltip} from "./parts.js";
+import {addBand, addDots, addFrame, addLegend, addLine, addShapes, addStripes, axisRange, base, extentOf, isKnown, pairs, tooltip} from "./parts.js";
 
 const TOP = 30, GAP = 26, BOTTOM = 46;
 
@@ -19,15 +19,21 @@ function inView(time, view, columns) {
 
 const timeAxis = (time, view, name = "time [s]") => {
   const [low, high] = view || extentOf(time);
-  return {name, min: low, max: high > low ? high : low + 1, axisLabel: {showMaxLabel: null}};
+  return {name, min: low, max: high > low ? high : low + 1, axisLabel: {showMinLabel: low === 0, showMaxLabel: false}};
 };
 const plus = (a, b, factor) => a.map((value, i) => (isKnown(value) && isKnown(b[i]) ? value + factor * b[i] : null));
+
+/// The value that a share of a column lies below.
+function mostOf(column, share) {
+  const known = (column || []).filter(isKnown).sort((a, b) => a - b);
+  return known.length ? known[Math.min(known.length - 1, Math.floor(share * known.length))] : share < 0.5 ? Infinity : -Infinity;
+}
 
 /// The extent of lines, and of a band as far as it does not dwarf them.
 function extentWithBand(lines, low, high) {
   const [least, most] = extentOf(...lines);
   const span = most - least || Math.abs(most) || 1;
-  const [bandLow, bandHigh] = extentOf(low, high);
+  const [bandLow, bandHigh] = [mostOf(low, 0.03), mostOf(high, 0.97)];
   return [Math.max(Math.min(bandLow, least), least - 0.6 * span), Math.min(Math.max(bandHigh, most), most + 0.6 * span)];
 }
 
@@ -44,7 +50,7 @@ function estimateFigure(document, column, variable, kind, prefix) {
   const what = meaning ? `${column.name}, ${meaning}` : column.name;
   return {
     name: `${prefix}${kind}-${column.name}`,
-    title: capital(`${what}: estimate${column.true ? " and truth" : ""}`),
+    title: `${what}: estimate${column.true ? " and truth" : ""}`,
     caption: (hasSigma ? "Band: ± 2 standard deviations, cut off where it would dwarf the lines." : "The estimator gives no standard deviation.") +
              (hasError ? " Below: estimate less truth." : ""),
     about: ["samples", "truth", "times"],
@@ -89,7 +95,7 @@ function estimateOption(look, width, height, view, column, wholeTime, unit, gaps
     addLine(option, lower, "error", pairs(time, error), {color: look.reference});
     names.push("error");
   }
-  option.legend = legend(look, names);
+  addLegend(option, look, names);
   option.tooltip = tooltip(look);
   if (error) option.axisPointer = {link: [{xAxisIndex: "all"}]};
   return option;
@@ -111,12 +117,12 @@ export function estimateFigures(document, source = document, prefix = "") {
 }
 
 /// One column in one frame: an error of the run, or how far fixes are from the estimate.
-export function columnFigure(document, {name, title, caption, about, label, unit, time, values, colour = "reference", zero = false, dots = false}) {
+export function columnFigure(document, {name, title, caption, about, label, unit, time, values, colour = "reference", zero = false, dots = false, log = false}) {
   return {
     name, title, caption, about, time: () => time, frames: 1, height: () => 220,
     option: (look, {width, height, view}) => {
       const option = base(look), part = inView(time, view, {values});
-      const range = axisRange(extentOf(part.values), {zero});
+      const range = log ? powersOf(part.values) : axisRange(extentOf(part.values), {zero});
       const frame = addFrame(option, look, {top: 12, height: height - 12 - BOTTOM, width, x: timeAxis(time, view),
         y: {name: withUnit(label, unit), ...range}});
       addStripes(option, frame, "no fix", gapStripes(document), look.gap, [range.min, range.max]);
@@ -139,6 +145,12 @@ export function errorFigures(document) {
   }));
 }
 
+/// A logarithmic axis over all positive values.
+function powersOf(values) {
+  const [low, high] = extentOf(values.filter((value) => value > 0)).map((value) => Math.log(value) / Math.LN10);
+  return {type: "log", min: Math.pow(10, Math.floor(Math.max(low, high - 6))), max: Math.pow(10, Math.ceil(high + 1e-9))};
+}
+
 const asColumn = (bound, length) => (Array.isArray(bound) ? bound : isKnown(bound) ? new Array(length).fill(bound) : null);
 
 export function inputFigures(document) {
@@ -149,7 +161,7 @@ export function inputFigures(document) {
     const bounded = [lower && "lower bound", upper && "upper bound"].filter(Boolean);
     return {
       name: `input-${column.name}`,
-      title: capital(`${variable && variable.meaning ? `${column.name}, ${variable.meaning}` : column.name}${bounded.length ? ": input and its bounds" : ": input"}`),
+      title: `${variable && variable.meaning ? `${column.name}, ${variable.meaning}` : column.name}${bounded.length ? ": input and its bounds" : ": input"}`,
       caption: `What the controller chose; it holds until the next sample.${bounded.length ? "" : " It has no bounds."} ${atBounds(column.values, lower, upper)}`,
       about: ["inputs", "samples"], time: () => time, frames: 1, height: () => 230,
       option: (look, {width, height, view}) => {
@@ -160,7 +172,7 @@ export function inputFigures(document) {
         if (part.upper) addLine(option, frame, "upper bound", pairs(part.time, part.upper), {color: look.bound, type: "dashed"}, {step: "end"});
         addLine(option, frame, column.name, pairs(part.time, part.values), {color: look.estimate}, {step: "end"});
         if (part.lower) addLine(option, frame, "lower bound", pairs(part.time, part.lower), {color: look.bound, type: "dotted"}, {step: "end"});
-        option.legend = legend(look, [upper && "upper bound", column.name, lower && "lower bound"].filter(Boolean));
+        addLegend(option, look, [upper && "upper bound", column.name, lower && "lower bound"].filter(Boolean));
         option.tooltip = tooltip(look);
         return option;
       },
@@ -213,6 +225,13 @@ function lastTime(source) {
   return Math.max(1, ...changes.map((list) => (list.length ? list[list.length - 1][1] : 0)));
 }
 
+/// What is well is blue or green, all else has a colour of its own.
+function statusColour(look, names, index) {
+  const fine = {solved: look.estimate, step_taken: look.measured};
+  const others = [look.kinds[1], look.kinds[3], look.kinds[4], look.kinds[5]], rank = names.filter((name) => !fine[name]).indexOf(names[index]);
+  return fine[names[index]] || others[rank % others.length];
+}
+
 function statusOption(look, width, height, view, {lanes, names, statuses, fallbacks, softened, end}) {
   const option = base(look), top = 40;
   const frame = addFrame(option, look, {
@@ -220,7 +239,7 @@ function statusOption(look, width, height, view, {lanes, names, statuses, fallba
     y: {type: "category", data: lanes.map((problem) => problems[problem]), splitLine: {show: false}, axisTick: {show: false}, axisLabel: {formatter: null, color: look.text}},
   });
   names.forEach((name, index) => {
-    const colour = look.kinds[index % look.kinds.length];
+    const colour = statusColour(look, names, index);
     addShapes(option, frame, name, [0, 0], (at) => {
       const shapes = [];
       lanes.forEach((problem, lane) => {
@@ -239,7 +258,7 @@ function statusOption(look, width, height, view, {lanes, names, statuses, fallba
   const marks = lanes.reduce((all, problem, lane) => all.concat((fallbacks[problem] || []).map(([, time]) => [time, lane])), []);
   if (marks.length) addDots(option, frame, "fallback", marks, look.alarm, {symbol: "path://M0,2L2,0L5,3L8,0L10,2L7,5L10,8L8,10L5,7L2,10L0,8L3,5Z", symbolSize: 9, symbolOffset: [0, -16], clip: false});
   if (softened.length) addDots(option, frame, "softened", softened.map(([, time]) => [time, lanes.length - 1]), look.reference, {symbol: "triangle", symbolSize: 7, symbolOffset: [0, 15], clip: false});
-  option.legend = legend(look, names.concat(marks.length ? ["fallback"] : [], softened.length ? ["softened"] : []));
+  addLegend(option, look, names.concat(marks.length ? ["fallback"] : [], softened.length ? ["softened"] : []));
   option.tooltip = {show: false};
   return option;
 }

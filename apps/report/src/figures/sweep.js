@@ -1,16 +1,22 @@
 // What a sweep found: errors and times over a grid, beside full-horizon blocking, absolute and relative, by speed, in
 // pairs of the same seed. `state` is what the reader has chosen (startState).
 import {css, readableOn} from "../look.js";
-import {capital, count, number, withUnit} from "../text.js";
-import {addFrame, addLine, addShapes, axisRange, base, extentOf, isKnown, legend, tooltip} from "./parts.js";
+import {capital, count, number, stem, withUnit} from "../text.js";
+import {addFrame, addLegend, addLine, addShapes, axisRange, base, extentOf, isKnown, tooltip} from "./parts.js";
 import {shading, shownRange, startView, surfaceShapes} from "./surface.js";
 
 // ---- what is looked at
 
 export function startState(document) {
-  const map = document.maps[0], measures = measuresOf(document, ["mae"]);
+  const map = richestMap(document), measures = measuresOf(document, ["mae"]);
   return {setting: map.setting.slice(), measure: (measures[0] || document.measures[0]).name, relative: false,
           time: (measuresOf(document, ["time"])[0] || {}).name, cell: startCell(map), ...startView};
+}
+
+/// The map with the most runs: what the page opens with.
+export function richestMap(document) {
+  const runs = (map) => map.runs.reduce((sum, row) => row.reduce((a, b) => a + b, sum), 0);
+  return document.maps.reduce((best, map) => (runs(map) > runs(best) ? map : best));
 }
 
 function startCell(map) {
@@ -29,8 +35,19 @@ export function nearestSetting(document, setting, fixed) {
   return fitting.length ? fitting.reduce((best, map) => (distance(map) < distance(best) ? map : best)).setting.slice() : null;
 }
 
-export function settingText(document, setting) {
-  return document.choices.map((choice, i) => (choice.values.length > 1 ? `${choice.label} ${choice.values[setting[i]]}` : null)).filter(Boolean).join(", ");
+/// The choices that a reader makes first: the place, the speed, what is blocked; of other sweeps, the first three.
+export function mainChoices(document) {
+  const wanted = document.choices.map((choice, i) => (/^(path|path\.name|scenario|speed|blocked)$/.test(choice.key) ? i : -1)).filter((i) => i >= 0);
+  return wanted.length ? wanted : document.choices.map((_, i) => i).slice(0, 3);
+}
+
+/// A setting in words: the main choices, and of the others those that are not as in the richest map.
+export function settingText(document, setting, without = -1) {
+  const main = mainChoices(document), usual = richestMap(document).setting;
+  return document.choices.map((choice, i) => {
+    if (choice.values.length < 2 || i === without || (main.indexOf(i) < 0 && setting[i] === usual[i])) return null;
+    return `${choice.label} ${choice.values[setting[i]]}${choice.key === "speed" ? " m/s" : ""}`;
+  }).filter(Boolean).join(", ");
 }
 
 const labelOf = (measure) => withUnit(measure.label, measure.unit);
@@ -62,9 +79,7 @@ export function sweepFigures(document) {
   };
 }
 
-function mapOf(document, state) {
-  return mapAt(document, state.setting) || document.maps[0];
-}
+const mapOf = (document, state) => mapAt(document, state.setting);
 
 const paperOrder = ["mae.tracking", "mae.kappa", "mae.position", "mae.mu"];
 
@@ -333,9 +348,9 @@ function linesOver(document, state, name) {
 
 function overChoice(document) {
   const choice = document.choices[numericChoice(document)];
-  const others = (state) => document.choices.map((other, i) => (other.values.length > 1 && other !== choice ? `${other.label} ${other.values[state.setting[i]]}` : null)).filter(Boolean).join(", ");
+  const others = (state) => settingText(document, state.setting, document.choices.indexOf(choice));
   return {
-    name: "by-" + choice.label.split(" ")[0], title: (state) => `${capital(measureOf(document, state.measure).label)} by ${choice.label}: ${others(state)}`,
+    name: `by-${stem(choice.label)}`, title: (state) => `${capital(measureOf(document, state.measure).label)} by ${choice.label}: ${others(state)}`,
     caption: () => "The cell is the one chosen in the map above; the best cell is another at each place, and chosen after the fact.", about: ["runs"],
     height: () => 300,
     option: (look, {width, height, state}) => {
@@ -343,7 +358,7 @@ function overChoice(document) {
       const range = axisRange(extentOf(...lines.map((line) => line.points.map(([, value]) => value))), {zero: true});
       const frame = addFrame(option, look, {top: 40, height: height - 40 - 46, width, x: {name: choice.label, minInterval: 1, ...pad(extentOf(choice.values))}, y: {name: shortLabel(measure), ...range}});
       for (const line of lines) addLine(option, frame, line.name, line.points, {color: look[line.colour], width: 2, type: line.type || "solid"}, {showSymbol: true, symbolSize: 6});
-      option.legend = legend(look, lines.map((line) => line.name));
+      addLegend(option, look, lines.map((line) => line.name));
       option.tooltip = tooltip(look);
       return option;
     },

@@ -1,6 +1,6 @@
 // Solve times as a distribution: every solve is in a bin, bins are even on a logarithmic scale.
-import {count, number} from "../text.js";
-import {addFrame, addLine, addShapes, axisRange, base, legend, tooltip} from "./parts.js";
+import {capital, count, number} from "../text.js";
+import {addFrame, addLegend, addLine, addShapes, axisRange, base, tooltip} from "./parts.js";
 
 const names = {rhe: "estimator (RHE)", rhc: "controller (RHC)"};
 
@@ -10,7 +10,7 @@ export function solveTimeFigure(document, source = document, prefix = "") {
   if (shown.length === 0) return null;
   return {
     name: `${prefix}solve-times`, title: "Solve times",
-    caption: `${shown.map((problem) => `${names[problem]}: median ${number(times[problem].median)} µs, 99 % within ${number(times[problem].p99)} µs, longest ${number(times[problem].max)} µs, of ${count(times[problem].count)} solves`).join("; ")}. Preparation and feedback together. Lines: median (dashed), 99th percentile (dotted).`,
+    caption: `${shown.map((problem) => `${capital(names[problem])}: median ${number(times[problem].median)} µs, 99 % within ${number(times[problem].p99)} µs, longest ${number(times[problem].max)} µs, of ${count(times[problem].count)} solves`).join("; ")}. Preparation and feedback together. Lines: median (dashed), 99th percentile (dotted).`,
     about: ["times"], height: () => 280,
     option: (look, size) => histogram(look, size, times, shown),
     table: () => ({columns: ["from [µs]", "to [µs]"].concat(shown.map((problem) => `solves, ${names[problem]}`)), rows: rowsOf(times, shown)}),
@@ -47,7 +47,7 @@ function histogram(look, {width, height}, times, shown) {
     addLine(option, frame, `${problem} median`, [[median, 0], [median, ends.max]], {color: colours[problem], type: "dashed"}, {silent: true});
     addLine(option, frame, `${problem} p99`, [[p99, 0], [p99, ends.max]], {color: colours[problem], type: "dotted"}, {silent: true});
   }
-  option.legend = legend(look, shown.map((problem) => names[problem]));
+  addLegend(option, look, shown.map((problem) => names[problem]));
   option.tooltip = {...tooltip(look), show: false};
   return option;
 }

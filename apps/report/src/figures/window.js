@@ -1,7 +1,7 @@
 // One sample of the scrubber: the estimation horizon with its blocks, the measurements in it, and what the controller
 // plans from there. Seen from above, and along the steps.
-import {capital, listed, number, withUnit} from "../text.js";
-import {addDots, addFrame, addLine, addShapes, axisRange, base, equalAxes, extentOf, hatch, isKnown, legend, pairs, tick} from "./parts.js";
+import {listed, seconds, withUnit} from "../text.js";
+import {addDots, addFrame, addLegend, addLine, addShapes, axisRange, base, equalAxes, extentOf, hatch, isKnown, legendHeight, pairs, tick} from "./parts.js";
 import {addGround, addGroundScale} from "./map.js";
 
 /// The blocks of a parameter in a window as a list with all that figures and tables want to know of them.
@@ -14,7 +14,7 @@ export function blocksOf(horizon, index) {
     const last = b === starts.length - 1;
     return {
       start, end: last ? end : starts[b + 1], value: values[b], sigma: sigmas ? sigmas[b] : null,
-      cut: b === 0 && isKnown(first_start) && first_start < start,
+      cut: b === 0 && isKnown(next_start) && isKnown(first_start) && first_start < start,
       growing: last && isKnown(next_start) && next_start > end,
       began: b === 0 && isKnown(first_start) ? first_start : start,
     };
@@ -50,29 +50,27 @@ export function parameterToColour(document) {
 
 // ---- seen from above
 
-const mapMargins = {left: 62, right: 16, top: 76, bottom: 46};
+const mapMargins = {left: 56, right: 12, bottom: 46};
 
 export function windowMapOption(look, {width, height}, document, horizon, chosen, colourOf) {
-  const option = base(look);
+  const option = base(look), shown = mapLegend(document, horizon);
+  const raster = rasterOf(document, chosen), top = legendHeight(look, shown, width) + (raster ? 24 : 6);
   const {x, y} = extentOfWindow(document, horizon);
-  const inner = {width: width - mapMargins.left - mapMargins.right, height: height - mapMargins.top - mapMargins.bottom};
+  const inner = {width: width - mapMargins.left - mapMargins.right, height: height - top - mapMargins.bottom};
   const axes = equalAxes(x, y, inner.width, inner.height);
   const frame = addFrame(option, look, {
-    top: mapMargins.top, height: inner.height, width, left: mapMargins.left, right: mapMargins.right,
+    top, height: inner.height, width, left: mapMargins.left, right: mapMargins.right,
     x: {name: "x [m]", ...axes.x, splitLine: {show: false}, axisLabel: {showMinLabel: false, showMaxLabel: false}},
     y: {name: "y [m]", ...axes.y, splitLine: {show: false}, axisLabel: {showMinLabel: false, showMaxLabel: false}},
   });
-  const names = [], map = document.map || {};
-  const parameter = document.model.parameters[chosen];
-  const raster = parameter && (map.slip || []).find((slip) => slip.parameter === parameter.name);
+  const map = document.map || {};
   if (raster) {
     addGround(option, frame, raster);
-    addGroundScale(option, look, raster, withUnit(`true ${raster.parameter}`, parameter.unit), {left: mapMargins.left, top: mapMargins.top - 20, width});
+    addGroundScale(option, look, raster, withUnit(`true ${raster.parameter}`, raster.unit), {left: mapMargins.left, top: top - 18, width});
   }
   const line = (name, data, style, more) => {
     addLine(option, frame, `${name} (edge)`, data, {...style, color: look.halo, width: (style.width || 1.5) + 2.5, type: "solid"}, {silent: true, z: 2});
     addLine(option, frame, name, data, style, {z: 3, ...more});
-    names.push(name);
   };
   if (map.path) line("path", pairs(map.path.x, map.path.y), {color: look.reference, width: 1.6, type: "dashed"});
   if (map.true) line("true track", near(pairs(map.true.x, map.true.y), axes), {color: look.truth, width: 1.4});
@@ -81,12 +79,10 @@ export function windowMapOption(look, {width, height}, document, horizon, chosen
   if (rhe) {
     const nodes = pairs(rhe.state[position_x], rhe.state[position_y]);
     addBlocksOnTrack(option, frame, look, nodes, blocksOf(horizon, chosen), horizon, chosen, colourOf);
-    names.push("blocks");
     const outputs = document.model.position_outputs;
     if (outputs) {
       const dots = pairs(rhe.measured[outputs[0]], rhe.measured[outputs[1]]).filter(([a, b]) => isKnown(a) && isKnown(b));
       addDots(option, frame, "measured position", dots, look.measured, {symbolSize: 7, z: 6, itemStyle: {color: look.measured, borderColor: look.ground, borderWidth: 1}});
-      names.push("measured position");
     }
   }
   if (rhc) {
@@ -94,12 +90,17 @@ export function windowMapOption(look, {width, height}, document, horizon, chosen
             {symbol: "rect", symbolSize: 8, z: 5, itemStyle: {color: look.halo, borderColor: look.reference, borderWidth: 1.6}});
     line("plan", pairs(rhc.state[position_x], rhc.state[position_y]), {color: look.plan, width: 2.4},
          {showSymbol: true, symbol: "circle", symbolSize: 5, z: 6});
-    names.push("local reference");
   }
   addVehicle(option, frame, look, pose(horizon, position_x, position_y, heading));
-  option.legend = legend(look, names.filter((name) => name !== "blocks"));
+  addLegend(option, look, shown);
   option.tooltip = {show: false};
   return option;
+}
+
+const rasterOf = ({model, map}, chosen) => (map && map.slip && model.parameters[chosen] ? map.slip.find((slip) => slip.parameter === model.parameters[chosen].name) : undefined);
+
+function mapLegend({map, model}, {rhe, rhc}) {
+  return [map && map.path && "path", map && map.true && "true track", rhe && model.position_outputs && "measured position", rhc && "plan", rhc && "local reference"].filter(Boolean);
 }
 
 function pose({rhe, rhc}, x, y, heading) {
@@ -174,7 +175,8 @@ function addVehicle(option, frame, look, place) {
 
 // ---- along the steps
 
-const stripMargins = {left: 62, right: 14, top: 52, bottom: 48, gap: 16};
+const stripMargins = {left: 62, right: 14, bottom: 52, gap: 16};
+const stripTop = (look, names, width) => legendHeight(look, names, width) + 24;
 
 export function stripRows(document, horizon) {
   const parameters = document.model.parameters.map((variable, index) => ({kind: "parameter", variable, index}));
@@ -182,7 +184,13 @@ export function stripRows(document, horizon) {
   return parameters.concat(inputs).filter((row) => horizon.rhe || (row.kind === "input" && horizon.rhc));
 }
 
-export const stripHeight = (rows) => stripMargins.top + stripMargins.bottom + rows.length * 112;
+export const stripHeight = (rows) => 76 + stripMargins.bottom + rows.length * 112;
+
+function stripLegend(document, {rhe, rhc}) {
+  const blocks = Boolean(rhe && rhe.blocks);
+  return [blocks && "block", blocks && rhe.blocks.some((each) => each.sigmas && each.sigmas.some(isKnown)) && "± 2σ", rhe && rhe.true && "truth",
+          rhe && rhe.measured_input && "measured", rhe && "estimated input", rhc && "planned", rhc && rhc.input_reference && "reference", rhc && (rhc.lower || rhc.upper) && "bound"].filter(Boolean);
+}
 
 export function stripOption(look, {width, height}, document, horizon, colourOf) {
   const option = base(look);
@@ -190,15 +198,16 @@ export function stripOption(look, {width, height}, document, horizon, colourOf) 
   const now = rhe ? rhe.first + rhe.time.length - 1 : horizon.sample;
   const planned = rhc ? rhc.input[0].length : 0;
   const from = rhe ? Math.min(rhe.first, now - 1) : now, to = now + planned;
-  const inner = (height - stripMargins.top - stripMargins.bottom - (rows.length - 1) * stripMargins.gap) / rows.length;
-  const seconds = stepTimes(document, horizon);
+  const names = stripLegend(document, horizon), topmost = stripTop(look, names, width);
+  const inner = (height - topmost - stripMargins.bottom - (rows.length - 1) * stripMargins.gap) / rows.length;
+  const secondsAt = stepTimes(document, horizon);
   rows.forEach((row, r) => {
     const isLast = r === rows.length - 1;
     const range = rowRange(document, horizon, row);
     const frame = addFrame(option, look, {
-      top: stripMargins.top + r * (inner + stripMargins.gap), height: inner, width, left: stripMargins.left, right: stripMargins.right,
-      x: {min: from, max: Math.max(to, from + 1), minInterval: 1, name: isLast ? "step k, time [s]" : "", nameGap: 34, splitLine: {show: false},
-          axisLabel: isLast ? {formatter: (k) => `${tick(k)}\n${seconds(k)}`} : {show: false}},
+      top: topmost + r * (inner + stripMargins.gap), height: inner, width, left: stripMargins.left, right: stripMargins.right,
+      x: {min: from, max: Math.max(to, from + 1), minInterval: 1, name: isLast ? "step k, time [s]" : "", nameGap: 40, splitLine: {show: false},
+          axisLabel: isLast ? {formatter: (k) => `${tick(k)}\n${secondsAt(k)}`, lineHeight: 14} : {show: false}},
       y: {name: withUnit(row.variable.name, row.variable.unit), ...range, splitNumber: 3},
     });
     if (row.kind === "parameter") addBlockSteps(option, frame, look, document, horizon, row.index, range, colourOf, to);
@@ -208,21 +217,19 @@ export function stripOption(look, {width, height}, document, horizon, colourOf) 
       const shapes = [{type: "line", shape: {x1: x, y1: top, x2: x, y2: bottom}, style: {stroke: look.text, lineWidth: 1.2}}];
       return shapes;
     }, {z: 7});
-    if (r === 0) option.graphic = nowLabels(look, width, from, now, to, Boolean(rhe), Boolean(rhc));
+    if (r === 0) option.graphic = nowLabels(look, topmost - 17, width, from, now, to, Boolean(rhe), Boolean(rhc));
   });
-  const names = rhe ? ["block", "± 2σ", "truth"].filter((name) => option.series.some((series) => series.name === name)) : [];
-  option.legend = legend(look, names.concat(["measured", "estimated input", "planned", "reference", "bound"].filter((name) => option.series.some((series) => series.name === name))));
+  addLegend(option, look, names);
   option.tooltip = {show: false};
   return option;
 }
 
-function nowLabels(look, width, from, now, to, hasPast, hasFuture) {
+function nowLabels(look, y, width, from, now, to, hasPast, hasFuture) {
   const inner = width - stripMargins.left - stripMargins.right;
   const x = stripMargins.left + inner * (now - from) / Math.max(to - from, 1);
-  const text = (words, left, align) => ({type: "text", silent: true, x: left, y: stripMargins.top - 18,
+  const text = (words, left, align) => ({type: "text", silent: true, x: left, y,
     style: {text: words, fill: look.faint, font: `${look.fontSize}px ${look.font}`, textAlign: align}});
-  return [hasPast && text("estimation horizon →", x - 6, "right"), hasFuture && text(hasPast ? "control horizon →" : "control horizon →", x + 6, "left")].filter(Boolean)
-    .concat([]);
+  return [hasPast && text("← estimation horizon", x - 6, "right"), hasFuture && text("control horizon →", x + 6, "left")].filter(Boolean);
 }
 
 /// Step number to seconds, by the window's nodes and, ahead of them, by the control's step.
@@ -230,9 +237,9 @@ function stepTimes(document, {rhe, time, sample}) {
   const step = document.settings && document.settings.step;
   return (k) => {
     const at = rhe ? k - rhe.first : -1;
-    if (rhe && at >= 0 && at < rhe.time.length && Math.round(at) === at) return number(rhe.time[at], 4);
+    if (rhe && at >= 0 && at < rhe.time.length && Math.round(at) === at) return seconds(rhe.time[at]);
     const now = rhe ? rhe.first + rhe.time.length - 1 : sample;
-    return isKnown(step) && k > now ? number(time + (k - now) * step, 4) : "";
+    return isKnown(step) && k > now ? seconds(time + (k - now) * step) : "";
   };
 }
 
@@ -326,7 +333,7 @@ function addInputs(option, frame, look, {rhe, rhc}, index, now) {
 
 /// One sentence for each thing that a reader sees, and that a screen reader says.
 export function windowWords(document, horizon) {
-  const {rhe, rhc} = horizon, sentences = [`Sample ${horizon.sample}, ${number(horizon.time, 5)} s.`];
+  const {rhe, rhc} = horizon, sentences = [`Sample ${horizon.sample}, ${seconds(horizon.time)} s.`];
   if (rhe) {
     const count = rhe.time.length - 1, end = rhe.first + count;
     sentences.push(count === 0 ? "The estimation horizon holds one node, and no interval yet." : `The estimation horizon has ${count} interval${count === 1 ? "" : "s"}, from step ${rhe.first} to ${end}.`);
@@ -335,8 +342,8 @@ export function windowWords(document, horizon) {
       if (blocks.length === 0) return;
       const partial = [blocks[0].cut && "the first", blocks[blocks.length - 1].growing && (blocks.length === 1 && blocks[0].cut ? false : "the last")].filter(Boolean);
       const suppressed = rhe.blocks[p].suppressed || [];
-      sentences.push(`${capital(variable.name)}: ${blocks.length === 1 ? "one block" : `${blocks.length} blocks`}` +
-        (blocks.length > 1 && partial.length ? `, ${listed(partial)} partial` : blocks.length === 1 && isKnown(rhe.blocks[p].next_start) && partial.length ? ", partial" : "") +
+      sentences.push(`${variable.name}: ${blocks.length === 1 ? "one block" : `${blocks.length} blocks`}` +
+        (blocks.length > 1 && partial.length ? `, ${listed(partial)} partial` : partial.length ? ", partial" : "") +
         (suppressed.length ? `; ${suppressed.length === 1 ? "a start" : "starts"} at step ${listed(suppressed.map(String))} suppressed by the overlap` : "") + ".");
     });
     const counted = rhe.measured && rhe.measured.length ? rhe.time.filter((_, i) => rhe.measured.some((column) => isKnown(column[i]))).length : 0;

@@ -29,16 +29,14 @@ export class Charts {
     matchMedia("print").addEventListener("change", (event) => this.print(event.matches));
   }
 
-  /// The <figure> of a figure; notes are the document's that are about it.
+  /// The <figure> of a figure.
   add(figure) {
     const title = element("h3", {}), caption = element("p", {class: "caption"});
     const canvas = element("div"), box = element("div", {class: "chart", role: "img"}, canvas);
-    const notes = this.document.notes.filter((note) => (figure.about || []).includes(note.about));
-    const noteList = notes.length ? element("ul", {class: "notes"}, ...notes.map((note) => element("li", {}, note.text))) : null;
     const table = figure.table ? foldedTable(figure.name, () => figure.table(this.state)) : null;
     const chart = {figure, title, caption, canvas, box, table, stale: true, near: false, drawnWidth: -1, instance: null, frames: []};
     this.all.push(chart);
-    const whole = element("figure", {id: `figure-${figure.name}`, "data-figure": figure.name}, title, box, caption, noteList, table);
+    const whole = element("figure", {id: `figure-${figure.name}`, "data-figure": figure.name}, title, box, caption, table);
     this.tell(chart);
     this.watcher.observe(box);
     this.sizes.observe(box);

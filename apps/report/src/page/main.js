@@ -30,10 +30,17 @@ function lookButton(charts) {
   return button;
 }
 
+/// What the document says of the figures of a section: what they leave out, how they were thinned.
+function notesOf(section) {
+  const about = section.figures.flatMap((figure) => figure.about || []);
+  const notes = report.notes.filter((note) => about.includes(note.about) && !(section.ofVariant && /^Variant /.test(note.text) && !note.text.startsWith(`Variant ${section.ofVariant}`)));
+  return notes.length ? element("ul", {class: "notes"}, ...notes.map((note) => element("li", {}, note.text))) : "";
+}
+
 function sectionElement(section, charts, scrubber, choices) {
   const heading = element("h2", {}, section.title);
-  const figures = element("div", {class: "figures"}, ...section.figures.map((figure) => charts.add(figure)));
-  const before = [];
+  const figures = element("div", {class: section.isScrubber || section.inPairs ? "figures pairs" : "figures"}, ...section.figures.map((figure) => charts.add(figure)));
+  const before = [notesOf(section)];
   if (section.isScrubber) before.push(...scrubber.words());
   if (section.hasMeasure) before.push(choices.measures());
   if (section.hasTime) before.push(choices.times());

@@ -1,7 +1,7 @@
 // The bar that goes through the samples of a run, by pointer, by keys, by itself.
 import {horizonsOf} from "../figures/index.js";
 import {windowTables} from "../figures/window.js";
-import {number} from "../text.js";
+import {seconds} from "../text.js";
 import {element, menu} from "./elements.js";
 import {tableElement} from "./tables.js";
 
@@ -78,7 +78,7 @@ export class Scrubber {
   show() {
     const at = this.charts.state.sample, horizon = this.horizons.list[at];
     this.slider.value = at;
-    this.slider.setAttribute("aria-valuetext", `sample ${horizon.sample}, ${number(horizon.time, 5)} seconds`);
+    this.slider.setAttribute("aria-valuetext", `sample ${horizon.sample}, ${seconds(horizon.time)} seconds`);
     this.output.textContent = `k = ${horizon.sample}   ${horizon.time.toFixed(1)} s`;
     const strip = this.charts.all.find((chart) => chart.figure.words);
     this.sentence.textContent = strip.figure.words(this.charts.state);

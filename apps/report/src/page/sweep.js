@@ -1,8 +1,11 @@
 // What a reader chooses in a sweep: the setting, the measure, absolute or relative, the cell, and where from to look.
-import {cellAt, cellText, mapAt, measureOf, measuresOf, nearestSetting} from "../figures/sweep.js";
+import {cellAt, cellText, mainChoices, mapAt, measureOf, measuresOf, nearestSetting} from "../figures/sweep.js";
 import {startView} from "../figures/surface.js";
 import {count} from "../text.js";
 import {element, menu} from "./elements.js";
+
+/// Indices of a choice's values, numbers by size.
+const inOrder = ({values}) => values.map((_, i) => i).sort((a, b) => (typeof values[a] === "number" && typeof values[b] === "number" ? values[a] - values[b] : a - b));
 
 export class SweepChoices {
   constructor(document, charts) {
@@ -26,11 +29,17 @@ export class SweepChoices {
     if (!this.box) return;
     const {document} = this, {setting} = this.charts.state, map = mapAt(document, setting);
     const focused = this.box.contains(window.document.activeElement) ? [...this.box.querySelectorAll("select")].indexOf(window.document.activeElement) : -1;
-    const menus = document.choices.map((choice, c) => choice.values.length < 2 ? null : menu(choice.label,
-      choice.values.map((text, value) => ({value, text: this.fits(c, value) ? String(text) : `${text} (changes others)`})), setting[c], (value) => this.choose(c, Number(value))));
+    const main = mainChoices(document);
+    const menuOf = (choice, c) => choice.values.length > 1 && menu(choice.label,
+      inOrder(choice).map((value) => ({value, text: `${choice.values[value]}${this.fits(c, value) ? "" : " *"}`})), setting[c], (value) => this.choose(c, Number(value)));
+    const shown = document.choices.map((choice, c) => main.includes(c) && menuOf(choice, c)).filter(Boolean);
+    const others = document.choices.map((choice, c) => !main.includes(c) && menuOf(choice, c)).filter(Boolean);
+    const wasOpen = this.others && this.others.open;
+    this.others = others.length ? element("details", {open: wasOpen}, element("summary", {}, "Other settings"), element("div", {class: "controls"}, ...others)) : null;
     const runs = map.runs.reduce((sum, row) => sum + row.reduce((a, b) => a + b, 0), 0);
-    this.box.replaceChildren(element("div", {class: "controls"}, ...menus.filter(Boolean)),
-      element("p", {class: "caption", role: "status"}, `${count(runs)} completed runs over ${map.axes.filter(Boolean).map((axis) => `${axis.values.length} values of ${axis.label}`).join(" and ")}.`));
+    const starred = [...shown, ...others].some((each) => each.textContent.includes(" *"));
+    this.box.replaceChildren(element("div", {class: "controls"}, ...shown), ...(this.others ? [this.others] : []),
+      element("p", {class: "caption", role: "status"}, `${count(runs)} completed runs over ${map.axes.filter(Boolean).map((axis) => `${axis.values.length} values of ${axis.label}`).join(" and ")}.${starred ? " * changes other settings too, as the sweep has not all combinations." : ""}`));
     if (focused >= 0) this.box.querySelectorAll("select")[focused].focus();
   }
 
