@@ -1,6 +1,6 @@
 // Solvers side by side: on the same problems, and each driving by itself. `comparison` is compare.json.
 import {capital, count, listed, number, withUnit} from "../text.js";
-import {addFrame, addLine, addShapes, axisRange, base, extentOf, isKnown, legend} from "./parts.js";
+import {addFrame, addShapes, axisRange, base, extentOf, isKnown, legend} from "./parts.js";
 
 const problemNames = {rhe: "estimation (RHE)", rhc: "control (RHC)"};
 const ROW = 34;
@@ -151,5 +151,3 @@ function loopFigures(comparison) {
       rows: driven.reduce((rows, loop) => rows.concat(loop.runs.map((run) => [loop.label, run.seed, run.completed ? "yes" : run.ended, run.steps, run.fallbacks].concat(keys.map((key) => run.mae[key])))), [])}),
   }];
 }
-
-export {addLine};

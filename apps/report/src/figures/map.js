@@ -2,29 +2,28 @@
 import {colourAt, css, scales} from "../look.js";
 import {pngUrl} from "../png.js";
 import {number, withUnit} from "../text.js";
-import {addFrame, addLine, addShapes, base, equalAxes, extentOf, legend, pairs, tooltip} from "./parts.js";
+import {addFrame, addLine, addShapes, base, equalAxes, extentOf, legend, pairs} from "./parts.js";
 
 const SHADES = 128;
-const pictures = new Map();  // of rasters, which are drawn once and placed often
+const pictures = [];  // {raster, url}: drawn once and placed often
 
 function groundPicture(raster) {
-  if (!pictures.has(raster)) {
-    const palette = [];
-    for (let i = 0; i < SHADES; ++i) palette.push(colourAt(scales.ground, i / (SHADES - 1)));
-    palette.push([160, 160, 160]);  // not known
-    const rows = [];
-    const span = raster.upper - raster.lower || 1;
-    for (let y = raster.ny - 1; y >= 0; --y) {
-      const row = [];
-      for (let x = 0; x < raster.nx; ++x) {
-        const value = raster.values[y * raster.nx + x];
-        row.push(value === null ? SHADES : Math.round(Math.min(Math.max((value - raster.lower) / span, 0), 1) * (SHADES - 1)));
-      }
-      rows.push(row);
+  const kept = pictures.find((picture) => picture.raster === raster);
+  if (kept) return kept.url;
+  const palette = [], rows = [], span = raster.upper - raster.lower || 1;
+  for (let i = 0; i < SHADES; ++i) palette.push(colourAt(scales.ground, i / (SHADES - 1)));
+  palette.push([160, 160, 160]);  // not known
+  for (let y = raster.ny - 1; y >= 0; --y) {
+    const row = [];
+    for (let x = 0; x < raster.nx; ++x) {
+      const value = raster.values[y * raster.nx + x];
+      row.push(value === null ? SHADES : Math.round(Math.min(Math.max((value - raster.lower) / span, 0), 1) * (SHADES - 1)));
     }
-    pictures.set(raster, pngUrl(rows, palette));
+    rows.push(row);
   }
-  return pictures.get(raster);
+  const url = pngUrl(rows, palette);
+  pictures.push({raster, url});
+  return url;
 }
 
 /// The picture of the ground in a frame whose axes are `axes` (of equalAxes).
@@ -122,5 +121,3 @@ function mapTable(map) {
   return {columns: ["line", "points", "least x [m]", "largest x [m]", "least y [m]", "largest y [m]"],
           rows: rows.map(([name, line]) => [name, line.x.length, ...extentOf(line.x), ...extentOf(line.y)])};
 }
-
-export {tooltip};

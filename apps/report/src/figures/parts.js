@@ -116,7 +116,8 @@ export function axisRange([low, high], {zero = false, margin = 0.05} = {}) {
   let span = high - low;
   if (!(span > 0)) span = Math.abs(high) || 1;
   const step = niceStep(span / 5);
-  return {min: clean(Math.floor((low - margin * span) / step) * step), max: clean(Math.ceil((high + margin * span) / step) * step)};
+  const below = zero && low === 0 ? 0 : margin * span, above = zero && high === 0 ? 0 : margin * span;
+  return {min: clean(Math.floor((low - below) / step) * step), max: clean(Math.ceil((high + above) / step) * step)};
 }
 
 export function niceStep(about) {

@@ -1,5 +1,5 @@
 // Columns over time: states and parameters with their bands, errors, inputs within their bounds, statuses.
-import {capital, listed, number, percent, withUnit} from "../text.js";
+import {capital, percent, withUnit} from "../text.js";
 import {addBand, addDots, addFrame, addLine, addShapes, addStripes, axisRange, base, extentOf, isKnown, legend, pairs, tooltip} from "./parts.js";
 
 const TOP = 30, GAP = 26, BOTTOM = 46;
@@ -243,5 +243,3 @@ function statusOption(look, width, height, view, {lanes, names, statuses, fallba
   option.tooltip = {show: false};
   return option;
 }
-
-export {listed, number};

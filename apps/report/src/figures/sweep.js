@@ -1,8 +1,8 @@
 // What a sweep found: errors and times over a grid, beside full-horizon blocking, absolute and relative, by speed, in
 // pairs of the same seed. `state` is what the reader has chosen (startState).
 import {css, readableOn} from "../look.js";
-import {capital, count, number, percent, withUnit} from "../text.js";
-import {addDots, addFrame, addLine, addShapes, axisRange, base, extentOf, isKnown, legend, tooltip} from "./parts.js";
+import {capital, count, number, withUnit} from "../text.js";
+import {addFrame, addLine, addShapes, axisRange, base, extentOf, isKnown, legend, tooltip} from "./parts.js";
 import {shading, shownRange, startView, surfaceShapes} from "./surface.js";
 
 // ---- what is looked at
@@ -385,5 +385,3 @@ function curves(document) {
     table: (state) => gridTable(mapOf(document, state), measuresOf(document, ["mae", "time"]), false),
   };
 }
-
-export {addDots, percent};

@@ -18,14 +18,14 @@ export function solveTimeFigure(document, source = document, prefix = "") {
 }
 
 function rowsOf(times, shown) {
-  const rows = new Map();
+  const rows = {};
   shown.forEach((problem, column) => times[problem].counts.forEach((solves, bin) => {
     const [from, to] = [times[problem].edges[bin], times[problem].edges[bin + 1]];
     const key = from.toPrecision(6);
-    if (!rows.has(key)) rows.set(key, [number(from, 4), number(to, 4)].concat(shown.map(() => 0)));
-    rows.get(key)[2 + column] = solves;
+    if (!rows[key]) rows[key] = [number(from, 4), number(to, 4)].concat(shown.map(() => 0));
+    rows[key][2 + column] = solves;
   }));
-  return Array.from(rows.keys()).sort((a, b) => Number(a) - Number(b)).map((key) => rows.get(key));
+  return Object.keys(rows).sort((a, b) => Number(a) - Number(b)).map((key) => rows[key]);
 }
 
 function histogram(look, {width, height}, times, shown) {

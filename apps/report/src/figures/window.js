@@ -1,7 +1,7 @@
 // One sample of the scrubber: the estimation horizon with its blocks, the measurements in it, and what the controller
 // plans from there. Seen from above, and along the steps.
 import {capital, listed, number, withUnit} from "../text.js";
-import {addBand, addDots, addFrame, addLine, addShapes, axisRange, base, equalAxes, extentOf, hatch, isKnown, legend, pairs, tick} from "./parts.js";
+import {addDots, addFrame, addLine, addShapes, axisRange, base, equalAxes, extentOf, hatch, isKnown, legend, pairs, tick} from "./parts.js";
 import {addGround, addGroundScale} from "./map.js";
 
 /// The blocks of a parameter in a window as a list with all that figures and tables want to know of them.
@@ -29,7 +29,9 @@ export function blockColours(horizons, parameterCount) {
     for (const horizon of horizons.list)
       for (const block of blocksOf(horizon, p)) starts[block.began] = true;
     const order = Object.keys(starts).map(Number).sort((a, b) => a - b);
-    ordinals.push(order.reduce((all, start, i) => ({...all, [start]: i}), {}));
+    const ordinal = {};
+    order.forEach((start, i) => (ordinal[start] = i));
+    ordinals.push(ordinal);
   }
   return (look, p, block) => look.blocks[(ordinals[p][block.began] || 0) % look.blocks.length];
 }
@@ -376,5 +378,3 @@ export function windowTables(document, horizon) {
   }
   return tables;
 }
-
-export {addBand};

@@ -1,7 +1,7 @@
 // The bar that goes through the samples of a run, by pointer, by keys, by itself.
 import {horizonsOf} from "../figures/index.js";
 import {windowTables} from "../figures/window.js";
-import {exact, number} from "../text.js";
+import {number} from "../text.js";
 import {element, menu} from "./elements.js";
 import {tableElement} from "./tables.js";
 
@@ -140,5 +140,3 @@ export class Scrubber {
     }
   }
 }
-
-export {exact};
