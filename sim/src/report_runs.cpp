@@ -61,8 +61,7 @@ class Measures {
   void put(const std::string& name, const Json& value, std::vector<double>& values) {
     const auto [entry, is_new] = places_.try_emplace(name, names_.size());
     if (is_new) names_.push_back(name);
-    if (values.size() <= entry->second)
-      values.resize(entry->second + 1, std::numeric_limits<double>::quiet_NaN());
+    if (values.size() <= entry->second) values.resize(entry->second + 1, std::numeric_limits<double>::quiet_NaN());
     if (value.is_number()) values[entry->second] = value.get<double>();
   }
 
@@ -78,9 +77,10 @@ void require_sweep(SqliteDatabase& database) {
     throw Error(fmt::format("{}: is a database, but not one of rhec's sweeps; expected one that 'rhec sweep' made",
                             database.file().string()));
   if (version != SweepStore::version)
-    throw Error(fmt::format("{}: has version {} of the schema, and this program reads version {}; use the program that "
-                            "made it, or make the sweep again with 'rhec sweep'",
-                            database.file().string(), version, SweepStore::version));
+    throw Error(
+        fmt::format("{}: has version {} of the schema, and this program reads version {}; use the program that "
+                    "made it, or make the sweep again with 'rhec sweep'",
+                    database.file().string(), version, SweepStore::version));
   database.require_whole();
 }
 
@@ -103,8 +103,8 @@ SweepRuns read_sweep_runs(const std::filesystem::path& file) {
     ++programs[select.text(8)];
     const auto [entry, is_new] = known.try_emplace(without_seed(select.text(1)), runs.groups.size());
     const auto refuse = [&](const std::string& what) {
-      throw Error(fmt::format("{}: run {}: {}; delete the run and start the sweep again", file.string(), select.text(0),
-                              what));
+      throw Error(
+          fmt::format("{}: run {}: {}; delete the run and start the sweep again", file.string(), select.text(0), what));
     };
     const auto parsed = [&](int column, const char* name) {
       Json json = Json::parse(select.text(column), nullptr, false);
@@ -126,8 +126,7 @@ SweepRuns read_sweep_runs(const std::filesystem::path& file) {
         for (const char* number : {"median", "p99"})
           if (times.contains(who))
             measures.put(fmt::format("{}.{}", who, number), times.at(who).value(number, Json()), outcome.values);
-      for (const auto& [name, value] : later.items())
-        measures.put("mae_after_start." + name, value, outcome.values);
+      for (const auto& [name, value] : later.items()) measures.put("mae_after_start." + name, value, outcome.values);
       measures.put("nees", select.is_null(7) ? Json() : Json(select.number(7)), outcome.values);
     }
     runs.groups[entry->second].outcomes.push_back(std::move(outcome));

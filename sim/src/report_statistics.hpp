@@ -13,8 +13,8 @@ class Moments {
  public:
   void add(double value) noexcept;
   std::size_t count() const noexcept { return count_; }
-  double mean() const noexcept;                ///< NaN of none
-  double half_width() const noexcept;          ///< of the 95 % interval of the mean; NaN of fewer than two
+  double mean() const noexcept;        ///< NaN of none
+  double half_width() const noexcept;  ///< of the 95 % interval of the mean; NaN of fewer than two
 
  private:
   std::size_t count_ = 0;

@@ -49,7 +49,7 @@ bool comes_before(const std::string& a, const std::string& b) {
 
 /// Keys that vary together: the values of any one of them tell those of the others.
 struct VariedKey {
-  std::string key;                ///< the one that speaks for all
+  std::string key;  ///< the one that speaks for all
   std::vector<std::string> all;
   std::vector<std::string> values;
   bool is_numeric() const {
@@ -321,9 +321,10 @@ class SweepReport {
     std::size_t choices = 1;
     for (std::size_t i = axes; i < keys.size(); ++i) {
       if (choices * keys[i].values.size() > most_choices) {
-        add_note(notes_, "settings",
-                 fmt::format("Means are also over the {} values of {}, since there are too many settings to choose from.",
-                             keys[i].values.size(), keys[i].key));
+        add_note(
+            notes_, "settings",
+            fmt::format("Means are also over the {} values of {}, since there are too many settings to choose from.",
+                        keys[i].values.size(), keys[i].key));
         continue;
       }
       choices *= keys[i].values.size();
@@ -338,8 +339,9 @@ class SweepReport {
       map.cells[{value_of(group, axes_[0].key), axes == 2 ? value_of(group, axes_[1].key) : none}].push_back(&group);
     }
     for (auto& [setting, map] : maps) maps_.push_back(std::move(map));
-    add_note(notes_, "pairs", "The sweep does not vary block length and overlap, so there is nothing that settings are held "
-                              "against seed by seed.");
+    add_note(notes_, "pairs",
+             "The sweep does not vary block length and overlap, so there is nothing that settings are held "
+             "against seed by seed.");
   }
 
   // ---- what there is room for
@@ -383,7 +385,8 @@ class SweepReport {
     }
     std::sort(measures_.begin(), measures_.end());
     if (!left_out.empty())
-      add_note(notes_, "runs", fmt::format("Left out, since the page would become too large: {}.", fmt::join(left_out, ", ")));
+      add_note(notes_, "runs",
+               fmt::format("Left out, since the page would become too large: {}.", fmt::join(left_out, ", ")));
     // A sweep over very many settings: those with most runs.
     used = 0;
     for (const Map& map : maps_) {
@@ -404,8 +407,9 @@ class SweepReport {
     if (measure == "rhe.median") return 1;
     if (measure == "rhe.p99") return 2;
     if (measure == "rhc.median") return 3;
+    if (measure == "mae_after_start.heading") return 5;
     if (measure.starts_with("mae_after_start.")) return 4;
-    return 5;
+    return 6;
   }
   static bool has_pairs(const std::string& measure) { return measure.starts_with("mae.") || measure == "rhe.median"; }
 
@@ -424,13 +428,14 @@ class SweepReport {
   static std::size_t bytes_of(const Map& map, bool pairs) {
     const auto [first, second] = places_of(map);
     const std::size_t cells = first.size() * second.size();
-    const auto with_pairs = pairs && map.reference ? static_cast<std::size_t>(std::count_if(
-                                                         map.cells.begin(), map.cells.end(),
-                                                         [&](const auto& entry) {
-                                                           return entry.second.front()->outcomes.size() > 1 &&
-                                                                  map.reference->outcomes.size() > 1;
-                                                         }))
-                                                   : std::size_t{0};
+    const auto with_pairs =
+        pairs && map.reference
+            ? static_cast<std::size_t>(std::count_if(map.cells.begin(), map.cells.end(),
+                                                     [&](const auto& entry) {
+                                                       return entry.second.front()->outcomes.size() > 1 &&
+                                                              map.reference->outcomes.size() > 1;
+                                                     }))
+            : std::size_t{0};
     return bytes_of_number * (cells + 3 * with_pairs);
   }
 
@@ -479,10 +484,10 @@ class SweepReport {
       const std::size_t dot = name.find('.');
       const std::string group = name.substr(0, dot), rest = dot == std::string::npos ? "" : name.substr(dot + 1);
       const bool is_time = group == "rhe" || group == "rhc";
-      const std::string unit = is_time                                        ? "us"
-                               : rest == "position" || rest == "tracking"     ? "m"
-                               : rest == "heading"                            ? "rad"
-                                                                              : "1";
+      const std::string unit = is_time                                    ? "us"
+                               : rest == "position" || rest == "tracking" ? "m"
+                               : rest == "heading"                        ? "rad"
+                                                                          : "1";
       std::string label = "mean absolute error of " + rest;
       if (group == "mae_after_start") label += ", without the first samples";
       if (is_time)
@@ -492,7 +497,9 @@ class SweepReport {
       list.push_back({{"name", name},
                       {"label", label},
                       {"unit", unit},
-                      {"group", is_time ? "time" : group == "nees" ? "other" : group}});
+                      {"group", is_time           ? "time"
+                                : group == "nees" ? "other"
+                                                  : group}});
     }
   }
 
@@ -524,7 +531,8 @@ class SweepReport {
     if (!fixed.empty()) add_note(notes_, "settings", fmt::format("The same on all maps: {}.", fixed));
     for (const std::size_t i : shown_choices_)
       if (choice_keys_[i].all.size() > 1)
-        add_note(notes_, "settings", fmt::format("With {} go {}.", choice_keys_[i].key, fmt::join(companions(i), ", ")));
+        add_note(notes_, "settings",
+                 fmt::format("With {} go {}.", choice_keys_[i].key, fmt::join(companions(i), ", ")));
   }
 
   std::vector<std::string> companions(std::size_t choice) const {
@@ -644,9 +652,8 @@ class SweepReport {
     const auto pairs = [&](const Cell& cell, std::size_t measure) {
       return cell.size() == 1 ? differences_of(*cell.front(), *map.reference, measure) : Moments();
     };
-    const bool has_some = std::any_of(map.cells.begin(), map.cells.end(), [&](const auto& entry) {
-      return pairs(entry.second, any).count() > 1;
-    });
+    const bool has_some = std::any_of(map.cells.begin(), map.cells.end(),
+                                      [&](const auto& entry) { return pairs(entry.second, any).count() > 1; });
     if (!has_some) return nullptr;
     Json json;
     json["count"] = table([&](const Cell& cell) { return pairs(cell, any).count(); });
@@ -694,8 +701,8 @@ class SweepReport {
                       {"means", std::move(means)}});
     }
     if (others_.size() > most_others)
-      add_note(notes_, "settings", fmt::format("Of {} further settings {} are in the table.", counted(std::ssize(others_)),
-                                               most_others));
+      add_note(notes_, "settings",
+               fmt::format("Of {} further settings {} are in the table.", counted(std::ssize(others_)), most_others));
     document_["others"] = {{"keys", keys}, {"rows", std::move(rows)}, {"total", others_.size()}};
   }
 
