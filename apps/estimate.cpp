@@ -65,11 +65,10 @@ int estimate(const EstimateArguments& arguments) {
         variant.name == scenario.name() ? variant.name : fmt::format("{}/{}", scenario.name(), variant.name);
     const auto nodes = static_cast<std::int64_t>(seconds / variant.robot.step()) + std::ssize(log.fixes);
     horizons.emplace_back(variant.robot, nodes, most_windows / std::ssize(scenario.variants()));
-    replays.push_back(
-        sim::replay(variant.robot, log, scenario.log(), hold_out,
-                    {.progress = [&](double share) { bar.show(share); },
-                     .solved = dump.watch(run, variant.robot),
-                     .sampled = [&](const sim::LoopSample& sample) { horizons.back().take(sample); }}));
+    replays.push_back(sim::replay(variant.robot, log, scenario.log(), hold_out,
+                                  {.progress = [&](double share) { bar.show(share); },
+                                   .solved = dump.watch(run, variant.robot),
+                                   .sampled = [&](const sim::LoopSample& sample) { horizons.back().take(sample); }}));
     replays.back().name = variant.name;
     all_usable = all_usable && replays.back().counts.fallbacks == 0;
   }

@@ -66,7 +66,8 @@ void add_report(CLI::App& program, Action& chosen) {
   CLI::App* command = program.add_subcommand(
       "report", "Makes a page to look at of a run, an estimation, a sweep or a comparison of solvers.");
   command->footer(
-      "The page is one HTML file that needs no network: open it in a browser. It has every figure with its numbers, and a\n"
+      "The page is one HTML file that needs no network: open it in a browser. It has every figure with its numbers, "
+      "and a\n"
       "window that can be moved through a run: blocks, measurements, the plan.\n\n"
       "Examples:\n"
       "  rhec report out/figure8 -o figure8.html\n"

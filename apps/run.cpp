@@ -80,7 +80,8 @@ void add_run(CLI::App& program, Action& chosen) {
   CLI::App* command =
       program.add_subcommand("run", "Runs a scenario: a robot on simulated ground learns its slip and holds its path.");
   command->footer(
-      "Writes steps.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; 'rhec report' makes a\n"
+      "Writes steps.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; 'rhec report' makes "
+      "a\n"
       "page of them. The exit code is 3 where the robot did not reach the end of its path.\n\n"
       "Examples:\n"
       "  rhec run scenarios/figure8.yaml --out out/figure8\n"

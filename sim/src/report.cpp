@@ -20,9 +20,10 @@ constexpr const char* what_there_is =
     "compare')";
 
 [[noreturn]] void missing(const fs::path& folder, const char* file, const char* beside, const char* maker) {
-  throw Error(fmt::format("{}: is missing, though {} is there; the folder is not whole: take a copy that is, or make it "
-                          "again with '{}'",
-                          (folder / file).string(), beside, maker));
+  throw Error(
+      fmt::format("{}: is missing, though {} is there; the folder is not whole: take a copy that is, or make it "
+                  "again with '{}'",
+                  (folder / file).string(), beside, maker));
 }
 
 Json folder_report(const fs::path& folder) {
@@ -70,17 +71,18 @@ std::string report_document(const fs::path& source, const std::string& program) 
   std::error_code failure;
   const fs::file_status status = fs::status(source, failure);
   if (source.empty() || !fs::exists(status))
-    throw Error(fmt::format("{}: there is no such folder or file; {}", source.empty() ? "''" : source.string(),
-                            what_there_is));
+    throw Error(
+        fmt::format("{}: there is no such folder or file; {}", source.empty() ? "''" : source.string(), what_there_is));
   Json document;
   document["form"] = "rhec report";
   document["version"] = version;
   try {
     document.update(fs::is_directory(status) ? folder_report(source) : file_report(source));
   } catch (const Json::exception& error) {
-    throw Error(fmt::format("{}: a value is of another kind than expected ({}); take a copy that is whole, or make it "
-                            "again",
-                            source.string(), error.what()));
+    throw Error(
+        fmt::format("{}: a value is of another kind than expected ({}); take a copy that is whole, or make it "
+                    "again",
+                    source.string(), error.what()));
   }
   document["source"] = source.string();
   document["program"] = program;

@@ -44,8 +44,8 @@ ResultTable::ResultTable(std::filesystem::path file, std::string maker)
     throw Error(fmt::format("{}: is empty; expected a line of names and rows; {}", file_.string(), what_to_do(maker_)));
   if (text_.back() != '\n') {
     const auto line = std::count(text_.begin(), text_.end(), '\n') + 1;
-    throw Error(fmt::format("{}:{}: ends within this line; expected whole rows; {}", file_.string(), line,
-                            what_to_do(maker_)));
+    throw Error(
+        fmt::format("{}:{}: ends within this line; expected whole rows; {}", file_.string(), line, what_to_do(maker_)));
   }
   std::string_view rest = text_;
   std::vector<std::string_view> names;
@@ -109,7 +109,8 @@ Json read_json(const std::filesystem::path& file, const std::string& maker) {
   } catch (const Json::parse_error& error) {
     const auto until = text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
     const auto line = std::count(text.begin(), until, '\n') + 1;
-    throw Error(fmt::format("{}:{}: is no JSON from here on, or is cut off; {}", file.string(), line, what_to_do(maker)));
+    throw Error(
+        fmt::format("{}:{}: is no JSON from here on, or is cut off; {}", file.string(), line, what_to_do(maker)));
   }
 }
 
@@ -124,8 +125,8 @@ Json parse_json_line(std::string_view line, const std::filesystem::path& file, s
 const Json& member(const Json& json, const char* key, const std::filesystem::path& file, const std::string& maker) {
   const auto found = json.is_object() ? json.find(key) : json.end();
   if (found == json.end())
-    throw Error(fmt::format("{}: {}: there is no such key; expected the form of docs/results.md; {}", file.string(), key,
-                            what_to_do(maker)));
+    throw Error(fmt::format("{}: {}: there is no such key; expected the form of docs/results.md; {}", file.string(),
+                            key, what_to_do(maker)));
   return *found;
 }
 

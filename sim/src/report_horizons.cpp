@@ -20,7 +20,6 @@ constexpr int version = 1;
                           maker));
 }
 
-
 bool fell_back(const Json& record) {
   const auto of = [&](const char* key) {
     const Json& part = record.at(key);
@@ -79,8 +78,7 @@ HorizonFile read_horizons(const std::filesystem::path& file, const std::string& 
   };
   HorizonFile horizons;
   horizons.head = next();
-  if (horizons.head.value("form", "") != "rhec horizons")
-    refuse(file, 1, "is not of the form 'rhec horizons'", maker);
+  if (horizons.head.value("form", "") != "rhec horizons") refuse(file, 1, "is not of the form 'rhec horizons'", maker);
   if (const Json found = horizons.head.value("version", Json()); found != version)
     refuse(file, 1, fmt::format("has version {}, and this program reads version {}", found.dump(), version), maker);
   if (const std::string found = horizons.head.value("kind", ""); found != kind)
@@ -131,9 +129,10 @@ Json horizons_of(const HorizonFile::Variant& variant, std::size_t samples, std::
   }
   const std::size_t every = in_file * stride;
   std::string how = every == 1 ? "every sample"
-                               : fmt::format("every {} of {} samples", every == 2   ? std::string("2nd")
-                                                                       : every == 3 ? std::string("3rd")
-                                                                                    : fmt::format("{}th", every),
+                               : fmt::format("every {} of {} samples",
+                                             every == 2   ? std::string("2nd")
+                                             : every == 3 ? std::string("3rd")
+                                                          : fmt::format("{}th", every),
                                              counted(static_cast<std::int64_t>(samples)));
   if (every > 1)
     how += all_failures_fit ? ", and each whose solver's result could not be used"
@@ -151,7 +150,8 @@ std::string thinning_words(const Thinned& thinned, std::size_t total, const char
   return fmt::format(
       "{}: {} of {} samples are drawn, of each stretch of {} those in which one of the curves is least or largest, so "
       "that extremes stay.",
-      what, counted(std::ssize(thinned.rows)), counted(static_cast<std::int64_t>(total)), counted(static_cast<std::int64_t>(thinned.stretch)));
+      what, counted(std::ssize(thinned.rows)), counted(static_cast<std::int64_t>(total)),
+      counted(static_cast<std::int64_t>(thinned.stretch)));
 }
 
 }  // namespace rhec::sim

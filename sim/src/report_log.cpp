@@ -44,8 +44,9 @@ class LogReport {
     fixes();
     document_["variants"] = Json::array();
     for (std::size_t v = 0; v < variants_.size(); ++v) document_["variants"].push_back(variant(v));
-    add_note(notes_, "truth", "Nobody knows what the vehicle and the ground really did, so there are no errors of states and "
-                              "slip; withheld fixes are what predictions can be held against.");
+    add_note(notes_, "truth",
+             "Nobody knows what the vehicle and the ground really did, so there are no errors of states and "
+             "slip; withheld fixes are what predictions can be held against.");
     add_note(notes_, "inputs", "Nothing was controlled: there are no chosen inputs, and no plans.");
     if (!words_.empty()) add_note(notes_, "samples", words_);
     document_["notes"] = std::move(notes_);
@@ -72,9 +73,10 @@ class LogReport {
       variants_.emplace_back(variant, range);
     }
     if (row < table_.rows())
-      throw Error(fmt::format("{}:{}: variant '{}' is not in summary.json; the two files are of different estimations: "
-                              "make them again with '{}'",
-                              table_.file().string(), table_.line_of(row), table_.text(row, name), maker));
+      throw Error(
+          fmt::format("{}:{}: variant '{}' is not in summary.json; the two files are of different estimations: "
+                      "make them again with '{}'",
+                      table_.file().string(), table_.line_of(row), table_.text(row, name), maker));
     if (variants_.empty())
       throw Error(fmt::format("{}: variants: there is none; expected one at least; make it again with '{}'",
                               (folder_ / "summary.json").string(), maker));
@@ -89,9 +91,10 @@ class LogReport {
              (nodes == 0 || nodes == expected) && hold_out_is_same();
     }
     if (!same)
-      throw Error(fmt::format("{}: is of another estimation than estimates.csv; make it again with '{}', or take the "
-                              "file away (the report then does without horizons)",
-                              (folder_ / "horizons.jsonl").string(), maker));
+      throw Error(
+          fmt::format("{}: is of another estimation than estimates.csv; make it again with '{}', or take the "
+                      "file away (the report then does without horizons)",
+                      (folder_ / "horizons.jsonl").string(), maker));
   }
 
   bool hold_out_is_same() const {
@@ -117,9 +120,10 @@ class LogReport {
       document_["model"] = horizons_->head.at("model");
     } else {
       document_["model"] = nullptr;
-      add_note(notes_, "horizons",
-               "There is no horizons.jsonl, since an older program made this: windows, statuses, units and the names of "
-               "what is slip are left out. Estimate again with this program to have them.");
+      add_note(
+          notes_, "horizons",
+          "There is no horizons.jsonl, since an older program made this: windows, statuses, units and the names of "
+          "what is slip are left out. Estimate again with this program to have them.");
     }
     document_["settings"] = {{"hold_out", summary_.value("hold_out", Json())}};
     document_["summary"] = summary_;
@@ -172,8 +176,9 @@ class LogReport {
     document_["fixes"] = std::move(fixes);
     if (thinned.stretch > 1) add_note(notes_, "fixes", thinning_words(thinned, rows.size(), "Fixes"));
     if (const auto unseen = summary_.at("fixes").at("rows").get<std::int64_t>() - std::ssize(rows); unseen > 0)
-      add_note(notes_, "fixes", fmt::format("{} of {} fixes came before anything could be estimated, and are not shown.",
-                                            counted(unseen), counted(unseen + std::ssize(rows))));
+      add_note(notes_, "fixes",
+               fmt::format("{} of {} fixes came before anything could be estimated, and are not shown.",
+                           counted(unseen), counted(unseen + std::ssize(rows))));
     Json& gaps = document_["gaps"] = Json::array();
     for (std::size_t i = 1; i < times.size(); ++i)
       if (times[i] - times[i - 1] > least_gap) gaps.push_back({{"from", seen(times[i - 1])}, {"to", seen(times[i])}});
@@ -212,8 +217,8 @@ class LogReport {
       Json notes = Json::array();
       const auto with_windows = static_cast<std::size_t>(std::count_if(
           horizons_->variants.begin(), horizons_->variants.end(), [](const auto& v) { return !v.records.empty(); }));
-      about["horizons"] = horizons_of(*kept, rows.size(), most_horizon_bytes / std::max<std::size_t>(1, with_windows),
-                                      {}, notes);
+      about["horizons"] =
+          horizons_of(*kept, rows.size(), most_horizon_bytes / std::max<std::size_t>(1, with_windows), {}, notes);
       if (about["horizons"].is_null())
         add_note(notes_, "horizons", fmt::format("Variant {} is a filter, which has no window to show.", name));
       for (const Json& note : notes)
@@ -278,8 +283,9 @@ class LogReport {
   Json histogram(const std::string& name) {
     if (!times_) {
       if (name == variants_.front().first)
-        add_note(notes_, "times", "There is no times.csv, since an older program made this: how solve times are "
-                                  "distributed is left out.");
+        add_note(notes_, "times",
+                 "There is no times.csv, since an older program made this: how solve times are "
+                 "distributed is left out.");
       return nullptr;
     }
     const std::size_t variant = times_->column("variant"), us = times_->column("rhe_us");
@@ -288,10 +294,10 @@ class LogReport {
       if (times_->text(row, variant) == name) times.push_back(times_->number(row, us));
     const Json& numbers = summary_.at("variants").at(name);
     if (std::ssize(times) != numbers.at("nodes").get<std::int64_t>())
-      throw Error(fmt::format("{}:{}: has {} rows of variant '{}', expected {} as summary.json says; take a copy that is "
-                              "whole, or make it again with '{}'",
-                              times_->file().string(), times_->rows() + 1, times.size(), name,
-                              numbers.at("nodes").dump(), maker));
+      throw Error(fmt::format(
+          "{}:{}: has {} rows of variant '{}', expected {} as summary.json says; take a copy that is "
+          "whole, or make it again with '{}'",
+          times_->file().string(), times_->rows() + 1, times.size(), name, numbers.at("nodes").dump(), maker));
     Json histogram = times_histogram(times);
     if (!histogram.is_null()) histogram.update(numbers.at("solve_time_us"));
     return histogram;

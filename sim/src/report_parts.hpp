@@ -41,8 +41,8 @@ Json horizons_of(const HorizonFile::Variant& variant, std::size_t samples, std::
 std::string thinning_words(const Thinned& thinned, std::size_t total, const char* what);
 
 // How much of a long run a page shows.
-constexpr std::size_t most_rows = 3000;             ///< samples of a curve
-constexpr std::size_t most_values = 60000;          ///< rows of all curves together
+constexpr std::size_t most_rows = 3000;                ///< samples of a curve
+constexpr std::size_t most_values = 60000;             ///< rows of all curves together
 constexpr std::size_t most_horizon_bytes = 1'700'000;  ///< as they are in the file
 constexpr std::size_t most_status_changes = 3000;
 

@@ -137,7 +137,8 @@ class RunReport {
     }
     if (window.is_object() && !window.at("fallback").get<bool>())
       for (std::size_t j = 0; j < names_.states.size(); ++j)
-        if (!is_close(window.at("state").at(j).back(), steps_.number(row, steps_.column(names_.states[j])))) return false;
+        if (!is_close(window.at("state").at(j).back(), steps_.number(row, steps_.column(names_.states[j]))))
+          return false;
     return true;
   }
 
@@ -311,8 +312,9 @@ class RunReport {
 
   void statuses() {
     const Json& counts = member(summary_, "statuses", folder_ / "summary.json", maker);
-    document_["statuses"] = {{"rhe", status_of("estimator_status", counts.value("rhe", Json::object()), "estimator")},
-                             {"rhc", status_of("controller_status", counts.value("rhc", Json::object()), "controller")}};
+    document_["statuses"] = {
+        {"rhe", status_of("estimator_status", counts.value("rhe", Json::object()), "estimator")},
+        {"rhc", status_of("controller_status", counts.value("rhc", Json::object()), "controller")}};
     document_["fallbacks"] = {{"rhe", events("estimator_fallback")}, {"rhc", events("controller_fallback")}};
     document_["softened"] = events("softened");
   }
