@@ -2,8 +2,8 @@
 import {BarChart, CustomChart, LineChart, ScatterChart} from "echarts/charts";
 import {GraphicComponent, GridComponent, LegendComponent, TooltipComponent} from "echarts/components";
 import {init, use} from "echarts/core";
-import {SVGRenderer} from "echarts/renderers";
+import {CanvasRenderer, SVGRenderer} from "echarts/renderers";
 
-use([BarChart, CustomChart, LineChart, ScatterChart, GraphicComponent, GridComponent, LegendComponent, TooltipComponent, SVGRenderer]);
+use([BarChart, CustomChart, LineChart, ScatterChart, GraphicComponent, GridComponent, LegendComponent, TooltipComponent, CanvasRenderer, SVGRenderer]);
 
 export {init};

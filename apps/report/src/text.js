@@ -31,7 +31,7 @@ function grouped(text) {
 export const percent = (share, digits = 3) => (share === null || share === undefined ? "–" : `${number(100 * share, digits)} %`);
 
 /// "speed [m/s]", or the name alone for what has no unit.
-export const withUnit = (name, unit) => (unit && unit !== "1" ? `${name} [${unit}]` : name);
+export const withUnit = (name, unit) => (unit && unit !== "1" ? `${name} [${unit === "us" ? "µs" : unit}]` : name);
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 

@@ -67,6 +67,12 @@ export function addShapes(option, frame, name, extent, draw, more = {}) {
   });
 }
 
+/// Shapes that are in pixels already, in a figure without axes. (ECharts' `graphic` takes far longer for thousands.)
+export function addDrawing(option, shapes) {
+  option.series.push({type: "custom", coordinateSystem: "none", data: [0], silent: true, tooltip: {show: false},
+                      renderItem: () => ({type: "group", children: shapes})});
+}
+
 /// The area between two columns, in as many pieces as gaps leave.
 export function addBand(option, frame, name, x, low, high, colour) {
   addShapes(option, frame, name, [x[0], low[0]], (at) => {

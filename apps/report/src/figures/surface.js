@@ -88,16 +88,18 @@ function room(look, project, places, axes, range, lift, text, label, {turn}, box
   shapes.push({...text(label, [Math.max(box.left + 2, topX - 8 - widest * 6), topY - 16], "left", look.fontSize, look.text)});
   const along = [(u, outward) => project(u, nearV * (1 + outward), -0.5), (v, outward) => project(nearU * (1 + outward), v, -0.5)];
   axes.forEach((axis, a) => {
+    const [x0, y0] = along[a](0, 0), [x1, y1] = along[a](0, 0.3), length = Math.hypot(x1 - x0, y1 - y0) || 1;
+    const outward = ([x, y], pixels) => [x + pixels * (x1 - x0) / length, y + pixels * (y1 - y0) / length];
     for (const index of tickIndices(axis.values, a === 0 ? 7 : 6)) {
-      line([along[a](places[a][index], 0), along[a](places[a][index], 0.06)], look.line);
-      shapes.push(text(String(axis.values[index]), shift(along[a](places[a][index], 0.13), 0, 4)));
+      const place = along[a](places[a][index], 0);
+      line([place, outward(place, 5)], look.line);
+      shapes.push(text(String(axis.values[index]), outward(place, 15)));
     }
-    shapes.push(text(axis.label, shift(along[a](0, 0.36), 0, 8), "center", look.fontSize, look.text));
+    const side = (x1 - x0) / length;
+    shapes.push(text(axis.label, outward([x0, y0], 30), side < -0.25 ? "right" : side > 0.25 ? "left" : "center", look.fontSize, look.text));
   });
   return shapes;
 }
-
-const shift = ([x, y], dx, dy) => [x + dx, y + dy];
 
 function ticksOf({min, max}) {
   const step = niceStep((max - min) / 4), ticks = [];

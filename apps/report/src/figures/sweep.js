@@ -2,21 +2,15 @@
 // pairs of the same seed. `state` is what the reader has chosen (startState).
 import {css, readableOn} from "../look.js";
 import {capital, count, number, stem, withUnit} from "../text.js";
-import {addFrame, addLegend, addLine, addShapes, axisRange, base, extentOf, isKnown, tooltip} from "./parts.js";
+import {addDrawing, addFrame, addLegend, addLine, addShapes, axisRange, base, extentOf, isKnown, tooltip} from "./parts.js";
 import {shading, shownRange, startView, surfaceShapes} from "./surface.js";
 
 // ---- what is looked at
 
 export function startState(document) {
-  const map = richestMap(document), measures = measuresOf(document, ["mae"]);
+  const map = document.maps[0], measures = measuresOf(document, ["mae"]);
   return {setting: map.setting.slice(), measure: (measures[0] || document.measures[0]).name, relative: false,
           time: (measuresOf(document, ["time"])[0] || {}).name, cell: startCell(map), ...startView};
-}
-
-/// The map with the most runs: what the page opens with.
-export function richestMap(document) {
-  const runs = (map) => map.runs.reduce((sum, row) => row.reduce((a, b) => a + b, sum), 0);
-  return document.maps.reduce((best, map) => (runs(map) > runs(best) ? map : best));
 }
 
 function startCell(map) {
@@ -41,12 +35,14 @@ export function mainChoices(document) {
   return wanted.length ? wanted : document.choices.map((_, i) => i).slice(0, 3);
 }
 
-/// A setting in words: the main choices, and of the others those that are not as in the richest map.
+export const choiceText = (choice, value) => (choice.values[value] === null ? "not given" : String(choice.values[value]));
+
+/// A setting in words: the main choices, and of the others those that are not as in the first map.
 export function settingText(document, setting, without = -1) {
-  const main = mainChoices(document), usual = richestMap(document).setting;
+  const main = mainChoices(document), usual = document.maps[0].setting;
   return document.choices.map((choice, i) => {
     if (choice.values.length < 2 || i === without || (main.indexOf(i) < 0 && setting[i] === usual[i])) return null;
-    return `${choice.label} ${choice.values[setting[i]]}${choice.key === "speed" ? " m/s" : ""}`;
+    return `${choice.label} ${choiceText(choice, setting[i])}${choice.key === "speed" ? " m/s" : ""}`;
   }).filter(Boolean).join(", ");
 }
 
@@ -102,11 +98,11 @@ function fourSurfaces(document, relative) {
     height: (width) => Math.ceil(measures.length / columns(width)) * panel(width),
     option: (look, {width, state}) => {
       const option = base(look), map = mapOf(document, state), across = columns(width);
-      option.graphic = measures.reduce((shapes, measure, m) => {
+      addDrawing(option, measures.reduce((shapes, measure, m) => {
         const box = {left: (m % across) * width / across, top: Math.floor(m / across) * panel(width), width: width / across, height: panel(width)};
         return shapes.concat(panelTitle(look, box, `(${"abcd"[m]}) ${shortLabel(measure)}${relative ? ", change" : ""}`),
                              surface(look, {...box, top: box.top + 26, height: box.height - 26}, map, measure, relative, state));
-      }, []);
+      }, []));
       return option;
     },
     table: (state) => gridTable(mapOf(document, state), measures, relative),
@@ -123,7 +119,7 @@ function surface(look, box, map, measure, relative, {turn, tilt}) {
   const range = shownRange(heights, plane);
   return surfaceShapes(look, {...box, shift: 6, drop: 0}, {
     axes: map.axes.map((axis) => ({label: axis.label, values: axis.values})), heights, plane, range, shade: shading(range, plane),
-    label: inPercent ? "%" : measure.unit === "1" ? "" : `[${measure.unit}]`, view: {turn, tilt},
+    label: inPercent ? "%" : withUnit("", measure.unit).trim(), view: {turn, tilt},
   });
 }
 
@@ -146,9 +142,12 @@ function oneSurface(document, name, pick) {
   return {
     name, title: (state) => `${capital(labelOf(measureOf(document, pick(state))))}${relativeWords(document, state, pick)}: ${settingText(document, state.setting)}`,
     caption: (state) => surfaceCaption(mapOf(document, state), [measureOf(document, pick(state))], state.relative),
-    about: ["runs", "settings"], turns: true, height: (width) => Math.min(520, Math.round(0.8 * width)),
-    option: (look, {width, height, state}) => ({...base(look),
-      graphic: surface(look, {left: 0, top: 0, width, height}, mapOf(document, state), measureOf(document, pick(state)), state.relative, state)}),
+    about: ["runs"], turns: true, height: (width) => Math.min(520, Math.round(0.8 * width)),
+    option: (look, {width, height, state}) => {
+      const option = base(look);
+      addDrawing(option, surface(look, {left: 0, top: 0, width, height}, mapOf(document, state), measureOf(document, pick(state)), state.relative, state));
+      return option;
+    },
     table: (state) => gridTable(mapOf(document, state), [measureOf(document, pick(state))], state.relative),
   };
 }
@@ -179,7 +178,7 @@ function heatMap(document, name, pick) {
       return `${map.reference ? `Blue is better than ${map.reference.label} (${number(plane)}${state.relative ? " %" : ""}), red worse. ` : ""}` +
         (best ? `Least: ${number(heights[best[0]][best[1]])}${state.relative && map.reference ? " %" : ""} at ${cellText(map, best)}.` : "");
     },
-    about: ["runs", "settings"], picksCell: true,
+    about: ["runs"], picksCell: true,
     height: (width, state) => heatHeight(mapOf(document, state), width),
     option: (look, {width, height, state}) => heatOption(look, width, height, document, state, pick(state)),
     table: (state) => gridTable(mapOf(document, state), [measureOf(document, pick(state))], state.relative),
@@ -380,7 +379,7 @@ function curves(document) {
   return {
     name: "curves", title: (state) => `Mean absolute errors over ${mapOf(document, state).axes[0].label}${document.choices.some((choice) => choice.values.length > 1) ? `: ${settingText(document, state.setting)}` : ""}`,
     caption: (state) => surfaceCaption(mapOf(document, state), measures, false).replace("From light (small) to dark (large). ", ""),
-    about: ["runs", "settings"], height: (width) => Math.ceil(measures.length / across(width)) * tall,
+    about: ["runs"], height: (width) => Math.ceil(measures.length / across(width)) * tall,
     option: (look, {width, state}) => {
       const option = base(look), map = mapOf(document, state), columns = across(width), [axis] = map.axes;
       const numeric = axis.values.every((value) => typeof value === "number");

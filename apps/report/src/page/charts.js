@@ -61,7 +61,14 @@ export class Charts {
     chart.box.style.height = `${height}px`;
     const size = {width, height, state: this.state, view: chart.figure.time ? this.state.view : null};
     const option = chart.figure.option(this.look, size);
-    if (!chart.instance) chart.instance = init(chart.canvas, null, {renderer: "svg", width, height});
+    // Thousands of polygons that are being turned are quicker as pixels; all else, and all on paper, is sharper as SVG.
+    const renderer = chart.figure.turns && !this.printing ? "canvas" : "svg";
+    if (chart.instance && chart.renderer !== renderer) {
+      chart.instance.dispose();
+      chart.instance = null;
+    }
+    chart.renderer = renderer;
+    if (!chart.instance) chart.instance = init(chart.canvas, null, {renderer, width, height});
     else if (chart.drawnWidth !== width || chart.drawnHeight !== height) chart.instance.resize({width, height});
     chart.instance.setOption(option, {notMerge: true});
     chart.frames = option.grid || [];

@@ -1,5 +1,5 @@
 // What a reader chooses in a sweep: the setting, the measure, absolute or relative, the cell, and where from to look.
-import {cellAt, cellText, mainChoices, mapAt, measureOf, measuresOf, nearestSetting} from "../figures/sweep.js";
+import {cellAt, cellText, choiceText, mainChoices, mapAt, measureOf, measuresOf, nearestSetting} from "../figures/sweep.js";
 import {startView} from "../figures/surface.js";
 import {count} from "../text.js";
 import {element, menu} from "./elements.js";
@@ -11,11 +11,13 @@ export class SweepChoices {
   constructor(document, charts) {
     this.document = document;
     this.charts = charts;
+    this.tellCell = [];
   }
 
   change(change) {
     this.charts.setState(change, () => true);
     this.fill();
+    this.tellCell.forEach((tell) => tell());
   }
 
   /// Menus of the settings, and what they leave.
@@ -31,7 +33,7 @@ export class SweepChoices {
     const focused = this.box.contains(window.document.activeElement) ? [...this.box.querySelectorAll("select")].indexOf(window.document.activeElement) : -1;
     const main = mainChoices(document);
     const menuOf = (choice, c) => choice.values.length > 1 && menu(choice.label,
-      inOrder(choice).map((value) => ({value, text: `${choice.values[value]}${this.fits(c, value) ? "" : " *"}`})), setting[c], (value) => this.choose(c, Number(value)));
+      inOrder(choice).map((value) => ({value, text: `${choiceText(choice, value)}${this.fits(c, value) ? "" : " *"}`})), setting[c], (value) => this.choose(c, Number(value)));
     const shown = document.choices.map((choice, c) => main.includes(c) && menuOf(choice, c)).filter(Boolean);
     const others = document.choices.map((choice, c) => !main.includes(c) && menuOf(choice, c)).filter(Boolean);
     const wasOpen = this.others && this.others.open;
@@ -80,14 +82,14 @@ export class SweepChoices {
     const {box, figure} = chart, state = this.charts.state;
     if (figure.turns) {
       const turn = (dx, dy) => {
-        const change = {turn: ((state.turn + dx + 540) % 360) - 180, tilt: Math.min(Math.max(state.tilt + dy, 4), 86)};
-        this.charts.setState(change, (other) => other.figure.turns);
+        Object.assign(state, {turn: ((state.turn + dx + 540) % 360) - 180, tilt: Math.min(Math.max(state.tilt + dy, 4), 86)});
+        this.turned(chart);
       };
       this.focusable(chart, "Arrow keys turn it, Home puts it back");
       box.addEventListener("keydown", (event) => {
         const by = {ArrowLeft: [6, 0], ArrowRight: [-6, 0], ArrowUp: [0, 4], ArrowDown: [0, -4]}[event.key];
         if (by) turn(...by);
-        else if (event.key === "Home") this.charts.setState({...startView}, (other) => other.figure.turns);
+        else if (event.key === "Home") turn(startView.turn - state.turn, startView.tilt - state.tilt);
         else return;
         event.preventDefault();
       });
@@ -108,10 +110,11 @@ export class SweepChoices {
     if (figure.picksCell) {
       this.focusable(chart, "Arrow keys move the chosen cell");
       const map = () => mapAt(this.document, state.setting);
-      const tell = () => (this.cellWords.textContent = this.wordsOf(map()));
+      const words = element("p", {class: "caption", role: "status"}), pickMeasure = () => (figure.name === "time-heat" ? state.time : state.measure);
+      this.tellCell.push(() => (words.textContent = this.wordsOf(map(), pickMeasure())));
       const pick = (cell) => {
         this.charts.setState({cell}, (other) => !other.figure.turns);
-        tell();
+        this.tellCell.forEach((tell) => tell());
       };
       box.addEventListener("click", (event) => {
         const {left, top} = box.getBoundingClientRect();
@@ -125,14 +128,21 @@ export class SweepChoices {
         pick(state.cell.map((at, a) => Math.min(Math.max(at + by[a], 0), lengths[a] - 1)));
         event.preventDefault();
       });
-      this.cellWords = this.cellWords || element("p", {class: "caption cell", role: "status"});
-      chart.box.after(this.cellWords);
-      tell();
+      chart.box.after(words);
+      this.tellCell.forEach((tell) => tell());
     }
   }
 
-  wordsOf(map) {
-    const {cell, measure} = this.charts.state, [i, j] = cell, described = measureOf(this.document, measure);
+  /// Draws the surface under the reader's hand once a frame, the others when the hand rests.
+  turned(chart) {
+    cancelAnimationFrame(this.frame);
+    clearTimeout(this.rest);
+    this.frame = requestAnimationFrame(() => this.charts.draw(chart));
+    this.rest = setTimeout(() => this.charts.refresh((other) => other.figure.turns && other !== chart), 200);
+  }
+
+  wordsOf(map, measure) {
+    const {cell} = this.charts.state, [i, j] = cell, described = measureOf(this.document, measure);
     const value = map.means[measure] && map.means[measure][i][j];
     return `Chosen: ${cellText(map, cell)}: ${described.label} ${value === null || value === undefined ? "not known" : `${value.toPrecision(5)}${described.unit === "1" ? "" : ` ${described.unit}`}`}, ${map.runs[i][j]} runs.`;
   }
