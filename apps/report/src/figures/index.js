@@ -46,7 +46,7 @@ function logSections(document) {
     const prefix = document.variants.length > 1 ? `${stem(variant.name)}-` : "", of = document.variants.length > 1 ? ` (${variant.name})` : "";
     const source = {...variant, times: document.times};
     const {states, parameters} = estimateFigures(document, source, prefix);
-    const residuals = variant.residuals && columnFigure(document, {
+    const residuals = variant.residuals && variant.residuals.values.some((value) => value !== null) && columnFigure(document, {
       name: `${prefix}residuals`, title: `Distance of the antenna from each fix${of}`, caption: "By the estimate; of a fix that was withheld, by the prediction of it.",
       about: ["fixes"], label: "distance", unit: "m", time: columnOf(document, variant.residuals.time), values: variant.residuals.values, log: true, dots: true, colour: "measured"});
     const named = (figure) => figure && {...figure, title: `${figure.title}${of}`};
