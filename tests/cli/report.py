@@ -284,6 +284,24 @@ class Test(cli.Findings):
         self.expect("older program" in self.notes(document, "horizons") and "older program" in self.notes(document, "times"),
                     "older log", f"notes: {document['notes']}")
 
+    def smoothed_log(self):
+        """What `rhec smooth` leaves has no windows, but a track."""
+        drs, gps = (self.work / name for name in ("short_drs.txt", "short_gps.txt"))
+        for short, full, count in ((drs, "drs.txt", 300), (gps, "gps.txt", 75)):
+            short.write_text("".join((self.work / full).read_text().splitlines(keepends=True)[:count]))
+        folder = self.work / "smoothed"
+        result = self.rhec("smooth", cli.ROOT / "scenarios" / "victoria_park.yaml", "--variant", "rhe_robust",
+                           "--dead-reckoning", drs, "--gps", gps, "--hold-out", 5, "--out", folder)
+        self.expect(result.returncode == FINE, "smooth", result.stderr)
+        document, _ = self.page_of(folder)
+        self.expect([variant["name"] for variant in document["variants"]] == ["rhe_robust", "rhe_robust causal"], "smooth", "variants")
+        rows = rows_of(folder / "estimates.csv")
+        for variant in document["variants"]:
+            nodes = [row for row in rows if row["variant"] == variant["name"] and row["held_out"] == "0"]
+            self.expect(variant["horizons"] is None and all(map(close, variant["track"]["x"], (float(row["x_pos"]) for row in nodes))),
+                        variant["name"], "track")
+        self.expect("smoother" in self.notes(document, "horizons"), "smooth", f"notes: {document['notes']}")
+
     def check_variant(self, variant, rows, document, summary):
         name, nodes = variant["name"], [row for row in rows if row["held_out"] == "0"]
         numbers = summary["variants"][name]
@@ -655,7 +673,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="rhec-report-") as work:
         test = Test(Program(sys.argv[1]), pathlib.Path(work))
         for part in (test.numbers_of_a_run, test.horizons_of_a_run, test.other_estimators, test.fallbacks, test.long_run,
-                     test.older_program, test.harmless_names, test.log_of_1500_seconds, test.numbers_of_a_sweep,
+                     test.older_program, test.harmless_names, test.log_of_1500_seconds, test.smoothed_log, test.numbers_of_a_sweep,
                      test.sweep_of_100_000_runs, test.sweep_of_other_keys, test.comparison, test.no_run, test.half_a_run,
                      test.no_sweep, test.no_output, test.figures):
             part()
