@@ -95,8 +95,9 @@ function room(look, project, places, axes, range, lift, text, label, {turn}, box
       line([place, outward(place, 5)], look.line);
       shapes.push(text(String(axis.values[index]), outward(place, 15)));
     }
-    const side = (x1 - x0) / length;
-    shapes.push(text(axis.label, outward([x0, y0], 30), side < -0.25 ? "right" : side > 0.25 ? "left" : "center", look.fontSize, look.text));
+    const side = (x1 - x0) / length, wide = axis.label.length * look.fontSize * 0.6, [x, y] = outward([x0, y0], 30);
+    const left = Math.min(Math.max(side < -0.25 ? x - wide : side > 0.25 ? x : x - wide / 2, box.left + 2), box.left + box.width - wide - 2);
+    shapes.push(text(axis.label, [left, y], "left", look.fontSize, look.text));
   });
   return shapes;
 }

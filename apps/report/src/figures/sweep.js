@@ -225,7 +225,7 @@ function heatOption(look, width, height, document, state, name) {
         return;
       }
       const colour = shade(value);
-      shapes.push({type: "rect", shape: box, style: {fill: css(colour), stroke: look.ground, lineWidth: 0.5}});
+      shapes.push({type: "rect", shape: box, style: {fill: css(colour), stroke: wide > 14 ? look.ground : "none", lineWidth: 0.5}});
       if (fontSize >= 8.5) shapes.push({type: "text", style: {text: cellNumber(value, state.relative), x, y, fill: readableOn(colour), font: `${fontSize}px ${look.font}`, textAlign: "center", textVerticalAlign: "middle"}});
     }));
     const [x, y] = at(state.cell);
