@@ -92,7 +92,8 @@ void add_estimate(CLI::App& program, Action& chosen) {
       "estimate", "Estimates state and slip from a recorded drive, and predicts what it withholds.");
   command->footer(
       "Files are comma-separated without a header: time, wheel speed, steering angle; and time, x, y. Writes\n"
-      "estimates.csv, summary.json and run.svg to the output folder. The exit code is 3 where a solve failed.\n\n"
+      "estimates.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; 'rhec report' makes a\n"
+      "page of them. The exit code is 3 where a solve failed.\n\n"
       "Examples:\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/park\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 --variant ekf");

@@ -222,7 +222,7 @@ std::string horizons_text(const HorizonLog& horizons, const RunLog& log, const S
 }
 
 std::string horizons_text(const std::vector<HorizonLog>& horizons, const RecordedLog& log, const LogScenario& scenario,
-                          const HoldOut& hold_out) {
+                          const HoldOut& hold_out, const std::vector<std::string>& suffixes) {
   const Robot& first = scenario.variants().front().robot;
   Json json;
   json["form"] = "rhec horizons";
@@ -232,11 +232,12 @@ std::string horizons_text(const std::vector<HorizonLog>& horizons, const Recorde
   json["fixes"] = log.fixes.size();
   json["hold_out"] = {{"every", hold_out.every}, {"phase", hold_out.phase}};
   json["variants"] = Json::array();
-  for (const LogVariant& variant : scenario.variants()) {
-    Json about = {{"name", variant.name}};
-    about["settings"] = settings_of(variant.robot, false);
-    json["variants"].push_back(std::move(about));
-  }
+  for (const LogVariant& variant : scenario.variants())
+    for (const std::string& suffix : suffixes) {
+      Json about = {{"name", variant.name + suffix}};
+      about["settings"] = settings_of(variant.robot, false);
+      json["variants"].push_back(std::move(about));
+    }
   json["model"] = json_of(first);
   std::string text = text_of(json) + "\n";
   for (std::size_t i = 0; i < horizons.size(); ++i)

@@ -220,7 +220,8 @@ class LogReport {
       about["horizons"] =
           horizons_of(*kept, rows.size(), most_horizon_bytes / std::max<std::size_t>(1, with_windows), {}, notes);
       if (about["horizons"].is_null())
-        add_note(notes_, "horizons", fmt::format("Variant {} is a filter, which has no window to show.", name));
+        add_note(notes_, "horizons",
+                 fmt::format("Variant {} is a filter or a smoother, which has no windows to show.", name));
       for (const Json& note : notes)
         add_note(notes_, "horizons", fmt::format("Variant {}: {}", name, note.at("text").get<std::string>()));
     }
@@ -293,7 +294,9 @@ class LogReport {
     for (std::int64_t row = 0; row < times_->rows(); ++row)
       if (times_->text(row, variant) == name) times.push_back(times_->number(row, us));
     const Json& numbers = summary_.at("variants").at(name);
-    if (std::ssize(times) != numbers.at("nodes").get<std::int64_t>())
+    // A smoother solves once for all nodes.
+    const std::int64_t count = std::ssize(times);
+    if (count != numbers.at("nodes").get<std::int64_t>() && count != numbers.at("solves").get<std::int64_t>())
       throw Error(fmt::format(
           "{}:{}: has {} rows of variant '{}', expected {} as summary.json says; take a copy that is "
           "whole, or make it again with '{}'",

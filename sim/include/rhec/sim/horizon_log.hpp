@@ -40,10 +40,12 @@ class RHEC_EXPORT HorizonLog {
   std::unique_ptr<Parts> parts_;
 };
 
-/// horizons.jsonl of a run and of the estimation from a log: the model and what the ground was like, then the lines of
-/// each HorizonLog. docs/results.md describes them. The same bytes for the same scenario and seed.
+/// horizons.jsonl of a run and of estimations from a log: the model and what the ground was like, then the lines of
+/// each HorizonLog. docs/results.md describes them. The same bytes for the same scenario and seed. Of a log, the
+/// horizons are those of each variant for each suffix that its name has.
 RHEC_EXPORT std::string horizons_text(const HorizonLog& horizons, const RunLog& log, const Scenario& scenario);
 RHEC_EXPORT std::string horizons_text(const std::vector<HorizonLog>& horizons, const RecordedLog& log,
-                                      const LogScenario& scenario, const HoldOut& hold_out);
+                                      const LogScenario& scenario, const HoldOut& hold_out,
+                                      const std::vector<std::string>& suffixes = {""});
 
 }  // namespace rhec::sim
