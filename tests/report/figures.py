@@ -15,12 +15,20 @@ LEAST = {"run": 12, "log": 8, "sweep": 8, "comparison": 5}
 AXES = {"#666666", "#dddddd", "none", None}
 
 
+def span(path):
+    """How many pixels a path reaches, in width or height; steps that are relative count by themselves."""
+    numbers = [float(number) for number in re.findall(r"-?[\d.]+(?:e-?\d+)?", path)]
+    steps = [abs(float(number)) for run in re.findall(r"[lhv]([^A-Za-z]*)", path) for number in re.findall(r"-?[\d.]+", run)]
+    if steps:
+        return max(steps)
+    return max((max(axis) - min(axis) for axis in (numbers[::2], numbers[1::2]) if axis), default=0.0)
+
+
 def has_data(root):
-    """Shapes that have not the colours of axes: one that is longer than those of a legend, or many, or a picture."""
+    """Shapes that have not the colours of axes: one that is larger than those of a legend, or many, or a picture."""
     shapes = [shape for name in ("path", "polygon", "circle") for shape in root.iter(SVG + name)
               if shape.get("fill") not in AXES or shape.get("stroke") not in AXES]
-    long = [shape for shape in shapes if len(shape.get("d") or shape.get("points") or "") > 130]
-    return bool(long) or len(shapes) >= 12 or next(root.iter(f"{SVG}image"), None) is not None
+    return any(span(shape.get("d") or shape.get("points") or "") > 40 for shape in shapes) or len(shapes) >= 12 or next(root.iter(f"{SVG}image"), None) is not None
 
 
 def look_at(file, complaints):

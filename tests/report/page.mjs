@@ -24,6 +24,7 @@ async function open(options, what) {
     findings.push(`${what}: asks the network for ${route.request().url()}`);
     return route.abort();
   });
+  context.setDefaultTimeout(180000);  // a busy machine is no fault of the page; scripts/measure-report takes its time
   const view = await context.newPage();
   view.on("console", (message) => ["error", "warning"].includes(message.type()) && findings.push(`${what}: console: ${message.text()}`));
   view.on("pageerror", (error) => findings.push(`${what}: ${error.message}`));
@@ -149,6 +150,7 @@ for (const folded of await view.locator("figure details.numbers > summary").all(
   await folded.focus();
   await view.keyboard.press("Enter");
 }
+await view.waitForTimeout(500);  // tables are made when the browser says that they were opened
 const empty = await view.evaluate(() => [...document.querySelectorAll("figure")].filter((figure) => {
   const folded = figure.querySelector("details.numbers");
   return folded && (!folded.open || figure.querySelectorAll("tbody tr").length === 0);
