@@ -80,8 +80,8 @@ function room(look, project, places, axes, range, lift, text, label, {turn}, box
   line([project(...left, -0.5), project(...left, 0.5)], look.line);
   let widest = 0;
   for (const height of heights) {
-    const [x, y] = project(...left, lift(height));
-    shapes.push(text(tick(height), [x - 6, y], "right"));
+    const [x, y] = project(...left, lift(height)), isLowest = lift(height) < -0.47;  // clear of the numbers of the floor
+    shapes.push(text(tick(height), [x - 6, isLowest ? y - 7 : y], "right"));
     widest = Math.max(widest, tick(height).length);
   }
   const [topX, topY] = project(...left, 0.5);
