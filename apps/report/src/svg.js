@@ -1,12 +1,19 @@
 // The figures without a browser, for `rhec report --svg`: a document's text in, [{name, svg}] as text out. Every figure
 // gets its title, in text that stays text.
 import "./polyfill.js";
-import {init} from "./echarts.js";
+import {init, setPlatformAPI} from "./echarts.js";
 import {firstState, sectionsOf, told} from "./figures/index.js";
 import {paper} from "./look.js";
 import {variantsForPaper} from "./paper.js";
 
 const WIDTH = 760, HEAD = 30;
+
+// There is no font to measure: about the widths of DejaVu Sans, which is wider than most.
+const widths = (letter) => (/[ijl.,:;'|!]/.test(letter) ? 0.3 : /[ftr ()\[\]]/.test(letter) ? 0.4 : /[mwMW%@]/.test(letter) ? 0.95 : 0.63);
+setPlatformAPI({measureText: (text, font) => {
+  const size = parseFloat((/(\d+(\.\d+)?)px/.exec(font || "") || [0, "12"])[1]);
+  return {width: String(text).split("").reduce((sum, letter) => sum + widths(letter), 0) * size};
+}});
 
 const escaped = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;").replace(/"/g, "&quot;");
 

@@ -49,7 +49,7 @@ function spreads(look, {width, height}, comparison, problems, measure, labels) {
   problems.forEach((problem, p) => {
     const {solvers} = comparison.same_problems[problem], top = 24 + p * each;
     const frame = addFrame(option, look, {
-      top: top + 18, height: each - 18 - 50, width, left, x: {name: measure.label, ...(measure.log ? {type: "log", axisLabel: {formatter: power}} : {}), ...ends},
+      top: top + 18, height: each - 18 - 50, width, left, right: 28, x: {name: measure.label, ...(measure.log ? {type: "log", axisLabel: {formatter: power}} : {}), ...ends},
       y: {type: "category", data: labels.slice().reverse(), splitLine: {show: false}, axisTick: {show: false}, axisLabel: {formatter: null, color: look.text, interval: 0, width: left - 12, overflow: "truncate"}},
     });
     option.graphic = (option.graphic || []).concat({type: "text", silent: true, x: left, y: top, style: {text: capital(problemNames[problem]), fill: look.text, font: `600 ${look.fontSize}px ${look.font}`}});
@@ -93,7 +93,7 @@ function statusFigure(comparison, problems) {
       const option = base(look), left = labelRoom(labels, width), each = (height - 40) / problems.length;
       problems.forEach((problem, p) => {
         const {solvers, problems: total} = comparison.same_problems[problem], top = 40 + p * each;
-        const frame = addFrame(option, look, {top: top + 18, height: each - 18 - 44, width, left, x: {min: 0, max: 100, name: "share [%]"},
+        const frame = addFrame(option, look, {top: top + 18, height: each - 18 - 44, width, left, right: 28, x: {min: 0, max: 100, name: "share [%]"},
           y: {type: "category", data: labels.slice().reverse(), splitLine: {show: false}, axisTick: {show: false}, axisLabel: {formatter: null, color: look.text, interval: 0, width: left - 12, overflow: "truncate"}}});
         option.graphic = (option.graphic || []).concat({type: "text", silent: true, x: left, y: top, style: {text: capital(problemNames[problem]), fill: look.text, font: `600 ${look.fontSize}px ${look.font}`}});
         names.forEach((name, n) => addShapes(option, frame, name, [0, 0], (at) => solvers.map((solver) => {

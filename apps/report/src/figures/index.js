@@ -46,7 +46,7 @@ function logSections(document) {
     const prefix = document.variants.length > 1 ? `${stem(variant.name)}-` : "", of = document.variants.length > 1 ? ` (${variant.name})` : "";
     const source = {...variant, times: document.times};
     const {states, parameters} = estimateFigures(document, source, prefix);
-    const residuals = variant.residuals && columnFigure(document, {
+    const residuals = variant.residuals && variant.residuals.values.some((value) => value !== null) && columnFigure(document, {
       name: `${prefix}residuals`, title: `Distance of the antenna from each fix${of}`, caption: "By the estimate; of a fix that was withheld, by the prediction of it.",
       about: ["fixes"], label: "distance", unit: "m", time: columnOf(document, variant.residuals.time), values: variant.residuals.values, log: true, dots: true, colour: "measured"});
     const named = (figure) => figure && {...figure, title: `${figure.title}${of}`};
@@ -58,19 +58,22 @@ function logSections(document) {
 
 const columnOf = (document, time) => (Array.isArray(time) ? time : document.times[time]);
 
+const horizonWord = ({kind}) => (kind === "log" ? "Estimation horizon" : "Horizons");
+
 function windowFigures(document) {
   const horizons = horizonsOf(document);
   if (!horizons) return [];
   const chosen = parameterToColour(document), colourOf = blockColours(horizons, document.model.parameters.length);
   const horizon = (state) => horizons.list[state.sample];
+  const hasBlocks = horizons.list.some(({rhe}) => rhe && rhe.blocks && rhe.blocks.some((blocks) => blocks.next_start !== null));
   const common = {about: ["horizons"], table: null, follows: true};
   return [
-    {...common, name: "window-map", title: (state) => `From above, at ${horizon(state).time.toFixed(1)} s`,
-     caption: () => `Thick line: the estimation horizon, coloured by the blocks of ${document.model.parameters[chosen].name}; dashed inside: a partial block; crosses: starts that the overlap suppresses. The arrow is the vehicle.`,
+    {...common, name: "window-map", title: (state) => `${horizonWord(document)} from above, at ${horizon(state).time.toFixed(1)} s`,
+     caption: () => `Thick line: the estimation horizon, ${hasBlocks ? `coloured by the blocks of ${document.model.parameters[chosen].name}; dashed inside: a partial block; crosses: starts that the overlap suppresses` : "all of it one block"}. The arrow is the vehicle; GPS is measured where its antenna is.`,
      height: (width) => Math.round(Math.min(width < 560 ? width * 1.05 : width * 0.8, 560)),
      option: (look, size) => windowMapOption(look, size, document, horizon(size.state), chosen, colourOf)},
-    {...common, name: "window-strip", title: (state) => `Along the steps, at ${horizon(state).time.toFixed(1)} s`,
-     caption: () => "Each step is a block with its value; its box is ± 2σ. Dashed and hatched: partial. Red: a start that the overlap suppresses. Dotted: the slip that the controller goes by.",
+    {...common, name: "window-strip", title: (state) => `${horizonWord(document)} along the steps, at ${horizon(state).time.toFixed(1)} s`,
+     caption: () => ["Each step is a block with its value; its box is ± 2σ.", hasBlocks && "Dashed and hatched: partial. Red: a start that the overlap suppresses.", document.kind === "run" && "Dotted: the slip that the controller goes by."].filter(Boolean).join(" "),
      height: (width, state) => stripHeight(stripRows(document, horizon(state))),
      option: (look, size) => stripOption(look, size, document, horizon(size.state), colourOf),
      words: (state) => windowWords(document, horizon(state))},

@@ -46,6 +46,9 @@ export function settingText(document, setting, without = -1) {
   }).filter(Boolean).join(", ");
 }
 
+/// "Error: path zigzag, speed 8 m/s", or without the colon where nothing else is to choose.
+const titled = (head, setting) => (setting ? `${head}: ${setting}` : head);
+
 const labelOf = (measure) => withUnit(measure.label, measure.unit);
 const shortLabel = (measure) => withUnit(measure.label.replace(/^mean absolute error of /, "").replace(/^mean absolute /, ""), measure.unit);
 
@@ -92,7 +95,7 @@ function fourSurfaces(document, relative) {
   const panel = (width) => Math.min(330, Math.round(0.78 * width / columns(width)));
   return {
     name: relative ? "surfaces-relative" : "surfaces",
-    title: (state) => `Mean absolute errors${relative ? " relative to full-horizon blocking" : ""}: ${settingText(document, state.setting)}`,
+    title: (state) => titled(`Mean absolute errors${relative ? " relative to full-horizon blocking" : ""}`, settingText(document, state.setting)),
     caption: (state) => surfaceCaption(mapOf(document, state), measures, relative),
     about: ["runs", "settings"], turns: true,
     height: (width) => Math.ceil(measures.length / columns(width)) * panel(width),
@@ -140,7 +143,7 @@ function surfaceCaption(map, measures, relative) {
 
 function oneSurface(document, name, pick) {
   return {
-    name, title: (state) => `${capital(labelOf(measureOf(document, pick(state))))}${relativeWords(document, state, pick)}: ${settingText(document, state.setting)}`,
+    name, title: (state) => titled(`${capital(labelOf(measureOf(document, pick(state))))}${relativeWords(document, state, pick)}`, settingText(document, state.setting)),
     caption: (state) => surfaceCaption(mapOf(document, state), [measureOf(document, pick(state))], state.relative),
     about: ["runs"], turns: true, height: (width) => Math.min(520, Math.round(0.8 * width)),
     option: (look, {width, height, state}) => {
@@ -171,7 +174,7 @@ function gridTable(map, measures, relative) {
 
 function heatMap(document, name, pick) {
   return {
-    name, title: (state) => `${capital(labelOf(measureOf(document, pick(state))))}${relativeWords(document, state, pick)}, cell by cell: ${settingText(document, state.setting)}`,
+    name, title: (state) => titled(`${capital(labelOf(measureOf(document, pick(state))))}${relativeWords(document, state, pick)}, cell by cell`, settingText(document, state.setting)),
     caption: (state) => {
       const map = mapOf(document, state), {heights, plane} = heightsOf(map, pick(state), state.relative);
       const best = bestCell(heights);
@@ -248,7 +251,7 @@ function cellNumber(value, relative) {
 
 function pairFigure(document) {
   return {
-    name: "pairs", title: (state) => `Difference to full-horizon blocking, seed by seed: ${measureOf(document, state.measure).label}, ${settingText(document, state.setting)}`,
+    name: "pairs", title: (state) => titled(`Difference to full-horizon blocking, seed by seed, in ${measureOf(document, state.measure).label}`, settingText(document, state.setting)),
     caption: (state) => pairCaption(document, state), about: ["pairs"],
     height: (width) => (width < 700 ? 500 : 300),
     option: (look, size) => pairOption(look, size, document, size.state),
@@ -349,7 +352,7 @@ function overChoice(document) {
   const choice = document.choices[numericChoice(document)];
   const others = (state) => settingText(document, state.setting, document.choices.indexOf(choice));
   return {
-    name: `by-${stem(choice.label)}`, title: (state) => `${capital(measureOf(document, state.measure).label)} by ${choice.label}: ${others(state)}`,
+    name: `by-${stem(choice.label)}`, title: (state) => titled(`${capital(measureOf(document, state.measure).label)} by ${choice.label}`, others(state)),
     caption: () => "The cell is the one chosen in the map above; the best cell is another at each place, and chosen after the fact.", about: ["runs"],
     height: () => 300,
     option: (look, {width, height, state}) => {
@@ -377,7 +380,7 @@ function curves(document) {
   const measures = measuresOf(document, ["mae"]).slice(0, 6);
   const across = (width) => (width < 640 ? 1 : 2), tall = 230;
   return {
-    name: "curves", title: (state) => `Mean absolute errors over ${mapOf(document, state).axes[0].label}${document.choices.some((choice) => choice.values.length > 1) ? `: ${settingText(document, state.setting)}` : ""}`,
+    name: "curves", title: (state) => titled(`Mean absolute errors over ${mapOf(document, state).axes[0].label}`, settingText(document, state.setting)),
     caption: (state) => surfaceCaption(mapOf(document, state), measures, false).replace("From light (small) to dark (large). ", ""),
     about: ["runs"], height: (width) => Math.ceil(measures.length / across(width)) * tall,
     option: (look, {width, state}) => {

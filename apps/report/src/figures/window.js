@@ -75,6 +75,8 @@ export function windowMapOption(look, {width, height}, document, horizon, chosen
   if (map.path) line("path", pairs(map.path.x, map.path.y), {color: look.reference, width: 1.6, type: "dashed"});
   if (map.true) line("true track", near(pairs(map.true.x, map.true.y), axes), {color: look.truth, width: 1.4});
 
+  const track = trackOf(document);
+  if (track) line("estimated track", near(pairs(track.x, track.y), axes), {color: look.faint, width: 1.2});
   const {rhe, rhc} = horizon, {position_x, position_y, heading} = document.model.roles;
   if (rhe) {
     const nodes = pairs(rhe.state[position_x], rhe.state[position_y]);
@@ -97,10 +99,14 @@ export function windowMapOption(look, {width, height}, document, horizon, chosen
   return option;
 }
 
+/// Of a log, where the estimate was before and after: there is no true track to show.
+const trackOf = (document) => (document.kind === "log" ? document.variants[0].track : null);
+
 const rasterOf = ({model, map}, chosen) => (map && map.slip && model.parameters[chosen] ? map.slip.find((slip) => slip.parameter === model.parameters[chosen].name) : undefined);
 
-function mapLegend({map, model}, {rhe, rhc}) {
-  return [map && map.path && "path", map && map.true && "true track", rhe && model.position_outputs && "measured position", rhc && "plan", rhc && "local reference"].filter(Boolean);
+function mapLegend(document, {rhe, rhc}) {
+  const {map, model} = document;
+  return [trackOf(document) && "estimated track", map && map.path && "path", map && map.true && "true track", rhe && model.position_outputs && "measured position", rhc && "plan", rhc && "local reference"].filter(Boolean);
 }
 
 function pose({rhe, rhc}, x, y, heading) {
@@ -175,7 +181,7 @@ function addVehicle(option, frame, look, place) {
 
 // ---- along the steps
 
-const stripMargins = {left: 62, right: 14, bottom: 52, gap: 16};
+const stripMargins = {left: 62, right: 26, bottom: 52, gap: 16};
 const stripTop = (look, names, width) => legendHeight(look, names, width) + 24;
 
 export function stripRows(document, horizon) {
