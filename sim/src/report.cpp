@@ -26,13 +26,23 @@ constexpr const char* what_there_is =
                   (folder / file).string(), beside, maker));
 }
 
+/// What OutputFolder leaves where a program was killed.
+std::string unfinished_in(const fs::path& folder) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (const std::string name = entry.path().filename().string();
+        entry.is_directory() && name.starts_with('.') && name.find(".partial-") != std::string::npos)
+      return fmt::format(", but {} of one that was ended before it was done: start it again", name);
+  return {};
+}
+
 Json folder_report(const fs::path& folder) {
   const auto has = [&](const char* name) { return fs::is_regular_file(folder / name); };
   if (!has("summary.json")) {
     if (has("steps.csv")) missing(folder, "summary.json", "steps.csv", run_maker);
     if (has("estimates.csv")) missing(folder, "summary.json", "estimates.csv", log_maker);
     if (has("compare.json")) return comparison_report(folder / "compare.json");
-    throw Error(fmt::format("{}: there is no run in this folder; {}", folder.string(), what_there_is));
+    throw Error(
+        fmt::format("{}: there is no run in this folder{}; {}", folder.string(), unfinished_in(folder), what_there_is));
   }
   // A folder may have held a run and an estimation, one after the other; the summary is that of the last.
   const Json summary = read_json(folder / "summary.json", run_maker);

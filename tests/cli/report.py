@@ -550,6 +550,8 @@ grid:
         empty.mkdir()
         everything = ("steps.csv", "estimates.csv", "rhec run", "rhec estimate", "rhec sweep", "rhec compare")
         self.refused(empty, "empty", "no run", *everything)
+        (empty / ".empty.partial-0").mkdir()
+        self.refused(empty, ".empty.partial-0", "ended before it was done", *everything)
         self.refused(self.work / "nowhere", "nowhere", *everything)
         text = self.work / "text.txt"
         text.write_text("some words\n")
