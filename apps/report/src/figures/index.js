@@ -83,8 +83,8 @@ function windowFigures(document) {
 function sweepSections(document) {
   const {surfaces, explore, pairs, speed, times} = sweepFigures(document);
   return [
-    {id: "surfaces", title: "Errors over block length and overlap", figures: surfaces},
-    {id: "explore", title: "One measure, closely", figures: explore, hasMeasure: true},
+    {id: "surfaces", title: document.maps.some((map) => map.is_blocking) ? "Errors over block length and overlap" : "Errors over the grid", figures: surfaces},
+    {id: "explore", title: "One measure, closely", figures: explore, hasMeasure: surfaces.length > 0},
     {id: "pairs", title: "Pairs of the same seed", figures: pairs},
     {id: "speed", title: "By speed", figures: speed},
     {id: "times", title: "Solve times", figures: times, hasTime: true},

@@ -198,13 +198,15 @@ function bestCell(heights) {
   return best;
 }
 
-const heatMargins = {left: 62, right: 14, top: 10, bottom: 46};
-const heatHeight = (map, width) => heatMargins.top + heatMargins.bottom + (map.axes[1] ? map.axes[1].values.length : 1) * Math.max(17, Math.min(26, Math.round(width / 30)));
+const heatMargins = {right: 14, top: 10, bottom: 46};
+/// Room for the names of the rows and of their axis.
+const heatLeft = (map, width) => Math.round(Math.min(0.4 * width, 44 + 7 * Math.max(2, ...(map.axes[1] ? map.axes[1].values.map((value) => String(value).length) : []))));
+const heatHeight = (map, width) => heatMargins.top + heatMargins.bottom + (map.axes[1] ? map.axes[1].values.length : 1) * Math.max(17, Math.min(26, Math.round(width / 30)), map.axes[1] && map.axes[1].values.length < 6 ? 30 : 0);
 
 /// Pixels to a cell of the map, for the pointer.
 export function cellAt(map, {width, height}, x, y) {
   const columns = map.axes[0].values.length, rows = map.axes[1] ? map.axes[1].values.length : 1;
-  const i = Math.floor((x - heatMargins.left) / (width - heatMargins.left - heatMargins.right) * columns);
+  const left = heatLeft(map, width), i = Math.floor((x - left) / (width - left - heatMargins.right) * columns);
   const j = rows - 1 - Math.floor((y - heatMargins.top) / (height - heatMargins.top - heatMargins.bottom) * rows);
   return i >= 0 && i < columns && j >= 0 && j < rows ? [i, j] : null;
 }
@@ -215,8 +217,10 @@ function heatOption(look, width, height, document, state, name) {
   const range = shownRange(heights, plane), shade = shading(range, plane);
   const [a, b] = map.axes;
   const category = (axis) => ({type: "category", data: axis ? axis.values.map(String) : [""], splitLine: {show: false}, axisTick: {show: false}});
-  const frame = addFrame(option, look, {top: heatMargins.top, height: height - heatMargins.top - heatMargins.bottom, width, left: heatMargins.left, right: heatMargins.right,
-    x: {...category(a), name: a.label, axisLabel: {formatter: null}}, y: {...category(b), name: b ? b.label : "", axisLabel: {formatter: null, interval: 0}}});
+  const left = heatLeft(map, width);
+  const frame = addFrame(option, look, {top: heatMargins.top, height: height - heatMargins.top - heatMargins.bottom, width, left, right: heatMargins.right,
+    x: {...category(a), name: a.label, axisLabel: {formatter: null}},
+    y: {...category(b), name: b ? b.label : "", nameGap: left - 20, axisLabel: {formatter: null, interval: 0, width: left - 34, overflow: "truncate"}}});
   addShapes(option, frame, "cells", [0, 0], (at, size) => {
     const [wide, high] = size([1, 1]), shapes = [];
     const fontSize = Math.min(11, high - 5, wide / 3.1);
@@ -381,7 +385,7 @@ function curves(document) {
   const across = (width) => (width < 640 ? 1 : 2), tall = 230;
   return {
     name: "curves", title: (state) => titled(`Mean absolute errors over ${mapOf(document, state).axes[0].label}`, settingText(document, state.setting)),
-    caption: (state) => surfaceCaption(mapOf(document, state), measures, false).replace("From light (small) to dark (large). ", ""),
+    caption: (state) => surfaceCaption(mapOf(document, state), measures, false).replace("From light (small) to dark (large). ", "").replace("Each cell", "Each point"),
     about: ["runs"], height: (width) => Math.ceil(measures.length / across(width)) * tall,
     option: (look, {width, state}) => {
       const option = base(look), map = mapOf(document, state), columns = across(width), [axis] = map.axes;
