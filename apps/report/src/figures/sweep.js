@@ -201,7 +201,7 @@ function bestCell(heights) {
 const heatMargins = {right: 14, top: 10, bottom: 46};
 /// Room for the names of the rows and of their axis.
 const heatLeft = (map, width) => Math.round(Math.min(0.4 * width, 44 + 7 * Math.max(2, ...(map.axes[1] ? map.axes[1].values.map((value) => String(value).length) : []))));
-const heatHeight = (map, width) => heatMargins.top + heatMargins.bottom + (map.axes[1] ? map.axes[1].values.length : 1) * Math.max(17, Math.min(26, Math.round(width / 30)), map.axes[1] && map.axes[1].values.length < 6 ? 30 : 0);
+const heatHeight = (map, width) => Math.max(150, heatMargins.top + heatMargins.bottom + (map.axes[1] ? map.axes[1].values.length : 1) * Math.max(17, Math.min(26, Math.round(width / 30)), map.axes[1] && map.axes[1].values.length < 6 ? 30 : 0));
 
 /// Pixels to a cell of the map, for the pointer.
 export function cellAt(map, {width, height}, x, y) {
