@@ -29,6 +29,7 @@ using Action = std::function<int()>;
 void add_check(CLI::App& program, Action& chosen);
 void add_compare(CLI::App& program, Action& chosen);
 void add_estimate(CLI::App& program, Action& chosen);
+void add_report(CLI::App& program, Action& chosen);
 void add_run(CLI::App& program, Action& chosen);
 void add_smooth(CLI::App& program, Action& chosen);
 void add_solve(CLI::App& program, Action& chosen);

@@ -10,11 +10,15 @@
 #include "dump.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
+#include "rhec/sim/horizon_log.hpp"
 #include "rhec/sim/output_folder.hpp"
 #include "rhec/sim/recorded_log.hpp"
 
 namespace rhec::apps {
 namespace {
+
+// Windows kept for a report, of all variants together.
+constexpr std::int64_t most_windows = 1500;
 
 struct EstimateArguments : LogArguments {
   DumpArguments dump;
@@ -51,19 +55,27 @@ int estimate(const EstimateArguments& arguments) {
   sim::OutputFolder folder(arguments.out);
   Dump dump(arguments.dump, {OcpKind::rhe});
   std::vector<sim::Replay> replays;
+  std::vector<sim::HorizonLog> horizons;
+  // At most so many nodes: at the fixes, and one a step between them.
+  const double seconds = log.rows.back().time - log.rows.front().time;
   bool all_usable = true;
   for (const sim::LogVariant& variant : scenario.variants()) {
     ProgressBar bar(variant.name);
     const std::string run =
         variant.name == scenario.name() ? variant.name : fmt::format("{}/{}", scenario.name(), variant.name);
-    replays.push_back(
-        sim::replay(variant.robot, log, scenario.log(), hold_out,
-                    {.progress = [&](double share) { bar.show(share); }, .solved = dump.watch(run, variant.robot)}));
+    const auto nodes = static_cast<std::int64_t>(seconds / variant.robot.step()) + std::ssize(log.fixes);
+    horizons.emplace_back(variant.robot, nodes, most_windows / std::ssize(scenario.variants()));
+    replays.push_back(sim::replay(variant.robot, log, scenario.log(), hold_out,
+                                  {.progress = [&](double share) { bar.show(share); },
+                                   .solved = dump.watch(run, variant.robot),
+                                   .sampled = [&](const sim::LoopSample& sample) { horizons.back().take(sample); }}));
     replays.back().name = variant.name;
     all_usable = all_usable && replays.back().counts.fallbacks == 0;
   }
   folder.write("estimates.csv", sim::estimates_csv(replays, log, scenario));
   folder.write("summary.json", sim::summary_json(replays, log, scenario, hold_out));
+  folder.write("times.csv", sim::times_csv(replays));
+  folder.write("horizons.jsonl", sim::horizons_text(horizons, log, scenario, hold_out));
   folder.write("run.svg", sim::replay_svg(replays.front(), log, scenario));
   folder.commit();
   dump.commit();
@@ -80,7 +92,8 @@ void add_estimate(CLI::App& program, Action& chosen) {
       "estimate", "Estimates state and slip from a recorded drive, and predicts what it withholds.");
   command->footer(
       "Files are comma-separated without a header: time, wheel speed, steering angle; and time, x, y. Writes\n"
-      "estimates.csv, summary.json and run.svg to the output folder. The exit code is 3 where a solve failed.\n\n"
+      "estimates.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; 'rhec report' makes a\n"
+      "page of them. The exit code is 3 where a solve failed.\n\n"
       "Examples:\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/park\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 --variant ekf");

@@ -66,7 +66,8 @@ constexpr const char* examples =
     "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
     "  rhec solve problems.jsonl --solver gn_rti --sequence > solutions.jsonl\n"
     "  rhec compare scenarios/figure8.yaml --solvers gn_rti,sparse_sqp\n"
-    "  rhec sweep scenarios/sweep_blocks.yaml --out out/blocks.sqlite\n\n"
+    "  rhec sweep scenarios/sweep_blocks.yaml --out out/blocks.sqlite\n"
+    "  rhec report out/figure8 -o out/figure8.html\n\n"
     "'rhec COMMAND --help' says more of each command.";
 
 int usage_error(std::string_view what) {
@@ -102,6 +103,7 @@ int run(int count, char** words) {
   add_solve(program, chosen);
   add_compare(program, chosen);
   add_sweep(program, chosen);
+  add_report(program, chosen);
   add_check(program, chosen);
   add_options(program, chosen);
   add_plugins(program, chosen);

@@ -15,6 +15,7 @@
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/horizon_log.hpp"
 #include "rhec/sim/output_folder.hpp"
 
 namespace rhec::apps {
@@ -52,14 +53,18 @@ int run(const RunArguments& arguments) {
   sim::OutputFolder folder(arguments.out);
   Dump dump(arguments.dump, {OcpKind::rhe, OcpKind::rhc});
   ProgressBar bar(scenario.options().name);
+  const double samples = scenario.path().length() / (scenario.options().speed * scenario.robot().step());
+  sim::HorizonLog horizons(scenario.robot(), static_cast<std::int64_t>(samples) + 1);
   const sim::RunLog log =
       sim::run_closed_loop(scenario, {.progress = [&](double share) { bar.show(share); },
-                                      .solved = dump.watch(scenario.options().name, scenario.robot())});
+                                      .solved = dump.watch(scenario.options().name, scenario.robot()),
+                                      .sampled = [&](const sim::LoopSample& sample) { horizons.take(sample); }});
   bar.finish();
   const sim::RunSummary summary = sim::summarise(log, scenario);
   folder.write("steps.csv", sim::steps_csv(log, scenario));
   folder.write("times.csv", sim::times_csv(log));
   folder.write("summary.json", sim::summary_json(summary));
+  folder.write("horizons.jsonl", sim::horizons_text(horizons, log, scenario));
   folder.write("run.svg", sim::run_svg(log, scenario));
   folder.commit();
   dump.commit();
@@ -75,9 +80,9 @@ void add_run(CLI::App& program, Action& chosen) {
   CLI::App* command =
       program.add_subcommand("run", "Runs a scenario: a robot on simulated ground learns its slip and holds its path.");
   command->footer(
-      "Writes steps.csv, times.csv, summary.json and run.svg to the output folder. The exit code is 3 where the robot "
-      "did\n"
-      "not reach the end of its path.\n\n"
+      "Writes steps.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; 'rhec report' makes "
+      "a\n"
+      "page of them. The exit code is 3 where the robot did not reach the end of its path.\n\n"
       "Examples:\n"
       "  rhec run scenarios/figure8.yaml --out out/figure8\n"
       "  rhec run scenarios/figure8.yaml --set speed=4 --set 'blocking.kappa={name: full_horizon}' --out out/fhb\n"

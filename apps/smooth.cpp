@@ -12,6 +12,7 @@
 #include "rhec/core/error.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/horizon_log.hpp"
 #include "rhec/sim/output_folder.hpp"
 #include "rhec/sim/smoothing.hpp"
 
@@ -65,6 +66,13 @@ int smooth(const LogArguments& arguments) {
   }
   folder.write("estimates.csv", sim::estimates_csv(replays, input.log, input.scenario));
   folder.write("summary.json", sim::summary_json(replays, input.log, input.scenario, input.hold_out));
+  folder.write("times.csv", sim::times_csv(replays));
+  // A smoother has no windows; what a report has to know of the model stands there nevertheless.
+  std::vector<sim::HorizonLog> none;
+  for (const sim::LogVariant& variant : input.scenario.variants())
+    for (int i = 0; i < 2; ++i) none.emplace_back(variant.robot, 1);
+  folder.write("horizons.jsonl",
+               sim::horizons_text(none, input.log, input.scenario, input.hold_out, {"", sim::causal_suffix}));
   folder.commit();
   print_table(results, input.log, input.hold_out, folder.path());
   return all_solved ? exit_fine : exit_not_solved;
@@ -78,8 +86,8 @@ void add_smooth(CLI::App& program, Action& chosen) {
       "smooth", "Estimates a whole recorded drive at once: every moment from what was measured before and after it.");
   command->footer(
       "The scenario's estimator goes through the log first; its estimates are the start. The section `smoother` says\n"
-      "which blocks the whole log has and which solver is used. Writes estimates.csv, summary.json and run.svg to the\n"
-      "output folder. The exit code is 3 where the problem was not solved.\n\n"
+      "which blocks the whole log has and which solver is used. Writes estimates.csv, times.csv, summary.json,\n"
+      "horizons.jsonl and run.svg to the output folder. The exit code is 3 where the problem was not solved.\n\n"
       "Examples:\n"
       "  rhec smooth scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/park\n"
       "  rhec smooth scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 \\\n"

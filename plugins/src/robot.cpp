@@ -410,6 +410,11 @@ PluginChoice Robot::solver_choice(OcpKind kind) const {
   return choice_of(kind == OcpKind::rhe ? estimator_.solver : controller_.solver, default_solver);
 }
 
+PluginChoice Robot::blocking_choice(int parameter) const {
+  const std::string& name = model_->description().parameters[static_cast<std::size_t>(parameter)].name;
+  return choice_of(member_or_null(options_.blocking, name), default_blocking);
+}
+
 void Robot::wrap_solvers(SolverWrap wrap) {
   if (!wrap_) {
     wrap_ = std::move(wrap);

@@ -186,6 +186,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.estimator_feedback_us = estimate->report.feedback_us;
     sample.controller_us = command.report.preparation_us + command.report.feedback_us;
     log.samples.push_back(std::move(sample));
+    if (hooks.sampled) hooks.sampled({k, time, estimator.get(), estimate, controller.get(), &command});
     if (hooks.progress) hooks.progress(std::min(1.0, true_follower.arc_length() / scenario.path().length()));
 
     if (controller->finished() || true_follower.finished()) {

@@ -224,6 +224,8 @@ class Driver {
     entry.values.resize(nx + np);
     entry.values << estimate.state, estimate.parameters;
     entry.sigmas = estimate.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+    if (!held_out && hooks_.sampled)
+      hooks_.sampled({estimator_->counts().nodes - 1, time, estimator_.get(), &estimate, nullptr, nullptr});
     if (!held_out) result_.solve_us.push_back(estimate.report.preparation_us + estimate.report.feedback_us);
     if (index >= 0) {
       Model::Nodes request;

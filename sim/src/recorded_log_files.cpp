@@ -95,6 +95,14 @@ std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& 
   return json.dump(2) + "\n";
 }
 
+std::string times_csv(const std::vector<Replay>& replays) {
+  std::string text = "variant,node,rhe_us\n";
+  for (const Replay& replay : replays)
+    for (std::size_t node = 0; node < replay.solve_us.size(); ++node)
+      fmt::format_to(std::back_inserter(text), "{},{},{:.3f}\n", replay.name, node, replay.solve_us[node]);
+  return text;
+}
+
 std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogScenario& scenario,
                        const Replay* beside) {
   const ModelDescription& about = scenario.variants().front().robot.model()->description();

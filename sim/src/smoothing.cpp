@@ -32,7 +32,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
     return std::make_unique<NodeRecorder>(std::move(method), nodes);
   });
   result.causal = replay(recorded, log, options, hold_out, hooks);
-  result.causal.name = name + " causal";
+  result.causal.name = name + causal_suffix;
   if (result.causal.estimates.empty()) throw Error("the log has no fix that is not withheld: nothing can be estimated");
 
   const auto start = Clock::now();

@@ -37,13 +37,14 @@ std::string_view explained(int code) {
 
 }  // namespace
 
-SqliteDatabase::SqliteDatabase(std::filesystem::path file) : file_(std::move(file)) {
+SqliteDatabase::SqliteDatabase(std::filesystem::path file, Access access) : file_(std::move(file)) {
   sqlite3* opened = nullptr;
-  const int code = sqlite3_open_v2(file_.c_str(), &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
+  const int flags = access == Access::read ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  const int code = sqlite3_open_v2(file_.c_str(), &opened, flags, nullptr);
   database_.reset(opened);  // there is one in case of an error, too, which has its words
   require(code);
   sqlite3_extended_result_codes(opened, 1);
-  if (sqlite3_db_readonly(opened, "main") == 1) require(SQLITE_READONLY);
+  if (access == Access::write && sqlite3_db_readonly(opened, "main") == 1) require(SQLITE_READONLY);
 }
 
 void SqliteDatabase::set_patience(int milliseconds) { require(sqlite3_busy_timeout(database_.get(), milliseconds)); }
@@ -54,6 +55,11 @@ void SqliteDatabase::require(int code) const {
                                      ? sqlite3_errmsg(database_.get())
                                      : sqlite3_errstr(code);
   throw Error(fmt::format("{}: {} ({})", file_.string(), explained(code), words));
+}
+
+void SqliteDatabase::require_whole() {
+  const auto pages = static_cast<std::uintmax_t>(number("PRAGMA page_count") * number("PRAGMA page_size"));
+  if (std::filesystem::file_size(file_) < pages) require(SQLITE_CORRUPT);
 }
 
 void SqliteDatabase::execute(const std::string& statements) {

@@ -16,8 +16,11 @@ class SqliteStatement;
 /// An open SQLite file. Errors are rhec::Error, with the file's name, SQLite's words and what to do.
 class SqliteDatabase {
  public:
-  /// Opens the file, or makes an empty one.
-  explicit SqliteDatabase(std::filesystem::path file);
+  enum class Access {
+    write,  ///< opens the file, or makes an empty one
+    read    ///< of a file that is there, which stays as it is
+  };
+  explicit SqliteDatabase(std::filesystem::path file, Access access = Access::write);
 
   const std::filesystem::path& file() const noexcept { return file_; }
   /// How long to wait for others that use the file [ms].
@@ -30,6 +33,8 @@ class SqliteDatabase {
 
   /// Throws Error unless `code` says that all is well.
   void require(int code) const;
+  /// Throws Error where the file is shorter than its pages: SQLite itself does not miss a part of the last one.
+  void require_whole();
 
  private:
   struct Close {

@@ -146,13 +146,6 @@ RunStatus status_from(const std::string& text) {
   return RunStatus::failed;
 }
 
-/// SQLite itself does not miss a part of the last page.
-void require_whole(SqliteDatabase& database) {
-  const auto pages =
-      static_cast<std::uintmax_t>(database.number("PRAGMA page_count") * database.number("PRAGMA page_size"));
-  if (fs::file_size(database.file()) < pages) database.require(SQLITE_CORRUPT);
-}
-
 RunIdentity identity_from(const std::string& text) {
   RunIdentity identity;
   std::from_chars(text.data(), text.data() + std::min<std::size_t>(16, text.size()), identity.high, 16);
@@ -176,7 +169,7 @@ struct SweepStore::Parts {
     // A journal beside the file rather than a log that readers share memory for: that also works where a cluster's
     // hosts share a disk. Each transaction is on the disk when it ends.
     database.execute("PRAGMA journal_mode = TRUNCATE; PRAGMA synchronous = FULL");
-    require_whole(database);
+    database.require_whole();
     database.set_patience(write_patience);
     insert.emplace(database.prepare(fmt::format(
         "INSERT INTO runs ({}, program, finished) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, "

@@ -374,7 +374,7 @@ class Test(cli.Findings):
         result = self.run("bounds.u2=[0, 0]")
         self.expect(result.returncode == NOT_SOLVED, "lost", f"exit code {result.returncode}: {result.stderr}")
         files = sorted(path.name for path in self.out.iterdir())
-        self.expect(files == ["run.svg", "steps.csv", "summary.json", "times.csv"], "lost", f"files: {files}")
+        self.expect(files == ["horizons.jsonl", "run.svg", "steps.csv", "summary.json", "times.csv"], "lost", f"files: {files}")
         summary = json.loads((self.out / "summary.json").read_text())
         self.expect(summary["completed"] is False and "end of the path" not in summary["ended"], "lost", summary["ended"])
         self.expect(summary["ended"] in result.stdout, "lost", f"it does not say why it ended: {result.stdout}")

@@ -24,8 +24,8 @@ class Program:
     def __init__(self, path):
         self.path = pathlib.Path(path).resolve()
 
-    def __call__(self, *words, **options):
-        return subprocess.run([str(self.path), *map(str, words)], capture_output=True, text=True, timeout=60, env=CLEAN,
+    def __call__(self, *words, timeout=60, **options):
+        return subprocess.run([str(self.path), *map(str, words)], capture_output=True, text=True, timeout=timeout, env=CLEAN,
                               **options)
 
 

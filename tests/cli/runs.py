@@ -92,7 +92,7 @@ class Test(cli.Findings):
             if out is None:
                 continue
             files = sorted(path.name for path in out.iterdir())
-            self.expect(files == ["run.svg", "steps.csv", "summary.json", "times.csv"], name, f"files: {files}")
+            self.expect(files == ["horizons.jsonl", "run.svg", "steps.csv", "summary.json", "times.csv"], name, f"files: {files}")
             summary = json.loads((out / "summary.json").read_text())
             self.check_summary(name, summary)
             self.check_steps(name, out / "steps.csv", summary)
@@ -128,7 +128,7 @@ class Test(cli.Findings):
     def repeats(self):
         one, same = self.run("seed 1", ["seed=1"]), self.run("seed 1 again", ["seed=1"])
         other = self.run("seed 2", ["seed=2"])
-        for file in ("steps.csv", "run.svg"):
+        for file in ("steps.csv", "horizons.jsonl", "run.svg"):
             first = (one / file).read_bytes()
             self.expect(first == (same / file).read_bytes(), file, "two runs of one scenario and seed differ")
             self.expect(first != (other / file).read_bytes(), file, "runs of different seeds are the same")

@@ -6,7 +6,7 @@ FOLDERS = ("core", "plugins", "solvers", "models", "blocking", "sim", "apps", "b
 CODE_FOLDERS = FOLDERS + ("tests", "examples")
 ALL_FOLDERS = CODE_FOLDERS + ("cmake", "docs", "scenarios", "scripts", ".ci")
 CODE = {".hpp", ".cpp", ".h", ".cc", ".in"}
-TEXT = CODE | {".py", ".sh", ".cmake", ".txt", ".md", ".yaml", ".yml", ".json", ".toml", ""}
+TEXT = CODE | {".py", ".sh", ".cmake", ".txt", ".md", ".yaml", ".yml", ".json", ".toml", ".js", ".mjs", ".css", ".html", ""}
 
 
 def files(root, folders, suffixes):

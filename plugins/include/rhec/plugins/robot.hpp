@@ -109,6 +109,7 @@ class RHEC_EXPORT Robot {
   const std::shared_ptr<const Model>& model() const noexcept { return model_; }
   PluginChoice model_choice() const;
   PluginChoice solver_choice(OcpKind kind) const;  ///< of the estimator (rhe) or the controller (rhc)
+  PluginChoice blocking_choice(int parameter) const;
   double step() const noexcept { return options_.step; }
   const EstimatorOptions& estimator_options() const noexcept { return estimator_; }
   const SmootherOptions& smoother_options() const noexcept { return smoother_; }

@@ -130,6 +130,7 @@ RHEC_EXPORT std::string estimates_csv(const std::vector<Replay>& replays, const 
                                       const LogScenario& scenario);
 RHEC_EXPORT std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& log,
                                      const LogScenario& scenario, const HoldOut& hold_out);
+RHEC_EXPORT std::string times_csv(const std::vector<Replay>& replays);
 RHEC_EXPORT std::string replay_svg(const Replay& replay, const RecordedLog& log, const LogScenario& scenario,
                                    const Replay* beside = nullptr);
 

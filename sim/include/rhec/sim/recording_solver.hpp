@@ -48,6 +48,16 @@ enum class LoopPart {
   end,               ///< of the loop
 };
 
+/// A sample of a loop once its estimate and its command are known, with those who found them.
+struct LoopSample {
+  std::int64_t step = 0;                         ///< absolute index of the newest node
+  double time = 0.0;                             ///< [s]
+  const Estimator* estimator = nullptr;          ///< null where the truth takes its place
+  const Estimate* estimate = nullptr;            ///< never null
+  const Controller* controller = nullptr;        ///< null in the replay of a log
+  const Controller::Command* command = nullptr;  ///< the same
+};
+
 /// What a caller can hang into a loop (a closed one, or the replay of a log).
 struct LoopHooks {
   /// Told the share of the way that is done.
@@ -59,6 +69,8 @@ struct LoopHooks {
       solved;
   /// Told which part of a sample begins, in a closed loop: for who takes the time.
   std::function<void(LoopPart part)> begins = {};
+  /// Told of each sample, before the next one is prepared: for who looks into windows and plans.
+  std::function<void(const LoopSample& sample)> sampled = {};
 };
 
 /// A copy of a robot whose solvers' times are taken, and that tell `hooks.solved`, where somebody wants to be told;

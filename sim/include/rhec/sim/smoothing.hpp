@@ -7,6 +7,9 @@
 
 namespace rhec::sim {
 
+/// Behind the name of a variant: its estimates of the drive as it went.
+inline constexpr const char* causal_suffix = " causal";
+
 /// A recorded drive estimated as a whole, and the estimates of the drive as it went that it started from.
 struct SmoothedReplay {
   Replay smoothed;  ///< at the same times as `causal`: at its nodes, and at the fixes that were withheld

@@ -1,0 +1,87 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "report/report_page.hpp"
+#include "rhec/core/error.hpp"
+#include "rhec/sim/output_folder.hpp"
+#include "rhec/sim/report.hpp"
+
+namespace rhec::apps {
+namespace {
+
+struct ReportArguments {
+  std::string source, page = "report.html", figures;
+};
+
+/// Writes one file beside where it shall be, to be put into place by `commit`.
+class OutputFile {
+ public:
+  OutputFile(const std::filesystem::path& file, const std::string& content) : folder_(folder_of(file)) {
+    folder_.write(file.filename().string(), content);
+  }
+  void commit() { folder_.commit(); }
+
+ private:
+  static std::filesystem::path folder_of(const std::filesystem::path& file) {
+    if (!file.has_filename() || std::filesystem::is_directory(file))
+      throw Error(fmt::format("--out {}: is a folder; give the name of a file, such as {}", file.string(),
+                              (file / "report.html").string()));
+    return file.has_parent_path() ? file.parent_path() : ".";
+  }
+  sim::OutputFolder folder_;
+};
+
+int report(const ReportArguments& arguments) {
+  if (!has_report_page())
+    throw Error("this program was built without the page of reports (-DRHEC_REPORT=OFF); build it with RHEC_REPORT=ON");
+  const std::string document = sim::report_document(arguments.source, "rhec " RHEC_PROJECT_VERSION);
+  OutputFile page(arguments.page, report_page(document));
+  std::optional<sim::OutputFolder> figures;
+  std::size_t count = 0;
+  if (!arguments.figures.empty()) {
+    figures.emplace(arguments.figures);
+    for (const ReportFigure& figure : report_figures(document)) {
+      figures->write(figure.name + ".svg", figure.svg);
+      ++count;
+    }
+    figures->commit();
+  }
+  page.commit();
+  fmt::print("report: {}\n", arguments.page);
+  if (figures) fmt::print("{} figures: {}\n", count, figures->path().string());
+  return exit_fine;
+}
+
+}  // namespace
+
+void add_report(CLI::App& program, Action& chosen) {
+  auto arguments = std::make_shared<ReportArguments>();
+  CLI::App* command = program.add_subcommand(
+      "report", "Makes a page to look at of a run, an estimation, a sweep or a comparison of solvers.");
+  command->footer(
+      "The page is one HTML file that needs no network: open it in a browser. It has every figure with its numbers, "
+      "and a\n"
+      "window that can be moved through a run: blocks, measurements, the plan.\n\n"
+      "Examples:\n"
+      "  rhec report out/figure8 -o figure8.html\n"
+      "  rhec report out/blocks.sqlite -o blocks.html --svg out/figures\n"
+      "  rhec report out/compare/compare.json");
+  command
+      ->add_option("source", arguments->source,
+                   "the folder of 'rhec run' or 'rhec estimate', the database of 'rhec sweep', or compare.json")
+      ->type_name("RUN_OR_DB_OR_COMPARISON")
+      ->required();
+  command->add_option("-o,--out", arguments->page, "the page")->type_name("FILE")->capture_default_str();
+  command->add_option("--svg", arguments->figures, "folder for the figures, each a file of its own for a paper")
+      ->type_name("DIR");
+  command->callback([&chosen, arguments] { chosen = [arguments] { return report(*arguments); }; });
+}
+
+}  // namespace rhec::apps

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+// The page of `rhec report` and its figures, from a report document (docs/report.md describes it).
+namespace rhec::apps {
+
+struct ReportFigure {
+  std::string name;  ///< stem of a file's name
+  std::string svg;   ///< the whole file
+};
+
+/// Whether this build has the page; the functions below throw rhec::Error if not.
+bool has_report_page();
+/// One HTML file, which needs no other.
+std::string report_page(const std::string& document);
+/// The figures of that page, drawn for paper.
+std::vector<ReportFigure> report_figures(const std::string& document);
+
+}  // namespace rhec::apps
