@@ -132,10 +132,11 @@ function extentOfWindow(document, {rhe, rhc}) {
   return {x: grow(extentOf(...xs)), y: grow(extentOf(...ys))};
 }
 
-/// Of a line, what is in sight, so that a long track is not drawn for a few metres of it.
+/// Of a line, what is in sight with one point more on either side, so that a long track is not drawn for a few metres of it.
 function near(points, axes) {
   const [wide, high] = [axes.x.max - axes.x.min, axes.y.max - axes.y.min];
-  return points.map(([x, y]) => (Math.abs(x - (axes.x.min + axes.x.max) / 2) < wide && Math.abs(y - (axes.y.min + axes.y.max) / 2) < high ? [x, y] : [null, null]));
+  const seen = points.map(([x, y]) => Math.abs(x - (axes.x.min + axes.x.max) / 2) < wide && Math.abs(y - (axes.y.min + axes.y.max) / 2) < high);
+  return points.map((point, i) => (seen[i] || seen[i - 1] || seen[i + 1] ? point : [null, null]));
 }
 
 function addBlocksOnTrack(option, frame, look, nodes, blocks, horizon, chosen, colourOf) {
