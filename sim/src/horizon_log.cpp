@@ -277,7 +277,8 @@ struct HorizonLog::Parts {
     line.open('{');
     for (const auto& [name, index] : {std::pair{"x", roles.position_x}, std::pair{"y", roles.position_y}}) {
       line.key(name);
-      line.column(N + 1, state_decimals[index], [&](int i) { return problem.state_reference(i)[index]; });
+      line.column(N + 1, state_decimals[index],
+                  [&, index = index](int i) { return problem.state_reference(i)[index]; });
     }
     line.close('}');
     line.key("input_reference");

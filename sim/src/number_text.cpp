@@ -34,7 +34,7 @@ void append_number(double value, int decimals, std::string& text) {
     text.append(digits.begin(), end);
     return;
   }
-  auto whole = static_cast<std::uint64_t>(scaled + 0.5);
+  auto whole = static_cast<std::uint64_t>(std::llround(scaled));
   if (whole == 0) {
     text += '0';
     return;

@@ -46,7 +46,7 @@ std::string without_seed(const std::string& text) {
 
 void flatten(const Json& json, const std::string& prefix, std::map<std::string, std::string>& keys) {
   for (const auto& [key, value] : json.items()) {
-    const std::string path = prefix.empty() ? key : prefix + "." + key;
+    const std::string path = prefix.empty() ? key : fmt::format("{}.{}", prefix, key);
     if (value.is_object() && !value.empty()) {
       flatten(value, path, keys);
     } else {

@@ -250,7 +250,7 @@ class SweepReport {
       if (const auto blocks = blocks_of(group)) ways.insert(blocks->parameters);
     const auto key_of = [&](const RunGroup& group, const std::vector<std::string>& blocked) {
       std::string key;
-      for (const std::string& parameter : blocked) key += parameter + "\n";
+      for (const std::string& parameter : blocked) (key += parameter) += '\n';
       return key + rest_of(group, blocked);
     };
     const auto has_options = [&](const RunGroup& group, const std::vector<std::string>& blocked) {
@@ -275,7 +275,7 @@ class SweepReport {
       if (!blocks) continue;
       shown.insert(&group);
       const std::string words = blocked_words(group, blocks->parameters), key = key_of(group, blocks->parameters);
-      Map& map = maps[words + "\n" + key];
+      Map& map = maps[fmt::format("{}\n{}", words, key)];
       if (map.cells.empty()) {
         map.is_blocking = true;
         for (const VariedKey& choice : choice_keys_) map.setting.push_back(value_of(group, choice.key));
@@ -605,7 +605,8 @@ class SweepReport {
   }
 
   Json map_of(const Map& map) const {
-    const auto [first, second] = places_of(map);
+    const auto places = places_of(map);
+    const std::vector<std::string>&first = places.first, &second = places.second;
     const auto table = [&](const auto& value_of_cell) {
       Json rows = Json::array();
       for (const std::string& one : first) {
