@@ -236,7 +236,7 @@ class LogReport {
     const int at_x = roles.value("position_x", -1), at_y = roles.value("position_y", -1);
     if (at_x < 0 || at_y < 0) return;
     const std::vector<double> x = column(names_[at_x], rows), y = column(names_[at_y], rows);
-    const Thinned thinned = thin({&x, &y}, rows.size(), most_);
+    const Thinned thinned = thin({&x, &y}, rows.size(), most_track_points / variants_.size());
     about["track"] = {{"x", column_of(x, thinned.rows)},
                       {"y", column_of(y, thinned.rows)},
                       {"time", time_key(name + " track", times, thinned)}};

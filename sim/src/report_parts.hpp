@@ -43,6 +43,7 @@ std::string thinning_words(const Thinned& thinned, std::size_t total, const char
 // How much of a long run a page shows.
 constexpr std::size_t most_rows = 3000;                ///< samples of a curve
 constexpr std::size_t most_values = 60000;             ///< rows of all curves together
+constexpr std::size_t most_track_points = 24000;       ///< of all tracks together, which are looked at closely
 constexpr std::size_t most_horizon_bytes = 1'700'000;  ///< as they are in the file
 constexpr std::size_t most_status_changes = 3000;
 

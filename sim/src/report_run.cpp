@@ -328,8 +328,8 @@ class RunReport {
     }
     const std::vector<double> true_x = state_column("true_", x), true_y = state_column("true_", y),
                               estimated_x = state_column("", x), estimated_y = state_column("", y);
-    const Thinned truth = thin({&true_x, &true_y}, time_.size(), most_),
-                  estimate = thin({&estimated_x, &estimated_y}, time_.size(), most_);
+    const Thinned truth = thin({&true_x, &true_y}, time_.size(), most_track_points / 2),
+                  estimate = thin({&estimated_x, &estimated_y}, time_.size(), most_track_points / 2);
     Json map;
     map["path"] = horizons_->head.at("path");
     map["true"] = {{"x", column_of(true_x, truth.rows)},

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <limits>
-#include <map>
 #include <numbers>
 
 namespace rhec::sim {
@@ -24,16 +23,17 @@ double share_up_to(double t, double n) {
 }  // namespace
 
 double student_975(std::size_t degrees) {
-  static thread_local std::map<std::size_t, double> known;
-  const auto [entry, is_new] = known.try_emplace(degrees, 0.0);
-  if (is_new) {
-    double lower = 0.0, upper = 20.0;
-    while (upper - lower > 1e-12 * upper) {
-      const double middle = 0.5 * (lower + upper);
-      (share_up_to(middle, static_cast<double>(degrees)) < 0.475 ? lower : upper) = middle;
-    }
-    entry->second = lower;
+  double lower = 0.0, upper = 20.0;
+  while (upper - lower > 1e-12 * upper) {
+    const double middle = 0.5 * (lower + upper);
+    (share_up_to(middle, static_cast<double>(degrees)) < 0.475 ? lower : upper) = middle;
   }
+  return lower;
+}
+
+double StudentQuantiles::of(std::size_t degrees) {
+  const auto [entry, is_new] = known_.try_emplace(degrees, 0.0);
+  if (is_new) entry->second = student_975(degrees);
   return entry->second;
 }
 
@@ -46,10 +46,10 @@ void Moments::add(double value) noexcept {
 
 double Moments::mean() const noexcept { return count_ > 0 ? mean_ : missing; }
 
-double Moments::half_width() const noexcept {
+double Moments::half_width(StudentQuantiles& quantiles) const {
   if (count_ < 2) return missing;
   const auto n = static_cast<double>(count_);
-  return student_975(count_ - 1) * std::sqrt(squares_ / (n - 1.0) / n);
+  return quantiles.of(count_ - 1) * std::sqrt(squares_ / (n - 1.0) / n);
 }
 
 }  // namespace rhec::sim

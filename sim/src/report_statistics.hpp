@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 
 namespace rhec::sim {
 
@@ -8,13 +9,23 @@ namespace rhec::sim {
 /// probability of 97.5 %: half of a two-sided interval of 95 %.
 double student_975(std::size_t degrees);
 
+/// The same, each found once.
+class StudentQuantiles {
+ public:
+  double of(std::size_t degrees);
+
+ private:
+  std::map<std::size_t, double> known_;
+};
+
 /// Mean and standard deviation of numbers that come one after the other.
 class Moments {
  public:
   void add(double value) noexcept;
   std::size_t count() const noexcept { return count_; }
-  double mean() const noexcept;        ///< NaN of none
-  double half_width() const noexcept;  ///< of the 95 % interval of the mean; NaN of fewer than two
+  double mean() const noexcept;  ///< NaN of none
+  /// Of the 95 % interval of the mean; NaN of fewer than two.
+  double half_width(StudentQuantiles& quantiles) const;
 
  private:
   std::size_t count_ = 0;

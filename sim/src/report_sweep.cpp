@@ -650,6 +650,7 @@ class SweepReport {
   Json pairs_of(const Map& map, const Table& table) const {
     if (!map.reference) return nullptr;
     const std::size_t any = measures_.front();
+    StudentQuantiles quantiles;
     const auto pairs = [&](const Cell& cell, std::size_t measure) {
       return cell.size() == 1 ? differences_of(*cell.front(), *map.reference, measure) : Moments();
     };
@@ -666,7 +667,7 @@ class SweepReport {
         return moments.count() > 1 ? seen(moments.mean(), digits - 1) : Json();
       }));
       json["half_width"][name] = without_empty_rows(
-          table([&](const Cell& cell) { return seen(pairs(cell, measure).half_width(), digits - 1); }));
+          table([&](const Cell& cell) { return seen(pairs(cell, measure).half_width(quantiles), digits - 1); }));
     }
     return json;
   }

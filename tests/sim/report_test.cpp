@@ -127,14 +127,15 @@ TEST(Student, IsThatOfTheTables) {
 }
 
 TEST(Moments, AreThoseOfTheNumbers) {
+  StudentQuantiles quantiles;
   Moments moments;
   EXPECT_TRUE(std::isnan(moments.mean()));
   moments.add(1.0);
-  EXPECT_TRUE(std::isnan(moments.half_width()));
+  EXPECT_TRUE(std::isnan(moments.half_width(quantiles)));
   moments.add(3.0);
   moments.add(8.0);
   EXPECT_DOUBLE_EQ(moments.mean(), 4.0);
-  EXPECT_NEAR(moments.half_width(), 4.3026527297 * std::sqrt(13.0 / 3.0), 1e-8);
+  EXPECT_NEAR(moments.half_width(quantiles), 4.3026527297 * std::sqrt(13.0 / 3.0), 1e-8);
 }
 
 Scenario scenario_with(const std::vector<std::string>& assignments) {
