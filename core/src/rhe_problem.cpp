@@ -14,6 +14,7 @@
 #include "recollection.hpp"
 #include "rhec/core/error.hpp"
 #include "scratch.hpp"
+#include "with_size.hpp"
 
 namespace rhec {
 
@@ -26,18 +27,25 @@ void add_curvature_of_outputs(const Model& model, StageRange range, const Iterat
                        wide = view.states + view.controls;
   Scratch memory(rest);
   double *states = memory.take(count * n), *hessians = memory.take(count * n * n);
-  for (std::ptrdiff_t i = 0; i < count; ++i)
-    for (int j = 0; j < n; ++j) states[i * n + j] = point.state(range.first)[i * stride + j];
+  with_size(static_cast<int>(n), [&](auto size) {
+    const double* state = point.state(range.first);
+    double* packed = states;
+    for (std::ptrdiff_t i = 0; i < count; ++i, state += stride, packed += size)
+      for (int j = 0; j < size; ++j) packed[j] = state[j];
+  });
   Model::Nodes request;
   request.count = static_cast<int>(count);
   request.states = states;
   request.multipliers = multipliers;
   request.hessians = hessians;
   model.observe(request);
-  double* H = view.H + range.first * wide * stride;
-  for (std::ptrdiff_t i = 0; i < count; ++i, H += wide * stride)
-    for (int c = 0; c < n; ++c)
-      for (int r = 0; r < n; ++r) H[c * stride + r] += *hessians++;
+  with_size(static_cast<int>(n), [&](auto size) {
+    double* H = view.H + range.first * wide * stride;
+    const double* of_node = hessians;
+    for (std::ptrdiff_t i = 0; i < count; ++i, H += wide * stride)
+      for (int c = 0; c < size; ++c, of_node += size)
+        for (int r = 0; r < size; ++r) H[c * stride + r] += of_node[r];
+  });
 }
 
 }  // namespace
@@ -345,8 +353,10 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
   const double total = program_kernels().write_measurements(view, measured, range.first, range.last);
   if (is_exact) {
     double* const multipliers = memory.take(count * ny_);
-    for (std::ptrdiff_t i = 0; i < count; ++i)
-      for (int j = 0; j < ny_; ++j) multipliers[i * ny_ + j] = measured.pulls[i * output_row_ + j];
+    with_size(ny_, [&](auto outputs) {
+      for (std::ptrdiff_t i = 0; i < count; ++i)
+        for (int j = 0; j < outputs; ++j) multipliers[i * outputs + j] = measured.pulls[i * output_row_ + j];
+    });
     add_curvature_of_outputs(model(), range, point, multipliers, view, memory.rest());
   } else if (known && view.H) {
     std::fill_n(known->is_clean.begin() + range.first, count, std::uint8_t{1});

@@ -61,12 +61,12 @@ struct LoopSample {
 /// What a caller can hang into a loop (a closed one, or the replay of a log).
 struct LoopHooks {
   /// Told the share of the way that is done.
-  std::function<void(double share)> progress;
+  std::function<void(double share)> progress = {};
   /// Told of each solve, as RecordingSolver::Callback is. `step` is the absolute index of the node that is the newest
   /// of an estimator's window and the first of a controller's; one step may solve several times.
   std::function<void(std::int64_t step, const HorizonProblem& problem, const Iterate& guess, const Iterate& result,
                      const Report& report)>
-      solved;
+      solved = {};
   /// Told which part of a sample begins, in a closed loop: for who takes the time.
   std::function<void(LoopPart part)> begins = {};
   /// Told of each sample, before the next one is prepared: for who looks into windows and plans.
