@@ -38,13 +38,11 @@ class SensitiveStep {
                 h * (Lane(1.0 / 6.0) * (rates_[0][r] + rates_[3][r]) + Lane(1.0 / 3.0) * (rates_[1][r] + rates_[2][r]));
       for_indices<nz>([&](auto j) RHEC_INLINE {
         Lane sum(0.0);
-        if constexpr (!with_hessian) {
-          if constexpr (Pattern::rates_depend(r) >> j & 1) sum = jacobian[r][j];
-        } else {
-          for_indices<4>([&](auto k) RHEC_INLINE {
-            if constexpr (Pattern::template rate_depends<k>(r, j)) sum = sum + Lane(share[k]) * slopes_[k][r][j];
-          });
-        }
+        if constexpr (!with_hessian && (Pattern::rates_depend(r) >> j & 1) != 0) sum = jacobian[r][j];
+        for_indices<4>([&](auto k) RHEC_INLINE {
+          if constexpr (with_hessian && Pattern::template rate_depends<k>(r, j))
+            sum = sum + Lane(share[k]) * slopes_[k][r][j];
+        });
         jacobian[r][j] = h * sum + Lane(r == j ? 1.0 : 0.0);
       });
     });
