@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -42,12 +43,13 @@ class LogReport {
     most_ = std::clamp(most_values / curves, std::size_t{600}, most_rows);
     document_["times"] = Json::object();
     fixes();
+    inputs();
     document_["variants"] = Json::array();
     for (std::size_t v = 0; v < variants_.size(); ++v) document_["variants"].push_back(variant(v));
     add_note(notes_, "truth",
              "Nobody knows what the vehicle and the ground really did, so there are no errors of states and "
              "slip; withheld fixes are what predictions can be held against.");
-    add_note(notes_, "inputs", "Nothing was controlled: there are no chosen inputs, and no plans.");
+    add_note(notes_, "inputs", "Nothing was controlled: inputs are those that were measured, and there are no plans.");
     if (!words_.empty()) add_note(notes_, "samples", words_);
     document_["notes"] = std::move(notes_);
     return std::move(document_);
@@ -127,6 +129,30 @@ class LogReport {
     }
     document_["settings"] = {{"hold_out", summary_.value("hold_out", Json())}};
     document_["summary"] = summary_;
+  }
+
+  /// What was measured of them on each interval, at its beginning; the same for all variants that keep windows.
+  void inputs() {
+    Json& list = document_["inputs"] = Json::array();
+    if (!horizons_) return;
+    const auto kept = std::find_if(horizons_->variants.begin(), horizons_->variants.end(),
+                                   [](const auto& variant) { return !variant.nodes.at("node_time").empty(); });
+    if (kept == horizons_->variants.end()) return;
+    const Json& variables = horizons_->head.at("model").at("inputs");
+    for (std::size_t j = 0; j < variables.size(); ++j) {
+      std::vector<double> values;
+      for (const Json& value : kept->nodes.at("input").at(j))
+        values.push_back(value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN());
+      std::vector<double> times = kept->nodes.at("node_time").get<std::vector<double>>();
+      times.resize(values.size());
+      const std::string name = variables.at(j).at("name").get<std::string>();
+      const Thinned thinned = thin({&values}, values.size(), most_);
+      list.push_back({{"name", name},
+                      {"time", time_key("input " + name, times, thinned)},
+                      {"values", column_of(values, thinned.rows)},
+                      {"lower", nullptr},
+                      {"upper", nullptr}});
+    }
   }
 
   /// The rows of a variant that are estimates at nodes, or those of fixes.

@@ -272,6 +272,11 @@ class Test(cli.Findings):
         self.expect(document["fixes"]["total"] == len(fixes), "log", "fixes")
         self.expect("Nobody knows" in self.notes(document, "truth"), "log", "nothing is said of the truth")
         self.expect("extremes stay" in self.notes(document, "samples"), "log", "nothing is said of thinning")
+        nodes = next(nodes for nodes in map(json.loads, (folder / "horizons.jsonl").read_text().splitlines()) if nodes.get("node_time"))
+        self.expect([series["name"] for series in document["inputs"]] == ["u1", "u2"], "log", "inputs")
+        for series, measured in zip(document["inputs"], nodes["input"]):
+            self.expect(min(series["values"]) == min(measured) and max(series["values"]) == max(measured), series["name"], "extremes")
+            self.expect(len(series["values"]) == len(document["times"][series["time"]]) < len(measured), series["name"], "is not thinned")
         names = [variant["name"] for variant in document["variants"]]
         self.expect(names == list(summary["variants"]), "log", f"variants {names}")
         for variant in document["variants"]:

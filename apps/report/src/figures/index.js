@@ -41,7 +41,8 @@ function runSections(document) {
 
 function logSections(document) {
   const sections = [{id: "window", title: "The horizon, sample by sample", figures: windowFigures(document), isScrubber: true},
-                    {id: "map", title: "Track and fixes", figures: [trackFigure(document)]}];
+                    {id: "map", title: "Track and fixes", figures: [trackFigure(document)]},
+                    {id: "inputs", title: "Inputs", figures: inputFigures(document)}];
   document.variants.forEach((variant, v) => {
     const prefix = document.variants.length > 1 ? `${stem(variant.name)}-` : "", of = document.variants.length > 1 ? ` (${variant.name})` : "";
     const source = {...variant, times: document.times};

@@ -161,8 +161,9 @@ export function inputFigures(document) {
     const bounded = [lower && "lower bound", upper && "upper bound"].filter(Boolean);
     return {
       name: `input-${column.name}`,
-      title: `${variable && variable.meaning ? `${column.name}, ${variable.meaning}` : column.name}${bounded.length ? ": input and its bounds" : ": input"}`,
-      caption: `What the controller chose; it holds until the next sample.${bounded.length ? "" : " It has no bounds."} ${atBounds(column.values, lower, upper)}`,
+      title: `${variable && variable.meaning ? `${column.name}, ${variable.meaning}` : column.name}${document.kind === "log" ? ": input as measured" : bounded.length ? ": input and its bounds" : ": input"}`,
+      caption: document.kind === "log" ? "What was measured of it on each interval between two nodes."
+        : `What the controller chose; it holds until the next sample.${bounded.length ? "" : " It has no bounds."} ${atBounds(column.values, lower, upper)}`,
       about: ["inputs", "samples"], time: () => time, frames: 1, height: () => 230,
       option: (look, {width, height, view}) => {
         const option = base(look), part = inView(time, view, {values: column.values, lower, upper});

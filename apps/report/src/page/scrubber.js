@@ -79,7 +79,7 @@ export class Scrubber {
     const at = this.charts.state.sample, horizon = this.horizons.list[at];
     this.slider.value = at;
     this.slider.setAttribute("aria-valuetext", `sample ${horizon.sample}, ${seconds(horizon.time)} seconds`);
-    this.output.textContent = `k = ${horizon.sample}   ${horizon.time.toFixed(1)} s`;
+    this.output.textContent = `k = ${horizon.sample}, ${horizon.time.toFixed(1)} s`;
     const strip = this.charts.all.find((chart) => chart.figure.words);
     this.sentence.textContent = strip.figure.words(this.charts.state);
     if (!this.timer) this.live.textContent = this.sentence.textContent;
