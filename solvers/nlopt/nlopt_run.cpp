@@ -18,6 +18,8 @@ using Optimiser = std::unique_ptr<nlopt_opt_s, Destroy>;
 constexpr double far_outside = 1e10;
 // Asking for less than this of NLopt would be asking for rounding errors.
 constexpr double least_allowed_violation = 1e-10;
+// How often a run may come back to one and the same point: more often than for its objective and its constraints.
+constexpr int most_returns = 100;
 
 }  // namespace
 
@@ -78,7 +80,13 @@ bool Run::go_to(const double* y, bool with_gradient) {
 
 /// Counts a new iteration, or stops where that would be one too many.
 bool Run::may_count(const Vector& x, bool with_gradient) {
-  if (with_gradient != uses_gradients_ || (iterations_ > 0 && x == last_counted_)) return true;
+  if (with_gradient != uses_gradients_) return true;
+  if (iterations_ > 0 && x == last_counted_) {
+    // LD_CCSAQ and LD_MMA try the point of their step again and again where rounding keeps it from being good enough.
+    if (++returns_ <= most_returns) return true;
+    stop(Outcome::ended);
+    return false;
+  }
   if (iterations_ >= limits_.iterations) {
     stop(Outcome::iteration_limit);
     return false;
@@ -88,6 +96,7 @@ bool Run::may_count(const Vector& x, bool with_gradient) {
     return false;
   }
   last_counted_ = x;
+  returns_ = 0;
   ++iterations_;
   return true;
 }

@@ -82,6 +82,7 @@ class Run {
   Limits limits_;
   bool uses_gradients_;
   long iterations_ = 0;
+  int returns_ = 0;  ///< to the point that was counted last
   nlopt_opt optimiser_ = nullptr;
   Outcome outcome_ = Outcome::ended;
   bool was_stopped_ = false;
