@@ -34,6 +34,12 @@ async function open(options, what) {
   return view;
 }
 
+/// Whether something comes true; a busy machine takes a while to draw.
+async function eventually(isSo) {
+  for (const end = Date.now() + 60000; !(await isSo()); await new Promise((go) => setTimeout(go, 50))) if (Date.now() > end) return false;
+  return true;
+}
+
 /// Of each figure what is drawn of data: shapes that have not the colours of axes and are larger than those of a legend, or
 /// many small ones; of a canvas the colours that it has.
 const drawn = (view) => view.evaluate(() => [...document.querySelectorAll("figure")].map((figure) => {
@@ -150,11 +156,12 @@ for (const folded of await view.locator("figure details.numbers > summary").all(
   await folded.focus();
   await view.keyboard.press("Enter");
 }
-await view.waitForTimeout(500);  // tables are made when the browser says that they were opened
-const empty = await view.evaluate(() => [...document.querySelectorAll("figure")].filter((figure) => {
+const withoutRows = () => view.evaluate(() => [...document.querySelectorAll("figure")].filter((figure) => {
   const folded = figure.querySelector("details.numbers");
   return folded && (!folded.open || figure.querySelectorAll("tbody tr").length === 0);
 }).map((figure) => figure.dataset.figure));
+await eventually(async () => (await withoutRows()).length === 0);  // tables are made when the browser says that they were opened
+const empty = await withoutRows();
 expect(empty.length === 0, `numbers: without rows: ${empty.join(", ")}`);
 const download = view.waitForEvent("download");
 await view.locator("figure button", {hasText: "Save as CSV"}).first().click();
@@ -180,7 +187,7 @@ if (await scrubber.count()) {
     await view.keyboard.press(key);
     const [now, last] = await at();
     expect(now === expected(last), `scrubber: after ${key} it is at ${now} of ${last}, expected ${expected(last)}`);
-    expect(before[0] !== await words() && before[1] !== await drawings(), `scrubber: after ${key} words or figure are as before`);
+    expect(await eventually(async () => before[0] !== await words() && before[1] !== await drawings()), `scrubber: after ${key} words or figure are as before`);
   }
   const box = await scrubber.boundingBox();
   await view.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
@@ -190,13 +197,13 @@ if (await scrubber.count()) {
   await figure.scrollIntoViewIfNeeded();
   const place = await figure.boundingBox();
   await view.mouse.click(place.x + place.width * 0.8, place.y + place.height * 0.4);
-  expect((await at())[0] > middle, "scrubber: a click into a figure over time does not lead there");
+  expect(await eventually(async () => (await at())[0] > middle), "scrubber: a click into a figure over time does not lead there");
   await view.locator("button", {hasText: "Play"}).click();
   const start = (await at())[0];
   await view.waitForFunction((from) => Number(document.getElementById("scrubber").value) !== from, start);
   await view.locator("button", {hasText: "Pause"}).click();
   await view.locator("#sample-numbers > summary").click();
-  expect(await view.locator("#sample-numbers tbody tr").count() > 5, "scrubber: the sample has no numbers");
+  expect(await eventually(async () => await view.locator("#sample-numbers tbody tr").count() > 5), "scrubber: the sample has no numbers");
   await view.locator(".bar select").selectOption("10");
   await looksRight(view, "ten seconds around the sample", 1440);
 }
@@ -208,18 +215,15 @@ if (await turned.count()) {
   const before = await pixels(first);
   await first.focus();
   await view.keyboard.press("ArrowLeft");
-  await view.waitForTimeout(400);
-  expect(before !== await pixels(first), "surface: an arrow key does not turn it");
+  expect(await eventually(async () => before !== await pixels(first)), "surface: an arrow key does not turn it");
   await view.keyboard.press("Home");
-  await view.waitForTimeout(400);
-  expect(before === await pixels(first), "surface: Home does not put it back");
+  expect(await eventually(async () => before === await pixels(first)), "surface: Home does not put it back");
   const box = await first.boundingBox();
   await view.mouse.move(box.x + 100, box.y + 100);
   await view.mouse.down();
   await view.mouse.move(box.x + 180, box.y + 120);
   await view.mouse.up();
-  await view.waitForTimeout(400);
-  expect(before !== await pixels(first), "surface: dragging does not turn it");
+  expect(await eventually(async () => before !== await pixels(first)), "surface: dragging does not turn it");
   const map = view.locator("figure[data-figure=heat] .chart"), told = view.locator("figure[data-figure=heat] p[role=status]");
   const chosen = await told.textContent();
   await map.focus();
@@ -238,10 +242,11 @@ if (await turned.count()) {
 
 // Printed: on white, in full, no controls.
 await view.emulateMedia({media: "print"});
-await view.waitForTimeout(500);
-const printed = await view.evaluate(() => ({
+const onPaper = () => view.evaluate(() => ({
   ground: getComputedStyle(document.body).backgroundColor, bar: [...document.querySelectorAll("nav, .bar, button")].filter((each) => each.offsetParent).length,
   undrawn: [...document.querySelectorAll("figure")].filter((figure) => figure.offsetParent && figure.querySelectorAll("svg path").length < 3).map((figure) => figure.dataset.figure)}));
+await eventually(async () => (await onPaper()).undrawn.length === 0);
+const printed = await onPaper();
 expect(printed.ground === "rgb(255, 255, 255)", `print: the ground is ${printed.ground}`);
 expect(printed.bar === 0, `print: ${printed.bar} controls are on paper`);
 expect(printed.undrawn.length === 0, `print: not drawn: ${printed.undrawn.join(", ")}`);
