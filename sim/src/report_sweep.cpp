@@ -136,6 +136,7 @@ class SweepReport {
     std::map<std::string, std::int64_t> counts;
     for (const RunGroup& group : runs_.groups) counts[value_of(group, key)] += std::ssize(group.outcomes);
     std::vector<std::string> values;
+    values.reserve(counts.size());
     for (const auto& [value, count] : counts) values.push_back(value);
     const bool numbers =
         std::all_of(values.begin(), values.end(), [](const std::string& v) { return number_in(v) || v == none; });
@@ -359,6 +360,7 @@ class SweepReport {
     }
     std::sort(order.begin(), order.end());
     std::vector<Map> sorted;
+    sorted.reserve(order.size());
     for (const auto& [rank, m] : order) sorted.push_back(std::move(maps_[m]));
     maps_ = std::move(sorted);
   }
