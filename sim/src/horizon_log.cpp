@@ -81,6 +81,7 @@ class Line {
 
 std::vector<int> decimals_of(const std::vector<Variable>& variables) {
   std::vector<int> decimals;
+  decimals.reserve(variables.size());
   for (const Variable& variable : variables) decimals.push_back(decimals_for(variable.scale));
   return decimals;
 }
