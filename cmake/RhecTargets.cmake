@@ -9,6 +9,9 @@ if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
 endif()
 # IEEE semantics stay; only what costs speed and that nobody reads (errno, floating-point traps) goes.
 target_compile_options(rhec_flags INTERFACE -fno-math-errno -fno-trapping-math)
+# Nobody replaces single functions of our libraries, so calls within one need not go through its tables.
+target_compile_options(rhec_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>)
+target_link_options(rhec_flags INTERFACE -Wl,-Bsymbolic-functions)
 if(RHEC_WARNINGS_AS_ERRORS)
   target_compile_options(rhec_flags INTERFACE -Werror)
 endif()

@@ -34,10 +34,7 @@ class ChosenOutputs final : public Model {
   void integrate_rows(const IntervalRows& request) const noexcept override { model_->integrate_rows(request); }
   void observe_rows(const NodeRows& request) const noexcept override {
     if (request.chosen) return observe_some(request);
-    NodeRows of_all = request;
-    of_all.chosen = chosen_.data();
-    of_all.chosen_count = static_cast<int>(chosen_.size());
-    model_->observe_rows(of_all);
+    observe_of_all(request, chosen_.data(), static_cast<int>(chosen_.size()));
   }
   std::size_t rows_scratch(int count) const noexcept override { return model_->rows_scratch(count); }
   void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
@@ -86,9 +83,20 @@ class ChosenOutputs final : public Model {
   void observe_some(const NodeRows& request) const noexcept {
     std::array<int, room> chosen;
     for (int j = 0; j < request.chosen_count; ++j) chosen[j] = chosen_[request.chosen[j]];
-    NodeRows of_all = request;
-    of_all.chosen = chosen.data();
-    model_->observe_rows(of_all);
+    observe_of_all(request, chosen.data(), request.chosen_count);
+  }
+  /// Member by member: a copy of what has just been written waits until that has reached the cache.
+  void observe_of_all(const NodeRows& request, const int* chosen, int count) const noexcept {
+    model_->observe_rows({.count = request.count,
+                          .states = request.states,
+                          .state_step = request.state_step,
+                          .chosen = chosen,
+                          .chosen_count = count,
+                          .outputs = request.outputs,
+                          .output_step = request.output_step,
+                          .jacobians = request.jacobians,
+                          .jacobian_row = request.jacobian_row,
+                          .scratch = request.scratch});
   }
   /// Columns of all outputs -> columns of the chosen ones.
   void pick(const double* all, int columns, double* chosen) const noexcept {

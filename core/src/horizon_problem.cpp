@@ -326,36 +326,34 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
   // Without carried inputs and ramps the model's rows are those of the program, but for channels that start.
   const bool in_place = is_direct() && !any_ramp_;
   const bool is_exact = how.hessian == Hessian::exact;
-  IntervalRows request;
-  request.count = static_cast<int>(how.ahead ? count + 1 : count);
+  const double *inputs = z, *durations = durations_.data() + steps.first, *costates = point.costate(steps.first + 1);
   if (how.ahead) {
-    request.z = row(how.ahead->rows, steps.first, stride_);
-    request.z_step = stride_;
+    inputs = row(how.ahead->rows, steps.first, stride_);
+    durations = how.ahead->durations.data();
+    costates = row(how.ahead->costates, 1, stride_);
   } else if (in_place && !any_start_) {
-    request.z = point.row(steps.first);
-    request.z_step = stride_;
+    inputs = point.row(steps.first);
   } else {
     gather_rows(point, steps, z);
-    request.z = z;
-    request.z_step = row_;
   }
-  request.ramp = any_ramp_;
-  request.durations = how.ahead ? how.ahead->durations.data() : durations_.data() + steps.first;
-  request.substeps = substeps_;
-  request.next_states = qp.b(steps.first);
-  request.next_step = stride_;
-  request.jacobians = in_place ? qp.F(steps.first) : jacobians;
-  request.jacobian_row = in_place ? stride_ : row_;
-  request.jacobian_step = in_place ? ns * stride_ : nx_ * row_;
-  if (is_exact) {
-    request.multipliers = how.ahead ? row(how.ahead->costates, 1, stride_) : point.costate(steps.first + 1);
-    request.multiplier_step = stride_;
-    request.hessians = in_place ? qp.H(steps.first) : hessians;
-    request.hessian_row = in_place ? stride_ : row_;
-    request.hessian_step = in_place ? (capacity_.states + capacity_.controls) * stride_ : row_ * row_;
-  }
-  request.scratch = memory.rest();
-  model_->integrate_rows(request);
+  double* const curvature = in_place ? qp.H(steps.first) : hessians;
+  model_->integrate_rows({.count = static_cast<int>(how.ahead ? count + 1 : count),
+                          .z = inputs,
+                          .z_step = inputs == z ? row_ : stride_,
+                          .ramp = any_ramp_,
+                          .durations = durations,
+                          .substeps = substeps_,
+                          .next_states = qp.b(steps.first),
+                          .next_step = stride_,
+                          .jacobians = in_place ? qp.F(steps.first) : jacobians,
+                          .jacobian_step = in_place ? ns * stride_ : nx_ * row_,
+                          .jacobian_row = in_place ? stride_ : row_,
+                          .multipliers = is_exact ? costates : nullptr,
+                          .multiplier_step = stride_,
+                          .hessians = is_exact ? curvature : nullptr,
+                          .hessian_step = in_place ? (ns + capacity_.controls) * stride_ : row_ * row_,
+                          .hessian_row = in_place ? stride_ : row_,
+                          .scratch = memory.rest()});
 
   if (!in_place) {
     std::fill_n(qp.F(steps.first), count * ns * stride_, 0.0);
@@ -380,38 +378,34 @@ void HorizonProblem::linearise_dynamics(StageRange steps, const Iterate& point, 
 /// What the model does not know of a program: rows of channels, and the next state in b.
 void HorizonProblem::complete_dynamics(StageRange steps, const Iterate& point, bool has_channel_rows,
                                        StageQp& qp) const noexcept {
-  DynamicsView dynamics{};
-  dynamics.first = steps.first;
-  dynamics.last = steps.last;
-  dynamics.states = capacity_.states;
-  dynamics.stride = stride_;
-  dynamics.vehicle_states = nx_;
-  dynamics.channels = channels_;
-  dynamics.control_of = control_index_.data();
-  dynamics.values = point.row(0);
-  dynamics.F = qp.F(0);
-  dynamics.b = qp.b(0);
-  dynamics.has_channel_rows = has_channel_rows;
-  dynamics.any_start = any_start_;
-  program_kernels().complete_dynamics(dynamics);
+  program_kernels().complete_dynamics({.first = steps.first,
+                                       .last = steps.last,
+                                       .states = capacity_.states,
+                                       .stride = stride_,
+                                       .vehicle_states = nx_,
+                                       .channels = channels_,
+                                       .control_of = control_index_.data(),
+                                       .values = point.row(0),
+                                       .F = qp.F(0),
+                                       .b = qp.b(0),
+                                       .has_channel_rows = has_channel_rows,
+                                       .any_start = any_start_});
 }
 
 CostView HorizonProblem::cost_view(Parts parts, Hessian hessian, StageQp& qp) const noexcept {
-  CostView view = cost_view();
-  view.bends = hessian == Hessian::exact;
-  if (parts != Parts::vectors) view.H = qp.H(0);
-  if (parts != Parts::matrices) view.h = qp.h(0);
-  return view;
+  return cost_view(parts != Parts::vectors ? qp.H(0) : nullptr, parts != Parts::matrices ? qp.h(0) : nullptr,
+                   hessian == Hessian::exact);
 }
 
-CostView HorizonProblem::cost_view() const noexcept {
-  CostView view{};
-  view.intervals = intervals_;
-  view.states = capacity_.states;
-  view.controls = capacity_.controls;
-  view.stride = stride_;
-  view.control_counts = control_counts_.data();
-  return view;
+CostView HorizonProblem::cost_view(double* H, double* h, bool bends) const noexcept {
+  return {.intervals = intervals_,
+          .states = capacity_.states,
+          .controls = capacity_.controls,
+          .stride = stride_,
+          .control_counts = control_counts_.data(),
+          .H = H,
+          .h = h,
+          .bends = bends};
 }
 
 /// What the model says of a parameter is that of its control where a block of it starts.

@@ -6,24 +6,23 @@
 namespace rhec {
 
 inline ProgramView view_of(const StageQp& qp, const Iterate& point) noexcept {
-  ProgramView view;
-  view.intervals = view.last = qp.intervals();
-  view.states = qp.capacity().states;
-  view.controls = qp.capacity().controls;
-  view.stride = qp.stride();
-  view.state_counts = qp.state_counts();
-  view.control_counts = qp.control_counts();
-  view.carried_counts = qp.carried_counts();
-  view.initial_state_is_given = qp.initial_state_is_given;
-  view.F = qp.F(0);
-  view.h = qp.h(0);
-  view.b = qp.b(0);
-  view.lower = qp.lower(0);
-  view.upper = qp.upper(0);
-  view.values = point.row(0);
-  view.costates = point.costate(0);
-  view.bounds = point.bound_row(0);
-  return view;
+  return {.intervals = qp.intervals(),
+          .last = qp.intervals(),
+          .states = qp.capacity().states,
+          .controls = qp.capacity().controls,
+          .stride = qp.stride(),
+          .state_counts = qp.state_counts(),
+          .control_counts = qp.control_counts(),
+          .carried_counts = qp.carried_counts(),
+          .initial_state_is_given = qp.initial_state_is_given,
+          .F = qp.F(0),
+          .h = qp.h(0),
+          .b = qp.b(0),
+          .lower = qp.lower(0),
+          .upper = qp.upper(0),
+          .values = point.row(0),
+          .costates = point.costate(0),
+          .bounds = point.bound_row(0)};
 }
 
 }  // namespace rhec

@@ -45,20 +45,18 @@ void HorizonProblem::foresee_interval(int i, Iterate& point) noexcept {
   gather_rows(point, {i, i}, foreseen_.z.data());
   // With a ramp, derivatives are by both its ends: `prepare` makes no use of those.
   foreseen_.duration = any_ramp_ ? 0.0 : durations_[i];
-  IntervalRows request;
-  request.count = 1;
-  request.z = foreseen_.z.data();
-  request.z_step = row_;
-  request.ramp = any_ramp_;
-  request.durations = &durations_[i];
-  request.substeps = substeps_;
-  request.next_states = foreseen_.next.data();
-  request.next_step = row_;
-  request.jacobians = foreseen_.jacobian.data();
-  request.jacobian_row = row_;
-  request.jacobian_step = nx_ * row_;
-  request.scratch = foreseen_.scratch.data();
-  model_->integrate_rows(request);
+  model_->integrate_rows({.count = 1,
+                          .z = foreseen_.z.data(),
+                          .z_step = row_,
+                          .ramp = any_ramp_,
+                          .durations = &durations_[i],
+                          .substeps = substeps_,
+                          .next_states = foreseen_.next.data(),
+                          .next_step = row_,
+                          .jacobians = foreseen_.jacobian.data(),
+                          .jacobian_step = nx_ * row_,
+                          .jacobian_row = row_,
+                          .scratch = foreseen_.scratch.data()});
   std::copy_n(foreseen_.next.data(), nx_, point.state(i + 1));
   carry_channels(i, point);
 }

@@ -129,15 +129,13 @@ int RhcProblem::soften_unreachable_bounds(std::span<double> scratch) noexcept {
   };
   const auto step = [&](double* state, int interval) {
     const double seconds = duration(interval);
-    Model::Intervals request;
-    request.count = 1;
-    request.states = state;
-    request.inputs = u;
-    request.parameters = given_parameters();
-    request.durations = &seconds;
-    request.substeps = substeps();
-    request.next_states = next;
-    model().integrate(request);
+    model().integrate({.count = 1,
+                       .states = state,
+                       .inputs = u,
+                       .parameters = given_parameters(),
+                       .durations = &seconds,
+                       .substeps = substeps(),
+                       .next_states = next});
     std::copy_n(next, n, state);
   };
 
@@ -183,8 +181,8 @@ std::size_t RhcProblem::cost_scratch_size() const noexcept {
 }
 
 double RhcProblem::cost(const Iterate& point, double* stage_costs, std::span<double> scratch) const noexcept {
-  CostView view = cost_view();
-  view.h = Scratch(scratch.data()).rest();  // gradients that nobody asks for
+  double* const gradients = Scratch(scratch.data()).rest();  // that nobody asks for
+  const CostView view = cost_view(nullptr, gradients, false);
   if (is_direct() && !stage_costs) return write_costs({0, intervals()}, point, view);
   double total = 0.0;
   for (int i = 0; i <= intervals(); ++i) {
@@ -201,13 +199,12 @@ double RhcProblem::add_cost(StageRange range, const Iterate& point, Hessian hess
 }
 
 double RhcProblem::write_costs(StageRange range, const Iterate& point, const CostView& view) const noexcept {
-  TrackingView tracked{};
-  tracked.values = point.row(0);
-  tracked.references = reference_.data();
-  tracked.stage_weights = stage_weights_.data();
-  tracked.terminal_weights = terminal_weights_.data();
-  tracked.turns = turns_.data();
-  tracked.inverse_turns = inverse_turns_.data();
+  const TrackingView tracked{.values = point.row(0),
+                             .references = reference_.data(),
+                             .stage_weights = stage_weights_.data(),
+                             .terminal_weights = terminal_weights_.data(),
+                             .turns = turns_.data(),
+                             .inverse_turns = inverse_turns_.data()};
   double total = program_kernels().write_tracking(view, tracked, range.first, range.last);
   if (is_direct()) return total;
   const std::ptrdiff_t wide = capacity().states + capacity().controls;

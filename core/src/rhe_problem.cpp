@@ -213,14 +213,12 @@ double RheProblem::cost(const Iterate& point, double* stage_costs, std::span<dou
   Scratch memory(scratch.data());
   double *predicted = memory.take(static_cast<std::ptrdiff_t>(count) * output_row_),
          *difference = memory.take(output_row_), *weight = memory.take(output_row_);
-  NodeRows request;
-  request.count = count;
-  request.states = point.state(0);
-  request.state_step = stride();
-  request.outputs = predicted;
-  request.output_step = output_row_;
-  request.scratch = memory.rest();
-  model().observe_rows(request);
+  model().observe_rows({.count = count,
+                        .states = point.state(0),
+                        .state_step = stride(),
+                        .outputs = predicted,
+                        .output_step = output_row_,
+                        .scratch = memory.rest()});
 
   double total = 0.0;
   const auto add = [&](int stage, double part) {
@@ -296,16 +294,14 @@ RheProblem::Observed RheProblem::observe(StageRange range, const Iterate& point,
                                          double* jacobians, double* room) const noexcept {
   const std::ptrdiff_t jacobian_row = padded(nx());
   const auto ask = [&](int first, int count, double* to, double* jacobians_to) {
-    NodeRows request;
-    request.count = count;
-    request.states = point.state(first);
-    request.state_step = stride();
-    request.outputs = to;
-    request.output_step = output_row_;
-    request.jacobians = jacobians_to;
-    request.jacobian_row = jacobian_row;
-    request.scratch = room;
-    model().observe_rows(request);
+    model().observe_rows({.count = count,
+                          .states = point.state(first),
+                          .state_step = stride(),
+                          .outputs = to,
+                          .output_step = output_row_,
+                          .jacobians = jacobians_to,
+                          .jacobian_row = jacobian_row,
+                          .scratch = room});
   };
   if (!known) {
     ask(range.first, range.last - range.first + 1, outputs, jacobians);
@@ -331,25 +327,22 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
   if (known && (is_exact || is_robust)) std::fill_n(known->is_clean.begin() + range.first, count, std::uint8_t{0});
   if (is_robust || (is_exact && !view.h))
     return write_bent_measurements(range, point, hessian, view, predicted, jacobians, memory.rest());
-  MeasurementView measured{};
-  measured.vehicle_states = nx();
-  measured.output_count = ny_;
-  measured.input_count = nu();
-  measured.outputs = outputs_.data();
-  measured.inputs = measured_inputs_.data();
-  measured.predicted = predicted;
-  measured.jacobians = jacobians;
-  measured.output_weights = output_weights_.data();
-  measured.input_weights = input_weights_.data();
-  measured.turns = output_turns_.data();
-  measured.inverse_turns = output_inverse_turns_.data();
-  measured.values = point.row(0);
-  measured.room = room;
-  if (known) measured.is_clean = known->is_clean.data();
-  if (is_exact) {
-    measured.pulls = memory.take(count * output_row_);
-    if (range.last == intervals()) program_kernels().clear_costs(view, range.last, range.last);
-  }
+  if (is_exact && range.last == intervals()) program_kernels().clear_costs(view, range.last, range.last);
+  const MeasurementView measured{.vehicle_states = nx(),
+                                 .output_count = ny_,
+                                 .input_count = nu(),
+                                 .outputs = outputs_.data(),
+                                 .inputs = measured_inputs_.data(),
+                                 .predicted = predicted,
+                                 .jacobians = jacobians,
+                                 .output_weights = output_weights_.data(),
+                                 .input_weights = input_weights_.data(),
+                                 .turns = output_turns_.data(),
+                                 .inverse_turns = output_inverse_turns_.data(),
+                                 .values = point.row(0),
+                                 .room = room,
+                                 .pulls = is_exact ? memory.take(count * output_row_) : nullptr,
+                                 .is_clean = known ? known->is_clean.data() : nullptr};
   const double total = program_kernels().write_measurements(view, measured, range.first, range.last);
   if (is_exact) {
     double* const multipliers = memory.take(count * ny_);

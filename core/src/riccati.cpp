@@ -77,33 +77,31 @@ static_assert(small::longest >= Riccati::max_width);
 }  // namespace
 
 RiccatiView Riccati::view_of(const StageQp& qp, const std::int8_t* sides) noexcept {
-  RiccatiView view;
-  view.intervals = qp.intervals();
-  view.states = ns_;
-  view.controls = nw_;
-  view.stride = stride_;
-  view.state_counts = state_counts_.data();
-  view.control_counts = control_counts_.data();
-  view.carried_counts = qp.carried_counts();
-  view.F = qp.F(0);
-  view.H = qp.H(0);
-  view.h = qp.h(0);
-  view.b = qp.b(0);
-  view.lower = qp.lower(0);
-  view.upper = qp.upper(0);
-  view.sides = sides;
-  view.special = is_special_.data();
-  view.P = P_.data();
-  view.U = U_.data();
-  view.V = V_.data();
-  view.closed = closed_.data();
-  view.T = columns_.data();
-  view.inverse = inverse_.data();
-  view.fixes = fixes_control_.data();
-  view.drift = drift_.data();
-  view.g = g_.data();
-  view.p = p_.data();
-  return view;
+  return {.intervals = qp.intervals(),
+          .states = ns_,
+          .controls = nw_,
+          .stride = stride_,
+          .state_counts = state_counts_.data(),
+          .control_counts = control_counts_.data(),
+          .carried_counts = qp.carried_counts(),
+          .F = qp.F(0),
+          .H = qp.H(0),
+          .h = qp.h(0),
+          .b = qp.b(0),
+          .lower = qp.lower(0),
+          .upper = qp.upper(0),
+          .sides = sides,
+          .special = is_special_.data(),
+          .P = P_.data(),
+          .U = U_.data(),
+          .V = V_.data(),
+          .closed = closed_.data(),
+          .T = columns_.data(),
+          .inverse = inverse_.data(),
+          .fixes = fixes_control_.data(),
+          .drift = drift_.data(),
+          .g = g_.data(),
+          .p = p_.data()};
 }
 
 void Riccati::factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept {
@@ -191,7 +189,6 @@ bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* g
     const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(stage) * stride_ * size;
     std::fill_n(values + first, (ns_ + qp.controls(stage)) * size, 0.0);
   };
-  for (int i = std::min(last + 1, N); i <= N; ++i) clear(i);
   for (int c = 0; c < count; ++c) {
     const auto [stage, place] = gradients[c];
     if (has_gradient_[stage] == 0) clear(stage);
@@ -224,7 +221,7 @@ bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* g
       scale(j, -1.0 / G[j * width_ + j]);
     }
   }
-  kernels_->respond_forward(view, values, costates);
+  kernels_->respond_forward(view, last, values, costates);
   return true;
 }
 

@@ -77,16 +77,15 @@ void GuessShifter::move_rows(int steps, const HorizonProblem& to, Iterate& guess
   const std::ptrdiff_t rest = static_cast<std::ptrdiff_t>(N - moved) * row;
   // Blocks may start elsewhere now, and the last node has no controls.
   const auto adopt = [&](int first, int count, int used) {
-    GuessView from{};
-    from.rows = count;
-    from.stride = row;
-    from.vehicle_states = nx_;
-    from.states = ns;
-    from.used = used;
-    from.values = kept_.row(first + steps);
-    from.multipliers = kept_.bound_row(first + steps);
-    from.lower = to.state_lower(first);
-    from.upper = to.state_upper(first);
+    const GuessView from{.rows = count,
+                         .stride = row,
+                         .vehicle_states = nx_,
+                         .states = ns,
+                         .used = used,
+                         .values = kept_.row(first + steps),
+                         .multipliers = kept_.bound_row(first + steps),
+                         .lower = to.state_lower(first),
+                         .upper = to.state_upper(first)};
     program_kernels().adopt(from, guess.row(first), guess.bound_row(first));
   };
   adopt(0, moved, ns + free_count_);

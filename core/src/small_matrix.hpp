@@ -23,16 +23,18 @@ inline void multiply(const double* A, int lda, const double* B, int ldb, double*
   }
 }
 
-/// C += sign A' B;  A is k x m, B is k x n.
+/// C += sign A' B;  A is k x m, B is k x n, and m is at most `longest`. Row by row of A, since k is mostly as short as
+/// the list of a stage's controls.
 inline void add_transposed(const double* A, int lda, const double* B, int ldb, double* C, int ldc, int m, int k, int n,
                            double sign = 1.0) noexcept {
-  for (int j = 0; j < n; ++j) {
-    const double* b = B + j * ldb;
-    for (int i = 0; i < m; ++i) {
-      const double* a = A + i * lda;
-      double sum = 0.0;
-      for (int l = 0; l < k; ++l) sum += a[l] * b[l];
-      C[j * ldc + i] += sign * sum;
+  double row[longest];
+  for (int l = 0; l < k; ++l) {
+    for (int i = 0; i < m; ++i) row[i] = sign * A[i * lda + l];
+    for (int j = 0; j < n; ++j) {
+      const double b = B[j * ldb + l];
+      if (b == 0.0) continue;
+      double* c = C + j * ldc;
+      for (int i = 0; i < m; ++i) c[i] += row[i] * b;
     }
   }
 }

@@ -249,14 +249,13 @@ void Riccati::factor_special(const StageQp& qp, const ActiveSet& active, const R
     small::multiply(v.G, width_, v.Y, width_, GY, width_, m, m, n);
     for (int c = 0; c < f; ++c) std::fill_n(G + c * width_, f, 0.0);
     small::add_transposed(v.T, width_, GT, width_, G, width_, f, m, f);
-    // H += Y'L + L'Y + Y'GY, L_v = T'(L + G Y)
-    small::add_transposed(v.Y, width_, v.L, width_, H, stride_, n, m, n);
-    small::add_transposed(v.L, width_, v.Y, width_, H, stride_, n, m, n);
-    small::add_transposed(v.Y, width_, GY, width_, H, stride_, n, m, n);
+    // H += Y'(L + G Y) + L'Y, L_v = T'(L + G Y)
     for (int c = 0; c < n; ++c) {
       std::fill_n(L + c * width_, f, 0.0);
       for (int r = 0; r < m; ++r) GY[c * width_ + r] += v.L[c * width_ + r];
     }
+    small::add_transposed(v.Y, width_, GY, width_, H, stride_, n, m, n);
+    small::add_transposed(v.L, width_, v.Y, width_, H, stride_, n, m, n);
     small::add_transposed(v.T, width_, GY, width_, L, width_, f, m, n);
     reduced_G = G;
     reduced_L = L;

@@ -21,6 +21,11 @@ ViolatedBounds find_violations(const double* values, const double* least, const 
   return {.largest = largest, .count = violated};
 }
 
+void widen_bounds(const double* lower, const double* upper, double tolerance, int count, double* least,
+                  double* most) noexcept {
+  program_kernels().widen_bounds(lower, upper, tolerance, count, least, most);
+}
+
 void add_to_step(int intervals, const Iterate& from, Iterate& step) noexcept {
   const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(intervals + 1) * from.capacity().row();
   program_kernels().add(from.row(0), step.row(0), count);

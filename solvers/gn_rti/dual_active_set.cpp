@@ -68,27 +68,22 @@ void DualActiveSet::let_go(int place) noexcept {
 }
 
 void DualActiveSet::take_claims(const StageQp& qp, const ActiveSet& claimed) noexcept {
-  const auto take = [&](int stage, int first, int count) {
-    const std::int8_t* sides = claimed.row(stage);
-    for (int j = first; j < first + count; ++j) {
-      if (sides[j] == 0 || !std::isfinite((sides[j] < 0 ? qp.lower(stage) : qp.upper(stage))[j])) continue;
-      const int place = stage * stride_ + j;
-      if (j >= states_) {
-        hold_[place] = Hold::held;
-        held_.row(stage)[j] = sides[j];
-        held_places_.push_back(place);
-      } else if (column_count() < max_columns) {
-        hold_[place] = Hold::column;
-        multipliers_[column_count()] = 0.0;
-        columns_.push_back(place);
-      }
-      side_[place] = sides[j];
+  claimed.for_each([&](int stage, int j, std::int8_t side) {
+    if (stage > qp.intervals() || !std::isfinite((side < 0 ? qp.lower(stage) : qp.upper(stage))[j])) return;
+    const bool is_given = stage == 0 && qp.initial_state_is_given;
+    if (j < states_ ? is_given || j >= qp.states(stage) : j >= states_ + qp.controls(stage)) return;
+    const int place = stage * stride_ + j;
+    if (j >= states_) {
+      hold_[place] = Hold::held;
+      held_.row(stage)[j] = side;
+      held_places_.push_back(place);
+    } else if (column_count() < max_columns) {
+      hold_[place] = Hold::column;
+      multipliers_[column_count()] = 0.0;
+      columns_.push_back(place);
     }
-  };
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    if (i > 0 || !qp.initial_state_is_given) take(i, 0, qp.states(i));
-    take(i, states_, qp.controls(i));
-  }
+    side_[place] = side;
+  });
 }
 
 /// The bounds as they are now; false where one that is active has gone.
@@ -96,10 +91,7 @@ bool DualActiveSet::take_bounds(const StageQp& qp) noexcept {
   has_bounds_ = true;
   lower_ = qp.lower(0);
   upper_ = qp.upper(0);
-  for (int k = 0; k < places_; ++k) {
-    least_[k] = lower_[k] - bound_tolerance * (1.0 + std::abs(lower_[k]));
-    most_[k] = upper_[k] + bound_tolerance * (1.0 + std::abs(upper_[k]));
-  }
+  widen_bounds(lower_, upper_, bound_tolerance, places_, least_.data(), most_.data());
   bool are_there = true;
   const auto leave_out = [&](int place) {
     least_[place] = -infinity;

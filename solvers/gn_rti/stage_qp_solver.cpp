@@ -88,6 +88,17 @@ void StageQpSolver::prepare_changes(const StageQp& qp) noexcept {
   prepared_ = true;
 }
 
+/// Where no bound is violated, only multipliers of held ones can be wrong.
+void StageQpSolver::release_wrong(const StageQp& qp, const Iterate& step, double pull_tolerance,
+                                  Violations& found) noexcept {
+  active_.for_each([&](int stage, int j, std::int8_t side) {
+    const double lower = qp.lower(stage)[j], upper = qp.upper(stage)[j];
+    if (!(side * step.bound_row(stage)[j] < -pull_tolerance) || is_equality(lower, upper)) return;
+    active_.row(stage)[j] = 0;
+    ++found.count;
+  });
+}
+
 StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, const Iterate& step) noexcept {
   Violations found;
   const StepCheck check = check_step(qp, step, bound_tolerance);
@@ -95,13 +106,19 @@ StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, c
   if (!found.finite || (!check.violates && !any_active_)) return found;
   any_active_ = true;
   const double pull_tolerance = multiplier_tolerance * (1.0 + check.largest_costate);
+  if (!check.violates) {
+    release_wrong(qp, step, pull_tolerance, found);
+    return found;
+  }
   const auto correct = [&](std::int8_t& side, double value, double multiplier, double lower, double upper) {
     const std::int8_t before = side;
     if (side == 0) {
       if (value < lower - bound_tolerance * (1.0 + std::abs(lower))) side = -1;
       if (value > upper + bound_tolerance * (1.0 + std::abs(upper))) side = 1;
-    } else if (side * multiplier < -pull_tolerance && !is_equality(lower, upper)) {
-      side = 0;
+    } else {
+      // The value is at one side, so the other one is violated, if they cross.
+      found.cross |= !(lower - upper <= bound_tolerance * (1.0 + std::abs(lower)));
+      if (side * multiplier < -pull_tolerance && !is_equality(lower, upper)) side = 0;
     }
     found.count += side != before;
   };
@@ -124,7 +141,7 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
     if (!factored_) factor(qp);
     if (riccati_.solve(qp, active_, step) != Riccati::Outcome::done) return false;
     const Violations violations = correct_active_set(qp, step);
-    if (!violations.finite) return false;
+    if (!violations.finite || violations.cross) return false;
     if (violations.count == 0) return true;
     factored_ = false;
   }
@@ -135,10 +152,9 @@ StageQpSolver::Outcome StageQpSolver::solve(StageQp& qp, Iterate& step, Clock::t
   is_dual_ = false;
   if (!factored_ && !prepared_) prepare(qp);
   if (factored_) {
-    // An active set takes one side of bounds that cross and does not see that the other is violated.
-    if (any_active_ && mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
     if (try_active_sets(qp, step, 1, deadline)) return Outcome::active_set;
     factored_ = false;
+    if (any_active_ && mark_bounds(qp, step, bound_tolerance, marks_.data())) return Outcome::infeasible;
     if (is_past(deadline)) return Outcome::out_of_time;
   }
   auto outcome = solve_from_guess(qp, step, deadline);

@@ -154,11 +154,12 @@ TEST(Kernels, OfResponsesAreWhatAStepDiffersBy) {
       // Where there are no gradients, what is in their place is not looked at.
       std::vector<unsigned char> has_gradient(N + 1, 0);
       has_gradient[stage] = 1;
-      for (int i = 0; i < std::min(stage, N); ++i) at(i, 0, number) = 3.0;
+      for (int i = 0; i <= N; ++i)
+        for (int k = 0; i != stage && k < states + qp.controls(i); ++k) at(i, k, number) = 3.0;
       set.riccati->respond_backward(before.view, stage, has_gradient.data(), values.data());
       for (int j = 0; j < states; ++j)
         for (int other = 0; other < response_batch; ++other) at(0, j, other) = 0.0;
-      set.riccati->respond_forward(before.view, values.data(), costates.data());
+      set.riccati->respond_forward(before.view, stage, values.data(), costates.data());
 
       StageQp moved = qp;
       moved.h(stage)[place] += 1.0;
@@ -484,6 +485,15 @@ TEST(Kernels, OfPlainSumsAgree) {
         EXPECT_EQ(out[k], a[k] - b[k]) << set.instruction_set;
         EXPECT_EQ(sum_h[k], h[k] - b[k]) << set.instruction_set;
       }
+      AlignedDoubles lower = a, upper = b;
+      lower[0] = -infinity;
+      upper[0] = infinity;
+      set.program->widen_bounds(lower.data(), upper.data(), 1e-3, width, out.data(), sum_h.data());
+      for (int k = 0; k < width; ++k) {
+        EXPECT_DOUBLE_EQ(out[k], lower[k] - 1e-3 * (1.0 + std::abs(lower[k]))) << set.instruction_set;
+        EXPECT_DOUBLE_EQ(sum_h[k], upper[k] + 1e-3 * (1.0 + std::abs(upper[k]))) << set.instruction_set;
+      }
+      std::copy_n(h.data(), width, sum_h.data());
       const ViolationParts found = set.program->find_violations(a.data(), b.data(), sum_h.data(), width, out.data());
       int violated = 0;
       double worst = 0.0;

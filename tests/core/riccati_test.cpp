@@ -1,5 +1,8 @@
 #include "rhec/core/riccati.hpp"
 
+#include <array>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "random_qp.hpp"
@@ -35,6 +38,26 @@ void expect_same_as_dense(const StageQp& qp, const ActiveSet& active, const Iter
     for (int j = 0; j < qp.controls(i); ++j) {
       ASSERT_NEAR(step.control_bound(i)[j], active.control(i)[j] ? z[size + row++] : 0.0, tolerance);
     }
+  }
+}
+
+TEST(ActiveSet, NamesTheBoundsThatAreHeldInTheirOrder) {
+  RandomQp random(17);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Capacity capacity{random.integer(1, 6), random.integer(1, 12), random.integer(1, 6)};
+    ActiveSet active(capacity);
+    std::vector<std::array<int, 3>> expected, found;
+    for (int i = 0; i <= capacity.intervals; ++i)
+      for (int k = 0; k < capacity.states + capacity.controls; ++k) {
+        if (random.integer(0, 5) > 0) continue;
+        const int side = random.integer(0, 1) == 0 ? -1 : 1;
+        active.row(i)[k] = static_cast<std::int8_t>(side);
+        expected.push_back({i, k, side});
+      }
+    active.for_each([&](int stage, int column, std::int8_t side) { found.push_back({stage, column, side}); });
+    EXPECT_EQ(found, expected);
+    active.clear();
+    active.for_each([](int, int, std::int8_t) { ADD_FAILURE() << "nothing is held"; });
   }
 }
 

@@ -1,5 +1,8 @@
 #include "../../solvers/gn_rti/stage_qp_solver.hpp"
 
+#include <cmath>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "qp_conditions.hpp"
@@ -81,6 +84,42 @@ TEST(StageQpSolver, StartsFromTheMultipliersOfAPoint) {
     ASSERT_LT(kkt_violation(qp, step), 1e-7) << "trial " << trial;
   }
   EXPECT_GT(with_states, 60);
+}
+
+TEST(StageQpSolver, SeesThatAHeldBoundHasPassedTheOtherOne) {
+  RandomQp random(15);
+  int seen = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    StageQp qp = feasible_qp(random, false, 0.8);
+    StageQpSolver solver(qp.capacity());
+    Iterate solution(qp.capacity()), step(qp.capacity());
+    solver.guess_from(qp, solution);
+    if (solver.solve(qp, solution) != StageQpSolver::Outcome::active_set) continue;
+    // With few state bounds the set is held in the factorisation, whose solution is at the bound, whatever the other
+    // is.
+    int held = 0;
+    double *lower = nullptr, *upper = nullptr;
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int j = 0; j < qp.states(i); ++j) {
+        if (solution.state_bound(i)[j] == 0.0) continue;
+        ++held;
+        lower = qp.state_lower(i) + j;
+        upper = qp.state_upper(i) + j;
+      }
+    if (held != 1 || !std::isfinite(*upper - *lower)) continue;
+    ++seen;
+    solver.guess_from(qp, solution);
+    solver.prepare(qp);
+    std::swap(*lower, *upper);
+    EXPECT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::infeasible) << "trial " << trial;
+    // And back again, it is solved by the same factorisation.
+    std::swap(*lower, *upper);
+    solver.guess_from(qp, solution);
+    solver.prepare(qp);
+    EXPECT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::active_set) << "trial " << trial;
+    EXPECT_EQ(solver.factorisations(), 1) << "trial " << trial;
+  }
+  EXPECT_GT(seen, 30);
 }
 
 TEST(StageQpSolver, SaysSoWhenTheBoundsCannotBeSatisfied) {

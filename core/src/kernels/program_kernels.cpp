@@ -172,6 +172,14 @@ ViolationParts find_violations(const double* values, const double* least, const 
   return {largest_of(largest), static_cast<int>(sum_of(counts))};
 }
 
+void widen_bounds(const double* lower, const double* upper, double tolerance, long count, double* least, double* most) {
+  for (long k = 0; k < count; k += lane_count) {
+    const Lanes from = load(lower + k), to = load(upper + k);
+    store(from - tolerance * (1.0 + absolute(from)), least + k);
+    store(to + tolerance * (1.0 + absolute(to)), most + k);
+  }
+}
+
 void write_bounds(const double* lower, const double* upper, const double* point, double* step_lower, double* step_upper,
                   long count) {
   for (long k = 0; k < count; k += lane_count) {
@@ -456,18 +464,10 @@ double write_measurements(const CostView& view, const MeasurementView& measured,
 #define RHEC_JOIN(a, b) a##b
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET);
-constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {&kernels::kkt,
-                                                                         &kernels::check_step,
-                                                                         &kernels::mark_bounds,
-                                                                         &kernels::find_violations,
-                                                                         &kernels::write_bounds,
-                                                                         &kernels::match,
-                                                                         &kernels::adopt,
-                                                                         &kernels::add,
-                                                                         &kernels::add_products,
-                                                                         &kernels::write_tracking,
-                                                                         &kernels::complete_dynamics,
-                                                                         &kernels::clear_costs,
-                                                                         &kernels::write_measurements};
+constinit const ProgramKernels RHEC_TABLE(program_kernels_, RHEC_SET) = {
+    &kernels::kkt,          &kernels::check_step,        &kernels::mark_bounds,    &kernels::find_violations,
+    &kernels::widen_bounds, &kernels::write_bounds,      &kernels::match,          &kernels::adopt,
+    &kernels::add,          &kernels::add_products,      &kernels::write_tracking, &kernels::complete_dynamics,
+    &kernels::clear_costs,  &kernels::write_measurements};
 
 }  // namespace rhec

@@ -2,6 +2,9 @@
 
 namespace rhec {
 
+// Views are made by naming their members, all at once: what is cleared first and filled then has to reach the cache
+// before it can be read, which takes longer than most kernels.
+
 /// What the kernels over stage programs and iterates work on: rows of `stride` entries, one a stage, 0 .. N.
 struct ProgramView {
   int intervals = 0;
@@ -93,6 +96,9 @@ struct ProgramKernels {
   /// violations = max(least - values, values - most), of `count` entries, which are whole eights.
   ViolationParts (*find_violations)(const double* values, const double* least, const double* most, long count,
                                     double* violations);
+  /// least = lower - tolerance (1 + |lower|) and most = upper + tolerance (1 + |upper|), of `count` entries.
+  void (*widen_bounds)(const double* lower, const double* upper, double tolerance, long count, double* least,
+                       double* most);
   /// Bounds of steps from a point: lower - point and upper - point.
   void (*write_bounds)(const double* lower, const double* upper, const double* point, double* step_lower,
                        double* step_upper, long count);

@@ -368,7 +368,8 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
 using Batch = Row<response_batch / lane_count>;
 
 template <class Stage>
-inline void respond_stage_backward(const RiccatiView& view, int i, bool has_gradient, double* gradients) {
+inline void respond_stage_backward(const RiccatiView& view, int i, bool has_gradient, bool has_next,
+                                   double* gradients) {
   const Stage stage(view, i);
   const long stride = view.stride;
   const double* F = view.F + i * view.states * stride;
@@ -378,7 +379,7 @@ inline void respond_stage_backward(const RiccatiView& view, int i, bool has_grad
   double* own = gradients + i * stride * response_batch;
   const double* next = own + stride * response_batch;
   Batch costates[Stage::most_states], gradient[Stage::most_columns];
-  for (int l = 0; l < stage.next_states; ++l) costates[l] = Batch::from(next + l * response_batch);
+  for (int l = 0; l < stage.next_states; ++l) costates[l] = has_next ? Batch::from(next + l * response_batch) : Batch{};
   const auto form = [&](int k) {
     gradient[k] = has_gradient ? Batch::from(own + k * response_batch) : Batch{};
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { gradient[k].add(costates[l], F[l * stride + k]); });
@@ -402,7 +403,7 @@ inline void respond_stage_backward(const RiccatiView& view, int i, bool has_grad
 }
 
 template <class Stage>
-inline void respond_stage_forward(const RiccatiView& view, int i, double* responses, double* costates) {
+inline void respond_stage_forward(const RiccatiView& view, int i, int last, double* responses, double* costates) {
   const Stage stage(view, i);
   const long stride = view.stride;
   const double* F = view.F + i * view.states * stride;
@@ -411,13 +412,17 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
   const std::int8_t* sides = view.sides + i * stride;
   double* own = responses + i * stride * response_batch;
   double* next = own + stride * response_batch;
+  // Behind the last gradient those of the value functions are zero, and so are those of controls.
+  const auto gradient_at = [](const double* row, int entry, bool is_there) RHEC_ALWAYS_INLINE {
+    return is_there ? Batch::from(row + entry * response_batch) : Batch{};
+  };
   Batch z[Stage::most_columns];
   for (int j = 0; j < stage.states; ++j) z[j] = Batch::from(own + j * response_batch);
   for (int k = stage.offset; k < stage.columns; ++k) {
     z[k] = {};
     if (sides[k] != 0) continue;
     const double* column = U + (k - stage.offset) * stride;
-    Batch sum = Batch::from(own + k * response_batch);
+    Batch sum = gradient_at(own, k, i <= last);
     for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
     for (int j = stage.offset; j < k; ++j) sum.add(z[j], column[j]);
     z[k].add(sum, -inverse[k - stage.offset]);
@@ -434,7 +439,7 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
   }
   const double* P_next = view.P + (i + 1) * view.states * stride;
   for (int l = 0; l < stage.next_states; ++l) {
-    Batch sum = Batch::from(next + l * response_batch);
+    Batch sum = gradient_at(next, l, i < last);
     for (int j = 0; j < stage.next_states; ++j) sum.add(next_state[j], P_next[l * stride + j]);
     sum.to(costates + ((i + 1) * stride + l) * response_batch);
   }
@@ -444,7 +449,7 @@ inline void respond_stage_forward(const RiccatiView& view, int i, double* respon
     if (sides[k] != 0) {
       // What a fixed control answers with is its multiplier.
       const double* column = U + (k - stage.offset) * stride;
-      Batch sum = Batch::from(own + k * response_batch);
+      Batch sum = gradient_at(own, k, i <= last);
       for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
       for (int j = stage.offset; j < stage.columns; ++j) sum.add(z[j], column[j]);
       answer = {};
@@ -536,13 +541,14 @@ int solve_forward(const RiccatiView& view, int first) {
 
 void respond_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
   for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0; --i)
-    with_shape<true>(view, i,
-                     [&]<class Stage>() { respond_stage_backward<Stage>(view, i, has_gradient[i] != 0, gradients); });
+    with_shape<true>(view, i, [&]<class Stage>() {
+      respond_stage_backward<Stage>(view, i, has_gradient[i] != 0, i < last, gradients);
+    });
 }
 
-void respond_forward(const RiccatiView& view, double* responses, double* costates) {
+void respond_forward(const RiccatiView& view, int last, double* responses, double* costates) {
   for (int i = 0; i < view.intervals; ++i)
-    with_shape<true>(view, i, [&]<class Stage>() { respond_stage_forward<Stage>(view, i, responses, costates); });
+    with_shape<true>(view, i, [&]<class Stage>() { respond_stage_forward<Stage>(view, i, last, responses, costates); });
 }
 
 void combine(const double* batch, const double* weights, double* sums, long count) {

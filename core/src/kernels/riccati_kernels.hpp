@@ -49,9 +49,10 @@ struct RiccatiKernels {
   int (*solve_forward)(const RiccatiView& view, int first);
   /// Responses to `response_batch` gradients at once, each entry of a row beside those of the others: from gradients of
   /// the stages up to `last` (0 where `has_gradient` is) to the value functions' gradients (in place), and from those
-  /// and the initial states to the responses (in place) and their costates. There must be no special stage.
+  /// and the initial states to the responses (in place) and their costates. What lies in rows without gradients is not
+  /// looked at. There must be no special stage.
   void (*respond_backward)(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients);
-  void (*respond_forward)(const RiccatiView& view, double* responses, double* costates);
+  void (*respond_forward)(const RiccatiView& view, int last, double* responses, double* costates);
   /// sums += those of a batch, each response by its weight, over `count` entries, which are whole eights.
   void (*combine)(const double* batch, const double* weights, double* sums, long count);
   /// The covariance (rows of the stride) of node `first` carried on to the special stage that is returned, or to node

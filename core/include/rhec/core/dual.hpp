@@ -96,6 +96,12 @@ struct SecondOrder {
   T dd[hessian_size > 0 ? hessian_size : 1];
 
   SecondOrder() = default;
+  /// Entry by entry, of which the compiler leaves out those that nobody asks for; a copy of the whole it would make.
+  SecondOrder(const SecondOrder& other) { assign_linear(*this, same, other); }
+  SecondOrder& operator=(const SecondOrder& other) {
+    assign_linear(*this, same, other);
+    return *this;
+  }
   template <std::convertible_to<T> Constant>
   SecondOrder(const Constant& constant) : value(constant) {  // NOLINT(google-explicit-constructor)
     for_each_index<N>([&](auto j) { d[j] = T(0.0); });
@@ -154,6 +160,9 @@ struct SecondOrder {
     for_each_index<N>([&](auto j) { out.d[j] = operation(a.d[j]...); });
     for_each_index<hessian_size>([&](auto k) { out.dd[k] = operation(a.dd[k]...); });
   }
+
+ private:
+  static constexpr auto same = [](const T& a) { return a; };
 };
 
 /// Numbers that carry derivatives: Dual and SecondOrder.

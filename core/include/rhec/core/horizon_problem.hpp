@@ -120,7 +120,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   /// Where the kernels of costs write to: all of a program, or (after the fact) its matrices or vectors alone.
   enum class Parts { all, matrices, vectors };
   CostView cost_view(Parts parts, Hessian hessian, StageQp& qp) const noexcept;
-  CostView cost_view() const noexcept;  ///< without a target
+  CostView cost_view(double* H, double* h, bool bends) const noexcept;
   /// Removes all bounds.
   void clear_bounds() noexcept;
   /// Where an input is found in z of an interval: free, or that of its channel.

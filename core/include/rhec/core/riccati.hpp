@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "rhec/core/stage_qp.hpp"
@@ -25,6 +26,18 @@ class RHEC_EXPORT ActiveSet {
   const std::int8_t* row(int stage) const noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
   bool is_empty() const noexcept;
   void clear() noexcept;
+  /// function(stage, column, side) for every bound that is held, stage by stage; a column is that of a row.
+  template <class Function>
+  void for_each(const Function& function) const {
+    // Rows are whole eights, of which most are free.
+    constexpr int eight = sizeof(std::uint64_t);
+    for (int k = 0; k < static_cast<int>(sides_.size()); k += eight) {
+      std::uint64_t any = 0;
+      std::memcpy(&any, sides_.data() + k, sizeof any);
+      for (int j = 0; any != 0 && j < eight; ++j)
+        if (const std::int8_t side = sides_[k + j]; side != 0) function(k / row_, k % row_ + j, side);
+    }
+  }
   bool operator==(const ActiveSet& other) const noexcept { return sides_ == other.sides_; }
 
  private:

@@ -30,6 +30,11 @@ struct ViolatedBounds {
 RHEC_EXPORT ViolatedBounds find_violations(const double* values, const double* least, const double* most, int count,
                                            double* violations) noexcept;
 
+/// Bounds b that are violated by more than tolerance (1 + |b|) only: from there on least and most are; of `count`
+/// entries, which are whole eights.
+RHEC_EXPORT void widen_bounds(const double* lower, const double* upper, double tolerance, int count, double* least,
+                              double* most) noexcept;
+
 /// Makes of a step the point that it leads to, all of it: values are added, its multipliers are those of the point
 /// already. Both are of one capacity.
 RHEC_EXPORT void add_to_step(int intervals, const Iterate& from, Iterate& step) noexcept;
