@@ -10,6 +10,7 @@
 
 #include "block_structure.hpp"
 #include "rhec/core/error.hpp"
+#include "rhec/core/kkt.hpp"
 
 namespace rhec {
 namespace {
@@ -286,6 +287,38 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
   point_ = best_;
 }
 
+/// The objective of what a point really says: its states are simulated from the first one.
+double RecedingHorizonEstimation::objective_from_start(const Iterate& point) noexcept {
+  trial_ = point;
+  problem_.simulate(trial_, scratch_);
+  const double objective = problem_.evaluate(trial_, nullptr, scratch_);
+  return std::isnan(objective) ? std::numeric_limits<double>::infinity() : objective;
+}
+
+/// A solve that has come to no end may have been led astray by its guess, window after window. Where the prior explains
+/// the measurements better than what came of it, the solve starts from there; the best of the three is taken.
+void RecedingHorizonEstimation::reconsider(Report& report, Clock::time_point deadline) noexcept {
+  const double found = objective_from_start(point_);
+  best_ = point_;
+  start_cold();
+  const double prior = objective_from_start(point_);
+  if (!(prior < found)) {
+    point_ = best_;
+    return;
+  }
+  best_ = point_;
+  const Report from_prior = solver_->solve(problem_, point_, deadline);
+  const int iterations = report.iterations + from_prior.iterations;
+  report = from_prior;
+  if (!is_usable(from_prior.status) || !(objective_from_start(point_) <= prior)) {
+    point_ = best_;
+    report.status = Status::iteration_limit;
+    report.objective = prior;
+    report.kkt = kkt_residual(problem_, point_, covariance_qp_, scratch_);
+  }
+  report.iterations = iterations;
+}
+
 void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count(), N = window_.intervals;
   const int heading = roles().heading;
@@ -308,6 +341,8 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   if (searching_ && remembers && is_known(arrival_.covariance())) searching_ = false;
   if (searching_) search_heading(deadline);
   result.report = solver_->solve(problem_, point_, deadline);
+  if (result.report.status == Status::iteration_limit || result.report.status == Status::stalled)
+    reconsider(result.report, deadline);
   result.fallback = !is_usable(result.report.status);
   result.predicted = false;
   if (result.fallback) recover();

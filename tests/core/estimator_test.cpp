@@ -492,6 +492,82 @@ TEST(Estimator, APoisonedGuessIsReportedAndGoneAtTheNextSample) {
   }
 }
 
+/// Comes to no end in some of its solves, and leaves the point where it has strayed to.
+class Strayer final : public Solver {
+ public:
+  Strayer(std::shared_ptr<Solver> inner, int first, int count, double distance)
+      : inner_(std::move(inner)), first_(first), count_(count), distance_(distance) {}
+  std::string why_not(const Ocp& ocp) const override { return inner_->why_not(ocp); }
+  void setup(const Ocp& ocp) override { inner_->setup(ocp); }
+  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override { inner_->prepare(ocp, guess); }
+  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override {
+    Report report = inner_->solve(ocp, point, deadline);
+    const int number = solves++;
+    if (number < first_ || number >= first_ + count_) return report;
+    report.status = Status::iteration_limit;
+    for (int i = 0; i <= ocp.intervals(); ++i) point.state(i)[0] += distance_;
+    return report;
+  }
+  void reset() noexcept override { inner_->reset(); }
+
+  int solves = 0;
+
+ private:
+  std::shared_ptr<Solver> inner_;
+  int first_, count_;
+  double distance_;
+};
+
+TEST(Estimator, ASolveThatHasGoneAstrayStartsAgainFromThePrior) {
+  const auto model = linear_model<Hovercraft>();
+  const std::vector<Sample> samples = simulate(*model, 30, true, 5);
+  constexpr int at = 20;
+  const auto drive_with = [&](bool prepares, int count, double distance, const auto& look) {
+    const auto strayer = std::make_shared<Strayer>(gn_rti(), at, count, distance);
+    Estimator estimator(make_method(false, model, strayer)), clean(make_method(false, model));
+    std::vector<Estimate> expected;
+    drive(clean, samples, prepares, [&](std::size_t, const Estimate& estimate) { expected.push_back(estimate); });
+    drive(estimator, samples, prepares, [&](std::size_t k, const Estimate& estimate) {
+      EXPECT_FALSE(estimate.fallback);
+      look(static_cast<int>(k), estimate, (estimate.state - expected[k].state).cwiseAbs().maxCoeff());
+    });
+    EXPECT_EQ(estimator.counts().fallbacks, 0);
+    return strayer->solves;
+  };
+  const int usual = static_cast<int>(samples.size());
+  for (const bool prepares : {false, true}) {
+    // From the prior, the second solve finds what the first should have found.
+    EXPECT_EQ(drive_with(prepares, 1, 1000.0,
+                         [&](int k, const Estimate& estimate, double error) {
+                           EXPECT_LE(error, 1e-9) << k;
+                           EXPECT_NE(estimate.report.status, Status::iteration_limit);
+                           if (k == at) {
+                             EXPECT_GE(estimate.report.iterations, 2);
+                           }
+                         }),
+              usual + 1);
+    // Where that goes astray too, the prior itself is better, and says so.
+    EXPECT_EQ(drive_with(prepares, 2, 1000.0,
+                         [&](int k, const Estimate& estimate, double error) {
+                           EXPECT_LE(error, k == at ? 1.0 : 1e-6) << k;
+                           EXPECT_EQ(estimate.report.status == Status::iteration_limit, k == at);
+                           if (k == at) {
+                             EXPECT_LT(estimate.report.objective, 1e4);
+                             EXPECT_LT(estimate.report.kkt.defect, 1e-9);
+                             EXPECT_GT(estimate.report.kkt.largest(), 1e-6);
+                           }
+                         }),
+              usual + 1);
+    // What is better than the prior is kept, whether its solve has come to an end or not.
+    EXPECT_EQ(drive_with(prepares, 1, 0.0,
+                         [&](int k, const Estimate& estimate, double error) {
+                           EXPECT_LE(error, 1e-9) << k;
+                           EXPECT_EQ(estimate.report.status == Status::iteration_limit, k == at);
+                         }),
+              usual);
+  }
+}
+
 /// Counts what it is asked to prepare.
 class PreparationCounter final : public Solver {
  public:

@@ -59,6 +59,8 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   void take_inputs(int interval, const double* inputs) noexcept;
   void start_cold() noexcept;
   void recover() noexcept;
+  double objective_from_start(const Iterate& point) noexcept;
+  void reconsider(Report& report, Clock::time_point deadline) noexcept;
   void write_covariance(int node, Estimate& result) noexcept;
 
   Setup setup_;
