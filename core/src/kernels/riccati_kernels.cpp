@@ -565,22 +565,39 @@ void combine(const double* batch, const double* weights, double* sums, long coun
   }
 }
 
-/// Sigma of the next node from that of stage i: A Sigma A' + B cov(w | s) B', with A the dynamics under the policy.
+/// Of a row, what belongs to states.
 template <class Stage>
-inline void carry_stage(const RiccatiView& view, int i, double* covariance) {
-  using R = Row<Stage::state_registers>;  // of rows, what belongs to states
+using StateRow = Row<Stage::state_registers>;
+
+/// Sigma of the next node from that of stage i, in its place: A Sigma A' + B cov(w | s) B', with A the dynamics under
+/// the policy.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, StateRow<Stage>* rows) {
+  using R = StateRow<Stage>;
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
-  R rows[Stage::most_states], closed[Stage::most_states], products[Stage::most_columns] = {};
-  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { rows[j] = R::from(covariance + j * at.stride); });
-  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
-    R row = R::from(at.F + l * at.stride).first(stage.states);
-    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
-      row.add(R::from(at.V + (k - stage.offset) * at.stride), -at.F[l * at.stride + k]);
+  // The dynamics under the policy, in memory: from there single entries cost no more than whole registers.
+  alignas(64) double closed_rows[Stage::is_compact ? 1 : Stage::most_states * Stage::most_columns];
+  const double* const closed = Stage::is_compact ? at.closed : closed_rows;
+  constexpr int width = Stage::is_compact ? 8 : Stage::most_columns;
+  if constexpr (!Stage::is_compact) {
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
+      R row = R::from(at.F + l * at.stride).first(stage.states);
+      stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+        row.add(R::from(at.V + (k - stage.offset) * at.stride), -at.F[l * at.stride + k]);
+      });
+      row.to(closed_rows + l * width);
     });
-    closed[l] = row;
-    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { products[l].add(rows[j], row.splat(j)); });
-  });
+  }
+  // Of a row of the dynamics, the sum of `terms`, each by its entry.
+  const auto combine_by = [&](auto l, const R* terms) RHEC_ALWAYS_INLINE {
+    R sums[2] = {};
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % R::chains].add(terms[j], closed[l * width + j]); });
+    if (R::chains > 1) sums[0].add(sums[1]);
+    return sums[0];
+  };
+  R products[Stage::most_columns] = {};
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { products[l] = combine_by(l, rows); });
   stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { products[l] = rows[l]; });
   // Of the products, columns are needed.
   constexpr bool is_one_register = Stage::state_registers == 1 && lane_count == 8;
@@ -597,9 +614,7 @@ inline void carry_stage(const RiccatiView& view, int i, double* covariance) {
     for (int j = 0; j < stage.states; ++j) columns[j] = R::from(transposed[j]);
   }
   R next[Stage::most_states] = {};
-  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
-    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { next[l].add(columns[j], closed[l].splat(j)); });
-  });
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l] = combine_by(l, columns); });
   stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { next[l] = columns[l]; });
   R effects[Stage::most_columns];  // columns of B
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
@@ -628,16 +643,22 @@ inline void carry_stage(const RiccatiView& view, int i, double* covariance) {
     const double variance = 2.0 * at.inverse[k - stage.offset];
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l].add(noise, noise.splat(l) * variance); });
   });
-  stage.each_next_state([&](auto l)
-                            RHEC_ALWAYS_INLINE { next[l].first(stage.next_states).to(covariance + l * at.stride); });
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { rows[l] = next[l].first(stage.next_states); });
 }
 
 int carry_covariance(const RiccatiView& view, int first, double* covariance, double* all) {
-  for (int i = first; i < view.intervals; ++i) {
+  for (int i = first; i < view.intervals;) {
     if (view.special[i]) return i;
-    with_shape<matrices_fit>(view, i, [&]<class Stage>() { carry_stage<Stage>(view, i, covariance); });
+    with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+      const int alike = i, states = view.state_counts[i], next_states = view.state_counts[i + 1];
+      StateRow<Stage> rows[Stage::most_states];
+      for (int j = 0; j < states; ++j) rows[j] = StateRow<Stage>::from(covariance + j * view.stride);
+      do carry_stage<Stage>(view, i, rows);
+      while (++i < view.intervals && !all && next_states == states && is_alike(view, alike, i));
+      for (int l = 0; l < next_states; ++l) rows[l].to(covariance + l * view.stride);
+    });
     if (!all) continue;
-    double* block = all + static_cast<long>(i + 1) * view.states * view.states;
+    double* block = all + static_cast<long>(i) * view.states * view.states;
     for (int c = 0; c < view.states; ++c)
       for (int r = 0; r < view.states; ++r) block[c * view.states + r] = covariance[c * view.stride + r];
   }
