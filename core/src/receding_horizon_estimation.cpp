@@ -362,7 +362,7 @@ void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noe
   double* of_node = covariances_.data() + (is_last ? 0 : static_cast<std::ptrdiff_t>(node) * ns * ns);
   if (!is_last || !solver_->covariances(problem_, point_, {node, node}, covariances_)) {
     problem_.prepare(point_, Hessian::gauss_newton, covariance_qp_, scratch_);
-    covariance_riccati_.factor(covariance_qp_, no_active_bounds_);
+    covariance_riccati_.factor_for_covariances(covariance_qp_, no_active_bounds_);
     covariance_riccati_.covariances(covariance_qp_, is_last ? nullptr : covariances_.data(),
                                     is_last ? of_node : nullptr);
   }

@@ -92,6 +92,7 @@ RiccatiView Riccati::view_of(const StageQp& qp, const std::int8_t* sides) noexce
           .upper = qp.upper(0),
           .sides = sides,
           .special = is_special_.data(),
+          .for_steps = for_steps_,
           .P = P_.data(),
           .U = U_.data(),
           .V = V_.data(),
@@ -105,6 +106,16 @@ RiccatiView Riccati::view_of(const StageQp& qp, const std::int8_t* sides) noexce
 }
 
 void Riccati::factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept {
+  for_steps_ = true;
+  factor_stages(qp, active, diagonal);
+}
+
+void Riccati::factor_for_covariances(const StageQp& qp, const ActiveSet& active) noexcept {
+  for_steps_ = false;
+  factor_stages(qp, active, nullptr);
+}
+
+void Riccati::factor_stages(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept {
   const int N = qp.intervals(), n = qp.states(N);
   convexified_ = false;
   std::copy_n(qp.state_counts(), N + 1, state_counts_.data());
@@ -142,6 +153,7 @@ void Riccati::factor(const StageQp& qp, const ActiveSet& active, const double* d
 Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* h) noexcept {
   const int N = qp.intervals();
   if (!h) h = qp.h(0);
+  if (!for_steps_) factor(qp, active);
   RiccatiView view = view_of(qp, active.row(0));
   view.h = h;
   view.values = step.row(0);

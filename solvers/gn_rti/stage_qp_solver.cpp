@@ -224,7 +224,7 @@ void StageQpSolver::convexify(StageQp& qp) noexcept {
 }
 
 bool StageQpSolver::covariances(const StageQp& qp, double* all, double* last) noexcept {
-  riccati_.factor(qp, no_bounds_);
+  riccati_.factor_for_covariances(qp, no_bounds_);
   factored_ = prepared_ = is_dual_ = false;
   if (riccati_.was_convexified()) return false;
   riccati_.covariances(qp, all, last);

@@ -1,6 +1,7 @@
 #include "rhec/core/riccati.hpp"
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -233,7 +234,7 @@ TEST(Riccati, TheCovarianceIsThatOfTheDenseInverse) {
   for (int trial = 0; trial < 60; ++trial) {
     // Six states have kernels of their own, with two to four controls.
     const bool is_usual = trial % 2 == 0;
-    StageQp qp = random.make(random.integer(1, 6), is_usual ? 6 : random.integer(1, 4),
+    StageQp qp = random.make(random.integer(1, 9), is_usual ? 6 : random.integer(1, 4),
                              is_usual ? random.integer(2, 4) : random.integer(1, 3), false);
     if (trial % 3 != 0) random.carry(qp);
     const int ns = qp.capacity().states;
@@ -251,6 +252,16 @@ TEST(Riccati, TheCovarianceIsThatOfTheDenseInverse) {
         for (int r = 0; r < ns; ++r)
           ASSERT_NEAR(blocks[(i * ns + c) * ns + r], covariance(dense.state_at[i] + r, dense.state_at[i] + c), 1e-8);
     EXPECT_EQ(last[0], blocks[static_cast<std::size_t>(qp.intervals()) * ns * ns]);
+    // The last one alone, from as much of the factorisation as it takes; a step is found all the same.
+    Iterate step(qp.capacity()), after(qp.capacity());
+    ASSERT_EQ(riccati.solve(qp, none, step), Riccati::Outcome::done);
+    std::vector<double> alone(ns * ns);
+    riccati.factor_for_covariances(qp, none);
+    riccati.covariances(qp, nullptr, alone.data());
+    for (int k = 0; k < ns * ns; ++k) ASSERT_NEAR(alone[k], last[k], 1e-12 * (1.0 + std::abs(last[k])));
+    ASSERT_EQ(riccati.solve(qp, none, after), Riccati::Outcome::done);
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int k = 0; k < qp.stride(); ++k) ASSERT_EQ(after.row(i)[k], step.row(i)[k]);
   }
 }
 

@@ -157,14 +157,15 @@ RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const S
 /// loop for gradients, columns of the dynamics and of the policy for steps. (Steps by the closed loop would be faster
 /// still, but where a policy is strong, next states would differ from what the dynamics make of state and control.)
 template <class Stage>
-RHEC_ALWAYS_INLINE inline void close_loop(const Stage& stage, const Memory<Stage>& at,
-                                          const typename Stage::R* policy) {
+RHEC_ALWAYS_INLINE inline void close_loop(const Stage& stage, const Memory<Stage>& at, const typename Stage::R* policy,
+                                          bool for_steps) {
   stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
     const double* F = at.F + l * at.stride;
     Lanes row = load(F);
     stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { row -= policy[k].part[0] * F[k]; });
     store(row, at.closed + l * 8);
   });
+  if (!for_steps) return;
   Lanes columns[8] = {};
   stage.each_state([&](auto l) RHEC_ALWAYS_INLINE { columns[l] = at.row(at.F, l).part[0]; });
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { columns[k] = -policy[k].part[0]; });
@@ -230,10 +231,12 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
     X[k] = policy;
   });
   stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
-  R drift{};
-  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
-  drift.to(at.drift);
-  if constexpr (Stage::is_compact) close_loop(stage, at, X);
+  if (view.for_steps) {
+    R drift{};
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
+    drift.to(at.drift);
+  }
+  if constexpr (Stage::is_compact) close_loop(stage, at, X, view.for_steps);
   return true;
 }
 
@@ -618,9 +621,7 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
   stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { next[l] = columns[l]; });
   R effects[Stage::most_columns];  // columns of B
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
-    if constexpr (Stage::is_compact && is_one_register) {
-      effects[k] = R::from(at.T + k * 8);
-    } else if constexpr (Stage::is_known) {
+    if constexpr (Stage::is_known) {
       effects[k] = R{};
       stage.each_next_state([&](auto l)
                                 RHEC_ALWAYS_INLINE { effects[k] = effects[k].with(l, at.F[l * at.stride + k]); });

@@ -22,6 +22,7 @@ struct RiccatiView {
   const double* diagonal = nullptr;       ///< a row a stage, added to the diagonal of H; or null
   const std::int8_t* sides = nullptr;     ///< a row a stage: which bounds hold
   const std::uint8_t* special = nullptr;  ///< stages that are not for the kernels
+  bool for_steps = true;  ///< whether a step will be asked for: otherwise `drift` and `T` are neither written nor read
 
   double* P = nullptr;  ///< n_s rows a node
   double* U = nullptr;  ///< n_w rows a stage: columns of the reduced Hessian, each as it is eliminated

@@ -71,6 +71,8 @@ class RHEC_EXPORT Riccati {
   /// `diagonal`, if not null, is added to the diagonals of H (barrier terms): a row of the program's stride a stage.
   void factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
   void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, nullptr); }
+  /// As much of it as `covariances` needs; a `solve` that follows factorises again.
+  void factor_for_covariances(const StageQp& qp, const ActiveSet& active) noexcept;
   bool was_convexified() const noexcept { return convexified_; }
   /// After a `factor` without active bounds: puts what convexification changed into the program's R, whose reduced
   /// Hessian is positive definite from then on, whichever bounds become active.
@@ -142,6 +144,7 @@ class RHEC_EXPORT Riccati {
   double* P(int node) noexcept { return P_.data() + static_cast<std::ptrdiff_t>(node) * ns_ * stride_; }
   double* p(int node) noexcept { return p_.data() + static_cast<std::ptrdiff_t>(node) * stride_; }
 
+  void factor_stages(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
   void factor_special(const StageQp& qp, const ActiveSet& active, const RiccatiView& view, int i) noexcept;
   void factor_initial(const StageQp& qp, const ActiveSet& active) noexcept;
   int count_active(const StageQp& qp, const ActiveSet& active, int node) const noexcept;
@@ -162,7 +165,7 @@ class RHEC_EXPORT Riccati {
 
   Capacity capacity_;
   int ns_ = 0, nw_ = 0, stride_ = 0, width_ = 0, max_rows_ = 0;
-  bool convexified_ = false;
+  bool convexified_ = false, for_steps_ = true;
   bool has_initial_inverse_ = false;  ///< of P at node 0; otherwise it was factorised as a special stage
   const RiccatiKernels* kernels_ = nullptr;
   AlignedDoubles P_, U_, V_, closed_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
