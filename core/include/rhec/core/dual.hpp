@@ -98,7 +98,7 @@ struct SecondOrder {
   SecondOrder() = default;
   /// Entry by entry, of which the compiler leaves out those that nobody asks for; a copy of the whole it would make.
   SecondOrder(const SecondOrder& other) { assign_linear(*this, same, other); }
-  SecondOrder& operator=(const SecondOrder& other) {
+  SecondOrder& operator=(const SecondOrder& other) {  // NOLINT(bugprone-unhandled-self-assignment)
     assign_linear(*this, same, other);
     return *this;
   }
