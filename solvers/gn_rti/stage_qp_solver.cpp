@@ -88,49 +88,34 @@ void StageQpSolver::prepare_changes(const StageQp& qp) noexcept {
   prepared_ = true;
 }
 
-/// Where no bound is violated, only multipliers of held ones can be wrong.
-void StageQpSolver::release_wrong(const StageQp& qp, const Iterate& step, double pull_tolerance,
-                                  Violations& found) noexcept {
-  active_.for_each([&](int stage, int j, std::int8_t side) {
-    const double lower = qp.lower(stage)[j], upper = qp.upper(stage)[j];
-    if (!(side * step.bound_row(stage)[j] < -pull_tolerance) || is_equality(lower, upper)) return;
-    active_.row(stage)[j] = 0;
-    ++found.count;
-  });
-}
-
 StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, const Iterate& step) noexcept {
   Violations found;
   const StepCheck check = check_step(qp, step, bound_tolerance);
   found.finite = check.is_finite;
   if (!found.finite || (!check.violates && !any_active_)) return found;
   any_active_ = true;
-  const double pull_tolerance = multiplier_tolerance * (1.0 + check.largest_costate);
-  if (!check.violates) {
-    release_wrong(qp, step, pull_tolerance, found);
-    return found;
-  }
-  const auto correct = [&](std::int8_t& side, double value, double multiplier, double lower, double upper) {
-    const std::int8_t before = side;
-    if (side == 0) {
-      if (value < lower - bound_tolerance * (1.0 + std::abs(lower))) side = -1;
-      if (value > upper + bound_tolerance * (1.0 + std::abs(upper))) side = 1;
-    } else {
-      // The value is at one side, so the other one is violated, if they cross.
-      found.cross |= !(lower - upper <= bound_tolerance * (1.0 + std::abs(lower)));
-      if (side * multiplier < -pull_tolerance && !is_equality(lower, upper)) side = 0;
-    }
-    found.count += side != before;
+  const auto hold_violated = [&](int stage, int j) {
+    const double value = step.row(stage)[j], lower = qp.lower(stage)[j], upper = qp.upper(stage)[j];
+    std::int8_t& side = active_.row(stage)[j];
+    if (side != 0) return;
+    if (value < lower - bound_tolerance * (1.0 + std::abs(lower))) side = -1;
+    if (value > upper + bound_tolerance * (1.0 + std::abs(upper))) side = 1;
+    found.count += side != 0;
   };
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    if (i > 0 || !qp.initial_state_is_given)
-      for (int j = 0; j < qp.states(i); ++j)
-        correct(active_.state(i)[j], step.state(i)[j], step.state_bound(i)[j], qp.state_lower(i)[j],
-                qp.state_upper(i)[j]);
-    for (int j = 0; j < qp.controls(i); ++j)
-      correct(active_.control(i)[j], step.control(i)[j], step.control_bound(i)[j], qp.control_lower(i)[j],
-              qp.control_upper(i)[j]);
+  for (int i = 0; check.violates && i <= qp.intervals(); ++i) {
+    for (int j = 0; (i > 0 || !qp.initial_state_is_given) && j < qp.states(i); ++j) hold_violated(i, j);
+    for (int j = 0; j < qp.controls(i); ++j) hold_violated(i, capacity_.states + j);
   }
+  // Of those that are held by now, multipliers may be wrong; new ones have none yet.
+  const double pull_tolerance = multiplier_tolerance * (1.0 + check.largest_costate);
+  active_.for_each([&](int stage, int j, std::int8_t side) {
+    const double lower = qp.lower(stage)[j], upper = qp.upper(stage)[j];
+    // The value is at one side, whatever the other is.
+    found.cross |= !(lower - upper <= bound_tolerance * (1.0 + std::abs(lower)));
+    if (!(side * step.bound_row(stage)[j] < -pull_tolerance) || is_equality(lower, upper)) return;
+    active_.row(stage)[j] = 0;
+    ++found.count;
+  });
   return found;
 }
 

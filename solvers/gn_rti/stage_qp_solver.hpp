@@ -70,7 +70,6 @@ class StageQpSolver {
   bool claim_is_likely(const StageQp& qp) const noexcept;
   void prepare_changes(const StageQp& qp) noexcept;
   DualActiveSet::Outcome solve_from_guess(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
-  void release_wrong(const StageQp& qp, const Iterate& step, double pull_tolerance, Violations& found) noexcept;
   Violations correct_active_set(const StageQp& qp, const Iterate& step) noexcept;
   bool try_active_sets(const StageQp& qp, Iterate& step, int rounds, Clock::time_point deadline) noexcept;
   bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted, Clock::time_point deadline) noexcept;
