@@ -300,8 +300,8 @@ double RecedingHorizonEstimation::objective_from_start(const Iterate& point) noe
 void RecedingHorizonEstimation::reconsider(Report& report, Clock::time_point deadline) noexcept {
   const double found = objective_from_start(point_);
   best_ = point_;
-  start_cold();
-  const double prior = objective_from_start(point_);
+  start_cold();  // simulated already
+  const double prior = problem_.evaluate(point_, nullptr, scratch_);
   if (!(prior < found)) {
     point_ = best_;
     return;
