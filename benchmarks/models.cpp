@@ -1,6 +1,6 @@
-// A step of gn_rti with every vehicle that ships, and with one from outside: the articulated loader of
-// plugins/template, built as its author would. Horizons are of 15 intervals; each drives its own scenario, with one
-// value of every parameter.
+// A step of gn_rti with every vehicle that ships, and with two from outside: the articulated loader of
+// plugins/template, built as its author would, and a vehicle of sizes that the core has no kernels for. Horizons are of
+// 15 intervals; each drives its own scenario, with one value of every parameter.
 #include <benchmark/benchmark.h>
 
 #include <memory>
@@ -28,6 +28,12 @@ const Vehicle vehicles[] = {
     {"articulated (outside)",
      RHEC_SOURCE_DIRECTORY "/plugins/template/field.yaml",
      {"estimator.solver=gn_rti", "controller.solver=gn_rti", "controller.blocking={}"}},
+    {"two_axle_steering (any size)",
+     RHEC_SOURCE_DIRECTORY "/plugins/template/field.yaml",
+     {"model=two_axle_steering",
+      "noise={outputs: {x_gps: 0.03, y_gps: 0.03, front: 0.01, rear: 0.01}, inputs: {v: 0.1, front_rate: 0.02, "
+      "rear_rate: 0.02}}",
+      "estimator.solver=gn_rti", "controller.solver=gn_rti", "controller.blocking={}"}},
 };
 
 void add(const Host& host, const Vehicle& vehicle) {

@@ -96,6 +96,11 @@ class ChosenOutputs final : public Model {
                           .output_step = request.output_step,
                           .jacobians = request.jacobians,
                           .jacobian_row = request.jacobian_row,
+                          .multipliers = request.multipliers,
+                          .multiplier_step = request.multiplier_step,
+                          .hessians = request.hessians,
+                          .hessian_step = request.hessian_step,
+                          .hessian_row = request.hessian_row,
                           .scratch = request.scratch});
   }
   /// Columns of all outputs -> columns of the chosen ones.

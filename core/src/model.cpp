@@ -44,7 +44,7 @@ std::size_t Model::rows_scratch(int count) const noexcept {
   const auto nx = static_cast<std::size_t>(state_count()), nu = static_cast<std::size_t>(input_count()),
              np = static_cast<std::size_t>(parameter_count()), ny = static_cast<std::size_t>(output_count());
   const std::size_t nz = nx + nu + 2 * np;
-  const std::size_t interval = 2 * nx + nu + 2 * np + nx + nx * nz + nz * nz, node = nx + ny + nx * ny;
+  const std::size_t interval = 2 * nx + nu + 2 * np + nx + nx * nz + nz * nz, node = nx + 2 * ny + nx * ny + nx * nx;
   return static_cast<std::size_t>(count) * std::max(interval, node) + 7;
 }
 
@@ -101,13 +101,22 @@ void Model::observe_rows(const NodeRows& q) const noexcept {
   const int nx = state_count(), all = output_count(), ny = q.chosen ? q.chosen_count : all;
   Scratch scratch(q.scratch);
   double *x = scratch.take(q.count * nx), *outputs = scratch.take(q.count * all),
-         *jacobians = scratch.take(q.count * nx * all);
+         *jacobians = scratch.take(q.count * nx * all), *multipliers = scratch.take(q.count * all),
+         *hessians = scratch.take(q.count * nx * nx);
   for (int i = 0; i < q.count; ++i) std::copy_n(q.states + i * q.state_step, nx, x + i * nx);
+  if (q.hessians) {
+    std::fill_n(multipliers, q.count * all, 0.0);
+    for (int i = 0; i < q.count; ++i)
+      for (int j = 0; j < ny; ++j)
+        multipliers[i * all + (q.chosen ? q.chosen[j] : j)] = q.multipliers[i * q.multiplier_step + j];
+  }
   Nodes request;
   request.count = q.count;
   request.states = x;
   request.outputs = q.outputs ? outputs : nullptr;
   request.jacobians = q.jacobians ? jacobians : nullptr;
+  request.multipliers = q.hessians ? multipliers : nullptr;
+  request.hessians = q.hessians ? hessians : nullptr;
   observe(request);
   for (int i = 0; i < q.count; ++i) {
     if (q.outputs) std::fill_n(q.outputs + i * q.output_step, padded(ny), 0.0);
@@ -118,6 +127,10 @@ void Model::observe_rows(const NodeRows& q) const noexcept {
       double* row = q.jacobians + (i * ny + j) * q.jacobian_row;
       std::fill_n(row, padded(nx), 0.0);
       for (int c = 0; c < nx; ++c) row[c] = jacobians[(i * nx + c) * all + from];
+    }
+    for (int r = 0; q.hessians && r < nx; ++r) {
+      double* row = q.hessians + i * q.hessian_step + r * q.hessian_row;
+      for (int c = 0; c < nx; ++c) row[c] += hessians[(i * nx + c) * nx + r];
     }
   }
 }

@@ -22,30 +22,17 @@ namespace {
 
 /// Of the outputs at the nodes of a range, each weighted by its multiplier.
 void add_curvature_of_outputs(const Model& model, StageRange range, const Iterate& point, const double* multipliers,
-                              const CostView& view, double* rest) noexcept {
-  const std::ptrdiff_t count = range.last - range.first + 1, n = model.state_count(), stride = view.stride,
-                       wide = view.states + view.controls;
-  Scratch memory(rest);
-  double *states = memory.take(count * n), *hessians = memory.take(count * n * n);
-  with_size(static_cast<int>(n), [&](auto size) {
-    const double* state = point.state(range.first);
-    double* packed = states;
-    for (std::ptrdiff_t i = 0; i < count; ++i, state += stride, packed += size)
-      for (int j = 0; j < size; ++j) packed[j] = state[j];
-  });
-  Model::Nodes request;
-  request.count = static_cast<int>(count);
-  request.states = states;
-  request.multipliers = multipliers;
-  request.hessians = hessians;
-  model.observe(request);
-  with_size(static_cast<int>(n), [&](auto size) {
-    double* H = view.H + range.first * wide * stride;
-    const double* of_node = hessians;
-    for (std::ptrdiff_t i = 0; i < count; ++i, H += wide * stride)
-      for (int c = 0; c < size; ++c, of_node += size)
-        for (int r = 0; r < size; ++r) H[c * stride + r] += of_node[r];
-  });
+                              std::ptrdiff_t step, const CostView& view, double* rest) noexcept {
+  const std::ptrdiff_t of_node = static_cast<std::ptrdiff_t>(view.states + view.controls) * view.stride;
+  model.observe_rows({.count = range.last - range.first + 1,
+                      .states = point.state(range.first),
+                      .state_step = view.stride,
+                      .multipliers = multipliers,
+                      .multiplier_step = step,
+                      .hessians = view.H + range.first * of_node,
+                      .hessian_step = of_node,
+                      .hessian_row = view.stride,
+                      .scratch = rest});
 }
 
 }  // namespace
@@ -170,10 +157,9 @@ void RheProblem::drop_first_interval() noexcept {
 std::size_t RheProblem::cost_scratch_size() const noexcept {
   const std::size_t nodes = static_cast<std::size_t>(capacity().intervals) + 1, outputs = output_row_, ny = ny_,
                     width = padded(nx());
-  // Of all nodes Jacobians, outputs and their pulls, multipliers, states and Hessians, and what the model needs; of
-  // one, the kernels' room and three rows of outputs.
-  return nodes * (ny * width + 2 * outputs + ny + nx() + static_cast<std::size_t>(nx()) * nx()) +
-         model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 16;
+  // Of all nodes Jacobians, outputs and their pulls, and what the model needs; of one, the kernels' room and three
+  // rows of outputs.
+  return nodes * (ny * width + 2 * outputs) + model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 16;
 }
 
 void RheProblem::residual(int node, const double* predicted, double* difference) const noexcept {
@@ -250,9 +236,14 @@ double RheProblem::add_cost(StageRange range, const Iterate& point, Hessian hess
   if (range.first == 0) {
     if (known && matrices) known->is_clean[0] = 0;
     if (vectors) total += arrival_term(point, qp.h(0));
-    const int n = nx() + np();
-    for (int c = 0; matrices && c < n; ++c)
-      for (int r = 0; r < n; ++r) qp.H(0)[c * stride() + r] += 2.0 * arrival_information(r, c);
+    if (matrices) {
+      with_size(nx() + np(), [&](auto n) {
+        double* H = qp.H(0);
+        const double* information = arrival_information.data();
+        for (int c = 0; c < n; ++c, H += stride(), information += n)
+          for (int r = 0; r < n; ++r) H[r] += 2.0 * information[r];
+      });
+    }
   }
   if (any_start())
     for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i) {
@@ -345,12 +336,7 @@ double RheProblem::write_measurements(StageRange range, const Iterate& point, He
                                  .is_clean = known ? known->is_clean.data() : nullptr};
   const double total = program_kernels().write_measurements(view, measured, range.first, range.last);
   if (is_exact) {
-    double* const multipliers = memory.take(count * ny_);
-    with_size(ny_, [&](auto outputs) {
-      for (std::ptrdiff_t i = 0; i < count; ++i)
-        for (int j = 0; j < outputs; ++j) multipliers[i * outputs + j] = measured.pulls[i * output_row_ + j];
-    });
-    add_curvature_of_outputs(model(), range, point, multipliers, view, memory.rest());
+    add_curvature_of_outputs(model(), range, point, measured.pulls, output_row_, view, memory.rest());
   } else if (known && view.H) {
     std::fill_n(known->is_clean.begin() + range.first, count, std::uint8_t{1});
     // Of the last node, only the rows of states were cleared.
@@ -373,7 +359,7 @@ double RheProblem::write_bent_measurements(StageRange range, const Iterate& poin
   Scratch memory(rest);
   double *difference = memory.take(output_row_), *weight = memory.take(output_row_),
          *curvature = memory.take(output_row_), *w = memory.take(output_row_),
-         *multipliers = memory.take(static_cast<std::ptrdiff_t>(count) * ny_);
+         *multipliers = memory.take(static_cast<std::ptrdiff_t>(count) * output_row_);
   const auto H_of = [&](int i) {
     return view.H ? view.H + static_cast<std::ptrdiff_t>(i) * (ns + capacity().controls) * stride() : nullptr;
   };
@@ -390,9 +376,9 @@ double RheProblem::write_bent_measurements(StageRange range, const Iterate& poin
     double* H = H_of(node);
     for (int j = 0; j < ny_; ++j) {
       w[j] = std::isnan(y[j]) ? 0.0 : 2.0 * weight[j] * setup_.output_weights[j];
-      multipliers[i * ny_ + j] = w[j] * difference[j];
+      multipliers[i * output_row_ + j] = w[j] * difference[j];
     }
-    program_kernels().add_products(J, w, multipliers + i * ny_, ny_, n, stride(), H, h_of(node));
+    program_kernels().add_products(J, w, multipliers + i * output_row_, ny_, n, stride(), H, h_of(node));
     if (!exact) continue;
     // The loss itself bends: 4 rho'' (J' W r)(J' W r)'.
     for (const RobustLoss& loss : setup_.robust) {
@@ -408,7 +394,7 @@ double RheProblem::write_bent_measurements(StageRange range, const Iterate& poin
       }
     }
   }
-  if (exact) add_curvature_of_outputs(model(), range, point, multipliers, view, memory.rest());
+  if (exact) add_curvature_of_outputs(model(), range, point, multipliers, output_row_, view, memory.rest());
   return total;
 }
 
@@ -434,8 +420,9 @@ double RheProblem::links(int i, const Iterate& point, double* H, double* h) cons
   double total = 0.0;
   for (int j = 0; j < np(); ++j) {
     const int control = control_of_channel(i, j), state = nx() + j;
-    if (control < 0) continue;
-    const double information = link_information_[i * np() + j], jump = u[control] - point.state(i)[state];
+    const double information = link_information_[i * np() + j];
+    if (control < 0 || information == 0.0) continue;
+    const double jump = u[control] - point.state(i)[state];
     total += information * jump * jump;
     const double pull = 2.0 * information * jump;
     if (h) {

@@ -10,6 +10,7 @@
 #include "kernels/riccati_kernels.hpp"
 #include "rhec/core/error.hpp"
 #include "small_matrix.hpp"
+#include "with_size.hpp"
 
 namespace rhec {
 
@@ -294,20 +295,22 @@ void Riccati::covariances(const StageQp& qp, double* covariance, double* last) n
   double* now = work_.data();
   double* half = now + static_cast<std::ptrdiff_t>(width) * stride_;
   const Special initial = special(N);
-  for (int c = 0; c < n0; ++c) {
-    std::fill_n(now + c * stride_, stride_, 0.0);
-    if (has_initial_inverse_) {
-      for (int r = 0; r < n0; ++r) now[c * stride_ + r] = 2.0 * initial_inverse_[c * stride_ + r];
-    } else {
+  if (has_initial_inverse_) {
+    // Whole rows: beyond the states they are zero.
+    for (int k = 0; k < n0 * stride_; ++k) now[k] = 2.0 * initial_inverse_[k];
+  } else {
+    std::fill_n(now, n0 * stride_, 0.0);
+    for (int c = 0; c < n0; ++c) {
       now[c * stride_ + c] = 2.0;
       small::solve(initial.factor, width_, n0, now + c * stride_);
     }
   }
   const auto store = [&](int node, double* target) {
     if (!target) return;
-    const int n = qp.states(node);
-    for (int c = 0; c < n; ++c)
-      for (int r = 0; r < n; ++r) target[c * ns_ + r] = 0.5 * (now[c * stride_ + r] + now[r * stride_ + c]);
+    with_size(qp.states(node), [&](auto n) {
+      for (int c = 0; c < n; ++c)
+        for (int r = 0; r < n; ++r) target[c * ns_ + r] = 0.5 * (now[c * stride_ + r] + now[r * stride_ + c]);
+    });
   };
   store(0, covariance);
   const RiccatiView view = view_of(qp, nullptr);  // no bound is looked at

@@ -104,9 +104,9 @@ ActiveSet some_active_controls(RandomQp& random, StageQp& qp) {
 
 TEST(Kernels, OfTheRecursionAgreeWithTheDenseSystem) {
   RandomQp random(7);
-  for (int trial = 0; trial < 120; ++trial) {
-    // Six states have kernels of their own, with two to four controls; long rows take several registers.
-    const int states = trial % 3 == 0 ? random.integer(1, 14) : 6;
+  for (int trial = 0; trial < 300; ++trial) {
+    // Five to eight states have kernels of their own, with two to four controls; long rows take several registers.
+    const int states = trial % 3 == 0 ? random.integer(1, 14) : random.integer(5, 8);
     const int controls = trial % 3 == 0 ? random.integer(1, 12) : random.integer(2, 4);
     StageQp qp = random.make(random.integer(1, 7), states, controls, true);
     if (trial % 2 == 0) random.carry(qp);
@@ -136,8 +136,8 @@ TEST(Kernels, OfTheRecursionAgreeWithTheDenseSystem) {
 
 TEST(Kernels, OfResponsesAreWhatAStepDiffersBy) {
   RandomQp random(13);
-  for (int trial = 0; trial < 40; ++trial) {
-    const int states = trial % 2 == 0 ? 6 : random.integer(1, 12);
+  for (int trial = 0; trial < 100; ++trial) {
+    const int states = trial % 2 == 0 ? random.integer(5, 8) : random.integer(1, 12);
     StageQp qp = random.make(random.integer(1, 6), states, random.integer(2, 4), true);
     if (trial % 4 < 2) random.carry(qp);
     const ActiveSet active = some_active_controls(random, qp);
@@ -205,9 +205,10 @@ struct RandomProgram {
 
   /// Of sizes that kernels are compiled for, or of any.
   explicit RandomProgram(RandomQp& random, bool is_usual = false)
-      : qp(random.make(random.integer(1, 9), is_usual ? 6 : random.integer(1, 11), is_usual ? 2 : random.integer(1, 9),
-                       random.integer(0, 1) == 0)),
+      : qp(random.make(random.integer(1, 9), is_usual ? random.integer(5, 8) : random.integer(1, 11),
+                       is_usual ? 2 : random.integer(1, 9), random.integer(0, 1) == 0)),
         point(qp.capacity()) {
+    if (is_usual) random.carry(qp);
     for (int i = 0; i <= qp.intervals(); ++i) {
       for (int j = 0; j < qp.states(i); ++j) {
         point.state(i)[j] = random.uniform(-1.0, 1.0);

@@ -59,7 +59,7 @@ class RandomQp {
   /// Lets most intervals hand on some of their last states as they are, and says so or not.
   void carry(StageQp& qp, bool says_so = true) {
     for (int i = 0; i < qp.intervals(); ++i) {
-      const int states = qp.states(i), carried = integer(0, 3) == 0 ? 0 : integer(1, std::min(2, states));
+      const int states = qp.states(i), carried = integer(0, 3) == 0 ? 0 : integer(1, std::min(3, states));
       for (int r = states - carried; r < states; ++r) {
         double* F = qp.F(i) + r * qp.stride();
         std::fill_n(F, qp.stride(), 0.0);

@@ -73,6 +73,16 @@ TEST_P(EveryModel, AllInstructionSetsAgreeAndWriteWhatIsAskedFor) {
   for_each_instruction_set([&] { checks::same_as_generic(*model_, *generic); });
 }
 
+TEST_P(EveryModel, ObservesByRowsWhatItObserves) {
+  for_each_instruction_set([&] {
+    for (int count = 0; count <= 17; ++count) {
+      checks::same_by_rows(*model_, count, [&](const NodeRows& request) { model_->observe_rows(request); });
+      // As a model does that leaves it to the base class.
+      checks::same_by_rows(*model_, count, [&](const NodeRows& request) { model_->Model::observe_rows(request); });
+    }
+  });
+}
+
 TEST_P(EveryModel, RefusesAnUnknownInstructionSetAndKeepsItsOwn) {
   EXPECT_FALSE(model_->use_instruction_set("mmx"));
   checks::expect_runge_kutta(*model_, false, 1);

@@ -124,6 +124,8 @@ TEST(EveryFunction, IsTheSameOnEveryInstructionSet) {
     SCOPED_TRACE(set);
     ASSERT_TRUE(model.use_instruction_set(set));
     checks::same_as_generic(model, generic);
+    for (const int count : {1, 8, 13})
+      checks::same_by_rows(model, count, [&](const NodeRows& request) { model.observe_rows(request); });
   }
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rhec/core/model.hpp"
+#include "rhec/core/padded.hpp"
 #include "rhec/sim/derivative_check.hpp"
 #include "rhec/sim/random.hpp"
 
@@ -154,6 +155,59 @@ inline void same_as_generic(const Model& model, const Model& generic) {
         if (hessians) expect_same(s.output_hessians, expected.output_hessians, count, "Hessians of outputs");
       }
     }
+  }
+}
+
+/// Rows as they lie in an Iterate and a StageQp hold what `observe` gives of the same nodes: some of the outputs in
+/// another order, zeros up to the next multiple of eight, Hessians added to what was there. `by_rows` answers.
+template <class Observe>
+void same_by_rows(const Model& model, int count, const Observe& by_rows) {
+  const bool second = model.has_second_derivatives();
+  Stages s = random_stages(model, count, false, 200 + count);
+  std::vector<int> chosen;
+  for (int j = s.ny - 1; j >= 0; j -= 2) chosen.push_back(j);
+  const int some = static_cast<int>(chosen.size()), row = padded(s.nx + 5), output_row = padded(s.ny),
+            jacobian_row = padded(s.nx);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> states(static_cast<std::size_t>(count) * row, nan),
+      weights(static_cast<std::size_t>(count) * output_row, nan), outputs(weights.size(), nan),
+      jacobians(static_cast<std::size_t>(count) * some * jacobian_row, nan),
+      hessians(static_cast<std::size_t>(count) * (s.nx + 2) * row, 3.0), scratch(model.rows_scratch(count));
+  std::fill(s.output_weights.begin(), s.output_weights.end(), 0.0);
+  for (int i = 0; i < count; ++i) {
+    std::copy_n(&s.x[i * s.nx], s.nx, &states[i * row]);
+    for (int j = 0; j < some; ++j) weights[i * output_row + j] = s.output_weights[i * s.ny + chosen[j]] = 0.3 * i - j;
+  }
+  model.observe(s.nodes(true, true, second));
+  by_rows({.count = count,
+           .states = states.data(),
+           .state_step = row,
+           .chosen = chosen.data(),
+           .chosen_count = some,
+           .outputs = outputs.data(),
+           .output_step = output_row,
+           .jacobians = jacobians.data(),
+           .jacobian_row = jacobian_row,
+           .multipliers = second ? weights.data() : nullptr,
+           .multiplier_step = output_row,
+           .hessians = second ? hessians.data() : nullptr,
+           .hessian_step = (s.nx + 2) * row,
+           .hessian_row = row,
+           .scratch = scratch.data()});
+  for (int i = 0; i < count; ++i) {
+    SCOPED_TRACE("node " + std::to_string(i) + " of " + std::to_string(count));
+    for (int j = 0; j < padded(some); ++j)
+      EXPECT_NEAR(outputs[i * output_row + j], j < some ? s.outputs[i * s.ny + chosen[j]] : 0.0, 1e-12) << j;
+    for (int j = 0; j < some; ++j)
+      for (int c = 0; c < jacobian_row; ++c)
+        EXPECT_NEAR(jacobians[(i * some + j) * jacobian_row + c],
+                    c < s.nx ? s.output_jacobians[(i * s.nx + c) * s.ny + chosen[j]] : 0.0, 1e-12)
+            << j << ", " << c;
+    for (int r = 0; r < s.nx + 2; ++r)
+      for (int c = 0; c < row; ++c)
+        EXPECT_NEAR(hessians[(i * (s.nx + 2) + r) * row + c],
+                    3.0 + (second && r < s.nx && c < s.nx ? s.output_hessians[(i * s.nx + c) * s.nx + r] : 0.0), 1e-12)
+            << r << ", " << c;
   }
 }
 

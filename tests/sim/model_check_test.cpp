@@ -23,7 +23,7 @@ using testing::HasSubstr;
 struct Unicycle {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 2;
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::sin, std::cos;
     dxdt[0] = p[0] * u[0] * cos(x[2]);
     dxdt[1] = p[0] * u[0] * sin(x[2]);
@@ -31,7 +31,7 @@ struct Unicycle {
     dxdt[3] = 5.0 * (u[1] - x[3]);  // the yaw rate follows its command
   }
   template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
     y[1] = x[1];
   }
@@ -39,7 +39,7 @@ struct Unicycle {
 
 struct RootOfAState : Unicycle {
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::sqrt;
     Unicycle::dynamics(x, u, p, dxdt);
     dxdt[3] = 0.1 * (u[1] - x[3]) - 0.01 * sqrt(x[3] + 0.5);  // not a number below -0.5
@@ -48,7 +48,7 @@ struct RootOfAState : Unicycle {
 
 struct PoleOfAState : Unicycle {
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::tan;
     Unicycle::dynamics(x, u, p, dxdt);
     dxdt[2] = p[1] * tan(x[3]);
@@ -57,7 +57,7 @@ struct PoleOfAState : Unicycle {
 
 struct LogOfAnOutput : Unicycle {
   template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
     using std::log;
     y[0] = x[0];
     y[1] = x[1] + 0.01 * log(0.9 - x[3]);
@@ -66,7 +66,7 @@ struct LogOfAnOutput : Unicycle {
 
 struct UnseenParameter : Unicycle {
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     Unicycle::dynamics(x, u, p, dxdt);
     dxdt[2] = x[3] + 0.0 * p[1];
   }
@@ -75,7 +75,7 @@ struct UnseenParameter : Unicycle {
 /// Two parameters of which only the product matters.
 struct ProductOfParameters : Unicycle {
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     Unicycle::dynamics(x, u, p, dxdt);
     const Scalar both[2] = {p[0] * p[1], p[0]};
     Unicycle::dynamics(x, u, both, dxdt);
@@ -85,7 +85,7 @@ struct ProductOfParameters : Unicycle {
 
 struct KnowsItsHeading : Unicycle {
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos;
     Unicycle::dynamics(x, u, p, dxdt);
     dxdt[3] = dxdt[3] + 0.1 * cos(x[2]);  // a slope that pulls to one side of the world
@@ -94,7 +94,7 @@ struct KnowsItsHeading : Unicycle {
 
 struct KnowsItsPlace : Unicycle {
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::tanh;
     Unicycle::dynamics(x, u, p, dxdt);
     dxdt[3] = dxdt[3] + 0.1 * tanh(x[1]);
@@ -103,7 +103,7 @@ struct KnowsItsPlace : Unicycle {
 
 struct PullsAside : Unicycle {
   template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     Unicycle::dynamics(x, u, p, dxdt);
     dxdt[2] = dxdt[2] + 0.1;
   }

@@ -17,18 +17,19 @@ inline int parts_of(const ProgramView& view, int stage) {
 /// least a known number is not carried.
 template <int known_parts, int known_states, int known_moved>
 KktParts kkt_of(const ProgramView& view) {
-  const long stride = view.stride;
-  const int state_parts = ((known_states > 0 ? known_states : view.states) + lane_count - 1) / lane_count;
+  const long stride = known_parts > 0 ? known_parts * lane_count : view.stride;
+  const int states = known_states > 0 ? known_states : view.states,
+            state_parts = (states + lane_count - 1) / lane_count;
   Lanes stationarity{}, defect{}, complementarity{}, highest_lower{}, lowest_upper{};
   Lanes gradients{}, bounds{}, costates{}, rest{};  // rest stays 0 as long as all is finite
   for (int i = view.first; i <= view.last; ++i) {
-    const double* row_F = view.F + i * view.states * stride;
+    const double* row_F = view.F + i * states * stride;
     const double* next_costate = view.costates + (i + 1) * stride;
     const bool is_last = i == view.intervals;
     const int next_states = is_last ? 0 : known_states > 0 ? known_states : view.state_counts[i + 1];
     const int moved = next_states - (is_last ? 0 : view.carried_counts[i]);
     const int parts = known_parts > 0 ? known_parts : parts_of(view, i);
-    const int used = view.states + (is_last ? 0 : view.control_counts[i]);
+    const int used = states + (is_last ? 0 : view.control_counts[i]);
     for (int v = 0; v < parts; ++v) {
       const long at = i * stride + v * lane_count;
       const Lanes gradient = load(view.h + at), bound = first_of(load(view.bounds + at), v, used);
@@ -43,7 +44,7 @@ KktParts kkt_of(const ProgramView& view) {
         sums[0] += between(load(next_costate + v * lane_count), v, moved, next_states);
       Lanes sum = sums[0] + sums[1];
       if (v < state_parts) {
-        const Lanes costate = first_of(load(view.costates + at), v, view.states);
+        const Lanes costate = first_of(load(view.costates + at), v, states);
         sum -= costate;
         costates = larger(costates, absolute(costate));
         if (i == 0 && !view.initial_state_is_given) stationarity = larger(stationarity, absolute(costate));
@@ -70,19 +71,38 @@ KktParts kkt_of(const ProgramView& view) {
           largest_of(complementarity), largest_of(larger(larger(gradients, bounds), costates))};
 }
 
-KktParts kkt(const ProgramView& view) {
-  bool is_full = view.states == 6;
+/// Whether all stages have all states, of which no more than so many are carried.
+inline bool is_full(const ProgramView& view, int most_carried) {
   const int end = view.last < view.intervals ? view.last + 1 : view.last;
-  for (int i = view.first; is_full && i <= end; ++i) is_full = view.state_counts[i] == 6 && view.carried_counts[i] <= 2;
-  if (is_full && view.stride == lane_count) return kkt_of<1, 6, 4>(view);
-  if (is_full && view.stride == 2 * lane_count) return kkt_of<2, 6, 4>(view);
+  for (int i = view.first; i <= end; ++i)
+    if (view.state_counts[i] != view.states || view.carried_counts[i] > most_carried) return false;
+  return true;
+}
+
+/// By the sizes that the recursion is compiled for.
+KktParts kkt(const ProgramView& view) {
+  const bool is_short = view.stride == lane_count, is_double = view.stride == 2 * lane_count;
+  if ((is_short || is_double) && is_full(view, view.states > 6 ? 3 : 2)) {
+    switch (view.states) {
+      case 5:
+        return is_short ? kkt_of<1, 5, 3>(view) : kkt_of<2, 5, 3>(view);
+      case 6:
+        return is_short ? kkt_of<1, 6, 4>(view) : kkt_of<2, 6, 4>(view);
+      case 7:
+        return is_short ? kkt_of<0, 0, 0>(view) : kkt_of<2, 7, 4>(view);
+      case 8:
+        return is_short ? kkt_of<0, 0, 0>(view) : kkt_of<2, 8, 5>(view);
+      default:
+        break;
+    }
+  }
   return kkt_of<0, 0, 0>(view);
 }
 
 /// Rows in parts of which one is all there is, or as many as it takes.
 template <bool is_one_part>
 StepParts check_step_of(const ProgramView& view, double tolerance) {
-  const long stride = view.stride;
+  const long stride = is_one_part ? lane_count : view.stride;
   const int state_parts = is_one_part ? 1 : (view.states + lane_count - 1) / lane_count;
   Lanes excess = all(-1.0), costates{}, rest{}, unordered{};  // the last two stay 0 as long as all is finite
   for (int i = 0; i <= view.intervals; ++i) {
@@ -117,11 +137,12 @@ StepParts check_step(const ProgramView& view, double tolerance) {
 /// Whether there is nothing to mark: all multipliers are 0, all bounds apart.
 template <bool is_one_part>
 inline bool is_unmarked(const ProgramView& view) {
+  const long stride = is_one_part ? lane_count : view.stride;
   Lanes found{};
   for (int i = 0; i <= view.intervals; ++i) {
     const int parts = is_one_part ? 1 : parts_of(view, i);
     for (int v = 0; v < parts; ++v) {
-      const long at = static_cast<long>(i) * view.stride + v * lane_count;
+      const long at = i * stride + v * lane_count;
       const Lanes lower = load(view.lower + at), gap = load(view.upper + at) - lower;
       const Lanes least = smaller(1e-14 * (1.0 + absolute(lower)), all(1e300));
       found = (load(view.bounds + at) == 0.0) & (gap > least) ? found : all(1.0);
@@ -251,15 +272,17 @@ inline Lanes on_circle(const Lanes& error, const Lanes& turn, const Lanes& inver
   return error - ((error * inverse_turn + to_integer) - to_integer) * turn;
 }
 
+/// Rows of a known length, or of any (0).
+template <int known_stride>
 double write_tracking(const CostView& view, const TrackingView& tracked, int first, int last) {
-  const long stride = view.stride, wide = view.states + view.controls;
+  const long stride = known_stride > 0 ? known_stride : view.stride, wide = view.states + view.controls;
   double total = 0.0;  // stage by stage, so that it is the same however the stages are asked for
   for (int i = first; i <= last; ++i) {
     Lanes of_stage{};
     const bool is_last = i == view.intervals;
     const double* weights = is_last ? tracked.terminal_weights : tracked.stage_weights;
     const int columns = view.states + (is_last ? 0 : view.control_counts[i]);
-    for (int k = 0; view.h && k < view.stride; k += lane_count) {
+    for (int k = 0; view.h && k < stride; k += lane_count) {
       const long at = i * stride + k;
       const Lanes weight = first_of(load(weights + k), 0, columns - k);
       Lanes error = load(tracked.values + at) - load(tracked.references + at);
@@ -280,9 +303,16 @@ double write_tracking(const CostView& view, const TrackingView& tracked, int fir
   return total;
 }
 
+double write_tracking(const CostView& view, const TrackingView& tracked, int first, int last) {
+  return view.stride == 8 ? write_tracking<8>(view, tracked, first, last)
+                          : write_tracking<0>(view, tracked, first, last);
+}
+
+/// The same.
+template <int known_stride>
 void complete_dynamics(const DynamicsView& view) {
-  const long stride = view.stride;
-  const int state_parts = (view.states + lane_count - 1) / lane_count;
+  const long stride = known_stride > 0 ? known_stride : view.stride;
+  const int state_parts = known_stride == lane_count ? 1 : (view.states + lane_count - 1) / lane_count;
   for (int i = view.first; i <= view.last; ++i) {
     double *F = view.F + i * view.states * stride, *b = view.b + i * stride;
     const double *z = view.values + i * stride, *next = z + stride;
@@ -297,12 +327,16 @@ void complete_dynamics(const DynamicsView& view) {
       const int row = view.vehicle_states + c, control = control_of[c];
       if (!view.has_channel_rows) {
         double* F_row = F + row * stride;
-        for (int k = 0; k < view.stride; k += lane_count) store(Lanes{}, F_row + k);
+        for (int k = 0; k < stride; k += lane_count) store(Lanes{}, F_row + k);
         F_row[control >= 0 ? view.states + control : row] = 1.0;
       }
       if (control >= 0) b[row] = z[view.states + control] - next[row];
     }
   }
+}
+
+void complete_dynamics(const DynamicsView& view) {
+  return view.stride == 8 ? complete_dynamics<8>(view) : complete_dynamics<0>(view);
 }
 
 void clear_costs(const CostView& view, int first, int last) {

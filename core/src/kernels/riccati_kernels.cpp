@@ -14,8 +14,10 @@ RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants
 }
 
 /// What is known of a stage when its kernel is compiled: how many times eight entries a row has, how many states and
-/// controls (unknown: 0), and how many of the states are carried. Its loops are written out where that is asked for.
-template <int eights, int state_count, int control_count, bool is_written_out = true, int carried_count = 0>
+/// controls (unknown: 0), how many of the states are carried, and how long the program's rows are (unknown: 0). Its
+/// loops are written out where that is asked for.
+template <int eights, int state_count, int control_count, bool is_written_out = true, int carried_count = 0,
+          int known_stride = 0>
 struct Shape {
   static constexpr bool is_known = state_count > 0;
   static constexpr bool has_pair = is_known && control_count == 2;
@@ -35,6 +37,13 @@ struct Shape {
         offset(is_known ? state_count : view.states),
         columns(offset + (is_known ? control_count : view.control_counts[i])),
         moved(next_states - (is_known ? carried_count : view.carried_counts[i])) {}
+
+  static long stride_of(const RiccatiView& view) { return known_stride > 0 ? known_stride : view.stride; }
+  /// States and controls that there is room for.
+  static long room_for_states(const RiccatiView& view) { return is_known ? state_count : view.states; }
+  static long room_for_controls(const RiccatiView& view) {
+    return is_known && state_count + control_count == known_stride ? control_count : view.controls;
+  }
 
   /// Of so many states, and nothing else.
   explicit Shape(int count)
@@ -102,21 +111,22 @@ struct Memory {
   double *P, *U, *V, *closed, *T, *inverse, *drift, *g, *p;
   const std::int8_t* sides;
 
-  Memory(const RiccatiView& view, int i) : stride(view.stride) {
-    const long at = i * stride, states = i * view.states * stride, controls = i * view.controls * stride;
+  Memory(const RiccatiView& view, int i) : stride(Stage::stride_of(view)) {
+    const long at = i * stride, states = at * Stage::room_for_states(view),
+               controls = at * Stage::room_for_controls(view);
     F = view.F + states;
     H = view.H + states + controls;
     h = view.h + at;
     b = view.b + at;
     P = view.P + states;
-    P_next = P + view.states * stride;
+    P_next = P + Stage::room_for_states(view) * stride;
     p = view.p + at;
     p_next = p + stride;
     U = view.U + controls;
     V = view.V + controls;
     closed = view.closed + static_cast<long>(i) * 64;
     T = view.T + static_cast<long>(i) * 64;
-    inverse = view.inverse + static_cast<long>(i) * view.controls;
+    inverse = view.inverse + i * Stage::room_for_controls(view);
     drift = view.drift + at;
     g = view.g + at;
     sides = view.sides + at;
@@ -146,11 +156,16 @@ RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const S
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(W[l], at.F[l * at.stride + k]); });
     if (k >= stage.moved && k < stage.next_states) sums[1].add(W[k]);
     if (R::chains > 1 || stage.moved < stage.next_states) sums[0].add(sums[1]);
-    if (view.diagonal) sums[0].part[k / lane_count][k % lane_count] += view.diagonal[i * at.stride + k];
     X[k] = sums[0];
   };
   stage.each_control_back(form);
   stage.each_state(form);
+  if (view.diagonal) {
+    const auto add = [&](auto k)
+                         RHEC_ALWAYS_INLINE { X[k] = X[k].with(k, X[k].entry(k) + view.diagonal[i * at.stride + k]); };
+    stage.each_control(add);
+    stage.each_state(add);
+  }
 }
 
 /// What a solution needs of a stage, in an order in which one stage need not wait long for another: rows of the closed
@@ -173,31 +188,19 @@ RHEC_ALWAYS_INLINE inline void close_loop(const Stage& stage, const Memory<Stage
   for (int k = 0; k < stage.columns; ++k) store(columns[k], at.T + k * 8);
 }
 
+/// Takes the controls out of X, one by one: what they owe to the state and to the controls before them goes to U, and X
+/// keeps their policies. False where they have no minimiser.
 template <class Stage>
-RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, double tolerance) {
+RHEC_ALWAYS_INLINE inline bool eliminate_controls(const Stage& stage, const Memory<Stage>& at, bool any_fixed,
+                                                  double tolerance, typename Stage::R* X) {
   using R = typename Stage::R;
-  const Stage stage(view, i);
-  const Memory<Stage> at(view, i);
-  R X[Stage::most_columns];
-  form_rows(view, i, stage, at, X);
   double diagonal[Stage::most_columns];
-  bool any_fixed = false, is_definite = true;
-  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
-    diagonal[k] = X[k].entry(k);
-    any_fixed |= at.sides[k] != 0;
-  });
-  view.fixes[i] = any_fixed;
+  bool is_definite = true;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { diagonal[k] = X[k].entry(k); });
   if (any_fixed)
     stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
       if (at.sides[k] != 0) X[k].to(at.U + (k - stage.offset) * at.stride);
     });
-  // Of two controls, both reciprocals can be taken at once: 1 / (a - b b / c) = c / (a c - b b).
-  double determinant_inverse = 0.0;
-  if constexpr (Stage::has_pair) {
-    constexpr int first = Stage::most_states, second = first + 1;
-    const double b = X[second].entry(first), c = X[second].entry(second);
-    determinant_inverse = c / (X[first].entry(first) * c - b * b);
-  }
   stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
     const int control = k - stage.offset;
     if (any_fixed && at.sides[k] != 0) {
@@ -207,7 +210,7 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
     }
     const double pivot = X[k].entry(k);
     is_definite = is_definite && pivot > tolerance * diagonal[k] && pivot > 0.0;
-    const double reciprocal = Stage::has_pair && !any_fixed && control == 0 ? determinant_inverse : 1.0 / pivot;
+    const double reciprocal = 1.0 / pivot;
     R row = X[k].first(k);
     if (any_fixed)
       stage.each_control_before(k, [&](auto f) RHEC_ALWAYS_INLINE {
@@ -222,14 +225,62 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
     stage.each_state(eliminate);
     X[k] = scaled;
   });
-  if (!is_definite) return false;
   // From what each control owes to the state and to the controls before it, to what it owes to the state alone.
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     R policy = X[k].first(stage.states);
     stage.each_control_before(k, [&](auto j) RHEC_ALWAYS_INLINE { policy.add(X[j], -X[k].splat(j)); });
-    policy.to(at.V + (k - stage.offset) * at.stride);
     X[k] = policy;
   });
+  return is_definite;
+}
+
+/// The same of two free controls at once: what comes after waits for one division, and for little beside it.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline bool eliminate_pair(const Stage& stage, const Memory<Stage>& at, double tolerance,
+                                              typename Stage::R* X) {
+  using R = typename Stage::R;
+  constexpr Constant<Stage::most_states> first;
+  constexpr Constant<Stage::most_states + 1> second;
+  const double a = X[first].entry(first), b = X[second].entry(first), c = X[second].entry(second);
+  const double determinant = a * c - b * b, inverse = 1.0 / determinant, inverse_of_second = 1.0 / c;
+  R of_first = X[first].first(first), of_second = X[second].first(first), policies[2] = {};
+  policies[0].add(of_first, c);
+  policies[0].add(of_second, -b);
+  policies[1].add(of_second, a);
+  policies[1].add(of_first, -b);
+  for (R& policy : policies)
+    for (Lanes& part : policy.part) part *= inverse;
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE {
+    X[j].add(policies[0], -of_first.splat(j));
+    X[j].add(policies[1], -of_second.splat(j));
+  });
+  X[second].first(second).to(at.U + at.stride);
+  of_first.add(of_second, -b * inverse_of_second);
+  of_first.to(at.U);
+  at.inverse[0] = c * inverse;
+  at.inverse[1] = inverse_of_second;
+  X[first] = policies[0];
+  X[second] = policies[1];
+  return c > 0.0 && determinant > 0.0 && determinant > tolerance * (a * c);
+}
+
+template <class Stage>
+RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, double tolerance) {
+  using R = typename Stage::R;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  R X[Stage::most_columns];
+  form_rows(view, i, stage, at, X);
+  bool any_fixed = false, is_definite = false;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { any_fixed |= at.sides[k] != 0; });
+  view.fixes[i] = any_fixed;
+  if (Stage::has_pair && !any_fixed) {
+    if constexpr (Stage::has_pair) is_definite = eliminate_pair(stage, at, tolerance, X);
+  } else {
+    is_definite = eliminate_controls(stage, at, any_fixed, tolerance, X);
+  }
+  if (!is_definite) return false;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { X[k].to(at.V + (k - stage.offset) * at.stride); });
   stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
   if (view.for_steps) {
     R drift{};
@@ -462,17 +513,29 @@ inline void respond_stage_forward(const RiccatiView& view, int i, int last, doub
   }
 }
 
-/// Calls `function` with the type of a stage's shape: one of the sizes that kernels are compiled for, or any.
+/// Calls `function` with the type of a stage's shape: one of the sizes that kernels are compiled for, or any. Those are
+/// the stages of estimators and controllers with two inputs: of vehicles with three to five states, whose other states
+/// are parameters, between the starts of blocks, which hand those on; and of the most usual ones where blocks start.
+/// How long rows are decides nothing else: a program gives the same bits in one of another capacity.
 template <bool is_written_out, class Function>
 inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
-  const int states = view.states, controls = view.control_counts[i];
+  const int states = view.states, controls = view.control_counts[i], carried = view.carried_counts[i];
   const bool is_full = view.state_counts[i] == states && view.state_counts[i + 1] == states;
-  if (is_full && states == 6) {
-    // An estimator's or a controller's between the starts of blocks: four states of the vehicle, two parameters.
-    if (controls == 2 && view.carried_counts[i] == 2) return function.template operator()<Shape<1, 6, 2, true, 2>>();
-    if (controls == 2) return function.template operator()<Shape<1, 6, 2>>();
-    if (controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out>>();
-    if (controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out>>();
+  if (is_full && view.stride == 8 && controls == 2) {
+    if (states == 5 && carried == 2) return function.template operator()<Shape<1, 5, 2, true, 2, 8>>();
+    if (states == 6 && carried == 2) return function.template operator()<Shape<1, 6, 2, true, 2, 8>>();
+    if (states == 6) return function.template operator()<Shape<1, 6, 2, true, 0, 8>>();
+  }
+  if (is_full && view.stride == 16) {
+    if (controls == 2) {
+      if (states == 5 && carried == 2) return function.template operator()<Shape<1, 5, 2, true, 2, 16>>();
+      if (states == 6 && carried == 2) return function.template operator()<Shape<1, 6, 2, true, 2, 16>>();
+      if (states == 6) return function.template operator()<Shape<1, 6, 2, true, 0, 16>>();
+      if (states == 7 && carried == 3) return function.template operator()<Shape<2, 7, 2, is_written_out, 3, 16>>();
+      if (states == 8 && carried == 3) return function.template operator()<Shape<2, 8, 2, is_written_out, 3, 16>>();
+    }
+    if (states == 6 && controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out, 0, 16>>();
+    if (states == 6 && controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out, 0, 16>>();
   }
   const int columns = states + controls;
   if (columns <= 8) return function.template operator()<Shape<1, 0, 0>>();
@@ -592,33 +655,8 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
       row.to(closed_rows + l * width);
     });
   }
-  // Of a row of the dynamics, the sum of `terms`, each by its entry.
-  const auto combine_by = [&](auto l, const R* terms) RHEC_ALWAYS_INLINE {
-    R sums[2] = {};
-    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % R::chains].add(terms[j], closed[l * width + j]); });
-    if (R::chains > 1) sums[0].add(sums[1]);
-    return sums[0];
-  };
-  R products[Stage::most_columns] = {};
-  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { products[l] = combine_by(l, rows); });
-  stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { products[l] = rows[l]; });
-  // Of the products, columns are needed.
-  constexpr bool is_one_register = Stage::state_registers == 1 && lane_count == 8;
-  R columns[Stage::most_columns];
-  if constexpr (is_one_register) {
-    Lanes lanes[8];
-    for (int l = 0; l < 8; ++l) lanes[l] = products[l].part[0];
-    transpose(lanes);
-    for (int j = 0; j < 8; ++j) columns[j].part[0] = lanes[j];
-  } else {
-    double transposed[Stage::most_states][Stage::most_columns] = {};
-    for (int l = 0; l < stage.next_states; ++l)
-      for (int j = 0; j < stage.states; ++j) transposed[j][l] = products[l].entry(j);
-    for (int j = 0; j < stage.states; ++j) columns[j] = R::from(transposed[j]);
-  }
+  // What the controls bring in, which waits for no stage before this one.
   R next[Stage::most_states] = {};
-  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l] = combine_by(l, columns); });
-  stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { next[l] = columns[l]; });
   R effects[Stage::most_columns];  // columns of B
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     if constexpr (Stage::is_known) {
@@ -644,6 +682,32 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
     const double variance = 2.0 * at.inverse[k - stage.offset];
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l].add(noise, noise.splat(l) * variance); });
   });
+  // Of a row of the dynamics, `start` and the sum of `terms`, each by its entry.
+  const auto combine_by = [&](auto l, const R* terms, const R& start) RHEC_ALWAYS_INLINE {
+    R sums[2] = {start, R{}};
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % R::chains].add(terms[j], closed[l * width + j]); });
+    if (R::chains > 1) sums[0].add(sums[1]);
+    return sums[0];
+  };
+  R products[Stage::most_columns] = {};
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { products[l] = combine_by(l, rows, R{}); });
+  stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { products[l] = rows[l]; });
+  // Of the products, columns are needed.
+  constexpr bool is_one_register = Stage::state_registers == 1 && lane_count == 8;
+  R columns[Stage::most_columns] = {};
+  if constexpr (is_one_register) {
+    Lanes lanes[8];
+    for (int l = 0; l < 8; ++l) lanes[l] = products[l].part[0];
+    transpose(lanes);
+    for (int j = 0; j < 8; ++j) columns[j].part[0] = lanes[j];
+  } else {
+    double transposed[Stage::most_states][Stage::most_columns] = {};
+    for (int l = 0; l < stage.next_states; ++l)
+      for (int j = 0; j < stage.states; ++j) transposed[j][l] = products[l].entry(j);
+    for (int j = 0; j < stage.states; ++j) columns[j] = R::from(transposed[j]);
+  }
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l] = combine_by(l, columns, next[l]); });
+  stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { next[l] = columns[l]; });
   stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { rows[l] = next[l].first(stage.next_states); });
 }
 
@@ -727,7 +791,10 @@ RHEC_ALWAYS_INLINE inline void solve_rows(const Stage& stage, const double* matr
 /// Calls `function` with a shape of `count` states, however long their rows are; false where those are too many.
 template <class Function>
 inline bool with_states(int count, const Function& function) {
+  if (count == 5) return function.template operator()<Shape<1, 5, 0>>();
   if (count == 6) return function.template operator()<Shape<1, 6, 0>>();
+  if (count == 7) return function.template operator()<Shape<1, 7, 0>>();
+  if (count == 8) return function.template operator()<Shape<1, 8, 0>>();
   if (count <= 8) return function.template operator()<Shape<1, 0, 0>>();
   if (count <= 16) return function.template operator()<Shape<2, 0, 0>>();
   return false;

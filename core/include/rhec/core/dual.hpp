@@ -10,6 +10,8 @@ namespace rhec {
 
 /// Up to here lists of entries are written out when they are compiled; longer ones are loops.
 inline constexpr int longest_list = 24;
+/// The same of the entries of a Hessian: those of thirteen directions.
+inline constexpr int longest_triangle = 91;
 
 /// function(0), ..., function(count - 1) one after the other, with indices that the compiler knows: no loop is left of
 /// it, so that what it knows of single entries (a derivative that is always 0 or 1) is not forgotten.
@@ -105,7 +107,7 @@ struct SecondOrder {
   template <std::convertible_to<T> Constant>
   SecondOrder(const Constant& constant) : value(constant) {  // NOLINT(google-explicit-constructor)
     for_each_index<N>([&](auto j) { d[j] = T(0.0); });
-    for_each_index<hessian_size>([&](auto k) { dd[k] = T(0.0); });
+    for_each_entry([&](auto k) { dd[k] = T(0.0); });
   }
   template <int direction>
   static SecondOrder variable(const T& value) {
@@ -137,10 +139,19 @@ struct SecondOrder {
     for_each_pair(fill);
     return result;
   }
+  /// function(k) for all entries of the triangle. In a loop the compiler would keep whole numbers in memory.
+  template <class Function>
+  RHEC_INLINE static void for_each_entry(const Function& function) {
+    if constexpr (hessian_size <= longest_triangle) {
+      for_indices<hessian_size>(function);
+    } else {
+      for (int k = 0; k < hessian_size; ++k) function(k);
+    }
+  }
   /// function(i, j) for all j <= i < M.
   template <class Function>
   static void for_each_pair(const Function& function) {
-    if constexpr (M <= longest_list) {
+    if constexpr (hessian_size <= longest_triangle) {
       for_indices<M>([&](auto i) { for_indices<i + 1>([&](auto j) { function(i, j); }); });
     } else {
       for (int i = 0; i < M; ++i)
@@ -158,7 +169,7 @@ struct SecondOrder {
   static void assign_linear(SecondOrder& out, Operation operation, const Others&... a) {
     out.value = operation(a.value...);
     for_each_index<N>([&](auto j) { out.d[j] = operation(a.d[j]...); });
-    for_each_index<hessian_size>([&](auto k) { out.dd[k] = operation(a.dd[k]...); });
+    for_each_entry([&](auto k) { out.dd[k] = operation(a.dd[k]...); });
   }
 
  private:

@@ -96,10 +96,48 @@ constexpr auto pattern_of_dynamics() {
   return rates;
 }
 
+/// The patterns of y = h(x), by x.
+template <class Formula>
+constexpr auto pattern_of_outputs() {
+  std::array<DerivativePattern, Formula::output_count> y{};
+  std::array<DerivativePattern, Formula::state_count> x{};
+  for (int j = 0; j < Formula::state_count; ++j) x[j] = DerivativePattern::argument(j);
+  Formula().outputs(static_cast<const DerivativePattern*>(x.data()), y.data());
+  return y;
+}
+
 /// Formulas that can be asked for their pattern when they are compiled.
 template <class Formula>
 concept HasPattern = requires {
   typename std::bool_constant<(pattern_of_dynamics<Formula>(), true)>;
+};
+template <class Formula>
+concept HasOutputPattern = requires {
+  typename std::bool_constant<(pattern_of_outputs<Formula>(), true)>;
+};
+
+/// Where the outputs bend: which second derivatives of any of them can be other than zero; of a formula that cannot
+/// tell, all.
+template <class Formula>
+struct OutputPattern {
+  static constexpr int nx = Formula::state_count;
+  static_assert(nx <= DerivativePattern::most_arguments);
+
+  std::array<std::uint64_t, nx> second{};
+  /// The states that some output is curved in: directions to differentiate along.
+  std::array<int, nx> direction_of{};  ///< -1: none
+  int curved = 0;
+
+  constexpr OutputPattern() {
+    if constexpr (HasOutputPattern<Formula>) {
+      for (const DerivativePattern& output : pattern_of_outputs<Formula>())
+        for (int i = 0; i < nx; ++i) second[i] |= output.second[i];
+    } else {
+      second.fill(~std::uint64_t{0});
+    }
+    for (int i = 0; i < nx; ++i) direction_of[i] = second[i] != 0 ? curved++ : -1;
+  }
+  constexpr bool bends(int i, int j) const { return (second[i] >> j & 1) != 0; }
 };
 
 /// What a Runge-Kutta step needs to know of f's derivatives by a = [x; p; u]; of a formula that cannot tell, nothing is

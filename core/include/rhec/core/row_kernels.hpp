@@ -91,6 +91,47 @@ template <class Scalar, class Formula>
   if (q.outputs) store_row<ny>(predicted, rows, q.outputs, q.output_step);
 }
 
+/// Adds to the Hessians what the outputs bend, entry by entry: most are zero.
+template <class Lane, class Formula>
+[[gnu::flatten]] inline void bend_row_pack(const Formula& formula, const NodeRows& q, Rows rows) {
+  constexpr int nx = Formula::state_count, ny = Formula::output_count, width = LaneTraits<Lane>::width;
+  static constexpr OutputPattern<Formula> pattern{};
+  if constexpr (pattern.curved > 0) {
+    using Scalar = SecondOrder<Lane, pattern.curved>;
+    Lane values[nx], given[ny], weights[ny];
+    LaneTraits<Lane>::template load_padded<nx>(q.states + rows.first * q.state_step, rows.count, q.state_step, values);
+    LaneTraits<Lane>::template load_padded<ny>(q.multipliers + rows.first * q.multiplier_step, rows.count,
+                                               q.multiplier_step, given);
+    const int count = q.chosen ? q.chosen_count : ny;
+    for (int j = 0; j < ny; ++j) weights[j] = Lane(0.0);
+    for (int j = 0; j < count; ++j) weights[q.chosen ? q.chosen[j] : j] = given[j];
+    Scalar x[nx], y[ny];
+    for_indices<nx>([&](auto j) RHEC_INLINE {
+      if constexpr (pattern.direction_of[j] >= 0)
+        x[j] = Scalar::template variable<pattern.direction_of[j]>(values[j]);
+      else
+        x[j] = Scalar(values[j]);
+    });
+    formula.outputs(static_cast<const Scalar*>(x), y);
+    for_indices<nx>([&](auto i) RHEC_INLINE {
+      for_indices<i + 1>([&](auto j) RHEC_INLINE {
+        if constexpr (pattern.bends(i, j)) {
+          constexpr int entry = StepPattern<Formula>::pair(pattern.direction_of[i], pattern.direction_of[j]);
+          Lane sum(0.0);
+          for (int k = 0; k < ny; ++k) sum = sum + weights[k] * y[k].dd[entry];
+          double bend[width];
+          LaneTraits<Lane>::template store<1>(&sum, rows.count, bend);
+          double* hessian = q.hessians + rows.first * q.hessian_step;
+          for (int k = 0; k < rows.count; ++k, hessian += q.hessian_step) {
+            hessian[i * q.hessian_row + j] += bend[k];
+            if (i != j) hessian[j * q.hessian_row + i] += bend[k];
+          }
+        }
+      });
+    });
+  }
+}
+
 template <class Formula, class Lane>
 void integrate_rows(const void* formula, const IntervalRows& q) {
   const auto& f = *static_cast<const Formula*>(formula);
@@ -101,8 +142,11 @@ template <class Formula, class Lane>
 void observe_rows(const void* formula, const NodeRows& q) {
   const auto& f = *static_cast<const Formula*>(formula);
   for_each_pack<Lane>(q.count, [&](Rows rows) {
-    if (q.jacobians) return observe_row_pack<Dual<Lane, Formula::state_count>>(f, q, rows);
-    return observe_row_pack<Lane>(f, q, rows);
+    if (q.jacobians)
+      observe_row_pack<Dual<Lane, Formula::state_count>>(f, q, rows);
+    else if (q.outputs)
+      observe_row_pack<Lane>(f, q, rows);
+    if (q.hessians) bend_row_pack<Lane>(f, q, rows);
   });
 }
 

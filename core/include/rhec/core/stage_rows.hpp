@@ -26,7 +26,7 @@ struct IntervalRows {
   double* scratch = nullptr;
 };
 
-/// The same for `Model::observe_rows`, with rows of states.
+/// The same for `Model::observe_rows`, with rows of states; but Hessians are added to what is there.
 struct NodeRows {
   int count = 0;
   const double* states = nullptr;
@@ -37,6 +37,10 @@ struct NodeRows {
   std::ptrdiff_t output_step = 0;
   double* jacobians = nullptr;  ///< dh/dx: a row for each output, one after the other, `jacobian_row` apart
   std::ptrdiff_t jacobian_row = 0;
+  const double* multipliers = nullptr;  ///< a row for each node, of as many as there are outputs
+  std::ptrdiff_t multiplier_step = 0;
+  double* hessians = nullptr;  ///< plus sum_j multipliers_j d2h_j/dx2: n_x rows a node, `hessian_row` apart
+  std::ptrdiff_t hessian_step = 0, hessian_row = 0;
   double* scratch = nullptr;
 };
 

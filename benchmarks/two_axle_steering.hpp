@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cmath>
+
+/// A vehicle that steers both axles, seen from its rear axle:
+///
+///     x' = kappa v cos(theta + mu rear),   theta' = kappa v sin(mu (front - rear)) / (length cos(mu front))
+///     y' = kappa v sin(theta + mu rear),   front' = front_rate,   rear' = rear_rate
+///
+/// with the state [x, y, theta, front, rear], the input [v, front_rate, rear_rate] and the slip [kappa, mu]. Its third
+/// input makes it one of those that no kernel of the recursion is compiled for.
+struct TwoAxleSteering {
+  static constexpr int state_count = 5, input_count = 3, parameter_count = 2, output_count = 4;
+
+  double length = 2.0;  ///< between the axles [m]
+
+  template <class Scalar>
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::cos, std::sin;
+    const Scalar speed = p[0] * u[0], front = p[1] * x[3], rear = p[1] * x[4];
+    dxdt[0] = speed * cos(x[2] + rear);
+    dxdt[1] = speed * sin(x[2] + rear);
+    dxdt[2] = speed * sin(front - rear) / (length * cos(front));
+    dxdt[3] = u[1];
+    dxdt[4] = u[2];
+  }
+
+  template <class Scalar>
+  constexpr void outputs(const Scalar* x, Scalar* y) const {
+    y[0] = x[0];
+    y[1] = x[1];
+    y[2] = x[3];
+    y[3] = x[4];
+  }
+};
