@@ -166,11 +166,11 @@ void same_by_rows(const Model& model, int count, const Observe& by_rows) {
   Stages s = random_stages(model, count, false, 200 + count);
   std::vector<int> chosen;
   for (int j = s.ny - 1; j >= 0; j -= 2) chosen.push_back(j);
-  const int some = static_cast<int>(chosen.size()), row = padded(s.nx + 5), output_row = padded(s.ny),
+  const int some = static_cast<int>(chosen.size()), row = padded(s.nx + 5), output_row = padded(some),
             jacobian_row = padded(s.nx);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> states(static_cast<std::size_t>(count) * row, nan),
-      weights(static_cast<std::size_t>(count) * output_row, nan), outputs(weights.size(), nan),
+      weights(static_cast<std::size_t>(count) * output_row, nan), outputs(weights.size() + Stages::behind, nan),
       jacobians(static_cast<std::size_t>(count) * some * jacobian_row, nan),
       hessians(static_cast<std::size_t>(count) * (s.nx + 2) * row, 3.0), scratch(model.rows_scratch(count));
   std::fill(s.output_weights.begin(), s.output_weights.end(), 0.0);
@@ -209,6 +209,7 @@ void same_by_rows(const Model& model, int count, const Observe& by_rows) {
                     3.0 + (second && r < s.nx && c < s.nx ? s.output_hessians[(i * s.nx + c) * s.nx + r] : 0.0), 1e-12)
             << r << ", " << c;
   }
+  for (int k = 0; k < Stages::behind; ++k) EXPECT_TRUE(std::isnan(outputs[weights.size() + k])) << "past their end";
 }
 
 }  // namespace rhec::checks

@@ -64,6 +64,16 @@ inline void integrate_row_packs(const Formula& formula, const IntervalRows& q) {
   }
 }
 
+/// Calls function(first, size) for each eight of `most` outputs, as constants, of which the first `count` are wanted:
+/// rows are as long as these take.
+template <int most, class Function>
+RHEC_INLINE inline void for_each_eight(int count, const Function& function) {
+  for_indices<(most + 7) / 8>([&](auto eight) RHEC_INLINE {
+    constexpr int first = 8 * eight, size = most - first < 8 ? most - first : 8;
+    if (first < count) function(std::integral_constant<int, first>(), std::integral_constant<int, size>());
+  });
+}
+
 template <class Scalar, class Formula>
 [[gnu::flatten]] inline void observe_row_pack(const Formula& formula, const NodeRows& q, Rows rows) {
   using Lane = typename LaneOf<Scalar>::Type;
@@ -88,7 +98,10 @@ template <class Scalar, class Formula>
       predicted[j] = output;
     }
   }
-  if (q.outputs) store_row<ny>(predicted, rows, q.outputs, q.output_step);
+  if (!q.outputs) return;
+  for_each_eight<ny>(count, [&](auto first, auto size) RHEC_INLINE {
+    store_row<size>(predicted + first, rows, q.outputs + first, q.output_step);
+  });
 }
 
 /// Adds to the Hessians what the outputs bend, entry by entry: most are zero.
@@ -100,9 +113,11 @@ template <class Lane, class Formula>
     using Scalar = SecondOrder<Lane, pattern.curved>;
     Lane values[nx], given[ny], weights[ny];
     LaneTraits<Lane>::template load_padded<nx>(q.states + rows.first * q.state_step, rows.count, q.state_step, values);
-    LaneTraits<Lane>::template load_padded<ny>(q.multipliers + rows.first * q.multiplier_step, rows.count,
-                                               q.multiplier_step, given);
     const int count = q.chosen ? q.chosen_count : ny;
+    for_each_eight<ny>(count, [&](auto first, auto size) RHEC_INLINE {
+      LaneTraits<Lane>::template load_padded<size>(q.multipliers + rows.first * q.multiplier_step + first, rows.count,
+                                                   q.multiplier_step, given + first);
+    });
     for (int j = 0; j < ny; ++j) weights[j] = Lane(0.0);
     for (int j = 0; j < count; ++j) weights[q.chosen ? q.chosen[j] : j] = given[j];
     Scalar x[nx], y[ny];
