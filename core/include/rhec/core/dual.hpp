@@ -13,6 +13,9 @@ inline constexpr int longest_list = 24;
 /// The same of the entries of a Hessian: those of thirteen directions.
 inline constexpr int longest_triangle = 91;
 
+/// The length of an array for `size` entries, of which there may be none.
+constexpr int room_for(int size) { return size > 0 ? size : 1; }
+
 /// function(0), ..., function(count - 1) one after the other, with indices that the compiler knows: no loop is left of
 /// it, so that what it knows of single entries (a derivative that is always 0 or 1) is not forgotten.
 template <int count, class Function>
@@ -94,8 +97,8 @@ struct SecondOrder {
   static constexpr int directions = N;
   static constexpr int hessian_size = M * (M + 1) / 2;
   T value;
-  T d[N > 0 ? N : 1];
-  T dd[hessian_size > 0 ? hessian_size : 1];
+  T d[room_for(N)];
+  T dd[room_for(hessian_size)];
 
   SecondOrder() = default;
   /// Entry by entry, of which the compiler leaves out those that nobody asks for; a copy of the whole it would make.

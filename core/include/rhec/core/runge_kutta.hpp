@@ -4,9 +4,6 @@
 
 namespace rhec::kernels {
 
-/// The length of an array for `size` entries, of which there may be none.
-constexpr int room_for(int size) { return size > 0 ? size : 1; }
-
 /// out = a + b * factor, without the copies that numbers with many derivatives would make on the way.
 template <class Scalar, class Lane>
 inline void add_scaled(const Scalar& a, const Scalar& b, const Lane& factor, Scalar& out) {

@@ -83,7 +83,7 @@ class SensitiveStep {
 
   template <int k>
   [[gnu::flatten]] void evaluate(const Formula& formula) {
-    Number x[nx], p[np > 0 ? np : 1], u[nu > 0 ? nu : 1];
+    Number x[nx], p[room_for(np)], u[room_for(nu)];
     const auto set = [&]<int a>(std::integral_constant<int, a>, Number& number, const Lane& value) RHEC_INLINE {
       if constexpr (Pattern::pattern.direction_of[a] >= 0)
         number = Number::template variable<Pattern::pattern.direction_of[a]>(value);
@@ -191,10 +191,10 @@ class SensitiveStep {
 
   static constexpr int first_count = Pattern::first_place(nx, 0);
   static constexpr int second_count = with_hessian ? Pattern::second_place(nx, 0, 0) : 0;
-  Lane rates_[4][nx];                                                       ///< f_k
-  Lane first_[slots][first_count > 0 ? first_count : 1];                    ///< df_k/d(x, p, u)
-  Lane second_[with_hessian ? 4 : 1][second_count > 0 ? second_count : 1];  ///< d2f_k/d(x, p, u)2, each pair once
-  Lane slopes_[slots][nx][nz];                                              ///< df_k/dz
+  Lane rates_[4][nx];                                          ///< f_k
+  Lane first_[slots][room_for(first_count)];                   ///< df_k/d(x, p, u)
+  Lane second_[with_hessian ? 4 : 1][room_for(second_count)];  ///< d2f_k/d(x, p, u)2, each pair once
+  Lane slopes_[slots][nx][nz];                                 ///< df_k/dz
 };
 
 }  // namespace rhec::kernels
