@@ -83,6 +83,19 @@ TEST_P(EveryModel, ObservesByRowsWhatItObserves) {
   });
 }
 
+TEST_P(EveryModel, IntegratesByRowsWhatItIntegrates) {
+  for_each_instruction_set([&] {
+    for (const int count : {0, 1, 7, 8, 9, 16, 17})
+      for (const int substeps : {1, 2})
+        for (const bool ramp : {false, true}) {
+          const auto ask = [&](const IntervalRows& request) { model_->integrate_rows(request); };
+          checks::same_steps_by_rows(*model_, count, ramp, substeps, ask);
+          const auto ask_base = [&](const IntervalRows& request) { model_->Model::integrate_rows(request); };
+          checks::same_steps_by_rows(*model_, count, ramp, substeps, ask_base);
+        }
+  });
+}
+
 TEST_P(EveryModel, RefusesAnUnknownInstructionSetAndKeepsItsOwn) {
   EXPECT_FALSE(model_->use_instruction_set("mmx"));
   checks::expect_runge_kutta(*model_, false, 1);

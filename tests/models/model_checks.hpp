@@ -212,4 +212,64 @@ void same_by_rows(const Model& model, int count, const Observe& by_rows) {
   for (int k = 0; k < Stages::behind; ++k) EXPECT_TRUE(std::isnan(outputs[weights.size() + k])) << "past their end";
 }
 
+/// The same of steps: [x; p; u], or [x; p; u; p_end] on ramps. All is written, nothing added.
+template <class Integrate>
+void same_steps_by_rows(const Model& model, int count, bool ramp, int substeps, const Integrate& by_rows) {
+  const bool second = model.has_second_derivatives();
+  Stages s = random_stages(model, count, ramp, 300 + count);
+  s.substeps = substeps;
+  model.integrate(s.intervals(true, true, second));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::size_t row = padded(s.nz), state_row = padded(s.nx), stages = count;
+  std::vector<double> z(stages * row, nan), weights(stages * state_row, nan), next(stages * state_row, nan),
+      jacobians(stages * s.nx * row, nan), hessians(stages * s.nz * row, nan), scratch(model.rows_scratch(count));
+  for (int i = 0; i < count; ++i) {
+    double* to = &z[i * row];
+    to = std::copy_n(&s.x[i * s.nx], s.nx, to);
+    to = std::copy_n(s.p.data() + i * s.np, s.np, to);
+    to = std::copy_n(s.u.data() + i * s.nu, s.nu, to);
+    if (ramp) std::copy_n(s.p_end.data() + i * s.np, s.np, to);
+    std::copy_n(&s.weights[i * s.nx], s.nx, &weights[i * state_row]);
+  }
+  const auto step = [](std::size_t size) { return static_cast<std::ptrdiff_t>(size); };
+  by_rows({.count = count,
+           .z = z.data(),
+           .z_step = step(row),
+           .ramp = ramp,
+           .durations = s.durations.data(),
+           .substeps = substeps,
+           .next_states = next.data(),
+           .next_step = step(state_row),
+           .jacobians = jacobians.data(),
+           .jacobian_step = step(s.nx * row),
+           .jacobian_row = step(row),
+           .multipliers = second ? weights.data() : nullptr,
+           .multiplier_step = step(state_row),
+           .hessians = second ? hessians.data() : nullptr,
+           .hessian_step = step(s.nz * row),
+           .hessian_row = step(row),
+           .scratch = scratch.data()});
+  // Where an entry of [x; p; u; p_end] is in [x; u; p; p_end].
+  const auto dense = [&](int k) {
+    const bool is_parameter = k >= s.nx && k < s.nx + s.np, is_input = k >= s.nx + s.np && k < s.nx + s.np + s.nu;
+    return is_parameter ? k + s.nu : is_input ? k - s.np : k;
+  };
+  const auto expect_near = [](double found, double expected) {
+    EXPECT_NEAR(found, expected, 1e-12 * (1.0 + std::abs(expected)));
+  };
+  for (int i = 0; i < count; ++i) {
+    SCOPED_TRACE("interval " + std::to_string(i) + " of " + std::to_string(count));
+    for (int r = 0; r < s.nx; ++r) {
+      expect_near(next[i * state_row + r], s.next[i * s.nx + r]);
+      for (int c = 0; c < static_cast<int>(row); ++c)
+        expect_near(jacobians[(i * s.nx + r) * row + c],
+                    c < s.nz ? s.jacobians[(i * s.nz + dense(c)) * s.nx + r] : 0.0);
+    }
+    for (int r = 0; second && r < s.nz; ++r)
+      for (int c = 0; c < static_cast<int>(row); ++c)
+        expect_near(hessians[(i * s.nz + r) * row + c],
+                    c < s.nz ? s.hessians[(i * s.nz + dense(c)) * s.nz + dense(r)] : 0.0);
+  }
+}
+
 }  // namespace rhec::checks

@@ -79,24 +79,30 @@ inline bool is_full(const ProgramView& view, int most_carried) {
   return true;
 }
 
-/// By the sizes that the recursion is compiled for.
-KktParts kkt(const ProgramView& view) {
-  const bool is_short = view.stride == lane_count, is_double = view.stride == 2 * lane_count;
-  if ((is_short || is_double) && is_full(view, view.states > 6 ? 3 : 2)) {
-    switch (view.states) {
-      case 5:
-        return is_short ? kkt_of<1, 5, 3>(view) : kkt_of<2, 5, 3>(view);
-      case 6:
-        return is_short ? kkt_of<1, 6, 4>(view) : kkt_of<2, 6, 4>(view);
-      case 7:
-        return is_short ? kkt_of<0, 0, 0>(view) : kkt_of<2, 7, 4>(view);
-      case 8:
-        return is_short ? kkt_of<0, 0, 0>(view) : kkt_of<2, 8, 5>(view);
-      default:
-        break;
-    }
+/// Of a known number of states, where that is all that stages have.
+template <int known_states, int most_carried>
+KktParts kkt_of_states(const ProgramView& view) {
+  if (is_full(view, most_carried)) {
+    if (view.stride == lane_count) return kkt_of<1, known_states, known_states - most_carried>(view);
+    if (view.stride == 2 * lane_count) return kkt_of<2, known_states, known_states - most_carried>(view);
   }
   return kkt_of<0, 0, 0>(view);
+}
+
+/// By the sizes that the recursion is compiled for.
+KktParts kkt(const ProgramView& view) {
+  switch (view.states) {
+    case 5:
+      return kkt_of_states<5, 2>(view);
+    case 6:
+      return kkt_of_states<6, 2>(view);
+    case 7:
+      return kkt_of_states<7, 3>(view);
+    case 8:
+      return kkt_of_states<8, 3>(view);
+    default:
+      return kkt_of<0, 0, 0>(view);
+  }
 }
 
 /// Rows in parts of which one is all there is, or as many as it takes.
@@ -272,7 +278,7 @@ inline Lanes on_circle(const Lanes& error, const Lanes& turn, const Lanes& inver
   return error - ((error * inverse_turn + to_integer) - to_integer) * turn;
 }
 
-/// Rows of a known length, or of any (0).
+/// Of rows of a known length, or of any (0).
 template <int known_stride>
 double write_tracking(const CostView& view, const TrackingView& tracked, int first, int last) {
   const long stride = known_stride > 0 ? known_stride : view.stride, wide = view.states + view.controls;
@@ -308,7 +314,7 @@ double write_tracking(const CostView& view, const TrackingView& tracked, int fir
                           : write_tracking<0>(view, tracked, first, last);
 }
 
-/// The same.
+/// Of rows of a known length, or of any (0).
 template <int known_stride>
 void complete_dynamics(const DynamicsView& view) {
   const long stride = known_stride > 0 ? known_stride : view.stride;

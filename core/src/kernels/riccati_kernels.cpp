@@ -271,15 +271,15 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
   const Memory<Stage> at(view, i);
   R X[Stage::most_columns];
   form_rows(view, i, stage, at, X);
-  bool any_fixed = false, is_definite = false;
+  bool any_fixed = false;
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { any_fixed |= at.sides[k] != 0; });
   view.fixes[i] = any_fixed;
-  if (Stage::has_pair && !any_fixed) {
-    if constexpr (Stage::has_pair) is_definite = eliminate_pair(stage, at, tolerance, X);
-  } else {
-    is_definite = eliminate_controls(stage, at, any_fixed, tolerance, X);
-  }
-  if (!is_definite) return false;
+  const auto eliminate = [&]() RHEC_ALWAYS_INLINE {
+    if constexpr (Stage::has_pair)
+      if (!any_fixed) return eliminate_pair(stage, at, tolerance, X);
+    return eliminate_controls(stage, at, any_fixed, tolerance, X);
+  };
+  if (!eliminate()) return false;
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { X[k].to(at.V + (k - stage.offset) * at.stride); });
   stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
   if (view.for_steps) {
