@@ -12,8 +12,8 @@
 
 #include "commands.hpp"
 #include "progress.hpp"
-#include "rhec/core/error.hpp"
-#include "rhec/core/option_values.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/config/option_values.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/comparison.hpp"
@@ -216,7 +216,7 @@ void print_head(const Comparison& comparison) {
 
 void print_answers(const Comparison& comparison, const sim::SameProblems& same) {
   const std::size_t width = label_width(comparison);
-  const bool is_rhe = same.kind == OcpKind::rhe;
+  const bool is_rhe = same.kind == "rhe";
   fmt::print("\n{}: {} problems, the same for all\n", is_rhe ? "ESTIMATION (RHE)" : "CONTROL (RHC)",
              same.problems.size());
   constexpr const char* row = "{:<{}}  {:>9} {:>8}  {:>8}  {:>8} {:>8} {:>8}  {:>8} {:>8} {:>8}  {:>9} {:>9} {:>7}";

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host.hpp"
 
 namespace rhec::apps {

@@ -32,7 +32,7 @@ void add_dump(CLI::App& command, DumpArguments& arguments) {
       ->needs(folder);
 }
 
-Dump::Dump(const DumpArguments& arguments, const std::vector<OcpKind>& kinds) {
+Dump::Dump(const DumpArguments& arguments, const std::vector<std::string>& kinds) {
   if (arguments.folder) dump_.emplace(*arguments.folder, kinds, arguments.every);
 }
 

@@ -23,7 +23,7 @@ void add_dump(CLI::App& command, DumpArguments& arguments);
 /// The problems that a command saves, if it was asked to.
 class Dump {
  public:
-  Dump(const DumpArguments& arguments, const std::vector<OcpKind>& kinds);
+  Dump(const DumpArguments& arguments, const std::vector<std::string>& kinds);
 
   decltype(sim::LoopHooks::solved) watch(const std::string& run, const Robot& robot);
   void commit();

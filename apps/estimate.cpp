@@ -53,7 +53,7 @@ int estimate(const EstimateArguments& arguments) {
   const LogInput input(arguments);
   const auto& [scenario, hold_out, log] = input;
   sim::OutputFolder folder(arguments.out);
-  Dump dump(arguments.dump, {OcpKind::rhe});
+  Dump dump(arguments.dump, {"rhe"});
   std::vector<sim::Replay> replays;
   std::vector<sim::HorizonLog> horizons;
   // At most so many nodes: at the fixes, and one a step between them.

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "rhec/core/error.hpp"
-#include "rhec/core/option_values.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/config/option_values.hpp"
 #include "rhec/plugins/yaml.hpp"
 
 namespace rhec::apps {

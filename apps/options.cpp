@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/sim/scenario.hpp"
 

@@ -15,9 +15,9 @@
 
 #include "commands.hpp"
 #include "doctor.hpp"
-#include "rhec/core/error.hpp"
-#include "rhec/core/model.hpp"
-#include "rhec/core/option_values.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/config/option_values.hpp"
+#include "rhec/core/model/model.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "commands.hpp"
 #include "report/report_page.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/output_folder.hpp"
 #include "rhec/sim/report.hpp"
 

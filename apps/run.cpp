@@ -51,7 +51,7 @@ int run(const RunArguments& arguments) {
   apply_assignments(settings, arguments.assignments);
   const sim::Scenario scenario(Host(arguments.plugin_path), settings);
   sim::OutputFolder folder(arguments.out);
-  Dump dump(arguments.dump, {OcpKind::rhe, OcpKind::rhc});
+  Dump dump(arguments.dump, {"rhe", "rhc"});
   ProgressBar bar(scenario.options().name);
   const double samples = scenario.path().length() / (scenario.options().speed * scenario.robot().step());
   sim::HorizonLog horizons(scenario.robot(), static_cast<std::int64_t>(samples) + 1);

@@ -9,7 +9,7 @@
 #include "commands.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/horizon_log.hpp"

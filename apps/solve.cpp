@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "rhec/core/error.hpp"
-#include "rhec/core/kkt.hpp"
-#include "rhec/core/shift.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/shift.hpp"
+#include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/qp/kkt.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/csv.hpp"
@@ -101,7 +101,7 @@ class Bench {
     last_first_.reset();
     if (is_usable(outcome.status)) last_first_ = first;
     reported_ = point_;
-    if (problem_->kind() == OcpKind::rhc) roll_out(*problem_, reported_, scratch_);
+    if (problem_->can_roll_out()) roll_out(*problem_, reported_, scratch_);
     outcome.objective = problem_->evaluate(reported_, nullptr, scratch_);
     return sim::solution_line(record, *problem_, reported_, outcome);
   }
@@ -139,8 +139,8 @@ class Bench {
 
   Outcome solve(Iterate& point) {
     const auto start = Clock::now();
-    solver_->prepare(*problem_, point);
-    const Report report = solver_->solve(*problem_, point);
+    solver_->prepare(point);
+    const Report report = solver_->solve(point);
     const double time = microseconds_since(start);
     Outcome outcome;
     outcome.solver = name_;

@@ -19,7 +19,7 @@
 
 #include "commands.hpp"
 #include "progress.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/sim/sweep.hpp"
 #include "rhec/sim/sweep_runner.hpp"

@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::apps {
 

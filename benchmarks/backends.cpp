@@ -12,7 +12,8 @@
 
 #include "long_problems.hpp"
 #include "program.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/ocp/solver_decorator.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"
@@ -26,30 +27,29 @@ constexpr int passes = 3;  // for the share of ipopt's time that is ours
 Settings accuracy() { return parse_yaml(fmt::format("{{tolerance: {}}}", tolerance), "benchmark"); }
 
 /// Ipopt linked into this program, which tells how much of its solves was Ipopt's own.
-class Observed final : public Solver {
+class Observed final : public SolverDecorator {
  public:
-  Observed() : solver_(options()) {}
+  Observed() : Observed(std::make_shared<ipopt::IpoptSolver>(options())) {}
   std::vector<double> our_shares;  ///< of each solve
 
-  std::string why_not(const Ocp& ocp) const override { return solver_.why_not(ocp); }
-  void setup(const Ocp& ocp) override { solver_.setup(ocp); }
-  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override { solver_.prepare(ocp, guess); }
   using Solver::solve;
-  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override {
+  Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override {
     const auto begin = Ticks::now();
-    const Report report = solver_.solve(ocp, point, deadline);
-    our_shares.push_back(1.0 - solver_.backend_us() / Ticks::microseconds(begin, Ticks::now()));
+    const Report report = inner().solve(iterate, deadline);
+    our_shares.push_back(1.0 - ipopt_->backend_us() / Ticks::microseconds(begin, Ticks::now()));
     return report;
   }
-  void reset() noexcept override { solver_.reset(); }
+  Report feedback(Iterate& iterate, Clock::time_point deadline) noexcept override { return solve(iterate, deadline); }
 
  private:
+  explicit Observed(const std::shared_ptr<ipopt::IpoptSolver>& solver)
+      : SolverDecorator(solver), ipopt_(solver.get()) {}
   static ipopt::IpoptOptions options() {
     ipopt::IpoptOptions options;
     options.tolerance = tolerance;
     return options;
   }
-  ipopt::IpoptSolver solver_;
+  const ipopt::IpoptSolver* ipopt_;
 };
 
 /// Solves along a sequence; adds the times of all but the first sample.

@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "ticks.hpp"

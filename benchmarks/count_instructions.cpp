@@ -4,7 +4,7 @@
 #include <exception>
 #include <string>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rti_loop.hpp"
 
 namespace {

@@ -8,7 +8,8 @@
 #include <utility>
 
 #include "program.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/ocp/solver_decorator.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/scenario.hpp"
 #include "rhec/sim/spread.hpp"
@@ -23,29 +24,25 @@ struct Times {
 };
 
 /// Unlike the core's TimedSolver, on a clock for single microseconds, and of covariances too.
-class TickedSolver final : public Solver {
+class TickedSolver final : public SolverDecorator {
  public:
   TickedSolver(std::shared_ptr<Solver> solver, std::shared_ptr<Times> times)
-      : solver_(std::move(solver)), times_(std::move(times)) {}
-  std::string why_not(const Ocp& ocp) const override { return solver_->why_not(ocp); }
-  void setup(const Ocp& ocp) override { solver_->setup(ocp); }
-  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override { solver_->prepare(ocp, guess); }
-  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override {
+      : SolverDecorator(std::move(solver)), times_(std::move(times)) {}
+  using Solver::solve;
+  Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override {
     const auto begin = Ticks::now();
-    const Report report = solver_->solve(ocp, point, deadline);
+    const Report report = inner().solve(iterate, deadline);
     times_->solve.push_back(Ticks::microseconds(begin, Ticks::now()));
     return report;
   }
-  bool covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept override {
+  bool covariances(const Iterate& iterate, StageRange nodes, std::span<double> blocks) noexcept override {
     const auto begin = Ticks::now();
-    const bool are_there = solver_->covariances(ocp, point, nodes, blocks);
+    const bool are_there = inner().covariances(iterate, nodes, blocks);
     times_->covariance.push_back(Ticks::microseconds(begin, Ticks::now()));
     return are_there;
   }
-  void reset() noexcept override { solver_->reset(); }
 
  private:
-  std::shared_ptr<Solver> solver_;
   std::shared_ptr<Times> times_;
 };
 
@@ -80,7 +77,7 @@ class TimedMethod final : public EstimationMethod {
 void run(benchmark::State& state, Robot robot) {
   constexpr int settling = 30, steps = 200;
   const auto times = std::make_shared<Times>();
-  robot.wrap_solvers([times](OcpKind, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
+  robot.wrap_solvers([times](std::string_view, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
     return std::make_shared<TickedSolver>(std::move(solver), times);
   });
   robot.wrap_methods([times](std::unique_ptr<EstimationMethod> method) {

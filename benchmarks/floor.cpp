@@ -9,9 +9,9 @@
 
 #include "floor_kernels.hpp"
 #include "program.hpp"
-#include "rhec/core/error.hpp"
-#include "rhec/core/rhc_problem.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"
 
@@ -50,13 +50,13 @@ Moment choose_moment(const Host& host, const Sequence& sequence) {
     const Report& report = loop.step();
     if (k < count / 2 || report.factorisations > 1) continue;
     Moment moment{&loop.problem(), loop.guess(), loop.point()};
-    if (sequence.kind == OcpKind::rhc) {
+    if (sequence.kind == "rhc") {
       for (int i = 0; i <= loop.problem().intervals(); ++i)
         std::copy_n(loop.problem().initial_state() + 4, 2, moment.guess.state(i) + 4);
       moment.result = moment.guess;
       const auto solver = host.make_solver("gn_rti");
       solver->setup(loop.problem());
-      if (solver->solve(loop.problem(), moment.result).factorisations > 1) continue;
+      if (solver->solve(moment.result).factorisations > 1) continue;
     }
     if (!is_bound_active(moment)) return moment;
   }
@@ -175,9 +175,9 @@ void register_all() {
   for (const Sequence& sequence : sequences) {
     const int N = sequence.workspace->intervals();
     const bool blocked = sequence.name.find("/sbo") != std::string::npos;
-    if (sequence.kind == OcpKind::rhe && N == 14 && !blocked) add<14, floor::Estimation>(host, sequence, 6);
-    if (sequence.kind == OcpKind::rhe && N == 15 && !blocked) add<15, floor::Estimation>(host, sequence, 6);
-    if (sequence.kind == OcpKind::rhc && N == 15) add<15, floor::Control>(host, sequence, 4);
+    if (sequence.kind == "rhe" && N == 14 && !blocked) add<14, floor::Estimation>(host, sequence, 6);
+    if (sequence.kind == "rhe" && N == 15 && !blocked) add<15, floor::Estimation>(host, sequence, 6);
+    if (sequence.kind == "rhc" && N == 15) add<15, floor::Control>(host, sequence, 4);
   }
 }
 

@@ -12,7 +12,7 @@
 
 #include "long_problems.hpp"
 #include "program.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "rhec/core/rhc_problem.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/plugins/yaml.hpp"
 
 namespace rhec::bench {
@@ -53,7 +53,7 @@ void write_truth(const DriveOfTruth& drive, int first, const HorizonProblem& pro
   point.clear_multipliers();
   std::copy_n(drive.states[first].data(), 4, point.state(0));
   std::copy_n(drive.parameters[first].data(), 2, point.state(0) + 4);
-  problem.set_decisions(point, drive.inputs[first].data(), drive.parameters[first].data());
+  problem.structure().set_decisions(point, drive.inputs[first].data(), drive.parameters[first].data());
   for (int i = 1; i <= N; ++i) std::copy_n(drive.states[first + i].data(), 4, point.state(i));
 }
 
@@ -65,7 +65,7 @@ void finish(Sequence& sequence, const DriveOfTruth& drive) {
 }  // namespace
 
 Sequence long_estimation(const Host& host, int intervals, int samples, int block, Blocks blocks) {
-  Sequence made{.name = "long/rhe/" + std::to_string(intervals), .kind = OcpKind::rhe, .model = bicycle(host)};
+  Sequence made{.name = "long/rhe/" + std::to_string(intervals), .kind = "rhe", .model = bicycle(host)};
   const DriveOfTruth drive = drive_truth(*made.model, intervals + samples, block);
   const std::array<double, 3> output_sigma = {0.03, 0.03, 0.01745};
   const double input_sigma = 0.1;
@@ -115,7 +115,7 @@ Sequence long_estimation(const Host& host, int intervals, int samples, int block
 }
 
 Sequence long_control(const Host& host, int intervals, int samples) {
-  Sequence made{.name = "long/rhc/" + std::to_string(intervals), .kind = OcpKind::rhc, .model = bicycle(host)};
+  Sequence made{.name = "long/rhc/" + std::to_string(intervals), .kind = "rhc", .model = bicycle(host)};
   const DriveOfTruth drive = drive_truth(*made.model, intervals + samples, intervals + samples);
   RhcProblem::Setup setup;
   setup.max_intervals = intervals;

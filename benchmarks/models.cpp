@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "program.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"
 

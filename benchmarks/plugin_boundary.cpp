@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "program.hpp"
-#include "rhec/core/chosen_outputs.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/model/chosen_outputs.hpp"
 #include "rhec/plugins/manifest.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"

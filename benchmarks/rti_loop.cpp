@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/rhc_problem.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
 
 namespace rhec::bench {
 
@@ -40,14 +40,14 @@ const Report& RtiLoop::step() noexcept {
     shifter_.take(*problem_, std::move(point_));
     set_known(sample, *problem_);
     shifter_.apply(sample.steps, *problem_, point_);
-    solver_->prepare(*problem_, point_);
+    solver_->prepare(point_);
     if (looks_inside) times_.prepared = Ticks::now();
     if (keep_guess) guess_ = point_;
   }
   set_newest(*sample.problem, *problem_, scratch_);
-  report_ = solver_->feedback(*problem_, point_, Clock::time_point::max());
+  report_ = solver_->feedback(point_, Clock::time_point::max());
   if (looks_inside) times_.answered = Ticks::now();
-  solver_->finish(*problem_, point_, report_);
+  solver_->finish(point_, report_);
   times_.end = Ticks::now();
   ++next_;
   return report_;
@@ -62,8 +62,8 @@ std::vector<double> excess_objectives(const Sequence& sequence, const std::share
   for (std::size_t k = 0; k < sequence.samples.size(); ++k) {
     loop.step();
     Iterate stepped = loop.point(), optimum = loop.point();
-    if (sequence.kind == OcpKind::rhc) roll_out(loop.problem(), stepped, scratch);
-    const Report report = converging->solve(loop.problem(), optimum);
+    if (sequence.kind == "rhc") roll_out(loop.problem(), stepped, scratch);
+    const Report report = converging->solve(optimum);
     if (report.status != Status::solved)
       throw Error(sequence.name + ": sample " + std::to_string(k) + " does not converge: " + name_of(report.status));
     const double objective = loop.problem().evaluate(stepped, nullptr, scratch);

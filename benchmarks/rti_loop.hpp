@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "rhec/core/shift.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/horizon/shift.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "sequences.hpp"
 #include "ticks.hpp"
 

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "program.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"

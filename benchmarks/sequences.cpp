@@ -11,9 +11,9 @@
 #include <optional>
 #include <utility>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/rhc_problem.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/csv.hpp"
@@ -42,9 +42,9 @@ std::filesystem::path reference_folder() {
 
 void set_blocks(const RheProblem& from, RheProblem& to) noexcept {
   std::array<std::uint8_t, longest_horizon> begins;
-  for (int j = 0; j < from.channel_count(); ++j) {
-    for (int i = 0; i < from.intervals(); ++i) begins[i] = from.begins(i, j);
-    to.set_blocks(j, begins.data(), from.is_ramp(j) ? Transition::ramp : Transition::step);
+  for (int j = 0; j < from.structure().lifted_count(); ++j) {
+    for (int i = 0; i < from.intervals(); ++i) begins[i] = from.structure().starts_block(i, j);
+    to.set_blocks(j, begins.data(), from.structure().is_ramp(j) ? Transition::ramp : Transition::step);
     for (int i = 0; i < from.intervals(); ++i)
       if (begins[i]) to.link(i, j, from.link_variance(i, j));
   }
@@ -103,7 +103,7 @@ bool slides(const HorizonProblem& before, const HorizonProblem& after) {
 
 void set_known(const Sequence::Sample& sample, HorizonProblem& to) noexcept {
   const HorizonProblem& from = *sample.problem;
-  if (from.kind() == OcpKind::rhe) {
+  if (from.kind() == "rhe") {
     set_known(static_cast<const RheProblem&>(from), sample.slides, static_cast<RheProblem&>(to));
     return;
   }
@@ -114,7 +114,7 @@ void set_known(const Sequence::Sample& sample, HorizonProblem& to) noexcept {
 }
 
 void set_newest(const HorizonProblem& from, HorizonProblem& to, std::span<double> scratch) noexcept {
-  if (from.kind() == OcpKind::rhc) {
+  if (from.kind() == "rhc") {
     set_newest(static_cast<const RhcProblem&>(from), static_cast<RhcProblem&>(to), scratch);
     return;
   }
@@ -172,7 +172,7 @@ std::vector<std::vector<ProblemRecord>> record(const Host& host, const Drive& ho
                      const Report&) {
     if (step < problem.capacity().intervals) return;
     try {
-      const std::string kind = problem.kind() == OcpKind::rhe ? "rhe" : "rhc";
+      const std::string kind = problem.kind() == "rhe" ? "rhe" : "rhc";
       auto& kept = records[kind];
       if (!kept.empty() && kept.back().step == step) kept.pop_back();  // of several solves the last one counts
       const std::string id = how.name + "/" + kind + "/" + std::to_string(step);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/horizon_problem.hpp"
+#include "rhec/core/horizon/horizon_problem.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/sim/problem_file.hpp"
 
@@ -14,7 +14,7 @@ namespace rhec::bench {
 /// Problems that follow each other over time, all of one structure, and where the first solve begins.
 struct Sequence {
   std::string name;  ///< "gentle/rhe/fhb", "figure8/rhc"
-  OcpKind kind{};
+  std::string kind;
   std::shared_ptr<const Model> model;
   struct Sample {
     std::unique_ptr<const HorizonProblem> problem;

@@ -2,7 +2,7 @@
 // for.
 #include "two_axle_steering.hpp"
 
-#include "rhec/core/formula_model.hpp"
+#include "rhec/core/model/formula_model.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

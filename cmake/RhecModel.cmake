@@ -4,7 +4,7 @@ if(NOT xsimd_FOUND)
   message(STATUS "rhec: xsimd was not found (package libxsimd-dev): models evaluate one stage at a time")
 endif()
 
-# Instruction sets that models are also compiled for, and what the compiler must be told; rhec/core/formula_model.hpp asks
+# Instruction sets that models are also compiled for, and what the compiler must be told; rhec/core/model/formula_model.hpp asks
 # the machine for all of it before it uses them.
 set(RHEC_WIDE_FLAGS_avx2 -mavx2 -mfma)
 set(RHEC_WIDE_FLAGS_avx512 ${RHEC_WIDE_FLAGS_avx2} -mavx512f -mavx512cd -mavx512dq -mavx512bw -mavx512vl)
@@ -27,7 +27,7 @@ function(rhec_add_wide_kernels TARGET PREFIX)
       set(TABLE ${PREFIX}_kernels_${SET})
       file(CONFIGURE OUTPUT "${UNIT}" CONTENT "\
 #define RHEC_PACK_NAMESPACE xsimd_${SET}
-#include \"rhec/core/pack.hpp\"
+#include \"rhec/core/model/pack.hpp\"
 
 #include \"${HEADER}\"
 
@@ -56,7 +56,7 @@ constinit const ModelKernels ${TABLE} = make_model_kernels<${ARG_FORMULA}, Wides
   endif()
   list(JOIN MEMBERS ", " MEMBERS)
   file(CONFIGURE OUTPUT "${FOLDER}/wide_kernels.cpp" CONTENT "\
-#include \"rhec/core/formula_model.hpp\"
+#include \"rhec/core/model/formula_model.hpp\"
 
 namespace rhec {
 ${DECLARATIONS}

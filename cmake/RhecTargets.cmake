@@ -20,22 +20,63 @@ if(RHEC_SANITIZE)
   target_link_options(rhec_flags INTERFACE -fsanitize=address,undefined)
 endif()
 
-# rhec_add_library(NAME FLOOR DIR SOURCES ... PUBLIC ... PRIVATE ...)
-#   A shared library `rhec_<NAME>` with the alias `rhec::<NAME>`, headers in <folder>/include.
+# rhec_add_room(FLOOR ROOM [INTERNAL] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
+#   A room of a floor's library, in its own folder: the target `rhec_<FLOOR>_<ROOM>`. It sees the public headers of the rooms
+#   of the same floor that it comes AFTER, and of those that they come after, and no others. The headers in <folder>/include
+#   are installed, those of an INTERNAL room are not.
+function(rhec_add_room FLOOR ROOM)
+  cmake_parse_arguments(PARSE_ARGV 2 ARG "INTERNAL" "" "AFTER;SOURCES;PUBLIC;PRIVATE")
+  if(ARG_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "rhec_add_room(${FLOOR} ${ROOM}): what is '${ARG_UNPARSED_ARGUMENTS}'?")
+  endif()
+  set(TARGET rhec_${FLOOR}_${ROOM})
+  list(TRANSFORM ARG_AFTER PREPEND rhec_${FLOOR}_)
+  set(HEADERS "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>")
+  if(ARG_SOURCES)
+    add_library(${TARGET} OBJECT ${ARG_SOURCES})
+    target_include_directories(${TARGET} PUBLIC "${HEADERS}")
+    target_link_libraries(${TARGET} PUBLIC ${ARG_AFTER} ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} rhec_flags)
+    target_compile_features(${TARGET} PUBLIC cxx_std_20)
+    rhec_add_objects(${FLOOR} ${TARGET})
+  else()
+    add_library(${TARGET} INTERFACE)
+    target_include_directories(${TARGET} INTERFACE "${HEADERS}")
+    target_link_libraries(${TARGET} INTERFACE ${ARG_AFTER} ${ARG_PUBLIC})
+    target_compile_features(${TARGET} INTERFACE cxx_std_20)
+  endif()
+  if(NOT ARG_INTERNAL)
+    set_property(GLOBAL APPEND PROPERTY RHEC_HEADERS_${FLOOR} "${CMAKE_CURRENT_SOURCE_DIR}/include")
+    install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  endif()
+endfunction()
+
+# rhec_add_objects(FLOOR TARGET): what an object library has compiled becomes part of a floor's library.
+function(rhec_add_objects FLOOR TARGET)
+  set_property(GLOBAL APPEND PROPERTY RHEC_OBJECTS_${FLOOR} "$<TARGET_OBJECTS:${TARGET}>")
+endfunction()
+
+# rhec_add_library(NAME [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
+#   A shared library `rhec_<NAME>` with the alias `rhec::<NAME>`: of its rooms, or of sources with headers in
+#   <folder>/include.
 function(rhec_add_library NAME)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
-  add_library(rhec_${NAME} SHARED ${ARG_SOURCES})
+  get_property(OBJECTS GLOBAL PROPERTY RHEC_OBJECTS_${NAME})
+  get_property(HEADERS GLOBAL PROPERTY RHEC_HEADERS_${NAME})
+  if(ARG_SOURCES)
+    list(APPEND HEADERS "${CMAKE_CURRENT_SOURCE_DIR}/include")
+    set_property(GLOBAL APPEND PROPERTY RHEC_HEADERS_${NAME} "${CMAKE_CURRENT_SOURCE_DIR}/include")
+    install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  endif()
+  add_library(rhec_${NAME} SHARED ${ARG_SOURCES} ${OBJECTS})
   add_library(rhec::${NAME} ALIAS rhec_${NAME})
   target_include_directories(rhec_${NAME} PUBLIC
-    "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>"
-    "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
+    "$<BUILD_INTERFACE:${HEADERS}>" "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
   target_link_libraries(rhec_${NAME} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} "$<BUILD_INTERFACE:rhec_flags>")
   target_compile_features(rhec_${NAME} PUBLIC cxx_std_20)
   set_target_properties(rhec_${NAME} PROPERTIES
-    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+    LINKER_LANGUAGE CXX VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
     EXPORT_NAME ${NAME} INSTALL_RPATH "$ORIGIN")
   install(TARGETS rhec_${NAME} EXPORT rhecTargets LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
-  install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 endfunction()
 
 include("${CMAKE_CURRENT_LIST_DIR}/RhecPlugin.cmake")

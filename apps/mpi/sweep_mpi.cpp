@@ -20,7 +20,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "sweep_ranks.hpp"
 
 namespace rhec::apps {

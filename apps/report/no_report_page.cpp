@@ -1,6 +1,6 @@
 // A build without the page (-DRHEC_REPORT=OFF).
 #include "report_page.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::apps {
 

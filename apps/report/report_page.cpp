@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "embedded.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "svg_engine.hpp"
 
 namespace rhec::apps {

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "embedded.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::apps {
 

@@ -2,7 +2,7 @@
 // have a border somewhere, which would slide through the window once in a while.
 #include <algorithm>
 
-#include "rhec/core/blocking.hpp"
+#include "rhec/core/horizon/blocking.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

@@ -1,7 +1,7 @@
 // Blocks of given lengths: move blocking as it is usually written, e.g. [1, 1, 3, 5].
 #include <algorithm>
 
-#include "rhec/core/linked_blocking.hpp"
+#include "rhec/core/horizon/linked_blocking.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "rhec/core/linked_blocking.hpp"
+#include "rhec/core/horizon/linked_blocking.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

@@ -1,7 +1,7 @@
 // A value for every interval.
 #include <algorithm>
 
-#include "rhec/core/linked_blocking.hpp"
+#include "rhec/core/horizon/linked_blocking.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

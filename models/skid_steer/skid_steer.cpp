@@ -1,7 +1,7 @@
 // The skid-steered vehicle as a plugin: names, units and bounds of what is in its formula.
 #include "skid_steer.hpp"
 
-#include "rhec/core/formula_model.hpp"
+#include "rhec/core/model/formula_model.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "rhec/core/formula_model.hpp"
+#include "rhec/core/model/formula_model.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

@@ -1,7 +1,7 @@
 // The unicycle with traction coefficients as a plugin: names, units and bounds of what is in its formula.
 #include "unicycle_traction.hpp"
 
-#include "rhec/core/formula_model.hpp"
+#include "rhec/core/model/formula_model.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

@@ -10,8 +10,8 @@
 #include <mutex>
 
 #include "library.hpp"
-#include "rhec/core/chosen_outputs.hpp"
-#include "rhec/core/options.hpp"
+#include "rhec/core/config/options.hpp"
+#include "rhec/core/model/chosen_outputs.hpp"
 
 namespace rhec {
 namespace {

@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/filter_estimation.hpp"
-#include "rhec/core/receding_horizon_estimation.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/plugins/yaml.hpp"
 
 namespace rhec {
@@ -406,8 +406,8 @@ std::vector<RobustLoss> Robot::read_robust(const Settings& section, const std::s
 
 PluginChoice Robot::model_choice() const { return choice_of(options_.model, default_model); }
 
-PluginChoice Robot::solver_choice(OcpKind kind) const {
-  return choice_of(kind == OcpKind::rhe ? estimator_.solver : controller_.solver, default_solver);
+PluginChoice Robot::solver_choice(std::string_view kind) const {
+  return choice_of(kind == "rhe" ? estimator_.solver : controller_.solver, default_solver);
 }
 
 PluginChoice Robot::blocking_choice(int parameter) const {
@@ -420,13 +420,13 @@ void Robot::wrap_solvers(SolverWrap wrap) {
     wrap_ = std::move(wrap);
     return;
   }
-  wrap_ = [inner = std::move(wrap_), outer = std::move(wrap)](OcpKind kind, std::shared_ptr<Solver> solver) {
+  wrap_ = [inner = std::move(wrap_), outer = std::move(wrap)](std::string_view kind, std::shared_ptr<Solver> solver) {
     return outer(kind, inner(kind, std::move(solver)));
   };
 }
 
-std::shared_ptr<Solver> Robot::make_solver(OcpKind kind) const {
-  const Settings& section = kind == OcpKind::rhe ? estimator_.solver : controller_.solver;
+std::shared_ptr<Solver> Robot::make_solver(std::string_view kind) const {
+  const Settings& section = kind == "rhe" ? estimator_.solver : controller_.solver;
   auto solver = made_from(
       section, [&] { return host_.make_solver(plugin_name(section, default_solver), plugin_options(section)); });
   return wrap_ ? wrap_(kind, std::move(solver)) : solver;
@@ -478,7 +478,7 @@ std::unique_ptr<EstimationMethod> Robot::make_receding_horizon(const Eigen::Vect
   setup.initial_mean = mean;
   setup.initial_covariance = covariance;
   setup.heading_starts = estimator_.heading_starts;
-  auto solver = make_solver(OcpKind::rhe);
+  auto solver = make_solver("rhe");
   return std::make_unique<RecedingHorizonEstimation>(model_, std::move(solver), std::move(setup));
 }
 
@@ -577,7 +577,7 @@ std::unique_ptr<Controller> Robot::make_controller(const Path& path) const {
           "an input jumps from block to block and no walk links its blocks; drop transition and neighbour_sigma");
     setup.blockings.push_back(std::move(blocking));
   }
-  auto solver = make_solver(OcpKind::rhc);
+  auto solver = make_solver("rhc");
   return std::make_unique<Controller>(model_, std::move(solver), path, std::move(setup));
 }
 

@@ -2,7 +2,7 @@
 // of the vehicle, and the line that makes a plugin of it. Try it with: rhec plugins articulated
 #include "articulated.hpp"
 
-#include "rhec/core/formula_model.hpp"
+#include "rhec/core/model/formula_model.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec {

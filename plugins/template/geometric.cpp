@@ -3,10 +3,10 @@
 // far away.
 //
 // To write one of your own: change the options, `starts`, and the two names in RHEC_PLUGIN. What `starts` has to do is
-// in rhec/core/blocking.hpp. Try it with: rhec plugins geometric
+// in rhec/core/horizon/blocking.hpp. Try it with: rhec plugins geometric
 #include <algorithm>
 
-#include "rhec/core/linked_blocking.hpp"
+#include "rhec/core/horizon/linked_blocking.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace {

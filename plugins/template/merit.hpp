@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "rhec/core/ocp.hpp"
+#include "rhec/core/ocp/ocp.hpp"
 
 /// What plain_sqp minimises along a step: the objective, an augmented Lagrangian of the bounds (Nocedal & Wright,
 /// Numerical Optimization, 17.4) and a price on defects of the dynamics,

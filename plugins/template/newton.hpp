@@ -3,9 +3,9 @@
 #include <limits>
 
 #include "merit.hpp"
-#include "rhec/core/point.hpp"
-#include "rhec/core/riccati.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/qp/riccati.hpp"
 
 /// The method of plain_sqp: Newton's on the dynamics and on an augmented Lagrangian of the bounds, by the core's
 /// Riccati recursion, with a line search on Merit.
@@ -30,7 +30,7 @@ class Newton {
   Status minimise(const Ocp& ocp, double tolerance, int max_iterations, rhec::Clock::time_point deadline,
                   rhec::Report& report) noexcept {
     // Residuals are small in estimation, where Gauss-Newton's curvature serves; under slip they are large in control.
-    const bool exact = ocp.kind() == rhec::OcpKind::rhc && ocp.has_second_derivatives();
+    const bool exact = ocp.preferred_hessian() == rhec::Hessian::exact;
     merit.price = 0.0;
     merit.multipliers = best;
     double curvature = 0.0, damping = 0.0, outside_before = std::numeric_limits<double>::infinity();

@@ -1,6 +1,6 @@
 // A solver: sequential quadratic programming with a line search; the method is in newton.hpp. To write one of your own,
 // replace that, and change the options and the names in RHEC_PLUGIN. What a solver owes its caller is in
-// rhec/core/solver.hpp.
+// rhec/core/ocp/solver.hpp.
 //
 // What this one does not do: prepare before the newest data come, remember more from solve to solve than the point
 // does, give covariances, take stages wider than the Riccati recursion does, or solve everything: from far guesses over
@@ -34,29 +34,31 @@ class PlainSqp : public rhec::Solver {
     return "a stage has more than " + std::to_string(rhec::Riccati::max_width) + " states or controls";
   }
 
-  /// All memory is set aside here, for every problem of this capacity.
+  /// The problem that is solved from here on; all memory is set aside for its capacity.
   void setup(const rhec::Ocp& ocp) override {
     if (const std::string reason = why_not(ocp); !reason.empty()) throw rhec::Error("solver 'plain_sqp': " + reason);
+    ocp_ = &ocp;
     newton_ = Newton(ocp);
   }
 
-  void prepare(const rhec::Ocp&, const rhec::Iterate&) noexcept override {}
+  void prepare(const rhec::Iterate&) noexcept override {}
   void reset() noexcept override {}
 
-  rhec::Report solve(const rhec::Ocp& ocp, rhec::Iterate& point, rhec::Clock::time_point deadline) noexcept override {
+  using Solver::solve;
+  rhec::Report solve(rhec::Iterate& iterate, rhec::Clock::time_point deadline) noexcept override {
     rhec::Report report;  // of status bad_input
-    if (ocp.capacity() == newton_.qp.capacity() && is_sound_start(ocp, point, newton_.merit.scratch)) {
-      newton_.best = point;
-      if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), newton_.best.state(0));
-      report.status = newton_.minimise(ocp, options_.tolerance, options_.max_iterations, deadline, report);
-      if (report.status != rhec::Status::infeasible) point = newton_.best;
-      judge(ocp, point, newton_.qp, newton_.merit.scratch, report);  // the core says what the point is worth
-    }
+    if (!ocp_ || !is_sound_start(*ocp_, iterate, newton_.merit.scratch)) return report;
+    newton_.best = iterate;
+    if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), newton_.best.state(0));
+    report.status = newton_.minimise(*ocp_, options_.tolerance, options_.max_iterations, deadline, report);
+    if (report.status != rhec::Status::infeasible) iterate = newton_.best;
+    judge(*ocp_, iterate, newton_.qp, newton_.merit.scratch, report);  // the core says what the iterate is worth
     return report;
   }
 
  private:
   Options options_;
+  const rhec::Ocp* ocp_ = nullptr;
   Newton newton_;
 };
 

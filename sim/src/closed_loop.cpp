@@ -8,7 +8,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/base/angle.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -214,6 +215,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     }
     begin(LoopPart::simulate);
   }
+  controller->finish();
   begin(LoopPart::end);
   return log;
 }

@@ -10,11 +10,12 @@
 
 #include <fmt/format.h>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/kkt.hpp"
-#include "rhec/core/point.hpp"
-#include "rhec/core/rhc_problem.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/base/angle.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/qp/kkt.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -35,13 +36,24 @@ struct Recorded {
   bool reference_is_usable = false;
 };
 
-/// The recorded problems by kind.
-using Records = std::map<OcpKind, std::vector<Recorded>>;
+/// The recorded problems by kind of problem, in the order in which a loop first poses them: estimation, then control.
+using Records = std::vector<std::pair<std::string, std::vector<Recorded>>>;
 
-std::unique_ptr<const HorizonProblem> copy_of(const HorizonProblem& problem) {
+std::vector<Recorded>& of_kind(Records& records, std::string_view kind) {
+  const auto at = std::ranges::find(records, kind, &Records::value_type::first);
+  return at != records.end() ? at->second : records.emplace_back(kind, std::vector<Recorded>{}).second;
+}
+
+std::unique_ptr<HorizonProblem> copy_of(const HorizonProblem& problem) {
   if (const auto* rhe = dynamic_cast<const RheProblem*>(&problem)) return std::make_unique<RheProblem>(*rhe);
   if (const auto* rhc = dynamic_cast<const RhcProblem*>(&problem)) return std::make_unique<RhcProblem>(*rhc);
   throw Error("compare: a problem that is neither an RheProblem nor an RhcProblem cannot be kept");
+}
+
+/// Into a copy of a problem of the same run.
+void take_data(const HorizonProblem& from, HorizonProblem& to) {
+  if (auto* rhe = dynamic_cast<RheProblem*>(&to)) rhe->take_data(dynamic_cast<const RheProblem&>(from));
+  if (auto* rhc = dynamic_cast<RhcProblem*>(&to)) rhc->take_data(dynamic_cast<const RhcProblem&>(from));
 }
 
 Settings section_of(const Backend& backend, const Settings& options) {
@@ -97,7 +109,7 @@ RunSummary record(const Task& task, std::int64_t seed, int every, Records& recor
       kept.guess = guess;
       kept.reference = result;
       kept.reference_is_usable = is_usable(report.status);
-      records[problem.kind()].push_back(std::move(kept));
+      of_kind(records, problem.kind()).push_back(std::move(kept));
     } catch (const std::exception&) {
       failure = std::current_exception();  // a solver must not throw
     }
@@ -128,7 +140,8 @@ class Bench {
   std::string why_not(const Recorded& record) {
     if (solver_->why_not(*record.problem).empty() && (!ready_ || seed_ != record.place.seed)) {
       if (ready_) make();
-      solver_->setup(*record.problem);
+      problem_ = copy_of(*record.problem);
+      solver_->setup(*problem_);
       ready_ = true;
       seed_ = record.place.seed;
     }
@@ -138,9 +151,10 @@ class Bench {
   /// Puts the answer into `point`.
   Answer solve(const Recorded& record, Iterate& point) {
     point = record.guess;
+    take_data(*record.problem, *problem_);
     const auto start = Clock::now();
-    solver_->prepare(*record.problem, point);
-    const Report report = solver_->solve(*record.problem, point);
+    solver_->prepare(point);
+    const Report report = solver_->solve(point);
     const double time = microseconds_since(start);
     Answer answer;
     answer.status = report.status;
@@ -157,6 +171,7 @@ class Bench {
   const Backend* backend_;
   Settings options_;
   std::shared_ptr<Solver> solver_;
+  std::unique_ptr<HorizonProblem> problem_;  ///< that the solver is set up for
   bool ready_ = false;
   std::int64_t seed_ = 0;
 };
@@ -186,7 +201,7 @@ class Judge {
 
   /// The point that counts: an estimate as it is, a plan by what its inputs do.
   void make_judged(Iterate& point) {
-    if (problem_->kind() == OcpKind::rhc) roll_out(*problem_, point, scratch_);
+    if (problem_->can_roll_out()) roll_out(*problem_, point, scratch_);
   }
 
   struct Verdict {
@@ -238,13 +253,13 @@ class Judge {
     row_.resize(std::max({nx, about.inputs.size(), about.parameters.size()}));
     other_row_.resize(row_.size());
     for (int i = 0; i <= problem_->intervals(); ++i) {
-      compare(about.states, problem_->vehicle_state(a, i), problem_->vehicle_state(b, i));
+      compare(about.states, a.state(i), b.state(i));
       if (i == problem_->intervals()) break;
-      problem_->inputs_on(a, i, row_.data());
-      problem_->inputs_on(b, i, other_row_.data());
+      problem_->structure().inputs_on(a, i, row_.data());
+      problem_->structure().inputs_on(b, i, other_row_.data());
       compare(about.inputs, row_.data(), other_row_.data());
-      problem_->parameters_on(a, i, row_.data());
-      problem_->parameters_on(b, i, other_row_.data());
+      problem_->structure().parameters_on(a, i, row_.data());
+      problem_->structure().parameters_on(b, i, other_row_.data());
       compare(about.parameters, row_.data(), other_row_.data());
     }
     // An estimator's window may have no interval yet; its parameters then stand in the first stage state.
@@ -338,9 +353,9 @@ Settings tighten(const Host& host, const Backend& backend, double accuracy, cons
 // ---- the two parts
 
 /// Options that each backend was left with, by kind.
-using Tuned = std::map<OcpKind, std::vector<Settings>>;
+using Tuned = std::map<std::string, std::vector<Settings>>;
 
-SameProblems solve_same_problems(Task& task, OcpKind kind, const std::vector<Recorded>& records,
+SameProblems solve_same_problems(Task& task, std::string_view kind, const std::vector<Recorded>& records,
                                  const std::vector<Settings>& options, SameProblems result) {
   const std::vector<Backend>& backends = task.options.backends;
   const std::size_t count = backends.size();
@@ -419,17 +434,16 @@ BackendRuns drive(Task& task, std::size_t index, const Comparison& comparison, c
   BackendRuns result;
   for (const SameProblems& same : comparison.problems) {
     if (const BackendAnswers& answers = same.backends[index]; answers.refused > 0)
-      result.refusal =
-          fmt::format("{} problems: {}", same.kind == OcpKind::rhe ? "estimation" : "control", answers.refusal);
+      result.refusal = fmt::format("{} problems: {}", same.kind == "rhe" ? "estimation" : "control", answers.refusal);
   }
-  const auto options_for = [&](OcpKind kind) {
+  const auto options_for = [&](const std::string& kind) {
     const auto at = tuned.find(kind);
     return at == tuned.end() ? backend.options : at->second[index];
   };
   for (const std::int64_t seed : task.seeds) {
     if (result.refusal.empty()) {
       const Scenario scenario =
-          scenario_with(task.host, task.scenario, seed, backend, options_for(OcpKind::rhe), options_for(OcpKind::rhc));
+          scenario_with(task.host, task.scenario, seed, backend, options_for("rhe"), options_for("rhc"));
       LoopHooks hooks;
       hooks.progress = [&](double share) { task.show(share); };
       result.runs.push_back(summarise(run_closed_loop(scenario, hooks), scenario));

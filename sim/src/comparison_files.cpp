@@ -14,8 +14,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* name_of(OcpKind kind) { return kind == OcpKind::rhe ? "rhe" : "rhc"; }
-
 Json json_of(const Spread& spread) { return {{"median", spread.median}, {"p99", spread.p99}, {"max", spread.max}}; }
 
 Json json_of(const Backend& backend) {
@@ -149,7 +147,7 @@ void draw_panel(Svg& svg, const SameProblems& same, const Decades& decades, doub
     return left + (std::log10(time) - decades.lower) / (decades.upper - decades.lower) * panel_width;
   };
   const auto y_of = [](double share) { return top + (1.0 - share) * panel_height; };
-  svg.text({left, top - 10.0}, same.kind == OcpKind::rhe ? "Estimation (RHE)" : "Control (RHC)",
+  svg.text({left, top - 10.0}, same.kind == "rhe" ? "Estimation (RHE)" : "Control (RHC)",
            R"(font-size="12.5" font-weight="bold" fill="#222")");
   for (int decade = decades.lower; decade <= decades.upper; ++decade) {
     for (int digit = 2; digit < 10 && decade < decades.upper; ++digit) {
@@ -200,7 +198,7 @@ std::string comparison_json(const Comparison& comparison) {
   json["reference"]["runs"] = json_of(comparison.reference_runs, comparison.seeds);
   json["same_problems"] = Json::object();
   for (const SameProblems& same : comparison.problems) {
-    Json& kind = json["same_problems"][name_of(same.kind)];
+    Json& kind = json["same_problems"][same.kind];
     kind["problems"] = same.problems.size();
     kind["without_best"] = same.without_best;
     kind["solvers"] = Json::array();
@@ -247,7 +245,7 @@ std::string comparison_svg(const Comparison& comparison) {
     return right - column * (2.0 * (panels - 1.0 - static_cast<double>(kind)) + 1.0 - number);
   };
   for (std::size_t k = 0; k < comparison.problems.size(); ++k) {
-    const char* kind = name_of(comparison.problems[k].kind);
+    const std::string& kind = comparison.problems[k].kind;
     end_text(column_end(k, 0), line - legend_step, fmt::format("{} median", kind), "#5f6368");
     end_text(column_end(k, 1), line - legend_step, "99 %", "#5f6368");
   }

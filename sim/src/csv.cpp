@@ -12,7 +12,7 @@
 #include <optional>
 #include <system_error>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {

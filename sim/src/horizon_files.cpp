@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "number_text.hpp"
-#include "rhec/core/rhc_problem.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/sim/horizon_log.hpp"
 #include "rhec/sim/problem_file.hpp"
 
@@ -102,8 +102,8 @@ Json settings_of(const Robot& robot, bool has_controller) {
     blocking["transition"] = blockings[j]->transition() == Transition::ramp ? "ramp" : "step";
     list.push_back(std::move(blocking));
   }
-  json["solvers"]["rhe"] = json_of(robot.solver_choice(OcpKind::rhe));
-  json["solvers"]["rhc"] = has_controller ? json_of(robot.solver_choice(OcpKind::rhc)) : Json(nullptr);
+  json["solvers"]["rhe"] = json_of(robot.solver_choice("rhe"));
+  json["solvers"]["rhc"] = has_controller ? json_of(robot.solver_choice("rhc")) : Json(nullptr);
   return json;
 }
 

@@ -144,7 +144,7 @@ struct HorizonLog::Parts {
     begins.assign(static_cast<std::size_t>(farther), 0);
     view.first_start = blocking.starts(window, begins.data());
     for (int i = 0; i < N; ++i)
-      if (i == 0 || problem.begins(i, parameter)) view.starts.push_back(window.first + i);
+      if (i == 0 || problem.structure().starts_block(i, parameter)) view.starts.push_back(window.first + i);
     if (blocking.is_one_block()) return view;
     // Starts that a later look at the same intervals finds beside those of now are there already, but for an overlap
     // that holds them back. Of a blocking whose borders move with the window nothing of the kind can be said.
@@ -155,7 +155,7 @@ struct HorizonLog::Parts {
     });
     if (!borders_stay) return view;
     for (int i = 1; i < N; ++i)
-      if (begins[static_cast<std::size_t>(i)] && !problem.begins(i, parameter))
+      if (begins[static_cast<std::size_t>(i)] && !problem.structure().starts_block(i, parameter))
         view.suppressed.push_back(window.first + i);
     for (int i = N; i < farther && view.next_start < 0; ++i)
       if (begins[static_cast<std::size_t>(i)]) view.next_start = window.first + i;
@@ -173,7 +173,7 @@ struct HorizonLog::Parts {
       scratch.assign(problem.scratch_size(), 0.0);
       covariances.assign(static_cast<std::size_t>(capacity.intervals + 1) * capacity.states * capacity.states, 0.0);
     }
-    problem.prepare(method.solution(), Hessian::gauss_newton, qp, scratch);
+    problem.linearise(all_stages(problem), method.solution(), Hessian::gauss_newton, qp, scratch);
     riccati.factor(qp, no_bounds);
     riccati.covariances(qp, covariances.data(), nullptr);
   }
@@ -203,12 +203,14 @@ struct HorizonLog::Parts {
     row.resize(static_cast<std::size_t>(N) * std::max(nu, np));
     line.key("input");
     line.open('[');
-    for (int i = 0; i < N; ++i) problem.inputs_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * nu);
+    for (int i = 0; i < N; ++i)
+      problem.structure().inputs_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * nu);
     for (int j = 0; j < nu; ++j) line.column(N, input_decimals[j], [&](int i) { return row[i * nu + j]; });
     line.close(']');
     line.key("blocks");
     line.open('[');
-    for (int i = 0; i < N; ++i) problem.parameters_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * np);
+    for (int i = 0; i < N; ++i)
+      problem.structure().parameters_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * np);
     for (int j = 0; j < np && N > 0; ++j) {
       const BlocksInView view = blocks_of(problem, window, j);
       const int count = static_cast<int>(view.starts.size());
@@ -269,7 +271,8 @@ struct HorizonLog::Parts {
     for (int j = 0; j < nx; ++j) line.column(N + 1, state_decimals[j], [&](int i) { return plan.state(i)[j]; });
     line.close(']');
     row.resize(static_cast<std::size_t>(N) * nu);
-    for (int i = 0; i < N; ++i) problem.inputs_on(plan, i, row.data() + static_cast<std::ptrdiff_t>(i) * nu);
+    for (int i = 0; i < N; ++i)
+      problem.structure().inputs_on(plan, i, row.data() + static_cast<std::ptrdiff_t>(i) * nu);
     line.key("input");
     line.open('[');
     for (int j = 0; j < nu; ++j) line.column(N, input_decimals[j], [&](int i) { return row[i * nu + j]; });

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "model_checks.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/derivative_check.hpp"
 
 namespace rhec::sim {

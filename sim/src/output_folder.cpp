@@ -7,7 +7,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace fs = std::filesystem;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/csv.hpp"
 
 namespace rhec::sim {

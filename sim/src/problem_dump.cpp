@@ -4,12 +4,10 @@
 
 #include <fmt/format.h>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {
-
-const char* name_of(OcpKind kind) { return kind == OcpKind::rhe ? "rhe" : "rhc"; }
 
 /// As one word of a shell.
 std::string quoted(const std::string& text) {
@@ -29,10 +27,10 @@ std::string command_of(const PluginChoice& solver) {
 
 }  // namespace
 
-ProblemDump::ProblemDump(const std::filesystem::path& folder, const std::vector<OcpKind>& kinds, int every)
+ProblemDump::ProblemDump(const std::filesystem::path& folder, const std::vector<std::string>& kinds, int every)
     : folder_(folder), every_(every) {
-  for (const OcpKind kind : kinds) {
-    const std::string name = fmt::format("{}.jsonl", name_of(kind));
+  for (const std::string& kind : kinds) {
+    const std::string name = fmt::format("{}.jsonl", kind);
     Stream& stream = streams_[kind];
     stream.path = folder_.path() / name;
     stream.file.open(folder_.file(name), std::ios::binary | std::ios::trunc);
@@ -53,10 +51,10 @@ decltype(LoopHooks::solved) ProblemDump::watch(const std::string& run, const Rob
 
 void ProblemDump::take(const std::string& run, const Robot& robot, std::int64_t step, const HorizonProblem& problem,
                        const Iterate& guess, const Report& report) {
-  const auto at = streams_.find(problem.kind());
+  const auto at = streams_.find(std::string(problem.kind()));
   if (at == streams_.end()) return;
   Stream& stream = at->second;
-  const std::string prefix = fmt::format("{}/{}", run, name_of(problem.kind()));
+  const std::string prefix = fmt::format("{}/{}", run, problem.kind());
   if (stream.step != step || stream.prefix != prefix) {
     end_step(stream);
     stream.prefix = prefix;

@@ -13,10 +13,10 @@
 #include <set>
 #include <utility>
 
-#include "rhec/core/kkt.hpp"
-#include "rhec/core/option_values.hpp"
-#include "rhec/core/rhc_problem.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/config/option_values.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/core/qp/kkt.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -202,7 +202,7 @@ void read_version(const Value& line, ProblemRecord& record) {
 }
 
 void check_keys(const Value& line, const ProblemRecord& record) {
-  if (record.kind == OcpKind::rhe) {
+  if (record.kind == "rhe") {
     line.allow({"version", "id", "problem", "model", "horizon", "arrival", "outputs", "inputs", "weights", "bounds",
                 "block_starts"},
                {"robust", "neighbour_variance", "transition", "guess", "origin"}, record.version);
@@ -216,7 +216,7 @@ void check_keys(const Value& line, const ProblemRecord& record) {
 void read_horizon(const Value& horizon, ProblemRecord& record) {
   horizon.allow({"intervals", "dt", "integrator", "substeps"});
   // Before an estimator's second node its window has no interval yet.
-  const bool may_be_empty = record.version >= 2 && record.kind == OcpKind::rhe;
+  const bool may_be_empty = record.version >= 2 && record.kind == "rhe";
   record.intervals = horizon["intervals"].integer(may_be_empty ? 0 : 1);
   const auto N = static_cast<std::size_t>(record.intervals);
   const Value dt = horizon["dt"];
@@ -252,8 +252,7 @@ void read_bounds(const Value& bounds, ProblemRecord& record) {
     constexpr std::string_view expected = "[lower, upper], null for none";
     const std::vector<Value> sides = pair.items(expected);
     if (sides.size() != 2) throw pair.mismatch(expected);
-    const bool by_interval =
-        record.version >= 2 && record.kind == OcpKind::rhc && (sides[0].is_list() || sides[1].is_list());
+    const bool by_interval = record.version >= 2 && record.kind == "rhc" && (sides[0].is_list() || sides[1].is_list());
     const std::size_t count = by_interval ? static_cast<std::size_t>(record.intervals) : 1;
     const auto read = [&](const Value& side, double none) {
       return by_interval ? read_side(side, none, count) : std::vector<double>{side.number_or(none)};
@@ -779,7 +778,7 @@ ProblemRecord read_problem(std::string_view text, const std::string& file, int l
   record.set_id(line["id"].text());
   const std::string kind = line["problem"].text();
   if (kind != "rhe" && kind != "rhc") throw line["problem"].mismatch("\"rhe\" or \"rhc\"");
-  record.kind = kind == "rhe" ? OcpKind::rhe : OcpKind::rhc;
+  record.kind = kind == "rhe" ? "rhe" : "rhc";
   check_keys(line, record);
   record.model = line["model"]["name"].text();
   record.model_options = Settings::map({file, line_number});
@@ -788,7 +787,7 @@ ProblemRecord read_problem(std::string_view text, const std::string& file, int l
   });
   read_horizon(line["horizon"], record);
   read_bounds(line["bounds"], record);
-  record.kind == OcpKind::rhe ? read_rhe(line, record) : read_rhc(line, record);
+  record.kind == "rhe" ? read_rhe(line, record) : read_rhc(line, record);
   if (line.has("guess")) read_guess(line["guess"], record);
   if (line.has("origin"))
     line["origin"].for_each([&](const std::string& key, const Value& value) { record.origin[key] = value.text(); });
@@ -816,7 +815,7 @@ std::vector<int> one_block_parameters(std::span<const ProblemRecord> records, co
 
 std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                       int max_intervals, std::vector<int> one_block) {
-  if (record.kind == OcpKind::rhe) {
+  if (record.kind == "rhe") {
     auto setup = rhe_setup(record, *model);
     setup.one_block = std::move(one_block);
     return build_from<RheProblem>(record, std::move(model), std::move(setup), max_intervals);
@@ -844,7 +843,7 @@ bool refill(const ProblemRecord& record, HorizonProblem& problem) {
 
 void cold_start(const ProblemRecord& record, const HorizonProblem& problem, Iterate& guess) {
   const ModelDescription& about = problem.model().description();
-  const bool is_rhe = record.kind == OcpKind::rhe;
+  const bool is_rhe = record.kind == "rhe";
   const std::vector<double>& state = is_rhe ? record.arrival_state : record.initial_state;
   const std::vector<double>& held = is_rhe ? record.arrival_parameters : record.parameters;
   std::vector<double> inputs, parameters;
@@ -862,7 +861,7 @@ void cold_start(const ProblemRecord& record, const HorizonProblem& problem, Iter
   }
   guess.clear_multipliers();
   std::copy(held.begin(), held.end(), std::copy(state.begin(), state.end(), guess.state(0)));
-  problem.set_decisions(guess, inputs.data(), parameters.data());
+  problem.structure().set_decisions(guess, inputs.data(), parameters.data());
   std::vector<double> scratch(problem.scratch_size());
   roll_out(problem, guess, scratch);
 }
@@ -891,11 +890,12 @@ std::string solution_line(const ProblemRecord& record, const HorizonProblem& pro
   std::string text = fmt::format("{{\"id\": {}, \"objective\": ", json(record.id).dump());
   append_number(text, outcome.objective);
   append_rows(text, "states", N + 1, model.state_count(),
-              [&](int i, double* row) { std::copy_n(problem.vehicle_state(point, i), model.state_count(), row); });
-  append_rows(text, "inputs", N, model.input_count(), [&](int i, double* row) { problem.inputs_on(point, i, row); });
-  if (record.kind == OcpKind::rhe)
+              [&](int i, double* row) { std::copy_n(point.state(i), model.state_count(), row); });
+  append_rows(text, "inputs", N, model.input_count(),
+              [&](int i, double* row) { problem.structure().inputs_on(point, i, row); });
+  if (record.kind == "rhe")
     append_rows(text, "parameters", N, model.parameter_count(),
-                [&](int i, double* row) { problem.parameters_on(point, i, row); });
+                [&](int i, double* row) { problem.structure().parameters_on(point, i, row); });
   fmt::format_to(
       std::back_inserter(text), ", \"bounds_active\": {}, \"solver\": {}, \"status\": \"{}\", \"iterations\": {}",
       any_bound_active(problem, point), json(outcome.solver).dump(), name_of(outcome.status), outcome.iterations);

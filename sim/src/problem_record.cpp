@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/rhc_problem.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/sim/problem_file.hpp"
 
 namespace rhec::sim {
@@ -69,14 +69,14 @@ void keep(ProblemRecord& record, const RheProblem& problem) {
     const std::string& name = about.parameters[j].name;
     std::vector<int>& starts = record.block_starts[name];
     std::vector<double> variances;
-    if (problem.is_ramp(j)) {
+    if (problem.structure().is_ramp(j)) {
       record.transition[name] = Transition::ramp;
     } else {
       starts.push_back(0);
       variances.push_back(infinity);
     }
     for (int i = 0; i < record.intervals; ++i) {
-      if (!problem.begins(i, j)) continue;
+      if (!problem.structure().starts_block(i, j)) continue;
       starts.push_back(i);
       // The problem keeps the reciprocal, and the reciprocal of a reciprocal's reciprocal is itself to the bit.
       variances.push_back(problem.link_variance(i, j));
@@ -125,11 +125,11 @@ void keep(ProblemRecord& record, const RhcProblem& problem) {
   for (std::size_t b = 0; b < setup.blocked_inputs.size(); ++b) {
     const std::string& name = about.inputs[setup.blocked_inputs[b]].name;
     const int channel = np + static_cast<int>(b);
-    if (!problem.begins(0, channel))
+    if (!problem.structure().starts_block(0, channel))
       throw Error(
           fmt::format("{}: input '{}' is blocked but has no blocks; call RhcProblem::set_blocks", record.id, name));
     for (int i = 0; i < record.intervals; ++i)
-      if (problem.begins(i, channel)) record.block_starts[name].push_back(i);
+      if (problem.structure().starts_block(i, channel)) record.block_starts[name].push_back(i);
   }
 }
 
@@ -259,7 +259,7 @@ std::string problem_line(const ProblemRecord& record) {
   json line;
   line["version"] = problem_format_version;
   line["id"] = record.id;
-  line["problem"] = record.kind == OcpKind::rhe ? "rhe" : "rhc";
+  line["problem"] = record.kind == "rhe" ? "rhe" : "rhc";
   line["model"]["name"] = record.model;
   for (const auto& [key, value] : record.model_options.members()) line["model"][key] = settings_of(value);
   const auto& durations = record.durations;
@@ -269,7 +269,7 @@ std::string problem_line(const ProblemRecord& record) {
                      {"dt", same ? number_or_null(durations.front()) : list_of(durations)},
                      {"integrator", "rk4"},
                      {"substeps", record.substeps}};
-  record.kind == OcpKind::rhe ? write_rhe(record, line) : write_rhc(record, line);
+  record.kind == "rhe" ? write_rhe(record, line) : write_rhc(record, line);
   line["bounds"] = bounds_of(record);
   if (record.guess) {
     json& guess = line["guess"];

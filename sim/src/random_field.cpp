@@ -9,7 +9,7 @@
 
 #include "lattice_sum.hpp"
 #include "piecewise_polynomial.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/random.hpp"
 #include "rhec/sim/slip_field.hpp"
 

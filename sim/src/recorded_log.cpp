@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/csv.hpp"
 
 namespace rhec::sim {

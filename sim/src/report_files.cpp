@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/csv.hpp"
 
 namespace rhec::sim {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "report_parts.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/csv.hpp"
 
 namespace rhec::sim {

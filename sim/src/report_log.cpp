@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "report_parts.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {

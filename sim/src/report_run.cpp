@@ -7,8 +7,9 @@
 #include <utility>
 
 #include "report_parts.hpp"
-#include "rhec/core/error.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/base/angle.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/sweep_store.hpp"
 #include "sqlite_database.hpp"
 

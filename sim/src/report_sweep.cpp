@@ -12,7 +12,7 @@
 #include "report_parts.hpp"
 #include "report_runs.hpp"
 #include "report_statistics.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {

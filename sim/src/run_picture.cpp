@@ -7,7 +7,7 @@
 #include <iterator>
 #include <map>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {

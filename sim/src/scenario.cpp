@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/paths.hpp"
 #include "rhec/sim/recorded_log.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/csv.hpp"
 #include "rhec/sim/slip_field.hpp"
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <utility>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {

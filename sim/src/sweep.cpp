@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <optional>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/options.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/config/options.hpp"
 #include "rhec/plugins/yaml.hpp"
 
 namespace rhec::sim {

@@ -10,7 +10,7 @@
 #include <openssl/evp.h>
 #include <nlohmann/json.hpp>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/scenario.hpp"
 #include "rhec/sim/sweep.hpp"
 

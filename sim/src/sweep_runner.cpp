@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/closed_loop.hpp"
 
 namespace rhec::sim {

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "sqlite_database.hpp"
 
 namespace rhec::sim {

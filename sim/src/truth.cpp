@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -5,10 +5,9 @@
 #include <cstring>
 #include <utility>
 
-#include "rhec/core/point.hpp"
-#include "rhec/core/stage_checks.hpp"
+#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/qp/stage_checks.hpp"
 #include "rhec/plugins/sdk.hpp"
-#include "tolerances.hpp"
 
 namespace rhec::gn_rti {
 namespace {
@@ -74,7 +73,7 @@ std::string GnRti::why_not(const Ocp& ocp) const {
   if (options_.hessian == Curvature::exact)
     return "the exact Hessian was asked for and the model has no second derivatives; set hessian: gauss_newton";
   // A line search makes Gauss-Newton's step safe; a full one need not lead anywhere.
-  if (options_.hessian == Curvature::automatic && options_.mode == Mode::rti && ocp.kind() == OcpKind::rhc)
+  if (options_.hessian == Curvature::automatic && options_.mode == Mode::rti && !ocp.has_small_residuals())
     return "the model has no second derivatives, and full Gauss-Newton steps need not converge in control; set mode: "
            "converge, or hessian: gauss_newton if residuals are small";
   return {};
@@ -82,278 +81,259 @@ std::string GnRti::why_not(const Ocp& ocp) const {
 
 void GnRti::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'gn_rti': " + reason);
-  capacity_ = ocp.capacity();
-  qp_ = other_qp_ = StageQp(capacity_);
-  ocp.remember_in(qp_);
-  remembers_ = qp_.memory.has_value();
-  qp_solver_ = StageQpSolver(capacity_);
-  for (Iterate* point : {&prepared_point_, &step_, &trial_, &best_, &other_trial_}) *point = Iterate(capacity_);
+  const Capacity capacity = ocp.capacity();
+  ocp_ = &ocp;
+  linearisation_ = ocp.make_linearisation();
+  trial_qp_ = relaxed_qp_ = StageQp(capacity);
+  qp_ = &linearisation_->qp();
+  qp_solver_ = StageQpSolver(capacity);
+  for (Iterate* iterate : {&step_, &trial_, &best_, &other_trial_}) *iterate = Iterate(capacity);
   scratch_.assign(ocp.scratch_size(), 0.0);
-  defects_.assign(static_cast<std::size_t>(capacity_.intervals) * capacity_.states, 0.0);
+  defects_.assign(static_cast<std::size_t>(capacity.intervals) * capacity.states, 0.0);
   reset();
 }
 
 void GnRti::reset() noexcept {
-  prepared_ = is_pending_ = false;
-  qp_.change();
+  is_prepared_ = is_pending_ = false;
+  if (linearisation_) linearisation_->forget();
   qp_solver_.reset();
 }
 
-Hessian GnRti::hessian_for(const Ocp& ocp) const noexcept {
-  if (use_exact_ && ocp.has_second_derivatives()) return Hessian::exact;
-  if (options_.hessian == Curvature::automatic)
-    return ocp.kind() == OcpKind::rhc && ocp.has_second_derivatives() ? Hessian::exact : Hessian::gauss_newton;
+Hessian GnRti::hessian() const noexcept {
+  if (use_exact_ && ocp_->has_second_derivatives()) return Hessian::exact;
+  if (options_.hessian == Curvature::automatic) return ocp_->preferred_hessian();
   return options_.hessian == Curvature::exact ? Hessian::exact : Hessian::gauss_newton;
 }
 
-/// Linearises at the point; a point without costates gets those that fit it first, since the exact Hessian needs them.
-void GnRti::linearise(const Ocp& ocp, Iterate& point) noexcept {
-  const Hessian hessian = hessian_for(ocp);
-  if (hessian == Hessian::exact && !has_costates(ocp, point)) {
-    ocp.linearise(all_stages(ocp), point, Hessian::gauss_newton, qp_, scratch_);
-    set_costates(qp_, point);
+/// Linearises at an iterate; one without costates gets those that fit it first, since the exact Hessian needs them.
+void GnRti::linearise(Iterate& iterate) noexcept {
+  if (hessian() == Hessian::exact && !has_costates(*ocp_, iterate)) {
+    linearisation_->linearise(iterate, Hessian::gauss_newton);
+    set_costates(linearisation_->qp(), iterate);
   }
-  ocp.linearise(all_stages(ocp), point, hessian, qp_, scratch_);
+  linearisation_->linearise(iterate, hessian());
+  qp_ = &linearisation_->qp();
 }
 
-void GnRti::prepare(const Ocp& ocp, const Iterate& guess) noexcept {
-  prepared_ = is_pending_ = false;
-  use_exact_ = false;
-  if (!(ocp.capacity() == capacity_) || !(guess.capacity() == capacity_)) return;
-  const Hessian hessian = hessian_for(ocp);
-  if (hessian == Hessian::exact && !has_costates(ocp, guess)) {
-    prepared_point_ = guess;
-    linearise(ocp, prepared_point_);
+void GnRti::prepare(const Iterate& guess) noexcept {
+  is_prepared_ = is_pending_ = use_exact_ = false;
+  if (!ocp_ || !(guess.capacity() == ocp_->capacity())) return;
+  if (hessian() == Hessian::exact && !has_costates(*ocp_, guess)) {
+    trial_ = guess;
+    linearise(trial_);
   } else {
-    if (!remembers_)
-      std::copy_n(guess.row(0), static_cast<std::ptrdiff_t>(ocp.intervals() + 1) * capacity_.row(),
-                  prepared_point_.row(0));
-    ocp.prepare(guess, hessian, qp_, scratch_);
+    linearisation_->prepare(guess, hessian());
+    qp_ = &linearisation_->qp();
   }
-  qp_solver_.guess_from(qp_, guess);
-  qp_solver_.prepare(qp_);
-  prepared_ = true;
-  prepared_ocp_ = &ocp;
+  qp_solver_.guess_from(*qp_, guess);
+  qp_solver_.prepare(*qp_);
+  is_prepared_ = true;
 }
 
-bool GnRti::is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept {
-  if (!prepared_ || prepared_ocp_ != &ocp) return false;
-  if (remembers_) return ocp.is_made_at(point, qp_);
-  const int N = ocp.intervals();
-  if (qp_.intervals() != N) return false;
-  for (int i = 0; i <= N; ++i)
-    if (qp_.states(i) != ocp.state_count(i) || (i < N && qp_.controls(i) != ocp.control_count(i))) return false;
-  const std::size_t bytes = static_cast<std::size_t>(N + 1) * capacity_.row() * sizeof(double);
-  return std::memcmp(prepared_point_.row(0), point.row(0), bytes) == 0;
-}
-
-void GnRti::add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept {
+void GnRti::add_step(const Iterate& from, double length, Iterate& to) const noexcept {
   to = from;
-  for_each_primal_row(ocp, to, step_, [&](double* row, const double* step, int n) {
+  for_each_primal_row(*ocp_, to, step_, [&](double* row, const double* step, int n) {
     for (int j = 0; j < n; ++j) row[j] += length * step[j];
   });
-  for_each_dual_row(ocp, to, step_, [&](double* row, const double* value, int n) {
+  for_each_dual_row(*ocp_, to, step_, [&](double* row, const double* value, int n) {
     for (int j = 0; j < n; ++j) row[j] += length * (value[j] - row[j]);
   });
 }
 
 /// The step as a policy: controls go the given length towards the new ones and answer to where simulation really leads,
 /// so that the result has no defect. Far from the solution this carries much further than the linearised states do.
-void GnRti::roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept {
-  add_step(ocp, from, length, to);
-  qp_solver_.prepare_feedback(qp_);
+void GnRti::roll_out_step(const Iterate& from, double length, Iterate& to) noexcept {
+  add_step(from, length, to);
+  qp_solver_.prepare_feedback(*qp_);
   double deviation[Riccati::max_width], policy[Riccati::max_width];
-  for (int i = 0; i < ocp.intervals(); ++i) {
-    const int n = ocp.state_count(i), m = ocp.control_count(i);
+  for (int i = 0; i < ocp_->intervals(); ++i) {
+    const int n = ocp_->state_count(i), m = ocp_->control_count(i);
     // Of the policy's step, what it does at the linearised states is scaled; its answer to the deviation is not.
     for (int j = 0; j < n; ++j)
       deviation[j] = step_.state(i)[j] + (to.state(i)[j] - from.state(i)[j] - length * step_.state(i)[j]);
-    qp_solver_.feedback(qp_, i, deviation, policy);
+    qp_solver_.feedback(*qp_, i, deviation, policy);
     for (int j = 0; j < m; ++j) {
       const double value = from.control(i)[j] + length * step_.control(i)[j] + (policy[j] - step_.control(i)[j]);
-      to.control(i)[j] = std::min(std::max(value, ocp.control_lower(i)[j]), ocp.control_upper(i)[j]);
+      to.control(i)[j] = std::min(std::max(value, ocp_->control_lower(i)[j]), ocp_->control_upper(i)[j]);
     }
-    ocp.simulate_interval(i, to, scratch_);
+    ocp_->simulate_interval(i, to, scratch_);
   }
 }
 
-double GnRti::merit(const Ocp& ocp, const Iterate& point) noexcept {
-  const double objective = ocp.evaluate(point, defects_.data(), scratch_);
+double GnRti::merit(const Iterate& iterate) noexcept {
+  const double objective = ocp_->evaluate(iterate, defects_.data(), scratch_);
   double defect = 0.0;
-  for (int i = 0; i < ocp.intervals(); ++i)
-    for (int j = 0; j < ocp.state_count(i + 1); ++j) defect += std::abs(defects_[i * capacity_.states + j]);
-  return objective + defect_penalty_ * defect + bound_penalty_ * total_violation(ocp, point);
+  for (int i = 0; i < ocp_->intervals(); ++i)
+    for (int j = 0; j < ocp_->state_count(i + 1); ++j) defect += std::abs(defects_[i * ocp_->capacity().states + j]);
+  return objective + defect_penalty_ * defect + bound_penalty_ * total_violation(*ocp_, iterate);
 }
 
-Report GnRti::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
-  Report report = feedback(ocp, point, deadline);
-  finish(ocp, point, report);
+Report GnRti::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
+  Report report = feedback(iterate, deadline);
+  finish(iterate, report);
   return report;
 }
 
-void GnRti::finish(const Ocp& ocp, Iterate& point, Report& report) noexcept {
-  if (is_pending_) settle(ocp, point, report);
+void GnRti::finish(Iterate& iterate, Report& report) noexcept {
+  if (is_pending_) settle(iterate, report);
 }
 
-Report GnRti::feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+Report GnRti::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   use_exact_ = is_pending_ = false;
-  if (ocp.capacity() == capacity_ && point.capacity() == capacity_) {
-    // A real-time iteration lives on the sample before; a point without costates has none.
-    if (options_.mode == Mode::rti && has_costates(ocp, point)) {
-      report = real_time(ocp, point, deadline);
-    } else if (is_sound_start(ocp, point, scratch_)) {
-      report = converge(ocp, point, deadline);
+  if (ocp_ && iterate.capacity() == ocp_->capacity()) {
+    // A real-time iteration lives on the sample before; an iterate without costates has none.
+    if (options_.mode == Mode::rti && has_costates(*ocp_, iterate)) {
+      report = real_time(iterate, deadline);
+    } else if (is_sound_start(*ocp_, iterate, scratch_)) {
+      report = converge(iterate, deadline);
     }
   }
-  prepared_ = false;
+  is_prepared_ = false;
   return report;
 }
 
-Report GnRti::real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   report.status = Status::step_taken;
-  bool ready = is_prepared_for(ocp, point);
+  bool is_ready = is_prepared_ && linearisation_->is_at(iterate);
   for (int iteration = 0; iteration < options_.iterations; ++iteration) {
     if (iteration > 0 && is_past(deadline)) {
       report.status = Status::deadline;
       break;
     }
-    if (ready) {
-      ocp.refresh(point, qp_, scratch_);
-    } else {
-      ocp.prepare(point, hessian_for(ocp), qp_, scratch_);
-      ocp.refresh(point, qp_, scratch_);
-      qp_solver_.guess_from(qp_, point);
-    }
-    ready = false;
-    const auto outcome = solve_program(report, deadline);
+    if (!is_ready) linearisation_->prepare(iterate, hessian());
+    linearisation_->refresh(iterate);
+    qp_ = &linearisation_->qp();
+    if (!is_ready) qp_solver_.guess_from(*qp_, iterate);
+    is_ready = false;
+    const auto outcome = solve_qp(report, deadline);
     if (outcome == StageQpSolver::Outcome::infeasible || outcome == StageQpSolver::Outcome::out_of_time) {
       report.status = outcome == StageQpSolver::Outcome::infeasible ? Status::infeasible : Status::deadline;
       break;
     }
-    // Of the active-set methods' steps all was seen.
-    if (outcome == StageQpSolver::Outcome::interior_point && !is_finite(ocp, step_)) {
+    // The active-set methods have checked their steps.
+    if (outcome == StageQpSolver::Outcome::interior_point && !is_finite(*ocp_, step_)) {
       report.status = Status::stalled;
       break;
     }
-    // The step becomes the point that it leads to, and the point that it came from is kept in its place: of a horizon,
-    // the processor's cache holds only so many.
-    add_to_step(ocp.intervals(), point, step_);
+    // The step becomes the iterate that it leads to, and the iterate that it came from is kept in its place: of a
+    // horizon, the processor's cache holds only so many.
+    add_to_step(ocp_->intervals(), iterate, step_);
     const bool is_last = iteration + 1 == options_.iterations;
-    if (!is_last && !judge_step(ocp, step_, report)) {
+    if (!is_last && !assess_step(step_, report)) {
       report.status = Status::stalled;
       break;
     }
     is_pending_ = is_last;
-    std::swap(point, step_);
+    std::swap(iterate, step_);
     ++report.iterations;
   }
   if (report.iterations == 0) {
-    give_up(ocp, point, report);
+    give_up(iterate, report);
     return report;
   }
   if (report.status == Status::infeasible || report.status == Status::stalled) report.status = Status::iteration_limit;
   return report;
 }
 
-/// Linearises at a new point, as the next sample will want it; false where the point comes to nothing.
-bool GnRti::judge_step(const Ocp& ocp, const Iterate& point, Report& report) noexcept {
-  const bool is_exact = hessian_for(ocp) == Hessian::exact && ocp.keeps_curvature();
-  const double objective =
-      ocp.linearise(all_stages(ocp), point, is_exact ? Hessian::exact : Hessian::none, qp_, scratch_);
-  const KktResidual kkt = kkt_residual(qp_, point);
+/// Linearises at a new iterate, as the next sample will want it; false where it is not finite.
+bool GnRti::assess_step(const Iterate& iterate, Report& report) noexcept {
+  const double objective = linearisation_->linearise_for_residual(iterate, hessian());
+  const KktResidual kkt = kkt_residual(linearisation_->qp(), iterate);
   if (!std::isfinite(objective) || !std::isfinite(kkt.stationarity)) return false;
   report.objective = objective;
   report.kkt = kkt;
   return true;
 }
 
-void GnRti::settle(const Ocp& ocp, Iterate& point, Report& report) noexcept {
+void GnRti::settle(Iterate& iterate, Report& report) noexcept {
   is_pending_ = false;
-  if (!judge_step(ocp, point, report)) {
+  if (!assess_step(iterate, report)) {
     --report.iterations;
     report.status = report.iterations > 0 ? Status::iteration_limit : Status::stalled;
-    std::swap(point, step_);  // the point before the last step
-    if (report.iterations == 0) give_up(ocp, point, report);
+    std::swap(iterate, step_);  // the iterate before the last step
+    if (report.iterations == 0) give_up(iterate, report);
   }
 }
 
-/// Where the point was judged, its linearisation is there already.
-bool GnRti::covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept {
-  const int N = ocp.intervals();
+/// Where the iterate was assessed, its linearisation is there already.
+bool GnRti::covariances(const Iterate& iterate, StageRange nodes, std::span<double> blocks) noexcept {
+  if (!ocp_ || is_prepared_ || is_pending_) return false;
+  const int N = ocp_->intervals(), states = ocp_->capacity().states;
   const bool is_all = nodes.first == 0, is_last = nodes.first == N;
-  const std::size_t block = static_cast<std::size_t>(capacity_.states) * capacity_.states;
-  if (prepared_ || is_pending_ || !(ocp.capacity() == capacity_) || nodes.last != N || !(is_all || is_last) ||
-      blocks.size() < block * static_cast<std::size_t>(nodes.last - nodes.first + 1))
-    return false;
-  ocp.prepare(point, Hessian::gauss_newton, qp_, scratch_);
-  return qp_solver_.covariances(qp_, is_last ? nullptr : blocks.data(), is_last ? blocks.data() : nullptr);
+  const std::size_t needed = static_cast<std::size_t>(states) * states * (nodes.last - nodes.first + 1);
+  if (nodes.last != N || !(is_all || is_last) || blocks.size() < needed) return false;
+  linearisation_->prepare(iterate, Hessian::gauss_newton);
+  return qp_solver_.covariances(linearisation_->qp(), is_last ? nullptr : blocks.data(),
+                                is_last ? blocks.data() : nullptr);
 }
 
-/// What is left to say of a point that no step has improved.
-void GnRti::give_up(const Ocp& ocp, const Iterate& point, Report& report) noexcept {
-  // What is not a number is seen in the result first.
-  if (is_sound_start(ocp, point, scratch_)) {
-    judge(ocp, point, qp_, scratch_, report);
+/// The report on an iterate that no step has improved.
+void GnRti::give_up(const Iterate& iterate, Report& report) noexcept {
+  // What is not finite is seen here first.
+  if (is_sound_start(*ocp_, iterate, scratch_)) {
+    report.objective = linearisation_->linearise(iterate, Hessian::none);
+    report.kkt = kkt_residual(linearisation_->qp(), iterate);
   } else {
     report = {};
   }
 }
 
-/// Solves the quadratic program in `qp_` at `best_` and searches along its step by the l1 merit; the accepted point
-/// goes to `trial_`. False where no length is acceptable.
-bool GnRti::search_along_step(const Ocp& ocp, double residual, double& merit_after) noexcept {
-  defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(ocp, step_));
-  bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(ocp, step_));
-  const double before = merit(ocp, best_);
+/// Searches along the step from `best_` by the l1 merit; the accepted iterate goes to `trial_`. False where no length
+/// is acceptable.
+bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
+  defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(*ocp_, step_));
+  bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(*ocp_, step_));
+  const double before = merit(best_);
   double defect = 0.0, slope = 0.0;
-  for (int i = 0; i <= ocp.intervals(); ++i) {
-    for (int j = 0; j < ocp.state_count(i); ++j) slope += qp_.q(i)[j] * step_.state(i)[j];
-    if (i == ocp.intervals()) break;
-    for (int j = 0; j < ocp.state_count(i + 1); ++j) defect += std::abs(qp_.b(i)[j]);
-    for (int j = 0; j < ocp.control_count(i); ++j) slope += qp_.r(i)[j] * step_.control(i)[j];
+  for (int i = 0; i <= ocp_->intervals(); ++i) {
+    for (int j = 0; j < ocp_->state_count(i); ++j) slope += qp_->q(i)[j] * step_.state(i)[j];
+    if (i == ocp_->intervals()) break;
+    for (int j = 0; j < ocp_->state_count(i + 1); ++j) defect += std::abs(qp_->b(i)[j]);
+    for (int j = 0; j < ocp_->control_count(i); ++j) slope += qp_->r(i)[j] * step_.control(i)[j];
   }
-  slope -= defect_penalty_ * defect + bound_penalty_ * asked_share_ * total_violation(ocp, best_);
+  slope -= defect_penalty_ * defect + bound_penalty_ * asked_share_ * total_violation(*ocp_, best_);
   const auto acceptable = [&](double length) {
-    merit_after = merit(ocp, trial_);
+    merit_after = merit(trial_);
     const double allowed =
         before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
     return std::isfinite(merit_after) && merit_after <= allowed;
   };
   // Control follows the policy, from a given start; estimation, whose every node is measured, takes the linearised
   // states, and the policy only where those lead nowhere.
-  const bool policy_first = ocp.kind() == OcpKind::rhc;
+  const bool policy_first = ocp_->can_roll_out();
   for (double length = 1.0; length >= shortest_step; length *= 0.5) {
     if (policy_first) {
-      roll_out_step(ocp, best_, length, trial_);
+      roll_out_step(best_, length, trial_);
     } else {
-      add_step(ocp, best_, length, trial_);
+      add_step(best_, length, trial_);
     }
     if (acceptable(length)) return true;
     // Near the solution the merit may refuse a step that Newton's method is right about.
     if (length == 1.0 && residual < near_solution && std::isfinite(merit_after)) {
-      ocp.linearise(all_stages(ocp), trial_, Hessian::gauss_newton, other_qp_, scratch_);
-      if (kkt_residual(other_qp_, trial_).largest() < 0.5 * residual) return true;
+      ocp_->linearise(all_stages(*ocp_), trial_, Hessian::gauss_newton, trial_qp_, scratch_);
+      if (kkt_residual(trial_qp_, trial_).largest() < 0.5 * residual) return true;
     }
     if (policy_first) continue;
-    roll_out_step(ocp, best_, length, trial_);
+    roll_out_step(best_, length, trial_);
     if (acceptable(length)) return true;
   }
   return false;
 }
 
-StageQpSolver::Outcome GnRti::solve_program(Report& report, Clock::time_point deadline) noexcept {
-  const auto outcome = qp_solver_.solve(qp_, step_, deadline);
+StageQpSolver::Outcome GnRti::solve_qp(Report& report, Clock::time_point deadline) noexcept {
+  const auto outcome = qp_solver_.solve(*qp_, step_, deadline);
   report.factorisations += qp_solver_.factorisations();
   report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
   return outcome;
 }
 
 /// Powell's relaxation: of all defects and violated bounds, the step is asked to remove only a share of what it was
-/// asked before. Where that share is 0, the program has a solution: no step.
-void GnRti::ask_for_less(double share) noexcept {
-  qp_.change();
+/// asked before. Where that share is 0, the QP has a solution: no step.
+void GnRti::relax_qp(double share) noexcept {
+  relaxed_qp_ = qp_solver_.solved(*qp_);
+  qp_ = &relaxed_qp_;
   asked_share_ *= share;
   const auto relax = [share](double* lower, double* upper, int count) {
     for (int j = 0; j < count; ++j) {
@@ -361,26 +341,26 @@ void GnRti::ask_for_less(double share) noexcept {
       if (upper[j] < 0.0) upper[j] *= share;
     }
   };
-  for (int i = 0; i <= qp_.intervals(); ++i) {
-    relax(qp_.state_lower(i), qp_.state_upper(i), qp_.states(i));
-    if (i == qp_.intervals()) break;
-    relax(qp_.control_lower(i), qp_.control_upper(i), qp_.controls(i));
-    for (int j = 0; j < qp_.states(i + 1); ++j) qp_.b(i)[j] *= share;
+  for (int i = 0; i <= relaxed_qp_.intervals(); ++i) {
+    relax(relaxed_qp_.state_lower(i), relaxed_qp_.state_upper(i), relaxed_qp_.states(i));
+    if (i == relaxed_qp_.intervals()) break;
+    relax(relaxed_qp_.control_lower(i), relaxed_qp_.control_upper(i), relaxed_qp_.controls(i));
+    for (int j = 0; j < relaxed_qp_.states(i + 1); ++j) relaxed_qp_.b(i)[j] *= share;
   }
 }
 
-Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   defect_penalty_ = bound_penalty_ = 0.0;
-  best_ = point;
+  best_ = iterate;
   // A given initial state is not for the line search to negotiate about.
-  if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), best_.state(0));
+  if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
   report.status = Status::iteration_limit;
   double least_residual = std::numeric_limits<double>::infinity();
   int slow = 0;
   for (;; ++report.iterations) {
-    linearise(ocp, best_);
-    report.kkt = kkt_residual(qp_, best_);
+    linearise(best_);
+    report.kkt = kkt_residual(*qp_, best_);
     const double residual = report.kkt.largest();
     if (residual <= options_.tolerance) {
       report.status = Status::solved;
@@ -393,11 +373,11 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
     }
     // Gauss-Newton that gains little, or goes round in circles, has met large residuals: from there the exact Hessian
     // serves better.
-    if (options_.hessian == Curvature::automatic && !use_exact_ && ocp.has_second_derivatives()) {
+    if (options_.hessian == Curvature::automatic && !use_exact_ && ocp_->has_second_derivatives()) {
       slow = residual > 0.3 * least_residual ? slow + 1 : 0;
       if (slow >= 4) {
         use_exact_ = true;
-        linearise(ocp, best_);
+        linearise(best_);
       }
     }
     least_residual = std::min(least_residual, residual);
@@ -405,27 +385,28 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
     double merit_after = 0.0;
     bool feasible = false, accepted = false, late = false;
     const auto try_step = [&] {
-      qp_solver_.guess_from(qp_, best_);
-      auto outcome = solve_program(report, deadline);
+      qp_solver_.guess_from(*qp_, best_);
+      auto outcome = solve_qp(report, deadline);
       // Linearised equations can contradict bounds that the true ones do not: then less is asked of a single step.
       for (asked_share_ = 1.0; outcome == StageQpSolver::Outcome::infeasible && asked_share_ > least_asked_share;) {
-        ask_for_less(0.5);
-        outcome = solve_program(report, deadline);
+        relax_qp(0.5);
+        outcome = solve_qp(report, deadline);
       }
       late = outcome == StageQpSolver::Outcome::out_of_time;
-      if (late || outcome == StageQpSolver::Outcome::infeasible || !is_finite(ocp, step_)) return false;
+      if (late || outcome == StageQpSolver::Outcome::infeasible || !is_finite(*ocp_, step_)) return false;
       feasible = true;
-      return search_along_step(ocp, residual, merit_after);
+      return search_along_step(residual, merit_after);
     };
     accepted = try_step();
-    // A curvature that had to be bent is a poor guide: Gauss-Newton's step competes with its own. Near the solution
-    // merits differ by rounding only, and the exact curvature is what converges.
-    if (!late && hessian_for(ocp) == Hessian::exact &&
-        (!accepted || (qp_solver_.was_bent() && residual > near_solution))) {
+    // A curvature that had to be convexified is a poor guide: Gauss-Newton's step competes with its own. Near the
+    // solution merits differ by rounding only, and the exact curvature is what converges.
+    if (!late && hessian() == Hessian::exact &&
+        (!accepted || (qp_solver_.was_convexified() && residual > near_solution))) {
       std::swap(trial_, other_trial_);
       const bool exact_accepted = accepted;
       const double exact_merit = merit_after;
-      ocp.linearise(all_stages(ocp), best_, Hessian::gauss_newton, qp_, scratch_);
+      linearisation_->linearise(best_, Hessian::gauss_newton);
+      qp_ = &linearisation_->qp();
       accepted = try_step();
       if (exact_accepted && (!accepted || exact_merit < merit_after)) {
         std::swap(trial_, other_trial_);
@@ -438,9 +419,11 @@ Report GnRti::converge(const Ocp& ocp, Iterate& point, Clock::time_point deadlin
     }
     std::swap(best_, trial_);
   }
-  const double objective = ocp.evaluate(best_, nullptr, scratch_);
-  if (report.status != Status::infeasible && is_finite(ocp, best_) && std::isfinite(objective)) std::swap(point, best_);
-  judge(ocp, point, qp_, scratch_, report);
+  const double objective = ocp_->evaluate(best_, nullptr, scratch_);
+  if (report.status != Status::infeasible && is_finite(*ocp_, best_) && std::isfinite(objective))
+    std::swap(iterate, best_);
+  report.objective = linearisation_->linearise(iterate, Hessian::none);
+  report.kkt = kkt_residual(linearisation_->qp(), iterate);
   return report;
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
-#include "rhec/core/options.hpp"
-#include "rhec/core/solver.hpp"
-#include "stage_qp_solver.hpp"
+#include "rhec/core/config/options.hpp"
+#include "rhec/core/ocp/linearisation.hpp"
+#include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/qp/stage_qp_solver.hpp"
 
 namespace rhec::gn_rti {
 
@@ -44,39 +46,39 @@ class GnRti final : public Solver {
 
   std::string why_not(const Ocp& ocp) const override;
   void setup(const Ocp& ocp) override;
-  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override;
-  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
-  Report feedback(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
-  void finish(const Ocp& ocp, Iterate& point, Report& report) noexcept override;
-  bool covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept override;
+  void prepare(const Iterate& guess) noexcept override;
+  using Solver::solve;
+  Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override;
+  Report feedback(Iterate& iterate, Clock::time_point deadline) noexcept override;
+  void finish(Iterate& iterate, Report& report) noexcept override;
+  bool covariances(const Iterate& iterate, StageRange nodes, std::span<double> blocks) noexcept override;
   void reset() noexcept override;
 
  private:
-  Hessian hessian_for(const Ocp& ocp) const noexcept;
-  void linearise(const Ocp& ocp, Iterate& point) noexcept;
-  bool is_prepared_for(const Ocp& ocp, const Iterate& point) const noexcept;
-  void settle(const Ocp& ocp, Iterate& point, Report& report) noexcept;
-  Report real_time(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept;
-  bool judge_step(const Ocp& ocp, const Iterate& point, Report& report) noexcept;
-  void give_up(const Ocp& ocp, const Iterate& point, Report& report) noexcept;
-  Report converge(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept;
-  void add_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) const noexcept;
-  void roll_out_step(const Ocp& ocp, const Iterate& from, double length, Iterate& to) noexcept;
-  double merit(const Ocp& ocp, const Iterate& point) noexcept;
-  StageQpSolver::Outcome solve_program(Report& report, Clock::time_point deadline) noexcept;
-  void ask_for_less(double share) noexcept;
-  bool search_along_step(const Ocp& ocp, double residual, double& merit_after) noexcept;
+  Hessian hessian() const noexcept;
+  void linearise(Iterate& iterate) noexcept;
+  void settle(Iterate& iterate, Report& report) noexcept;
+  Report real_time(Iterate& iterate, Clock::time_point deadline) noexcept;
+  bool assess_step(const Iterate& iterate, Report& report) noexcept;
+  void give_up(const Iterate& iterate, Report& report) noexcept;
+  Report converge(Iterate& iterate, Clock::time_point deadline) noexcept;
+  void add_step(const Iterate& from, double length, Iterate& to) const noexcept;
+  void roll_out_step(const Iterate& from, double length, Iterate& to) noexcept;
+  double merit(const Iterate& iterate) noexcept;
+  StageQpSolver::Outcome solve_qp(Report& report, Clock::time_point deadline) noexcept;
+  void relax_qp(double share) noexcept;
+  bool search_along_step(double residual, double& merit_after) noexcept;
 
   Options options_;
-  Capacity capacity_;
-  StageQp qp_, other_qp_;
+  const Ocp* ocp_ = nullptr;
+  std::unique_ptr<Linearisation> linearisation_;
+  StageQp trial_qp_, relaxed_qp_;
+  const StageQp* qp_ = nullptr;  ///< that is solved: the linearisation's, or `relaxed_qp_`
   StageQpSolver qp_solver_;
-  Iterate prepared_point_, step_, trial_, best_, other_trial_;
+  Iterate step_, trial_, best_, other_trial_;
   std::vector<double> scratch_, defects_;
-  bool remembers_ = false;  ///< `qp_` does, at which point it was made; otherwise `prepared_point_` is that
-  bool prepared_ = false;
-  const Ocp* prepared_ocp_ = nullptr;  ///< looked at no more, only compared with
-  bool is_pending_ = false;            ///< the last step was not judged yet; `step_` is the point before it
+  bool is_prepared_ = false;
+  bool is_pending_ = false;  ///< the last step was not assessed yet; `step_` is the iterate before it
   bool use_exact_ = false;
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
   double asked_share_ = 1.0;  ///< of the defects and violations that the step is asked to remove

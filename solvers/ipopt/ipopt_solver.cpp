@@ -8,7 +8,7 @@
 #include <IpoptConfig.h>
 
 #include "native_options.hpp"
-#include "rhec/core/point.hpp"
+#include "rhec/core/ocp/point.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec::ipopt {
@@ -146,10 +146,10 @@ std::string IpoptSolver::why_not(const Ocp& ocp) const {
 
 void IpoptSolver::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'ipopt': " + reason);
-  capacity_ = ocp.capacity();
+  ocp_ = &ocp;
   scratch_.assign(ocp.scratch_size(), 0.0);
-  judge_ = StageQp(capacity_, OcpNlp::window);
-  guess_ = best_ = Iterate(capacity_);
+  judge_ = StageQp(ocp.capacity(), OcpNlp::window);
+  guess_ = best_ = Iterate(ocp.capacity());
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);
 }
@@ -317,9 +317,9 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
   return true;
 }
 
-Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
-  if (!(ocp.capacity() == capacity_) || !has_sound_numbers(ocp, point)) return report;
+  if (!ocp_ || !has_sound_numbers(*ocp_, iterate)) return report;
   deadline_ = deadline;
   iterations_ = 0;
   backend_us_ = 0.0;
@@ -334,7 +334,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     }
     if (hold.owns_lock()) {
       nlp_->set_spectator(this);
-      is_judged = improve(ocp, point, report);
+      is_judged = improve(*ocp_, iterate, report);
       nlp_->release();
       if (report.status == Status::bad_input) return report;
     }
@@ -346,7 +346,7 @@ Report IpoptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point dead
     report.status = Status::stalled;
   }
   report.iterations = iterations_;
-  if (!is_judged) judge(ocp, point, judge_, scratch_, report);
+  if (!is_judged) judge(*ocp_, iterate, judge_, scratch_, report);
   return std::isfinite(report.objective) ? report : Report{};
 }
 

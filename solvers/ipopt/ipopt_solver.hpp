@@ -7,8 +7,8 @@
 #include <IpIpoptApplication.hpp>
 
 #include "ocp_nlp.hpp"
-#include "rhec/core/options.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/config/options.hpp"
+#include "rhec/core/ocp/solver.hpp"
 
 namespace rhec::ipopt {
 
@@ -49,8 +49,9 @@ class IpoptSolver final : public Solver, private Spectator {
 
   std::string why_not(const Ocp& ocp) const override;
   void setup(const Ocp& ocp) override;
-  void prepare(const Ocp&, const Iterate&) noexcept override {}
-  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
+  void prepare(const Iterate&) noexcept override {}
+  using Solver::solve;
+  Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override;
   void reset() noexcept override {}
 
   /// Of the last solve, the time within Ipopt, without what its calls back took [us].
@@ -86,7 +87,7 @@ class IpoptSolver final : public Solver, private Spectator {
   std::set<std::string> native_;
   Ipopt::SmartPtr<Ipopt::IpoptApplication> application_;  ///< touched under the lock only
   Ipopt::SmartPtr<OcpNlp> nlp_;
-  Capacity capacity_;
+  const Ocp* ocp_ = nullptr;
   StageQp judge_;
   std::vector<double> scratch_;
 

@@ -9,7 +9,7 @@
 #include <IpOptionsList.hpp>
 #include <IpRegOptions.hpp>
 
-#include "rhec/core/option_values.hpp"
+#include "rhec/core/config/option_values.hpp"
 
 namespace rhec::ipopt {
 namespace {

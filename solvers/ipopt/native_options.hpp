@@ -5,7 +5,7 @@
 
 #include <IpIpoptApplication.hpp>
 
-#include "rhec/core/settings.hpp"
+#include "rhec/core/config/settings.hpp"
 
 namespace rhec::ipopt {
 

@@ -10,7 +10,7 @@
 #include <IpOrigIpoptNLP.hpp>
 #include <IpTNLPAdapter.hpp>
 
-#include "rhec/core/point.hpp"
+#include "rhec/core/ocp/point.hpp"
 
 namespace rhec::ipopt {
 namespace {
@@ -215,7 +215,7 @@ void OcpNlp::set_fixed_multipliers(StageRange piece) noexcept {
       double pull = pieces_.h(i)[k];
       if (i < ocp_->intervals())
         for (int r = 0; r < ocp_->state_count(i + 1); ++r)
-          pull += pieces_.F(i)[r * pieces_.stride() + k] * linear_.costate(i + 1)[r];
+          pull += pieces_.AB(i)[r * pieces_.stride() + k] * linear_.costate(i + 1)[r];
       if (k < ocp_->state_count(i)) pull -= linear_.costate(i)[k];
       linear_.bound_row(i)[k] = -pull;
     }

@@ -6,10 +6,10 @@
 #include <IpTNLP.hpp>
 #include <IpTaggedObject.hpp>
 
-#include "rhec/core/kkt.hpp"
-#include "rhec/core/ocp.hpp"
-#include "rhec/core/solver.hpp"
-#include "rhec/core/sparse_nlp.hpp"
+#include "rhec/core/ocp/ocp.hpp"
+#include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/ocp/sparse_nlp.hpp"
+#include "rhec/core/qp/kkt.hpp"
 
 namespace Ipopt {
 class OrigIpoptNLP;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rhec/core/kkt.hpp"
-#include "rhec/core/point.hpp"
+#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/qp/kkt.hpp"
 
 namespace rhec::nlopt {
 
@@ -116,7 +116,7 @@ double CondensedProblem::reduced_gradient(const Entry& e) const noexcept {
   const int i = e.stage, N = ocp_->intervals();
   double sum = e.is_state ? qp_.q(0)[e.component] : qp_.r(i)[e.component];
   if (i < N) {
-    const double* column = qp_.F(i) + e.component + (e.is_state ? 0 : qp_.capacity().states);
+    const double* column = qp_.AB(i) + e.component + (e.is_state ? 0 : qp_.capacity().states);
     for (int j = 0; j < qp_.states(i + 1); ++j) sum += column[j * qp_.stride()] * adjoint_.costate(i + 1)[j];
   }
   return sum;

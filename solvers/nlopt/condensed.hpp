@@ -4,8 +4,8 @@
 
 #include <Eigen/Core>
 
-#include "rhec/core/kkt.hpp"
-#include "rhec/core/ocp.hpp"
+#include "rhec/core/ocp/ocp.hpp"
+#include "rhec/core/qp/kkt.hpp"
 
 namespace rhec::nlopt {
 

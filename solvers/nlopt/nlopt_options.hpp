@@ -7,7 +7,7 @@
 
 #include <nlopt.h>
 
-#include "rhec/core/options.hpp"
+#include "rhec/core/config/options.hpp"
 
 namespace rhec::nlopt {
 

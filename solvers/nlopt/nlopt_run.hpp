@@ -4,7 +4,7 @@
 
 #include "condensed.hpp"
 #include "nlopt_options.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/ocp/solver.hpp"
 
 namespace rhec::nlopt {
 

@@ -8,7 +8,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "active_set.hpp"
-#include "rhec/core/point.hpp"
+#include "rhec/core/ocp/point.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec::nlopt {
@@ -114,29 +114,29 @@ std::string NloptSolver::why_not(const Ocp& ocp) const {
 
 void NloptSolver::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'nlopt': " + reason);
-  capacity_ = ocp.capacity();
+  ocp_ = &ocp;
   problem_ = CondensedProblem(ocp);
-  qp_ = StageQp(capacity_);
+  qp_ = StageQp(ocp.capacity());
   scratch_.assign(ocp.scratch_size(), 0.0);
 }
 
-void NloptSolver::prepare(const Ocp&, const Iterate&) noexcept {}
+void NloptSolver::prepare(const Iterate&) noexcept {}
 
 // Nothing is learnt from one problem for the next.
 void NloptSolver::reset() noexcept {}
 
-Report NloptSolver::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+Report NloptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
-  if (ocp.capacity() == capacity_ && is_sound_start(ocp, point, scratch_)) {
+  if (ocp_ && is_sound_start(*ocp_, iterate, scratch_)) {
     factorisations_ = 0;
     iterations_ = 0;
     limit_ = options_.max_iterations;
     fallback_used_ = false;
     try {
-      report = optimise(ocp, point, deadline);
-    } catch (const std::exception&) {  // memory ran out; `point` is written last
+      report = optimise(*ocp_, iterate, deadline);
+    } catch (const std::exception&) {  // memory ran out; `iterate` is written last
       report.status = Status::stalled;
-      rhec::judge(ocp, point, qp_, scratch_, report);
+      rhec::judge(*ocp_, iterate, qp_, scratch_, report);
     }
     report.factorisations = factorisations_;
     report.fallback_used = fallback_used_;

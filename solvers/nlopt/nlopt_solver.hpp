@@ -5,7 +5,7 @@
 #include "condensed.hpp"
 #include "nlopt_options.hpp"
 #include "nlopt_run.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/ocp/solver.hpp"
 
 namespace rhec::nlopt {
 
@@ -30,8 +30,9 @@ class NloptSolver final : public Solver {
 
   std::string why_not(const Ocp& ocp) const override;
   void setup(const Ocp& ocp) override;
-  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override;
-  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
+  void prepare(const Iterate& guess) noexcept override;
+  using Solver::solve;
+  Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
 
  private:
@@ -60,7 +61,7 @@ class NloptSolver final : public Solver {
 
   Options options_;
   Traits traits_;
-  Capacity capacity_;
+  const Ocp* ocp_ = nullptr;
   CondensedProblem problem_;
   std::vector<double> scratch_;
   StageQp qp_;

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "rhec/core/sparse_nlp.hpp"
+#include "rhec/core/ocp/sparse_nlp.hpp"
 
 namespace rhec::sparse_sqp {
 

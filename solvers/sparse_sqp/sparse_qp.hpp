@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "kkt_factor.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/ocp/solver.hpp"
 
 namespace rhec::sparse_sqp {
 

@@ -8,7 +8,7 @@
 #include <new>
 #include <utility>
 
-#include "rhec/core/point.hpp"
+#include "rhec/core/ocp/point.hpp"
 #include "rhec/plugins/sdk.hpp"
 #include "stage_convexity.hpp"
 #include "stage_covariances.hpp"
@@ -89,12 +89,12 @@ std::string SparseSqp::why_not(const Ocp& ocp) const {
 
 void SparseSqp::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'sparse_sqp': " + reason);
-  capacity_ = ocp.capacity();
-  stages_ = StageQp(capacity_);
-  other_stages_ = StageQp(capacity_);
-  for (Iterate* point : {&current_, &trial_}) *point = Iterate(capacity_);
+  const Capacity capacity = ocp.capacity();
+  ocp_ = &ocp;
+  stages_ = other_stages_ = StageQp(capacity);
+  for (Iterate* iterate : {&current_, &trial_}) *iterate = Iterate(capacity);
   scratch_.assign(ocp.scratch_size(), 0.0);
-  defects_.assign(static_cast<std::size_t>(capacity_.intervals) * capacity_.states, 0.0);
+  defects_.assign(static_cast<std::size_t>(capacity.intervals) * capacity.states, 0.0);
   reset();
 }
 
@@ -331,9 +331,9 @@ void SparseSqp::polish(const Ocp& ocp, Report& report, Clock::time_point deadlin
   if (after.largest() <= options_.tolerance && after.defect < report.kkt.defect) std::swap(current_, trial_);
 }
 
-Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point deadline) {
-  bool use_exact = options_.hessian == Curvature::exact || (options_.hessian == Curvature::automatic &&
-                                                            ocp.kind() == OcpKind::rhc && ocp.has_second_derivatives());
+Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point deadline) {
+  bool use_exact = options_.hessian == Curvature::exact ||
+                   (options_.hessian == Curvature::automatic && ocp.preferred_hessian() == Hessian::exact);
   double last_residual = std::numeric_limits<double>::infinity();
   int slow = 0;
   bool has_costates = max_abs(multipliers_) > 0.0;
@@ -390,10 +390,11 @@ Status SparseSqp::iterate(const Ocp& ocp, Report& report, Clock::time_point dead
   }
 }
 
-Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept {
+Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
-  if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_)) return report;
-  current_ = point;
+  if (!ocp_ || !is_sound_start(*ocp_, iterate, scratch_)) return report;
+  const Ocp& ocp = *ocp_;
+  current_ = iterate;
   const int factorisations_before = qp_.factorisations();
   try {
     take_structure(ocp);
@@ -405,32 +406,33 @@ Report SparseSqp::solve(const Ocp& ocp, Iterate& point, Clock::time_point deadli
     for (std::size_t k = 0; k < z_.size(); ++k) bounds_cross = bounds_cross || lower_z_[k] > upper_z_[k];
     if (bounds_cross) {
       report.status = Status::infeasible;
-      judge(ocp, point, stages_, scratch_, report);
+      judge(ocp, iterate, stages_, scratch_, report);
       return report;
     }
-    nlp_.read(ocp, point, z_.data(), multipliers_.data(), bound_multipliers_.data());
+    nlp_.read(ocp, iterate, z_.data(), multipliers_.data(), bound_multipliers_.data());
     for (std::size_t k = 0; k < z_.size(); ++k) z_[k] = std::clamp(z_[k], lower_z_[k], upper_z_[k]);
     nlp_.write(ocp, z_.data(), nullptr, nullptr, current_);
-    report.status = iterate(ocp, report, deadline);
+    report.status = converge(ocp, report, deadline);
   } catch (const std::bad_alloc&) {
     reset();  // what was made for the structure may be incomplete
     report.status = Status::stalled;
   }
   report.factorisations = qp_.factorisations() - factorisations_before;
-  if (report.status != Status::infeasible && is_sound_start(ocp, current_, scratch_)) std::swap(point, current_);
-  judge(ocp, point, stages_, scratch_, report);
+  if (report.status != Status::infeasible && is_sound_start(ocp, current_, scratch_)) std::swap(iterate, current_);
+  judge(ocp, iterate, stages_, scratch_, report);
   return report;
 }
 
-bool SparseSqp::covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept {
+bool SparseSqp::covariances(const Iterate& iterate, StageRange nodes, std::span<double> blocks) noexcept {
+  if (!ocp_ || !is_sound_start(*ocp_, iterate, scratch_)) return false;
+  const Ocp& ocp = *ocp_;
   // It has all or nothing.
-  if (nodes.first != 0 || nodes.last != ocp.intervals()) return false;
-  const auto stride = static_cast<std::size_t>(capacity_.states);
-  if (!(ocp.capacity() == capacity_) || !is_sound_start(ocp, point, scratch_) ||
+  const auto stride = static_cast<std::size_t>(ocp.capacity().states);
+  if (nodes.first != 0 || nodes.last != ocp.intervals() ||
       blocks.size() < (static_cast<std::size_t>(ocp.intervals()) + 1) * stride * stride)
     return false;
   try {
-    linearise_stages(ocp, point, Hessian::gauss_newton, stages_, scratch_);
+    linearise_stages(ocp, iterate, Hessian::gauss_newton, stages_, scratch_);
     return stage_covariances(stages_, blocks);
   } catch (const std::bad_alloc&) {
     return false;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "rhec/core/options.hpp"
+#include "rhec/core/config/options.hpp"
 #include "sparse_qp.hpp"
 
 namespace rhec::sparse_sqp {
@@ -37,9 +37,10 @@ class SparseSqp final : public Solver {
 
   std::string why_not(const Ocp& ocp) const override;
   void setup(const Ocp& ocp) override;
-  void prepare(const Ocp&, const Iterate&) noexcept override {}
-  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
-  bool covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept override;
+  void prepare(const Iterate&) noexcept override {}
+  using Solver::solve;
+  Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override;
+  bool covariances(const Iterate& iterate, StageRange nodes, std::span<double> blocks) noexcept override;
   void reset() noexcept override;
 
  private:
@@ -51,13 +52,13 @@ class SparseSqp final : public Solver {
   bool shorten_locally();
   bool search(const Ocp& ocp, double residual, double& after);
   void polish(const Ocp& ocp, Report& report, Clock::time_point deadline);
-  Status iterate(const Ocp& ocp, Report& report, Clock::time_point deadline);
+  Status converge(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome find_step(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);
   SparseQp::Program program() const noexcept;
 
   Options options_;
-  Capacity capacity_;
+  const Ocp* ocp_ = nullptr;
   SparseNlp nlp_;
   SparseQp qp_;
   StageQp stages_, other_stages_;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "rhec/core/stage_qp.hpp"
+#include "rhec/core/qp/stage_qp.hpp"
 
 namespace rhec::sparse_sqp {
 

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "rhec/core/stage_qp.hpp"
+#include "rhec/core/qp/stage_qp.hpp"
 
 namespace rhec::sparse_sqp {
 

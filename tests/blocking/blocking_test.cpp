@@ -1,5 +1,5 @@
 // The blocking strategies, through their plugins, against METHOD's rules.
-#include "rhec/core/blocking.hpp"
+#include "rhec/core/horizon/blocking.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

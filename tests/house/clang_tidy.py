@@ -27,7 +27,7 @@ class Headers:
     """Which files of ours a file includes, itself and through others."""
 
     def __init__(self, root):
-        self.include_directories = [root / folder / "include" for folder in ("core", "plugins", "sim")]
+        self.include_directories = sorted([*root.glob("*/include"), *root.glob("*/*/include")])
         self.digests = {}
 
     def closure(self, file):
@@ -40,7 +40,7 @@ class Headers:
             text = path.read_text(encoding="utf-8")
             self.digests.setdefault(path, hashlib.sha256(text.encode()).hexdigest())
             for name in QUOTED.findall(text):
-                places = [path.parent, path.parent.parent, *self.include_directories]
+                places = [path.parent, *self.include_directories]
                 open_files += [(place / name).resolve() for place in places if (place / name).is_file()]
         return sorted(seen)
 

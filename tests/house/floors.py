@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""The order of the floors, in what files include and in what libraries link to.
+"""The order of the floors and of their rooms, in what files include and in what libraries link to.
 
     floors.py <source root> [--lib <directory of the libraries> --plugins <directory of the plugins>]
     floors.py --self-test
 
 A folder includes folders on lower floors, and itself; a plugin includes its own folder, core and plugins. Benchmarks look
-into plugins too, as "solvers/gn_rti/gn_rti.hpp".
+into plugins too, as "solvers/gn_rti/gn_rti.hpp". A room includes its own files and the public headers of the rooms that it
+comes after: `rhec_add_room(<floor> <room> AFTER <room> ...)` in its CMakeLists.txt says which.
 """
 import argparse
 import pathlib
@@ -40,7 +41,71 @@ type_traits typeindex typeinfo unordered_map unordered_set utility valarray vari
 cassert cctype cerrno cfenv cfloat cinttypes climits clocale cmath csetjmp csignal cstdarg cstddef cstdint cstdio
 cstdlib cstring ctime cuchar cwchar cwctype
 """.split())
+ROOM = re.compile(r"^rhec_add_room\((\w+)\s+(\w+)([^)]*)\)", re.MULTILINE)
+ROOM_KEYWORDS = ("INTERNAL", "AFTER", "SOURCES", "PUBLIC", "PRIVATE")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+
+class Rooms:
+    """The rooms of all floors: which rooms of its floor each may include, and which are not to be seen from other floors."""
+
+    def __init__(self, root):
+        self.after, self.internal, self.violations = {}, set(), []
+        for file in sorted(root.glob("*/*/CMakeLists.txt")):
+            for floor, room, words in ROOM.findall(file.read_text(encoding="utf-8")):
+                self._add(file, floor, room, words.split())
+        for floor, room in self.after:
+            for other in sorted(self.reach(floor, room) - {room}):
+                if (floor, other) not in self.after:
+                    self.violations.append(f"{floor}/{room}: comes after {other}, which is no room of {floor}/")
+                elif room in self.reach(floor, other):
+                    self.violations.append(f"{floor}/{room}: comes after {other}, which comes after {room}")
+
+    def _add(self, file, floor, room, words):
+        self.after[floor, room] = set()
+        taker = None
+        for word in words:
+            if word in ROOM_KEYWORDS:
+                taker = word
+                if word == "INTERNAL":
+                    self.internal.add((floor, room))
+            elif taker == "AFTER":
+                self.after[floor, room].add(word)
+        if file.parent.parts[-2:] != (floor, room):
+            self.violations.append(f"{file}: declares the room {floor}/{room}, which is another folder")
+
+    def of_floor(self, floor):
+        return {room for of, room in self.after if of == floor}
+
+    def reach(self, floor, room):
+        """The room itself and all that come before it."""
+        reached, waiting = set(), [room]
+        while waiting:
+            at = waiting.pop()
+            if at not in reached:
+                reached.add(at)
+                waiting += self.after.get((floor, at), ())
+        return reached
+
+    def of_file(self, root, file):
+        """The room that a file lies in, or None."""
+        parts = file.relative_to(root).parts
+        return parts[1] if len(parts) > 2 and (parts[0], parts[1]) in self.after else None
+
+    def why_not(self, root, file, name):
+        """`name` is "rhec/<floor>/..." of a floor that may be included."""
+        floor, rest = name.split("/")[1], name.split("/")[2:]
+        if not self.of_floor(floor):
+            return None
+        if len(rest) != 2 or rest[0] not in self.of_floor(floor):
+            return f'public headers of {floor}/ are named "rhec/{floor}/<room>/<header>.hpp"'
+        own_floor, own_room = file.relative_to(root).parts[0], self.of_file(root, file)
+        if own_floor != floor:
+            return f"{floor}/{rest[0]} is not to be seen from other floors" if (floor, rest[0]) in self.internal else None
+        reach = self.reach(floor, own_room)
+        if rest[0] not in reach:
+            return f"{floor}/{own_room} does not come after {rest[0]}, only after {', '.join(sorted(reach - {own_room})) or 'none'}"
+        return None
 
 
 def allowed_text(folder):
@@ -54,13 +119,14 @@ def allowed_text(folder):
     return f"{names}, own files, third parties in <>"
 
 
-def own_folder(root, file):
-    """The folder within which a file may include by relative name: for a plugin its own, else that of the floor."""
+def own_folder(root, rooms, file):
+    """The folder within which a file may include by relative name: its plugin's or its room's, else that of the floor."""
     parts = file.relative_to(root).parts
-    return root.joinpath(*parts[: 2 if parts[0] in PLUGIN_FOLDERS and len(parts) > 2 else 1])
+    is_inner = len(parts) > 2 and (parts[0] in PLUGIN_FOLDERS or rooms.of_file(root, file))
+    return root.joinpath(*parts[: 2 if is_inner else 1])
 
 
-def why_not_include(root, file, quote, name):
+def why_not_include(root, rooms, file, quote, name):
     folder = file.relative_to(root).parts[0]
     if name.startswith("rhec/"):
         if quote == "<":
@@ -70,11 +136,11 @@ def why_not_include(root, file, quote, name):
             return 'public headers are named "rhec/<folder>/<header>.hpp"'
         if parts[1] not in MAY_USE[folder]:
             return f"{folder}/ does not reach {parts[1]}/"
-        return None
+        return rooms.why_not(root, file, name)
     if quote == '"':
         if folder == "benchmarks" and name.startswith(tuple(f"{other}/" for other in PLUGIN_FOLDERS)) and ".." not in name:
             return None if (root / name).is_file() else f'"{name}" is not a file of {root}'
-        own = own_folder(root, file).resolve()
+        own = own_folder(root, rooms, file).resolve()
         places = [file.parent, own, own / "src"]
         targets = [(place / name).resolve() for place in places]
         if any(target.is_file() and target.is_relative_to(own) for target in targets):
@@ -86,15 +152,18 @@ def why_not_include(root, file, quote, name):
 
 
 def include_violations(root):
-    violations, looked_at = [], 0
+    rooms, looked_at = Rooms(root), 0
+    violations = list(rooms.violations)
     for file in house.cpp_files(root, house.FOLDERS):
         looked_at += 1
         folder = file.relative_to(root).parts[0]
         for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
             match = INCLUDE.match(line)
-            reason = match and why_not_include(root, file, *match.groups())
+            reason = match and why_not_include(root, rooms, file, *match.groups())
             if reason:
                 violations.append(f"{file}:{number}: {reason}; allowed: {allowed_text(folder)}")
+        if rooms.of_floor(folder) and not rooms.of_file(root, file):
+            violations.append(f"{file}:1: lies in no room of {folder}/; its rooms are {', '.join(sorted(rooms.of_floor(folder)))}")
     return violations, looked_at
 
 
@@ -144,11 +213,20 @@ def library_violations(lib, plugins):
 def self_test():
     """Plants violations, and things that are none, in a small tree; each must be told apart."""
     wrong = {
-        "core/src/up.cpp": '#include "rhec/plugins/host.hpp"',
-        "core/src/angle.cpp": "#include <rhec/core/model.hpp>",
-        "core/src/boost.cpp": "#include <boost/dll.hpp>",
-        "core/include/rhec/core/escapes.hpp": '#include "../../../../sim/src/own.hpp"',
+        "core/low/up.cpp": '#include "rhec/plugins/host.hpp"',
+        "core/low/angle.cpp": "#include <rhec/core/low/model.hpp>",
+        "core/low/boost.cpp": "#include <boost/dll.hpp>",
+        "core/low/include/rhec/core/low/escapes.hpp": '#include "../../../../../../sim/src/own.hpp"',
+        "core/low/higher.cpp": '#include "rhec/core/high/model.hpp"',
+        "core/side/beside.cpp": '#include "rhec/core/high/model.hpp"',
+        "core/high/no_room.cpp": '#include "rhec/core/model.hpp"',
+        "core/high/private.cpp": '#include "../low/own.hpp"',
+        "core/astray.cpp": "#include <vector>",
+        "core/round/CMakeLists.txt": "rhec_add_room(core round AFTER trip)",
+        "core/trip/CMakeLists.txt": "rhec_add_room(core trip AFTER round)",
+        "core/lost/CMakeLists.txt": "rhec_add_room(core lost AFTER nowhere)",
         "plugins/src/up.cpp": '  #  include "rhec/sim/world.hpp"',
+        "plugins/src/internal.cpp": '#include "rhec/core/inner/lanes.hpp"',
         "models/a/other.cpp": '#include "../b/b.hpp"',
         "solvers/s/sim.cpp": '#include "rhec/sim/world.hpp"',
         "sim/src/model.cpp": '#include "rhec/models/a.hpp"',
@@ -157,10 +235,15 @@ def self_test():
         "benchmarks/gone.cpp": '#include "models/b/gone.hpp"',
     }
     right = {
-        "core/src/good.cpp": '#include <vector>\n#include <Eigen/Core>\n#include <fmt/format.h>\n#include "rhec/core/model.hpp"',
-        "core/src/own_user.cpp": '#include "own.hpp"',
-        "core/src/own.hpp": "#pragma once\n// #include \"rhec/sim/world.hpp\"",
-        "plugins/src/good.cpp": '#include <boost/dll.hpp>\n#include "rhec/core/model.hpp"',
+        "core/low/CMakeLists.txt": "rhec_add_room(core low)",
+        "core/inner/CMakeLists.txt": "rhec_add_room(core inner INTERNAL AFTER low SOURCES a.cpp)",
+        "core/high/CMakeLists.txt": "# A comment.\nrhec_add_room(core high\n  AFTER inner\n  SOURCES good.cpp\n  PRIVATE fmt::fmt)",
+        "core/side/CMakeLists.txt": "rhec_add_room(core side AFTER low)",
+        "core/high/good.cpp": '#include <vector>\n#include <Eigen/Core>\n#include <fmt/format.h>\n#include "rhec/core/low/model.hpp"',
+        "core/high/inner.cpp": '#include "rhec/core/inner/lanes.hpp"\n#include "rhec/core/high/model.hpp"',
+        "core/low/own_user.cpp": '#include "own.hpp"',
+        "core/low/own.hpp": "#pragma once\n// #include \"rhec/sim/world.hpp\"",
+        "plugins/src/good.cpp": '#include <boost/dll.hpp>\n#include "rhec/core/high/model.hpp"',
         "models/b/b.hpp": '#include "rhec/plugins/sdk.hpp"',
         "models/b/b.cpp": '#include "b.hpp"',
         "sim/src/own.hpp": '#include "rhec/plugins/host.hpp"\n#include "rhec/sim/world.hpp"',
@@ -173,9 +256,10 @@ def self_test():
         for name, text in {**wrong, **right}.items():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_text(text + "\n")
-        told = {violation.split(":")[0] for violation in include_violations(root)[0]}
-        failures += [f"not noticed: {name}" for name in wrong if str(root / name) not in told]
-        failures += [f"wrongly blamed: {name}" for name in right if str(root / name) in told]
+        told = {violation.split(":")[0].removeprefix(f"{root}/") for violation in include_violations(root)[0]}
+        # A room that is declared wrongly is told by its name.
+        failures += [f"not noticed: {name}" for name in wrong if name.removesuffix("/CMakeLists.txt") not in told]
+        failures += [f"wrongly blamed: {name}" for name in right if name.removesuffix("/CMakeLists.txt") in told]
     links = [
         ("core", "librhec_plugins.so.0.1", True),
         ("core", "libboost_filesystem.so.1.74.0", True),

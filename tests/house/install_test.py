@@ -44,7 +44,7 @@ int main() {
 }
 """
 PLUGIN = """\
-#include "rhec/core/model.hpp"
+#include "rhec/core/model/model.hpp"
 
 extern "C" __attribute__((visibility("default"))) const int outside = 1;
 """
@@ -134,6 +134,20 @@ def check_robot(prefix, work, arguments):
     expect(len(lines) > 20 and "kappa 0.7" in lines[-1], "the robot did not learn its slip:\n" + "\n".join(lines))
 
 
+def check_problem(prefix, work, arguments):
+    """A kind of problem that rhec does not know, against the installed headers, with every solver that is installed."""
+    settings = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={arguments.cxxflags}", "-DCMAKE_BUILD_TYPE=Debug"]
+    if arguments.cxx:
+        settings.append(f"-DCMAKE_CXX_COMPILER={arguments.cxx}")
+    source, build = work / "problem", work / "build-problem"
+    shutil.copytree(arguments.source / "examples" / "problem", source)
+    run(arguments.cmake, "-S", source, "-B", build, *settings)
+    run(arguments.cmake, "--build", build)
+    for solver in ("sparse_sqp", "ipopt", "nlopt"):
+        told = run(build / "parking", solver, cwd="/")
+        expect(told.startswith("solved"), f"the parking problem by {solver}: {told}")
+
+
 def check_template(home, arguments):
     """What the README says of a plugin from outside, command by command, as someone whose rhec lies in ~/rhec.
 
@@ -183,6 +197,7 @@ def main():
         plugins = check_plugins(moved)
         headers = check_consumer(moved, work, arguments)
         check_robot(moved, work, arguments)
+        check_problem(moved, work, arguments)
         check_template(home, arguments)
     print(f"install: moved, {plugins} plugins seen, {headers} headers included from outside, the README's examples run")
 

@@ -2,8 +2,8 @@
 #include "every_function.hpp"
 
 #include "model_checks.hpp"
-#include "rhec/core/error.hpp"
-#include "rhec/core/formula_model.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/model/formula_model.hpp"
 
 namespace rhec {
 

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "rhec/core/model.hpp"
-#include "rhec/core/padded.hpp"
+#include "rhec/core/base/padded.hpp"
+#include "rhec/core/model/model.hpp"
 #include "rhec/sim/derivative_check.hpp"
 #include "rhec/sim/random.hpp"
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "rhec/core/model.hpp"
+#include "rhec/core/model/model.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
 

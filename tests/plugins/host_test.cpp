@@ -13,8 +13,8 @@
 #include <thread>
 #include <tuple>
 
-#include "rhec/core/blocking.hpp"
-#include "rhec/core/model.hpp"
+#include "rhec/core/horizon/blocking.hpp"
+#include "rhec/core/model/model.hpp"
 #include "rhec/plugins/fingerprint.hpp"
 
 namespace rhec {

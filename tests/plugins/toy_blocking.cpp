@@ -2,7 +2,7 @@
 // it.
 #include <stdexcept>
 
-#include "rhec/core/blocking.hpp"
+#include "rhec/core/horizon/blocking.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bicycle.hpp"
-#include "rhec/core/path.hpp"
+#include "rhec/core/control/path.hpp"
 #include "rhec/sim/paths.hpp"
 #include "rhec/sim/truth.hpp"
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "rhec/core/model.hpp"
+#include "rhec/core/model/model.hpp"
 
 namespace rhec::sim {
 

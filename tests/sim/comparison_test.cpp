@@ -9,10 +9,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/kkt.hpp"
-#include "rhec/core/rhc_problem.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/core/qp/kkt.hpp"
 #include "rhec/plugins/yaml.hpp"
 
 namespace rhec::sim {
@@ -137,7 +137,7 @@ TEST(Comparison, ADefectCannotFlatter) {
     }
     EXPECT_GT(with_defect, same.problems.size() / 2);
     // An estimate's objective as it was returned lies below the optimum; a plan is judged by what its inputs do.
-    if (same.kind == OcpKind::rhe) {
+    if (same.kind == "rhe") {
       EXPECT_GT(below, same.problems.size() / 2);
     } else {
       EXPECT_EQ(below, 0U);
@@ -182,7 +182,7 @@ TEST(Comparison, AnAnswerThatIsNotUsableHasNoGap) {
 struct Kept {
   std::vector<RheProblem> rhe;
   std::vector<RhcProblem> rhc;
-  std::map<OcpKind, std::vector<Iterate>> guesses;
+  std::map<std::string, std::vector<Iterate>> guesses;
 };
 
 Kept keep_problems(Settings settings) {
@@ -192,9 +192,9 @@ Kept keep_problems(Settings settings) {
   Kept kept;
   LoopHooks hooks;
   hooks.solved = [&](std::int64_t, const HorizonProblem& problem, const Iterate& guess, const Iterate&, const Report&) {
-    if (problem.kind() == OcpKind::rhe) kept.rhe.push_back(dynamic_cast<const RheProblem&>(problem));
-    if (problem.kind() == OcpKind::rhc) kept.rhc.push_back(dynamic_cast<const RhcProblem&>(problem));
-    kept.guesses[problem.kind()].push_back(guess);
+    if (problem.kind() == "rhe") kept.rhe.push_back(dynamic_cast<const RheProblem&>(problem));
+    if (problem.kind() == "rhc") kept.rhc.push_back(dynamic_cast<const RhcProblem&>(problem));
+    kept.guesses[std::string(problem.kind())].push_back(guess);
   };
   run_closed_loop(scenario, hooks);
   return kept;
@@ -206,12 +206,14 @@ std::vector<double> residuals(const Backend& backend, Settings options, double t
   if (backend.solver == "gn_rti") options.set("mode", Settings::scalar("converge"));
   options.set("tolerance", Settings::scalar(fmt::format("{}", tolerance)));
   const auto solver = host().make_solver(backend.solver, options);
-  solver->setup(problems.front());
+  Problem live = problems.front();
+  solver->setup(live);
   std::vector<double> result;
   for (std::size_t p = 0; p < problems.size(); ++p) {
+    live.take_data(problems[p]);
     Iterate point = guesses[p];
-    solver->prepare(problems[p], point);
-    solver->solve(problems[p], point);
+    solver->prepare(point);
+    solver->solve(point);
     StageQp qp(problems[p].capacity());
     std::vector<double> scratch(problems[p].scratch_size());
     result.push_back(kkt_residual(problems[p], point, qp, scratch).largest());
@@ -235,8 +237,8 @@ TEST(Comparison, EqualAccuracyEndsWithTheResidualAskedFor) {
       const double tolerance = *answers.tolerance;
       const std::vector<Iterate>& guesses = kept.guesses.at(same.kind);
       const auto p99 = [&](double at) {
-        return spread_of(same.kind == OcpKind::rhe ? residuals(mine, mine.options, at, kept.rhe, guesses)
-                                                   : residuals(mine, mine.options, at, kept.rhc, guesses))
+        return spread_of(same.kind == "rhe" ? residuals(mine, mine.options, at, kept.rhe, guesses)
+                                            : residuals(mine, mine.options, at, kept.rhc, guesses))
             .p99;
       };
       EXPECT_LE(p99(tolerance), wanted);
@@ -355,7 +357,7 @@ TEST(Comparison, WithoutEstimationProblemsThereAreThoseOfControl) {
   options.closed_loop = true;
   const Comparison result = compare(host(), settings, options);
   ASSERT_EQ(result.problems.size(), 1U);
-  EXPECT_EQ(result.problems[0].kind, OcpKind::rhc);
+  EXPECT_EQ(result.problems[0].kind, "rhc");
   EXPECT_TRUE(result.all_usable());
   EXPECT_THAT(comparison_svg(result), HasSubstr("Control"));
 }

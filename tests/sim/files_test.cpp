@@ -7,7 +7,7 @@
 #include <functional>
 #include <string>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/csv.hpp"
 #include "rhec/sim/output_folder.hpp"
 

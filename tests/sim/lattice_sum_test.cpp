@@ -1,4 +1,4 @@
-#include "../../sim/src/lattice_sum.hpp"
+#include "sim/src/lattice_sum.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/formula_model.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/model/formula_model.hpp"
 #include "rhec/sim/derivative_check.hpp"
 
 namespace rhec::sim {

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/random.hpp"
 
 namespace rhec::sim {

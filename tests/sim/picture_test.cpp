@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/run_picture.hpp"
 
 namespace rhec::sim {

@@ -10,10 +10,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "rhec/core/error.hpp"
-#include "rhec/core/formula_model.hpp"
-#include "rhec/core/rhc_problem.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/core/model/formula_model.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -169,8 +169,8 @@ TEST(ProblemFile, BuildsWhatVersion2Adds) {
   ASSERT_EQ(rhe.setup().robust.size(), 1U);
   EXPECT_THAT(rhe.setup().robust[0].outputs, ElementsAre(0));
   EXPECT_EQ(rhe.setup().robust[0].delta, 3.0);
-  EXPECT_TRUE(rhe.is_ramp(0));
-  EXPECT_TRUE(rhe.begins(0, 0)) << "a ramp that starts at the window's edge";
+  EXPECT_TRUE(rhe.structure().is_ramp(0));
+  EXPECT_TRUE(rhe.structure().starts_block(0, 0)) << "a ramp that starts at the window's edge";
   EXPECT_EQ(rhe.link_variance(0, 0), 0.5);
   EXPECT_EQ(rhe.link_variance(2, 0), infinity);
   Iterate point(rhe.capacity());
@@ -184,7 +184,7 @@ TEST(ProblemFile, BuildsWhatVersion2Adds) {
   std::string alone = rhe_line_2.substr(0, rhe_line_2.find(",\n \"guess\"")) + "}";
   alone = replaced(replaced(alone, "\"grip\": [0, 2]", "\"grip\": []"), "[0.5, null]", "[]");
   const auto never = build(read_problem(alone, "set.jsonl", 3), cart());
-  EXPECT_FALSE(never->begins(0, 0)) << "no ramp starts in the window";
+  EXPECT_FALSE(never->structure().starts_block(0, 0)) << "no ramp starts in the window";
 
   const auto control = build(read_problem(rhc_line_2, "set.jsonl", 3), cart());
   EXPECT_EQ(control->control_lower(0)[0], 0.0);

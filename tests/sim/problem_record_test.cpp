@@ -12,13 +12,13 @@
 
 #include <fmt/format.h>
 
-#include "../core/random_problem.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/problem_file.hpp"
 #include "rhec/sim/recording_solver.hpp"
+#include "support/random_problem.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -83,7 +83,7 @@ void expect_same_problem(const HorizonProblem& live, const Iterate& at_live, con
       if (i == N) break;
       const int m = a.controls(i);
       ASSERT_EQ(m, b.controls(i));
-      ASSERT_TRUE(same_bits("F", i, a.F(i), b.F(i), ns * a.stride()));
+      ASSERT_TRUE(same_bits("F", i, a.AB(i), b.AB(i), ns * a.stride()));
       ASSERT_TRUE(same_bits("b", i, a.b(i), b.b(i), ns));
       ASSERT_TRUE(same_bits("control lower", i, a.control_lower(i), b.control_lower(i), m));
       ASSERT_TRUE(same_bits("control upper", i, a.control_upper(i), b.control_upper(i), m));
@@ -196,7 +196,7 @@ TEST_P(EveryModel, AWindowThatIsShorterThanItsRoom) {
                          built->state_upper(0)[model->state_count()]));
     const auto solver = host().make_solver("gn_rti", parse_yaml("mode: converge", "options"));
     solver->setup(*built);
-    EXPECT_EQ(solver->solve(*built, point).status, Status::solved);
+    EXPECT_EQ(solver->solve(point).status, Status::solved);
   }
 }
 
@@ -291,7 +291,6 @@ TEST(ProblemRecord, OptionsKeepTheirMeaning) {
 class Disguised final : public Ocp {
  public:
   explicit Disguised(const Ocp& of) : of_(of) {}
-  OcpKind kind() const noexcept override { return of_.kind(); }
   Capacity capacity() const noexcept override { return of_.capacity(); }
   int intervals() const noexcept override { return of_.intervals(); }
   int state_count(int i) const noexcept override { return of_.state_count(i); }
@@ -331,9 +330,11 @@ TEST(RecordingSolver, IsTheSolverItIsMadeOf) {
   int calls = 0;
   Iterate result;
   RecordingSolver recording(
-      host().make_solver("gn_rti", converge),
-      [&](const HorizonProblem& asked, const Iterate& from, const Iterate& to, const Report& report) {
+      host().make_solver("gn_rti", converge), [] { return std::int64_t{17}; },
+      [&](std::int64_t step, const HorizonProblem& asked, const Iterate& from, const Iterate& to,
+          const Report& report) {
         ++calls;
+        EXPECT_EQ(step, 17);
         EXPECT_EQ(&asked, problem.get());
         expect_same_point(asked, from, guess);
         EXPECT_EQ(report.status, Status::solved);
@@ -343,9 +344,9 @@ TEST(RecordingSolver, IsTheSolverItIsMadeOf) {
   plain->setup(*problem);
   recording.setup(*problem);
   Iterate expected = guess, point = guess;
-  plain->prepare(*problem, expected);
-  recording.prepare(*problem, point);
-  const Report wanted = plain->solve(*problem, expected), report = recording.solve(*problem, point);
+  plain->prepare(expected);
+  recording.prepare(point);
+  const Report wanted = plain->solve(expected), report = recording.solve(point);
   EXPECT_EQ(report.iterations, wanted.iterations);
   EXPECT_EQ(report.objective, wanted.objective);
   expect_same_point(*problem, point, expected);
@@ -353,9 +354,55 @@ TEST(RecordingSolver, IsTheSolverItIsMadeOf) {
   EXPECT_EQ(calls, 1);
 
   const Disguised other(*problem);
+  recording.setup(other);
   point = guess;
-  EXPECT_EQ(recording.solve(other, point).status, Status::solved);
+  EXPECT_EQ(recording.solve(point).status, Status::solved);
   EXPECT_EQ(calls, 1) << "a problem of another kind passes unrecorded";
+}
+
+TEST(RecordingSolver, TellsOfAFeedbackOnceItIsFinished) {
+  RandomProblem random(host().make_model("bicycle_slip"), 11);
+  const auto problem = random.rhc({});
+  const auto plain = host().make_solver("gn_rti");
+  std::int64_t step = 0;
+  struct Told {
+    std::int64_t step;
+    Iterate guess, result;
+    Report report;
+  };
+  std::vector<Told> told;
+  RecordingSolver recording(
+      host().make_solver("gn_rti"), [&] { return step; },
+      [&](std::int64_t at, const HorizonProblem&, const Iterate& from, const Iterate& to, const Report& report) {
+        told.push_back({at, from, to, report});
+      });
+  plain->setup(*problem);
+  recording.setup(*problem);
+  Iterate expected = RandomProblem::cold_start(*problem), point = expected;
+  for (step = 1; step <= 3; ++step) {
+    const Iterate guess = point;
+    for (Solver* solver : {plain.get(), static_cast<Solver*>(&recording)}) {
+      Iterate& iterate = solver == &recording ? point : expected;
+      solver->prepare(iterate);
+      Report report = solver->feedback(iterate, Clock::time_point::max());
+      EXPECT_EQ(std::ssize(told), step - 1) << "what is not finished has no KKT residual yet";
+      if (solver == &recording) ++step;  // whoever asks is a step further by then
+      solver->finish(iterate, report);
+      if (solver == &recording) --step;
+    }
+    ASSERT_EQ(std::ssize(told), step);
+    EXPECT_EQ(told.back().step, step) << "the step at which it was asked";
+    expect_same_point(*problem, told.back().guess, guess);
+    expect_same_point(*problem, told.back().result, expected);
+    EXPECT_GT(told.back().report.objective, 0.0);
+  }
+  // An iterate that cannot be used is not finished by anybody.
+  problem->input_lower(0, 0) = std::nan("");
+  std::vector<double> scratch(problem->scratch_size());
+  problem->finish(scratch);
+  recording.prepare(point);
+  EXPECT_FALSE(is_usable(recording.feedback(point, Clock::time_point::max()).status));
+  EXPECT_EQ(told.size(), 4U);
 }
 
 // It cannot stop before the wall that it drives against.
@@ -414,8 +461,8 @@ TEST_P(Replayed, GivesTheSameBits) {
     solver->setup(*problem);
     Iterate point(problem->capacity());
     start(record, *problem, point);
-    solver->prepare(*problem, point);
-    const Report report = solver->solve(*problem, point);
+    solver->prepare(point);
+    const Report report = solver->solve(point);
     ASSERT_EQ(report.status, live.report.status) << record.id;
     ASSERT_EQ(report.iterations, live.report.iterations) << record.id;
     ASSERT_TRUE(same_bits("objective", 0, &report.objective, &live.report.objective, 1)) << record.id;

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/recorded_log.hpp"
 

@@ -10,14 +10,14 @@
 #include <string>
 #include <vector>
 
-#include "../../sim/src/number_text.hpp"
-#include "../../sim/src/report_files.hpp"
-#include "../../sim/src/report_statistics.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/horizon_log.hpp"
 #include "rhec/sim/report.hpp"
+#include "sim/src/number_text.hpp"
+#include "sim/src/report_files.hpp"
+#include "sim/src/report_statistics.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/random.hpp"
 
 namespace rhec::sim {

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <Eigen/Dense>
 
-#include "rhec/core/kkt.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/qp/kkt.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace {
@@ -29,15 +29,18 @@ class ToySolver : public rhec::Solver {
   explicit ToySolver(const Options& options) : kind_(options.kind) {}
 
   std::string why_not(const rhec::Ocp& ocp) const override {
-    return kind_ == Kind::refuse_rhe && ocp.kind() == rhec::OcpKind::rhe ? "a toy cannot look back" : "";
+    return kind_ == Kind::refuse_rhe && !ocp.can_roll_out() ? "a toy cannot look back" : "";
   }
   void setup(const rhec::Ocp& ocp) override {
+    ocp_ = &ocp;
     qp_ = rhec::StageQp(ocp.capacity());
     scratch_.assign(ocp.scratch_size(), 0.0);
   }
-  void prepare(const rhec::Ocp&, const rhec::Iterate&) noexcept override {}
+  void prepare(const rhec::Iterate&) noexcept override {}
 
-  rhec::Report solve(const rhec::Ocp& ocp, rhec::Iterate& point, rhec::Clock::time_point) noexcept override {
+  using Solver::solve;
+  rhec::Report solve(rhec::Iterate& point, rhec::Clock::time_point) noexcept override {
+    const rhec::Ocp& ocp = *ocp_;
     rhec::Report report;
     report.iterations = 1;
     report.status = kind_ == Kind::lost ? rhec::Status::infeasible : rhec::Status::solved;  // or so it says
@@ -72,6 +75,7 @@ class ToySolver : public rhec::Solver {
   }
 
   Kind kind_;
+  const rhec::Ocp* ocp_ = nullptr;
   rhec::StageQp qp_;
   std::vector<double> scratch_;
 };

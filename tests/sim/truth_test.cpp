@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "bicycle.hpp"
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -8,13 +8,13 @@
 #include <limits>
 #include <new>
 
-#include "../core/random_problem.hpp"
-#include "other_model.hpp"
-#include "rhec/core/receding_horizon_estimation.hpp"
-#include "rhec/core/riccati.hpp"
-#include "rhec/core/shift.hpp"
+#include "rhec/core/estimation/receding_horizon_estimation.hpp"
+#include "rhec/core/horizon/shift.hpp"
+#include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
+#include "support/other_model.hpp"
+#include "support/random_problem.hpp"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -75,8 +75,8 @@ TEST(GnRti, AllocatesNothingAfterSetup) {
         Iterate point = RandomProblem::cold_start(*problem);
         const long before = allocations;
         for (int repeat = 0; repeat < 3; ++repeat) {
-          solver->prepare(*problem, point);
-          solver->solve(*problem, point);
+          solver->prepare(point);
+          solver->solve(point);
         }
         solver->reset();
         EXPECT_EQ(allocations - before, 0) << options << ", seed " << seed;
@@ -92,15 +92,15 @@ TEST(GnRti, AStepIsTheSamePreparedOrNot) {
   converged->setup(*problem);
   step->setup(*problem);
   Iterate base = RandomProblem::cold_start(*problem);
-  converged->solve(*problem, base);
+  converged->solve(base);
   for (int j = 0; j < 3; ++j) problem->output(problem->intervals())[j] += 0.02;
   // Prepared with the old measurement, fed the new one; against all at once.
   Iterate prepared = base, direct = base;
   for (int j = 0; j < 3; ++j) problem->output(problem->intervals())[j] -= 0.02;
-  step->prepare(*problem, prepared);
+  step->prepare(prepared);
   for (int j = 0; j < 3; ++j) problem->output(problem->intervals())[j] += 0.02;
-  EXPECT_EQ(step->solve(*problem, prepared).status, Status::step_taken);
-  EXPECT_EQ(step->solve(*problem, direct).status, Status::step_taken);
+  EXPECT_EQ(step->solve(prepared).status, Status::step_taken);
+  EXPECT_EQ(step->solve(direct).status, Status::step_taken);
   for (int i = 0; i <= problem->intervals(); ++i)
     for (int j = 0; j < problem->state_count(i); ++j) EXPECT_NEAR(prepared.state(i)[j], direct.state(i)[j], 1e-12);
 }
@@ -113,16 +113,16 @@ TEST(GnRti, PreparesControlForAnotherInitialState) {
   converged->setup(*problem);
   step->setup(*problem);
   Iterate point = RandomProblem::cold_start(*problem);
-  converged->solve(*problem, point);
-  step->prepare(*problem, point);
+  converged->solve(point);
+  step->prepare(point);
   problem->given_state()[0] += 0.01;
   problem->given_parameters()[0] -= 0.01;
   problem->finish(scratch);
-  const Report report = step->solve(*problem, point);
+  const Report report = step->solve(point);
   EXPECT_EQ(report.status, Status::step_taken);
   EXPECT_EQ(report.factorisations, 1) << "the prepared factorisation should have been enough";
   Iterate exact = point;
-  converged->solve(*problem, exact);
+  converged->solve(exact);
   EXPECT_NEAR(problem->evaluate(point, nullptr, scratch), problem->evaluate(exact, nullptr, scratch),
               1e-4 * (1.0 + problem->evaluate(exact, nullptr, scratch)));
 }
@@ -164,7 +164,7 @@ TEST(GnRti, AnswersFirstAndJudgesAfterwards) {
                  converged = gn_rti("{mode: converge}");
       for (const auto& solver : {at_once, in_parts, without_finish, converged}) solver->setup(*problem);
       Iterate start = RandomProblem::cold_start(*problem);
-      converged->solve(*problem, start);
+      converged->solve(start);
       GuessShifter shifters[] = {GuessShifter(*problem), GuessShifter(*problem), GuessShifter(*problem)};
       Iterate whole = start, parts = start, unfinished = start;
       for (int sample = 0; sample < 6; ++sample) {
@@ -180,20 +180,20 @@ TEST(GnRti, AnswersFirstAndJudgesAfterwards) {
         shifters[0].apply(1, *problem, whole);
         shifters[1].apply(1, *problem, parts);
         shifters[2].apply(1, *problem, unfinished);
-        at_once->prepare(*problem, whole);
-        in_parts->prepare(*problem, parts);
-        without_finish->prepare(*problem, unfinished);
-        const Report expected = at_once->solve(*problem, whole);
-        Report report = in_parts->feedback(*problem, parts, Clock::time_point::max());
+        at_once->prepare(whole);
+        in_parts->prepare(parts);
+        without_finish->prepare(unfinished);
+        const Report expected = at_once->solve(whole);
+        Report report = in_parts->feedback(parts, Clock::time_point::max());
         expect_same_bits(*problem, parts, whole, where + ", answered");
-        in_parts->finish(*problem, parts, report);
+        in_parts->finish(parts, report);
         expect_same_bits(*problem, parts, whole, where + ", judged");
         EXPECT_EQ(report.status, expected.status) << where;
         EXPECT_EQ(report.iterations, expected.iterations) << where;
         EXPECT_EQ(report.objective, expected.objective) << where;
         EXPECT_EQ(report.kkt.largest(), expected.kkt.largest()) << where;
         // It costs time to leave it out, and nothing else.
-        without_finish->feedback(*problem, unfinished, Clock::time_point::max());
+        without_finish->feedback(unfinished, Clock::time_point::max());
         expect_same_bits(*problem, unfinished, whole, where + ", not judged");
         if (HasFatalFailure()) return;
       }
@@ -210,22 +210,22 @@ TEST(GnRti, TakesAStepBackThatComesToNothing) {
                one_less = gn_rti("{mode: rti}"), converged = gn_rti("{mode: converge}");
     for (const auto& each : {solver, one_less, converged}) each->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    converged->solve(*problem, point);
+    converged->solve(point);
     problem->given_state()[0] += 0.01;
     Iterate before = point;
-    if (iterations > 1) one_less->solve(*problem, before);
-    Report report = solver->feedback(*problem, point, Clock::time_point::max());
+    if (iterations > 1) one_less->solve(before);
+    Report report = solver->feedback(point, Clock::time_point::max());
     ASSERT_EQ(report.status, Status::step_taken);
     EXPECT_TRUE(point.is_finite());
     model->calls_until_nan = 0;
-    solver->finish(*problem, point, report);
+    solver->finish(point, report);
     expect_same_bits(*problem, point, before, "taken back");
     EXPECT_EQ(report.status, iterations > 1 ? Status::iteration_limit : Status::stalled);
     EXPECT_EQ(report.iterations, iterations - 1);
     EXPECT_TRUE(std::isfinite(report.objective));
     EXPECT_TRUE(std::isfinite(report.kkt.largest()));
     // And goes on from there.
-    EXPECT_EQ(solver->solve(*problem, point).status, Status::step_taken);
+    EXPECT_EQ(solver->solve(point).status, Status::step_taken);
   }
 }
 
@@ -236,7 +236,7 @@ TEST(GnRti, GivesTheCovariancesOfItsLinearisation) {
     const auto solver = gn_rti("{mode: converge}");
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    ASSERT_EQ(solver->solve(*problem, point).status, Status::solved);
+    ASSERT_EQ(solver->solve(point).status, Status::solved);
     const int N = problem->intervals(), ns = problem->capacity().states;
     std::vector<double> scratch(problem->scratch_size()), expected((N + 1) * ns * ns), all(expected), last(ns * ns);
     StageQp qp(problem->capacity());
@@ -244,18 +244,18 @@ TEST(GnRti, GivesTheCovariancesOfItsLinearisation) {
     problem->linearise(all_stages(*problem), point, Hessian::gauss_newton, qp, scratch);
     riccati.factor(qp, ActiveSet(problem->capacity()));
     riccati.covariances(qp, expected.data(), nullptr);
-    ASSERT_TRUE(solver->covariances(*problem, point, all_stages(*problem), all));
-    ASSERT_TRUE(solver->covariances(*problem, point, {N, N}, last));
+    ASSERT_TRUE(solver->covariances(point, all_stages(*problem), all));
+    ASSERT_TRUE(solver->covariances(point, {N, N}, last));
     for (std::size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(all[k], expected[k], 1e-12 * (1 + std::abs(all[k])));
     for (std::size_t k = 0; k < last.size(); ++k) {
       const double of_all = all[all.size() - last.size() + k];
       EXPECT_NEAR(last[k], of_all, 1e-12 * (1 + std::abs(of_all)));
     }
-    EXPECT_FALSE(solver->covariances(*problem, point, {1, 2}, all)) << "it has all or the last one";
-    EXPECT_FALSE(solver->covariances(*problem, point, all_stages(*problem), last)) << "there is no room for all";
+    EXPECT_FALSE(solver->covariances(point, {1, 2}, all)) << "it has all or the last one";
+    EXPECT_FALSE(solver->covariances(point, all_stages(*problem), last)) << "there is no room for all";
     // What was prepared for the next sample is not to be disturbed.
-    solver->prepare(*problem, point);
-    EXPECT_FALSE(solver->covariances(*problem, point, {N, N}, last));
+    solver->prepare(point);
+    EXPECT_FALSE(solver->covariances(point, {N, N}, last));
   }
 }
 
@@ -265,7 +265,7 @@ TEST(GnRti, GivesUpOnNothingButSaysSoAtTheIterationLimit) {
   const auto solver = gn_rti("{mode: converge, max_iterations: 1, tolerance: 1e-14}");
   solver->setup(*problem);
   Iterate point = RandomProblem::cold_start(*problem);
-  const Report report = solver->solve(*problem, point);
+  const Report report = solver->solve(point);
   EXPECT_EQ(report.status, Status::iteration_limit);
   EXPECT_STRNE(advice_for(report.status), "");
   EXPECT_TRUE(point.is_finite());

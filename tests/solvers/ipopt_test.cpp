@@ -12,11 +12,11 @@
 #include <limits>
 #include <thread>
 
-#include "../../solvers/ipopt/ocp_nlp.hpp"
-#include "../core/random_problem.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
+#include "solvers/ipopt/ocp_nlp.hpp"
+#include "support/random_problem.hpp"
 
 namespace rhec {
 namespace {
@@ -57,7 +57,6 @@ class Scaled final : public Ocp {
   Scaled(const Ocp& of, double factor) : of_(of), factor_(factor), weighted_(of.capacity()) {}
   mutable int evaluations = 0, linearisations = 0;
 
-  OcpKind kind() const noexcept override { return of_.kind(); }
   Capacity capacity() const noexcept override { return of_.capacity(); }
   int intervals() const noexcept override { return of_.intervals(); }
   int state_count(int node) const noexcept override { return of_.state_count(node); }
@@ -68,6 +67,7 @@ class Scaled final : public Ocp {
   const double* control_lower(int i) const noexcept override { return of_.control_lower(i); }
   const double* control_upper(int i) const noexcept override { return of_.control_upper(i); }
   bool has_second_derivatives() const noexcept override { return of_.has_second_derivatives(); }
+  bool has_small_residuals() const noexcept override { return of_.has_small_residuals(); }
   std::size_t scratch_size() const noexcept override { return of_.scratch_size(); }
   void mark_dynamics(int i, std::uint8_t* states, std::uint8_t* controls) const noexcept override {
     of_.mark_dynamics(i, states, controls);
@@ -236,7 +236,7 @@ TEST(Ipopt, PassesNativeOptionsOn) {
     const auto solver = ipopt_with(options);
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    return solver->solve(*problem, point);
+    return solver->solve(point);
   };
   const Report usual = report_with("{}");
   ASSERT_EQ(usual.status, Status::solved);
@@ -284,13 +284,13 @@ TEST(Ipopt, AWarmStartTakesFewerIterationsThanAColdOne) {
     warm->setup(*problem);
     cold->setup(*problem);
     Iterate solution = RandomProblem::cold_start(*problem);
-    ASSERT_EQ(warm->solve(*problem, solution).status, Status::solved);
+    ASSERT_EQ(warm->solve(solution).status, Status::solved);
     problem->given_state()[0] += 0.02;
     problem->given_state()[2] -= 0.01;
     std::vector<double> scratch(problem->scratch_size());
     problem->finish(scratch);
     Iterate from_warm = solution, from_cold = solution;
-    const Report a = warm->solve(*problem, from_warm), b = cold->solve(*problem, from_cold);
+    const Report a = warm->solve(from_warm), b = cold->solve(from_cold);
     EXPECT_EQ(a.status, Status::solved);
     EXPECT_EQ(b.status, Status::solved);
     warm_iterations += a.iterations;
@@ -312,12 +312,13 @@ TEST(Ipopt, TheUnitsOfTheObjectiveMatterToNothing) {
     const auto solver = ipopt_with("{}");
     solver->setup(*problem);
     Iterate expected = start;
-    ASSERT_EQ(solver->solve(*problem, expected).status, Status::solved);
+    ASSERT_EQ(solver->solve(expected).status, Status::solved);
     const double optimum = problem->evaluate(expected, nullptr, scratch);
     for (const double factor : {1e-4, 1e-2, 1e2, 1e4}) {
       const Scaled scaled(*problem, factor);
       Iterate point = start;
-      const Report report = solver->solve(scaled, point);
+      solver->setup(scaled);
+      const Report report = solver->solve(point);
       EXPECT_EQ(report.status, Status::solved) << factor;
       EXPECT_LE(report.kkt.defect, 1e-8) << factor;
       EXPECT_NEAR(problem->evaluate(point, nullptr, scratch), optimum, 1e-7 * optimum) << factor;
@@ -334,7 +335,7 @@ TEST(Ipopt, TwoThreadsGetTheBitsThatEachGetsAlone) {
     const auto solver = ipopt_with("{}");
     solver->setup(problem);
     Iterate point = RandomProblem::cold_start(problem);
-    EXPECT_EQ(solver->solve(problem, point).status, Status::solved);
+    EXPECT_EQ(solver->solve(point).status, Status::solved);
     return point;
   };
   const Iterate alone[] = {solve(*rhe), solve(*rhc)};
@@ -368,7 +369,7 @@ TEST(Ipopt, ADeadlineGivesTheBestIterateSoFar) {
   bool improved = false;
   for (const int milliseconds : {-1000, 1, 5, 10, 20, 40}) {
     Iterate point = start;
-    const Report report = solver->solve(*problem, point, Clock::now() + std::chrono::milliseconds(milliseconds));
+    const Report report = solver->solve(point, Clock::now() + std::chrono::milliseconds(milliseconds));
     EXPECT_TRUE(report.status == Status::deadline || (report.status == Status::solved && milliseconds > 0));
     EXPECT_TRUE(point.is_finite());
     EXPECT_EQ(report.kkt.largest(), kkt_residual(*problem, point, qp, scratch).largest());
@@ -388,7 +389,7 @@ TEST(Ipopt, WaitingForAnotherSolveCountsForTheDeadline) {
     while (!stop) {
       started = true;
       Iterate point = RandomProblem::cold_start(*longer);
-      solver->solve(*longer, point);
+      solver->solve(point);
     }
   });
   const auto solver = ipopt_with("{}");
@@ -396,7 +397,7 @@ TEST(Ipopt, WaitingForAnotherSolveCountsForTheDeadline) {
   while (!started) std::this_thread::yield();
   for (int repeat = 0; repeat < 5; ++repeat) {
     Iterate point = RandomProblem::cold_start(*longer);
-    EXPECT_EQ(solver->solve(*longer, point, Clock::now() + std::chrono::milliseconds(1)).status, Status::deadline);
+    EXPECT_EQ(solver->solve(point, Clock::now() + std::chrono::milliseconds(1)).status, Status::deadline);
     EXPECT_TRUE(point.is_finite());
   }
   stop = true;
@@ -421,7 +422,7 @@ TEST(Ipopt, PrintsNothingAndReadsNoFile) {
       const auto solver = ipopt_with(options);
       solver->setup(*problem);
       Iterate point = RandomProblem::cold_start(*problem);
-      const Report report = solver->solve(*problem, point);
+      const Report report = solver->solve(point);
       if (problem == possible.get() && std::string(options) == "{}") {
         EXPECT_EQ(report.status, Status::solved);
       }
@@ -444,7 +445,7 @@ TEST(Ipopt, AnotherCapacityThanAtSetupIsBadInput) {
   const auto solver = ipopt_with("{}");
   solver->setup(*small);
   Iterate point = RandomProblem::cold_start(*large);
-  EXPECT_EQ(solver->solve(*large, point).status, Status::bad_input);
+  EXPECT_EQ(solver->solve(point).status, Status::bad_input);
 }
 
 }  // namespace

@@ -6,14 +6,14 @@
 #include <cstring>
 #include <thread>
 
-#include "../../solvers/nlopt/active_set.hpp"
-#include "../../solvers/nlopt/condensed.hpp"
-#include "../core/random_problem.hpp"
-#include "rhec/core/formula_model.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/model/formula_model.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
-#include "test_models.hpp"
+#include "solvers/nlopt/active_set.hpp"
+#include "solvers/nlopt/condensed.hpp"
+#include "support/random_problem.hpp"
+#include "support/test_models.hpp"
 
 namespace rhec {
 namespace {
@@ -236,12 +236,12 @@ TEST(Nlopt, AgreesWithGnRtiOnSolutionsAndMultipliersAtActiveBounds) {
     const auto reference = host().make_solver("gn_rti", parse_yaml("{mode: converge}", "options"));
     reference->setup(*problem);
     Iterate expected = RandomProblem::cold_start(*problem);
-    const Report before = reference->solve(*problem, expected);
+    const Report before = reference->solve(expected);
     if (before.status != Status::solved) continue;
     const auto solver = nlopt_with("{}");
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    const Report report = solver->solve(*problem, point);
+    const Report report = solver->solve(point);
     EXPECT_EQ(report.status, Status::solved) << seed << ": " << name_of(report.status);
     EXPECT_LT(report.kkt.largest(), 1e-8) << seed;
     // Another optimum is a fair answer, but says nothing about multipliers.
@@ -276,7 +276,7 @@ TEST(Nlopt, IsAccurateWithoutThePolishToo) {
     const auto solver = nlopt_with("{polish: false}");
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    const Report report = solver->solve(*problem, point);
+    const Report report = solver->solve(point);
     EXPECT_EQ(report.status, Status::solved) << seed << ": " << name_of(report.status);
   }
 }
@@ -288,7 +288,7 @@ TEST(Nlopt, SaysSolvedOnlyWithinTheTolerance) {
     const auto solver = nlopt_with(options);
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    const Report report = solver->solve(*problem, point);
+    const Report report = solver->solve(point);
     EXPECT_EQ(report.status, Status::stalled) << options << ": " << name_of(report.status);
     EXPECT_TRUE(point.is_finite());
   }
@@ -300,14 +300,14 @@ TEST(Nlopt, DoesAsManyIterationsAsItMayAndNoMore) {
   const auto unlimited_one = nlopt_with("{}");
   unlimited_one->setup(*problem);
   Iterate solution = RandomProblem::cold_start(*problem);
-  const Report whole = unlimited_one->solve(*problem, solution);
+  const Report whole = unlimited_one->solve(solution);
   ASSERT_EQ(whole.status, Status::solved);
   ASSERT_GT(whole.iterations, 3);
   for (const int most : {1, 2, 3, whole.iterations - 1}) {
     const auto solver = nlopt_with("{max_iterations: " + std::to_string(most) + "}");
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    const Report report = solver->solve(*problem, point);
+    const Report report = solver->solve(point);
     EXPECT_EQ(report.status, Status::iteration_limit) << most << ": " << name_of(report.status);
     EXPECT_EQ(report.iterations, most);
   }
@@ -315,7 +315,7 @@ TEST(Nlopt, DoesAsManyIterationsAsItMayAndNoMore) {
   const auto solver = nlopt_with("{algorithm: LN_COBYLA, polish: false, max_iterations: 40}");
   solver->setup(*problem);
   Iterate point = RandomProblem::cold_start(*problem);
-  const Report report = solver->solve(*problem, point);
+  const Report report = solver->solve(point);
   EXPECT_EQ(report.status, Status::iteration_limit) << name_of(report.status);
   EXPECT_EQ(report.iterations, 40);
 }
@@ -325,7 +325,7 @@ TEST(Nlopt, TriesSmallerControlsWhereThoseOfTheGuessLeaveTheNumbers) {
   const auto solver = nlopt_with("{}");
   solver->setup(*problem);
   Iterate expected(problem->capacity());
-  ASSERT_EQ(solver->solve(*problem, expected).status, Status::solved);
+  ASSERT_EQ(solver->solve(expected).status, Status::solved);
   nlopt::CondensedProblem condensed(*problem);
   ASSERT_TRUE(condensed.take(*problem));
   // A few halvings will do for the first guess; the second is too large for any number of them that is tried.
@@ -333,14 +333,14 @@ TEST(Nlopt, TriesSmallerControlsWhereThoseOfTheGuessLeaveTheNumbers) {
     Iterate point(problem->capacity());
     for (int i = 0; i < problem->intervals(); ++i) point.control(i)[0] = input;
     ASSERT_FALSE(condensed.move_to(condensed.read(point))) << input << " can be simulated, so nothing is tested";
-    const Report report = solver->solve(*problem, point);
+    const Report report = solver->solve(point);
     EXPECT_EQ(report.status, Status::solved) << input << ": " << name_of(report.status);
     for (int i = 0; i <= problem->intervals(); ++i) EXPECT_NEAR(point.state(i)[0], expected.state(i)[0], 1e-6) << input;
   }
   // A first state that no control saves.
   Iterate lost(problem->capacity());
   lost.state(0)[0] = 1e6;
-  const Report report = solver->solve(*problem, lost);
+  const Report report = solver->solve(lost);
   EXPECT_EQ(report.status, Status::stalled) << name_of(report.status);
   EXPECT_TRUE(std::isfinite(report.objective));
   EXPECT_EQ(lost.state(0)[0], 1e6);
@@ -357,7 +357,7 @@ TEST(Nlopt, MeetsAnyToleranceWhereMultipliersAreLarge) {
     const auto solver = nlopt_with(std::string("{tolerance: ") + tolerance + "}");
     solver->setup(*problem);
     Iterate point(problem->capacity());
-    const Report report = solver->solve(*problem, point);
+    const Report report = solver->solve(point);
     EXPECT_EQ(report.status, Status::solved) << tolerance << ": " << report.kkt.largest();
     EXPECT_GT(bounds_held(*problem, point), 5) << tolerance;
   }
@@ -370,7 +370,7 @@ TEST(Nlopt, TakesHorizonsOfNoIntervalAndOfOne) {
     solver->setup(*problem);
     Iterate point(problem->capacity());
     point.state(0)[0] = 1.5;
-    const Report report = solver->solve(*problem, point);
+    const Report report = solver->solve(point);
     EXPECT_EQ(report.status, Status::solved) << intervals;
     // Without an interval: (x - 0)^2 + (x - 0.5)^2.
     if (intervals == 0) {
@@ -387,14 +387,15 @@ TEST(Nlopt, HoldsBoundsThatAreEqual) {
   const auto solver = nlopt_with("{}");
   solver->setup(*problem);
   Iterate point(problem->capacity());
-  const Report report = solver->solve(*problem, point);
+  const Report report = solver->solve(point);
   EXPECT_EQ(report.status, Status::solved) << name_of(report.status) << ' ' << report.kkt.largest();
   for (int i = 0; i <= 4; ++i) EXPECT_NEAR(point.state(i)[0], 0.5, 1e-9);
   limits = limited_states;
   limits.input_lower = limits.input_upper = {0.125};
   const auto fixed_inputs = integrator(4, limits);
   Iterate other(fixed_inputs->capacity());
-  EXPECT_EQ(solver->solve(*fixed_inputs, other).status, Status::solved);
+  solver->setup(*fixed_inputs);
+  EXPECT_EQ(solver->solve(other).status, Status::solved);
   for (int i = 0; i < 4; ++i) EXPECT_EQ(other.control(i)[0], 0.125);
 }
 
@@ -407,7 +408,7 @@ TEST(Nlopt, LeavesThePointOfAnInfeasibleProblemAlone) {
   solver->setup(*problem);
   Iterate point = RandomProblem::cold_start(*problem);
   const Iterate before = point;
-  EXPECT_EQ(solver->solve(*problem, point).status, Status::infeasible);
+  EXPECT_EQ(solver->solve(point).status, Status::infeasible);
   for (int i = 0; i <= 10; ++i) EXPECT_EQ(point.state(i)[0], before.state(i)[0]);
 }
 
@@ -482,11 +483,11 @@ TEST(Nlopt, EveryAlgorithmThatTakesAProblemComesClose) {
       const auto exact = nlopt_with("{}");
       exact->setup(*problem);
       Iterate expected(problem->capacity());
-      const double optimum = exact->solve(*problem, expected).objective;
+      const double optimum = exact->solve(expected).objective;
       solver->setup(*problem);
       Iterate point(problem->capacity());
       point.state(0)[0] = -1.0;
-      const Report report = solver->solve(*problem, point, Clock::now() + std::chrono::seconds(2));
+      const Report report = solver->solve(point, Clock::now() + std::chrono::seconds(2));
       EXPECT_LT(report.objective, optimum + 1e-2) << name << ": " << name_of(report.status);
       EXPECT_GE(report.objective, optimum - 1e-6) << name;
       EXPECT_LT(report.kkt.bound_violation, 1e-6) << name;
@@ -503,13 +504,13 @@ TEST(Nlopt, AnotherAlgorithmSolvesAVehiclesProblem) {
   const auto exact = nlopt_with("{}");
   exact->setup(*problem);
   Iterate expected = RandomProblem::cold_start(*problem);
-  const Report best = exact->solve(*problem, expected);
+  const Report best = exact->solve(expected);
   ASSERT_EQ(best.status, Status::solved);
   for (const char* name : {"LD_MMA", "LD_CCSAQ", "LD_AUGLAG"}) {
     const auto solver = nlopt_with(std::string("{polish: false, algorithm: ") + name + "}");
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    const Report report = solver->solve(*problem, point);
+    const Report report = solver->solve(point);
     EXPECT_NEAR(report.objective, best.objective, 1e-4 * (1.0 + std::abs(best.objective))) << name;
     EXPECT_NE(report.iterations, best.iterations) << name << " went the very way of LD_SLSQP";
   }
@@ -529,7 +530,7 @@ TEST(Nlopt, StopsAtADeadlineInTheMiddleWithTheBestSoFar) {
   std::vector<double> scratch(problem->scratch_size());
   const double before = problem->evaluate(point, nullptr, scratch);
   const auto start = Clock::now();
-  const Report report = solver->solve(*problem, point, start + std::chrono::milliseconds(200));
+  const Report report = solver->solve(point, start + std::chrono::milliseconds(200));
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   EXPECT_EQ(report.status, Status::deadline) << name_of(report.status);
   EXPECT_TRUE(point.is_finite());
@@ -551,7 +552,7 @@ TEST(Nlopt, FollowsAStructureThatChanges) {
     for (int j = 0; j < 2; ++j) problem->set_blocks(j, begins.data(), Transition::step);
     problem->finish();
     Iterate point = RandomProblem::cold_start(*problem);
-    EXPECT_EQ(solver->solve(*problem, point).status, Status::solved) << shift;
+    EXPECT_EQ(solver->solve(point).status, Status::solved) << shift;
   }
 }
 
@@ -560,14 +561,14 @@ void expect_undisturbed(const Ocp& problem, const Iterate& start, const std::str
   const auto alone = nlopt_with(options);
   alone->setup(problem);
   Iterate expected = start;
-  alone->solve(problem, expected);
+  alone->solve(expected);
   int wrong[2] = {0, 0};
   const auto work = [&](int which) {
     const auto solver = nlopt_with(options);
     solver->setup(problem);
     for (int repeat = 0; repeat < 10; ++repeat) {
       Iterate point = start;
-      solver->solve(problem, point);
+      solver->solve(point);
       for (int i = 0; i < problem.intervals(); ++i)
         wrong[which] += std::memcmp(point.control(i), expected.control(i),
                                     sizeof(double) * static_cast<std::size_t>(problem.control_count(i))) != 0;

@@ -1,6 +1,6 @@
 // The solver for long horizons and wide models, from its factor upwards, against dense algebra and the core's
 // recursion.
-#include "../../solvers/sparse_sqp/sparse_sqp.hpp"
+#include "solvers/sparse_sqp/sparse_sqp.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,15 +14,15 @@
 
 #include <Eigen/Dense>
 
-#include "../../solvers/sparse_sqp/stage_convexity.hpp"
-#include "../../solvers/sparse_sqp/stage_covariances.hpp"
-#include "../core/random_problem.hpp"
-#include "../core/random_qp.hpp"
-#include "rhec/core/point.hpp"
-#include "rhec/core/riccati.hpp"
+#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
-#include "test_models.hpp"
+#include "solvers/sparse_sqp/stage_convexity.hpp"
+#include "solvers/sparse_sqp/stage_covariances.hpp"
+#include "support/random_problem.hpp"
+#include "support/random_qp.hpp"
+#include "support/test_models.hpp"
 
 namespace rhec::sparse_sqp {
 namespace {
@@ -50,7 +50,6 @@ std::shared_ptr<Solver> plugin(const std::string& options = "{}") {
 class Shape final : public Ocp {
  public:
   explicit Shape(const StageQp& qp) : qp_(qp), origin_(qp.capacity().states, 0.0) {}
-  OcpKind kind() const noexcept override { return OcpKind::rhe; }
   Capacity capacity() const noexcept override { return qp_.capacity(); }
   int intervals() const noexcept override { return qp_.intervals(); }
   int state_count(int node) const noexcept override { return qp_.states(node); }
@@ -63,6 +62,7 @@ class Shape final : public Ocp {
   const double* control_lower(int interval) const noexcept override { return qp_.control_lower(interval); }
   const double* control_upper(int interval) const noexcept override { return qp_.control_upper(interval); }
   bool has_second_derivatives() const noexcept override { return true; }
+  bool has_small_residuals() const noexcept override { return true; }
   std::size_t scratch_size() const noexcept override { return 0; }
   double evaluate_stages(const Iterate&, double*, double*, std::span<double>) const noexcept override { return 0.0; }
   void simulate_interval(int, Iterate&, std::span<double>) const noexcept override {}
@@ -525,7 +525,7 @@ TEST(SparseQp, KeepsADeadlineThatIsPast) {
 
 /// Solves with a solver that is set up for the problem, and holds the report against the core's own judgement.
 Report solve_and_judge(Solver& solver, const HorizonProblem& problem, Iterate& point, double tolerance = 1e-8) {
-  const Report report = solver.solve(problem, point);
+  const Report report = solver.solve(point);
   StageQp qp(problem.capacity());
   std::vector<double> scratch(problem.scratch_size());
   EXPECT_EQ(kkt_residual(problem, point, qp, scratch).largest() <= tolerance, report.status == Status::solved)
@@ -540,7 +540,7 @@ double covariance_deviation(Solver& solver, const HorizonProblem& problem, const
   const int ns = problem.capacity().states, N = problem.intervals();
   const auto size = (static_cast<std::size_t>(N) + 1) * ns * ns;
   std::vector<double> blocks(size), reference(size), last(static_cast<std::size_t>(ns) * ns);
-  if (!solver.covariances(problem, point, all_stages(problem), blocks)) return infinity;
+  if (!solver.covariances(point, all_stages(problem), blocks)) return infinity;
   StageQp qp(problem.capacity());
   std::vector<double> scratch(problem.scratch_size());
   problem.linearise(all_stages(problem), point, Hessian::gauss_newton, qp, scratch);
@@ -594,15 +594,15 @@ TEST(SparseSqp, CovariancesOfAGivenStateAreZero) {
   ASSERT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved);
   const int ns = problem->capacity().states;
   std::vector<double> blocks(static_cast<std::size_t>(problem->intervals() + 1) * ns * ns, -1.0);
-  ASSERT_TRUE(solver->covariances(*problem, point, all_stages(*problem), blocks));
+  ASSERT_TRUE(solver->covariances(point, all_stages(*problem), blocks));
   for (int k = 0; k < ns * ns; ++k) EXPECT_EQ(blocks[k], 0.0);
   EXPECT_GT(blocks[ns * ns], 0.0);
   // Room that is too small, and a point that is none, are refused, and nothing is written.
   std::vector<double> small(blocks.size() - 1, -1.0);
-  EXPECT_FALSE(solver->covariances(*problem, point, all_stages(*problem), small));
+  EXPECT_FALSE(solver->covariances(point, all_stages(*problem), small));
   point.state(2)[0] = std::nan("");
   std::vector<double> untouched(blocks.size(), -1.0);
-  EXPECT_FALSE(solver->covariances(*problem, point, all_stages(*problem), untouched));
+  EXPECT_FALSE(solver->covariances(point, all_stages(*problem), untouched));
   EXPECT_THAT(untouched, ::testing::Each(-1.0));
 }
 
@@ -730,7 +730,7 @@ LongCase long_case(int intervals) {
   LongCase result;
   result.problem = random.rhe(spec);
   result.guess = Iterate(result.problem->capacity());
-  result.problem->set_decisions(result.guess, drive.inputs.data(), drive.parameters.data());
+  result.problem->structure().set_decisions(result.guess, drive.inputs.data(), drive.parameters.data());
   const int nx = result.problem->model().state_count();
   for (std::ptrdiff_t i = 0; i <= intervals; ++i)
     std::copy_n(drive.states.data() + i * nx, nx, result.guess.state(static_cast<int>(i)));
@@ -835,21 +835,23 @@ TEST(SparseSqp, IsRightAgainAfterFailures) {
   const auto bad = random.rhe(spec);
   const Iterate bad_start = RandomProblem::cold_start(*bad);
   Iterate point = bad_start;
-  EXPECT_EQ(solver->solve(*bad, point).status, Status::infeasible);
+  solver->setup(*bad);
+  EXPECT_EQ(solver->solve(point).status, Status::infeasible);
   EXPECT_EQ(numbers_of(*bad, point), numbers_of(*bad, bad_start)) << "the point was not left as it was";
   point = start;
+  solver->setup(*good);
   EXPECT_EQ(solve_and_judge(*solver, *good, point).status, Status::solved);
   EXPECT_EQ(numbers_of(*good, point), expected);
 
   point = start;
   point.control(2)[0] = std::nan("");
-  EXPECT_EQ(solver->solve(*good, point).status, Status::bad_input);
+  EXPECT_EQ(solver->solve(point).status, Status::bad_input);
   point = start;
-  EXPECT_EQ(solver->solve(*good, point, Clock::now() - std::chrono::seconds(1)).status, Status::deadline);
+  EXPECT_EQ(solver->solve(point, Clock::now() - std::chrono::seconds(1)).status, Status::deadline);
   EXPECT_TRUE(is_finite(*good, point));
   point = start;
   solver->reset();
-  EXPECT_EQ(solver->solve(*good, point).status, Status::solved);
+  EXPECT_EQ(solver->solve(point).status, Status::solved);
   EXPECT_EQ(numbers_of(*good, point), expected);
 }
 
@@ -864,7 +866,7 @@ TEST(SparseSqp, BoundsThatCrossAreInfeasible) {
   solver->setup(*problem);
   const Iterate start = RandomProblem::cold_start(*problem);
   Iterate point = start;
-  EXPECT_EQ(solver->solve(*problem, point).status, Status::infeasible);
+  EXPECT_EQ(solver->solve(point).status, Status::infeasible);
   EXPECT_EQ(numbers_of(*problem, point), numbers_of(*problem, start));
 }
 
@@ -887,7 +889,6 @@ TEST(SparseSqp, TakesHorizonsOfNoneAndOfOneInterval) {
 
 TEST(SparseSqp, StructuresThatChangeFromSolveToSolve) {
   const auto solver = plugin();
-  bool is_set_up = false;
   for (int k = 0; k < 40; ++k) {
     RandomProblem random(bicycle(), 50 + k);
     RheSpec spec;
@@ -896,8 +897,18 @@ TEST(SparseSqp, StructuresThatChangeFromSolveToSolve) {
     spec.block = k % 4;
     spec.transition = k % 3 == 0 ? Transition::ramp : Transition::step;
     const auto problem = random.rhe(spec);
-    if (!std::exchange(is_set_up, true)) solver->setup(*problem);
+    solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
+    EXPECT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved) << k;
+    // Blocks that end, and then all as before.
+    const RheProblem before = *problem;
+    std::vector<std::uint8_t> begins(problem->intervals(), 0);
+    for (int j = 0; j < 2; ++j) problem->set_blocks(j, begins.data(), Transition::step);
+    problem->finish();
+    point = RandomProblem::cold_start(*problem);
+    EXPECT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved) << k;
+    problem->take_data(before);
+    point = RandomProblem::cold_start(*problem);
     EXPECT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved) << k;
   }
 }

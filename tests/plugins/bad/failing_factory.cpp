@@ -1,7 +1,7 @@
 // Plugins whose manifest is right and whose factory fails, in a way chosen by a macro.
 #include <stdexcept>
 
-#include "rhec/core/blocking.hpp"
+#include "rhec/core/horizon/blocking.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace {

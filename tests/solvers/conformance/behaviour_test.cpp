@@ -11,11 +11,11 @@
 #include <thread>
 #include <utility>
 
-#include "../../core/random_problem.hpp"
 #include "families.hpp"
 #include "found.hpp"
 #include "judge.hpp"
-#include "rhec/core/shift.hpp"
+#include "rhec/core/horizon/shift.hpp"
+#include "support/random_problem.hpp"
 
 namespace rhec::conformance {
 namespace {
@@ -53,6 +53,12 @@ class Behaviour : public ::testing::TestWithParam<Pair> {
     return solve_and_judge(solver, *of.ocp, of.guess, tolerance_);
   }
 
+  /// The same with a solver that was busy with another problem.
+  Judged set_up_and_solve(Solver& solver, const Problem& of) const {
+    solver.setup(*of.ocp);
+    return solve(solver, of);
+  }
+
   /// What a new instance makes of a problem.
   Judged by_new_instance(const Problem& of) const {
     const auto solver = make();
@@ -68,7 +74,7 @@ class Behaviour : public ::testing::TestWithParam<Pair> {
 
   /// Solved as a new instance solves it.
   void expect_right(Solver& solver, const Problem& of, const std::string& when) const {
-    const Judged judged = solve(solver, of), fresh = by_new_instance(of);
+    const Judged judged = set_up_and_solve(solver, of), fresh = by_new_instance(of);
     expect_solved(judged, when);
     EXPECT_NEAR(judged.objective, fresh.objective, 1e-7 * (1e-3 + std::abs(fresh.objective))) << when;
   }
@@ -99,8 +105,8 @@ TEST_P(Behaviour, SaysBadInputAndChangesNothingWhereTheGuessIsNotFinite) {
       Iterate poisoned = good.guess;
       (poisoned.*row)(2)[0] = value;
       const Iterate before = poisoned;
-      solver->prepare(*good.ocp, poisoned);
-      const Report report = solver->solve(*good.ocp, poisoned);
+      solver->prepare(poisoned);
+      const Report report = solver->solve(poisoned);
       EXPECT_EQ(report.status, Status::bad_input) << when << ": " << name_of(report.status);
       EXPECT_TRUE(same_bits(*good.ocp, poisoned, before)) << when;
     }
@@ -115,8 +121,8 @@ TEST_P(Behaviour, SaysBadInputWhereTheProblemIsNotFinite) {
   auto& rhe = dynamic_cast<RheProblem&>(*good.ocp);
   const auto expect_bad_input = [&](const char* when) {
     Iterate point = good.guess;
-    solver->prepare(*good.ocp, point);
-    const Report report = solver->solve(*good.ocp, point);
+    solver->prepare(point);
+    const Report report = solver->solve(point);
     EXPECT_EQ(report.status, Status::bad_input) << when << ": " << name_of(report.status);
     EXPECT_TRUE(same_bits(*good.ocp, point, good.guess)) << when;
   };
@@ -142,8 +148,8 @@ TEST_P(Behaviour, SaysBadInputWhereTheProblemIsNotFinite) {
   const double seconds = rhe.duration(4);
   rhe.set_duration(4, nan);
   Iterate point = good.guess;
-  solver->prepare(*good.ocp, point);
-  const Report report = solver->solve(*good.ocp, point);
+  solver->prepare(point);
+  const Report report = solver->solve(point);
   EXPECT_NE(report.status, Status::solved) << "duration";
   EXPECT_NE(report.status, Status::step_taken) << "duration";
   EXPECT_TRUE(same_bits(*good.ocp, point, good.guess)) << "duration";
@@ -160,8 +166,8 @@ TEST_P(Behaviour, SaysBadInputWhereABoundIsNotANumber) {
   const double lower = std::exchange(rhc.input_lower(2, 0), nan);
   rhc.finish(scratch);
   Iterate point = good.guess;
-  solver->prepare(*good.ocp, point);
-  const Report report = solver->solve(*good.ocp, point);
+  solver->prepare(point);
+  const Report report = solver->solve(point);
   EXPECT_EQ(report.status, Status::bad_input) << name_of(report.status);
   EXPECT_TRUE(same_bits(*good.ocp, point, good.guess));
   rhc.input_lower(2, 0) = lower;
@@ -174,8 +180,8 @@ TEST_P(Behaviour, SaysBadInputOfAnotherCapacity) {
   const auto solver = make();
   solver->setup(*good.ocp);
   Iterate point = other.guess;
-  solver->prepare(*other.ocp, point);
-  EXPECT_EQ(solver->solve(*other.ocp, point).status, Status::bad_input);
+  solver->prepare(point);
+  EXPECT_EQ(solver->solve(point).status, Status::bad_input);
   EXPECT_TRUE(same_bits(*other.ocp, point, other.guess));
   expect_right(*solver, good, "after another capacity");
 }
@@ -183,9 +189,8 @@ TEST_P(Behaviour, SaysBadInputOfAnotherCapacity) {
 TEST_P(Behaviour, IsRightAfterAnInfeasibleProblem) {
   const Problem impossible = problem("rhc_infeasible"), possible = problem("rhc_inputs_at_bounds");
   const auto solver = make();
-  solver->setup(*impossible.ocp);
   for (int repeat = 0; repeat < 2; ++repeat) {
-    const Judged judged = solve(*solver, impossible);
+    const Judged judged = set_up_and_solve(*solver, impossible);
     EXPECT_EQ(judged.report.status, Status::infeasible) << name_of(judged.report.status);
     EXPECT_TRUE(same_bits(*impossible.ocp, judged.point, impossible.guess));
     expect_right(*solver, possible, "after an infeasible problem");
@@ -206,6 +211,7 @@ TEST_P(SolverAlone, SaysInfeasibleOfAVehicleThatCannotStayWhereItMust) {
   const Judged refused = solve_and_judge(*solver, *impossible.ocp, impossible.guess, tolerance);
   EXPECT_EQ(refused.report.status, Status::infeasible) << name_of(refused.report.status);
   EXPECT_TRUE(same_bits(*impossible.ocp, refused.point, impossible.guess));
+  solver->setup(*possible.ocp);
   const Judged judged = solve_and_judge(*solver, *possible.ocp, possible.guess, tolerance);
   EXPECT_EQ(judged.report.status, Status::solved) << name_of(judged.report.status);
   for (const std::string& complaint : judged.complaints) ADD_FAILURE() << complaint;
@@ -215,46 +221,51 @@ TEST_P(SolverAlone, SaysInfeasibleOfAVehicleThatCannotStayWhereItMust) {
 
 TEST_P(Behaviour, ResetGivesTheBitsOfANewInstance) {
   const Problem wanted = problem("rhe_blocks", 2);
+  const auto& original = dynamic_cast<const RheProblem&>(*wanted.ocp);
   Iterate expected = wanted.guess;
   const auto fresh = make();
-  fresh->setup(*wanted.ocp);
-  const Report report = fresh->solve(*wanted.ocp, expected);
+  fresh->setup(original);
+  const Report report = fresh->solve(expected);
 
+  RheProblem live = original;
   const auto solver = make();
-  solver->setup(*wanted.ocp);
+  solver->setup(live);
   const auto expect_same = [&](const char* after) {
     solver->reset();
+    live.take_data(original);
     Iterate point = wanted.guess;
-    const Report again = solver->solve(*wanted.ocp, point);
-    EXPECT_TRUE(same_bits(*wanted.ocp, point, expected)) << after;
+    const Report again = solver->solve(point);
+    EXPECT_TRUE(same_bits(original, point, expected)) << after;
     EXPECT_EQ(again.status, report.status) << after;
     EXPECT_EQ(again.iterations, report.iterations) << after;
   };
   expect_same("setup alone");
   expect_same("the same problem");
-  const Problem other = problem("rhe_blocks", 3);
-  Iterate point = other.guess;
-  solver->solve(*other.ocp, point);
-  expect_same("another problem");
-  point = other.guess;
-  solver->prepare(*other.ocp, point);
+  const auto change_data = [&] {
+    for (int i = 0; i <= live.intervals(); ++i)
+      for (int j = 0; j < model_->output_count(); ++j)
+        live.output(i)[j] += 0.05 * model_->description().outputs[j].scale * (i % 3);
+  };
+  change_data();
+  Iterate point = wanted.guess;
+  solver->solve(point);
+  expect_same("other data");
+  change_data();
+  point = wanted.guess;
+  solver->prepare(point);
   expect_same("a preparation without a solve");
-  const Problem blocks = problem("rhe_unblocked");
-  point = blocks.guess;
-  solver->solve(*blocks.ocp, point);
+  std::vector<std::uint8_t> begins(live.intervals(), 1);
+  for (int j = 0; j < model_->parameter_count(); ++j) live.set_blocks(j, begins.data(), Transition::step);
+  live.finish();
+  point = RandomProblem::cold_start(live);
+  solver->solve(point);
   expect_same("another structure");
-  const Problem impossible = problem("rhe_infeasible");
-  if (impossible.ocp->capacity() == wanted.ocp->capacity()) {
-    point = impossible.guess;
-    solver->solve(*impossible.ocp, point);
-    expect_same("an infeasible problem");
-  }
-  point = other.guess;
+  point = wanted.guess;
   point.state(1)[0] = nan;
-  solver->solve(*other.ocp, point);
+  solver->solve(point);
   expect_same("a poisoned guess");
-  point = other.guess;
-  solver->solve(*other.ocp, point, Clock::now() - std::chrono::seconds(1));
+  point = wanted.guess;
+  solver->solve(point, Clock::now() - std::chrono::seconds(1));
   expect_same("a deadline");
 }
 
@@ -272,13 +283,12 @@ TEST_P(Behaviour, TwoInstancesOnTwoThreadsDoNotDisturbEachOther) {
   std::array<int, 2> wrong = {0, 0};
   const auto work = [&](std::size_t k) {
     const auto solver = make();
-    solver->setup(*problems[k].front().ocp);
     for (int repeat = 0; repeat < repeats; ++repeat) {
       const std::size_t which = repeat % 2;
       Iterate point = problems[k][which].guess;
-      solver->reset();
-      solver->prepare(*problems[k][which].ocp, point);
-      solver->solve(*problems[k][which].ocp, point);
+      solver->setup(*problems[k][which].ocp);
+      solver->prepare(point);
+      solver->solve(point);
       wrong[k] += !same_bits(*problems[k][which].ocp, point, expected[k][which]);
     }
   };

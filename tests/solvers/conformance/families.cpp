@@ -8,10 +8,10 @@
 #include <tuple>
 #include <utility>
 
-#include "../../core/random_problem.hpp"
-#include "../test_models.hpp"
 #include "found.hpp"
-#include "rhec/core/formula_model.hpp"
+#include "rhec/core/model/formula_model.hpp"
+#include "support/random_problem.hpp"
+#include "support/test_models.hpp"
 
 namespace rhec::conformance {
 namespace {
@@ -225,13 +225,13 @@ void scatter(const HorizonProblem& problem, RandomProblem& random, double share,
             np = problem.model().parameter_count();
   std::vector<double> u(static_cast<std::size_t>(problem.intervals()) * nu), p(problem.intervals() * np);
   for (int i = 0; i < problem.intervals(); ++i) {
-    problem.inputs_on(guess, i, u.data() + i * nu);
-    problem.parameters_on(guess, i, p.data() + i * np);
+    problem.structure().inputs_on(guess, i, u.data() + i * nu);
+    problem.structure().parameters_on(guess, i, p.data() + i * np);
     for (int j = 0; j < nu; ++j) u[i * nu + j] += random.uniform(-share, share) * about.inputs[j].scale;
-    if (problem.kind() == OcpKind::rhe)
+    if (problem.kind() == "rhe")
       for (int j = 0; j < np; ++j) p[i * np + j] = random.typical(about.parameters[j]);
   }
-  problem.set_decisions(guess, u.data(), p.data());
+  problem.structure().set_decisions(guess, u.data(), p.data());
   for (int i = 0; i <= problem.intervals(); ++i)
     for (int j = 0; j < nx; ++j) guess.state(i)[j] += random.uniform(-share, share) * about.states[j].scale;
 }
@@ -349,7 +349,7 @@ std::vector<Family> make_families() {
               [](RheProblem& problem, RandomProblem& random) {
                 for (int j = 0; j < problem.model().parameter_count(); ++j)
                   for (int i = 1; i < problem.intervals(); ++i)
-                    if (problem.begins(i, j))
+                    if (problem.structure().starts_block(i, j))
                       problem.link(i, j, uneven_variance(random, problem.model().description().parameters[j]));
               }))
       .applies = has_parameters;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/horizon_problem.hpp"
+#include "rhec/core/horizon/horizon_problem.hpp"
 
 namespace rhec::conformance {
 

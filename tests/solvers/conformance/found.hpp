@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "rhec/core/settings.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/config/settings.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host.hpp"
 
 namespace rhec::conformance {

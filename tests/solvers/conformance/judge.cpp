@@ -7,7 +7,7 @@
 #include <cstring>
 #include <random>
 
-#include "rhec/core/point.hpp"
+#include "rhec/core/ocp/point.hpp"
 
 namespace rhec::conformance {
 namespace {
@@ -156,8 +156,8 @@ Judged solve_and_judge(Solver& solver, const HorizonProblem& problem, const Iter
   Judged judged;
   judged.point = guess;
   const auto start = Clock::now();
-  solver.prepare(problem, judged.point);
-  judged.report = solver.solve(problem, judged.point, deadline);
+  solver.prepare(judged.point);
+  judged.report = solver.solve(judged.point, deadline);
   judged.milliseconds = 1e-3 * microseconds_since(start);
   const Report& report = judged.report;
   std::vector<std::string>& complaints = judged.complaints;
@@ -207,8 +207,8 @@ std::vector<double> scaled_primal(const HorizonProblem& problem, const Iterate& 
   for (int i = 0; i <= problem.intervals(); ++i) {
     for (int j = 0; j < nx; ++j) all.push_back(point.state(i)[j] / about.states[j].scale);
     if (i == problem.intervals()) break;
-    problem.inputs_on(point, i, u.data());
-    problem.parameters_on(point, i, p.data());
+    problem.structure().inputs_on(point, i, u.data());
+    problem.structure().parameters_on(point, i, p.data());
     for (int j = 0; j < nu; ++j) all.push_back(u[j] / about.inputs[j].scale);
     for (int j = 0; j < np; ++j) all.push_back(p[j] / about.parameters[j].scale);
   }

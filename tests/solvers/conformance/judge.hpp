@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "families.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/ocp/solver.hpp"
 
 namespace rhec::conformance {
 

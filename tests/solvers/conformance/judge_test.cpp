@@ -10,6 +10,7 @@
 #include "families.hpp"
 #include "found.hpp"
 #include "judge.hpp"
+#include "rhec/core/ocp/solver_decorator.hpp"
 
 namespace rhec::conformance {
 namespace {
@@ -21,21 +22,23 @@ using ::testing::IsEmpty;
 using Lie = std::function<void(const Ocp&, Iterate&, Report&)>;
 
 /// An honest solver whose answers are changed afterwards.
-class Liar final : public Solver {
+class Liar final : public SolverDecorator {
  public:
-  explicit Liar(Lie lie) : honest_(make_solver(host().names(PluginKind::solver).front())), lie_(std::move(lie)) {}
-  std::string why_not(const Ocp& ocp) const override { return honest_->why_not(ocp); }
-  void setup(const Ocp& ocp) override { honest_->setup(ocp); }
-  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override { honest_->prepare(ocp, guess); }
-  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override {
-    Report report = honest_->solve(ocp, point, deadline);
-    lie_(ocp, point, report);
+  explicit Liar(Lie lie)
+      : SolverDecorator(make_solver(host().names(PluginKind::solver).front())), lie_(std::move(lie)) {}
+  using Solver::solve;
+  void setup(const Ocp& ocp) override {
+    ocp_ = &ocp;
+    SolverDecorator::setup(ocp);
+  }
+  Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override {
+    Report report = inner().solve(iterate, deadline);
+    lie_(*ocp_, iterate, report);
     return report;
   }
-  void reset() noexcept override { honest_->reset(); }
 
  private:
-  std::shared_ptr<Solver> honest_;
+  const Ocp* ocp_ = nullptr;
   Lie lie_;
 };
 

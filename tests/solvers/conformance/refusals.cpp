@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "rhec/core/error.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
 
 namespace rhec::conformance {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/settings.hpp"
+#include "rhec/core/config/settings.hpp"
 
 namespace rhec::conformance {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rhec/core/settings.hpp"
+#include "rhec/core/config/settings.hpp"
 #include "rhec/plugins/manifest.hpp"
 
 namespace rhec {

@@ -5,8 +5,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "rhec/core/option_values.hpp"
-#include "rhec/core/settings.hpp"
+#include "rhec/core/config/option_values.hpp"
+#include "rhec/core/config/settings.hpp"
 
 namespace rhec {
 

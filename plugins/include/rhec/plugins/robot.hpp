@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "rhec/core/controller.hpp"
-#include "rhec/core/estimator.hpp"
-#include "rhec/core/full_information.hpp"
-#include "rhec/core/options.hpp"
-#include "rhec/core/rhe_problem.hpp"
+#include "rhec/core/config/options.hpp"
+#include "rhec/core/control/controller.hpp"
+#include "rhec/core/estimation/estimator.hpp"
+#include "rhec/core/estimation/full_information.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/plugins/host.hpp"
 
 namespace rhec {
@@ -108,7 +108,7 @@ class RHEC_EXPORT Robot {
 
   const std::shared_ptr<const Model>& model() const noexcept { return model_; }
   PluginChoice model_choice() const;
-  PluginChoice solver_choice(OcpKind kind) const;  ///< of the estimator (rhe) or the controller (rhc)
+  PluginChoice solver_choice(std::string_view kind) const;  ///< of the estimator (rhe) or the controller (rhc)
   PluginChoice blocking_choice(int parameter) const;
   double step() const noexcept { return options_.step; }
   const EstimatorOptions& estimator_options() const noexcept { return estimator_; }
@@ -123,7 +123,7 @@ class RHEC_EXPORT Robot {
   /// Is given the solver of each estimator (rhe) and controller (rhc) made from now on, and returns the one to use in
   /// its place, never null: to watch what it is asked, say. Goes round what wraps them already; copies of the robot
   /// have it too.
-  using SolverWrap = std::function<std::shared_ptr<Solver>(OcpKind, std::shared_ptr<Solver>)>;
+  using SolverWrap = std::function<std::shared_ptr<Solver>(std::string_view, std::shared_ptr<Solver>)>;
   void wrap_solvers(SolverWrap wrap);
 
   /// The estimator of the section `estimator`; the initial state, where given, takes the place of that section's.
@@ -145,7 +145,7 @@ class RHEC_EXPORT Robot {
   std::unique_ptr<EstimationMethod> make_receding_horizon(const Eigen::VectorXd& mean,
                                                           const Eigen::MatrixXd& covariance) const;
   std::vector<RobustLoss> read_robust(const Settings& section, const std::string& owner) const;
-  std::shared_ptr<Solver> make_solver(OcpKind kind) const;
+  std::shared_ptr<Solver> make_solver(std::string_view kind) const;
   FullInformationEstimation::Setup estimation_setup(int horizon, const Settings& blocking) const;
 
   Host host_;

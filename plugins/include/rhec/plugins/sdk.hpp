@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "rhec/core/options.hpp"
+#include "rhec/core/config/options.hpp"
 #include "rhec/plugins/fingerprint.hpp"
 #include "rhec/plugins/manifest.hpp"
 
@@ -25,7 +25,7 @@
 /// be shared with plugins that use the same names), linked to rhec::core, and put into a directory that the host
 /// searches. A class whose name holds a comma needs an alias. What has no options says `using Options =
 /// rhec::NoOptions`. The constructor throws rhec::Error where its options do not fit together; destructors do not
-/// throw. The file with this line includes the interface that it implements (rhec/core/model.hpp, blocking.hpp or
+/// throw. The file with this line includes the interface that it implements (rhec/core/model/model.hpp, blocking.hpp or
 /// solver.hpp).
 namespace rhec {
 

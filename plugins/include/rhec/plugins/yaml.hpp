@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "rhec/core/settings.hpp"
+#include "rhec/core/config/settings.hpp"
 
 namespace rhec {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/settings.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/config/settings.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/spread.hpp"
@@ -66,7 +66,7 @@ struct BackendAnswers {
 
 /// Problems of one kind along the reference's trajectories, which every backend solves from the same guesses.
 struct SameProblems {
-  OcpKind kind = OcpKind::rhe;
+  std::string kind = "rhe";
   struct Place {
     std::int64_t seed = 0, step = 0;
   };

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "rhec/core/export.hpp"
-#include "rhec/core/model.hpp"
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/model/model.hpp"
 
 /// A model's derivatives and its integration against what they are said to be, by values alone.
 namespace rhec::sim {

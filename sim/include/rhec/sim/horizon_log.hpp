@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/receding_horizon_estimation.hpp"
-#include "rhec/core/riccati.hpp"
+#include "rhec/core/estimation/receding_horizon_estimation.hpp"
+#include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/robot.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/recorded_log.hpp"

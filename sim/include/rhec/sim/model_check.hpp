@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "rhec/core/blocking.hpp"
-#include "rhec/core/export.hpp"
-#include "rhec/core/model.hpp"
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/horizon/blocking.hpp"
+#include "rhec/core/model/model.hpp"
 #include "rhec/plugins/robot.hpp"
 #include "rhec/sim/spread.hpp"
 

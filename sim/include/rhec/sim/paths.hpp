@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "rhec/core/export.hpp"
-#include "rhec/core/path.hpp"
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/control/path.hpp"
 
 namespace rhec::sim {
 

@@ -24,7 +24,7 @@ namespace rhec::sim {
 class RHEC_EXPORT ProblemDump {
  public:
   /// Files of these kinds in a folder, written aside until `commit`. every = 0: failures alone. Throws Error.
-  ProblemDump(const std::filesystem::path& folder, const std::vector<OcpKind>& kinds, int every);
+  ProblemDump(const std::filesystem::path& folder, const std::vector<std::string>& kinds, int every);
   ProblemDump(const ProblemDump&) = delete;
   ProblemDump& operator=(const ProblemDump&) = delete;
 
@@ -63,7 +63,7 @@ class RHEC_EXPORT ProblemDump {
   static void write(Stream& stream);
 
   OutputFolder folder_;
-  std::map<OcpKind, Stream> streams_;
+  std::map<std::string, Stream> streams_;
   int every_;
   std::exception_ptr failure_;
 };

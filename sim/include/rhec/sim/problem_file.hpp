@@ -10,10 +10,10 @@
 #include <string_view>
 #include <vector>
 
-#include "rhec/core/blocking.hpp"
-#include "rhec/core/horizon_problem.hpp"
-#include "rhec/core/settings.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/config/settings.hpp"
+#include "rhec/core/horizon/blocking.hpp"
+#include "rhec/core/horizon/horizon_problem.hpp"
+#include "rhec/core/ocp/solver.hpp"
 
 namespace rhec::sim {
 
@@ -31,7 +31,7 @@ struct ProblemRecord {
   std::string id;          ///< "gentle/rhe/fhb/19"
   std::string prefix;      ///< "gentle/rhe/fhb": of the sequence over time that it belongs to
   std::int64_t step = -1;  ///< 19: the place in that sequence; -1 where the id does not end in a number
-  OcpKind kind = OcpKind::rhe;
+  std::string kind = "rhe";
   std::string model;              ///< name of the plugin
   Settings model_options;         ///< a map
   int intervals = 0;              ///< N
@@ -71,7 +71,7 @@ struct ProblemRecord {
   /// Takes an id, and prefix and step from it.
   RHEC_EXPORT void set_id(std::string text);
   /// Absolute index of the window's first interval, for a sequence: RHE looks back from `step`, RHC ahead.
-  std::int64_t first_interval() const noexcept { return kind == OcpKind::rhe ? step - intervals : step; }
+  std::int64_t first_interval() const noexcept { return kind == "rhe" ? step - intervals : step; }
 };
 
 /// Reads a line. Throws Error naming file, line and key: no JSON, a key that is unknown (with the nearest one that is

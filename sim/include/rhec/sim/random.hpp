@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "rhec/core/export.hpp"
+#include "rhec/core/base/export.hpp"
 
 namespace rhec::sim {
 

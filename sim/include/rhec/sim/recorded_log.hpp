@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/estimator.hpp"
+#include "rhec/core/estimation/estimator.hpp"
 #include "rhec/plugins/robot.hpp"
 #include "rhec/sim/recording_solver.hpp"
 

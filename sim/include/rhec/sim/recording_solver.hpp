@@ -6,35 +6,37 @@
 #include <span>
 #include <string>
 
-#include "rhec/core/horizon_problem.hpp"
-#include "rhec/core/solver.hpp"
+#include "rhec/core/horizon/horizon_problem.hpp"
+#include "rhec/core/ocp/solver_decorator.hpp"
 #include "rhec/plugins/robot.hpp"
 
 namespace rhec::sim {
 
-/// A solver that shows what it is asked and what it answers, and else is the one it is made of.
-class RHEC_EXPORT RecordingSolver final : public Solver {
+/// A solver that shows what it is asked and what it answers.
+class RHEC_EXPORT RecordingSolver final : public SolverDecorator {
  public:
-  /// Called after each solve of a HorizonProblem, in the caller's thread. `guess` is the point as it came in, `result`
-  /// as it went out. It must not throw, since `solve` does not.
-  using Callback = std::function<void(const HorizonProblem& problem, const Iterate& guess, const Iterate& result,
-                                      const Report& report)>;
-  RecordingSolver(std::shared_ptr<Solver> solver, Callback callback);
+  /// Called after each solve of a HorizonProblem, in the caller's thread, once its report is complete: of a `feedback`
+  /// whose iterate is usable that is after `finish`. `step` is what the function `step` said when the solve began,
+  /// `guess` is the iterate as it came in, `result` as it went out. It must not throw, since `solve` does not.
+  using Callback = std::function<void(std::int64_t step, const HorizonProblem& problem, const Iterate& guess,
+                                      const Iterate& result, const Report& report)>;
+  RecordingSolver(std::shared_ptr<Solver> solver, std::function<std::int64_t()> step, Callback callback);
 
-  std::string why_not(const Ocp& ocp) const override { return solver_->why_not(ocp); }
   void setup(const Ocp& ocp) override;
-  void prepare(const Ocp& ocp, const Iterate& guess) noexcept override { solver_->prepare(ocp, guess); }
   using Solver::solve;
-  Report solve(const Ocp& ocp, Iterate& point, Clock::time_point deadline) noexcept override;
-  bool covariances(const Ocp& ocp, const Iterate& point, StageRange nodes, std::span<double> blocks) noexcept override {
-    return solver_->covariances(ocp, point, nodes, blocks);
-  }
-  void reset() noexcept override { solver_->reset(); }
+  Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override;
+  Report feedback(Iterate& iterate, Clock::time_point deadline) noexcept override;
+  void finish(Iterate& iterate, Report& report) noexcept override;
 
  private:
-  std::shared_ptr<Solver> solver_;
+  bool keep_guess(const Iterate& guess) noexcept;
+
+  std::function<std::int64_t()> step_;
   Callback callback_;
+  const HorizonProblem* problem_ = nullptr;  ///< null where the problem is of another class, which nobody is told of
   Iterate guess_;
+  std::int64_t asked_at_ = 0;  ///< step of the solve under way
+  bool is_pending_ = false;    ///< a `feedback` is not finished
 };
 
 /// What a closed loop does in a sample, and its end.

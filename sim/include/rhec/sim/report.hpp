@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "rhec/core/export.hpp"
+#include "rhec/core/base/export.hpp"
 
 namespace rhec::sim {
 

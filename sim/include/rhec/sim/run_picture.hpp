@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/export.hpp"
+#include "rhec/core/base/export.hpp"
 #include "rhec/sim/svg.hpp"
 
 namespace rhec::sim {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/path.hpp"
+#include "rhec/core/control/path.hpp"
 #include "rhec/plugins/robot.hpp"
 #include "rhec/sim/slip_field.hpp"
 #include "rhec/sim/truth.hpp"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "rhec/core/export.hpp"
+#include "rhec/core/base/export.hpp"
 
 namespace rhec::sim {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "rhec/core/full_information.hpp"
+#include "rhec/core/estimation/full_information.hpp"
 #include "rhec/sim/recorded_log.hpp"
 
 namespace rhec::sim {

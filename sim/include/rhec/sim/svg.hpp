@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rhec/core/export.hpp"
+#include "rhec/core/base/export.hpp"
 
 namespace rhec::sim {
 

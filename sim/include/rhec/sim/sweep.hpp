@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "rhec/core/export.hpp"
-#include "rhec/core/settings.hpp"
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/config/settings.hpp"
 #include "rhec/plugins/host.hpp"
 
 namespace rhec::sim {

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "rhec/core/export.hpp"
+#include "rhec/core/base/export.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/sim/sweep.hpp"
 #include "rhec/sim/sweep_store.hpp"

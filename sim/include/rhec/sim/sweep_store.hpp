@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rhec/core/export.hpp"
+#include "rhec/core/base/export.hpp"
 #include "rhec/sim/sweep.hpp"
 
 namespace rhec::sim {

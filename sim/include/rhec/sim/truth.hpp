@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/export.hpp"
-#include "rhec/core/model.hpp"
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/model/model.hpp"
 #include "rhec/sim/random.hpp"
 #include "rhec/sim/slip_field.hpp"
 

@@ -1,0 +1,146 @@
+#pragma once
+
+#include <functional>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "rhec/core/config/option_values.hpp"
+
+namespace rhec {
+
+/// The options of a struct T: for each a name, a member, what it means and what values it may have. It reads T from
+/// Settings and documents itself; the defaults are those of a default-constructed T.
+///
+///     struct StructuredOptions {
+///       int size = 5;
+///       Transition transition = Transition::step;
+///       static const OptionTable<StructuredOptions>& table() {
+///         static const auto options = OptionTable<StructuredOptions>()
+///             .integer("size", &StructuredOptions::size, "block length [intervals]", at_least(1))
+///             .choice("transition", &StructuredOptions::transition,
+///                     {{"step", Transition::step}, {"ramp", Transition::ramp}}, "how a parameter changes block");
+///         return options;
+///       }
+///     };
+template <class T>
+class OptionTable {
+ public:
+  OptionTable& number(std::string name, double T::*member, std::string meaning, Range range = any()) {
+    return leaf(std::move(name), member, NumberValue{range}, std::move(meaning));
+  }
+  OptionTable& integer(std::string name, int T::*member, std::string meaning, Range range = any()) {
+    return leaf(std::move(name), member, IntegerValue{range}, std::move(meaning));
+  }
+  OptionTable& flag(std::string name, bool T::*member, std::string meaning) {
+    return leaf(std::move(name), member, FlagValue{}, std::move(meaning));
+  }
+  OptionTable& text(std::string name, std::string T::*member, std::string meaning) {
+    return leaf(std::move(name), member, TextValue{}, std::move(meaning));
+  }
+  template <class Enum>
+  OptionTable& choice(std::string name, Enum T::*member,
+                      std::vector<std::pair<std::string, std::type_identity_t<Enum>>> choices, std::string meaning) {
+    return leaf(std::move(name), member, ChoiceValue<Enum>{std::move(choices)}, std::move(meaning));
+  }
+  /// `none` or an empty value stand for no number.
+  OptionTable& optional_number(std::string name, std::optional<double> T::*member, std::string meaning,
+                               Range range = any()) {
+    return leaf(std::move(name), member, OptionalValue<NumberValue>{{range}}, std::move(meaning));
+  }
+  OptionTable& optional_integer(std::string name, std::optional<int> T::*member, std::string meaning,
+                                Range range = any()) {
+    return leaf(std::move(name), member, OptionalValue<IntegerValue>{{range}}, std::move(meaning));
+  }
+  OptionTable& numbers(std::string name, std::vector<double> T::*member, std::string meaning, Range each = any()) {
+    return leaf(std::move(name), member, ListValue<NumberValue>{{each}}, std::move(meaning));
+  }
+  OptionTable& integers(std::string name, std::vector<int> T::*member, std::string meaning, Range each = any()) {
+    return leaf(std::move(name), member, ListValue<IntegerValue>{{each}}, std::move(meaning));
+  }
+  OptionTable& names(std::string name, std::vector<std::string> T::*member, std::string meaning) {
+    return leaf(std::move(name), member, ListValue<TextValue>{}, std::move(meaning));
+  }
+  /// Whatever is written there, passed through as it is: e.g. the native options of a backend.
+  OptionTable& subtree(std::string name, Settings T::*member, std::string meaning) {
+    return leaf(std::move(name), member, SubtreeValue{}, std::move(meaning));
+  }
+  /// A nested struct with a table of its own; its options are rows "name.option".
+  template <class Group>
+  OptionTable& group(std::string name, Group T::*member, OptionTable<Group> table) {
+    auto shared = std::make_shared<const OptionTable<Group>>(std::move(table));
+    return entry({std::move(name),
+                  [=](T& into, const Settings& from, std::string_view context) {
+                    shared->parse_into(into.*member, from, context);
+                  },
+                  [=](const T& defaults, const std::string& prefix, std::vector<OptionRow>& rows) {
+                    shared->describe(defaults.*member, prefix + ".", rows);
+                  }});
+  }
+
+  /// The options written in `from` (a map, or null for all defaults). `context` says whose options they are, e.g.
+  /// "blocking 'structured'"; keys of `skip` (e.g. the "name" that chose the plugin) are passed over. Throws Error with
+  /// the place, the key path, what was found and what was expected; an unknown key is answered with the nearest known
+  /// one.
+  T parse(const Settings& from, std::string_view context, std::initializer_list<std::string_view> skip = {}) const {
+    T result{};
+    parse_into(result, from, context, skip);
+    return result;
+  }
+
+  /// The same, on top of the values that `into` has.
+  void parse_into(T& into, const Settings& from, std::string_view context,
+                  std::initializer_list<std::string_view> skip = {}) const {
+    check_keys(from, names_, context, skip);
+    for (const Entry& option : entries_) {
+      if (const Settings* value = from.find(option.name)) option.read(into, *value, context);
+    }
+  }
+
+  /// One row an option, in the order of the table.
+  std::vector<OptionRow> schema() const {
+    std::vector<OptionRow> rows;
+    describe(T{}, "", rows);
+    return rows;
+  }
+
+  /// Appends the rows with the defaults that `defaults` has.
+  void describe(const T& defaults, const std::string& prefix, std::vector<OptionRow>& rows) const {
+    for (const Entry& option : entries_) option.describe(defaults, prefix + option.name, rows);
+  }
+
+ private:
+  struct Entry {
+    std::string name;
+    std::function<void(T&, const Settings&, std::string_view context)> read;
+    std::function<void(const T&, const std::string& full_name, std::vector<OptionRow>&)> describe;
+  };
+
+  template <class Member, class Value>
+  OptionTable& leaf(std::string name, Member T::*member, Value value, std::string meaning) {
+    auto read = [=](T& into, const Settings& from, std::string_view context) {
+      into.*member = value.read(from, OptionContext{context, meaning});
+    };
+    auto describe = [=](const T& defaults, const std::string& full_name, std::vector<OptionRow>& rows) {
+      rows.push_back({full_name, value.type(), value.print(defaults.*member), value.constraint(), meaning});
+    };
+    return entry({std::move(name), std::move(read), std::move(describe)});
+  }
+
+  OptionTable& entry(Entry option) {
+    check_new_name(option.name, names_);
+    names_.push_back(option.name);
+    entries_.push_back(std::move(option));
+    return *this;
+  }
+
+  std::vector<std::string> names_;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace rhec

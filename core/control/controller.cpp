@@ -1,0 +1,205 @@
+#include "rhec/core/control/controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+
+namespace rhec {
+namespace {
+
+RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Setup& setup) {
+  const Roles& roles = model->description().roles;
+  if (roles.position_x < 0 || roles.position_y < 0)
+    throw Error(
+        fmt::format("controller: the model '{}' does not say which states are its position; it cannot follow a "
+                    "path",
+                    model->description().name));
+  if (setup.blockings.size() != setup.problem.blocked_inputs.size())
+    throw Error("controller: expected one blocking for each blocked input");
+  for (const auto& blocking : setup.blockings)
+    if (const std::string reason = blocking->why_not(setup.problem.max_intervals); !reason.empty())
+      throw Error("controller: blocking: " + reason);
+  if (!(setup.interval > 0.0))
+    throw Error(fmt::format("controller: interval {} s; expected a positive number", setup.interval));
+  return {std::move(model), setup.problem};
+}
+
+}  // namespace
+
+Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Path path, Setup setup)
+    : setup_(std::move(setup)),
+      path_(std::move(path)),
+      follower_(path_, setup_.search),
+      problem_(make_problem(std::move(model), setup_)),
+      solver_(std::move(solver)),
+      shifter_(problem_),
+      point_(problem_.capacity()) {
+  const int N = setup_.problem.max_intervals;
+  problem_.set_intervals(N);
+  begins_.assign(N, 0);
+  for (int i = 0; i < N; ++i) problem_.set_duration(i, setup_.interval);
+  // Move blocking is counted from the start of the horizon, so it is the same at every sample.
+  for (std::size_t b = 0; b < setup_.blockings.size(); ++b) {
+    setup_.blockings[b]->starts({0, N}, begins_.data());
+    problem_.set_blocks(setup_.problem.blocked_inputs[b], begins_.data());
+  }
+  scratch_.assign(problem_.scratch_size(), 0.0);
+  problem_.finish(scratch_);
+  if (const std::string reason = solver_->why_not(problem_); !reason.empty())
+    throw Error("controller: the solver cannot take this problem: " + reason);
+  solver_->setup(problem_);
+  const Model& vehicle = problem_.model();
+  command_.inputs.assign(vehicle.input_count(), 0.0);
+  const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count());
+  for (std::vector<double>* motion : {&straight_, &slipless_, &largest_}) motion->assign(nx + nu, 0.0);
+  nominal_parameters_ = nominal_values(vehicle.description().parameters);
+  reference_parameters_ = nominal_parameters_;
+  go_straight(1.0, nominal_parameters_.data(), slipless_);
+  if (std::all_of(slipless_.begin(), slipless_.end(), [](double value) { return value == 0.0; }))
+    throw Error(
+        fmt::format("controller: the model '{}' does not say what drives it straight ahead; it cannot follow a path",
+                    vehicle.description().name));
+}
+
+void Controller::reset() noexcept {
+  solver_->reset();
+  shifter_.forget();
+  follower_.reset();
+  has_plan_ = prepared_ = false;
+  is_finished_ = true;
+  fallbacks_ = 0;
+}
+
+/// Speeds among the states, then inputs.
+void Controller::go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept {
+  const Model& vehicle = problem_.model();
+  std::fill(motion.begin(), motion.end(), 0.0);
+  vehicle.straight_motion(ground_speed, parameters, motion.data(), motion.data() + vehicle.state_count());
+}
+
+/// What goes straight on at a speed over ground, on ground that slips like the estimate, as far as that is trusted.
+void Controller::choose_straight_motion(double ground_speed, const double* parameters) noexcept {
+  go_straight(ground_speed, nominal_parameters_.data(), slipless_);
+  straight_ = slipless_;
+  if (setup_.reference_speed == ReferenceSpeed::literal) return;
+  go_straight(ground_speed, parameters, straight_);
+  for (std::size_t j = 0; j < straight_.size(); ++j) {
+    const double most = slipless_[j] / setup_.least_speed_factor;
+    const bool trusted = straight_[j] * most >= 0.0 && std::abs(straight_[j]) <= std::abs(most);
+    if (!trusted) straight_[j] = most;  // also where it is not a number
+  }
+}
+
+/// References and bounds of the horizon that starts at an arc length of the path.
+void Controller::set_reference(double arc_length, const double* parameters) noexcept {
+  const Model& vehicle = problem_.model();
+  const Roles& roles = vehicle.description().roles;
+  const int N = problem_.intervals(), nx = vehicle.state_count(), nu = vehicle.input_count();
+  int segment = reference_segment_;
+  command_.reference = path_.point_at(arc_length, segment);
+  reference_segment_ = segment;
+  const double ground_speed = command_.reference.speed, distance = setup_.interval * std::abs(ground_speed);
+  bound_speed(setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset);
+  choose_straight_motion(ground_speed, parameters);
+  for (int j = 0; j < nu; ++j)
+    straight_[nx + j] = std::min(std::max(straight_[nx + j], problem_.input_lower(0, j)), problem_.input_upper(0, j));
+  for (int i = 0; i <= N; ++i) {
+    const PathPoint target = path_.point_at(arc_length + i * distance, segment);
+    double* x = problem_.state_reference(i);
+    std::copy_n(straight_.data(), nx, x);
+    roles.place(target.x, target.y, target.heading, x);
+    if (i < N) std::copy_n(straight_.data() + nx, nu, problem_.input_reference(i));
+  }
+}
+
+/// Inputs that drive the vehicle ahead at most as fast as a speed over ground without slip asks for.
+void Controller::bound_speed(double most) noexcept {
+  if (!std::isfinite(most) || most == bounded_speed_) return;
+  bounded_speed_ = most;
+  go_straight(most, nominal_parameters_.data(), largest_);
+  const int nx = problem_.model().state_count(), nu = problem_.model().input_count();
+  for (int i = 0; i < problem_.intervals(); ++i) {
+    for (int j = 0; j < nu; ++j) {
+      const double largest = largest_[nx + j];
+      if (largest == 0.0) continue;
+      problem_.input_lower(i, j) = std::min(0.0, largest);
+      problem_.input_upper(i, j) = std::max(0.0, largest);
+    }
+  }
+}
+
+/// A first plan: the reference inputs, rolled out.
+void Controller::start_cold() noexcept {
+  const int nu = problem_.model().input_count();
+  for (int i = 0; i < problem_.intervals(); ++i)
+    std::copy_n(problem_.input_reference(i), nu, scratch_.data() + static_cast<std::ptrdiff_t>(i) * nu);
+  problem_.structure().set_decisions(point_, scratch_.data(), problem_.given_parameters());
+  point_.clear_multipliers();
+  roll_out(problem_, point_, scratch_);
+}
+
+const Controller::Command& Controller::control(const Estimate& estimate, Clock::time_point deadline) noexcept {
+  finish();
+  const Roles& roles = problem_.model().description().roles;
+  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
+  follower_.advance(estimate.state[roles.position_x], estimate.state[roles.position_y]);
+  std::copy_n(estimate.state.data(), nx, problem_.given_state());
+  std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
+  set_reference(follower_.arc_length(), estimate.parameters.data());
+  command_.softened = problem_.finish(scratch_) > 0;
+  bool from_plan = has_plan_;
+  if (!has_plan_) {
+    start_cold();
+  } else if (!prepared_) {
+    from_plan = shifter_.apply(1, problem_, point_);
+    if (!from_plan) start_cold();
+  }
+  // An estimate that has jumped is no small step for the plan of the last sample: start it from a simulation instead.
+  command_.report = solver_->feedback(point_, deadline);
+  if (!is_usable(command_.report.status) && from_plan) {
+    // The plan may have led astray; a fresh start may not.
+    start_cold();
+    command_.report = solver_->feedback(point_, deadline);
+    command_.report.fallback_used = true;
+  }
+  command_.fallback = !is_usable(command_.report.status);
+  fallbacks_ += command_.fallback;
+  prepared_ = false;
+  has_plan_ = true;
+  problem_.structure().inputs_on(point_, 0, command_.inputs.data());
+  for (std::size_t j = 0; j < command_.inputs.size(); ++j)
+    command_.inputs[j] = std::min(std::max(command_.inputs[j], problem_.input_lower(0, static_cast<int>(j))),
+                                  problem_.input_upper(0, static_cast<int>(j)));
+  is_finished_ = false;
+  return command_;
+}
+
+/// What the robot need not wait for: the plan is judged and kept, before the problem becomes that of the next sample.
+void Controller::finish() noexcept {
+  if (is_finished_) return;
+  is_finished_ = true;
+  solver_->finish(point_, command_.report);
+  shifter_.take(problem_, point_);
+}
+
+void Controller::prepare() noexcept {
+  finish();
+  if (!has_plan_ || prepared_) return;
+  // What the next sample will probably be: the plan's second node, the reference one step further on.
+  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
+  std::copy_n(point_.state(1), nx, problem_.given_state());
+  std::copy_n(problem_.given_parameters(), np, reference_parameters_.data());
+  const PathPoint reference = command_.reference;
+  set_reference(follower_.arc_length() + setup_.interval * std::abs(reference.speed), reference_parameters_.data());
+  command_.reference = reference;
+  problem_.finish(scratch_);
+  if (!shifter_.apply(1, problem_, point_)) return;
+  solver_->prepare(point_);
+  prepared_ = true;
+}
+
+}  // namespace rhec

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "rhec/core/control/path.hpp"
+#include "rhec/core/estimation/estimate.hpp"
+#include "rhec/core/horizon/blocking.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/horizon/shift.hpp"
+
+namespace rhec {
+
+enum class ReferenceSpeed {
+  ground,  ///< the path's speed is meant over ground: the wheels turn as much faster as they slip by the estimate
+  literal  ///< the path's speed is the wheels' (the paper's; under slip the vehicle lags and cuts corners)
+};
+
+/// Drives along a path: estimate in, input out (METHOD, receding horizon control with a space-based reference).
+///
+/// At each call the closest point of the path is searched for ahead of the last one; the local reference is that point
+/// and the next N_c, each dt * u1ref metres further on. Where the solver fails, the plan of the last sample goes on,
+/// and is counted. Allocates in its constructor only.
+class RHEC_EXPORT Controller {
+ public:
+  struct Setup {
+    RhcProblem::Setup problem;
+    double interval = 0.2;  ///< dt [s]
+    ReferenceSpeed reference_speed = ReferenceSpeed::ground;
+    /// An estimate by which the wheels keep less than this of their speed is not trusted.
+    double least_speed_factor = 0.3;
+    /// The inputs that drive straight ahead are bounded between 0 and what they would be at a speed of
+    /// factor * speed + offset without slip; an infinite factor leaves the model's bounds.
+    double speed_bound_factor = 2.5, speed_bound_offset = 1.0;
+    std::vector<std::shared_ptr<const Blocking>> blockings;  ///< one for each of problem.blocked_inputs
+    PathFollower::Window search;
+  };
+  /// Throws Error where the model has no position or speed to follow a path with, or sizes do not fit.
+  Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Path path, Setup setup);
+  Controller(const Controller&) = delete;  // the follower points into the path
+  Controller& operator=(const Controller&) = delete;
+
+  struct Command {
+    std::vector<double> inputs;  ///< u_k, n_u: to be applied until the next call
+    PathPoint reference;         ///< the closest point of the path
+    Report report;               ///< its objective and KKT residual need not be there before `finish`
+    bool fallback = false;       ///< the solver failed: this is the last plan's
+    bool softened = false;       ///< a state bound was out of the estimate's reach and was moved
+  };
+  /// The input for an estimate. Valid until the next call.
+  const Command& control(const Estimate& estimate, Clock::time_point deadline = Clock::time_point::max()) noexcept;
+  /// Completes the last command's report by the objective and the KKT residual of its plan. `prepare` and the next
+  /// `control` do that too; the last command of a run has neither behind it.
+  void finish() noexcept;
+  /// Work for the next sample that can be done now; calling it is never needed.
+  void prepare() noexcept;
+  void reset() noexcept;
+
+  /// True once the vehicle has passed the end of the path.
+  bool finished() const noexcept { return follower_.finished(); }
+  const PathFollower& follower() const noexcept { return follower_; }
+  const Path& path() const noexcept { return path_; }
+  const RhcProblem& problem() const noexcept { return problem_; }
+  const Iterate& plan() const noexcept { return point_; }
+  std::int64_t fallbacks() const noexcept { return fallbacks_; }
+
+ private:
+  void go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept;
+  void choose_straight_motion(double ground_speed, const double* parameters) noexcept;
+  void bound_speed(double most) noexcept;
+  void set_reference(double arc_length, const double* parameters) noexcept;
+  void start_cold() noexcept;
+
+  Setup setup_;
+  Path path_;
+  PathFollower follower_;
+  RhcProblem problem_;
+  std::shared_ptr<Solver> solver_;
+  GuessShifter shifter_;
+  Iterate point_;
+  Command command_;
+  bool has_plan_ = false, prepared_ = false;
+  bool is_finished_ = true;  ///< the last sample's plan was judged and is kept for the next one
+  double bounded_speed_ = std::numeric_limits<double>::quiet_NaN();  ///< that the inputs' bounds are made for [m/s]
+  int reference_segment_ = 0;                                        ///< of the path, where the last reference began
+  std::int64_t fallbacks_ = 0;
+  std::vector<double> scratch_, straight_, slipless_, largest_;
+  std::vector<double> nominal_parameters_, reference_parameters_;
+  std::vector<std::uint8_t> begins_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,286 @@
+#include "rhec/core/estimation/arrival_cost.hpp"
+#include "rhec/core/base/angle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rhec/core/base/with_size.hpp"
+#include "rhec/core/qp/small_matrix.hpp"
+
+namespace rhec {
+namespace {
+
+// A variable that is known exactly is given this part of its typical magnitude as a standard deviation.
+constexpr double least_sigma = 1e-9;
+// Pivots of a correlation matrix below this are rounding.
+constexpr double least_pivot = 1e-15;
+
+KalmanFilter make_filter(const RheProblem& like) {
+  const RheProblem::Setup& setup = like.setup();
+  KalmanFilter::Noise noise;
+  for (const double w : setup.output_weights) noise.output_variances.push_back(w > 0.0 ? 1.0 / w : 1e12);
+  for (const double w : setup.input_weights) noise.input_variances.push_back(w > 0.0 ? 1.0 / w : 1e12);
+  noise.parameter_lower = setup.parameter_lower;
+  noise.parameter_upper = setup.parameter_upper;
+  return {like.shared_model(), std::move(noise), like.substeps()};
+}
+
+/// Householder reduction of the columns but the last one, in place: afterwards the upper triangle holds R, and the last
+/// column Q' times what was there.
+void triangularise(Eigen::MatrixXd& rows) noexcept {
+  const Eigen::Index m = rows.rows(), n = rows.cols() - 1;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    double square = 0.0;
+    for (Eigen::Index r = k; r < m; ++r) square += rows(r, k) * rows(r, k);
+    if (square == 0.0) continue;
+    const double pivot = rows(k, k) > 0.0 ? -std::sqrt(square) : std::sqrt(square);
+    // v = a - pivot e_k; 2 / v'v = -1 / (pivot v_k)
+    const double top = rows(k, k) - pivot;
+    for (Eigen::Index c = k + 1; c <= n; ++c) {
+      double sum = top * rows(k, c);
+      for (Eigen::Index r = k + 1; r < m; ++r) sum += rows(r, k) * rows(r, c);
+      sum /= pivot * top;
+      rows(k, c) += sum * top;
+      for (Eigen::Index r = k + 1; r < m; ++r) rows(r, c) += sum * rows(r, k);
+    }
+    rows(k, k) = pivot;
+    for (Eigen::Index r = k + 1; r < m; ++r) rows(r, k) = 0.0;
+  }
+}
+
+}  // namespace
+
+ArrivalCost::ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<ParameterWalk> walks)
+    : kind_(kind), walks_(std::move(walks)), filter_(make_filter(like)) {
+  const Model& model = like.model();
+  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(), ny = model.output_count();
+  initial_covariance_ = filter_.covariance;
+  robust_.assign(ny, 1.0);
+  inputs_.assign(nu, 0.0);
+  ends_.assign(np, 0.0);
+  scratch_.assign(2 * static_cast<std::size_t>(ny), 0.0);
+  ramp_variances_.assign(np, 0.0);
+  next_.assign(nx, 0.0);
+  jacobian_.assign(static_cast<std::size_t>(nx) * (nx + nu + 2 * np), 0.0);
+  predicted_.assign(ny, 0.0);
+  output_jacobian_.assign(static_cast<std::size_t>(ny) * nx, 0.0);
+  scale_ = Eigen::VectorXd::Ones(nx + np);
+  factor_ = inverse_ = Eigen::MatrixXd::Identity(nx + np, nx + np);
+  const int unknowns = nx + nu + 2 * np;  // x_0, u_0, p_0 and, on a ramp, its change
+  rows_ = Eigen::MatrixXd::Zero(unknowns + ny, unknowns + 1);
+  map_ = spread_ = Eigen::MatrixXd::Zero(nx + np, unknowns);
+  shift_ = Eigen::VectorXd::Zero(unknowns);
+  next_mean_ = Eigen::VectorXd::Zero(nx + np);
+}
+
+void ArrivalCost::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+  filter_.mean = mean;
+  filter_.covariance = initial_covariance_ = covariance;
+}
+
+/// Where rounding has made the covariance singular it gets the least ridge that lets it be factorised.
+void ArrivalCost::factor_covariance() noexcept {
+  const ModelDescription& about = filter_.model().description();
+  const int n = static_cast<int>(scale_.size()), nx = filter_.model().state_count();
+  for (int j = 0; j < n; ++j) {
+    const double least = least_sigma * (j < nx ? about.states[j] : about.parameters[j - nx]).scale;
+    scale_[j] = std::sqrt(std::max(filter_.covariance(j, j), least * least));
+  }
+  double ridge = 0.0;
+  const auto factor_with_ridge = [&](auto size) {
+    const double *covariance = filter_.covariance.data(), *scale = scale_.data();
+    double* factor = factor_.data();
+    for (int c = 0; c < size; ++c) {
+      factor[c * size + c] = 1.0 + ridge;
+      for (int r = c + 1; r < size; ++r) factor[c * size + r] = covariance[c * size + r] / (scale[r] * scale[c]);
+    }
+    return small::factor(factor, size, size, least_pivot);
+  };
+  while (!with_size(n, factor_with_ridge) && ridge < 10.0) ridge = ridge == 0.0 ? least_pivot : 10.0 * ridge;
+}
+
+void ArrivalCost::write(RheProblem& problem) noexcept {
+  const int n = static_cast<int>(scale_.size());
+  problem.arrival_mean = filter_.mean;
+  if (kind_ == ArrivalKind::off) {
+    problem.arrival_information.setZero();
+    return;
+  }
+  factor_covariance();
+  invert_factor();
+  // D^-1 L^-T L^-1 D^-1
+  with_size(n, [&](auto size) {
+    const double *inverse = inverse_.data(), *scale = scale_.data();
+    double* information = problem.arrival_information.data();
+    for (int c = 0; c < size; ++c) {
+      for (int r = c; r < size; ++r) {
+        double sum = 0.0;
+        for (int k = r; k < size; ++k) sum += inverse[r * size + k] * inverse[c * size + k];
+        information[c * size + r] = information[r * size + c] = sum / (scale[r] * scale[c]);
+      }
+    }
+  });
+}
+
+/// Of the factor L, in the lower triangle.
+void ArrivalCost::invert_factor() noexcept {
+  with_size(static_cast<int>(scale_.size()), [&](auto n) {
+    const double* factor = factor_.data();
+    double* inverse = inverse_.data();
+    for (int c = 0; c < n; ++c) {
+      for (int r = c; r < n; ++r) {
+        double value = r == c ? 1.0 : 0.0;
+        for (int k = c; k < r; ++k) value -= factor[k * n + r] * inverse[c * n + k];
+        inverse[c * n + r] = value / factor[r * n + r];
+      }
+    }
+  });
+}
+
+void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, const std::vector<Border>& borders,
+                        bool mean_is_lost) noexcept {
+  const int nx = problem.model().state_count(), np = problem.model().parameter_count();
+  for (int j = 0; j < np; ++j) ramp_variances_[j] = borders[j].leaves_as_ramp ? borders[j].ramp_variance : 0.0;
+  switch (kind_ == ArrivalKind::ekf && mean_is_lost ? ArrivalKind::smoothing : kind_) {
+    case ArrivalKind::ekf:
+      filter_first_interval(problem, solution);
+      break;
+    case ArrivalKind::smoothing:
+      smooth_first_interval(problem, solution);
+      break;
+    case ArrivalKind::constant:
+    case ArrivalKind::off:
+      for (int j = 0; j < nx + np; ++j) filter_.mean[j] = solution.state(1)[j];
+      filter_.covariance = initial_covariance_;
+      return;
+  }
+  for (int j = 0; j < np; ++j) {
+    const Border& border = borders[j];
+    filter_.add_parameter_variance(j, walks_[j].forgetting * walks_[j].forgetting);
+    if (!border.reached) continue;
+    if (border.neighbour_sigma) {
+      filter_.add_parameter_variance(j, *border.neighbour_sigma * *border.neighbour_sigma * border.steps);
+    } else {
+      filter_.restart_parameter(j, walks_[j].restart_sigma * walks_[j].restart_sigma);
+    }
+  }
+}
+
+void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate& solution) noexcept {
+  if (!problem.setup().robust.empty()) problem.robust_weights(solution, 0, robust_.data(), scratch_);
+  filter_.update(problem.output(0), robust_.data());
+  problem.structure().inputs_on(solution, 0, inputs_.data());
+  const bool ramp = std::any_of(ramp_variances_.begin(), ramp_variances_.end(), [](double v) { return v > 0.0; });
+  filter_.predict(problem.measured_input(0), inputs_.data(), problem.duration(0),
+                  ramp ? ramp_variances_.data() : nullptr);
+}
+
+/// Rows in [dx; du; dp; dramp] about the solution: prior, outputs, measured inputs, ramp. Their QR factor R gives the
+/// covariance R^-1 R^-T of what leaves, which the linearised dynamics carry over to the next node.
+void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate& solution) noexcept {
+  const Model& model = problem.model();
+  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(), ny = model.output_count();
+  const int n = nx + np, unknowns = nx + nu + 2 * np;
+  const double* x = solution.state(0);
+  const double* p = x + nx;
+  problem.structure().inputs_on(solution, 0, inputs_.data());
+  problem.structure().parameters_on(solution, 0, ends_.data());
+  for (int j = 0; j < np; ++j)
+    if (!(ramp_variances_[j] > 0.0)) ends_[j] = p[j];
+  if (!problem.setup().robust.empty()) problem.robust_weights(solution, 0, robust_.data(), scratch_);
+  Model::Nodes nodes;
+  nodes.count = 1;
+  nodes.states = x;
+  nodes.outputs = predicted_.data();
+  nodes.jacobians = output_jacobian_.data();
+  model.observe(nodes);
+  const double duration = problem.duration(0);
+  Model::Intervals step;
+  step.count = 1;
+  step.states = x;
+  step.inputs = inputs_.data();
+  step.parameters = p;
+  step.parameters_end = ends_.data();
+  step.durations = &duration;
+  step.substeps = problem.substeps();
+  step.next_states = next_.data();
+  step.jacobians = jacobian_.data();
+  model.integrate(step);
+
+  rows_.setZero();
+  auto right = rows_.col(unknowns);
+  // Prior: L^-1 D^-1 ([x; p] + [dx; dp] - mean). Columns of p stand behind those of u.
+  factor_covariance();
+  invert_factor();
+  const auto column_of = [&](int j) { return j < nx ? j : nu + j; };
+  for (int c = 0; c < n; ++c) {
+    for (int r = c; r < n; ++r) {
+      rows_(r, column_of(c)) = inverse_(r, c) / scale_[c];
+      right[r] -= rows_(r, column_of(c)) * (x[c] - filter_.mean[c]);
+    }
+  }
+  int row = n;
+  for (int j = 0; j < nu; ++j, ++row) {
+    const double measured = problem.measured_input(0)[j];
+    const bool missing = std::isnan(measured);
+    const double sigma =
+        missing ? 100.0 * model.description().inputs[j].scale : std::sqrt(filter_.noise().input_variances[j]);
+    rows_(row, nx + j) = 1.0 / sigma;
+    right[row] = missing ? 0.0 : (measured - inputs_[j]) / sigma;
+  }
+  for (int j = 0; j < np; ++j, ++row) {
+    // No ramp: no change, by a row of any weight, since nothing else speaks of that column.
+    const double sigma = ramp_variances_[j] > 0.0 ? std::sqrt(ramp_variances_[j]) : 1.0;
+    rows_(row, nx + nu + np + j) = 1.0 / sigma;
+    right[row] = (p[j] - ends_[j]) / sigma;
+  }
+  for (int j = 0; j < ny; ++j, ++row) {
+    const double y = problem.output(0)[j];
+    if (std::isnan(y)) continue;
+    const double difference =
+        model.description().outputs[j].is_angle ? angle_difference(y, predicted_[j]) : y - predicted_[j];
+    const double weight = std::sqrt(robust_[j] / filter_.noise().output_variances[j]);
+    for (int c = 0; c < nx; ++c) rows_(row, c) = weight * output_jacobian_[c * ny + j];
+    right[row] = weight * difference;
+  }
+  triangularise(rows_);
+  for (int r = unknowns - 1; r >= 0; --r) {
+    double value = right[r];
+    for (int c = r + 1; c < unknowns; ++c) value -= rows_(r, c) * shift_[c];
+    shift_[r] = value / rows_(r, r);
+  }
+
+  map_.setZero();
+  for (int c = 0; c < nx + nu + np; ++c)
+    for (int r = 0; r < nx; ++r) map_(r, c) = jacobian_[c * nx + r];
+  for (int c = 0; c < np; ++c) {
+    const int change = nx + nu + np + c;
+    for (int r = 0; r < nx; ++r) {
+      const double by_end = jacobian_[change * nx + r];
+      map_(r, nx + nu + c) += by_end;
+      map_(r, change) = ramp_variances_[c] > 0.0 ? by_end : 0.0;
+    }
+    map_(nx + c, nx + nu + c) = 1.0;
+    map_(nx + c, change) = ramp_variances_[c] > 0.0 ? 1.0 : 0.0;
+  }
+  // covariance = (M R^-1)(M R^-1)'
+  for (int c = 0; c < unknowns; ++c) {
+    for (int r = 0; r < n; ++r) {
+      double value = map_(r, c);
+      for (int k = 0; k < c; ++k) value -= spread_(r, k) * rows_(k, c);
+      spread_(r, c) = value / rows_(c, c);
+    }
+  }
+  inverse_.noalias() = spread_.lazyProduct(spread_.transpose());
+  for (int r = 0; r < n; ++r) next_mean_[r] = (r < nx ? next_[r] : ends_[r - nx]) + map_.row(r).dot(shift_);
+  if (!next_mean_.allFinite() || !inverse_.allFinite()) {
+    // A solution that is not one tells nothing of the next node: begin anew from what is known of this one.
+    filter_.covariance = initial_covariance_;
+    return;
+  }
+  filter_.mean = next_mean_;
+  filter_.covariance = inverse_;
+}
+
+}  // namespace rhec

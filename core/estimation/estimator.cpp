@@ -1,0 +1,230 @@
+#include "rhec/core/estimation/estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/measurement.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr std::size_t remembered_nodes = 1024;
+constexpr int most_parts = 1000;  // that one gap, or one prediction, is divided into
+
+/// Intervals of at most a length that a time is divided into.
+int parts_of(double duration, double longest) noexcept {
+  const double parts = std::ceil(duration / longest - 1e-6);
+  return parts < most_parts ? std::max(1, static_cast<int>(parts)) : most_parts;
+}
+
+}  // namespace
+
+Estimator::Rows::Rows(std::size_t capacity, int width)
+    // Twice the room, so that rows are moved to the front once in `capacity` drops only.
+    : capacity_(capacity), width_(width), times_(2 * capacity), values_(2 * capacity * width) {}
+
+bool Estimator::Rows::insert(double time, const double* values) noexcept {
+  const bool full = count_ == capacity_;
+  if (full) drop_front(1);
+  if (first_ + count_ == times_.size()) {
+    std::move(times_.begin() + first_, times_.end(), times_.begin());
+    std::move(values_.begin() + first_ * width_, values_.end(), values_.begin());
+    first_ = 0;
+  }
+  std::size_t at = first_ + count_;
+  for (; at > first_ && times_[at - 1] > time; --at) {
+    times_[at] = times_[at - 1];
+    std::copy_n(values_.begin() + (at - 1) * width_, width_, values_.begin() + at * width_);
+  }
+  times_[at] = time;
+  std::copy_n(values, width_, values_.begin() + at * width_);
+  ++count_;
+  return !full;
+}
+
+void Estimator::Rows::drop_front(std::size_t rows) noexcept {
+  first_ += rows;
+  count_ -= rows;
+  if (count_ == 0) first_ = 0;
+}
+
+Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline)
+    : method_(std::move(method)),
+      timeline_(timeline),
+      measurements_(timeline.capacity, method_->model().output_count()),
+      inputs_(timeline.capacity, method_->model().input_count()) {
+  if (!(timeline.longest_interval > 0.0))
+    throw Error(fmt::format("estimator: longest interval {} s; expected a positive number", timeline.longest_interval));
+  if (!(timeline.tolerance >= 0.0 && timeline.tolerance < timeline.longest_interval))
+    throw Error(fmt::format("estimator: tolerance {} s; expected a number from 0 to below the longest interval, {} s",
+                            timeline.tolerance, timeline.longest_interval));
+  if (timeline.capacity < 1) throw Error("estimator: capacity 0; expected room for at least 1 row");
+  const Model& m = method_->model();
+  clear_estimates();
+  node_times_.assign(remembered_nodes, 0.0);
+  mean_.assign(m.input_count(), 0.0);
+  weight_.assign(m.input_count(), 0.0);
+  nothing_.assign(m.output_count(), std::numeric_limits<double>::quiet_NaN());
+  next_.assign(m.state_count(), 0.0);
+  values_.assign(std::max(m.output_count(), m.input_count()), 0.0);
+}
+
+void Estimator::clear_estimates() noexcept {
+  const Model& m = method_->model();
+  const int n = m.state_count() + m.parameter_count();
+  for (Estimate* e : {&estimate_, &predicted_}) {
+    e->time = 0.0;
+    e->state.setZero(m.state_count());
+    e->parameters.setZero(m.parameter_count());
+    e->covariance.setZero(n, n);
+    e->report = {};
+    e->fallback = e->predicted = false;
+  }
+}
+
+void Estimator::reset() noexcept {
+  method_->reset();
+  measurements_.clear();
+  inputs_.clear();
+  clear_estimates();
+  started_ = stale_ = false;
+  newest_ = 0;
+  counts_ = {};
+}
+
+void Estimator::push_measurement(double time, const double* outputs) noexcept {
+  for (std::size_t j = 0; j < nothing_.size(); ++j) {
+    values_[j] = cleaned(outputs[j]);
+    counts_.missing += std::isnan(values_[j]);
+  }
+  outputs = values_.data();
+  if (!std::isfinite(time)) {
+    ++counts_.dropped;
+    return;
+  }
+  const double newest_time = node_times_[newest_ % remembered_nodes];
+  if (!started_ || time > newest_time + timeline_.tolerance) {
+    if (!measurements_.insert(time, outputs)) ++counts_.dropped;
+    return;
+  }
+  for (std::size_t back = 0; back <= std::min(newest_, remembered_nodes - 1); ++back) {
+    if (std::abs(node_times_[(newest_ - back) % remembered_nodes] - time) > timeline_.tolerance) continue;
+    if (!method_->amend(static_cast<int>(back), outputs)) break;
+    ++counts_.late;
+    stale_ = true;
+    return;
+  }
+  ++counts_.dropped;
+}
+
+void Estimator::push_input(double time, const double* inputs) noexcept {
+  if (!std::isfinite(time)) return;
+  for (std::size_t j = 0; j < mean_.size(); ++j) values_[j] = cleaned(inputs[j]);
+  inputs_.insert(time, values_.data());
+}
+
+/// Mean over an interval of inputs that hold from their stamps on; NaN where none is known.
+void Estimator::mean_input(double from, double to) noexcept {
+  std::fill(mean_.begin(), mean_.end(), 0.0);
+  std::fill(weight_.begin(), weight_.end(), 0.0);
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    const double start = std::max(inputs_.time(i), from);
+    const double end = i + 1 < inputs_.size() ? std::min(inputs_.time(i + 1), to) : to;
+    if (inputs_.time(i) >= to - timeline_.tolerance) break;
+    const double seconds = end - start;
+    if (seconds <= 0.0) continue;
+    for (std::size_t j = 0; j < mean_.size(); ++j) {
+      const double value = inputs_.values(i)[j];
+      if (std::isnan(value)) continue;
+      mean_[j] += value * seconds;
+      weight_[j] += seconds;
+    }
+  }
+  for (std::size_t j = 0; j < mean_.size(); ++j)
+    mean_[j] = weight_[j] > 0.0 ? mean_[j] / weight_[j] : std::numeric_limits<double>::quiet_NaN();
+}
+
+void Estimator::add_node(double time, const double* outputs) noexcept {
+  if (!started_) {
+    method_->start(outputs);
+    started_ = true;
+    newest_ = 0;
+  } else {
+    const double last = node_times_[newest_ % remembered_nodes];
+    mean_input(last, time);
+    method_->add_node(time - last, mean_.data(), outputs);
+    ++newest_;
+  }
+  node_times_[newest_ % remembered_nodes] = time;
+  ++counts_.nodes;
+  stale_ = true;
+  // Of the rows of inputs before this node, only the last one still holds.
+  std::size_t used = 0;
+  while (used + 1 < inputs_.size() && inputs_.time(used + 1) <= time) ++used;
+  inputs_.drop_front(used);
+}
+
+void Estimator::add_nodes_until(double time, const double* outputs) noexcept {
+  if (started_) {
+    const double last = node_times_[newest_ % remembered_nodes];
+    const int parts = parts_of(time - last, timeline_.longest_interval);
+    for (int i = 1; i < parts; ++i) add_node(last + (time - last) * i / parts, nothing_.data());
+  }
+  add_node(time, outputs);
+}
+
+void Estimator::predict_to(double time) noexcept {
+  const double last = node_times_[newest_ % remembered_nodes];
+  predicted_ = estimate_;
+  predicted_.predicted = true;
+  mean_input(last, time);
+  for (double& u : mean_)
+    if (std::isnan(u)) u = 0.0;
+  const double duration = time - last;
+  Model::Intervals request;
+  request.count = 1;
+  request.states = estimate_.state.data();
+  request.inputs = mean_.data();
+  request.parameters = estimate_.parameters.data();
+  request.durations = &duration;
+  request.substeps = method_->substeps() * parts_of(duration, timeline_.longest_interval);
+  request.next_states = next_.data();
+  method_->model().integrate(request);
+  predicted_.time = time;
+  if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))
+    std::copy(next_.begin(), next_.end(), predicted_.state.data());
+}
+
+const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noexcept {
+  while (measurements_.size() > 0 && measurements_.time(0) <= time + timeline_.tolerance) {
+    const double stamp = measurements_.time(0);
+    // Measurements with one stamp, such as those of two sensors, make one node.
+    std::size_t same = 1;
+    double* merged = measurements_.values(0);
+    while (same < measurements_.size() && measurements_.time(same) <= stamp + timeline_.tolerance) {
+      for (std::size_t j = 0; j < nothing_.size(); ++j)
+        if (const double value = measurements_.values(same)[j]; !std::isnan(value)) merged[j] = value;
+      ++same;
+    }
+    add_nodes_until(stamp, merged);
+    measurements_.drop_front(same);
+  }
+  if (!started_) return estimate_;
+  if (stale_) {
+    method_->estimate(estimate_, deadline);
+    estimate_.time = node_times_[newest_ % remembered_nodes];
+    stale_ = false;
+    ++counts_.estimates;
+    counts_.fallbacks += estimate_.fallback;
+  }
+  if (!std::isfinite(time) || time <= estimate_.time + timeline_.tolerance) return estimate_;
+  predict_to(time);
+  return predicted_;
+}
+
+}  // namespace rhec

@@ -1,0 +1,136 @@
+#include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/core/base/angle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+
+namespace rhec {
+namespace {
+
+// Once the best hypothesis explains the data e^25 times better than any that differs, the others are dropped.
+constexpr double decisive = 25.0;
+
+}  // namespace
+
+FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Setup setup) : setup_(std::move(setup)) {
+  if (setup_.walk.size() != static_cast<std::size_t>(model->parameter_count()))
+    throw Error("filter: expected one random walk a parameter");
+  const Eigen::Index n = Eigen::Index{model->state_count()} + model->parameter_count();
+  if (setup_.initial_mean.size() != n || setup_.initial_covariance.rows() != n || setup_.initial_covariance.cols() != n)
+    throw Error(fmt::format("filter: the initial mean and covariance must have the size {} of [x; p]", n));
+  const int count = model->description().roles.heading >= 0 ? std::max(1, setup_.heading_starts) : 1;
+  for (int i = 0; i < count; ++i) bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps), 0.0});
+  no_input_.assign(model->input_count(), 0.0);
+  predicted_.assign(model->output_count(), 0.0);
+  jacobian_.assign(static_cast<std::size_t>(model->output_count()) * model->state_count(), 0.0);
+  reset();
+}
+
+void FilterEstimation::reset() noexcept {
+  alive_ = bank_.size();
+  best_ = 0;
+  for (std::size_t i = 0; i < bank_.size(); ++i) {
+    KalmanFilter& filter = bank_[i].filter;
+    bank_[i].log_likelihood = 0.0;
+    filter.mean = setup_.initial_mean;
+    filter.covariance = setup_.initial_covariance;
+    if (bank_.size() == 1) continue;
+    // Each start covers its part of the circle.
+    const Roles& roles = model().description().roles;
+    const int h = roles.heading;
+    const double part = 2.0 * std::numbers::pi / static_cast<double>(bank_.size());
+    roles.turn(part * static_cast<double>(i), filter.mean.data());
+    filter.covariance.row(h).setZero();
+    filter.covariance.col(h).setZero();
+    filter.covariance(h, h) = std::min(setup_.initial_covariance(h, h), 0.25 * part * part);
+  }
+}
+
+/// Of the measured outputs given the past, each by itself.
+double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double* outputs) noexcept {
+  const Model& m = filter.model();
+  const int ny = m.output_count(), nx = m.state_count();
+  Model::Nodes request;
+  request.count = 1;
+  request.states = filter.mean.data();
+  request.outputs = predicted_.data();
+  request.jacobians = jacobian_.data();
+  m.observe(request);
+  double sum = 0.0;
+  for (int j = 0; j < ny; ++j) {
+    if (std::isnan(outputs[j])) continue;
+    const double error =
+        m.description().outputs[j].is_angle ? angle_difference(outputs[j], predicted_[j]) : outputs[j] - predicted_[j];
+    double variance = filter.noise().output_variances[j];
+    for (int c = 0; c < nx; ++c)
+      for (int r = 0; r < nx; ++r) variance += jacobian_[c * ny + j] * filter.covariance(r, c) * jacobian_[r * ny + j];
+    // A single wild fix must not decide.
+    sum -= 0.5 * std::min(error * error / variance, 16.0) + 0.5 * std::log(variance);
+  }
+  return sum;
+}
+
+void FilterEstimation::take(const double* outputs) noexcept {
+  for (std::size_t i = 0; i < alive_; ++i) {
+    if (alive_ > 1) bank_[i].log_likelihood += log_likelihood(bank_[i].filter, outputs);
+    bank_[i].filter.update(outputs, nullptr);
+  }
+  if (alive_ == 1) return;
+  best_ = 0;
+  for (std::size_t i = 1; i < alive_; ++i)
+    if (bank_[i].log_likelihood > bank_[best_].log_likelihood) best_ = i;
+  const int h = model().description().roles.heading;
+  for (std::size_t i = 0; i < alive_; ++i) {
+    const bool agrees = std::abs(angle_difference(bank_[i].filter.mean[h], bank_[best_].filter.mean[h])) < 0.2;
+    if (!agrees && bank_[i].log_likelihood > bank_[best_].log_likelihood - decisive) return;
+  }
+  std::swap(bank_[0], bank_[best_]);
+  best_ = 0;
+  alive_ = 1;
+}
+
+void FilterEstimation::start(const double* outputs) noexcept {
+  reset();
+  take(outputs);
+}
+
+void FilterEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+  if (!(duration > 0.0) || !std::isfinite(duration)) {
+    take(outputs);
+    return;
+  }
+  for (std::size_t i = 0; i < alive_; ++i) {
+    bank_[i].filter.predict(inputs, no_input_.data(), duration);
+    for (std::size_t j = 0; j < setup_.walk.size(); ++j)
+      bank_[i].filter.add_parameter_variance(static_cast<int>(j), setup_.walk[j] * setup_.walk[j]);
+  }
+  take(outputs);
+}
+
+bool FilterEstimation::amend(int back, const double* outputs) noexcept {
+  if (back != 0) return false;  // a filter has no memory of older nodes
+  take(outputs);
+  return true;
+}
+
+void FilterEstimation::estimate(Estimate& result, Clock::time_point) noexcept {
+  const KalmanFilter& filter = bank_[best_].filter;
+  const int nx = filter.model().state_count();
+  result.state = filter.mean.head(nx);
+  result.parameters = filter.mean.tail(filter.mean.size() - nx);
+  result.covariance = filter.covariance;
+  result.report = {};
+  result.report.status = Status::solved;
+  result.fallback = !filter.mean.allFinite();
+  result.predicted = false;
+}
+
+}  // namespace rhec

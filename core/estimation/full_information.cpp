@@ -1,0 +1,208 @@
+#include "rhec/core/estimation/full_information.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "block_structure.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/measurement.hpp"
+#include "track_alignment.hpp"
+
+namespace rhec {
+
+void NodeRecorder::append_outputs(const double* outputs) {
+  const int ny = model().output_count();
+  log_->outputs.insert(log_->outputs.end(), outputs, outputs + ny);
+  log_->states.resize(log_->states.size() + static_cast<std::size_t>(model().state_count()), std::nan(""));
+  log_->parameters.resize(log_->parameters.size() + static_cast<std::size_t>(model().parameter_count()), std::nan(""));
+}
+
+void NodeRecorder::start(const double* outputs) noexcept {
+  method_->start(outputs);
+  *log_ = {};
+  append_outputs(outputs);
+  started_ = true;
+}
+
+void NodeRecorder::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+  if (!started_) {
+    start(outputs);
+    return;
+  }
+  method_->add_node(duration, inputs, outputs);
+  if (!(duration > 0.0) || !std::isfinite(duration)) return;
+  log_->durations.push_back(duration);
+  log_->inputs.insert(log_->inputs.end(), inputs, inputs + model().input_count());
+  append_outputs(outputs);
+}
+
+bool NodeRecorder::amend(int back, const double* outputs) noexcept {
+  if (!method_->amend(back, outputs)) return false;
+  const int ny = model().output_count();
+  double* row = log_->outputs.data() + static_cast<std::ptrdiff_t>(log_->intervals() - back) * ny;
+  for (int j = 0; j < ny; ++j)
+    if (!std::isnan(outputs[j])) row[j] = outputs[j];
+  return true;
+}
+
+void NodeRecorder::estimate(Estimate& result, Clock::time_point deadline) noexcept {
+  method_->estimate(result, deadline);
+  const auto node = static_cast<std::ptrdiff_t>(log_->intervals());
+  std::copy_n(result.state.data(), result.state.size(), log_->states.data() + node * result.state.size());
+  std::copy_n(result.parameters.data(), result.parameters.size(),
+              log_->parameters.data() + node * result.parameters.size());
+}
+
+void NodeRecorder::reset() noexcept {
+  method_->reset();
+  *log_ = {};
+  started_ = false;
+}
+
+FullInformationEstimation::FullInformationEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver,
+                                                     Setup setup)
+    : model_(std::move(model)), solver_(std::move(solver)), setup_(std::move(setup)) {
+  const auto np = static_cast<std::size_t>(model_->parameter_count());
+  const auto n = Eigen::Index{model_->state_count()} + model_->parameter_count();
+  if (setup_.blockings.size() != np || setup_.walks.size() != np)
+    throw Error(fmt::format("smoother: {} blockings and {} parameter walks given; expected {} of each, one a parameter",
+                            setup_.blockings.size(), setup_.walks.size(), np));
+  if (setup_.initial_mean.size() != n || setup_.initial_covariance.rows() != n || setup_.initial_covariance.cols() != n)
+    throw Error(fmt::format("smoother: the initial mean and covariance must have the size {} of [x; p]", n));
+}
+
+namespace {
+
+/// Rows that were not estimated take over those before them (at the start: after them).
+void fill_gaps(std::vector<double>& rows, int width) {
+  const std::ptrdiff_t count = width > 0 ? static_cast<std::ptrdiff_t>(rows.size()) / width : 0;
+  const auto is_known = [&](std::ptrdiff_t i) {
+    return std::all_of(rows.begin() + i * width, rows.begin() + (i + 1) * width,
+                       [](double v) { return std::isfinite(v); });
+  };
+  for (std::ptrdiff_t i = 1; i < count; ++i)
+    if (!is_known(i) && is_known(i - 1)) std::copy_n(rows.begin() + (i - 1) * width, width, rows.begin() + i * width);
+  for (std::ptrdiff_t i = count - 2; i >= 0; --i)
+    if (!is_known(i)) std::copy_n(rows.begin() + (i + 1) * width, width, rows.begin() + i * width);
+}
+
+void fill_data(const NodeLog& log, RheProblem& problem) {
+  const int nu = problem.model().input_count(), ny = problem.model().output_count(), N = log.intervals();
+  for (std::ptrdiff_t i = 0; i <= N; ++i) {
+    std::copy_n(log.outputs.data() + i * ny, ny, problem.output(static_cast<int>(i)));
+    if (i == N) break;
+    std::copy_n(log.inputs.data() + i * nu, nu, problem.measured_input(static_cast<int>(i)));
+    problem.set_duration(static_cast<int>(i), log.durations[i]);
+  }
+}
+
+/// The log's own estimates as a point; the value of a block is that of its last interval, which had seen most of it.
+Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
+  const int nx = problem.model().state_count(), np = problem.model().parameter_count(), N = log.intervals();
+  Iterate guess(problem.capacity());
+  std::vector<double> states = log.states, at_nodes = log.parameters, inputs = log.inputs;
+  fill_gaps(states, nx);
+  fill_gaps(at_nodes, np);
+  for (double& value : states) value = std::isfinite(value) ? value : 0.0;
+  for (double& value : inputs) value = std::isnan(value) ? 0.0 : value;
+  std::vector<double> parameters(static_cast<std::size_t>(N) * np);
+  for (int j = 0; j < np; ++j) {
+    const double lower = problem.setup().parameter_lower[j], upper = problem.setup().parameter_upper[j];
+    double value = 0.0;
+    for (int i = N - 1; i >= 0; --i) {
+      const bool ends = i == N - 1 || problem.structure().starts_block(i + 1, j);
+      if (ends) value = at_nodes[static_cast<std::ptrdiff_t>(i + 1) * np + j];
+      if (!std::isfinite(value)) value = problem.arrival_mean[nx + j];
+      parameters[static_cast<std::ptrdiff_t>(i) * np + j] = std::clamp(value, lower, upper);
+    }
+  }
+  align_track(problem, states, inputs, parameters);
+  problem.structure().set_decisions(guess, inputs.data(), parameters.data());
+  for (std::ptrdiff_t i = 0; i <= N; ++i) std::copy_n(states.data() + i * nx, nx, guess.state(static_cast<int>(i)));
+  return guess;
+}
+
+}  // namespace
+
+SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point deadline) const {
+  for (auto* rows : {&log.outputs, &log.inputs}) std::ranges::transform(*rows, rows->begin(), cleaned);
+  const int N = log.intervals(), nx = model_->state_count(), nu = model_->input_count(), np = model_->parameter_count();
+  if (N < 1) throw Error("smoother: the log has fewer than two nodes; there is nothing between them to estimate");
+  RheProblem::Setup problem_setup = setup_.problem;
+  problem_setup.max_intervals = N;
+  problem_setup.one_block = one_block_parameters(setup_.blockings);
+  for (int j = 0; j < np; ++j)
+    if (const std::string reason = setup_.blockings[j]->why_not(N); !reason.empty())
+      throw Error(fmt::format("blocking of '{}': {}", model_->description().parameters[j].name, reason));
+  RheProblem problem(model_, problem_setup);
+  std::vector<std::int64_t> first_starts(np, 0);
+  std::vector<std::uint8_t> begins(N, 0);
+  set_block_structure({0, N}, setup_.blockings, setup_.walks, first_starts, begins, problem);
+  fill_data(log, problem);
+  ArrivalCost prior(ArrivalKind::constant, problem, setup_.walks);
+  prior.reset(setup_.initial_mean, setup_.initial_covariance);
+  prior.write(problem);
+  if (const std::string reason = solver_->why_not(problem); !reason.empty())
+    throw Error("smoother: the solver cannot take this problem: " + reason);
+  solver_->setup(problem);
+
+  Iterate point = guess_from(log, problem);
+  SmoothedRun run;
+  const auto start = Clock::now();
+  run.report = solver_->solve(point, deadline);
+  run.solve_seconds = 1e-6 * microseconds_since(start);
+  run.times.assign(1, 0.0);
+  run.inputs.resize(static_cast<std::size_t>(N) * nu);
+  run.parameters.resize(static_cast<std::size_t>(N) * np);
+  for (std::ptrdiff_t i = 0; i <= N; ++i) {
+    const int node = static_cast<int>(i);
+    run.states.insert(run.states.end(), point.state(node), point.state(node) + nx);
+    if (i == N) break;
+    run.times.push_back(run.times.back() + log.durations[i]);
+    problem.structure().inputs_on(point, node, run.inputs.data() + i * nu);
+    problem.structure().parameters_on(point, node, run.parameters.data() + i * np);
+    for (int j = 0; j < np; ++j) {
+      const bool ramp = setup_.blockings[j]->transition() == Transition::ramp;
+      run.start_parameters.push_back(ramp ? point.state(node)[nx + j] : run.parameters[i * np + j]);
+    }
+  }
+  const std::size_t n = static_cast<std::size_t>(nx) + static_cast<std::size_t>(np);
+  run.covariances.resize((static_cast<std::size_t>(N) + 1) * n * n);
+  if (!solver_->covariances(point, all_stages(problem), run.covariances)) run.covariances.clear();
+  return run;
+}
+
+void state_at(const SmoothedRun& run, const Model& model, int substeps, double time, double* state) {
+  const int nx = model.state_count();
+  const auto after = std::upper_bound(run.times.begin(), run.times.end(), time);
+  const std::ptrdiff_t node = std::max<std::ptrdiff_t>(0, after - run.times.begin() - 1);
+  const double* from = run.states.data() + node * nx;
+  const double duration = time - run.times[node];
+  if (node == run.intervals() || !(duration > 0.0)) {
+    std::copy_n(from, nx, state);
+    return;
+  }
+  Model::Intervals request;
+  request.count = 1;
+  request.states = from;
+  request.inputs = run.inputs.data() + node * model.input_count();
+  // Of a ramp, the part that the time is into the interval.
+  const int np = model.parameter_count();
+  const double share = duration / (run.times[node + 1] - run.times[node]);
+  std::vector<double> ends(np);
+  for (int j = 0; j < np; ++j) {
+    const double start = run.start_parameters[node * np + j];
+    ends[j] = start + share * (run.parameters[node * np + j] - start);
+  }
+  request.parameters = run.start_parameters.data() + node * np;
+  request.parameters_end = ends.data();
+  request.durations = &duration;
+  request.substeps = substeps;
+  request.next_states = state;
+  model.integrate(request);
+}
+
+}  // namespace rhec

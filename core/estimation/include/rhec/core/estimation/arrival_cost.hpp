@@ -1,0 +1,74 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "rhec/core/estimation/kalman_filter.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+
+namespace rhec {
+
+/// How what has left the window is remembered (METHOD, arrival cost). The prior of the window's first node is the
+/// predicted one, before that node's measurement, so that no measurement counts twice.
+enum class ArrivalKind {
+  ekf,  ///< filtering update: an extended Kalman filter runs along at the window's edge, linearised at its own mean
+  smoothing,  ///< one QR factorisation of what leaves, linearised at the window's solution (Kuehl et al. 2011)
+  constant,   ///< the window's own estimate of its next node, with the initial covariance for ever
+  off         ///< no memory
+};
+
+/// How a parameter may change outside what the window sees.
+struct ParameterWalk {
+  double forgetting = 0.03;    ///< standard deviation per square root of a step, added at each slide
+  double restart_sigma = 1.0;  ///< standard deviation with which an unlinked block starts
+  /// Standard deviation of an unlinked block inside the window about the block before it; infinite: none.
+  double block_sigma = 0.25;
+};
+
+/// The prior [xbar; pbar], Pi of the window's first node, as the window slides. Allocates in its constructor only.
+class RHEC_EXPORT ArrivalCost {
+ public:
+  ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<ParameterWalk> walks);
+
+  ArrivalKind kind() const noexcept { return kind_; }
+  void reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
+  const Eigen::VectorXd& mean() const noexcept { return filter_.mean; }
+  const Eigen::MatrixXd& covariance() const noexcept { return filter_.covariance; }
+
+  /// What happens to one parameter when the window's first node reaches a new interval.
+  struct Border {
+    bool reached = false;                                  ///< that interval starts a block
+    double steps = 0.0;                                    ///< s_b - s_a: since the start of the block before
+    std::optional<double> neighbour_sigma = std::nullopt;  ///< the link between the blocks, if any
+    bool leaves_as_ramp = false;  ///< the interval that leaves was a ramp into its block, of this variance
+    double ramp_variance = 0.0;
+  };
+  /// Moves the prior over the first interval of a problem, whose newest solution is given. `borders` has n_p entries.
+  /// `mean_is_lost`: the filter's own mean is too far off to linearise at; smoothing takes its place for this slide.
+  void slide(const RheProblem& problem, const Iterate& solution, const std::vector<Border>& borders,
+             bool mean_is_lost = false) noexcept;
+
+  /// Puts mean and information into a problem.
+  void write(RheProblem& problem) noexcept;
+
+ private:
+  void filter_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
+  void smooth_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
+  void factor_covariance() noexcept;
+  void invert_factor() noexcept;
+
+  ArrivalKind kind_;
+  std::vector<ParameterWalk> walks_;
+  KalmanFilter filter_;  ///< owns mean and covariance for every kind
+  Eigen::MatrixXd initial_covariance_;
+  std::vector<double> robust_, inputs_, ends_, scratch_, ramp_variances_, next_, jacobian_, predicted_,
+      output_jacobian_;
+  /// Pi = D L L' D with D diagonal, so that the units of one variable do not decide about the precision of another.
+  Eigen::VectorXd scale_;
+  Eigen::MatrixXd factor_;
+  Eigen::MatrixXd rows_, map_, spread_, inverse_;
+  Eigen::VectorXd shift_, next_mean_;
+};
+
+}  // namespace rhec

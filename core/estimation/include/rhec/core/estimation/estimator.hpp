@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "rhec/core/estimation/estimation_method.hpp"
+
+namespace rhec {
+
+/// The estimator of a robot: push stamped measurements and inputs as they come, ask for the estimate at a time.
+///
+/// Nodes lie where measurements do, and at most `longest_interval` apart. An input holds from its stamp until the next;
+/// what an interval uses is the mean over it of all rows. A measurement may lack any of its outputs (NaN). One that
+/// comes late is merged into the node at its time, if that is still in the window; otherwise it is dropped and counted.
+/// An input that comes late counts from the newest node on; intervals that are made already keep their means. Works
+/// with any EstimationMethod: RecedingHorizonEstimation or FilterEstimation. Throws nothing after its construction.
+class RHEC_EXPORT Estimator {
+ public:
+  struct Timeline {
+    double longest_interval = 0.2;  ///< [s]; a gap so long that it needs more than 1000 nodes is divided into 1000
+    double tolerance = 1e-6;        ///< two stamps closer than this are one node [s]
+    std::size_t capacity = 4096;    ///< rows of inputs, and of measurements, that can wait to be used
+  };
+  explicit Estimator(std::unique_ptr<EstimationMethod> method) : Estimator(std::move(method), Timeline{}) {}
+  /// Throws Error where a number of the timeline makes no sense.
+  Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline);
+
+  /// y (n_y, NaN where missing) at a time [s].
+  void push_measurement(double time, const double* outputs) noexcept;
+  /// u (n_u, NaN where missing), holding from a time [s] on.
+  void push_input(double time, const double* inputs) noexcept;
+
+  /// The estimate at a time, from all that was pushed with stamps up to it. Beyond the newest node it is integrated
+  /// with the newest inputs; a time before the newest node, or none, gives the newest node's. Before the first
+  /// measurement it is empty (`has_started` says so).
+  const Estimate& estimate(double time, Clock::time_point deadline = Clock::time_point::max()) noexcept;
+  bool has_started() const noexcept { return started_; }
+
+  /// Work for the next sample that can be done now; calling it is never needed, and always saves time later.
+  void prepare() noexcept { method_->prepare(); }
+  void reset() noexcept;
+
+  struct Counts {
+    std::int64_t nodes = 0;      ///< with those that fill gaps
+    std::int64_t estimates = 0;  ///< solves
+    std::int64_t fallbacks = 0;  ///< of those, failed
+    std::int64_t late = 0;       ///< measurements merged into an older node
+    std::int64_t dropped = 0;    ///< measurements too late, too many, or with a stamp that is not finite
+    std::int64_t missing = 0;    ///< single outputs that were NaN or otherwise no measurement
+  };
+  const Counts& counts() const noexcept { return counts_; }
+  const EstimationMethod& method() const noexcept { return *method_; }
+  const Model& model() const noexcept { return method_->model(); }
+
+ private:
+  /// Stamped rows in the order of their stamps; the oldest give way when it is full.
+  class Rows {
+   public:
+    Rows(std::size_t capacity, int width);
+    bool insert(double time, const double* values) noexcept;
+    std::size_t size() const noexcept { return count_; }
+    double time(std::size_t i) const noexcept { return times_[first_ + i]; }
+    const double* values(std::size_t i) const noexcept { return values_.data() + (first_ + i) * width_; }
+    double* values(std::size_t i) noexcept { return values_.data() + (first_ + i) * width_; }
+    void drop_front(std::size_t rows) noexcept;
+    void clear() noexcept { first_ = count_ = 0; }
+
+   private:
+    std::size_t capacity_, width_, first_ = 0, count_ = 0;
+    std::vector<double> times_, values_;
+  };
+  void add_nodes_until(double time, const double* outputs) noexcept;
+  void add_node(double time, const double* outputs) noexcept;
+  void mean_input(double from, double to) noexcept;
+  void predict_to(double time) noexcept;
+  void clear_estimates() noexcept;
+
+  std::unique_ptr<EstimationMethod> method_;
+  Timeline timeline_;
+  Rows measurements_, inputs_;
+  std::vector<double> node_times_;  ///< of the newest nodes, in a ring
+  std::size_t newest_ = 0;
+  bool started_ = false, stale_ = false;
+  Estimate estimate_, predicted_;
+  Counts counts_;
+  std::vector<double> mean_, weight_, nothing_, next_, values_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "rhec/core/estimation/estimation_method.hpp"
+#include "rhec/core/estimation/kalman_filter.hpp"
+
+namespace rhec {
+
+/// Extended Kalman filter with random-walk parameters behind the Estimator: the baseline. Where the heading at the
+/// start is unknown, a bank of filters with starts around the circle runs until one explains the measurements best.
+class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
+ public:
+  struct Setup {
+    KalmanFilter::Noise noise;
+    std::vector<double> walk;  ///< n_p, standard deviation of a parameter per square root of a step
+    Eigen::VectorXd initial_mean;
+    Eigen::MatrixXd initial_covariance;
+    int substeps = 1;
+    int heading_starts = 1;
+  };
+  FilterEstimation(const std::shared_ptr<const Model>& model, Setup setup);
+
+  const Model& model() const noexcept override { return bank_.front().filter.model(); }
+  int substeps() const noexcept override { return setup_.substeps; }
+  void start(const double* outputs) noexcept override;
+  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
+  bool amend(int back, const double* outputs) noexcept override;
+  void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
+  void reset() noexcept override;
+
+ private:
+  struct Hypothesis {
+    KalmanFilter filter;
+    double log_likelihood = 0.0;
+  };
+  void take(const double* outputs) noexcept;
+  double log_likelihood(const KalmanFilter& filter, const double* outputs) noexcept;
+
+  Setup setup_;
+  std::vector<Hypothesis> bank_;
+  std::size_t alive_ = 1, best_ = 0;
+  std::vector<double> no_input_, predicted_, jacobian_;
+};
+
+}  // namespace rhec

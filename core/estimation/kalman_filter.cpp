@@ -1,0 +1,222 @@
+#include "rhec/core/estimation/kalman_filter.hpp"
+#include "rhec/core/base/angle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rhec/core/base/padded.hpp"
+#include "rhec/core/base/with_size.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+
+namespace rhec {
+
+KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps)
+    : model_(std::move(model)),
+      noise_(std::move(noise)),
+      substeps_(substeps),
+      nx_(model_->state_count()),
+      nu_(model_->input_count()),
+      np_(model_->parameter_count()),
+      ny_(model_->output_count()) {
+  const int n = nx_ + np_;
+  mean = Eigen::VectorXd::Zero(n);
+  covariance = Eigen::MatrixXd::Identity(n, n);
+  predicted_.assign(ny_, 0.0);
+  output_jacobian_.assign(static_cast<std::size_t>(ny_) * nx_, 0.0);
+  next_.assign(nx_, 0.0);
+  jacobian_.assign(static_cast<std::size_t>(nx_) * (nx_ + nu_ + 2 * np_), 0.0);
+  input_.assign(nu_, 0.0);
+  const std::size_t width = padded(nx_ + np_ + nu_);
+  for (auto* v : {&row_, &next_row_}) v->assign(width, 0.0);
+  jacobian_rows_.assign(nx_ * width, 0.0);
+  scratch_.assign(model_->rows_scratch(1), 0.0);
+  work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
+  gain_ = image_ = zeros_ = correction_ = Eigen::VectorXd::Zero(n);
+}
+
+void KalmanFilter::clip() noexcept {
+  for (int j = 0; j < np_; ++j)
+    mean[nx_ + j] = std::min(std::max(mean[nx_ + j], noise_.parameter_lower[j]), noise_.parameter_upper[j]);
+}
+
+void KalmanFilter::update(const double* y, const double* robust_weights) noexcept {
+  Model::Nodes request;
+  request.count = 1;
+  request.states = mean.data();
+  request.outputs = predicted_.data();
+  request.jacobians = output_jacobian_.data();
+  model_->observe(request);
+  // One output after the other, all linearised at the same point; noises are independent.
+  correction_.setZero();
+  for (int j = 0; j < ny_; ++j)
+    if (!std::isnan(y[j]))
+      take_output(j, y[j], noise_.output_variances[j] / (robust_weights ? robust_weights[j] : 1.0));
+  mean += correction_;
+  clip();
+}
+
+void KalmanFilter::take_output(int output, double measured, double variance) noexcept {
+  double innovation = model_->description().outputs[output].is_angle ? angle_difference(measured, predicted_[output])
+                                                                     : measured - predicted_[output];
+  const double* of_output = output_jacobian_.data() + output;
+  for (int c = 0; c < nx_; ++c) innovation -= of_output[c * ny_] * correction_[c];
+  const bool taken = with_size(nx_ + np_, [&](auto n) {
+    const double* P = covariance.data();
+    double* __restrict image = image_.data();
+    double* __restrict gain = gain_.data();
+    double* __restrict work = work_.data();
+    double* __restrict next = next_covariance_.data();
+    const auto multiply_row = [&](const double* by) {
+      std::fill_n(image, n, 0.0);
+      for (int c = 0; c < nx_; ++c)
+        for (int r = 0; r < n; ++r) image[r] += by[c * n + r] * of_output[c * ny_];
+    };
+    multiply_row(P);
+    double total = variance;
+    for (int c = 0; c < nx_; ++c) total += of_output[c * ny_] * image[c];
+    if (!(total > 0.0)) return false;
+    for (int r = 0; r < n; ++r) gain[r] = image[r] / total;
+    // Joseph's form, (I - k h') Pi (I - k h')' + k r k': it stays positive semidefinite, and exact where a vague prior
+    // meets a good measurement. One factor after the other, it takes no product of matrices (Bierman 1977).
+    for (int c = 0; c < n; ++c)
+      for (int r = 0; r < n; ++r) work[c * n + r] = P[c * n + r] - gain[r] * image[c];
+    multiply_row(work);
+    for (int r = 0; r < n; ++r) image[r] = variance * gain[r] - image[r];
+    double* __restrict zeros = zeros_.data();  // as long as every number is finite, else NaN
+    std::fill_n(zeros, n, 0.0 * innovation);
+    for (int c = 0; c < n; ++c) {
+      for (int r = 0; r < n; ++r) {
+        next[c * n + r] = work[c * n + r] + image[r] * gain[c];
+        zeros[r] += 0.0 * next[c * n + r];
+      }
+    }
+    for (int r = 0; r < n; ++r)
+      if (zeros[r] != 0.0) return false;
+    for (int r = 0; r < n; ++r) correction_[r] += gain[r] * innovation;
+    return true;
+  });
+  if (taken) make_symmetric();
+}
+
+/// covariance = the symmetric part of the next one.
+void KalmanFilter::make_symmetric() noexcept {
+  with_size(nx_ + np_, [&](auto n) {
+    double* __restrict P = covariance.data();
+    const double* next = next_covariance_.data();
+    for (int c = 0; c < n; ++c)
+      for (int r = 0; r < n; ++r) P[c * n + r] = 0.5 * (next[c * n + r] + next[r * n + c]);
+  });
+}
+
+void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration) noexcept {
+  predict(measured_input, input_guess, duration, nullptr);
+}
+
+void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration,
+                           const double* ramp_variances) noexcept {
+  const int n = nx_ + np_;
+  for (int j = 0; j < nu_; ++j) input_[j] = std::isnan(measured_input[j]) ? input_guess[j] : measured_input[j];
+  if (ramp_variances) {
+    Model::Intervals request;
+    request.count = 1;
+    request.states = mean.data();
+    request.inputs = input_.data();
+    request.parameters = request.parameters_end = mean.data() + nx_;
+    request.durations = &duration;
+    request.substeps = substeps_;
+    request.next_states = next_.data();
+    request.jacobians = jacobian_.data();
+    model_->integrate(request);
+  } else {
+    differentiate(duration);
+  }
+  // Of the transition [F_x F_p; 0 I] only the vehicle's rows are worth a product.
+  if (ramp_variances)
+    for (int c = 0; c < np_; ++c)
+      for (int r = 0; r < nx_; ++r) jacobian_[(nx_ + nu_ + c) * nx_ + r] += jacobian_[(nx_ + nu_ + np_ + c) * nx_ + r];
+  with_size(nx_, [&](auto nx) {
+    const auto transition = [&](int column) { return jacobian_.data() + (column < nx ? column : nu_ + column) * nx; };
+    const double* P = covariance.data();
+    double* __restrict work = work_.data();
+    double* __restrict next = next_covariance_.data();
+    for (int c = 0; c < n; ++c) {
+      double* moved = work + c * n;
+      std::fill_n(moved, nx, 0.0);
+      for (int k = 0; k < n; ++k)
+        for (int r = 0; r < nx; ++r) moved[r] += transition(k)[r] * P[c * n + k];
+    }
+    std::copy_n(P, n * n, next);
+    for (int c = 0; c < nx; ++c) {
+      double* column = next + c * n;
+      std::fill_n(column, nx, 0.0);
+      for (int k = 0; k < n; ++k)
+        for (int r = 0; r < nx; ++r) column[r] += work[k * n + r] * transition(k)[c];
+    }
+    for (int c = nx; c < n; ++c)
+      for (int r = 0; r < nx; ++r) next[c * n + r] = next[r * n + c] = work[c * n + r];
+  });
+  // Noise enters through the inputs and, on a ramp, through the change of the parameter over the interval.
+  for (int j = 0; j < nu_; ++j) {
+    const double wide = 100.0 * model_->description().inputs[j].scale;
+    const double variance = std::isnan(measured_input[j]) ? wide * wide : noise_.input_variances[j];
+    const double* by_input = jacobian_.data() + (nx_ + j) * nx_;
+    for (int c = 0; c < nx_; ++c)
+      for (int r = 0; r < nx_; ++r) next_covariance_(r, c) += by_input[r] * (variance * by_input[c]);
+  }
+  for (int j = 0; ramp_variances && j < np_; ++j) {
+    const double variance = ramp_variances[j];
+    const double* by_end = jacobian_.data() + (nx_ + nu_ + np_ + j) * nx_;
+    for (int c = 0; c < nx_; ++c) {
+      for (int r = 0; r < nx_; ++r) next_covariance_(r, c) += by_end[r] * (variance * by_end[c]);
+      next_covariance_(c, nx_ + j) += variance * by_end[c];
+      next_covariance_(nx_ + j, c) += variance * by_end[c];
+    }
+    next_covariance_(nx_ + j, nx_ + j) += variance;
+  }
+  const bool finite = std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); });
+  if (!finite || !next_covariance_.allFinite()) return;
+  make_symmetric();
+  std::copy(next_.begin(), next_.end(), mean.data());
+}
+
+/// Next state and its Jacobian where parameters stay what they are, by the faster of the model's functions.
+void KalmanFilter::differentiate(double duration) noexcept {
+  std::copy_n(mean.data(), nx_ + np_, row_.data());
+  std::copy_n(input_.data(), nu_, row_.data() + nx_ + np_);
+  const std::ptrdiff_t width = padded(nx_ + np_ + nu_);
+  IntervalRows request;
+  request.count = 1;
+  request.z = row_.data();
+  request.z_step = width;
+  request.durations = &duration;
+  request.substeps = substeps_;
+  request.next_states = next_row_.data();
+  request.next_step = width;
+  request.jacobians = jacobian_rows_.data();
+  request.jacobian_row = width;
+  request.jacobian_step = nx_ * width;
+  request.scratch = scratch_.data();
+  model_->integrate_rows(request);
+  std::copy_n(next_row_.data(), nx_, next_.data());
+  // From rows by [x; p; u] to columns by [x; u; p].
+  for (int r = 0; r < nx_; ++r) {
+    const double* row = jacobian_rows_.data() + r * width;
+    for (int c = 0; c < nx_; ++c) jacobian_[c * nx_ + r] = row[c];
+    for (int c = 0; c < nu_; ++c) jacobian_[(nx_ + c) * nx_ + r] = row[nx_ + np_ + c];
+    for (int c = 0; c < np_; ++c) jacobian_[(nx_ + nu_ + c) * nx_ + r] = row[nx_ + c];
+  }
+}
+
+void KalmanFilter::add_parameter_variance(int parameter, double variance) noexcept {
+  covariance(nx_ + parameter, nx_ + parameter) += variance;
+}
+
+void KalmanFilter::restart_parameter(int parameter, double variance) noexcept {
+  const int i = nx_ + parameter;
+  covariance.row(i).setZero();
+  covariance.col(i).setZero();
+  covariance(i, i) = variance;
+}
+
+}  // namespace rhec

@@ -1,0 +1,372 @@
+#include "rhec/core/estimation/receding_horizon_estimation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "block_structure.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/measurement.hpp"
+#include "rhec/core/qp/kkt.hpp"
+
+namespace rhec {
+namespace {
+
+// Above this standard deviation an angle is searched for around the circle rather than refined [rad].
+constexpr double uncertain_angle = 0.35;
+// Iterations that a start of that search is given.
+constexpr int search_iterations = 12;
+// Durations that differ by less than this part of themselves are the same.
+constexpr double same_time = 1e-9;
+
+RheProblem make_problem(std::shared_ptr<const Model> model, const RecedingHorizonEstimation::Setup& setup) {
+  const auto np = static_cast<std::size_t>(model->parameter_count());
+  if (setup.blockings.size() != np || setup.walks.size() != np)
+    throw Error(
+        fmt::format("estimator: {} blockings and {} parameter walks given; expected {} of each, one a parameter",
+                    setup.blockings.size(), setup.walks.size(), np));
+  const auto n = static_cast<Eigen::Index>(model->state_count() + np);
+  if (setup.initial_mean.size() != n || setup.initial_covariance.rows() != n || setup.initial_covariance.cols() != n)
+    throw Error(fmt::format("estimator: the initial mean and covariance must have the size {} of [x; p]", n));
+  for (std::size_t j = 0; j < np; ++j)
+    if (const std::string reason = setup.blockings[j]->why_not(setup.problem.max_intervals); !reason.empty())
+      throw Error(fmt::format("blocking of '{}': {}", model->description().parameters[j].name, reason));
+  RheProblem::Setup problem = setup.problem;
+  problem.one_block = one_block_parameters(setup.blockings);
+  return {std::move(model), std::move(problem)};
+}
+
+}  // namespace
+
+RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver,
+                                                     Setup setup)
+    : setup_(std::move(setup)),
+      problem_(make_problem(std::move(model), setup_)),
+      arrival_(setup_.arrival, problem_, setup_.walks),
+      solver_(std::move(solver)),
+      shifter_(problem_),
+      point_(problem_.capacity()),
+      trial_(problem_.capacity()),
+      best_(problem_.capacity()),
+      covariance_qp_(problem_.capacity()),
+      covariance_riccati_(problem_.capacity()),
+      no_active_bounds_(problem_.capacity()) {
+  if (const std::string reason = solver_->why_not(problem_); !reason.empty())
+    throw Error("estimator: the solver cannot take this problem: " + reason);
+  solver_->setup(problem_);
+  const int np = problem_.model().parameter_count();
+  const auto intervals = static_cast<std::size_t>(setup_.problem.max_intervals);
+  begins_.assign(intervals, 0);
+  next_begins_.assign(intervals, 0);
+  first_starts_.assign(np, 0);
+  borders_.resize(np);
+  scratch_.assign(problem_.scratch_size(), 0.0);
+  inputs_.assign(problem_.model().input_count(), 0.0);
+  outputs_.assign(problem_.model().output_count(), 0.0);
+  const auto states = static_cast<std::size_t>(problem_.capacity().states);
+  covariances_.assign((intervals + 1) * states * states, 0.0);
+  last_state_ = setup_.initial_mean;
+  reset();
+}
+
+void RecedingHorizonEstimation::reset() noexcept {
+  arrival_.reset(setup_.initial_mean, setup_.initial_covariance);
+  solver_->reset();
+  shifter_.forget();
+  window_ = {};
+  std::fill(first_starts_.begin(), first_starts_.end(), 0);
+  last_state_ = setup_.initial_mean;
+  started_ = solved_ = prepared_ = false;
+  searching_ = roles().heading >= 0 && setup_.heading_starts > 1;
+}
+
+void RecedingHorizonEstimation::start(const double* outputs) noexcept {
+  reset();
+  started_ = true;
+  problem_.set_intervals(0);
+  take_outputs(0, outputs);
+  arrival_.write(problem_);
+  problem_.finish();
+  start_cold();
+}
+
+void RecedingHorizonEstimation::take_outputs(int node, const double* outputs) noexcept {
+  std::copy_n(outputs, outputs_.size(), problem_.output(node));
+}
+
+void RecedingHorizonEstimation::take_inputs(int interval, const double* inputs) noexcept {
+  std::copy_n(inputs, inputs_.size(), problem_.measured_input(interval));
+}
+
+/// A guess out of nothing: the prior, rolled out with the inputs as measured.
+void RecedingHorizonEstimation::start_cold() noexcept {
+  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
+  const auto& lower = problem_.setup().parameter_lower;
+  const auto& upper = problem_.setup().parameter_upper;
+  for (int j = 0; j < nx; ++j) point_.state(0)[j] = problem_.arrival_mean[j];
+  for (int j = 0; j < np; ++j)
+    point_.state(0)[nx + j] = std::min(std::max(problem_.arrival_mean[nx + j], lower[j]), upper[j]);
+  for (int i = 0; i < window_.intervals; ++i) {
+    double* w = point_.control(i);
+    for (std::size_t j = 0; j < inputs_.size(); ++j) {
+      const double measured = problem_.measured_input(i)[j];
+      w[j] = std::isnan(measured) ? 0.0 : measured;
+    }
+    for (int j = static_cast<int>(inputs_.size()), c = 0; c < np; ++c)
+      if (problem_.structure().starts_block(i, c)) w[j++] = point_.state(0)[nx + c];
+  }
+  point_.clear_multipliers();
+  problem_.simulate(point_, scratch_);
+}
+
+/// After a solve that came to nothing: leaves a guess that is finite, and from which the next solve starts anew.
+void RecedingHorizonEstimation::recover() noexcept {
+  const int N = window_.intervals;
+  const auto is_finite = [&] {
+    bool finite = true;
+    for (int i = 0; i <= N; ++i) {
+      for (int j = 0; j < problem_.capacity().states; ++j) finite = finite && std::isfinite(point_.state(i)[j]);
+      for (int j = 0; i < N && j < problem_.control_count(i); ++j)
+        finite = finite && std::isfinite(point_.control(i)[j]);
+    }
+    return finite;
+  };
+  if (!is_finite()) start_cold();
+  if (!is_finite()) {
+    // Not even the prior leads anywhere: the vehicle is where it was last.
+    for (int i = 0; i <= N; ++i) std::copy_n(last_state_.data(), last_state_.size(), point_.state(i));
+    for (int i = 0; i < N; ++i) std::fill_n(point_.control(i), problem_.control_count(i), 0.0);
+  }
+  point_.clear_multipliers();
+  solver_->reset();
+}
+
+void RecedingHorizonEstimation::slide_arrival() noexcept {
+  const Window next{window_.first + 1, window_.intervals};
+  for (std::size_t j = 0; j < borders_.size(); ++j) {
+    const Blocking& blocking = *setup_.blockings[j];
+    const bool ramp = blocking.transition() == Transition::ramp;
+    const std::int64_t start = blocking.starts(next, next_begins_.data());
+    ArrivalCost::Border& border = borders_[j];
+    border.reached = !ramp && start == next.first;
+    border.steps = static_cast<double>(next.first - first_starts_[j]);
+    border.neighbour_sigma = blocking.neighbour_sigma();
+    border.leaves_as_ramp = ramp && problem_.structure().starts_block(0, static_cast<int>(j));
+    border.ramp_variance = border.leaves_as_ramp ? problem_.link_variance(0, static_cast<int>(j)) : 0.0;
+    // What leaves has to have a covariance, so here a block that nothing links is only as free as one that restarts.
+    if (!std::isfinite(border.ramp_variance))
+      border.ramp_variance = setup_.walks[j].restart_sigma * setup_.walks[j].restart_sigma;
+  }
+  const int heading = roles().heading;
+  const bool lost = heading >= 0 && arrival_.covariance()(heading, heading) > uncertain_angle * uncertain_angle;
+  arrival_.slide(problem_, point_, borders_, lost);
+}
+
+void RecedingHorizonEstimation::advance_window(double duration, const double* inputs, const double* outputs) noexcept {
+  const bool full = window_.intervals == setup_.problem.max_intervals;
+  const bool was_empty = window_.intervals == 0;
+  if (full) slide_arrival();
+  if (!was_empty) shifter_.take(problem_, std::move(point_));
+  if (full) {
+    problem_.drop_first_interval();
+    ++window_.first;
+  } else {
+    ++window_.intervals;
+  }
+  const int last = window_.intervals;
+  problem_.set_intervals(last);
+  problem_.set_duration(last - 1, duration);
+  take_inputs(last - 1, inputs);
+  take_outputs(last, outputs);
+  set_block_structure(window_, setup_.blockings, setup_.walks, first_starts_, begins_, problem_);
+  arrival_.write(problem_);
+  if (was_empty) {
+    for (std::size_t j = 0; j < inputs_.size(); ++j) {
+      const double measured = problem_.measured_input(0)[j];
+      point_.control(0)[j] = std::isnan(measured) ? 0.0 : measured;
+    }
+    point_.clear_multipliers();
+    problem_.simulate(point_, scratch_);
+  } else if (!shifter_.apply(full ? 1 : 0, problem_, point_)) {
+    start_cold();
+  }
+}
+
+void RecedingHorizonEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+  if (!started_) {
+    start(outputs);
+    return;
+  }
+  if (!(duration > 0.0) || !std::isfinite(duration)) {
+    amend(0, outputs);
+    return;
+  }
+  solved_ = false;
+  if (!prepared_) {
+    advance_window(duration, inputs, outputs);
+    return;
+  }
+  // The window has moved already, with placeholders for what is now known. Where it fits, the linearisation stays good.
+  prepared_ = false;
+  const int last = window_.intervals;
+  // Stamps that are sums or multiples of one step differ in their last digits, and no vehicle moves in those.
+  const bool same_duration = std::abs(problem_.duration(last - 1) - duration) <= same_time * duration;
+  // The weights of robust losses were those of the predicted outputs, so with them the matrices change too.
+  bool fits = same_duration && setup_.problem.robust.empty();
+  for (std::size_t j = 0; j < outputs_.size(); ++j)
+    fits = fits && std::isnan(problem_.output(last)[j]) == std::isnan(outputs[j]);
+  for (std::size_t j = 0; j < inputs_.size(); ++j)
+    fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) == std::isnan(inputs[j]);
+  take_inputs(last - 1, inputs);
+  take_outputs(last, outputs);
+  if (fits) return;
+  problem_.set_duration(last - 1, duration);
+  if (!same_duration) problem_.simulate_interval(last - 1, point_, scratch_);
+  solver_->prepare(point_);
+}
+
+bool RecedingHorizonEstimation::amend(int back, const double* outputs) noexcept {
+  const int node = window_.intervals - (prepared_ ? 1 : 0) - back;
+  if (!started_ || back < 0 || node < 0) return false;
+  bool masks_change = false;
+  for (std::size_t j = 0; j < outputs_.size(); ++j) {
+    if (std::isnan(outputs[j])) continue;
+    masks_change = masks_change || std::isnan(problem_.output(node)[j]);
+    problem_.output(node)[j] = outputs[j];
+  }
+  solved_ = solved_ && prepared_;
+  if (masks_change && prepared_) solver_->prepare(point_);
+  return true;
+}
+
+void RecedingHorizonEstimation::prepare() noexcept {
+  if (!started_ || prepared_ || window_.intervals == 0 || !solved_) return;
+  const int last = window_.intervals;
+  std::copy_n(problem_.measured_input(last - 1), inputs_.size(), inputs_.data());
+  // Placeholders that leave no residual, and the same mask as before.
+  Model::Nodes request;
+  request.count = 1;
+  request.states = point_.state(last);
+  request.outputs = outputs_.data();
+  problem_.model().observe(request);
+  for (std::size_t j = 0; j < outputs_.size(); ++j)
+    if (std::isnan(problem_.output(last)[j])) outputs_[j] = missing_value;
+  const double duration = problem_.duration(last - 1);
+  advance_window(duration, inputs_.data(), outputs_.data());
+  solver_->prepare(point_);
+  prepared_ = true;
+}
+
+/// Starts around the circle, each solved from a roll-out; the best objective wins.
+void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexcept {
+  double best_objective = std::numeric_limits<double>::infinity();
+  best_ = point_;
+  for (int start = 0; start <= setup_.heading_starts; ++start) {
+    trial_ = point_;  // the last start is the guess as it is
+    if (start < setup_.heading_starts) {
+      trial_.clear_multipliers();
+      for (int j = 0; j < problem_.model().state_count(); ++j) trial_.state(0)[j] = problem_.arrival_mean[j];
+      roles().turn(2.0 * std::numbers::pi * start / setup_.heading_starts, trial_.state(0));
+      problem_.simulate(trial_, scratch_);
+    }
+    Report report;
+    for (int i = 0; i < search_iterations; ++i) {
+      report = solver_->solve(trial_, deadline);
+      if (!is_usable(report.status) || report.status == Status::solved) break;
+    }
+    if (!is_usable(report.status) || !(report.kkt.defect < 1e-2) || !(report.objective < best_objective)) continue;
+    best_objective = report.objective;
+    best_ = trial_;
+  }
+  point_ = best_;
+}
+
+/// The objective of what a point really says: its states are simulated from the first one.
+double RecedingHorizonEstimation::objective_from_start(const Iterate& point) noexcept {
+  trial_ = point;
+  problem_.simulate(trial_, scratch_);
+  const double objective = problem_.evaluate(trial_, nullptr, scratch_);
+  return std::isnan(objective) ? std::numeric_limits<double>::infinity() : objective;
+}
+
+/// A solve that has come to no end may have been led astray by its guess, window after window. Where the prior explains
+/// the measurements better than what came of it, the solve starts from there; the best of the three is taken.
+void RecedingHorizonEstimation::reconsider(Report& report, Clock::time_point deadline) noexcept {
+  const double found = objective_from_start(point_);
+  best_ = point_;
+  start_cold();  // simulated already
+  const double prior = problem_.evaluate(point_, nullptr, scratch_);
+  if (!(prior < found)) {
+    point_ = best_;
+    return;
+  }
+  best_ = point_;
+  const Report from_prior = solver_->solve(point_, deadline);
+  const int iterations = report.iterations + from_prior.iterations;
+  report = from_prior;
+  if (!is_usable(from_prior.status) || !(objective_from_start(point_) <= prior)) {
+    point_ = best_;
+    report.status = Status::iteration_limit;
+    report.objective = prior;
+    report.kkt = kkt_residual(problem_, point_, covariance_qp_, scratch_);
+  }
+  report.iterations = iterations;
+}
+
+void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
+  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count(), N = window_.intervals;
+  const int heading = roles().heading;
+  result.state.resize(nx);
+  result.parameters.resize(np);
+  result.covariance.resize(nx + np, nx + np);
+  // A window that was moved in advance ends in a node that is not there yet. What stands for it says nothing of the
+  // nodes before, once nothing is measured there.
+  const int newest = prepared_ ? N - 1 : N;
+  if (prepared_) {
+    std::fill_n(problem_.output(N), outputs_.size(), missing_value);
+    solver_->prepare(point_);
+  }
+  // Once found, a heading is followed, even where it grows uncertain again in a gap: it cannot have turned about
+  // unseen.
+  const bool remembers = setup_.arrival == ArrivalKind::ekf || setup_.arrival == ArrivalKind::smoothing;
+  const auto is_known = [&](const Eigen::MatrixXd& covariance) {
+    return covariance(heading, heading) <= uncertain_angle * uncertain_angle;
+  };
+  if (searching_ && remembers && is_known(arrival_.covariance())) searching_ = false;
+  if (searching_) search_heading(deadline);
+  result.report = solver_->solve(point_, deadline);
+  if (result.report.status == Status::iteration_limit || result.report.status == Status::stalled)
+    reconsider(result.report, deadline);
+  result.fallback = !is_usable(result.report.status);
+  result.predicted = false;
+  if (result.fallback) recover();
+  solved_ = true;
+  std::copy_n(point_.state(newest), nx + np, last_state_.data());
+  result.state = last_state_.head(nx);
+  result.parameters = last_state_.tail(np);
+  write_covariance(newest, result);
+  // An arrival cost that learns nothing never knows the heading: there the window has to.
+  if (searching_ && !remembers && is_known(result.covariance)) searching_ = false;
+}
+
+/// Of the state of a node and the parameters before it. Where it comes to nothing, the last one stays.
+void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noexcept {
+  const int n = static_cast<int>(last_state_.size()), ns = problem_.capacity().states;
+  const bool is_last = node == window_.intervals;
+  double* of_node = covariances_.data() + (is_last ? 0 : static_cast<std::ptrdiff_t>(node) * ns * ns);
+  if (!is_last || !solver_->covariances(point_, {node, node}, covariances_)) {
+    problem_.linearise(all_stages(problem_), point_, Hessian::gauss_newton, covariance_qp_, scratch_);
+    covariance_riccati_.factor_for_covariances(covariance_qp_, no_active_bounds_);
+    covariance_riccati_.covariances(covariance_qp_, is_last ? nullptr : covariances_.data(),
+                                    is_last ? of_node : nullptr);
+  }
+  if (!std::all_of(of_node, of_node + ns * ns, [](double value) { return std::isfinite(value); })) return;
+  result.covariance =
+      Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(of_node, n, n, Eigen::OuterStride<>(ns));
+}
+
+}  // namespace rhec

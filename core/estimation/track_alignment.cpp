@@ -1,0 +1,239 @@
+#include "track_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <utility>
+
+#include "rhec/core/base/angle.hpp"
+
+namespace rhec {
+namespace {
+
+using Point = std::complex<double>;
+
+constexpr double shortest_reach = 5.0, longest_reach = 40.0;  // of a piece to each side, along the track [m]
+constexpr int fewest_fixes = 4;
+constexpr double least_spread = 1.5;                       // of a piece's fixes, root mean square [m]
+constexpr double least_stretch = 0.5, most_stretch = 2.0;  // beyond, something else is wrong
+constexpr int reweightings = 20;
+constexpr double least_jump = 1.0;  // of a gap; below, linearisation is good enough [m]
+
+struct Pose {
+  Point position;
+  double heading = 0.0;
+};
+
+Pose chained(const Pose& from, const Pose& motion) {
+  return {from.position + std::polar(1.0, from.heading) * motion.position, from.heading + motion.heading};
+}
+
+class Track {
+ public:
+  Track(const RheProblem& problem, std::vector<double>& states, std::vector<double>& inputs,
+        const std::vector<double>& parameters)
+      : problem_(problem),
+        model_(problem.model()),
+        roles_(model_.description().roles),
+        states_(states),
+        inputs_(inputs),
+        parameters_(parameters),
+        count_(problem.intervals() + 1) {
+    // What drives, among states and inputs, is what going straight on sets.
+    const std::vector<double> nominal = nominal_values(model_.description().parameters);
+    std::vector<double> state(model_.state_count(), 0.0), input(model_.input_count(), 0.0);
+    model_.straight_motion(1.0, nominal.data(), state.data(), input.data());
+    const auto find = [](const std::vector<double>& motion, std::vector<int>& driving) {
+      for (std::size_t j = 0; j < motion.size(); ++j)
+        if (motion[j] != 0.0) driving.push_back(static_cast<int>(j));
+    };
+    find(state, driving_states_);
+    find(input, driving_inputs_);
+  }
+
+  void align() {
+    if (roles_.position_x < 0 || roles_.position_y < 0 || roles_.heading < 0 || !find_outputs()) return;
+    chain();
+    std::vector<Pose> poses(count_);
+    std::vector<char> known(count_, 0);
+    for (int k = 0; k < count_; ++k) known[k] = fit(k, poses[k]) ? 1 : 0;
+    const int first = static_cast<int>(std::find(known.begin(), known.end(), 1) - known.begin());
+    if (first == count_) return;
+    for (int k = first - 1; k >= 0; --k) {
+      poses[k].heading = poses[k + 1].heading - motions_[k].heading;
+      poses[k].position = poses[k + 1].position - std::polar(1.0, poses[k].heading) * motions_[k].position;
+    }
+    int last_known = first;
+    for (int k = first + 1; k < count_; ++k) {
+      const Pose reached = chained(poses[k - 1], motions_[k - 1]);
+      if (!known[k]) {
+        poses[k] = reached;
+        continue;
+      }
+      if (k > last_known + 1) close_gap(last_known, k, reached.position, poses);
+      // Turns are counted along the track, not by the fit.
+      const double expected = chained(poses[k - 1], motions_[k - 1]).heading;
+      poses[k].heading = expected + angle_difference(poses[k].heading, expected);
+      last_known = k;
+    }
+    for (int k = 0; k < count_; ++k) write(k, poses[k]);
+  }
+
+ private:
+  double* state(int node) { return states_.data() + static_cast<std::ptrdiff_t>(node) * model_.state_count(); }
+  Pose pose_of(const double* s) const { return {{s[roles_.position_x], s[roles_.position_y]}, s[roles_.heading]}; }
+  void write(int node, const Pose& pose) {
+    state(node)[roles_.position_x] = pose.position.real();
+    state(node)[roles_.position_y] = pose.position.imag();
+    roles_.turn(pose.heading - state(node)[roles_.heading], state(node));
+  }
+
+  /// The outputs that move one to one with the position's x and y.
+  bool find_outputs() {
+    const int ny = model_.output_count();
+    std::vector<double> jacobian(static_cast<std::size_t>(ny) * model_.state_count());
+    Model::Nodes request;
+    request.count = 1;
+    request.states = state(0);
+    request.jacobians = jacobian.data();
+    model_.observe(request);
+    for (int j = 0; j < ny; ++j) {
+      const double by_x = jacobian[static_cast<std::ptrdiff_t>(roles_.position_x) * ny + j];
+      const double by_y = jacobian[static_cast<std::ptrdiff_t>(roles_.position_y) * ny + j];
+      if (by_x == 1.0 && by_y == 0.0) x_output_ = j;
+      if (by_x == 0.0 && by_y == 1.0) y_output_ = j;
+    }
+    return x_output_ >= 0 && y_output_ >= 0;
+  }
+
+  /// The track by its motions alone, with what is observed along it and how far the vehicle has gone.
+  void chain() {
+    const std::ptrdiff_t nx = model_.state_count(), nu = model_.input_count(), np = model_.parameter_count();
+    std::vector<double> next(nx), outputs(model_.output_count());
+    motions_.resize(count_ - 1);
+    chain_.resize(count_);
+    observed_.resize(count_);
+    gone_.assign(count_, 0.0);
+    for (std::ptrdiff_t k = 0; k < count_; ++k) {
+      const int node = static_cast<int>(k);
+      std::vector<double> moved(state(node), state(node) + nx);
+      moved[roles_.position_x] = chain_[k].position.real();
+      moved[roles_.position_y] = chain_[k].position.imag();
+      roles_.turn(chain_[k].heading - moved[roles_.heading], moved.data());
+      Model::Nodes observation;
+      observation.count = 1;
+      observation.states = moved.data();
+      observation.outputs = outputs.data();
+      model_.observe(observation);
+      observed_[k] = {outputs[x_output_], outputs[y_output_]};
+      const double* measured = problem_.output(node);
+      if (!std::isnan(measured[x_output_]) && !std::isnan(measured[y_output_])) fixes_.push_back(node);
+      if (k + 1 == count_) break;
+      const double duration = problem_.duration(node);
+      Model::Intervals request;
+      request.count = 1;
+      request.states = state(node);
+      request.inputs = inputs_.data() + k * nu;
+      request.parameters = parameters_.data() + k * np;
+      request.durations = &duration;
+      request.substeps = problem_.substeps();
+      request.next_states = next.data();
+      model_.integrate(request);
+      const Pose from = pose_of(state(node)), to = pose_of(next.data());
+      motions_[k] = {std::polar(1.0, -from.heading) * (to.position - from.position), to.heading - from.heading};
+      chain_[k + 1] = chained(chain_[k], motions_[k]);
+      gone_[k + 1] = gone_[k] + std::abs(motions_[k].position);
+    }
+  }
+
+  Point measured(int node) const { return {problem_.output(node)[x_output_], problem_.output(node)[y_output_]}; }
+
+  /// The pose of a node from the fixes around it.
+  bool fit(int node, Pose& pose) {
+    for (double reach = shortest_reach; reach <= longest_reach; reach *= 2.0) {
+      const auto from =
+          std::partition_point(fixes_.begin(), fixes_.end(), [&](int fix) { return gone_[fix] < gone_[node] - reach; });
+      const auto to =
+          std::partition_point(from, fixes_.end(), [&](int fix) { return gone_[fix] <= gone_[node] + reach; });
+      if (to - from < fewest_fixes || !surrounds(*from, *(to - 1), node)) continue;
+      weights_.assign(static_cast<std::size_t>(to - from), 1.0);
+      Point turn, shift;
+      double spread = 0.0;
+      for (int round = 0; round < reweightings; ++round) {
+        double sum = 0.0, square = 0.0;
+        Point from_mean, to_mean, cross;
+        for (auto fix = from; fix != to; ++fix) {
+          const double w = weights_[fix - from];
+          sum += w;
+          from_mean += w * observed_[*fix];
+          to_mean += w * measured(*fix);
+        }
+        from_mean /= sum;
+        to_mean /= sum;
+        for (auto fix = from; fix != to; ++fix) {
+          const double w = weights_[fix - from];
+          const Point offset = observed_[*fix] - from_mean;
+          cross += w * std::conj(offset) * (measured(*fix) - to_mean);
+          square += w * std::norm(offset);
+        }
+        spread = std::sqrt(square / sum);
+        if (!(spread > 0.0)) break;
+        turn = cross / square;
+        shift = to_mean - turn * from_mean;
+        for (auto fix = from; fix != to; ++fix)
+          weights_[fix - from] =
+              1.0 / std::max(std::abs(turn * observed_[*fix] + shift - measured(*fix)), 1e-3 * least_spread);
+      }
+      if (!(spread > least_spread)) continue;
+      if (!(std::abs(turn) > least_stretch && std::abs(turn) < most_stretch)) return false;
+      pose.position = turn * chain_[node].position + shift;
+      pose.heading = chain_[node].heading + std::arg(turn);
+      return true;
+    }
+    return false;
+  }
+
+  /// A piece tells of what is between its fixes, not of what lies beyond.
+  bool surrounds(int first, int last, int node) const {
+    return (first <= node || node == 0 || first == fixes_.front()) && (last >= node || last == fixes_.back());
+  }
+
+  void close_gap(int start, int end, Point reached, std::vector<Pose>& poses) {
+    const Point from = poses[start].position, was = reached - from, is = poses[end].position - from;
+    if (!(std::abs(is - was) > least_jump)) return;
+    const Point factor = is / was;
+    if (!(std::abs(factor) > least_stretch && std::abs(factor) < most_stretch)) return;
+    for (int i = start; i < end; ++i) {
+      poses[i].position = from + factor * (poses[i].position - from);
+      poses[i].heading += std::arg(factor);
+      for (const int j : driving_inputs_)
+        inputs_[static_cast<std::ptrdiff_t>(i) * model_.input_count() + j] *= std::abs(factor);
+      for (const int j : driving_states_) state(i)[j] *= std::abs(factor);
+    }
+  }
+
+  const RheProblem& problem_;
+  const Model& model_;
+  const Roles& roles_;
+  std::vector<double>& states_;
+  std::vector<double>& inputs_;
+  const std::vector<double>& parameters_;
+  int count_;
+  std::vector<int> driving_states_, driving_inputs_;
+  int x_output_ = -1, y_output_ = -1;
+  std::vector<Pose> motions_, chain_;  ///< of each interval in its start's frame; all chained from the origin
+  std::vector<Point> observed_;        ///< position outputs along the chain
+  std::vector<double> gone_;           ///< distance along the chain [m]
+  std::vector<int> fixes_;             ///< nodes with a measured position
+  std::vector<double> weights_;
+};
+
+}  // namespace
+
+void align_track(const RheProblem& problem, std::vector<double>& states, std::vector<double>& inputs,
+                 const std::vector<double>& parameters) {
+  Track(problem, states, inputs, parameters).align();
+}
+
+}  // namespace rhec

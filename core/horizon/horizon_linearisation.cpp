@@ -1,0 +1,258 @@
+#include "horizon_linearisation.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+#include "interval_dynamics.hpp"
+#include "rhec/core/base/padded.hpp"
+#include "rhec/core/kernels/kernel_sets.hpp"
+#include "rhec/core/kernels/transcription_kernels.hpp"
+
+namespace rhec {
+namespace {
+
+/// Where more intervals than this are not known, all are evaluated anew.
+constexpr int most_unknown = 8;
+
+}  // namespace
+
+HorizonLinearisation::HorizonLinearisation(const HorizonProblem& problem) : Linearisation(problem), problem_(problem) {
+  const HorizonStructure& structure = problem.structure();
+  const Capacity& capacity = structure.capacity();
+  const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1;
+  rows_.assign(nodes * qp_.stride(), 0.0);
+  costates_.assign((nodes + 1) * qp_.stride(), 0.0);
+  curvature_behind_.assign(static_cast<std::size_t>(capacity.states + capacity.controls) * qp_.stride(), 0.0);
+  durations_.assign(nodes, 0.0);
+  starts_.assign(nodes * structure.lifted_count(), 0);
+  for (auto* marks : {&same_, &same_costate_}) marks->assign(nodes, 0);
+}
+
+IntervalDynamics HorizonLinearisation::dynamics() const noexcept {
+  return {*problem_.model_, problem_.structure_, problem_.durations_.data(), problem_.substeps_};
+}
+
+double* HorizonLinearisation::row(AlignedDoubles& rows, int stage) const noexcept {
+  return rows.data() + static_cast<std::ptrdiff_t>(stage) * qp_.stride();
+}
+const double* HorizonLinearisation::row(const AlignedDoubles& rows, int stage) const noexcept {
+  return rows.data() + static_cast<std::ptrdiff_t>(stage) * qp_.stride();
+}
+std::uint8_t* HorizonLinearisation::starts(int interval) noexcept {
+  return starts_.data() + static_cast<std::ptrdiff_t>(interval) * problem_.structure_.lifted_count();
+}
+
+void HorizonLinearisation::forget() noexcept {
+  known_intervals_ = -1;
+  is_extended_ = has_curvature_ = false;
+}
+
+double HorizonLinearisation::linearise(const Iterate& iterate, Hessian hessian) noexcept {
+  linearise_stages(iterate, hessian);
+  return write_cost(all_stages(problem_), iterate, hessian,
+                    hessian == Hessian::none ? CostParts::vectors : CostParts::all);
+}
+
+double HorizonLinearisation::linearise_for_residual(const Iterate& iterate, Hessian next) noexcept {
+  const bool is_kept = next == Hessian::exact && problem_.keeps_curvature();
+  return linearise(iterate, is_kept ? Hessian::exact : Hessian::none);
+}
+
+void HorizonLinearisation::prepare(const Iterate& iterate, Hessian hessian) noexcept {
+  const bool has_moved = move_along(iterate, hessian);
+  if (has_moved && hessian == Hessian::exact) return;
+  if (!has_moved) linearise_stages(iterate, hessian);
+  write_cost(all_stages(problem_), iterate, hessian, CostParts::matrices);
+}
+
+void HorizonLinearisation::refresh(const Iterate& iterate) noexcept {
+  if (problem_.has_late_bounds()) problem_.write_bounds(iterate, all_stages(problem_), qp_);
+  write_cost(all_stages(problem_), iterate, Hessian::none, CostParts::vectors);
+}
+
+bool HorizonLinearisation::is_at(const Iterate& iterate) const noexcept {
+  // Behind the last state there may be inputs of the interval behind the horizon.
+  const std::size_t entries = static_cast<std::size_t>(problem_.intervals()) * qp_.stride() + qp_.capacity().states;
+  return has_structure() && std::memcmp(rows_.data(), iterate.row(0), entries * sizeof(double)) == 0;
+}
+
+/// Whether the QP was made for today's blocks.
+bool HorizonLinearisation::has_structure() const noexcept {
+  const HorizonStructure& structure = problem_.structure_;
+  const int N = structure.intervals();
+  return known_intervals_ == N && std::memcmp(starts_.data(), structure.block_starts(0),
+                                              static_cast<std::size_t>(N) * structure.lifted_count()) == 0;
+}
+
+/// Whether AB has the rows that lifted variables have in today's structure.
+bool HorizonLinearisation::has_lifted_rows() const noexcept {
+  return problem_.structure_.is_direct() && !problem_.structure_.any_ramp() && has_structure();
+}
+
+/// Sizes, dynamics with their curvature, and bounds, all evaluated anew.
+void HorizonLinearisation::linearise_stages(const Iterate& iterate, Hessian hessian) noexcept {
+  const int N = problem_.intervals();
+  const StageRange all{0, N};
+  IntervalDynamics::Options options{.hessian = hessian, .has_lifted_rows = has_lifted_rows()};
+  const IntervalDynamics dynamics = this->dynamics();
+  if (!options.has_lifted_rows) dynamics.write_sizes(all, problem_.initial_state() != nullptr, qp_);
+  forget();
+  remember(iterate, 0);
+  has_curvature_ = hessian == Hessian::exact && problem_.keeps_curvature() && N > 0;
+  const IntervalDynamics::Extension extension{rows_.data(), costates_.data(), durations_.data(),
+                                              curvature_behind_.data()};
+  if (has_curvature_) {
+    extend_horizon();
+    options.extension = &extension;
+  }
+  if (N > 0) dynamics.linearise({0, N - 1}, iterate, options, qp_, scratch_.data());
+  problem_.write_bounds(iterate, all, qp_);
+}
+
+/// That AB and b were made at this iterate, of which the first rows are known.
+void HorizonLinearisation::remember(const Iterate& iterate, int first) noexcept {
+  const int N = problem_.intervals();
+  known_intervals_ = N;
+  std::copy_n(iterate.row(first), static_cast<std::ptrdiff_t>(N + 1 - first) * qp_.stride(), row(rows_, first));
+  if (problem_.keeps_curvature())
+    std::copy_n(iterate.costate(0), static_cast<std::ptrdiff_t>(N + 1) * qp_.stride(), costates_.data());
+  std::copy_n(problem_.durations_.data(), N, durations_.data());
+  std::copy_n(problem_.structure_.block_starts(0), static_cast<std::ptrdiff_t>(N) * problem_.structure_.lifted_count(),
+              starts_.data());
+}
+
+/// What is remembered goes on for one interval, with the last inputs.
+void HorizonLinearisation::extend_horizon() noexcept {
+  const int N = known_intervals_, states = qp_.capacity().states, lifted = problem_.structure_.lifted_count();
+  std::copy_n(row(rows_, N - 1) + states, qp_.capacity().controls, row(rows_, N) + states);
+  std::copy_n(row(costates_, N), qp_.stride(), row(costates_, N + 1));
+  durations_[N] = durations_[N - 1];
+  std::fill_n(starts(N), lifted, std::uint8_t{0});
+  is_extended_ = true;
+}
+
+/// By how many intervals the horizon has moved on since: to the first known node that its first node is at.
+int HorizonLinearisation::find_steps(const Iterate& iterate) const noexcept {
+  const std::size_t bytes = problem_.nx() * sizeof(double);
+  int steps = 0;
+  while (steps < known_intervals_ && std::memcmp(iterate.state(0), row(rows_, steps), bytes) != 0) ++steps;
+  return steps;
+}
+
+/// Marks what is found again, `steps` intervals earlier, and moves the rows there. Returns the number of intervals that
+/// could be known.
+int HorizonLinearisation::match(const Iterate& iterate, int steps, bool is_exact) noexcept {
+  const int N = problem_.intervals(), end = known_intervals_ - steps, states = qp_.capacity().states;
+  const int count = std::min(N, is_extended_ ? end + 1 : end);
+  std::fill_n(same_.data(), N + 1, std::uint8_t{0});
+  transcription_kernels().match(iterate.row(0), row(rows_, steps), rows_.data(), count, qp_.stride(), states,
+                                same_.data());
+  if (count <= end)
+    same_[count] = std::memcmp(iterate.state(count), row(rows_, count + steps), states * sizeof(double)) == 0;
+  if (is_exact)
+    transcription_kernels().match(iterate.costate(1), row(costates_, steps + 1), row(costates_, 1), count, qp_.stride(),
+                                  problem_.nx(), same_costate_.data());
+  return count;
+}
+
+bool HorizonLinearisation::is_known(int interval, int steps, int count, bool is_exact) const noexcept {
+  if (interval >= count || same_[interval] != 2) return false;
+  // Of the interval behind the horizon, the next state is not known.
+  const bool is_behind = interval == known_intervals_ - steps;
+  if (!is_behind && same_[interval + 1] == 0) return false;
+  if (is_exact && same_costate_[interval] == 0) return false;
+  if (problem_.durations_[interval] != durations_[interval + steps]) return false;
+  const int lifted = problem_.structure_.lifted_count();
+  const std::uint8_t* known = starts_.data() + static_cast<std::ptrdiff_t>(interval + steps) * lifted;
+  return std::memcmp(problem_.structure_.block_starts(interval), known, lifted) == 0;
+}
+
+/// Does what `linearise_stages` does with what is remembered; only intervals that are not known are evaluated. The
+/// exact Hessian is complete afterwards, costs and all. False, with nothing done, where most is not known.
+bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) noexcept {
+  const HorizonStructure& structure = problem_.structure_;
+  const bool is_exact = hessian == Hessian::exact;
+  const int N = structure.intervals();
+  if (known_intervals_ < 0 || (is_exact && !has_curvature_) || !structure.is_direct() || structure.any_ramp())
+    return false;
+  if (!is_exact && !problem_.has_late_bounds() && is_at(iterate) &&
+      std::equal(durations_.begin(), durations_.begin() + N, problem_.durations_.begin()))
+    return true;  // as it was made
+
+  const int steps = find_steps(iterate), end = known_intervals_ - steps, count = match(iterate, steps, is_exact);
+  std::array<int, most_unknown> unknown;
+  int unknown_count = 0;
+  for (int i = 0; i < N; ++i) {
+    if (is_known(i, steps, count, is_exact)) continue;
+    if (unknown_count == most_unknown) return false;
+    unknown[unknown_count++] = i;
+  }
+  const bool was_behind = end < N && is_known(end, steps, count, is_exact);
+  const std::ptrdiff_t curvature_size = static_cast<std::ptrdiff_t>(curvature_behind_.size());
+  if (steps > 0) qp_.drop_first(steps);
+  // The last node stays the last one.
+  if (steps > 0 && is_exact) std::copy_n(qp_.H(end), curvature_size, qp_.H(known_intervals_));
+  // Stages that are known have their sizes.
+  const IntervalDynamics dynamics = this->dynamics();
+  const auto write_sizes = [&](int stage) {
+    dynamics.write_sizes({stage, stage}, problem_.initial_state() != nullptr, qp_);
+  };
+  write_sizes(N);
+  for (int k = 0; k < unknown_count; ++k) write_sizes(unknown[k]);
+  if (was_behind) {
+    write_sizes(end);
+    dynamics.complete({end, end}, iterate, false, qp_);
+    if (is_exact) {
+      std::copy(curvature_behind_.begin(), curvature_behind_.end(), qp_.H(end));
+      write_cost({end, end}, iterate, hessian, CostParts::matrices);
+    }
+  }
+  evaluate_unknown(iterate, hessian, unknown.data(), unknown_count);
+  if (is_exact && N != known_intervals_) write_cost({N, N}, iterate, hessian, CostParts::matrices);
+  problem_.write_bounds(iterate, all_stages(problem_), qp_);
+  move_nodes(steps);
+  remember(iterate, count);
+  is_extended_ = false;
+  has_curvature_ = is_exact;
+  return true;
+}
+
+void HorizonLinearisation::evaluate_unknown(const Iterate& iterate, Hessian hessian, const int* unknown,
+                                            int count) noexcept {
+  const bool is_exact = hessian == Hessian::exact;
+  for (int k = 0; k < count;) {
+    StageRange together{unknown[k], unknown[k]};
+    while (++k < count && unknown[k] == together.last + 1) ++together.last;
+    if (!is_exact && together.first == together.last && has_simulated(together.first, iterate)) {
+      take_simulated(together.first, iterate);
+      continue;
+    }
+    dynamics().linearise(together, iterate, {.hessian = hessian}, qp_, scratch_.data());
+    if (is_exact) write_cost(together, iterate, hessian, CostParts::matrices);
+  }
+}
+
+/// Whether the problem has simulated this interval at the same numbers.
+bool HorizonLinearisation::has_simulated(int interval, const Iterate& iterate) noexcept {
+  const HorizonProblem::SimulatedInterval& simulated = problem_.simulated_;
+  if (simulated.duration != problem_.durations_[interval]) return false;
+  double* const z = scratch_.data();
+  dynamics().gather_rows(iterate, {interval, interval}, z);
+  return std::equal(z, z + problem_.nx() + problem_.np() + problem_.nu(), simulated.z.begin());
+}
+
+void HorizonLinearisation::take_simulated(int interval, const Iterate& iterate) noexcept {
+  const HorizonProblem::SimulatedInterval& simulated = problem_.simulated_;
+  const int nx = problem_.nx(), row_length = IntervalDynamics::row_length(problem_.structure_);
+  const IntervalDynamics dynamics = this->dynamics();
+  std::copy_n(simulated.next.data(), nx, qp_.b(interval));
+  for (int r = 0; r < nx; ++r)
+    std::copy_n(simulated.jacobian.data() + r * row_length, padded(nx + problem_.np() + problem_.nu()),
+                qp_.AB(interval) + r * qp_.stride());
+  dynamics.complete({interval, interval}, iterate, false, qp_);
+  if (problem_.structure_.control_count(interval) > problem_.nu())
+    dynamics.place_starts(interval, Hessian::gauss_newton, qp_);
+}
+
+}  // namespace rhec

@@ -1,0 +1,155 @@
+#include "rhec/core/horizon/horizon_problem.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "horizon_linearisation.hpp"
+#include "interval_dynamics.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/kernels/kernel_sets.hpp"
+#include "rhec/core/kernels/transcription_kernels.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Whether an interval uses the value that its first stage carries: where no block starts, and where a ramp starts
+/// there.
+bool uses_carried_value(const HorizonStructure& structure, int interval, int lifted) noexcept {
+  return structure.control_of_lifted(interval, lifted) < 0 || structure.is_ramp(lifted);
+}
+
+}  // namespace
+
+HorizonProblem::HorizonProblem(std::shared_ptr<const Model> model, const Setup& setup)
+    : model_(std::move(model)), structure_(*model_, setup.structure), substeps_(setup.substeps) {
+  if (substeps_ < 1) throw Error("substeps: expected at least 1 integration step per interval");
+  const auto nodes = static_cast<std::size_t>(structure_.capacity().intervals) + 1;
+  durations_.assign(nodes, 0.0);
+  lower_.assign(nodes * stride(), -infinity);
+  upper_.assign(nodes * stride(), infinity);
+  const int row = IntervalDynamics::row_length(structure_);
+  for (auto* v : {&simulated_.z, &simulated_.next}) v->assign(row, 0.0);
+  simulated_.jacobian.assign(static_cast<std::size_t>(nx()) * row, 0.0);
+  simulated_.scratch.assign(model_->rows_scratch(1), 0.0);
+}
+
+void HorizonProblem::clear_bounds() noexcept {
+  std::fill(lower_.begin(), lower_.end(), -infinity);
+  std::fill(upper_.begin(), upper_.end(), infinity);
+}
+
+void HorizonProblem::take_horizon(const HorizonProblem& from) noexcept {
+  structure_ = from.structure_;
+  durations_ = from.durations_;
+  lower_ = from.lower_;
+  upper_ = from.upper_;
+}
+
+std::size_t HorizonProblem::scratch_size() const noexcept {
+  const auto nodes = static_cast<std::size_t>(structure_.capacity().intervals) + 1;
+  return IntervalDynamics::scratch_size(*model_, structure_, nodes) + cost_scratch_size();
+}
+
+void HorizonProblem::mark_dynamics(int i, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept {
+  const int ns = structure_.capacity().states, free_count = structure_.free_input_count();
+  // The model's next state depends on all of its own, and on a lifted variable where that is in use.
+  for (int c = 0; c < ns; ++c) {
+    const int lifted = c - nx();
+    const bool is_carried = lifted >= 0 && structure_.control_of_lifted(i, lifted) < 0;
+    const bool is_used = lifted < 0 || uses_carried_value(structure_, i, lifted);
+    for (int r = 0; r < nx(); ++r) state_flags[c * ns + r] = is_used;
+    for (int r = nx(); r < ns; ++r) state_flags[c * ns + r] = is_carried && r == c;
+  }
+  for (int c = 0; c < structure_.control_count(i); ++c)
+    for (int r = 0; r < ns; ++r)
+      control_flags[c * ns + r] = r < nx() || (c >= free_count && structure_.control_of_lifted(i, r - nx()) == c);
+}
+
+double HorizonProblem::evaluate_stages(const Iterate& iterate, double* defects, double* stage_costs,
+                                       std::span<double> scratch) const noexcept {
+  if (defects)
+    IntervalDynamics{*model_, structure_, durations_.data(), substeps_}.write_defects(iterate, defects, scratch.data());
+  if (stage_costs) std::fill_n(stage_costs, intervals() + 1, 0.0);
+  return cost(iterate, stage_costs, scratch);
+}
+
+void HorizonProblem::simulate_interval(int interval, Iterate& iterate, std::span<double> scratch) const noexcept {
+  IntervalDynamics{*model_, structure_, durations_.data(), substeps_}.simulate(interval, iterate, scratch.data());
+}
+
+double HorizonProblem::linearise(StageRange range, const Iterate& iterate, Hessian hessian, StageQp& qp,
+                                 std::span<double> scratch) const noexcept {
+  const IntervalDynamics dynamics{*model_, structure_, durations_.data(), substeps_};
+  dynamics.write_sizes(range, initial_state() != nullptr, qp);
+  const StageRange steps{range.first, std::min(range.last, intervals() - 1)};
+  if (steps.last >= steps.first) dynamics.linearise(steps, iterate, {.hessian = hessian}, qp, scratch.data());
+  write_bounds(iterate, range, qp);
+  return write_cost(range, iterate, hessian, hessian == Hessian::none ? CostParts::vectors : CostParts::all, qp,
+                    scratch);
+}
+
+void HorizonProblem::refresh(const Iterate& iterate, StageQp& qp, std::span<double> scratch) const noexcept {
+  if (has_late_bounds()) write_bounds(iterate, all_stages(*this), qp);
+  write_cost(all_stages(*this), iterate, Hessian::none, CostParts::vectors, qp, scratch);
+}
+
+void HorizonProblem::write_bounds(const Iterate& iterate, StageRange range, StageQp& qp) const noexcept {
+  const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(range.first) * stride(),
+                       count = static_cast<std::ptrdiff_t>(range.last - range.first + 1) * stride();
+  transcription_kernels().write_bounds(lower_.data() + first, upper_.data() + first, iterate.row(range.first),
+                                       qp.lower(range.first), qp.upper(range.first), count);
+  if (range.first == 0 && initial_state())
+    for (int j = 0; j < structure_.capacity().states; ++j)
+      qp.initial_step()[j] = initial_state()[j] - iterate.state(0)[j];
+}
+
+void HorizonProblem::clear_cost(StageRange range, Hessian hessian, CostParts parts, StageQp& qp) const noexcept {
+  const int ns = structure_.capacity().states;
+  const bool keeps_H = hessian == Hessian::exact;
+  for (int i = range.first; i <= range.last; ++i) {
+    const int used = ns + (i < intervals() ? structure_.control_count(i) : 0);
+    if (parts != CostParts::matrices) std::fill_n(qp.h(i), stride(), 0.0);
+    // No dynamics have written to the last node's.
+    if (parts != CostParts::vectors && !(keeps_H && i < intervals())) std::fill_n(qp.H(i), used * stride(), 0.0);
+  }
+}
+
+std::unique_ptr<Linearisation> HorizonProblem::make_linearisation() const {
+  return std::make_unique<HorizonLinearisation>(*this);
+}
+
+bool HorizonProblem::keeps_curvature() const noexcept {
+  return has_constant_cost_hessian() && structure_.is_direct() && !structure_.any_start();
+}
+
+void HorizonProblem::simulate_new_interval(int interval, Iterate& iterate, std::span<double> scratch) noexcept {
+  const int row = IntervalDynamics::row_length(structure_);
+  const IntervalDynamics dynamics{*model_, structure_, durations_.data(), substeps_};
+  if (keeps_curvature()) {
+    // A linearisation that keeps curvature has evaluated the interval behind its horizon already.
+    dynamics.simulate(interval, iterate, scratch.data());
+    return;
+  }
+  dynamics.gather_rows(iterate, {interval, interval}, simulated_.z.data());
+  // With a ramp, derivatives are by both its ends: a linearisation makes no use of those.
+  simulated_.duration = structure_.any_ramp() ? 0.0 : durations_[interval];
+  model_->integrate_rows({.count = 1,
+                          .z = simulated_.z.data(),
+                          .z_step = row,
+                          .ramp = structure_.any_ramp(),
+                          .durations = &durations_[interval],
+                          .substeps = substeps_,
+                          .next_states = simulated_.next.data(),
+                          .next_step = row,
+                          .jacobians = simulated_.jacobian.data(),
+                          .jacobian_step = nx() * row,
+                          .jacobian_row = row,
+                          .scratch = simulated_.scratch.data()});
+  std::copy_n(simulated_.next.data(), nx(), iterate.state(interval + 1));
+  structure_.carry_lifted(interval, iterate);
+}
+
+}  // namespace rhec

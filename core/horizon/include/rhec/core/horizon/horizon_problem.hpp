@@ -1,0 +1,134 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "rhec/core/base/aligned.hpp"
+#include "rhec/core/horizon/horizon_structure.hpp"
+#include "rhec/core/model/model.hpp"
+#include "rhec/core/ocp/ocp.hpp"
+
+namespace rhec {
+
+/// A model over a horizon: the structure, the dynamics and the bounds that all kinds of problems share.
+///
+/// Stages are those of HorizonStructure; interval i leads from s_i to s_{i+1} by the model's integration over
+/// `duration(i)` in `substeps` Runge-Kutta steps. What makes a kind of problem is its cost: a class derives from this
+/// one and implements `cost` and `write_cost`. RheProblem and RhcProblem are such classes; others may be written
+/// outside of rhec, against this header alone.
+///
+/// Data are set in place, without allocation. A problem can be copied, but not assigned or moved: whoever has been set
+/// up with it refers to it.
+class RHEC_EXPORT HorizonProblem : public Ocp {
+ public:
+  HorizonProblem& operator=(const HorizonProblem&) = delete;
+
+  /// The name of the kind of problem, by which files and reports know it: "rhe", "rhc", ...
+  virtual std::string_view kind() const noexcept = 0;
+  const Model& model() const noexcept { return *model_; }
+  std::shared_ptr<const Model> shared_model() const noexcept { return model_; }
+  int substeps() const noexcept { return substeps_; }
+  const HorizonStructure& structure() const noexcept { return structure_; }
+
+  /// Length of an interval [s].
+  double duration(int interval) const noexcept { return durations_[interval]; }
+  void set_duration(int interval, double seconds) noexcept { durations_[interval] = seconds; }
+  /// What is known of the inputs of an interval (n_u, NaN where nothing is), for a first guess; null: nothing.
+  virtual const double* known_inputs(int /*interval*/) const noexcept { return nullptr; }
+
+  Capacity capacity() const noexcept override { return structure_.capacity(); }
+  int intervals() const noexcept override { return structure_.intervals(); }
+  int state_count(int) const noexcept override { return structure_.capacity().states; }
+  int control_count(int interval) const noexcept override { return structure_.control_count(interval); }
+  const double* state_lower(int node) const noexcept override { return at(lower_, node); }
+  const double* state_upper(int node) const noexcept override { return at(upper_, node); }
+  const double* control_lower(int i) const noexcept override { return at(lower_, i) + structure_.capacity().states; }
+  const double* control_upper(int i) const noexcept override { return at(upper_, i) + structure_.capacity().states; }
+  bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
+  std::size_t scratch_size() const noexcept override;
+  void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
+  double evaluate_stages(const Iterate& iterate, double* defects, double* stage_costs,
+                         std::span<double> scratch) const noexcept override;
+  void simulate_interval(int interval, Iterate& iterate, std::span<double> scratch) const noexcept override;
+  double linearise(StageRange range, const Iterate& iterate, Hessian hessian, StageQp& qp,
+                   std::span<double> scratch) const noexcept override;
+  void refresh(const Iterate& iterate, StageQp& qp, std::span<double> scratch) const noexcept override;
+  /// One that evaluates again only what has changed since the iterate before, be it some intervals earlier.
+  std::unique_ptr<Linearisation> make_linearisation() const override;
+
+  /// As `simulate_interval`, for an interval that is new at the end of a horizon that has moved on: keeps its
+  /// derivatives, which the next `Linearisation::prepare` will need.
+  void simulate_new_interval(int interval, Iterate& iterate, std::span<double> scratch) noexcept;
+
+ protected:
+  struct Setup {
+    HorizonStructure::Setup structure;
+    int substeps = 1;
+  };
+  /// Throws Error where a number of the set-up makes no sense.
+  HorizonProblem(std::shared_ptr<const Model> model, const Setup& setup);
+  HorizonProblem(const HorizonProblem&) = default;
+
+  int nx() const noexcept { return structure_.vehicle_states(); }
+  int nu() const noexcept { return structure_.inputs(); }
+  int np() const noexcept { return structure_.parameters(); }
+  int stride() const noexcept { return structure_.stride(); }
+  HorizonStructure& changing_structure() noexcept { return structure_; }
+  /// Structure, durations and bounds of a problem of the same capacity.
+  void take_horizon(const HorizonProblem& from) noexcept;
+
+  /// Bounds of z = [s; w] at every stage, as rows of `stride()` entries. They begin as none.
+  double* lower_row(int stage) noexcept { return at(lower_, stage); }
+  double* upper_row(int stage) noexcept { return at(upper_, stage); }
+  void clear_bounds() noexcept;
+
+  /// Which part of a cost a call of `write_cost` is to write: H and h, H alone, or h alone.
+  enum class CostParts { all, matrices, vectors };
+
+  /// The sum of the stages' costs; adds those of single stages to `stage_costs` (N + 1), if not null.
+  virtual double cost(const Iterate& iterate, double* stage_costs, std::span<double> scratch) const noexcept = 0;
+  /// Writes the cost of a range of stages into h (gradient) and H (Hessian) of a QP at an iterate; what was there
+  /// before is no more. With Hessian::exact, H holds the curvature of the intervals' dynamics already, which stays: the
+  /// cost's is added to it. Returns the costs of these stages, where vectors are wanted.
+  virtual double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
+                            std::span<double> scratch) const noexcept = 0;
+  /// What the two need of scratch, which lies behind what the dynamics need.
+  virtual std::size_t cost_scratch_size() const noexcept { return 0; }
+  /// Zeros to what `write_cost` is about to write, for one that adds term by term.
+  void clear_cost(StageRange range, Hessian hessian, CostParts parts, StageQp& qp) const noexcept;
+
+  /// Whether bounds are data that may come between `Linearisation::prepare` and `refresh`.
+  virtual bool has_late_bounds() const noexcept { return false; }
+  /// Whether the cost's Hessian depends on no data, so that a linearisation may keep that of intervals that it knows.
+  virtual bool has_constant_cost_hessian() const noexcept { return false; }
+
+ private:
+  friend class HorizonLinearisation;
+
+  double* at(AlignedDoubles& rows, int i) const noexcept {
+    return rows.data() + static_cast<std::ptrdiff_t>(i) * structure_.stride();
+  }
+  const double* at(const AlignedDoubles& rows, int i) const noexcept {
+    return rows.data() + static_cast<std::ptrdiff_t>(i) * structure_.stride();
+  }
+  bool keeps_curvature() const noexcept;
+  void write_bounds(const Iterate& iterate, StageRange range, StageQp& qp) const noexcept;
+
+  std::shared_ptr<const Model> model_;
+  HorizonStructure structure_;
+  int substeps_;
+  AlignedDoubles lower_, upper_;
+  std::vector<double> durations_;
+  /// The interval that `simulate_new_interval` has simulated, with its derivatives.
+  struct SimulatedInterval {
+    double duration = 0.0;                      ///< 0: none
+    AlignedDoubles z, next, jacobian, scratch;  ///< rows as Model::integrate_rows has them
+  };
+  SimulatedInterval simulated_;
+};
+
+}  // namespace rhec

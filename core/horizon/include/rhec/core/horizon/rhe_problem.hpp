@@ -1,0 +1,136 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rhec/core/horizon/blocking.hpp"
+#include "rhec/core/horizon/horizon_problem.hpp"
+
+namespace rhec {
+
+class OutputCache;
+struct CostView;
+
+/// A pseudo-Huber loss on a group of outputs: with s the weighted squared residual of the group,
+/// 2 delta^2 (sqrt(1 + s / delta^2) - 1) takes the place of s. Smooth, so that its exact Hessian exists.
+struct RobustLoss {
+  std::vector<int> outputs;  ///< they share one loss, such as the two coordinates of a fix
+  double delta = 3.0;        ///< in standard deviations: where the loss turns from quadratic to linear
+};
+
+/// Receding horizon estimation over N intervals (METHOD; Wallace et al., eq. 2):
+///
+///     minimise  || [chi_0; rho_first] - [xbar; pbar] ||^2_P            arrival cost
+///             + sum over nodes      || h(chi_i) - y_i ||^2_Ry          what is missing (NaN) is left out
+///             + sum over intervals  || nu_i - u_meas_i ||^2_Ru
+///             + sum over block starts (rho_b - rho_a)^2 / variance     where neighbouring blocks are linked
+///     subject to the dynamics, bounds on states at every node, on inputs, and on every parameter block.
+///
+/// Data are set in place, without allocation; after the structure (the number of intervals or the block starts) has
+/// changed, `finish` must be called.
+class RHEC_EXPORT RheProblem final : public HorizonProblem {
+ public:
+  struct Setup {
+    int max_intervals = 15;
+    int substeps = 1;
+    std::vector<double> output_weights;  ///< n_y, diagonal of Ry = 1 / sigma^2
+    std::vector<double> input_weights;   ///< n_u, diagonal of Ru
+    std::vector<RobustLoss> robust;
+    std::vector<int> one_block;                            ///< parameters with one value over every horizon
+    std::vector<double> state_lower, state_upper;          ///< n_x; empty: the model's own bounds
+    std::vector<double> input_lower, input_upper;          ///< n_u; empty: none, since the input was measured
+    std::vector<double> parameter_lower, parameter_upper;  ///< n_p; empty: the model's own bounds
+  };
+  RheProblem(std::shared_ptr<const Model> model, Setup setup);
+
+  const Setup& setup() const noexcept { return setup_; }
+
+  /// Arrival cost: mean and information matrix of [x; p] at node 0.
+  Eigen::VectorXd arrival_mean;         ///< n_x + n_p
+  Eigen::MatrixXd arrival_information;  ///< symmetric positive semidefinite
+
+  /// y at a node (n_y) and measured u on an interval (n_u), NaN where missing.
+  double* output(int node) noexcept { return outputs_.data() + at_output(node); }
+  double* measured_input(int interval) noexcept { return measured_inputs_.data() + at_input(interval); }
+  const double* output(int node) const noexcept { return outputs_.data() + at_output(node); }
+  const double* measured_input(int interval) const noexcept { return measured_inputs_.data() + at_input(interval); }
+
+  void set_intervals(int intervals) noexcept { changing_structure().set_intervals(intervals); }
+  /// Marks where a parameter's blocks start. `begins` has an entry an interval; the first interval's block is that of
+  /// node 0's value, so begins[0] matters only for a ramp that starts there. Of a parameter that was set up as one
+  /// block, none counts.
+  void set_blocks(int parameter, const std::uint8_t* begins, Transition transition) noexcept;
+  /// Links the block that starts at an interval to the one before it; infinite variance: not linked.
+  void link(int interval, int parameter, double variance) noexcept;
+  double link_variance(int interval, int parameter) const noexcept {
+    return 1.0 / link_information_[interval * np() + parameter];
+  }
+  void finish() noexcept;
+  /// Takes on the data and the structure of a problem with the same model and set-up, without allocation.
+  void take_data(const RheProblem& from) noexcept;
+  /// Moves durations, outputs and measured inputs one interval towards the window's start; the last ones stay where
+  /// they are until they are overwritten.
+  void drop_first_interval() noexcept;
+
+  /// Weight in (0, 1] that the robust loss gives an output at a point: derivative of the loss by s.
+  void robust_weights(const Iterate& iterate, int node, double* weights, std::span<double> scratch) const noexcept;
+
+  std::string_view kind() const noexcept override { return "rhe"; }
+  bool has_small_residuals() const noexcept override { return true; }
+  const double* known_inputs(int interval) const noexcept override { return measured_input(interval); }
+  std::unique_ptr<Linearisation> make_linearisation() const override;
+  const double* initial_state() const noexcept override { return nullptr; }
+
+ private:
+  friend class RheLinearisation;
+
+  std::ptrdiff_t at_output(int node) const noexcept { return static_cast<std::ptrdiff_t>(node) * output_row_; }
+  std::ptrdiff_t at_input(int interval) const noexcept {
+    return static_cast<std::ptrdiff_t>(interval) * stride() + capacity().states;
+  }
+
+  double cost(const Iterate& iterate, double* stage_costs, std::span<double> scratch) const noexcept override;
+  double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
+                    std::span<double> scratch) const noexcept override {
+    return write_cost(range, iterate, hessian, parts, qp, nullptr, scratch);
+  }
+  /// The same with outputs that are known already, or will be from now on; null: none.
+  double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
+                    OutputCache* known, std::span<double> scratch) const noexcept;
+  std::size_t cost_scratch_size() const noexcept override;
+
+  void residual(int node, const double* predicted, double* difference) const noexcept;
+  double losses(const double* difference, double* weight, double* curvature) const noexcept;
+  struct Observed {
+    const double *outputs, *jacobians;  ///< rows of a range's nodes
+  };
+  Observed observe(StageRange range, const Iterate& iterate, OutputCache* known, double* outputs, double* jacobians,
+                   double* room) const noexcept;
+  double write_measurements(StageRange range, const Iterate& iterate, Hessian hessian, const CostView& view,
+                            OutputCache* known, std::span<double> scratch) const noexcept;
+  double write_general_measurements(StageRange range, const Iterate& iterate, Hessian hessian, const CostView& view,
+                                    const double* predicted, const double* jacobians, double* memory) const noexcept;
+  double inputs(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
+  double links(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
+  void write_bounds(int stage) noexcept;
+  double arrival_term(const Iterate& iterate, double* q) const noexcept;
+
+  Setup setup_;
+  int ny_, output_row_;
+  int bounded_intervals_ = -1;                    ///< that bounds were written for
+  std::vector<std::uint8_t> has_block_bounds_;    ///< of a stage
+  std::vector<std::uint8_t> is_one_block_;        ///< of a parameter
+  std::vector<int> robust_group_;                 ///< of an output, or -1
+  AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
+  AlignedDoubles outputs_;                        ///< a row a node, NaN where nothing was measured
+  AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period where it is an angle
+  AlignedDoubles measured_inputs_, input_weights_;  ///< rows as those of an Iterate, NaN and 0 but for the inputs
+  std::vector<double> link_information_;
+};
+
+}  // namespace rhec

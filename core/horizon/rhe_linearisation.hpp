@@ -1,0 +1,23 @@
+#pragma once
+
+#include "horizon_linearisation.hpp"
+#include "output_cache.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+
+namespace rhec {
+
+/// The linearisation of an estimation horizon, which remembers what the model's sensors say at its nodes too.
+class RheLinearisation final : public HorizonLinearisation {
+ public:
+  explicit RheLinearisation(const RheProblem& problem);
+  void forget() noexcept override;
+
+ private:
+  double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts) noexcept override;
+  void move_nodes(int steps) noexcept override;
+
+  const RheProblem& problem_;
+  OutputCache outputs_;
+};
+
+}  // namespace rhec

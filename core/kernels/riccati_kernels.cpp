@@ -1,0 +1,843 @@
+// Compiled once for every instruction set RHEC_SET; its table is riccati_kernels_<RHEC_SET>.
+#include "rhec/core/kernels/riccati_kernels.hpp"
+
+#include "rhec/core/kernels/lanes.hpp"
+
+namespace rhec {
+namespace kernels {
+namespace {
+
+/// Calls function(first), function(first + step), ... with constants; no loop is left of it.
+template <int first, int step, class Function, int... k>
+RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants<k...> /*numbers*/) {
+  (function(Constant<first + step * k>()), ...);
+}
+
+/// What is known of a stage when its kernel is compiled: how many times eight entries a row has, how many states and
+/// controls (unknown: 0), how many of the states are carried, and how long the program's rows are (unknown: 0). Its
+/// loops are written out where that is asked for.
+template <int eights, int state_count, int control_count, bool is_written_out = true, int carried_count = 0,
+          int known_stride = 0>
+struct Shape {
+  static constexpr bool is_known = state_count > 0;
+  static constexpr bool has_pair = is_known && control_count == 2;
+  static constexpr int most_columns = eights * 8;
+  static constexpr int registers = most_columns / lane_count;
+  static constexpr int state_registers = is_known ? (state_count + lane_count - 1) / lane_count : registers;
+  static constexpr int most_states = is_known ? state_count : (most_columns < 32 ? most_columns : 32);
+  using R = Row<registers>;
+  /// Next state and control together fill no more than one register: a step is carried on in it.
+  static constexpr bool is_compact = is_known && registers == 1;
+  int states, next_states, offset, columns;
+  int moved;  ///< next states that are more than carried: of the others AB has rows of the identity
+
+  Shape(const RiccatiView& view, int i)
+      : states(is_known ? state_count : view.state_counts[i]),
+        next_states(is_known ? state_count : view.state_counts[i + 1]),
+        offset(is_known ? state_count : view.states),
+        columns(offset + (is_known ? control_count : view.control_counts[i])),
+        moved(next_states - (is_known ? carried_count : view.identity_counts[i])) {}
+
+  static long stride_of(const RiccatiView& view) { return known_stride > 0 ? known_stride : view.stride; }
+  /// States and controls that there is room for.
+  static long room_for_states(const RiccatiView& view) { return is_known ? state_count : view.states; }
+  static long room_for_controls(const RiccatiView& view) {
+    return is_known && state_count + control_count == known_stride ? control_count : view.controls;
+  }
+
+  /// Of so many states, and nothing else.
+  explicit Shape(int count)
+      : states(is_known ? state_count : count), next_states(states), offset(states), columns(states), moved(states) {}
+
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_state(const Function& function) const {
+    each<0, state_count>(0, states, function);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_next_state(const Function& function) const {
+    each<0, state_count>(0, next_states, function);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_moved(const Function& function) const {
+    each<0, state_count - carried_count>(0, moved, function);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_carried(const Function& function) const {
+    each<state_count - carried_count, carried_count>(moved, next_states, function);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_control(const Function& function) const {
+    each<state_count, control_count>(offset, columns, function);
+  }
+  /// Of the controls before another one.
+  template <class Control, class Function>
+  RHEC_ALWAYS_INLINE void each_control_before(Control k, const Function& function) const {
+    if constexpr (is_straight)
+      each<state_count, k - state_count>(offset, k, function);
+    else
+      each<0, 0>(offset, k, function);
+  }
+  template <class Function>
+  RHEC_ALWAYS_INLINE void each_control_back(const Function& function) const {
+    if constexpr (is_straight)
+      each_constant<state_count + control_count - 1, -1>(function, make_constants<control_count>());
+    else
+      for (int k = columns - 1; k >= offset; --k) function(k);
+  }
+
+ private:
+  static constexpr bool is_straight = is_known && is_written_out;
+  /// function(first), ..., function(end - 1): `known_count` times from `known_first`, where that is written out.
+  template <int known_first, int known_count, class Function>
+  RHEC_ALWAYS_INLINE static void each(int first, int end, const Function& function) {
+    if constexpr (is_straight)
+      each_constant<known_first, 1>(function, make_constants<known_count>());
+    else
+      for (int k = first; k < end; ++k) function(k);
+  }
+};
+
+inline double bound_of(const RiccatiView& view, int i, int k) {
+  const long at = static_cast<long>(i) * view.stride + k;
+  return (view.sides[at] < 0 ? view.lower : view.upper)[at];
+}
+
+/// Where a stage's rows are.
+template <class Stage>
+struct Memory {
+  using R = typename Stage::R;
+  long stride;
+  const double *AB, *H, *h, *b, *P_next, *p_next;
+  double *P, *U, *V, *closed, *T, *inverse, *drift, *g, *p;
+  const std::int8_t* sides;
+
+  Memory(const RiccatiView& view, int i) : stride(Stage::stride_of(view)) {
+    const long at = i * stride, states = at * Stage::room_for_states(view),
+               controls = at * Stage::room_for_controls(view);
+    AB = view.AB + states;
+    H = view.H + states + controls;
+    h = view.h + at;
+    b = view.b + at;
+    P = view.P + states;
+    P_next = P + Stage::room_for_states(view) * stride;
+    p = view.p + at;
+    p_next = p + stride;
+    U = view.U + controls;
+    V = view.V + controls;
+    closed = view.closed + static_cast<long>(i) * 64;
+    T = view.T + static_cast<long>(i) * 64;
+    inverse = view.inverse + i * Stage::room_for_controls(view);
+    drift = view.drift + at;
+    g = view.g + at;
+    sides = view.sides + at;
+  }
+  RHEC_ALWAYS_INLINE R row(const double* rows, int r) const { return R::from(rows + r * stride); }
+};
+
+/// Rows of H + [A B]'P[A B]; those of the controls first, since what follows waits for them.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at,
+                                         typename Stage::R* X) {
+  using R = typename Stage::R;
+  R W[Stage::most_states];  // rows of P [A B]
+  stage.each_next_state([&](auto j) RHEC_ALWAYS_INLINE {
+    // Of what is moved, P is read from its lower triangle alone, and of what is carried beside it from its upper one,
+    // so that it stays symmetric.
+    R sums[2] = {at.row(at.P_next, j).between(stage.moved, stage.next_states), R{}};
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
+      const bool is_above = l < j || j >= stage.moved;
+      sums[l % R::chains].add(at.row(at.AB, l), is_above ? at.P_next[l * at.stride + j] : at.P_next[j * at.stride + l]);
+    });
+    W[j] = sums[0];
+    if (R::chains > 1) W[j].add(sums[1]);
+  });
+  const auto form = [&](auto k) RHEC_ALWAYS_INLINE {
+    R sums[2] = {at.row(at.H, k), R{}};
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(W[l], at.AB[l * at.stride + k]); });
+    if (k >= stage.moved && k < stage.next_states) sums[1].add(W[k]);
+    if (R::chains > 1 || stage.moved < stage.next_states) sums[0].add(sums[1]);
+    X[k] = sums[0];
+  };
+  stage.each_control_back(form);
+  stage.each_state(form);
+  if (view.diagonal) {
+    const auto add = [&](auto k)
+                         RHEC_ALWAYS_INLINE { X[k] = X[k].with(k, X[k].entry(k) + view.diagonal[i * at.stride + k]); };
+    stage.each_control(add);
+    stage.each_state(add);
+  }
+}
+
+/// What a solution needs of a stage, in an order in which one stage need not wait long for another: rows of the closed
+/// loop for gradients, columns of the dynamics and of the policy for steps. (Steps by the closed loop would be faster
+/// still, but where a policy is strong, next states would differ from what the dynamics make of state and control.)
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void close_loop(const Stage& stage, const Memory<Stage>& at, const typename Stage::R* policy,
+                                          bool for_steps) {
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
+    const double* AB = at.AB + l * at.stride;
+    Lanes row = load(AB);
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { row -= policy[k].part[0] * AB[k]; });
+    store(row, at.closed + l * 8);
+  });
+  if (!for_steps) return;
+  Lanes columns[8] = {};
+  stage.each_state([&](auto l) RHEC_ALWAYS_INLINE { columns[l] = at.row(at.AB, l).part[0]; });
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { columns[k] = -policy[k].part[0]; });
+  transpose(columns);
+  for (int k = 0; k < stage.columns; ++k) store(columns[k], at.T + k * 8);
+}
+
+/// Takes the controls out of X, one by one: what they owe to the state and to the controls before them goes to U, and X
+/// keeps their policies. False where they have no minimiser.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline bool eliminate_controls(const Stage& stage, const Memory<Stage>& at, bool any_fixed,
+                                                  double tolerance, typename Stage::R* X) {
+  using R = typename Stage::R;
+  double diagonal[Stage::most_columns];
+  bool is_definite = true;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { diagonal[k] = X[k].entry(k); });
+  if (any_fixed)
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+      if (at.sides[k] != 0) X[k].to(at.U + (k - stage.offset) * at.stride);
+    });
+  stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
+    const int control = k - stage.offset;
+    if (any_fixed && at.sides[k] != 0) {
+      at.inverse[control] = 0.0;
+      X[k] = R{};
+      return;
+    }
+    const double pivot = X[k].entry(k);
+    is_definite = is_definite && pivot > tolerance * diagonal[k] && pivot > 0.0;
+    const double reciprocal = 1.0 / pivot;
+    R row = X[k].first(k);
+    if (any_fixed)
+      stage.each_control_before(k, [&](auto f) RHEC_ALWAYS_INLINE {
+        if (at.sides[f] != 0) row.part[f / lane_count][f % lane_count] = 0.0;
+      });
+    row.to(at.U + control * at.stride);
+    at.inverse[control] = reciprocal;
+    R scaled{};
+    scaled.add(row, reciprocal);
+    const auto eliminate = [&](auto j) RHEC_ALWAYS_INLINE { X[j].add(row, -scaled.splat(j)); };
+    stage.each_control_before(k, eliminate);
+    stage.each_state(eliminate);
+    X[k] = scaled;
+  });
+  // From what each control owes to the state and to the controls before it, to what it owes to the state alone.
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    R policy = X[k].first(stage.states);
+    stage.each_control_before(k, [&](auto j) RHEC_ALWAYS_INLINE { policy.add(X[j], -X[k].splat(j)); });
+    X[k] = policy;
+  });
+  return is_definite;
+}
+
+/// The same of two free controls at once: what comes after waits for one division, and for little beside it.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline bool eliminate_pair(const Stage& stage, const Memory<Stage>& at, double tolerance,
+                                              typename Stage::R* X) {
+  using R = typename Stage::R;
+  constexpr Constant<Stage::most_states> first;
+  constexpr Constant<Stage::most_states + 1> second;
+  const double a = X[first].entry(first), b = X[second].entry(first), c = X[second].entry(second);
+  const double determinant = a * c - b * b, inverse = 1.0 / determinant, inverse_of_second = 1.0 / c;
+  R of_first = X[first].first(first), of_second = X[second].first(first), policies[2] = {};
+  policies[0].add(of_first, c);
+  policies[0].add(of_second, -b);
+  policies[1].add(of_second, a);
+  policies[1].add(of_first, -b);
+  for (R& policy : policies)
+    for (Lanes& part : policy.part) part *= inverse;
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE {
+    X[j].add(policies[0], -of_first.splat(j));
+    X[j].add(policies[1], -of_second.splat(j));
+  });
+  X[second].first(second).to(at.U + at.stride);
+  of_first.add(of_second, -b * inverse_of_second);
+  of_first.to(at.U);
+  at.inverse[0] = c * inverse;
+  at.inverse[1] = inverse_of_second;
+  X[first] = policies[0];
+  X[second] = policies[1];
+  return c > 0.0 && determinant > 0.0 && determinant > tolerance * (a * c);
+}
+
+template <class Stage>
+RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, double tolerance) {
+  using R = typename Stage::R;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  R X[Stage::most_columns];
+  form_rows(view, i, stage, at, X);
+  bool any_fixed = false;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { any_fixed |= at.sides[k] != 0; });
+  view.fixes[i] = any_fixed;
+  const auto eliminate = [&]() RHEC_ALWAYS_INLINE {
+    if constexpr (Stage::has_pair)
+      if (!any_fixed) return eliminate_pair(stage, at, tolerance, X);
+    return eliminate_controls(stage, at, any_fixed, tolerance, X);
+  };
+  if (!eliminate()) return false;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { X[k].to(at.V + (k - stage.offset) * at.stride); });
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { X[j].first(stage.states).to(at.P + j * at.stride); });
+  if (view.for_steps) {
+    R drift{};
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { drift.add(at.row(at.P_next, l), at.b[l]); });
+    drift.to(at.drift);
+  }
+  if constexpr (Stage::is_compact) close_loop(stage, at, X, view.for_steps);
+  return true;
+}
+
+/// Takes p of the next node and leaves p of this one: what was just written to memory takes a while to come back.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int i, typename Stage::R& p) {
+  using R = typename Stage::R;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  const auto subtract_policy = [&](R& sum, const R& gradient) RHEC_ALWAYS_INLINE {
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { sum.add(at.row(at.V, k - stage.offset), -gradient.splat(k)); });
+  };
+  R costate = p;
+  costate.add(R::from(at.drift));
+  R gradient;  // by the state (but in a closed loop) and the controls
+  if (Stage::is_compact && !view.fixes[i]) {
+    const R h = R::from(at.h);
+    R sums[2] = {h, costate.between(stage.moved, stage.next_states)};
+    subtract_policy(sums[0], h);
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % 2].add(R::from(at.closed + l * 8), costate.splat(l)); });
+    gradient = sums[0];
+    gradient.add(sums[1]);
+    p = gradient;
+  } else {
+    R sums[2] = {R::from(at.h), costate.between(stage.moved, stage.next_states)};
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.AB, l), costate.splat(l)); });
+    gradient = sums[0];
+    if (R::chains > 1 || stage.moved < stage.next_states) gradient.add(sums[1]);
+    if (view.fixes[i]) {
+      gradient.to(at.g);
+      stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+        if (at.sides[k] != 0) gradient.add(at.row(at.U, k - stage.offset), bound_of(view, i, k));
+      });
+    }
+    p = gradient;
+    subtract_policy(p, gradient);
+  }
+  p.to(at.p);
+  // What the controls do where the state does not step: eliminated from the last to the first, found in their order.
+  double own[Stage::most_columns];
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { own[k] = gradient.entry(k); });
+  stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
+    const double* U = at.U + (k - stage.offset) * at.stride;
+    own[k] *= at.inverse[k - stage.offset];
+    stage.each_control_before(k, [&](auto j) RHEC_ALWAYS_INLINE { own[j] -= U[j] * own[k]; });
+  });
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    const double* U = at.U + (k - stage.offset) * at.stride;
+    double sum = own[k];
+    stage.each_control_before(k,
+                              [&](auto j) RHEC_ALWAYS_INLINE { sum -= U[j] * at.inverse[k - stage.offset] * own[j]; });
+    own[k] = sum;
+    at.p[k] = -sum;
+  });
+  if (view.fixes[i])
+    for (int k = stage.offset; k < stage.columns; ++k)
+      if (at.sides[k] != 0) at.p[k] = bound_of(view, i, k);
+}
+
+/// Multipliers of the bounds at which a stage's controls are held.
+template <class Stage>
+inline void write_multipliers(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at) {
+  const double* z = view.values + i * at.stride;
+  double* bounds = view.bounds + i * at.stride;
+  for (int k = stage.offset; k < stage.columns; ++k) {
+    if (at.sides[k] == 0) continue;
+    const double* row = at.U + (k - stage.offset) * at.stride;
+    double sum = at.g[k];
+    for (int j = 0; j < stage.states; ++j) sum += row[j] * z[j];
+    for (int j = stage.offset; j < stage.columns; ++j) sum += row[j] * z[j];
+    bounds[k] = -sum;
+  }
+}
+
+/// Takes the state's step s and leaves that of the next node.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, double* s) {
+  using R = typename Stage::R;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  double *z = view.values + i * at.stride, *next = z + at.stride;
+  double w[Stage::most_columns], reached[Stage::most_states];
+  // In two sums, which do not wait for each other.
+  const auto dot = [&](const double* row) RHEC_ALWAYS_INLINE {
+    double sums[2] = {0.0, 0.0};
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % 2] += row[j] * s[j]; });
+    return sums[0] + sums[1];
+  };
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    w[k] = at.p[k] - dot(at.V + (k - stage.offset) * at.stride);
+    z[k] = w[k];
+  });
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
+    const double* AB = at.AB + l * at.stride;
+    double sum = at.b[l] + dot(AB);
+    stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { sum += AB[k] * w[k]; });
+    reached[l] = next[l] = sum;
+  });
+  R sums[2] = {R::from(at.p_next).first(stage.next_states), R{}};
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.P_next, l), reached[l]); });
+  if (R::chains > 1) sums[0].add(sums[1]);
+  sums[0].to(view.costates + (i + 1) * at.stride);
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { s[l] = reached[l]; });
+  if (view.fixes[i]) write_multipliers(view, i, stage, at);
+}
+
+/// The same in one register: [next state; control] is a sum of columns. What is carried is in a register of its own,
+/// too, for which nothing else has to wait.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, Row<1>& carried, Row<1>& s) {
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  const LaneMask is_state = lane_numbers < static_cast<long long>(stage.states);
+  Lanes sums[2] = {is_state ? load(at.b) : load(at.p), Lanes{}};
+  stage.each_carried([&](auto j) RHEC_ALWAYS_INLINE { sums[1] += load(at.T + j * 8) * carried.splat(j); });
+  stage.each_moved([&](auto j) RHEC_ALWAYS_INLINE { sums[j % 2] += load(at.T + j * 8) * s.splat(j); });
+  Row<1> next{{sums[0] + sums[1]}};
+  double* z = view.values + i * at.stride;
+  store(is_state ? s.part[0] : next.part[0], z);
+  const Row<1> reached = next;
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { next.part[0] += load(at.T + k * 8) * reached.splat(k); });
+  s.part[0] = is_state ? next.part[0] : Lanes{};
+  carried.part[0] += load(at.b);
+  store(s.part[0], z + at.stride);
+  Lanes costates[2] = {Row<1>::from(at.p_next).first(stage.states).part[0], Lanes{}};
+  stage.each_state([&](auto l) RHEC_ALWAYS_INLINE { costates[l % 2] += at.row(at.P_next, l).part[0] * s.splat(l); });
+  store(costates[0] + costates[1], view.costates + (i + 1) * at.stride);
+  if (view.fixes[i]) write_multipliers(view, i, stage, at);
+}
+
+/// One entry of the rows of a batch of responses.
+using Batch = Row<response_batch / lane_count>;
+
+template <class Stage>
+inline void respond_stage_backward(const RiccatiView& view, int i, bool has_gradient, bool has_next,
+                                   double* gradients) {
+  const Stage stage(view, i);
+  const long stride = view.stride;
+  const double* AB = view.AB + i * view.states * stride;
+  const double* U = view.U + i * view.controls * stride;
+  const double* inverse = view.inverse + i * view.controls;
+  const std::int8_t* sides = view.sides + i * stride;
+  double* own = gradients + i * stride * response_batch;
+  const double* next = own + stride * response_batch;
+  Batch costates[Stage::most_states], gradient[Stage::most_columns];
+  for (int l = 0; l < stage.next_states; ++l) costates[l] = has_next ? Batch::from(next + l * response_batch) : Batch{};
+  const auto form = [&](int k) {
+    gradient[k] = has_gradient ? Batch::from(own + k * response_batch) : Batch{};
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { gradient[k].add(costates[l], AB[l * stride + k]); });
+    if (k >= stage.moved && k < stage.next_states) gradient[k].add(costates[k]);
+  };
+  for (int k = stage.offset; k < stage.columns; ++k) {
+    form(k);
+    gradient[k].to(own + k * response_batch);
+  }
+  for (int k = 0; k < stage.states; ++k) form(k);
+  for (int k = stage.columns - 1; k >= stage.offset; --k) {
+    if (sides[k] != 0) continue;
+    const double* column = U + (k - stage.offset) * stride;
+    Batch of_control{};
+    of_control.add(gradient[k], -inverse[k - stage.offset]);
+    for (int j = stage.offset; j < k; ++j) gradient[j].add(of_control, column[j]);
+    for (int j = 0; j < stage.states; ++j) gradient[j].add(of_control, column[j]);
+    gradient[k].to(own + k * response_batch);
+  }
+  for (int k = 0; k < stage.states; ++k) gradient[k].to(own + k * response_batch);
+}
+
+template <class Stage>
+inline void respond_stage_forward(const RiccatiView& view, int i, int last, double* responses, double* costates) {
+  const Stage stage(view, i);
+  const long stride = view.stride;
+  const double* AB = view.AB + i * view.states * stride;
+  const double* U = view.U + i * view.controls * stride;
+  const double* inverse = view.inverse + i * view.controls;
+  const std::int8_t* sides = view.sides + i * stride;
+  double* own = responses + i * stride * response_batch;
+  double* next = own + stride * response_batch;
+  // Behind the last gradient those of the value functions are zero, and so are those of controls.
+  const auto gradient_at = [](const double* row, int entry, bool is_there) RHEC_ALWAYS_INLINE {
+    return is_there ? Batch::from(row + entry * response_batch) : Batch{};
+  };
+  Batch z[Stage::most_columns];
+  for (int j = 0; j < stage.states; ++j) z[j] = Batch::from(own + j * response_batch);
+  for (int k = stage.offset; k < stage.columns; ++k) {
+    z[k] = {};
+    if (sides[k] != 0) continue;
+    const double* column = U + (k - stage.offset) * stride;
+    Batch sum = gradient_at(own, k, i <= last);
+    for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
+    for (int j = stage.offset; j < k; ++j) sum.add(z[j], column[j]);
+    z[k].add(sum, -inverse[k - stage.offset]);
+  }
+  Batch next_state[Stage::most_states];
+  for (int l = 0; l < stage.next_states; ++l) {
+    next_state[l] = {};
+    if (l >= stage.moved) {
+      next_state[l] = z[l];
+      continue;
+    }
+    for (int j = 0; j < stage.states; ++j) next_state[l].add(z[j], AB[l * stride + j]);
+    for (int k = stage.offset; k < stage.columns; ++k) next_state[l].add(z[k], AB[l * stride + k]);
+  }
+  const double* P_next = view.P + (i + 1) * view.states * stride;
+  for (int l = 0; l < stage.next_states; ++l) {
+    Batch sum = gradient_at(next, l, i < last);
+    for (int j = 0; j < stage.next_states; ++j) sum.add(next_state[j], P_next[l * stride + j]);
+    sum.to(costates + ((i + 1) * stride + l) * response_batch);
+  }
+  for (int l = 0; l < stage.next_states; ++l) next_state[l].to(next + l * response_batch);
+  for (int k = stage.offset; k < stage.columns; ++k) {
+    Batch answer = z[k];
+    if (sides[k] != 0) {
+      // What a fixed control answers with is its multiplier.
+      const double* column = U + (k - stage.offset) * stride;
+      Batch sum = gradient_at(own, k, i <= last);
+      for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
+      for (int j = stage.offset; j < stage.columns; ++j) sum.add(z[j], column[j]);
+      answer = {};
+      answer.add(sum, -1.0);
+    }
+    answer.to(own + k * response_batch);
+  }
+}
+
+/// Calls `function` with the type of a stage's shape: one of the sizes that kernels are compiled for, or any. Those are
+/// the stages of estimators and controllers with two inputs: of vehicles with three to five states, whose other states
+/// are parameters, between the starts of blocks, which hand those on; and of the most usual ones where blocks start.
+/// How long rows are decides nothing else: a program gives the same bits in one of another capacity.
+template <bool is_written_out, class Function>
+inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
+  const int states = view.states, controls = view.control_counts[i], carried = view.identity_counts[i];
+  const bool is_full = view.state_counts[i] == states && view.state_counts[i + 1] == states;
+  if (is_full && view.stride == 8 && controls == 2) {
+    if (states == 5 && carried == 2) return function.template operator()<Shape<1, 5, 2, true, 2, 8>>();
+    if (states == 6 && carried == 2) return function.template operator()<Shape<1, 6, 2, true, 2, 8>>();
+    if (states == 6) return function.template operator()<Shape<1, 6, 2, true, 0, 8>>();
+  }
+  if (is_full && view.stride == 16) {
+    if (controls == 2) {
+      if (states == 5 && carried == 2) return function.template operator()<Shape<1, 5, 2, true, 2, 16>>();
+      if (states == 6 && carried == 2) return function.template operator()<Shape<1, 6, 2, true, 2, 16>>();
+      if (states == 6) return function.template operator()<Shape<1, 6, 2, true, 0, 16>>();
+      if (states == 7 && carried == 3) return function.template operator()<Shape<2, 7, 2, is_written_out, 3, 16>>();
+      if (states == 8 && carried == 3) return function.template operator()<Shape<2, 8, 2, is_written_out, 3, 16>>();
+    }
+    if (states == 6 && controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out, 0, 16>>();
+    if (states == 6 && controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out, 0, 16>>();
+  }
+  const int columns = states + controls;
+  if (columns <= 8) return function.template operator()<Shape<1, 0, 0>>();
+  if (columns <= 16) return function.template operator()<Shape<2, 0, 0>>();
+  if (columns <= 24) return function.template operator()<Shape<3, 0, 0>>();  // rows are no longer than that then
+  if (columns <= 32) return function.template operator()<Shape<4, 0, 0>>();
+  return function.template operator()<Shape<8, 0, 0>>();
+}
+
+// Whole matrices of long rows fit into the widest registers only; written out for others, they are moved to memory and
+// back.
+constexpr bool matrices_fit = lane_count == 8;
+
+/// Whether stage j can be treated in one go with stage i.
+inline bool is_alike(const RiccatiView& view, int i, int j) {
+  return view.special[j] == 0 && view.control_counts[j] == view.control_counts[i] &&
+         view.identity_counts[j] == view.identity_counts[i] && view.state_counts[j] == view.state_counts[i] &&
+         view.state_counts[j + 1] == view.state_counts[i + 1];
+}
+
+int factor(const RiccatiView& view, int first, double tolerance) {
+  for (int i = first; i >= 0;) {
+    if (view.special[i]) return i;
+    const bool done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+      const int alike = i;
+      do
+        if (!factor_stage<Stage>(view, i, tolerance)) return false;
+      while (--i >= 0 && is_alike(view, alike, i));
+      return true;
+    });
+    if (!done) return i;
+  }
+  return -1;
+}
+
+int solve_backward(const RiccatiView& view, int first) {
+  for (int i = first; i >= 0;) {
+    if (view.special[i]) return i;
+    with_shape<true>(view, i, [&]<class Stage>() {
+      const int alike = i;
+      auto p = Stage::R::from(view.p + static_cast<long>(i + 1) * view.stride);
+      do solve_stage_backward<Stage>(view, i, p);
+      while (--i >= 0 && is_alike(view, alike, i));
+    });
+  }
+  return -1;
+}
+
+int solve_forward(const RiccatiView& view, int first) {
+  for (int i = first; i < view.intervals;) {
+    if (view.special[i]) return i;
+    with_shape<true>(view, i, [&]<class Stage>() {
+      const int alike = i;
+      const double* first_state = view.values + static_cast<long>(i) * view.stride;
+      if constexpr (Stage::is_compact) {
+        Row<1> s = Row<1>::from(first_state), carried = s;
+        do solve_stage_forward<Stage>(view, i, carried, s);
+        while (++i < view.intervals && is_alike(view, alike, i));
+      } else {
+        double s[Stage::most_states];
+        for (int j = 0; j < view.state_counts[i]; ++j) s[j] = first_state[j];
+        do solve_stage_forward<Stage>(view, i, s);
+        while (++i < view.intervals && is_alike(view, alike, i));
+      }
+    });
+  }
+  return view.intervals;
+}
+
+void respond_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
+  for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0; --i)
+    with_shape<true>(view, i, [&]<class Stage>() {
+      respond_stage_backward<Stage>(view, i, has_gradient[i] != 0, i < last, gradients);
+    });
+}
+
+void respond_forward(const RiccatiView& view, int last, double* responses, double* costates) {
+  for (int i = 0; i < view.intervals; ++i)
+    with_shape<true>(view, i, [&]<class Stage>() { respond_stage_forward<Stage>(view, i, last, responses, costates); });
+}
+
+void combine(const double* batch, const double* weights, double* sums, long count) {
+  static_assert(response_batch == 8);
+  const Batch weight = Batch::from(weights);
+  for (long k = 0; k < count; k += 8, batch += 8 * response_batch) {
+    Lanes of_entry[8];
+    for (int j = 0; j < 8; ++j) {
+      const Batch entry = Batch::from(batch + j * response_batch);
+      of_entry[j] = entry.part[0] * weight.part[0];
+      for (int v = 1; v < response_batch / lane_count; ++v) of_entry[j] += entry.part[v] * weight.part[v];
+    }
+    add_sums_of(of_entry, sums + k);
+  }
+}
+
+/// Of a row, what belongs to states.
+template <class Stage>
+using StateRow = Row<Stage::state_registers>;
+
+/// Sigma of the next node from that of stage i, in its place: A Sigma A' + B cov(w | s) B', with A the dynamics under
+/// the policy.
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, StateRow<Stage>* rows) {
+  using R = StateRow<Stage>;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  // The dynamics under the policy, in memory: from there single entries cost no more than whole registers.
+  alignas(64) double closed_rows[Stage::is_compact ? 1 : Stage::most_states * Stage::most_columns];
+  const double* const closed = Stage::is_compact ? at.closed : closed_rows;
+  constexpr int width = Stage::is_compact ? 8 : Stage::most_columns;
+  if constexpr (!Stage::is_compact) {
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
+      R row = R::from(at.AB + l * at.stride).first(stage.states);
+      stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+        row.add(R::from(at.V + (k - stage.offset) * at.stride), -at.AB[l * at.stride + k]);
+      });
+      row.to(closed_rows + l * width);
+    });
+  }
+  // What the controls bring in, which waits for no stage before this one.
+  R next[Stage::most_states] = {};
+  R effects[Stage::most_columns];  // columns of B
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    if constexpr (Stage::is_known) {
+      effects[k] = R{};
+      stage.each_next_state([&](auto l)
+                                RHEC_ALWAYS_INLINE { effects[k] = effects[k].with(l, at.AB[l * at.stride + k]); });
+    } else {
+      double column[Stage::most_columns] = {};
+      for (int l = 0; l < stage.next_states; ++l) column[l] = at.AB[l * at.stride + k];
+      effects[k] = R::from(column);
+    }
+  });
+  // What is left of a control's variance when those before it are known moves the later ones too.
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    double moved[Stage::most_columns] = {};
+    moved[k] = 1.0;
+    R noise = effects[k];
+    for (int j = k + 1; j < stage.columns; ++j) {
+      for (int before = k; before < j; ++before)
+        moved[j] -= at.U[(j - stage.offset) * at.stride + before] * at.inverse[j - stage.offset] * moved[before];
+      noise.add(effects[j], moved[j]);
+    }
+    const double variance = 2.0 * at.inverse[k - stage.offset];
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l].add(noise, noise.splat(l) * variance); });
+  });
+  // Of a row of the dynamics, `start` and the sum of `terms`, each by its entry.
+  const auto combine_by = [&](auto l, const R* terms, const R& start) RHEC_ALWAYS_INLINE {
+    R sums[2] = {start, R{}};
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % R::chains].add(terms[j], closed[l * width + j]); });
+    if (R::chains > 1) sums[0].add(sums[1]);
+    return sums[0];
+  };
+  R products[Stage::most_columns] = {};
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { products[l] = combine_by(l, rows, R{}); });
+  stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { products[l] = rows[l]; });
+  // Of the products, columns are needed.
+  constexpr bool is_one_register = Stage::state_registers == 1 && lane_count == 8;
+  R columns[Stage::most_columns] = {};
+  if constexpr (is_one_register) {
+    Lanes lanes[8];
+    for (int l = 0; l < 8; ++l) lanes[l] = products[l].part[0];
+    transpose(lanes);
+    for (int j = 0; j < 8; ++j) columns[j].part[0] = lanes[j];
+  } else {
+    double transposed[Stage::most_states][Stage::most_columns] = {};
+    for (int l = 0; l < stage.next_states; ++l)
+      for (int j = 0; j < stage.states; ++j) transposed[j][l] = products[l].entry(j);
+    for (int j = 0; j < stage.states; ++j) columns[j] = R::from(transposed[j]);
+  }
+  stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l] = combine_by(l, columns, next[l]); });
+  stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { next[l] = columns[l]; });
+  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { rows[l] = next[l].first(stage.next_states); });
+}
+
+int carry_covariance(const RiccatiView& view, int first, double* covariance, double* all) {
+  for (int i = first; i < view.intervals;) {
+    if (view.special[i]) return i;
+    with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+      const int alike = i, states = view.state_counts[i], next_states = view.state_counts[i + 1];
+      StateRow<Stage> rows[Stage::most_states];
+      for (int j = 0; j < states; ++j) rows[j] = StateRow<Stage>::from(covariance + j * view.stride);
+      do carry_stage<Stage>(view, i, rows);
+      while (++i < view.intervals && !all && next_states == states && is_alike(view, alike, i));
+      for (int l = 0; l < next_states; ++l) rows[l].to(covariance + l * view.stride);
+    });
+    if (!all) continue;
+    double* block = all + static_cast<long>(i) * view.states * view.states;
+    for (int c = 0; c < view.states; ++c)
+      for (int r = 0; r < view.states; ++r) block[c * view.states + r] = covariance[c * view.stride + r];
+  }
+  return view.intervals;
+}
+
+void form(const RiccatiView& view, int i, double* out) {
+  with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+    typename Stage::R X[Stage::most_columns]{};
+    const Stage stage(view, i);
+    form_rows(view, i, stage, Memory<Stage>(view, i), X);
+    for (int k = 0; k < stage.columns; ++k) X[k].to(out + static_cast<long>(k) * view.stride);
+  });
+}
+
+template <class Stage>
+RHEC_ALWAYS_INLINE inline bool invert_rows(const Stage& stage, const double* matrix, long stride, double tolerance,
+                                           double* inverse) {
+  using R = typename Stage::R;
+  R rows[Stage::most_states];
+  double least[Stage::most_states];
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE {
+    rows[j] = R::from(matrix + j * stride).first(stage.states);
+    least[j] = tolerance * rows[j].entry(j);
+  });
+  bool is_definite = true;
+  stage.each_state([&](auto k) RHEC_ALWAYS_INLINE {
+    const double pivot = rows[k].entry(k);
+    is_definite = is_definite && pivot > least[k] && pivot > 0.0;
+    R scaled{};
+    scaled.add(rows[k].with(k, 1.0), 1.0 / pivot);
+    stage.each_state([&](auto j) RHEC_ALWAYS_INLINE {
+      if (j == k) return;
+      const double factor = rows[j].entry(k);
+      rows[j] = rows[j].with(k, 0.0);
+      rows[j].add(scaled, -factor);
+    });
+    rows[k] = scaled;
+  });
+  if (!is_definite) return false;
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { rows[j].to(inverse + j * stride); });
+  return true;
+}
+
+template <class Stage>
+RHEC_ALWAYS_INLINE inline void solve_rows(const Stage& stage, const double* matrix, const double* inverse, long stride,
+                                          const double* p, double* x) {
+  using R = typename Stage::R;
+  const auto product = [&](const double* rows, const R& factors, R start) RHEC_ALWAYS_INLINE {
+    R sums[2] = {start, R{}};
+    stage.each_state([&](auto j)
+                         RHEC_ALWAYS_INLINE { sums[j % R::chains].add(R::from(rows + j * stride), factors.splat(j)); });
+    if (R::chains > 1) sums[0].add(sums[1]);
+    return sums[0];
+  };
+  const R right = R::from(p).first(stage.states), first = product(inverse, right, R{});
+  R rest{};  // matrix x + p = p - matrix first
+  rest.add(product(matrix, first, R{}), -1.0);
+  rest.add(right);
+  R solution{};
+  solution.add(product(inverse, rest, first), -1.0);
+  solution.first(stage.states).to(x);
+}
+
+/// Calls `function` with a shape of `count` states, however long their rows are; false where those are too many.
+template <class Function>
+inline bool with_states(int count, const Function& function) {
+  if (count == 5) return function.template operator()<Shape<1, 5, 0>>();
+  if (count == 6) return function.template operator()<Shape<1, 6, 0>>();
+  if (count == 7) return function.template operator()<Shape<1, 7, 0>>();
+  if (count == 8) return function.template operator()<Shape<1, 8, 0>>();
+  if (count <= 8) return function.template operator()<Shape<1, 0, 0>>();
+  if (count <= 16) return function.template operator()<Shape<2, 0, 0>>();
+  return false;
+}
+
+bool invert(const double* matrix, int count, int stride, double tolerance, double* inverse) {
+  return with_states(count,
+                     [&]<class Stage>() { return invert_rows(Stage(count), matrix, stride, tolerance, inverse); });
+}
+
+void answer(const double* inverse, int count, int stride, double* batch) {
+  Batch gradients[32];
+  for (int j = 0; j < count; ++j) gradients[j] = Batch::from(batch + j * response_batch);
+  for (int j = 0; j < count; ++j) {
+    Batch sum{};
+    for (int k = 0; k < count; ++k) sum.add(gradients[k], -inverse[j * stride + k]);
+    sum.to(batch + j * response_batch);
+  }
+}
+
+void solve(const double* matrix, const double* inverse, int count, int stride, const double* p, double* x) {
+  with_states(count, [&]<class Stage>() {
+    solve_rows(Stage(count), matrix, inverse, stride, p, x);
+    return true;
+  });
+}
+
+}  // namespace
+}  // namespace kernels
+
+#define RHEC_JOIN(a, b) a##b
+#define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
+extern const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET);
+constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {&kernels::factor,
+                                                                         &kernels::solve_backward,
+                                                                         &kernels::solve_forward,
+                                                                         &kernels::respond_backward,
+                                                                         &kernels::respond_forward,
+                                                                         &kernels::combine,
+                                                                         &kernels::carry_covariance,
+                                                                         &kernels::form,
+                                                                         &kernels::invert,
+                                                                         &kernels::answer,
+                                                                         &kernels::solve};
+
+}  // namespace rhec

@@ -1,0 +1,144 @@
+#include "rhec/core/model/chosen_outputs.hpp"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+
+namespace rhec {
+namespace {
+
+/// Asks the model for all of its outputs, some nodes at a time, and hands on those that were chosen.
+class ChosenOutputs final : public Model {
+ public:
+  ChosenOutputs(std::shared_ptr<Model> model, std::vector<int> chosen)
+      : model_(std::move(model)), chosen_(std::move(chosen)), description_(model_->description()) {
+    all_ = model_->output_count();
+    const std::size_t a_node = static_cast<std::size_t>(all_) * (static_cast<std::size_t>(model_->state_count()) + 2);
+    if (a_node > room)
+      throw Error(
+          fmt::format("model '{}': {} outputs of {} states are too many to choose from; expected at most {} "
+                      "derivatives",
+                      description_.name, all_, model_->state_count(), room));
+    nodes_at_once_ = static_cast<int>(room / std::max<std::size_t>(a_node, 1));
+    description_.outputs.clear();
+    for (const int output : chosen_) description_.outputs.push_back(model_->description().outputs[output]);
+  }
+
+  const ModelDescription& description() const noexcept override { return description_; }
+  void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
+  void integrate_rows(const IntervalRows& request) const noexcept override { model_->integrate_rows(request); }
+  void observe_rows(const NodeRows& request) const noexcept override {
+    if (request.chosen) return observe_some(request);
+    observe_of_all(request, chosen_.data(), static_cast<int>(chosen_.size()));
+  }
+  std::size_t rows_scratch(int count) const noexcept override { return model_->rows_scratch(count); }
+  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
+    model_->rates(x, u, p, dxdt);
+  }
+  void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept override {
+    model_->straight_motion(ground_speed, p, state, inputs);
+  }
+  bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
+  std::vector<std::string> instruction_sets() const override { return model_->instruction_sets(); }
+  bool use_instruction_set(const std::string& name) override { return model_->use_instruction_set(name); }
+
+  void observe(const Nodes& request) const noexcept override {
+    const std::ptrdiff_t nx = state_count(), ny = output_count();
+    std::array<double, room> buffer;
+    double* const outputs = buffer.data();
+    double* const jacobians = outputs + static_cast<std::ptrdiff_t>(nodes_at_once_) * all_;
+    double* const multipliers = jacobians + nodes_at_once_ * all_ * nx;
+    for (int first = 0; first < request.count; first += nodes_at_once_) {
+      const int count = std::min(nodes_at_once_, request.count - first);
+      Nodes part;
+      part.count = count;
+      part.states = request.states + first * nx;
+      if (request.outputs) part.outputs = outputs;
+      if (request.jacobians) part.jacobians = jacobians;
+      if (request.hessians) {
+        std::fill_n(multipliers, count * all_, 0.0);
+        for (int i = 0; i < count; ++i)
+          for (int j = 0; j < ny; ++j) multipliers[i * all_ + chosen_[j]] = request.multipliers[(first + i) * ny + j];
+        part.multipliers = multipliers;
+        part.hessians = request.hessians + first * nx * nx;
+      }
+      model_->observe(part);
+      for (int i = 0; i < count; ++i) {
+        if (request.outputs) pick(outputs + i * all_, 1, request.outputs + (first + i) * ny);
+        if (request.jacobians)
+          pick(jacobians + i * all_ * nx, static_cast<int>(nx), request.jacobians + (first + i) * ny * nx);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t room = 4096;  ///< doubles on the stack
+
+  /// Some of the chosen ones.
+  void observe_some(const NodeRows& request) const noexcept {
+    std::array<int, room> chosen;
+    for (int j = 0; j < request.chosen_count; ++j) chosen[j] = chosen_[request.chosen[j]];
+    observe_of_all(request, chosen.data(), request.chosen_count);
+  }
+  /// Member by member: a copy of what has just been written waits until that has reached the cache.
+  void observe_of_all(const NodeRows& request, const int* chosen, int count) const noexcept {
+    model_->observe_rows({.count = request.count,
+                          .states = request.states,
+                          .state_step = request.state_step,
+                          .chosen = chosen,
+                          .chosen_count = count,
+                          .outputs = request.outputs,
+                          .output_step = request.output_step,
+                          .jacobians = request.jacobians,
+                          .jacobian_row = request.jacobian_row,
+                          .multipliers = request.multipliers,
+                          .multiplier_step = request.multiplier_step,
+                          .hessians = request.hessians,
+                          .hessian_step = request.hessian_step,
+                          .hessian_row = request.hessian_row,
+                          .scratch = request.scratch});
+  }
+  /// Columns of all outputs -> columns of the chosen ones.
+  void pick(const double* all, int columns, double* chosen) const noexcept {
+    for (int c = 0; c < columns; ++c, all += all_)
+      for (const int output : chosen_) *chosen++ = all[output];
+  }
+
+  std::shared_ptr<Model> model_;
+  std::vector<int> chosen_;
+  ModelDescription description_;
+  int all_ = 0, nodes_at_once_ = 1;
+};
+
+}  // namespace
+
+std::vector<int> usual_outputs(const ModelDescription& about) {
+  std::vector<int> usual;
+  for (std::size_t j = 0; j < about.outputs.size(); ++j)
+    if (about.outputs[j].usual) usual.push_back(static_cast<int>(j));
+  return usual;
+}
+
+std::shared_ptr<Model> with_outputs(std::shared_ptr<Model> model, const std::vector<int>& chosen) {
+  const ModelDescription& about = model->description();
+  std::vector<bool> seen(about.outputs.size(), false);
+  for (const int output : chosen) {
+    if (output < 0 || output >= model->output_count())
+      throw Error(fmt::format("model '{}': output {} chosen; it has {}, counted from 0", about.name, output,
+                              model->output_count()));
+    if (seen[output])
+      throw Error(fmt::format("model '{}': output '{}' chosen twice", about.name, about.outputs[output].name));
+    seen[output] = true;
+  }
+  std::vector<int> all(about.outputs.size());
+  std::iota(all.begin(), all.end(), 0);
+  if (chosen == all) return model;
+  return std::make_shared<ChosenOutputs>(std::move(model), chosen);
+}
+
+}  // namespace rhec

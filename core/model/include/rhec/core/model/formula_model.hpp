@@ -1,0 +1,126 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rhec/core/model/row_kernels.hpp"
+
+namespace rhec {
+
+/// Kernels for instruction sets wider than the one that the program is compiled for; null where they were not built.
+/// `rhec_add_model(<name> ...)` in CMake defines `rhec::WideKernels <name>_wide_kernels()` for its model.
+struct WideKernels {
+  const ModelKernels* avx2 = nullptr;
+  const ModelKernels* avx512 = nullptr;
+};
+
+/// How many variables of each kind a formula has.
+struct FormulaCounts {
+  int states, inputs, parameters, outputs;
+};
+/// Throws Error where a description has others, or gives a role to a variable that is not there.
+RHEC_EXPORT void check_description(const ModelDescription& description, const FormulaCounts& counts);
+
+/// A number that no formula computes: what results hold before they are written.
+RHEC_EXPORT double unwritten_result() noexcept;
+/// Throws Error where of the results of a function of a formula ("dynamics" or "outputs"), which all were unwritten and
+/// are followed by `result_guard` more, some still are, or one behind the last is not.
+inline constexpr int result_guard = 8;
+RHEC_EXPORT void check_results(const ModelDescription& description, const char* function,
+                               const std::vector<Variable>& variables, const std::vector<double>& results);
+
+/// Makes a Model out of one formula. All else (integration, first and second derivatives, evaluation of several stages
+/// at once) is derived. `Formula` is
+///
+///     struct Formula {
+///       static constexpr int state_count, input_count, parameter_count, output_count;
+///       template <class Scalar> void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const;
+///       template <class Scalar> void outputs(const Scalar* x, Scalar* y) const;
+///     };
+///
+/// where Scalar behaves like a double: + - * /, sqrt exp log sin cos tan tanh asin acos atan atan2, the latter called
+/// without `std::` after a `using std::sin;`. It is no double: a formula does not compare, and decides nothing by
+/// values. With both functions `constexpr` the compiler finds out which derivatives are always zero, and leaves them
+/// out: a step takes less time.
+template <class Formula>
+class FormulaModel : public Model {
+ public:
+  /// Throws Error where the description has other numbers of variables than the formula.
+  explicit FormulaModel(Formula formula, ModelDescription description, WideKernels wide = {})
+      : formula_(std::move(formula)), description_(std::move(description)) {
+    check_description(description_, {.states = Formula::state_count,
+                                     .inputs = Formula::input_count,
+                                     .parameters = Formula::parameter_count,
+                                     .outputs = Formula::output_count});
+    check_written();
+    static constexpr ModelKernels generic = make_model_kernels<Formula, double>();
+    add("generic", &generic);
+#if defined(__x86_64__)
+    // All that the kernels are compiled with (cmake/RhecModel.cmake), not just what names the instruction set.
+    const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
+                            __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
+                            __builtin_cpu_supports("avx512vl");
+    if (wide.avx2 && has_avx2) add("avx2", wide.avx2);
+    if (wide.avx512 && has_avx2 && has_avx512) add("avx512", wide.avx512);
+#else
+    static_cast<void>(wide);
+#endif
+  }
+
+  const ModelDescription& description() const noexcept override { return description_; }
+  void integrate(const Intervals& request) const noexcept override { kernels_->integrate(&formula_, request); }
+  void observe(const Nodes& request) const noexcept override { kernels_->observe(&formula_, request); }
+  void integrate_rows(const IntervalRows& request) const noexcept override {
+    if (!kernels_->integrate_rows || request.substeps != 1 || request.ramp || !request.jacobians)
+      return Model::integrate_rows(request);
+    kernels_->integrate_rows(&formula_, request);
+  }
+  void observe_rows(const NodeRows& request) const noexcept override {
+    if (!kernels_->observe_rows) return Model::observe_rows(request);
+    kernels_->observe_rows(&formula_, request);
+  }
+  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
+    formula_.dynamics(x, u, p, dxdt);
+  }
+  bool has_second_derivatives() const noexcept override { return true; }
+
+  std::vector<std::string> instruction_sets() const override {
+    std::vector<std::string> names;
+    for (const auto& [name, kernels] : available_) names.push_back(name);
+    return names;
+  }
+  bool use_instruction_set(const std::string& wanted) override {
+    for (const auto& [name, kernels] : available_) {
+      if (name != wanted) continue;
+      kernels_ = kernels;
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  /// Calls the formula once to see what it writes: a result that it forgets would be whatever was in memory.
+  void check_written() const {
+    const auto room = [](int count) { return std::vector<double>(count + result_guard, unwritten_result()); };
+    const std::vector<double> x(Formula::state_count, 0.1), u(Formula::input_count, 0.1);
+    std::vector<double> p = nominal_values(description_.parameters), rates = room(Formula::state_count),
+                        outputs = room(Formula::output_count);
+    formula_.dynamics(x.data(), u.data(), p.data(), rates.data());
+    check_results(description_, "dynamics", description_.states, rates);
+    formula_.outputs(x.data(), outputs.data());
+    check_results(description_, "outputs", description_.outputs, outputs);
+  }
+  void add(std::string name, const ModelKernels* kernels) {
+    available_.emplace_back(std::move(name), kernels);
+    kernels_ = kernels;
+  }
+
+  Formula formula_;
+  ModelDescription description_;
+  std::vector<std::pair<std::string, const ModelKernels*>> available_;
+  const ModelKernels* kernels_ = nullptr;
+};
+
+}  // namespace rhec

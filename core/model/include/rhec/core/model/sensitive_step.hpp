@@ -1,0 +1,200 @@
+#pragma once
+
+#include "rhec/core/model/step_pattern.hpp"
+
+namespace rhec::kernels {
+
+/// One step of the classical Runge-Kutta method with its derivatives by z = [x; p; u]. Derivatives are taken of f
+/// alone, along the directions that f depends on, and carried through the step by the chain rule. With the stages f_k =
+/// f(x_k, p, u), x_{k+1} = x + c_{k+1} h f_k:
+///
+///     dx_{k+1}/dz = dx/dz + c_{k+1} h (df_k/d(x, p, u)) S_k,      S_k = d(x_k, p, u)/dz
+///
+/// In sum_r weights_r F_r the weight of f_k is  mu_4 = h/6 weights,  mu_k = b_k h weights + c_{k+1} h (df_{k+1}/dx)'
+/// mu_{k+1}, and the sum's Hessian is  sum_k S_k' (sum_r mu_{k,r} d2f_r/d(x, p, u)2) S_k. What the formula's pattern
+/// says to be zero is not computed.
+template <class Formula, class Lane, bool with_hessian>
+class SensitiveStep {
+ public:
+  using Pattern = StepPattern<Formula>;
+  static constexpr int nx = Pattern::nx, np = Pattern::np, nu = Pattern::nu, nz = Pattern::nz;
+  static constexpr bool has_hessian = with_hessian;
+
+  Lane z[nz], h, weights[nx];  ///< to be set; without a Hessian the weights are not looked at
+  Lane next[nx], jacobian[nx][nz], hessian[with_hessian ? nz : 1][with_hessian ? nz : 1];
+
+  /// Steps from places that have nothing to do with each other; taken together, none waits for the others.
+  static void take(const Formula& formula, int count, SensitiveStep* steps) {
+    for_indices<4>([&](auto k) RHEC_INLINE {
+      for (int i = 0; i < count; ++i) steps[i].template evaluate<k>(formula);
+    });
+    for (int i = 0; i < count; ++i) steps[i].finish();
+  }
+
+ private:
+  void finish() {
+    for_indices<nx>([&](auto r) RHEC_INLINE {
+      next[r] = z[r] +
+                h * (Lane(1.0 / 6.0) * (rates_[0][r] + rates_[3][r]) + Lane(1.0 / 3.0) * (rates_[1][r] + rates_[2][r]));
+      for_indices<nz>([&](auto j) RHEC_INLINE {
+        Lane sum(0.0);
+        if constexpr (!with_hessian && (Pattern::rates_depend(r) >> j & 1) != 0) sum = jacobian[r][j];
+        for_indices<4>([&](auto k) RHEC_INLINE {
+          if constexpr (with_hessian && Pattern::template rate_depends<k>(r, j))
+            sum = sum + Lane(share[k]) * slopes_[k][r][j];
+        });
+        jacobian[r][j] = h * sum + Lane(r == j ? 1.0 : 0.0);
+      });
+    });
+    if constexpr (with_hessian) bend();
+  }
+
+  static constexpr double reach[4] = {0.0, 0.5, 0.5, 1.0}, share[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  using Number = SecondOrder<Lane, Pattern::pattern.directions, with_hessian ? Pattern::pattern.curved : 0>;
+
+  /// Where derivatives of f_k are kept. Without a Hessian nobody asks for them once the next stage is through, and what
+  /// they add to the Jacobian is added at once: a step that stays small leaves the processor's cache to the rest.
+  static constexpr int slot(int k) { return with_hessian ? k : k % 2; }
+  static constexpr int slots = with_hessian ? 4 : 2;
+  /// Adds the share of what has been found of f_k.
+  template <int k, int r, int j>
+  RHEC_INLINE void add_share(const Lane& slope) {
+    if constexpr (with_hessian || Pattern::is_argument(r)) slopes_[slot(k)][r][j] = slope;
+    if constexpr (!with_hessian) {
+      if constexpr (k > 0 && Pattern::template rate_depends<k - (k > 0)>(r, j))
+        jacobian[r][j] = jacobian[r][j] + Lane(share[k]) * slope;
+      else
+        jacobian[r][j] = Lane(share[k]) * slope;
+    }
+  }
+
+  /// d(argument a of f_k)/dz_j, where it can be other than zero.
+  template <int k, int a, int j>
+  RHEC_INLINE Lane sensitivity() const {
+    if constexpr (a >= nx || k == 0) {
+      return Lane(1.0);
+    } else {
+      Lane value(a == j ? 1.0 : 0.0);
+      if constexpr (Pattern::template rate_depends<k - 1>(a, j))
+        value = value + h * Lane(reach[k]) * slopes_[slot(k - 1)][a][j];
+      return value;
+    }
+  }
+
+  template <int k>
+  [[gnu::flatten]] void evaluate(const Formula& formula) {
+    Number x[nx], p[room_for(np)], u[room_for(nu)];
+    const auto set = [&]<int a>(std::integral_constant<int, a>, Number& number, const Lane& value) RHEC_INLINE {
+      if constexpr (Pattern::pattern.direction_of[a] >= 0)
+        number = Number::template variable<Pattern::pattern.direction_of[a]>(value);
+      else
+        number = Number(value);
+    };
+    for_indices<nx>([&](auto r) RHEC_INLINE {
+      Lane value = z[r];
+      if constexpr (k > 0) value = value + h * Lane(reach[k]) * rates_[k - 1][r];
+      set(r, x[r], value);
+    });
+    for_indices<np>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + j>(), p[j], z[nx + j]); });
+    for_indices<nu>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + np + j>(), u[j], z[nx + np + j]); });
+    // Only what can be other than zero is kept, so that the compiler leaves out what only leads to the rest.
+    Number f[nx];
+    formula.dynamics(static_cast<const Number*>(x), static_cast<const Number*>(u), static_cast<const Number*>(p), f);
+    for_indices<nx>([&](auto r) RHEC_INLINE {
+      rates_[k][r] = f[r].value;
+      for_indices<nz>([&](auto a) RHEC_INLINE {
+        if constexpr (Pattern::pattern.first[r] >> a & 1)
+          first_[slot(k)][Pattern::first_place(r, a)] = f[r].d[Pattern::pattern.direction_of[a]];
+        for_indices<a + 1>([&](auto b) RHEC_INLINE {
+          if constexpr (with_hessian && Pattern::bends(r, a, b))
+            second_[k][Pattern::second_place(r, a, b)] = f[r].dd[Pattern::pair_of_directions(a, b)];
+        });
+      });
+    });
+    for_indices<nx>([&](auto r) RHEC_INLINE {
+      for_indices<nz>([&](auto j) RHEC_INLINE {
+        if constexpr (Pattern::template rate_depends<k>(r, j)) {
+          Lane sum(0.0);
+          for_indices<nz>([&](auto a) RHEC_INLINE {
+            if constexpr ((Pattern::pattern.first[r] >> a & 1) && Pattern::template argument_depends<k>(a, j))
+              sum = sum + first_[slot(k)][Pattern::first_place(r, a)] * sensitivity<k, a, j>();
+          });
+          add_share<k, r, j>(sum);
+        }
+      });
+    });
+  }
+
+  void bend() {
+    for (auto& row : hessian)
+      for (Lane& entry : row) entry = Lane(0.0);
+    Lane mu[nx];
+    for_indices<4>([&](auto backwards) RHEC_INLINE {
+      constexpr int k = 3 - backwards;
+      Lane now[nx];
+      for_indices<nx>([&](auto c) RHEC_INLINE {
+        now[c] = h * Lane(share[k]) * weights[c];
+        if constexpr (k < 3) {
+          Lane pulled(0.0);
+          for_indices<nx>([&](auto r) RHEC_INLINE {
+            if constexpr (Pattern::pattern.first[r] >> c & 1)
+              pulled = pulled + first_[slot(k + 1)][Pattern::first_place(r, c)] * mu[r];
+          });
+          now[c] = now[c] + h * Lane(reach[k + 1]) * pulled;
+        }
+      });
+      for_indices<nx>([&](auto r) RHEC_INLINE { mu[r] = now[r]; });
+      add_curvature<k>(mu);
+    });
+    for (int i = 0; i < nz; ++i)
+      for (int j = 0; j < i; ++j) hessian[j][i] = hessian[i][j];
+  }
+
+  /// Adds S_k' (sum_r mu_r d2f_r) S_k to the lower triangle.
+  template <int k>
+  void add_curvature(const Lane* mu) {
+    for_indices<nz>([&](auto b) RHEC_INLINE {
+      if constexpr (Pattern::pattern.second[b] != 0) {
+        Lane second[nz];
+        for_indices<nz>([&](auto a) RHEC_INLINE {
+          if constexpr (Pattern::curves(b, a)) {
+            Lane sum(0.0);
+            for_indices<nx>([&](auto r) RHEC_INLINE {
+              if constexpr (Pattern::bends(r, a, b)) sum = sum + mu[r] * second_[k][Pattern::second_place(r, a, b)];
+            });
+            second[a] = sum;
+          }
+        });
+        for_indices<nz>([&](auto j) RHEC_INLINE {
+          // (d2f S)_{b, j}
+          if constexpr (any_curves<k>(b, j)) {
+            Lane product(0.0);
+            for_indices<nz>([&](auto a) RHEC_INLINE {
+              if constexpr (Pattern::curves(b, a) && Pattern::template argument_depends<k>(a, j))
+                product = product + second[a] * sensitivity<k, a, j>();
+            });
+            for_indices<nz>([&](auto i) RHEC_INLINE {
+              if constexpr (i >= j && Pattern::template argument_depends<k>(b, i))
+                hessian[i][j] = hessian[i][j] + sensitivity<k, b, i>() * product;
+            });
+          }
+        });
+      }
+    });
+  }
+  template <int k>
+  static constexpr bool any_curves(int b, int j) {
+    for (int a = 0; a < nz; ++a)
+      if (Pattern::curves(b, a) && Pattern::template argument_depends<k>(a, j)) return true;
+    return false;
+  }
+
+  static constexpr int first_count = Pattern::first_place(nx, 0);
+  static constexpr int second_count = with_hessian ? Pattern::second_place(nx, 0, 0) : 0;
+  Lane rates_[4][nx];                                          ///< f_k
+  Lane first_[slots][room_for(first_count)];                   ///< df_k/d(x, p, u)
+  Lane second_[with_hessian ? 4 : 1][room_for(second_count)];  ///< d2f_k/d(x, p, u)2, each pair once
+  Lane slopes_[slots][nx][nz];                                 ///< df_k/dz
+};
+
+}  // namespace rhec::kernels

@@ -1,0 +1,78 @@
+#include "rhec/core/ocp/point.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rhec {
+
+bool is_finite(const Ocp& ocp, const Iterate& point) noexcept {
+  double rest = 0.0;  // stays 0 as long as all is finite
+  const auto check = [&](const double* row, int n) {
+    double of_row = 0.0;  // no row waits for another
+    for (int j = 0; j < n; ++j) of_row += 0.0 * row[j];
+    rest += of_row;
+  };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    const int n = ocp.state_count(i), m = i < ocp.intervals() ? ocp.control_count(i) : 0;
+    for (const double* row : {point.state(i), point.costate(i), point.state_bound(i)}) check(row, n);
+    if (m == 0) continue;
+    for (const double* row : {point.control(i), point.control_bound(i)}) check(row, m);
+  }
+  return rest == 0.0;
+}
+
+namespace {
+
+bool bounds_are_numbers(const Ocp& ocp) noexcept {
+  bool numbers = true;
+  const auto check = [&](const double* row, int n) {
+    for (int j = 0; j < n; ++j) numbers = numbers && !std::isnan(row[j]);
+  };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    for (const double* row : {ocp.state_lower(i), ocp.state_upper(i)}) check(row, ocp.state_count(i));
+    if (i < ocp.intervals())
+      for (const double* row : {ocp.control_lower(i), ocp.control_upper(i)}) check(row, ocp.control_count(i));
+  }
+  return numbers;
+}
+
+}  // namespace
+
+bool has_sound_numbers(const Ocp& ocp, const Iterate& point) noexcept {
+  return point.capacity() == ocp.capacity() && is_finite(ocp, point) && bounds_are_numbers(ocp);
+}
+
+bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept {
+  return has_sound_numbers(ocp, point) && std::isfinite(ocp.evaluate(point, nullptr, scratch));
+}
+
+double largest_costate(const Ocp& ocp, const Iterate& point) noexcept {
+  double largest = 0.0;
+  for (int i = 1; i <= ocp.intervals(); ++i)
+    for (int j = 0, n = ocp.state_count(i); j < n; ++j) largest = std::max(largest, std::abs(point.costate(i)[j]));
+  return largest;
+}
+
+double largest_bound_multiplier(const Ocp& ocp, const Iterate& point) noexcept {
+  double largest = 0.0;
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    const int n = ocp.state_count(i), m = i < ocp.intervals() ? ocp.control_count(i) : 0;
+    for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(point.state_bound(i)[j]));
+    for (int j = 0; j < m; ++j) largest = std::max(largest, std::abs(point.control_bound(i)[j]));
+  }
+  return largest;
+}
+
+double total_violation(const Ocp& ocp, const Iterate& point) noexcept {
+  double total = 0.0;
+  const auto add = [&](const double* value, const double* lower, const double* upper, int n) {
+    for (int j = 0; j < n; ++j) total += std::max({0.0, lower[j] - value[j], value[j] - upper[j]});
+  };
+  for (int i = 0; i <= ocp.intervals(); ++i) {
+    add(point.state(i), ocp.state_lower(i), ocp.state_upper(i), ocp.state_count(i));
+    if (i < ocp.intervals()) add(point.control(i), ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
+  }
+  return total;
+}
+
+}  // namespace rhec

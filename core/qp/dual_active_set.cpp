@@ -1,0 +1,562 @@
+#include "rhec/core/qp/dual_active_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "rhec/core/qp/stage_checks.hpp"
+#include "tolerances.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+// A bound whose gradient is, to this part of its own curvature, one of the others' depends on them.
+constexpr double dependence = 1e-10;
+// Active bounds are met to this part of the tolerance for violated ones before a solution is taken.
+constexpr double exactness = 0.1;
+// With more violated at once there is little hope to be done within the changes that are provided for.
+constexpr int max_violated = 2 * DualActiveSet::max_columns;
+// Solutions with a set that does not change any more, before rounding is to blame; of those, first ones that are put
+// together from responses.
+constexpr int max_refinements = 4, max_combined = 2;
+
+/// In four sums, none of which waits for the others.
+double dot(const double* a, const double* b, int count) noexcept {
+  double sums[4] = {};
+  int k = 0;
+  for (; k + 4 <= count; k += 4)
+    for (int j = 0; j < 4; ++j) sums[j] += a[k + j] * b[k + j];
+  for (; k < count; ++k) sums[0] += a[k] * b[k];
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
+/// Calls function(number) for the batches of which something is wanted.
+template <class Weights, class Function>
+void for_each_weighted(const Weights& weights, const Function& function) {
+  const auto is_zero = [](double weight) { return weight == 0.0; };
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    if (!std::all_of(weights[k].begin(), weights[k].end(), is_zero)) function(static_cast<int>(k));
+}
+
+}  // namespace
+
+DualActiveSet::DualActiveSet(const Capacity& capacity)
+    : states_(capacity.states), stride_(capacity.row()), held_(capacity), claimed_(capacity), policy_step_(capacity) {
+  const std::size_t most = (static_cast<std::size_t>(capacity.intervals) + 1) * capacity.row();
+  for (auto* v : {&value_, &direction_, &violation_, &least_, &most_, &h_}) v->assign(most, 0.0);
+  hold_.assign(most, Hold::free);
+  side_.assign(most, 0);
+  number_.assign(most, none);
+  held_places_.reserve(most);
+  batches_.resize(batch_count);
+  for (Batch& batch : batches_) batch.responses = Riccati::Responses(capacity);
+  for (auto* places : {&columns_, &base_places_}) places->reserve(max_columns);
+  for (auto* v : {&multipliers_, &base_multipliers_}) v->assign(max_columns, 0.0);
+  factor_.assign(static_cast<std::size_t>(max_columns) * max_columns, 0.0);
+}
+
+bool DualActiveSet::is_equality_bound(int place) const noexcept { return is_equality(lower_[place], upper_[place]); }
+
+/// A bound is active no more. What its tolerance is, `take_bounds` will say, or says so here.
+void DualActiveSet::let_go(int place) noexcept {
+  hold_[place] = Hold::free;
+  if (!has_bounds_) return;
+  least_[place] = lower_[place] - bound_tolerance * (1.0 + std::abs(lower_[place]));
+  most_[place] = upper_[place] + bound_tolerance * (1.0 + std::abs(upper_[place]));
+}
+
+void DualActiveSet::take_claims(const StageQp& qp, const ActiveSet& claimed) noexcept {
+  claimed.for_each([&](int stage, int j, std::int8_t side) {
+    if (stage > qp.intervals() || !std::isfinite((side < 0 ? qp.lower(stage) : qp.upper(stage))[j])) return;
+    const bool is_given = stage == 0 && qp.initial_state_is_given;
+    if (j < states_ ? is_given || j >= qp.states(stage) : j >= states_ + qp.controls(stage)) return;
+    const int place = stage * stride_ + j;
+    if (j >= states_) {
+      hold_[place] = Hold::held;
+      held_.row(stage)[j] = side;
+      held_places_.push_back(place);
+    } else if (column_count() < max_columns) {
+      hold_[place] = Hold::column;
+      multipliers_[column_count()] = 0.0;
+      columns_.push_back(place);
+    }
+    side_[place] = side;
+  });
+}
+
+/// The bounds as they are now; false where one that is active has gone.
+bool DualActiveSet::take_bounds(const StageQp& qp) noexcept {
+  has_bounds_ = true;
+  lower_ = qp.lower(0);
+  upper_ = qp.upper(0);
+  widen_bounds(lower_, upper_, bound_tolerance, places_, least_.data(), most_.data());
+  bool are_there = true;
+  const auto leave_out = [&](int place) {
+    least_[place] = -infinity;
+    most_[place] = infinity;
+  };
+  for (const auto* places : {&held_places_, &columns_}) {
+    for (const int place : *places) {
+      leave_out(place);
+      are_there = are_there && std::isfinite(bound(place));
+    }
+  }
+  for (int j = 0; qp.initial_state_is_given && j < states_; ++j) leave_out(j);
+  return are_there;
+}
+
+void DualActiveSet::factor(const StageQp& qp, Riccati& riccati) noexcept {
+  riccati.factor(qp, held_);
+  ++factorisations_;
+  is_convex_ = !riccati.was_convexified();
+  has_base_ = false;
+  for (Batch& batch : batches_) {
+    for (int c = 0; c < batch.count; ++c) number_[batch.of[c]] = none;
+    batch.count = 0;
+  }
+}
+
+void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed) noexcept {
+  factorisations_ = 0;
+  has_bounds_ = false;
+  for (const auto* places : {&held_places_, &columns_})
+    for (const int place : *places) let_go(place);
+  held_.clear();
+  held_places_.clear();
+  columns_.clear();
+  places_ = (qp.intervals() + 1) * stride_;
+  if (claimed) take_claims(qp, *claimed);
+  factor(qp, riccati);
+  if (!claimed || !is_convex_ || !take_bounds(qp)) return;
+  // Claims are mostly those of a sample before: in control some bound beside them will be next. Where the vehicle was
+  // going to be is known, and how near that is to its bounds.
+  if (qp.initial_state_is_given && column_count() < batch_size) {
+    std::fill_n(value_.data(), places_, 0.0);
+    find_violations();
+    find_responses_of_next(qp, riccati, columns_.data(), column_count());
+  } else {
+    find_responses_of_columns(qp, riccati, 0);
+  }
+  has_bounds_ = false;
+}
+
+/// Factorises anew without the held bounds that have been released; columns of controls are held from now on, and those
+/// that are left have no responses yet.
+bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
+  held_.clear();
+  int kept = 0;
+  for (int k = 0; k < column_count(); ++k) {
+    const int place = columns_[k];
+    if (is_control(place)) {
+      hold_[place] = Hold::held;
+      held_places_.push_back(place);
+      value_[place] = multipliers_[k];
+    } else {
+      columns_[kept] = place;
+      multipliers_[kept++] = multipliers_[k];
+    }
+  }
+  columns_.resize(kept);
+  for (const int place : held_places_) held_.row(place / stride_)[place % stride_] = side_[place];
+  factor(qp, riccati);
+  return is_convex_;
+}
+
+/// Of one batch, which takes the place of one that no column needs.
+bool DualActiveSet::find_responses(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept {
+  const auto choose = [&] {
+    int batch = 0;
+    while (batch < batch_count && is_needed(batch, places, count)) ++batch;
+    return batch;
+  };
+  int chosen = choose();
+  if (chosen == batch_count) {
+    // Columns are everywhere: put together, they leave a batch.
+    for (int k = 0; k < batch_count; ++k) forget(k);
+    if (!find_responses_of_columns(qp, riccati, 0)) return false;
+    chosen = choose();
+  }
+  Batch& batch = batches_[chosen];
+  Riccati::Entry gradients[batch_size] = {};
+  for (int c = 0; c < count; ++c) gradients[c] = {places[c] / stride_, places[c] % stride_};
+  if (!riccati.respond(qp, held_, gradients, count, batch.responses)) return false;
+  forget(chosen);
+  batch.count = count;
+  std::copy_n(places, count, batch.of.begin());
+  for (int c = 0; c < count; ++c) number_[places[c]] = chosen * batch_size + c;
+  return true;
+}
+
+/// Whether a column has its responses there, other than those that are asked for anew.
+bool DualActiveSet::is_needed(int batch, const int* places, int count) const noexcept {
+  for (int c = 0; c < batches_[batch].count; ++c) {
+    const int place = batches_[batch].of[c];
+    if (hold_[place] == Hold::column && number_[place] == batch * batch_size + c &&
+        std::find(places, places + count, place) == places + count)
+      return true;
+  }
+  return false;
+}
+
+void DualActiveSet::forget(int batch) noexcept {
+  for (int c = 0; c < batches_[batch].count; ++c) {
+    int& number = number_[batches_[batch].of[c]];
+    if (number == batch * batch_size + c) number = none;
+  }
+  batches_[batch].count = 0;
+}
+
+bool DualActiveSet::find_responses_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept {
+  for (; first < column_count(); first += batch_size)
+    if (!find_responses(qp, riccati, columns_.data() + first, std::min(batch_size, column_count() - first)))
+      return false;
+  return true;
+}
+
+/// Of the first ones, and in the same time of those that may be next: the most violated ones, or nearest to being so.
+/// `find_violations` has looked at all.
+bool DualActiveSet::find_responses_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count) noexcept {
+  std::array<int, batch_size> places{};
+  std::copy_n(first, count, places.begin());
+  const int given = count;
+  double least = -infinity;  // of those that have been chosen, once there is no room
+  for (int place = 0; place < places_; ++place) {
+    if (!(violation_[place] > least) || number_[place] != none) continue;
+    if (std::find(first, first + given, place) != first + given) continue;
+    if (count < batch_size) ++count;
+    int at = count - 1;
+    for (; at > given && violation_[places[at - 1]] < violation_[place]; --at) places[at] = places[at - 1];
+    places[at] = place;
+    if (count == batch_size) least = violation_[places[batch_size - 1]];
+  }
+  return find_responses(qp, riccati, places.data(), count);
+}
+
+/// Adds to values the responses, each by its weight.
+void DualActiveSet::add_responses(const Riccati& riccati, const Weights& weights,
+                                  std::vector<double>& sums) const noexcept {
+  for_each_weighted(weights,
+                    [&](int k) { riccati.add_values(batches_[k].responses, weights[k].data(), places_, sums.data()); });
+}
+
+/// The row of the factor that a bound would add below `count` others; returns the square of its diagonal entry, or 0
+/// where it depends on them.
+double DualActiveSet::eliminate(int entering, int count, double* row) const noexcept {
+  double left = -response(entering, entering);
+  const double least = dependence * left;
+  for (int k = 0; k < count; ++k) {
+    const double* above = factor_row(k);
+    row[k] = (-response(entering, columns_[k]) - dot(above, row, k)) * above[k];
+    left -= row[k] * row[k];
+  }
+  return left > least && least > 0.0 ? left : 0.0;
+}
+
+/// x := L'^-1 x.
+void DualActiveSet::back_substitute(double* x) const noexcept {
+  for (int k = column_count() - 1; k >= 0; --k) {
+    const double* row = factor_row(k);
+    x[k] *= row[k];
+    for (int l = 0; l < k; ++l) x[l] -= row[l] * x[k];
+  }
+}
+
+/// The Cholesky factor of S from row `first` on, with reciprocals on its diagonal. Columns that depend on those before
+/// are left out, or make this fail.
+bool DualActiveSet::factor_columns(int first, bool may_leave_out) noexcept {
+  int kept = first;
+  for (int k = first; k < column_count(); ++k) {
+    double* row = factor_row(kept);
+    const double square = eliminate(columns_[k], kept, row);
+    if (square == 0.0) {
+      if (!may_leave_out) return false;
+      let_go(columns_[k]);
+      continue;
+    }
+    row[kept] = 1.0 / std::sqrt(square);
+    columns_[kept] = columns_[k];
+    multipliers_[kept++] = multipliers_[k];
+  }
+  columns_.resize(kept);
+  return true;
+}
+
+void DualActiveSet::drop_column(int k) noexcept {
+  let_go(columns_[k]);
+  columns_.erase(columns_.begin() + k);
+  std::copy(multipliers_.begin() + k + 1, multipliers_.begin() + column_count() + 1, multipliers_.begin() + k);
+  // What is left of a positive definite system is no less so.
+  factor_columns(k, true);
+}
+
+/// Brings a step from the multipliers that it was found with to the present ones; false where some have no responses.
+bool DualActiveSet::combine(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept {
+  if (!has_base_) return false;
+  const auto has_responses = [this](int place) { return number_[place] != none; };
+  if (!std::all_of(columns_.begin(), columns_.end(), has_responses) ||
+      !std::all_of(base_places_.begin(), base_places_.end(), has_responses))
+    return false;
+  Weights weights{};
+  for (int k = 0; k < column_count(); ++k) weight_of(columns_[k], weights) += multipliers_[k];
+  for (std::size_t k = 0; k < base_places_.size(); ++k) weight_of(base_places_[k], weights) -= base_multipliers_[k];
+  for_each_weighted(weights,
+                    [&](int k) { riccati.combine(qp, held_, batches_[k].responses, weights[k].data(), step); });
+  has_policy_ = false;
+  return true;
+}
+
+/// The minimiser for the held bounds and the multipliers of the columns, by the factorisation; false where there is
+/// none.
+bool DualActiveSet::solve_with_multipliers(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept {
+  const double* h = nullptr;
+  if (column_count() > 0) {
+    std::copy_n(qp.h(0), places_, h_.begin());
+    for (int k = 0; k < column_count(); ++k) h_[columns_[k]] += multipliers_[k];
+    h = h_.data();
+  }
+  has_policy_ = true;
+  return riccati.solve(qp, held_, step, h) == Riccati::Outcome::done;
+}
+
+void DualActiveSet::complete_policy(const StageQp& qp, Riccati& riccati) noexcept {
+  if (!has_policy_) solve_with_multipliers(qp, riccati, policy_step_);
+}
+
+/// By how much the bound of a column is missed, relative to what a bound may be violated by.
+double DualActiveSet::largest_miss() const noexcept {
+  double largest = 0.0;
+  for (const int place : columns_)
+    largest =
+        std::max(largest, std::abs(value_[place] - bound(place)) / (bound_tolerance * (1.0 + std::abs(bound(place)))));
+  return largest;
+}
+
+/// Moves the multipliers of the columns so that their bounds are met.
+void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
+  double change[max_columns];
+  const int count = column_count();
+  for (int k = 0; k < count; ++k) {
+    const double* row = factor_row(k);
+    change[k] = (value_[columns_[k]] - bound(columns_[k]) - dot(row, change, k)) * row[k];
+  }
+  back_substitute(change);
+  Weights weights{};
+  for (int k = 0; k < count; ++k) {
+    multipliers_[k] += change[k];
+    weight_of(columns_[k], weights) = change[k];
+  }
+  add_responses(riccati, weights, value_);
+}
+
+bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
+  bool any = false;
+  Weights weights{};
+  for (int k = column_count() - 1; k >= 0; --k) {
+    const int place = columns_[k];
+    if (side_[place] * multipliers_[k] >= -pull_tolerance_ || is_equality_bound(place)) continue;
+    weight_of(place, weights) = -multipliers_[k];
+    drop_column(k);
+    any = true;
+    ++changes_;
+  }
+  if (any) add_responses(riccati, weights, value_);
+  return any;
+}
+
+bool DualActiveSet::release_wrong_held() noexcept {
+  return std::erase_if(held_places_, [this](int place) {
+           if (side_[place] * value_[place] >= -pull_tolerance_ || is_equality_bound(place)) return false;
+           let_go(place);
+           ++changes_;
+           return true;
+         }) > 0;
+}
+
+/// Makes the set dual feasible; true where that takes another factorisation.
+bool DualActiveSet::drop_wrong(const Riccati& riccati) noexcept {
+  while (drop_wrong_columns(riccati)) return_to_bounds(riccati);
+  return release_wrong_held();
+}
+
+/// Of the bounds that are not active.
+DualActiveSet::Violations DualActiveSet::find_violations() noexcept {
+  const auto [largest, count] =
+      rhec::find_violations(value_.data(), least_.data(), most_.data(), places_, violation_.data());
+  if (count == 0) return {};
+  const auto worst = std::find(violation_.begin(), violation_.begin() + places_, largest);
+  return {static_cast<int>(worst - violation_.begin()), count};
+}
+
+/// All violated bounds of controls that have responses become columns at once: those are mostly right. Not so with
+/// states, of which one bound often keeps a whole run.
+bool DualActiveSet::add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept {
+  if (number_[worst] == none && !find_responses_of_next(qp, riccati, &worst, 1)) return false;
+  for (const Batch& batch : batches_) {
+    for (int c = 0; c < batch.count && column_count() < max_columns; ++c) {
+      const int place = batch.of[c];
+      if (!is_control(place) || hold_[place] != Hold::free || number_[place] == none || !(violation_[place] > 0.0))
+        continue;
+      const int count = column_count();
+      const double square = eliminate(place, count, factor_row(count));
+      if (square == 0.0) continue;
+      side_[place] = value_[place] < lower_[place] ? std::int8_t{-1} : std::int8_t{1};
+      append_column(place, square, 0.0);
+      ++changes_;
+    }
+  }
+  return_to_bounds(riccati);
+  return true;
+}
+
+/// The row of the factor is there but for its diagonal.
+void DualActiveSet::append_column(int place, double square, double multiplier) noexcept {
+  const int count = column_count();
+  hold_[place] = Hold::column;
+  least_[place] = -infinity;
+  most_[place] = infinity;
+  columns_.push_back(place);
+  multipliers_[count] = multiplier;
+  factor_row(count)[count] = 1.0 / std::sqrt(square);
+}
+
+DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, int entering,
+                                          Clock::time_point deadline) noexcept {
+  const int side = value_[entering] < lower_[entering] ? -1 : 1;
+  side_[entering] = static_cast<std::int8_t>(side);
+  double multiplier = 0.0;
+  for (;;) {
+    if (++changes_ > max_changes) return Outcome::too_much;
+    if (is_past(deadline)) return Outcome::out_of_time;
+    if (number_[entering] == none && !find_responses_of_next(qp, riccati, &entering, 1)) return Outcome::too_much;
+    // How values and multipliers change while that of the entering bound grows and the active ones stay met.
+    const int count = column_count();
+    double pull[max_columns], row[max_columns];
+    const double square = eliminate(entering, count, row);
+    std::copy_n(row, count, pull);
+    back_substitute(pull);
+    Weights weights{};
+    weight_of(entering, weights) = side;
+    for (int k = 0; k < count; ++k) {
+      pull[k] *= side;
+      weight_of(columns_[k], weights) = -pull[k];
+    }
+    std::fill_n(direction_.data(), places_, 0.0);
+    add_responses(riccati, weights, direction_);
+    // Until its bound is met, or a multiplier has gone.
+    double length = square > 0.0 ? side * (value_[entering] - bound(entering)) / square : infinity;
+    int blocking_column = none, blocking_held = none;
+    for (int k = 0; k < count; ++k) {
+      const int other = columns_[k];
+      const double loss = side_[other] * pull[k];
+      if (!(loss > 0.0) || is_equality_bound(other)) continue;
+      const double until = std::max(side_[other] * multipliers_[k], 0.0) / loss;
+      if (until < length) length = until, blocking_column = k;
+    }
+    for (const int other : held_places_) {
+      const double loss = -side_[other] * direction_[other];
+      if (!(loss > 0.0) || is_equality_bound(other)) continue;
+      const double until = std::max(side_[other] * value_[other], 0.0) / loss;
+      if (until < length) length = until, blocking_held = other;
+    }
+    if (length == infinity) return Outcome::no_solution;
+    multiplier += side * length;
+    for (int k = 0; k < count; ++k) multipliers_[k] -= length * pull[k];
+    for (int k = 0; k < places_; ++k) value_[k] += length * direction_[k];
+    if (blocking_held != none) {
+      std::erase(held_places_, blocking_held);
+      let_go(blocking_held);
+      value_[blocking_held] = bound(blocking_held);
+      if (!refactor(qp, riccati)) return Outcome::not_convex;
+      find_violations();
+      if (!find_responses_of_columns(qp, riccati, 0) || !factor_columns(0, false)) return Outcome::too_much;
+    } else if (blocking_column != none) {
+      drop_column(blocking_column);
+    } else {
+      if (count == max_columns) return Outcome::too_much;
+      value_[entering] = bound(entering);
+      std::copy_n(row, count, factor_row(count));
+      append_column(entering, square, multiplier);
+      return Outcome::solved;
+    }
+  }
+}
+
+/// Where the present multipliers lead.
+DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& riccati, bool may_combine,
+                                                Iterate& step) noexcept {
+  if (column_count() > 0 && number_[columns_[0]] == none && !find_responses_of_columns(qp, riccati, 0))
+    return Found::nothing;
+  if (!has_base_) factor_columns(0, true);
+  if (!(may_combine && combine(qp, riccati, step)) && !solve_with_multipliers(qp, riccati, step)) return Found::nothing;
+  has_base_ = true;
+  base_places_ = columns_;
+  std::copy_n(multipliers_.begin(), column_count(), base_multipliers_.begin());
+  const StepCheck check = check_step(qp, step, bound_tolerance);
+  if (!check.is_finite) return Found::nothing;
+  pull_tolerance_ = multiplier_tolerance * (1.0 + check.largest_costate);
+  if (columns_.empty() && held_places_.empty() && !check.violates) return Found::step;
+  if (!has_bounds_) take_bounds(qp);
+  std::copy_n(step.row(0), places_, value_.begin());
+  for (const int place : held_places_) value_[place] = step.bound_row(0)[place];
+  if (largest_miss() <= exactness) return check.violates ? Found::values : Found::step;
+  return_to_bounds(riccati);
+  return Found::values;
+}
+
+DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
+                                            Clock::time_point deadline) noexcept {
+  const bool has_claims = !columns_.empty() || !held_places_.empty();
+  if (has_claims && !take_bounds(qp)) {
+    claimed_ = active;
+    prepare(qp, riccati, &claimed_);
+    take_bounds(qp);
+  }
+  changes_ = 0;
+  pull_tolerance_ = multiplier_tolerance;
+  bool may_add_together = true;
+  for (int refinements = 0; refinements < max_refinements; ++refinements) {
+    if (!is_convex_) return Outcome::not_convex;
+    const int changes_before = changes_;
+    const Found found = find_values(qp, riccati, refinements < max_combined, step);
+    if (found == Found::nothing) return Outcome::too_much;
+    if (found == Found::step && columns_.empty() && held_places_.empty()) {
+      write(active, step);
+      return Outcome::solved;
+    }
+    bool needs_factor = drop_wrong(riccati);
+    Violations violations = find_violations();
+    if (violations.count > max_violated) return Outcome::too_much;
+    if (!needs_factor && may_add_together && violations.worst != none) {
+      may_add_together = false;
+      if (!add_controls_together(qp, riccati, violations.worst)) return Outcome::too_much;
+      needs_factor = drop_wrong(riccati);
+      violations = find_violations();
+    }
+    if (needs_factor) {
+      if (changes_ > max_changes) return Outcome::too_much;
+      if (is_past(deadline)) return Outcome::out_of_time;
+      if (!refactor(qp, riccati)) return Outcome::not_convex;
+    }
+    for (; !needs_factor && violations.worst != none; violations = find_violations())
+      if (const Outcome outcome = add(qp, riccati, violations.worst, deadline); outcome != Outcome::solved)
+        return outcome;
+    if (needs_factor || changes_ > changes_before) {
+      refinements = 0;
+    } else if (found == Found::step) {
+      write(active, step);
+      return Outcome::solved;
+    }
+  }
+  return Outcome::too_much;
+}
+
+void DualActiveSet::write(ActiveSet& active, Iterate& step) const noexcept {
+  active.clear();
+  for (const auto* places : {&held_places_, &columns_})
+    for (const int place : *places) active.row(place / stride_)[place % stride_] = side_[place];
+  for (int k = 0; k < column_count(); ++k) step.bound_row(0)[columns_[k]] = multipliers_[k];
+}
+
+}  // namespace rhec

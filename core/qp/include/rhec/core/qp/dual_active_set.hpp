@@ -1,0 +1,145 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "rhec/core/base/clock.hpp"
+#include "rhec/core/qp/riccati.hpp"
+
+namespace rhec {
+
+/// Solves a strictly convex StageQp with all its bounds, exactly, by a dual active-set method (Goldfarb & Idnani 1983,
+/// "A numerically stable dual method for solving strictly convex quadratic programs").
+///
+/// What pulls the wrong way in the claimed active set is dropped, until all multipliers have their sign. From there the
+/// most violated bound is added, one at a time, by a step that keeps the signs: it drops the bound whose multiplier
+/// comes to zero first. The dual objective grows with each step, so that this ends.
+///
+/// A change of the set costs no factorisation, in general. Claimed bounds of controls are held inside the Riccati
+/// factorisation, at no cost. Every other active bound is a multiplier in the gradient: with the responses W of the
+/// minimiser to the gradients A of these bounds, the multipliers solve the small dense system S = -A'W, whose Cholesky
+/// factor grows and shrinks with the set. Only where a held bound is dropped is the program factorised anew. Responses
+/// come in batches, at once those of the bounds that may be next; where there is a claim, before the vectors are known.
+///
+/// A variable is known by its place in the rows of all stages, as those of an Iterate.
+class RHEC_EXPORT DualActiveSet {
+ public:
+  enum class Outcome {
+    solved,
+    not_convex,   ///< without its state bounds the program has no minimiser: it has to be convexified first
+    no_solution,  ///< the bounds contradict each other, as far as can be seen here
+    too_much,     ///< more changes than are provided for, or rounding: another method has to do it
+    out_of_time
+  };
+  /// At most so many active bounds beside the held ones, and so many changes of the set.
+  static constexpr int max_columns = 32, max_changes = 96;
+
+  DualActiveSet() = default;
+  explicit DualActiveSet(const Capacity& capacity);
+
+  /// What needs the program's matrices only: the factorisation with the claimed set (null: none), and responses.
+  void prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed) noexcept;
+  /// After `prepare`, with the program's vectors as they are now. Where solved, the set goes to `active` and the
+  /// minimiser, its costates and multipliers to `step`. The deadline is looked at before every change of the set.
+  Outcome solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
+                Clock::time_point deadline) noexcept;
+  /// After `solve`: has the factorisation give its policy too (Riccati::feedback), which a solution may come without.
+  void complete_policy(const StageQp& qp, Riccati& riccati) noexcept;
+  /// Since the last `prepare`.
+  int factorisations() const noexcept { return factorisations_; }
+
+ private:
+  enum class Hold : std::uint8_t { free, held, column };
+  enum class Found { nothing, values, step };
+  static constexpr int none = -1, batch_size = Riccati::Responses::size;
+  /// Room for all columns and for those that may be next.
+  static constexpr int batch_count = max_columns / batch_size + 1;
+  struct Batch {
+    Riccati::Responses responses;
+    std::array<int, batch_size> of{};  ///< places
+    int count = 0;
+  };
+  struct Violations {
+    int worst = none, count = 0;
+  };
+  using Weights = std::array<std::array<double, batch_size>, batch_count>;
+
+  void take_claims(const StageQp& qp, const ActiveSet& claimed) noexcept;
+  bool take_bounds(const StageQp& qp) noexcept;
+  void factor(const StageQp& qp, Riccati& riccati) noexcept;
+  bool refactor(const StageQp& qp, Riccati& riccati) noexcept;
+  void let_go(int place) noexcept;
+  bool is_control(int place) const noexcept { return place % stride_ >= states_; }
+  double bound(int place) const noexcept { return (side_[place] < 0 ? lower_ : upper_)[place]; }
+  bool is_equality_bound(int place) const noexcept;
+  double violation(int place) const noexcept {
+    return std::max(least_[place] - value_[place], value_[place] - most_[place]);
+  }
+
+  bool find_responses(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept;
+  bool is_needed(int batch, const int* places, int count) const noexcept;
+  void forget(int batch) noexcept;
+  bool find_responses_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept;
+  bool find_responses_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count) noexcept;
+  /// What the variable at one place answers to the gradient of another, which has responses.
+  double response(int of, int at) const noexcept {
+    const int number = number_[of];
+    return batches_[number / batch_size]
+        .responses.values[static_cast<std::ptrdiff_t>(at) * batch_size + number % batch_size];
+  }
+  double& weight_of(int place, Weights& weights) const noexcept {
+    return weights[number_[place] / batch_size][number_[place] % batch_size];
+  }
+  void add_responses(const Riccati& riccati, const Weights& weights, std::vector<double>& sums) const noexcept;
+  double* factor_row(int k) noexcept { return factor_.data() + static_cast<std::ptrdiff_t>(k) * max_columns; }
+  const double* factor_row(int k) const noexcept {
+    return factor_.data() + static_cast<std::ptrdiff_t>(k) * max_columns;
+  }
+  int column_count() const noexcept { return static_cast<int>(columns_.size()); }
+
+  double eliminate(int entering, int count, double* row) const noexcept;
+  void back_substitute(double* right_hand_side) const noexcept;
+  bool factor_columns(int first, bool may_leave_out) noexcept;
+  void drop_column(int k) noexcept;
+
+  bool combine(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
+  bool solve_with_multipliers(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept;
+  double largest_miss() const noexcept;
+  void return_to_bounds(const Riccati& riccati) noexcept;
+  bool drop_wrong_columns(const Riccati& riccati) noexcept;
+  bool release_wrong_held() noexcept;
+  bool drop_wrong(const Riccati& riccati) noexcept;
+  Violations find_violations() noexcept;
+  bool add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept;
+  void append_column(int place, double square, double multiplier) noexcept;
+  Outcome add(const StageQp& qp, Riccati& riccati, int entering, Clock::time_point deadline) noexcept;
+  Found find_values(const StageQp& qp, Riccati& riccati, bool may_combine, Iterate& step) noexcept;
+  void write(ActiveSet& active, Iterate& step) const noexcept;
+
+  int factorisations_ = 0, changes_ = 0;
+  int states_ = 0, stride_ = 0, places_ = 0;  ///< as many places as the program has
+  bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
+  double pull_tolerance_ = 0.0;
+  const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the program that is being solved
+  ActiveSet held_, claimed_;
+  // By place. The value of a held variable is its multiplier: that is what changes of it.
+  std::vector<double> value_, direction_, violation_;
+  /// The bounds with their tolerance; of variables that are not free there are none.
+  std::vector<double> least_, most_;
+  std::vector<Hold> hold_;
+  std::vector<std::int8_t> side_;  ///< of the active bound
+  std::vector<int> number_;        ///< among the responses, or none
+  std::vector<int> held_places_;
+  std::vector<Batch> batches_;
+  std::vector<int> columns_;  ///< active bounds that are not held, in the order of the factor
+  std::vector<double> multipliers_, factor_;
+  /// Which multipliers the step was found with.
+  std::vector<int> base_places_;
+  std::vector<double> base_multipliers_;
+  std::vector<double> h_;  ///< the program's gradient with the multipliers of the columns
+  Iterate policy_step_;
+};
+
+}  // namespace rhec

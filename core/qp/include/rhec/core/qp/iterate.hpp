@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+
+#include "rhec/core/base/aligned.hpp"
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/base/padded.hpp"
+
+namespace rhec {
+
+/// The sizes that memory is set aside for: the largest structure that a problem can take.
+struct Capacity {
+  int intervals = 0;  ///< N
+  int states = 0;     ///< n_s, at any node
+  int controls = 0;   ///< n_w, on any interval
+
+  bool operator==(const Capacity&) const = default;
+
+  /// The length of a row z = [s; w] of one stage in memory: as long as registers of eight are wide. The state is at its
+  /// beginning, the control at `states`, whatever a stage uses of both.
+  int row() const noexcept {
+    const int used = states + controls;
+    return used > 32 ? (used + 63) / 64 * 64 : padded(used);
+  }
+};
+
+/// Consecutive stages first .. last (both included).
+struct StageRange {
+  int first = 0;
+  int last = 0;
+};
+
+/// A primal-dual point of an Ocp. Rows have the capacity's length, whatever a stage really uses. With the Lagrangian
+///
+///     L = sum_i l_i(s_i, w_i) + sum_i costate_{i+1}' (F_i(s_i, w_i) - s_{i+1}) + sum_i state_bound_i' s_i +
+///     control_bound_i' w_i
+///
+/// a bound multiplier is positive at an upper bound, negative at a lower one and zero between. costate_0 belongs to a
+/// given initial state; it is zero where the initial state is free.
+class RHEC_EXPORT Iterate {
+ public:
+  Iterate() = default;
+  explicit Iterate(const Capacity& capacity);
+
+  const Capacity& capacity() const noexcept { return capacity_; }
+
+  double* state(int node) noexcept { return at(values_, node); }
+  double* control(int interval) noexcept { return at(values_, interval) + capacity_.states; }
+  double* costate(int node) noexcept { return at(costates_, node); }
+  double* state_bound(int node) noexcept { return at(bounds_, node); }
+  double* control_bound(int interval) noexcept { return at(bounds_, interval) + capacity_.states; }
+  const double* state(int node) const noexcept { return at(values_, node); }
+  const double* control(int interval) const noexcept { return at(values_, interval) + capacity_.states; }
+  const double* costate(int node) const noexcept { return at(costates_, node); }
+  const double* state_bound(int node) const noexcept { return at(bounds_, node); }
+  const double* control_bound(int interval) const noexcept { return at(bounds_, interval) + capacity_.states; }
+
+  /// Values and bound multipliers of a stage as one row [s; w], which begins at the state; rows follow each other.
+  double* row(int stage) noexcept { return at(values_, stage); }
+  double* bound_row(int stage) noexcept { return at(bounds_, stage); }
+  const double* row(int stage) const noexcept { return at(values_, stage); }
+  const double* bound_row(int stage) const noexcept { return at(bounds_, stage); }
+
+  bool is_finite() const noexcept;
+  void clear_multipliers() noexcept;
+
+ private:
+  double* at(AlignedDoubles& v, int i) const noexcept { return v.data() + static_cast<std::ptrdiff_t>(i) * row_; }
+  const double* at(const AlignedDoubles& v, int i) const noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * row_;
+  }
+
+  Capacity capacity_;
+  int row_ = 0;
+  AlignedDoubles values_, costates_, bounds_;
+};
+
+}  // namespace rhec

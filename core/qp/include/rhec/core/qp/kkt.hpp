@@ -1,0 +1,40 @@
+#pragma once
+
+#include "rhec/core/qp/stage_qp.hpp"
+
+namespace rhec {
+
+/// How far a primal-dual point is from a first-order optimum: the one judge of every backend.
+///
+/// Stationarity and complementarity are relative to 1 + the largest term of the Lagrangian's gradient (objective,
+/// costates and bound multipliers each count), so that scaling the objective does not change the verdict. Defect and
+/// bound violation are absolute, in the units of their variables.
+struct RHEC_EXPORT KktResidual {
+  double stationarity = 0.0;
+  double defect = 0.0;  ///< max |F_i(s_i, w_i) - s_{i+1}|, the given initial state included
+  double bound_violation = 0.0;
+  double complementarity = 0.0;  ///< max |multiplier| x distance from the bound that it claims to be at
+
+  double largest() const noexcept;
+};
+
+/// The residual at the point that the program was linearised at.
+RHEC_EXPORT KktResidual kkt_residual(const StageQp& linearisation, const Iterate& point) noexcept;
+
+/// What a residual is made of, for who goes through a long horizon piece by piece: largest absolute values.
+struct RHEC_EXPORT KktTerms {
+  double stationarity = 0.0, defect = 0.0, bound_violation = 0.0, complementarity = 0.0;
+  double largest_term = 0.0;  ///< of the Lagrangian's gradient
+
+  /// Those of the stages of a range, where the program holds the linearisation at the point. Of the stage behind a
+  /// range that does not reach the end its sizes must be known.
+  void add(const StageQp& linearisation, const Iterate& point, StageRange range) noexcept;
+  void add(const KktTerms& others) noexcept;
+  KktResidual residual() const noexcept;
+};
+
+/// Costates that make the point stationary in all states, by one backward sweep; bound multipliers are taken as they
+/// are.
+RHEC_EXPORT void set_costates(const StageQp& linearisation, Iterate& point) noexcept;
+
+}  // namespace rhec

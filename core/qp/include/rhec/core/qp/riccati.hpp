@@ -1,0 +1,183 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "rhec/core/qp/stage_qp.hpp"
+
+namespace rhec {
+
+struct RiccatiKernels;
+struct RiccatiView;
+
+/// Which bounds of a StageQp are held as equalities: -1 at the lower bound, +1 at the upper, 0 free.
+class RHEC_EXPORT ActiveSet {
+ public:
+  ActiveSet() = default;
+  explicit ActiveSet(const Capacity& capacity);
+
+  std::int8_t* state(int node) noexcept { return row(node); }
+  std::int8_t* control(int interval) noexcept { return row(interval) + capacity_.states; }
+  const std::int8_t* state(int node) const noexcept { return row(node); }
+  const std::int8_t* control(int interval) const noexcept { return row(interval) + capacity_.states; }
+  /// A stage's states and controls as in a row of StageQp.
+  std::int8_t* row(int stage) noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
+  const std::int8_t* row(int stage) const noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
+  bool is_empty() const noexcept;
+  void clear() noexcept;
+  /// function(stage, column, side) for every bound that is held, stage by stage; a column is that of a row.
+  template <class Function>
+  void for_each(const Function& function) const {
+    // Rows are whole eights, of which most are free.
+    constexpr int eight = sizeof(std::uint64_t);
+    for (int k = 0; k < static_cast<int>(sides_.size()); k += eight) {
+      std::uint64_t any = 0;
+      std::memcpy(&any, sides_.data() + k, sizeof any);
+      for (int j = 0; any != 0 && j < eight; ++j)
+        if (const std::int8_t side = sides_[k + j]; side != 0) function(k / row_, k % row_ + j, side);
+    }
+  }
+  bool operator==(const ActiveSet& other) const noexcept { return sides_ == other.sides_; }
+
+ private:
+  Capacity capacity_;
+  int row_ = 0;
+  std::vector<std::int8_t> sides_;
+};
+
+/// Solves a StageQp in which the bounds of an active set hold with equality and all others are ignored, by a backward
+/// Riccati recursion: with the value function V_{i+1}(s) = 1/2 s'Ps + p's subject to C s = d,
+///
+///     G = R + B'PB,  L = S + B'PA,  g = r + B'(Pb + p)
+///     w = -G^-1 (L s + g),   P_i = Q + A'PA - L'G^-1 L,   p_i = q + A'(Pb + p) - L'G^-1 g
+///
+/// on the null space of the active rows. An active control is fixed; an active state bound C s_{i+1} = d becomes
+/// C B w = d - C b - C A s, solved for as many controls as it has pivots; what is left over passes on to node i. The
+/// cost is linear in the horizon. Where a reduced G is not positive definite it is convexified (its negative
+/// eigenvalues are reflected), which changes R on the free directions only; the reduced Hessian is then positive
+/// definite.
+///
+/// `factor` needs the matrices and the active set, `solve` the vectors too, so that the former can be done in advance.
+class RHEC_EXPORT Riccati {
+ public:
+  enum class Outcome {
+    done,
+    inconsistent  ///< the active bounds contradict each other
+  };
+  Riccati() = default;
+  explicit Riccati(const Capacity& capacity);
+
+  /// `diagonal`, if not null, is added to the diagonals of H (barrier terms): a row of the program's stride a stage.
+  void factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
+  void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, nullptr); }
+  /// As much of it as `covariances` needs; a `solve` that follows factorises again.
+  void factor_for_covariances(const StageQp& qp, const ActiveSet& active) noexcept;
+  bool was_convexified() const noexcept { return convexified_; }
+  /// After a `factor` without active bounds: puts what convexification changed into the program's R, whose reduced
+  /// Hessian is positive definite from then on, whichever bounds become active.
+  void write_convexified(StageQp& qp) noexcept;
+
+  /// The minimiser as a step, with costates and the multipliers of the active bounds, for vectors that may be newer
+  /// than `factor`; the gradients h may be replaced by rows of the caller (null: those of the program).
+  Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* h) noexcept;
+  Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept {
+    return solve(qp, active, step, nullptr);
+  }
+
+  /// What the minimiser answers to gradients of one entry each: with h = e_k and all else of the program's vectors 0,
+  /// the values z of all stages, and in the places of active controls their multipliers. All in the time of one:
+  /// entry c of the row of stage i is at values[(i * stride + c) * size + (number of the gradient)].
+  struct Responses {
+    static constexpr int size = 8;
+    AlignedDoubles values, costates;
+    std::vector<int> control_counts;  ///< of the program that they are for
+    Responses() = default;
+    explicit Responses(const Capacity& capacity);
+  };
+  struct Entry {
+    int stage, place;
+  };
+  /// Of at most Responses::size gradients. False where the last factorisation holds state bounds or was convexified:
+  /// those have no responses here.
+  bool respond(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
+               Responses& responses) noexcept;
+  /// Adds the responses, each by its weight (there are Responses::size), to a minimiser that `solve` has found: as if
+  /// it had been asked with those gradients, but for `feedback`.
+  void combine(const StageQp& qp, const ActiveSet& active, const Responses& responses, const double* weights,
+               Iterate& step) noexcept;
+
+  /// sums += the values of the responses, each by its weight, over the first `places` entries of the rows of all
+  /// stages.
+  void add_values(const Responses& responses, const double* weights, int places, double* sums) const noexcept;
+
+  /// The control of stage i as the last `solve` would choose it for any stage-state step: w = T v(s) + Y s + y0.
+  void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
+
+  /// Marginal covariances of all states when the objective is twice a negative log-likelihood's quadratic (METHOD: no
+  /// factor 1/2), from the last factorisation: node i's n_s x n_s block goes to covariance + i * n_s^2, if not null;
+  /// the last node's to `last`.
+  void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
+
+  /// The largest number of controls, and of states, that one stage may have.
+  static constexpr int max_width = 32;
+  /// A reduced Hessian with a pivot below this part of its diagonal entry is not positive definite enough.
+  static constexpr double definite_tolerance = 1e-11;
+
+ private:
+  /// How a special stage was reduced. Node 0 of a free initial state is a stage too, with s_0 in the place of w.
+  struct Reduction {
+    int free = 0;       ///< directions left to decide
+    int rows = 0;       ///< rows of C that were reduced here
+    int pivots = 0;     ///< of those, solved for a control
+    int left = 0;       ///< of those, passed on
+    bool plain = true;  ///< nothing is fixed and there are no rows: T is the identity
+    bool overflow = false;
+  };
+  /// Pointers to what is kept of one special stage; see the members.
+  struct Special {
+    double *G, *L, *factor, *K, *T, *Y, *C, *eliminator;
+    int *pivot_row, *pivot_column, *left_row;
+  };
+  Special special(int i) noexcept;
+  RiccatiView view_of(const StageQp& qp, const std::int8_t* sides) noexcept;
+  double* P(int node) noexcept { return P_.data() + static_cast<std::ptrdiff_t>(node) * ns_ * stride_; }
+  double* p(int node) noexcept { return p_.data() + static_cast<std::ptrdiff_t>(node) * stride_; }
+
+  void factor_stages(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
+  void factor_special(const StageQp& qp, const ActiveSet& active, const RiccatiView& view, int i) noexcept;
+  void factor_initial(const StageQp& qp, const ActiveSet& active) noexcept;
+  int count_active(const StageQp& qp, const ActiveSet& active, int node) const noexcept;
+  void write_active_rows(const StageQp& qp, const ActiveSet& active, int node) noexcept;
+  void write_active_bounds(const StageQp& qp, const ActiveSet& active, int node) noexcept;
+  void eliminate(double* D, double* E, int rows, int width, const bool* fixed, Reduction& reduction,
+                 Special& v) noexcept;
+  void null_space(const double* D, const double* E, int width, const bool* fixed, const Reduction& reduction,
+                  Special& v) noexcept;
+  void factor_reduced(double* reduced, int n, double tolerance, double* factor) noexcept;
+  bool transform_rows(const double* right_hand_side, const Reduction& reduction, const Special& v, double* transformed,
+                      double scale) const noexcept;
+  bool solve_special_backward(const StageQp& qp, const ActiveSet& active, const double* h, int i) noexcept;
+  bool solve_initial(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept;
+  void solve_special_forward(const StageQp& qp, const ActiveSet& active, Iterate& step, int i) noexcept;
+  void add_special_controls(int i, int states, int controls, double* covariance) noexcept;
+  void write_bound_multipliers(const StageQp& qp, const ActiveSet& active, Iterate& step, int node) noexcept;
+
+  Capacity capacity_;
+  int ns_ = 0, nw_ = 0, stride_ = 0, width_ = 0, max_rows_ = 0;
+  bool convexified_ = false, for_steps_ = true;
+  bool has_initial_inverse_ = false;  ///< of P at node 0; otherwise it was factorised as a special stage
+  const RiccatiKernels* kernels_ = nullptr;
+  AlignedDoubles P_, U_, V_, closed_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
+  AlignedDoubles initial_inverse_;
+  std::vector<int> state_counts_, control_counts_;
+  std::vector<std::uint8_t> is_special_, fixes_control_, has_gradient_;  // N stages
+  std::vector<Reduction> reductions_;                                    // N stages, then node 0
+  std::vector<double> G_, L_, factor_;  // of special stages: full G and L; Cholesky factor of the reduced G
+  std::vector<double> K_, T_, Y_;       // v = -K s - k, w = T v + Y s + y0
+  std::vector<double> C_, eliminator_;  // rows at each node; row operations of the elimination at each stage
+  std::vector<int> pivot_row_, pivot_column_, left_row_;
+  std::vector<double> d_, special_g_, y0_, k_, row_multipliers_, work_;
+};
+
+}  // namespace rhec

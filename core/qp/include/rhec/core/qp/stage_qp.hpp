@@ -1,0 +1,135 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rhec/core/qp/iterate.hpp"
+
+namespace rhec {
+
+/// An Ocp linearised at a point, in the steps z_i = [ds_i; dw_i] from there:
+///
+///     minimise    sum_{i=0}^{N} 1/2 z_i' H_i z_i + h_i' z_i                           (no dw at node N)
+///     subject to  ds_{i+1} = AB_i z_i + b_i,   lower_i <= z_i <= upper_i
+///                 ds_0 = initial_step where the initial state is given
+///
+/// with  AB = [A B],  H = [Q S'; S R],  h = [q; r].
+///
+/// Sizes are per stage and at run time; storage never moves, but for `drop_first`. All rows have the length `stride` =
+/// capacity().row(): a stage's AB is n_s such rows (row r: what next state r depends on), its H is symmetric and as
+/// many rows (or columns) as z has entries, both halves filled. What a stage does not use of a row is zero, and free of
+/// bounds.
+class RHEC_EXPORT StageQp {
+ public:
+  using Rows =
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0, Eigen::OuterStride<>>;
+  using ConstRows =
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0, Eigen::OuterStride<>>;
+  using Vector = Eigen::Map<Eigen::VectorXd>;
+  using ConstVector = Eigen::Map<const Eigen::VectorXd>;
+
+  StageQp() = default;
+  explicit StageQp(const Capacity& capacity);
+  /// A window: of a program of the capacity so many stages at a time, for who goes through it piece by piece and wants
+  /// it to stay in the processor's cache. Other stages than those from `look_at` on must not be touched.
+  StageQp(const Capacity& capacity, int stages);
+  /// Stages `first`, first + 1, ... are looked at next, which hold nothing of use yet.
+  void look_at(int first) noexcept;
+  int window() const noexcept { return window_; }  ///< how many stages that are; 0: all are there
+
+  const Capacity& capacity() const noexcept { return capacity_; }
+  int stride() const noexcept { return stride_; }
+  int intervals() const noexcept { return intervals_; }
+  int states(int node) const noexcept { return state_counts_[node]; }
+  int controls(int interval) const noexcept { return interval < intervals_ ? control_counts_[interval] : 0; }
+  const int* state_counts() const noexcept { return state_counts_.data(); }
+  const int* control_counts() const noexcept { return control_counts_.data(); }  ///< of intervals 0 .. N - 1
+  const int* identity_counts() const noexcept { return identity_counts_.data(); }
+  void set_intervals(int intervals) noexcept { intervals_ = intervals; }
+  /// Clears what a stage that has become smaller does not use any more. The last `identities` states are those that the
+  /// interval hands on as they are: their rows of AB are, or will be, rows of the identity, and solvers may rely on it.
+  void set_sizes(int node, int states, int controls, int identities = 0) noexcept {
+    if (states < state_counts_[node] || controls < control_counts_[node]) clear(node);
+    state_counts_[node] = states;
+    control_counts_[node] = controls;
+    identity_counts_[node] = identities;
+  }
+  /// Moves AB, b, H, h and sizes towards the front; behind them are zeros.
+  void drop_first(int stages) noexcept;
+  bool initial_state_is_given = false;
+  /// For who writes to AB: no state is handed on as it is any more.
+  void drop_identity_rows() noexcept;
+
+  // Raw access for kernels: pointers to stage i.
+  double* AB(int i) noexcept { return at(AB_, first_ + i, capacity_.states); }
+  double* H(int i) noexcept { return at(H_, first_ + i, wide_); }
+  double* h(int i) noexcept { return at(h_, first_ + i, 1); }
+  double* b(int i) noexcept { return at(b_, first_ + i, 1); }
+  double* lower(int i) noexcept { return at(lower_, first_bounds_ + i, 1); }
+  double* upper(int i) noexcept { return at(upper_, first_bounds_ + i, 1); }
+  double* q(int i) noexcept { return h(i); }
+  double* r(int i) noexcept { return h(i) + capacity_.states; }
+  double* state_lower(int i) noexcept { return lower(i); }
+  double* state_upper(int i) noexcept { return upper(i); }
+  double* control_lower(int i) noexcept { return lower(i) + capacity_.states; }
+  double* control_upper(int i) noexcept { return upper(i) + capacity_.states; }
+  double* initial_step() noexcept { return initial_step_.data(); }
+  const double* AB(int i) const noexcept { return at(AB_, first_ + i, capacity_.states); }
+  const double* H(int i) const noexcept { return at(H_, first_ + i, wide_); }
+  const double* h(int i) const noexcept { return at(h_, first_ + i, 1); }
+  const double* b(int i) const noexcept { return at(b_, first_ + i, 1); }
+  const double* lower(int i) const noexcept { return at(lower_, first_bounds_ + i, 1); }
+  const double* upper(int i) const noexcept { return at(upper_, first_bounds_ + i, 1); }
+  const double* q(int i) const noexcept { return h(i); }
+  const double* r(int i) const noexcept { return h(i) + capacity_.states; }
+  const double* state_lower(int i) const noexcept { return lower(i); }
+  const double* state_upper(int i) const noexcept { return upper(i); }
+  const double* control_lower(int i) const noexcept { return lower(i) + capacity_.states; }
+  const double* control_upper(int i) const noexcept { return upper(i) + capacity_.states; }
+  const double* initial_step() const noexcept { return initial_step_.data(); }
+
+  // The same as Eigen views of the stage's true size. S is n_w x n_s; who writes it writes its transpose too.
+  Rows A_of(int i) { return rows(AB(i), states(i + 1), states(i)); }
+  Rows B_of(int i) { return rows(AB(i) + capacity_.states, states(i + 1), controls(i)); }
+  Rows Q_of(int i) { return rows(H(i), states(i), states(i)); }
+  Rows S_of(int i) { return rows(control_rows(i), controls(i), states(i)); }
+  Rows S_transposed_of(int i) { return rows(H(i) + capacity_.states, states(i), controls(i)); }
+  Rows R_of(int i) { return rows(control_rows(i) + capacity_.states, controls(i), controls(i)); }
+  ConstRows A_of(int i) const { return rows(AB(i), states(i + 1), states(i)); }
+  ConstRows B_of(int i) const { return rows(AB(i) + capacity_.states, states(i + 1), controls(i)); }
+  ConstRows Q_of(int i) const { return rows(H(i), states(i), states(i)); }
+  ConstRows S_of(int i) const { return rows(control_rows(i), controls(i), states(i)); }
+  ConstRows R_of(int i) const { return rows(control_rows(i) + capacity_.states, controls(i), controls(i)); }
+  ConstVector b_of(int i) const { return {b(i), states(i + 1)}; }
+  ConstVector q_of(int i) const { return {q(i), states(i)}; }
+  ConstVector r_of(int i) const { return {r(i), controls(i)}; }
+
+ private:
+  double* at(AlignedDoubles& v, int i, int rows) const noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * rows * stride_;
+  }
+  const double* at(const AlignedDoubles& v, int i, int rows) const noexcept {
+    return v.data() + static_cast<std::ptrdiff_t>(i) * rows * stride_;
+  }
+  double* control_rows(int i) noexcept { return H(i) + static_cast<std::ptrdiff_t>(capacity_.states) * stride_; }
+  const double* control_rows(int i) const noexcept {
+    return H(i) + static_cast<std::ptrdiff_t>(capacity_.states) * stride_;
+  }
+  Rows rows(double* first, int count, int length) { return {first, count, length, Eigen::OuterStride<>(stride_)}; }
+  ConstRows rows(const double* first, int count, int length) const {
+    return {first, count, length, Eigen::OuterStride<>(stride_)};
+  }
+  void clear(int i) noexcept;
+
+  Capacity capacity_;
+  int stride_ = 0, wide_ = 0, intervals_ = 0;
+  int window_ = 0;
+  int first_ = 0;         ///< slot of stage 0 in AB, b, H and h: what moves towards the front is not copied
+  int first_bounds_ = 0;  ///< the same of the bounds
+  std::vector<int> state_counts_, control_counts_, identity_counts_;
+  AlignedDoubles AB_, H_, h_, b_, lower_, upper_, initial_step_;
+};
+
+}  // namespace rhec

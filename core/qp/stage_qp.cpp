@@ -1,0 +1,80 @@
+#include "rhec/core/qp/stage_qp.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace rhec {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+StageQp::StageQp(const Capacity& capacity) : StageQp(capacity, capacity.intervals + 1) {
+  window_ = 0;
+  // Room for twice the stages, so that they move back to the front once in so many drops only.
+  for (auto* v : {&AB_, &H_, &h_, &b_}) v->resize(2 * v->size(), 0.0);
+}
+
+StageQp::StageQp(const Capacity& capacity, int stages)
+    : capacity_(capacity),
+      stride_(capacity.row()),
+      wide_(capacity.states + capacity.controls),
+      window_(std::min(stages, capacity.intervals + 1)) {
+  const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1, held = static_cast<std::size_t>(window_);
+  // With those of places behind the last stage, which a window that ends there has.
+  for (auto* counts : {&state_counts_, &control_counts_, &identity_counts_}) counts->assign(nodes + held, 0);
+  AB_.assign(held * capacity.states * stride_, 0.0);
+  H_.assign(held * wide_ * stride_, 0.0);
+  for (auto* v : {&h_, &b_}) v->assign(held * stride_, 0.0);
+  lower_.assign(held * stride_, -infinity);
+  upper_.assign(held * stride_, infinity);
+  initial_step_.assign(stride_, 0.0);
+}
+
+void StageQp::look_at(int first) noexcept {
+  // Each place keeps its contents, and the sizes of the stage that they were of: `set_sizes` clears what is too much.
+  for (auto* counts : {&state_counts_, &control_counts_}) {
+    const auto held = counts->begin() - first_, end = held + window_;
+    if (first > -first_)
+      std::copy_backward(held, end, counts->begin() + first + window_);
+    else
+      std::copy(held, end, counts->begin() + first);
+  }
+  first_ = first_bounds_ = -first;
+}
+
+void StageQp::drop_identity_rows() noexcept {
+  if (window_ > 0)
+    std::fill_n(identity_counts_.begin() - first_, window_, 0);
+  else
+    std::fill(identity_counts_.begin(), identity_counts_.end(), 0);
+}
+
+void StageQp::clear(int i) noexcept {
+  std::fill_n(AB(i), capacity_.states * stride_, 0.0);
+  std::fill_n(H(i), wide_ * stride_, 0.0);
+  for (double* row : {h(i), b(i)}) std::fill_n(row, stride_, 0.0);
+  std::fill_n(lower(i), stride_, -infinity);
+  std::fill_n(upper(i), stride_, infinity);
+}
+
+void StageQp::drop_first(int stages) noexcept {
+  const int kept = intervals_ + 1 - stages;
+  const bool has_room = first_ + stages + capacity_.intervals < 2 * (capacity_.intervals + 1);
+  const int first = has_room ? first_ + stages : 0;
+  const auto move = [&](AlignedDoubles& v, int rows) {
+    const std::ptrdiff_t slot = static_cast<std::ptrdiff_t>(rows) * stride_;
+    if (!has_room) std::copy_n(v.data() + (first_ + stages) * slot, kept * slot, v.data());
+    // Also what a longer horizon has left there once.
+    std::fill_n(v.data() + (first + kept) * slot, (capacity_.intervals + 1 - kept) * slot, 0.0);
+  };
+  move(AB_, capacity_.states);
+  move(H_, wide_);
+  for (auto* v : {&h_, &b_}) move(*v, 1);
+  first_ = first;
+  for (auto* counts : {&state_counts_, &control_counts_, &identity_counts_})
+    std::copy_n(counts->data() + stages, kept, counts->data());
+}
+
+}  // namespace rhec

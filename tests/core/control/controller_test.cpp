@@ -1,0 +1,166 @@
+// What a controller asks of a vehicle: its place on the path, and inputs that go straight on where the ground slips so.
+#include "rhec/core/control/controller.hpp"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <numbers>
+
+#include "rhec/core/model/formula_model.hpp"
+#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/yaml.hpp"
+
+namespace rhec {
+namespace {
+
+using ::testing::DoubleNear;
+using ::testing::ElementsAre;
+
+const Host& host() {
+  static const Host found;
+  return found;
+}
+
+constexpr double speed = 2.0;
+
+std::unique_ptr<Controller> controller_for(const std::string& configuration) {
+  const Robot robot(host(), RobotOptions::table().parse(parse_yaml(configuration, "robot.yaml"), "robot"));
+  // Straight along the diagonal.
+  return robot.make_controller(Path({{0.0, 0.0, speed}, {50.0, 50.0, speed}}));
+}
+
+/// The reference inputs for a vehicle at the path's start, facing along it, on ground that slips so.
+std::vector<double> reference(Controller& controller, const std::vector<double>& slip) {
+  const Model& model = controller.problem().model();
+  Estimate estimate;
+  estimate.state = Eigen::VectorXd::Zero(model.state_count());
+  model.description().roles.place(0.0, 0.0, 0.25 * std::numbers::pi, estimate.state.data());
+  estimate.parameters = Eigen::Map<const Eigen::VectorXd>(slip.data(), static_cast<Eigen::Index>(slip.size()));
+  controller.control(estimate);
+  const double* first = controller.problem().input_reference(0);
+  return {first, first + model.input_count()};
+}
+
+TEST(ControllerReference, MakesUpForSlipAsFarAsItIsTrusted) {
+  const auto controller = controller_for("model: bicycle_slip");
+  EXPECT_THAT(reference(*controller, {1.0, 1.0}), ElementsAre(2.0, 0.0));
+  EXPECT_THAT(reference(*controller, {0.5, 1.0}), ElementsAre(4.0, 0.0));
+  // An estimate of less than 0.3 is not trusted, nor is one that is no number at all.
+  const double clipped = 2.0 / 0.3;  // and no more than the bound allows, 2.5 * 2 + 1
+  ASSERT_GT(clipped, 6.0);
+  for (const double kappa : {0.3, 0.1, 0.0, -0.5, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THAT(reference(*controller, {kappa, 1.0}), ElementsAre(6.0, 0.0)) << kappa;
+  const auto wide = controller_for("{model: bicycle_slip, controller: {speed_bound_factor: 5}}");
+  for (const double kappa : {0.3, 0.1, 0.0, -0.5, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THAT(reference(*wide, {kappa, 1.0}), ElementsAre(DoubleNear(clipped, 1e-12), 0.0)) << kappa;
+}
+
+TEST(ControllerReference, IsThePathsSpeedLiterallyWhereThatIsAskedFor) {
+  const auto controller = controller_for("{model: bicycle_slip, controller: {reference_speed: literal}}");
+  EXPECT_THAT(reference(*controller, {0.5, 1.0}), ElementsAre(2.0, 0.0));
+}
+
+TEST(ControllerReference, KnowsVehiclesWhoseSpeedIsNotOneInput) {
+  const auto controller = controller_for(
+      "{model: {name: skid_steer, wheel_radius: 0.2}, controller: {speed_bound_factor: 4, speed_bound_offset: 0}}");
+  EXPECT_THAT(reference(*controller, {0.5, 0.2, 0.1}),
+              ElementsAre(DoubleNear(2.0 / 0.2 / 0.5, 1e-12), DoubleNear(2.0 / 0.2 / 0.8, 1e-12)));
+  EXPECT_THAT(reference(*controller, {0.9, -0.1, 0.1}),
+              ElementsAre(DoubleNear(2.0 / 0.2 / 0.3, 1e-12), DoubleNear(2.0 / 0.2 / 1.1, 1e-12)));
+  const RhcProblem& problem = controller->problem();
+  for (int side = 0; side < 2; ++side) {
+    EXPECT_EQ(problem.input_lower(0, side), 0.0);
+    EXPECT_DOUBLE_EQ(problem.input_upper(0, side), 4.0 * 2.0 / 0.2);
+  }
+}
+
+/// x' = kappa s cos(psi), y' = kappa s sin(psi), psi' = omega, s' = a.
+struct Accelerated {
+  static constexpr int state_count = 4, input_count = 2, parameter_count = 1, output_count = 2;
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::cos, std::sin;
+    dxdt[0] = p[0] * x[3] * cos(x[2]);
+    dxdt[1] = p[0] * x[3] * sin(x[2]);
+    dxdt[2] = u[1];
+    dxdt[3] = u[0];
+  }
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    y[0] = x[0];
+    y[1] = x[1];
+  }
+};
+
+TEST(ControllerReference, KnowsVehiclesWhoseInputIsAnAcceleration) {
+  ModelDescription about;
+  about.name = "accelerated";
+  about.states = {{.name = "x", .unit = "m", .meaning = "x"},
+                  {.name = "y", .unit = "m", .meaning = "y"},
+                  {.name = "psi", .unit = "rad", .meaning = "heading", .is_angle = true},
+                  {.name = "speed", .unit = "m/s", .meaning = "speed of the wheels"}};
+  about.inputs = {{.name = "a", .unit = "m/s2", .meaning = "acceleration", .lower = -1.0, .upper = 1.0},
+                  {.name = "omega", .unit = "rad/s", .meaning = "yaw rate"}};
+  about.parameters = {{.name = "kappa", .unit = "1", .meaning = "slip", .lower = 0.0, .upper = 1.0}};
+  about.outputs = {{.name = "x_gps", .unit = "m", .meaning = "x"}, {.name = "y_gps", .unit = "m", .meaning = "y"}};
+  about.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed_state = 3, .speed_factor = 0};
+  const auto model = std::make_shared<FormulaModel<Accelerated>>(Accelerated{}, about);
+  Controller::Setup setup;
+  setup.problem.state_weights = {1.0, 1.0, 0.0, 1.0};
+  setup.problem.terminal_weights = {1.0, 1.0, 0.0, 0.0};
+  setup.problem.input_weights = {0.1, 0.1};
+  Controller controller(model, host().make_solver("gn_rti"), Path({{0.0, 0.0, speed}, {50.0, 50.0, speed}}), setup);
+  EXPECT_THAT(reference(controller, {0.5}), ElementsAre(0.0, 0.0));
+  EXPECT_DOUBLE_EQ(controller.problem().state_reference(3)[3], speed / 0.5);
+  EXPECT_EQ(controller.problem().input_upper(3, 0), 1.0);
+  // And it drives: from a standstill to its end at the speed that was asked for over ground.
+  Estimate now;
+  now.state = Eigen::VectorXd::Zero(4);
+  now.state[2] = 0.25 * std::numbers::pi;
+  now.parameters = Eigen::VectorXd::Constant(1, 0.5);
+  controller.reset();
+  const double step = setup.interval;
+  double reached = 0.0;
+  for (int k = 0; k < 400 && !controller.finished(); ++k) {
+    const std::vector<double> inputs = controller.control(now).inputs;
+    Eigen::VectorXd next(4);
+    model->integrate({.count = 1,
+                      .states = now.state.data(),
+                      .inputs = inputs.data(),
+                      .parameters = now.parameters.data(),
+                      .durations = &step,
+                      .next_states = next.data()});
+    now.state = next;
+    if (k == 100) reached = 0.5 * now.state[3];
+  }
+  EXPECT_TRUE(controller.finished());
+  EXPECT_NEAR(reached, speed, 0.05);
+}
+
+TEST(ControllerReference, BoundsTheInputsThatDriveAndNoOthers) {
+  const auto controller = controller_for("model: bicycle_slip");
+  reference(*controller, {1.0, 1.0});
+  const RhcProblem& problem = controller->problem();
+  const Variable& steering_rate = problem.model().description().inputs[1];
+  EXPECT_EQ(problem.input_lower(3, 0), 0.0);
+  EXPECT_EQ(problem.input_upper(3, 0), 2.5 * speed + 1.0);
+  EXPECT_EQ(problem.input_lower(3, 1), steering_rate.lower);
+  EXPECT_EQ(problem.input_upper(3, 1), steering_rate.upper);
+  const auto free = controller_for("{model: bicycle_slip, controller: {speed_bound_factor: .inf}}");
+  reference(*free, {1.0, 1.0});
+  EXPECT_EQ(free->problem().input_upper(3, 0), std::numeric_limits<double>::infinity());
+}
+
+TEST(ControllerReference, PutsAllBodiesInLineAlongThePath) {
+  const auto controller = controller_for("model: tractor_trailer");
+  reference(*controller, {1.0, 1.0, 1.0});
+  const double* third = controller->problem().state_reference(3);
+  const double distance = 3 * 0.2 * speed, angle = 0.25 * std::numbers::pi;
+  EXPECT_NEAR(third[0], distance * std::cos(angle), 1e-12);
+  EXPECT_NEAR(third[1], distance * std::sin(angle), 1e-12);
+  EXPECT_NEAR(third[2], angle, 1e-12);
+  EXPECT_NEAR(third[3], angle, 1e-12);
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,161 @@
+// Once set up, estimator and controller allocate nothing: every allocation of this program is counted.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <cstdlib>
+#include <memory>
+#include <new>
+#include <numbers>
+#include <vector>
+
+#include "rhec/core/control/controller.hpp"
+#include "rhec/core/estimation/estimator.hpp"
+#include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/core/estimation/receding_horizon_estimation.hpp"
+#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/paths.hpp"
+#include "rhec/sim/truth.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+}  // namespace
+
+// Eigen takes its memory from malloc rather than from operator new: both are counted. A sanitizer has a malloc of its
+// own.
+#if defined(__SANITIZE_ADDRESS__)
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#else
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+#endif
+
+namespace rhec {
+namespace {
+
+const Host& host() {
+  static const Host instance;
+  return instance;
+}
+
+struct Options {
+  bool filter = false;
+  ArrivalKind arrival = ArrivalKind::ekf;
+  const char* blocking = "{size: 5, overlap: 3}";
+  const char* solver = "{mode: rti}";
+  int heading_starts = 1;
+};
+
+std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& model, const Options& options) {
+  RecedingHorizonEstimation::Setup setup;
+  setup.problem.output_weights = {1.0 / (0.03 * 0.03), 1.0 / (0.03 * 0.03), 1.0 / (0.01745 * 0.01745)};
+  setup.problem.input_weights = {100.0, 100.0};
+  setup.arrival = options.arrival;
+  setup.blockings = {host().make_blocking("structured", parse_yaml(options.blocking, "test")),
+                     host().make_blocking("full_horizon")};
+  setup.walks = {{}, {}};
+  setup.initial_mean = Eigen::VectorXd::Zero(6);
+  setup.initial_mean.tail(2).setConstant(0.5);
+  setup.initial_covariance = Eigen::MatrixXd::Identity(6, 6);
+  if (options.heading_starts > 1) {
+    setup.heading_starts = options.heading_starts;
+    setup.initial_covariance(2, 2) = 10.0;
+  }
+  if (!options.filter)
+    return std::make_unique<RecedingHorizonEstimation>(
+        model, host().make_solver("gn_rti", parse_yaml(options.solver, "test")), setup);
+  FilterEstimation::Setup own;
+  own.noise.output_variances = {0.0009, 0.0009, 0.0003};
+  own.noise.input_variances = {0.01, 0.01};
+  own.noise.parameter_lower = {0.0, 0.0};
+  own.noise.parameter_upper = {1.0, 1.0};
+  own.walk = {0.03, 0.03};
+  own.initial_mean = setup.initial_mean;
+  own.initial_covariance = setup.initial_covariance;
+  own.heading_starts = setup.heading_starts;
+  return std::make_unique<FilterEstimation>(model, own);
+}
+
+/// The closed loop; returns what was allocated in it, of 40 samples from the very first one.
+long allocations_in_the_loop(const Options& options) {
+  const std::shared_ptr<Model> model = host().make_model("bicycle_slip");
+  Estimator estimator(make_method(model, options));
+  Controller::Setup setup;
+  setup.problem.state_weights = {1.0, 1.0, 0.0, 0.0};
+  setup.problem.input_weights = {5.0, 5.0};
+  setup.problem.terminal_weights = {10.0, 10.0, 0.0, 0.0};
+  sim::FigureEight path;
+  path.speed = 4.0;
+  Controller controller(model, host().make_solver("gn_rti"), Path(sim::figure_eight(path)), setup);
+  const auto field = sim::gaussian_random_field({});
+  sim::TruthVehicle vehicle(*model, *field, Eigen::Vector4d::Zero());
+  sim::Sensors sensors(*model, {.outputs = {0.03, 0.03, 0.01745}, .inputs = {0.1, 0.1}}, 1);
+  std::array<double, 2> measured{};
+  std::array<double, 3> outputs{};
+  int fallbacks = 0;
+  const long before = allocations;
+  for (int k = 0; k < 40; ++k) {
+    const double time = 0.2 * k;
+    sensors.observe(vehicle.state().data(), outputs.data());
+    if (k % 7 == 6) outputs[k % 3] = std::nan("");
+    if (k != 20) estimator.push_measurement(time, outputs.data());  // a gap
+    const Estimate& estimate = estimator.estimate(time);
+    fallbacks += estimate.fallback;
+    const Controller::Command& command = controller.control(estimate);
+    if (k % 2) estimator.prepare();
+    if (k % 3) controller.prepare();
+    if (k % 5 == 4) estimator.push_measurement(time - 0.4, outputs.data());  // late
+    vehicle.advance(command.inputs.data(), 0.2);
+    sensors.measure_inputs(command.inputs.data(), measured.data());
+    estimator.push_input(time, measured.data());
+  }
+  const long after = allocations;
+  EXPECT_EQ(fallbacks, 0);
+  EXPECT_GT(controller.follower().arc_length(), 15.0);
+  EXPECT_LT(std::hypot(estimator.estimate(7.8).state[0] - vehicle.state()[0],
+                       estimator.estimate(7.8).state[1] - vehicle.state()[1]),
+            2.0);
+  return after - before;
+}
+
+TEST(EstimationAllocation, AllocationsAreCounted) {
+  long before = allocations;
+  const auto memory = std::make_unique<std::vector<double>>(100);
+  EXPECT_GE(allocations - before, 2);
+  before = allocations;
+#if !defined(__SANITIZE_ADDRESS__)
+  const Eigen::VectorXd vector = Eigen::VectorXd::Zero(100);
+  EXPECT_GE(allocations - before, 1);
+#endif
+}
+
+TEST(EstimationAllocation, NoneInTheClosedLoop) {
+  for (const ArrivalKind arrival :
+       {ArrivalKind::ekf, ArrivalKind::smoothing, ArrivalKind::constant, ArrivalKind::off}) {
+    EXPECT_EQ(allocations_in_the_loop({.arrival = arrival}), 0);
+    EXPECT_EQ(allocations_in_the_loop({.arrival = arrival, .solver = "{mode: converge}"}), 0);
+    EXPECT_EQ(allocations_in_the_loop({.arrival = arrival, .blocking = "{size: 2, overlap: 4, neighbour_sigma: 0.04}"}),
+              0);
+    EXPECT_EQ(allocations_in_the_loop({.arrival = arrival, .blocking = "{size: 2, transition: ramp}"}), 0);
+  }
+}
+
+TEST(EstimationAllocation, NoneInTheClosedLoopOfAFilter) { EXPECT_EQ(allocations_in_the_loop({.filter = true}), 0); }
+
+TEST(EstimationAllocation, NoneWhereTheHeadingIsSearchedFor) {
+  EXPECT_EQ(allocations_in_the_loop({.heading_starts = 8}), 0);
+  EXPECT_EQ(allocations_in_the_loop({.filter = true, .heading_starts = 8}), 0);
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,307 @@
+// The timeline: which nodes and intervals are made of stamped rows, and what becomes of what is late, missing or
+// absurd.
+#include "rhec/core/estimation/estimator.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "rhec/core/base/error.hpp"
+#include "support/linear_case.hpp"
+
+namespace rhec {
+namespace {
+
+using namespace rhec::testing;
+using ::testing::DoubleEq;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Keeps what an Estimator tells a method, and answers with the number of nodes.
+class Recorder final : public EstimationMethod {
+ public:
+  struct Node {
+    double duration;
+    std::vector<double> inputs, outputs;
+  };
+  const Model& model() const noexcept override { return *model_; }
+  int substeps() const noexcept override { return 1; }
+  void start(const double* outputs) noexcept override { nodes = {{0.0, {}, {outputs, outputs + 2}}}; }
+  void add_node(double duration, const double* inputs, const double* outputs) noexcept override {
+    nodes.push_back({duration, {inputs, inputs + 1}, {outputs, outputs + 2}});
+  }
+  bool amend(int back, const double* outputs) noexcept override {
+    if (back >= window || back >= static_cast<int>(nodes.size())) return false;
+    for (int j = 0; j < 2; ++j)
+      if (!std::isnan(outputs[j])) nodes[nodes.size() - 1 - back].outputs[j] = outputs[j];
+    return true;
+  }
+  void estimate(Estimate& result, Clock::time_point) noexcept override {
+    ++estimates;
+    result.state = Eigen::Vector2d(static_cast<double>(nodes.size()), 0.0);
+    result.report.status = Status::solved;
+  }
+  void reset() noexcept override { nodes.clear(); }
+
+  std::vector<Node> nodes;
+  int window = 5, estimates = 0;
+
+ private:
+  std::shared_ptr<const Model> model_ = linear_model<Trolley>();
+};
+
+struct Timeline : ::testing::Test {
+  Recorder* recorder = nullptr;
+  Estimator estimator = make({.longest_interval = 0.2});
+
+  Estimator make(const Estimator::Timeline& timeline) {
+    auto method = std::make_unique<Recorder>();
+    recorder = method.get();
+    return Estimator(std::move(method), timeline);
+  }
+  void measure(double time, double first, double second = nan) {
+    const double outputs[] = {first, second};
+    estimator.push_measurement(time, outputs);
+  }
+  void input(double time, double value) { estimator.push_input(time, &value); }
+  std::vector<double> durations() const {
+    std::vector<double> result;
+    for (const auto& node : recorder->nodes) result.push_back(node.duration);
+    return result;
+  }
+};
+
+TEST_F(Timeline, NodesLieWhereMeasurementsDo) {
+  measure(10.0, 1.0);
+  measure(10.125, 2.0);
+  measure(10.1875, 3.0);
+  EXPECT_FALSE(estimator.has_started());
+  const Estimate& estimate = estimator.estimate(10.1875);
+  EXPECT_TRUE(estimator.has_started());
+  EXPECT_EQ(estimate.time, 10.1875);
+  EXPECT_FALSE(estimate.predicted);
+  EXPECT_THAT(durations(), ElementsAre(0.0, 0.125, 0.0625));
+  EXPECT_EQ(recorder->nodes[1].outputs[0], 2.0);
+  EXPECT_TRUE(std::isnan(recorder->nodes[1].outputs[1]));
+  EXPECT_EQ(estimator.counts().nodes, 3);
+  EXPECT_EQ(estimator.counts().estimates, 1);
+}
+
+TEST_F(Timeline, OnlyWhatIsStampedUpToTheTimeIsUsed) {
+  measure(0.0, 1.0);
+  measure(0.1, 2.0);
+  measure(0.2, 3.0);
+  estimator.estimate(0.1);
+  EXPECT_EQ(recorder->nodes.size(), 2u);
+  estimator.estimate(0.25);
+  EXPECT_EQ(recorder->nodes.size(), 3u);
+}
+
+TEST_F(Timeline, GapsAreFilledWithNodesAtMostTheLongestIntervalApart) {
+  input(0.0, 1.0);
+  measure(0.0, 1.0);
+  measure(0.2, 2.0);  // just fits
+  measure(0.7, 3.0);  // three parts
+  input(0.5, 4.0);
+  estimator.estimate(0.7);
+  ASSERT_EQ(recorder->nodes.size(), 5u);
+  for (std::size_t i = 1; i < 5; ++i) EXPECT_LE(recorder->nodes[i].duration, 0.2 + 1e-9);
+  EXPECT_NEAR(recorder->nodes[1].duration, 0.2, 1e-15);
+  for (std::size_t i = 2; i < 5; ++i) EXPECT_NEAR(recorder->nodes[i].duration, 0.5 / 3.0, 1e-12);
+  for (std::size_t i = 2; i < 4; ++i)
+    for (const double output : recorder->nodes[i].outputs) EXPECT_TRUE(std::isnan(output));
+  EXPECT_EQ(recorder->nodes[4].outputs[0], 3.0);
+  // From 0.2 on: [0.2, 0.3667] 1; [0.3667, 0.5333] 1 and, from 0.5, 4; [0.5333, 0.7] 4.
+  EXPECT_NEAR(recorder->nodes[2].inputs[0], 1.0, 1e-12);
+  const double part = 0.5 / 3.0, late = 0.2 + 2.0 * part - 0.5;
+  EXPECT_NEAR(recorder->nodes[3].inputs[0], (1.0 * (part - late) + 4.0 * late) / part, 1e-12);
+  EXPECT_NEAR(recorder->nodes[4].inputs[0], 4.0, 1e-12);
+}
+
+TEST_F(Timeline, AnAbsurdGapIsDividedIntoAThousandParts) {
+  measure(0.0, 1.0);
+  measure(1e9, 2.0);
+  estimator.estimate(2e9);
+  EXPECT_EQ(recorder->nodes.size(), 1001u);
+}
+
+TEST_F(Timeline, InputsAreAveragedOverAnInterval) {
+  measure(1.0, 0.0);
+  measure(1.2, 0.0);
+  measure(1.4, 0.0);
+  measure(1.6, 0.0);
+  // Rows at irregular times, not in order, each holding until the next.
+  input(1.15, 6.0);
+  input(0.7, 2.0);
+  input(1.05, 4.0);
+  input(1.3, nan);  // unknown for 0.05 s, and left out of the mean
+  input(1.35, 10.0);
+  estimator.estimate(1.6);
+  ASSERT_EQ(recorder->nodes.size(), 4u);
+  EXPECT_NEAR(recorder->nodes[1].inputs[0], (0.05 * 2.0 + 0.1 * 4.0 + 0.05 * 6.0) / 0.2, 1e-12);
+  EXPECT_NEAR(recorder->nodes[2].inputs[0], (0.1 * 6.0 + 0.05 * 10.0) / 0.15, 1e-12);
+  EXPECT_NEAR(recorder->nodes[3].inputs[0], 10.0, 1e-12);
+}
+
+TEST_F(Timeline, WhatIsKnownOfAnInputCountsAndNothingIsNothing) {
+  measure(0.0, 0.0);
+  measure(0.1, 0.0);
+  input(0.15, 3.0);
+  measure(0.2, 0.0);
+  estimator.estimate(0.2);
+  EXPECT_TRUE(std::isnan(recorder->nodes[1].inputs[0]));
+  EXPECT_NEAR(recorder->nodes[2].inputs[0], 3.0, 1e-12);
+}
+
+TEST_F(Timeline, OfInputsWithOneStampTheLastCounts) {
+  measure(0.0, 0.0);
+  input(0.0, 1.0);
+  input(0.0, 2.0);
+  measure(0.1, 0.0);
+  estimator.estimate(0.1);
+  EXPECT_NEAR(recorder->nodes[1].inputs[0], 2.0, 1e-12);
+}
+
+TEST_F(Timeline, MeasurementsWithOneStampAreOneNode) {
+  measure(0.0, 1.0);
+  measure(0.1, 2.0);
+  measure(0.1 + 5e-7, nan, 3.0);
+  measure(0.1, nan, nan);
+  estimator.estimate(0.2);
+  ASSERT_EQ(recorder->nodes.size(), 2u);
+  EXPECT_THAT(recorder->nodes[1].outputs, ElementsAre(2.0, 3.0));
+}
+
+TEST_F(Timeline, WhatComesOutOfOrderButInTimeIsSorted) {
+  measure(0.2, 3.0);
+  measure(0.0, 1.0);
+  measure(0.1, 2.0);
+  estimator.estimate(0.2);
+  ASSERT_EQ(recorder->nodes.size(), 3u);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(recorder->nodes[i].outputs[0], 1.0 + i);
+  EXPECT_EQ(estimator.counts().late, 0);
+}
+
+TEST_F(Timeline, LateMeasurementsAreMergedOrDropped) {
+  for (int i = 0; i <= 10; ++i) measure(0.1 * i, i);
+  estimator.estimate(1.0);
+  EXPECT_EQ(recorder->estimates, 1);
+  measure(0.8, nan, 7.0);  // two nodes back
+  EXPECT_EQ(recorder->nodes[8].outputs[1], 7.0);
+  EXPECT_EQ(recorder->nodes[8].outputs[0], 8.0);
+  measure(1.0, nan, 9.0);  // the newest
+  EXPECT_EQ(recorder->nodes[10].outputs[1], 9.0);
+  EXPECT_EQ(estimator.counts().late, 2);
+  EXPECT_EQ(estimator.counts().dropped, 0);
+  estimator.estimate(1.0);
+  EXPECT_EQ(recorder->estimates, 2);
+  measure(0.2, nan, 7.0);   // out of reach
+  measure(0.85, nan, 7.0);  // no node there
+  measure(-3.0, nan, 7.0);  // before the run
+  EXPECT_EQ(estimator.counts().late, 2);
+  EXPECT_EQ(estimator.counts().dropped, 3);
+  estimator.estimate(1.0);
+  EXPECT_EQ(recorder->estimates, 2);
+}
+
+TEST_F(Timeline, WhatIsNoNumberIsMaskedAndCounted) {
+  measure(0.0, nan, 1.0);
+  measure(0.1, infinity, -infinity);
+  measure(0.2, 1e300, 2.0);
+  input(0.0, infinity);
+  input(0.1, 5.0);
+  estimator.estimate(0.2);
+  ASSERT_EQ(recorder->nodes.size(), 3u);
+  for (const double output : recorder->nodes[1].outputs) EXPECT_TRUE(std::isnan(output));
+  EXPECT_TRUE(std::isnan(recorder->nodes[2].outputs[0]));
+  EXPECT_EQ(estimator.counts().missing, 4);
+  EXPECT_TRUE(std::isnan(recorder->nodes[1].inputs[0]));
+  EXPECT_NEAR(recorder->nodes[2].inputs[0], 5.0, 1e-12);
+}
+
+TEST_F(Timeline, StampsThatAreNoTimesAreDropped) {
+  for (const double stamp : {nan, infinity, -infinity}) {
+    measure(stamp, 1.0);
+    input(stamp, 1.0);
+  }
+  EXPECT_EQ(estimator.counts().dropped, 3);
+  measure(0.0, 1.0);
+  measure(0.1, 1.0);
+  for (const double time : {nan, -infinity}) EXPECT_EQ(estimator.estimate(time).time, 0.0);
+  EXPECT_FALSE(estimator.has_started());
+  const Estimate& estimate = estimator.estimate(infinity);  // all there is
+  EXPECT_EQ(estimate.time, 0.1);
+  EXPECT_TRUE(estimate.state.allFinite());
+  EXPECT_TRUE(std::isnan(recorder->nodes[1].inputs[0]));
+}
+
+TEST_F(Timeline, BeyondTheNewestNodeItIsIntegrated) {
+  input(0.0, 0.0);
+  measure(0.0, 1.0);
+  input(0.1, 2.0);
+  const double from[] = {1.0, 0.0};
+  double expected[2];
+  const double mean = (0.1 * 0.0 + 0.2 * 2.0) / 0.3, duration = 0.3;
+  Model::Intervals request;
+  request.count = 1;
+  request.states = from;
+  request.inputs = &mean;
+  request.durations = &duration;
+  request.substeps = 2;
+  request.next_states = expected;
+  recorder->model().integrate(request);
+  const Estimate& ahead = estimator.estimate(0.3);
+  EXPECT_TRUE(ahead.predicted);
+  EXPECT_EQ(ahead.time, 0.3);
+  EXPECT_THAT(ahead.state[0], DoubleEq(expected[0]));
+  EXPECT_THAT(ahead.state[1], DoubleEq(expected[1]));
+  EXPECT_EQ(ahead.report.status, Status::solved);
+  EXPECT_FALSE(estimator.estimate(0.0).predicted);
+  EXPECT_EQ(recorder->nodes.size(), 1u);
+  EXPECT_TRUE(estimator.estimate(1e300).state.allFinite());
+}
+
+TEST_F(Timeline, BuffersThatAreFullLoseTheirOldest) {
+  estimator = make({.longest_interval = 1.0, .capacity = 4});
+  for (int i = 0; i < 11; ++i) {
+    measure(i, i);
+    input(i, i);
+  }
+  EXPECT_EQ(estimator.counts().dropped, 7);
+  estimator.estimate(20.0);
+  ASSERT_EQ(recorder->nodes.size(), 4u);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(recorder->nodes[i].outputs[0], 7.0 + i);
+  EXPECT_EQ(recorder->nodes[1].inputs[0], 7.0);
+  // Full and emptied again and again, so that the rows go round their memory.
+  for (int i = 11; i < 100; ++i) {
+    measure(i, i);
+    input(i, i);
+    if (i % 3 == 0) estimator.estimate(i);
+  }
+  estimator.estimate(99.0);
+  EXPECT_EQ(recorder->nodes.size(), 4u + 89u);
+  for (std::size_t i = 1; i < recorder->nodes.size(); ++i) EXPECT_EQ(recorder->nodes[i].inputs[0], 6.0 + i);
+}
+
+TEST_F(Timeline, RefusesNumbersThatMakeNoSense) {
+  const auto message = [&](const Estimator::Timeline& timeline) -> std::string {
+    try {
+      make(timeline);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(message({.longest_interval = 0.0}), HasSubstr("longest interval"));
+  EXPECT_THAT(message({.longest_interval = nan}), HasSubstr("longest interval"));
+  EXPECT_THAT(message({.tolerance = -1.0}), HasSubstr("tolerance"));
+  EXPECT_THAT(message({.tolerance = 0.5}), HasSubstr("tolerance"));
+  EXPECT_THAT(message({.capacity = 0}), HasSubstr("capacity"));
+}
+
+}  // namespace
+}  // namespace rhec

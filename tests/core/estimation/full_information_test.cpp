@@ -1,0 +1,241 @@
+// Smoothing a whole log: on a linear model with Gaussian noise it is the Rauch-Tung-Striebel smoother.
+#include "rhec/core/estimation/full_information.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <functional>
+#include <utility>
+
+#include "rhec/core/base/error.hpp"
+#include "support/linear_case.hpp"
+
+namespace rhec {
+namespace {
+
+using namespace rhec::testing;
+using ::testing::HasSubstr;
+using Matrix = ReferenceFilter::Matrix;
+using Vector = ReferenceFilter::Vector;
+
+struct Moments {
+  Vector mean;
+  Matrix covariance;
+};
+
+/// The textbook's smoother (Rauch, Tung and Striebel 1965) on z = [x; p]: the filter forwards, then a pass backwards
+/// with the covariance of each state and the next, which the filter's linear prediction gives column by column.
+std::vector<Moments> rauch_tung_striebel(const Model& model, const std::vector<Change>& changes,
+                                         const std::vector<Sample>& samples) {
+  ReferenceFilter filter(model, noise_of(model), changes);
+  std::vector<Moments> filtered, predicted;
+  std::vector<Matrix> transitions;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    if (k > 0) {
+      const auto n = filter.mean.size();
+      Matrix transition(n, n);
+      ReferenceFilter at_zero(model, noise_of(model), changes);
+      at_zero.mean = Vector::Zero(n);
+      at_zero.predict(static_cast<int>(k) - 1, samples[k]);
+      for (Eigen::Index c = 0; c < n; ++c) {
+        ReferenceFilter at_unit(model, noise_of(model), changes);
+        at_unit.mean = Vector::Unit(n, c);
+        at_unit.predict(static_cast<int>(k) - 1, samples[k]);
+        transition.col(c) = at_unit.mean - at_zero.mean;
+      }
+      transitions.push_back(transition);
+      filter.predict(static_cast<int>(k) - 1, samples[k]);
+      predicted.push_back({filter.mean, filter.covariance});
+    }
+    filter.update(samples[k]);
+    filtered.push_back({filter.mean, filter.covariance});
+  }
+  std::vector<Moments> smoothed = filtered;
+  for (std::size_t k = samples.size() - 1; k-- > 0;) {
+    const Matrix gain =
+        filtered[k].covariance * transitions[k].transpose() * predicted[k].covariance.fullPivLu().inverse();
+    smoothed[k].mean += gain * (smoothed[k + 1].mean - predicted[k].mean);
+    smoothed[k].covariance += gain * (smoothed[k + 1].covariance - predicted[k].covariance) * gain.transpose();
+  }
+  return smoothed;
+}
+
+NodeLog log_of(const Model& model, const std::vector<Sample>& samples) {
+  NodeLog log;
+  for (const Sample& sample : samples) {
+    if (sample.duration > 0.0) {
+      log.durations.push_back(sample.duration);
+      log.inputs.insert(log.inputs.end(), sample.inputs.begin(), sample.inputs.end());
+    }
+    log.outputs.insert(log.outputs.end(), sample.outputs.begin(), sample.outputs.end());
+  }
+  log.states.assign(samples.size() * model.state_count(), nan);
+  log.parameters.assign(samples.size() * model.parameter_count(), nan);
+  return log;
+}
+
+std::shared_ptr<Solver> solver_of(const std::string& name, const std::string& options = "{}") {
+  return host().make_solver(name, parse_yaml(options, "test"));
+}
+FullInformationEstimation::Setup setup_of(const Model& model, std::vector<std::shared_ptr<const Blocking>> blockings) {
+  RecedingHorizonEstimation::Setup from = linear_setup(model, 1, ArrivalKind::constant, std::move(blockings));
+  return {from.problem, from.blockings, from.walks, from.initial_mean, from.initial_covariance};
+}
+
+/// The largest deviation of means and covariances from the textbook's, relative to its standard deviations. Node 0's
+/// parameters belong to the first interval, as the textbook's do.
+double deviation(const SmoothedRun& run, const Model& model, const std::vector<Moments>& reference) {
+  const int nx = model.state_count(), np = model.parameter_count(), n = nx + np;
+  double worst = 0.0;
+  for (std::ptrdiff_t k = 0; k <= run.intervals(); ++k) {
+    const Moments& expected = reference[k];
+    const auto sigma = [&](int i) { return std::sqrt(static_cast<double>(expected.covariance(i, i))); };
+    for (int r = 0; r < n; ++r) {
+      const double value =
+          r < nx ? run.states[k * nx + r] : run.parameters[std::max<std::ptrdiff_t>(k - 1, 0) * np + r - nx];
+      worst = std::max(worst, std::abs(value - static_cast<double>(expected.mean[r])) / sigma(r));
+      if (run.covariances.empty()) continue;
+      for (int c = 0; c < n; ++c)
+        worst = std::max(
+            worst, std::abs(run.covariances[(k * n + c) * n + r] - static_cast<double>(expected.covariance(r, c))) /
+                       (sigma(r) * sigma(c)));
+    }
+  }
+  return worst;
+}
+
+struct Blocks {
+  std::string name, options;
+  Change change;
+};
+const Blocks unblocked{"unblocked", "{neighbour_sigma: 0.2}", {1, 0.04}};
+const Blocks threes{"structured", "{size: 3, neighbour_sigma: 0.2}", {3, 0.04}};
+const Blocks one_value{"full_horizon", "{}", {0}};
+
+double worst_of(const std::shared_ptr<const Model>& model, const std::vector<Blocks>& blocks,
+                const std::string& solver) {
+  double worst = 0.0;
+  for (unsigned seed = 0; seed < 6; ++seed) {
+    const auto samples = simulate(*model, 12 + 9 * static_cast<int>(seed), seed % 2 == 0, 40 + seed);
+    std::vector<std::shared_ptr<const Blocking>> blockings;
+    std::vector<Change> changes;
+    for (const Blocks& each : blocks) {
+      blockings.push_back(blocking(each.name, each.options));
+      changes.push_back(each.change);
+    }
+    const FullInformationEstimation smoother(model, solver_of(solver, solver == "gn_rti" ? "{mode: converge}" : "{}"),
+                                             setup_of(*model, blockings));
+    const SmoothedRun run = smoother.estimate(log_of(*model, samples));
+    EXPECT_EQ(run.report.status, Status::solved) << seed;
+    EXPECT_FALSE(run.covariances.empty());
+    worst = std::max(worst, deviation(run, *model, rauch_tung_striebel(*model, changes, samples)));
+  }
+  std::printf("%s: worst deviation %.1e standard deviations\n", solver.c_str(), worst);
+  return worst;
+}
+
+TEST(FullInformation, IsTheTextbooksSmoother) {
+  for (const std::string solver : {"sparse_sqp", "gn_rti"}) {
+    EXPECT_LT(worst_of(linear_model<Trolley>(), {}, solver), 1e-8);
+    EXPECT_LT(worst_of(linear_model<Boat>(), {unblocked}, solver), 1e-8);
+    EXPECT_LT(worst_of(linear_model<Boat>(), {threes}, solver), 1e-8);
+    EXPECT_LT(worst_of(linear_model<Boat>(), {one_value}, solver), 1e-8);
+    EXPECT_LT(worst_of(linear_model<Hovercraft>(), {threes, one_value}, solver), 1e-8);
+  }
+}
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(FullInformation, SaysWhatIsWrong) {
+  const auto model = linear_model<Boat>();
+  const auto good = setup_of(*model, {blocking("unblocked")});
+  const auto with = [&](const std::function<void(FullInformationEstimation::Setup&)>& change, const NodeLog& log) {
+    return message_of([&] {
+      auto setup = good;
+      change(setup);
+      FullInformationEstimation(model, solver_of("sparse_sqp"), setup).estimate(log);
+    });
+  };
+  const auto samples = simulate(*model, 5, true, 1);
+  const NodeLog log = log_of(*model, samples);
+  EXPECT_EQ(with([](auto&) {}, log), "no error");
+  EXPECT_THAT(with([](auto&) {}, log_of(*model, {samples[0]})), HasSubstr("fewer than two nodes"));
+  EXPECT_THAT(with([](auto& setup) { setup.blockings.clear(); }, log), HasSubstr("0 blockings"));
+  EXPECT_THAT(with([](auto& setup) { setup.walks.push_back({}); }, log), HasSubstr("2 parameter walks"));
+  EXPECT_THAT(with([](auto& setup) { setup.initial_mean.conservativeResize(3); }, log), HasSubstr("size 4"));
+}
+
+TEST(NodeRecorder, RecordsWhatPassesThrough) {
+  const auto model = linear_model<Trolley>();
+  const auto log = std::make_shared<NodeLog>();
+  RecedingHorizonEstimation::Setup setup = linear_setup(*model, 5, ArrivalKind::ekf, {});
+  NodeRecorder recorder(std::make_unique<RecedingHorizonEstimation>(model, gn_rti(), setup), log);
+  Estimate estimate = empty_estimate(*model);
+  const auto samples = simulate(*model, 9, false, 3);
+  for (int round = 0; round < 2; ++round) {
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      if (k == 0) recorder.start(samples[k].outputs.data());
+      if (k > 0) recorder.add_node(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
+      recorder.estimate(estimate, Clock::time_point::max());
+      EXPECT_EQ(log->states[2 * k], estimate.state[0]);
+      EXPECT_EQ(log->states[2 * k + 1], estimate.state[1]);
+    }
+    const NodeLog expected = log_of(*model, samples);
+    EXPECT_EQ(log->durations, expected.durations);
+    EXPECT_EQ(log->inputs, expected.inputs);
+    for (std::size_t k = 0; k < expected.outputs.size(); ++k)
+      EXPECT_TRUE(log->outputs[k] == expected.outputs[k] ||
+                  (std::isnan(log->outputs[k]) && std::isnan(expected.outputs[k])));
+    // A late measurement changes what it has, and what it lacks stays.
+    const double before = log->outputs[2 * 7 + 1];
+    const double late[] = {0.25, nan};
+    ASSERT_TRUE(recorder.amend(2, late));
+    EXPECT_EQ(log->outputs[2 * 7], 0.25);
+    EXPECT_TRUE(log->outputs[2 * 7 + 1] == before || std::isnan(before));
+    EXPECT_FALSE(recorder.amend(100, late));
+    recorder.reset();
+    EXPECT_EQ(log->intervals(), 0);
+    EXPECT_TRUE(log->outputs.empty());
+  }
+}
+
+TEST(StateAt, IntegratesFromTheNodeBefore) {
+  const auto model = linear_model<Boat>();
+  SmoothedRun run;
+  run.times = {0.0, 0.5, 0.9};
+  run.states = {1.0, 0.5, 0.2, 9.0, 8.0, 7.0, 3.0, 2.0, 1.0};
+  run.inputs = {0.3, -0.4};
+  run.start_parameters = {0.1, 0.2};
+  run.parameters = {0.1, 0.6};  // the second interval is a ramp
+  std::vector<double> state(3), expected(3);
+  for (const auto& [time, node] :
+       std::vector<std::pair<double, int>>{{-1.0, 0}, {0.0, 0}, {0.5, 1}, {0.9, 2}, {7.0, 2}}) {
+    state_at(run, *model, 1, time, state.data());
+    for (int j = 0; j < 3; ++j) EXPECT_EQ(state[j], run.states[3 * node + j]) << time;
+  }
+  // Three quarters into the ramp, the parameter has gone three quarters of its way.
+  const double duration = 0.3, end = 0.2 + 0.75 * 0.4;
+  Model::Intervals request;
+  request.count = 1;
+  request.states = run.states.data() + 3;
+  request.inputs = run.inputs.data() + 1;
+  request.parameters = run.start_parameters.data() + 1;
+  request.parameters_end = &end;
+  request.durations = &duration;
+  request.next_states = expected.data();
+  model->integrate(request);
+  state_at(run, *model, 1, 0.8, state.data());
+  for (int j = 0; j < 3; ++j) EXPECT_NEAR(state[j], expected[j], 1e-12);
+}
+
+}  // namespace
+}  // namespace rhec

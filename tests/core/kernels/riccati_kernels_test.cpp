@@ -1,0 +1,252 @@
+// The Riccati recursion against dense systems, on every instruction set that this machine can run.
+#include "rhec/core/kernels/riccati_kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include "rhec/core/kernels/kernel_sets.hpp"
+#include "support/random_qp.hpp"
+
+namespace rhec {
+namespace {
+
+using testing::DenseQp;
+using testing::RandomQp;
+
+/// What the recursion keeps of a program.
+struct Recursion {
+  AlignedDoubles P, U, V, closed, T, inverse, drift, g, p;
+  std::vector<std::uint8_t> fixes, special;
+  Iterate step;
+  RiccatiView view;
+
+  Recursion(const StageQp& qp, const ActiveSet& active) : step(qp.capacity()) {
+    const Capacity& capacity = qp.capacity();
+    const std::size_t stages = capacity.intervals + 1, row = qp.stride();
+    P.assign(stages * capacity.states * row, 0.0);
+    for (auto* v : {&U, &V}) v->assign(stages * capacity.controls * row, 0.0);
+    for (auto* v : {&closed, &T}) v->assign(stages * 64, 0.0);
+    inverse.assign(stages * capacity.controls, 0.0);
+    for (auto* v : {&drift, &g, &p}) v->assign(stages * row, 0.0);
+    for (auto* v : {&fixes, &special}) v->assign(stages, 0);
+    view.intervals = qp.intervals();
+    view.states = capacity.states;
+    view.controls = capacity.controls;
+    view.stride = qp.stride();
+    view.state_counts = qp.state_counts();
+    view.control_counts = qp.control_counts();
+    view.identity_counts = qp.identity_counts();
+    view.AB = qp.AB(0);
+    view.H = qp.H(0);
+    view.h = qp.h(0);
+    view.b = qp.b(0);
+    view.lower = qp.lower(0);
+    view.upper = qp.upper(0);
+    view.sides = active.row(0);
+    view.special = special.data();
+    view.P = P.data();
+    view.U = U.data();
+    view.V = V.data();
+    view.closed = closed.data();
+    view.T = T.data();
+    view.inverse = inverse.data();
+    view.fixes = fixes.data();
+    view.drift = drift.data();
+    view.g = g.data();
+    view.p = p.data();
+    view.values = step.row(0);
+    view.costates = step.costate(0);
+    view.bounds = step.bound_row(0);
+    const int N = qp.intervals();
+    for (int j = 0; j < qp.states(N); ++j) {
+      std::copy_n(qp.H(N) + j * row, qp.states(N), P.data() + (N * capacity.states + j) * row);
+      p[N * row + j] = qp.q(N)[j];
+    }
+    std::copy_n(qp.initial_step(), qp.states(0), step.state(0));
+  }
+
+  void solve(const RiccatiKernels& kernels) {
+    const int last = view.intervals - 1;
+    ASSERT_EQ(kernels.factor(view, last, 1e-11), -1);
+    ASSERT_EQ(kernels.solve_backward(view, last), -1);
+    ASSERT_EQ(kernels.solve_forward(view, 0), view.intervals);
+  }
+};
+
+/// Holds some controls at bounds of their own.
+ActiveSet some_active_controls(RandomQp& random, StageQp& qp) {
+  ActiveSet active(qp.capacity());
+  for (int i = 0; i < qp.intervals(); ++i) {
+    for (int j = 0; j < qp.controls(i); ++j) {
+      if (random.integer(0, 3) != 0) continue;
+      const bool is_lower = random.integer(0, 1) == 0;
+      active.control(i)[j] = is_lower ? std::int8_t{-1} : std::int8_t{1};
+      (is_lower ? qp.control_lower(i) : qp.control_upper(i))[j] = random.uniform(-0.5, 0.5);
+    }
+  }
+  return active;
+}
+
+TEST(RiccatiKernels, OfTheRecursionAgreeWithTheDenseSystem) {
+  RandomQp random(7);
+  for (int trial = 0; trial < 300; ++trial) {
+    // Five to eight states have kernels of their own, with two to four controls; long rows take several registers.
+    const int states = trial % 3 == 0 ? random.integer(1, 14) : random.integer(5, 8);
+    const int controls = trial % 3 == 0 ? random.integer(1, 12) : random.integer(2, 4);
+    StageQp qp = random.make(random.integer(1, 7), states, controls, true);
+    if (trial % 2 == 0) random.carry(qp);
+    const ActiveSet active = some_active_controls(random, qp);
+    const DenseQp dense(qp, active);
+    const Eigen::VectorXd z = dense.solve();
+    for (const KernelSet& set : runnable_kernels()) {
+      Recursion recursion(qp, active);
+      recursion.solve(*set.riccati);
+      const Iterate& step = recursion.step;
+      const auto where = [&](int i) { return std::string(set.instruction_set) + ", stage " + std::to_string(i); };
+      int costate = static_cast<int>(dense.H.rows()), bound = costate + dense.dynamics_rows;
+      for (int i = 0; i <= qp.intervals(); ++i) {
+        for (int j = 0; j < states; ++j)
+          ASSERT_NEAR(step.state(i)[j], z[dense.state_at[i] + j], 1e-8) << where(i) << " of " << states;
+        for (int j = 0; j < qp.controls(i); ++j) {
+          ASSERT_NEAR(step.control(i)[j], z[dense.control_at[i] + j], 1e-8) << where(i) << " of " << states;
+          if (active.control(i)[j] != 0) {
+            ASSERT_NEAR(step.control_bound(i)[j], z[bound++], 1e-7) << where(i);
+          }
+        }
+        for (int j = 0; i > 0 && j < states; ++j) ASSERT_NEAR(step.costate(i)[j], z[costate++], 1e-7) << where(i);
+      }
+    }
+  }
+}
+
+TEST(RiccatiKernels, OfResponsesAreWhatAStepDiffersBy) {
+  RandomQp random(13);
+  for (int trial = 0; trial < 100; ++trial) {
+    const int states = trial % 2 == 0 ? random.integer(5, 8) : random.integer(1, 12);
+    StageQp qp = random.make(random.integer(1, 6), states, random.integer(2, 4), true);
+    if (trial % 4 < 2) random.carry(qp);
+    const ActiveSet active = some_active_controls(random, qp);
+    const int N = qp.intervals(), stage = random.integer(0, N), place = random.integer(0, states - 1),
+              number = random.integer(0, response_batch - 1);
+    for (const KernelSet& set : runnable_kernels()) {
+      Recursion before(qp, active);
+      before.solve(*set.riccati);
+      AlignedDoubles values(static_cast<std::size_t>(N + 1) * qp.stride() * response_batch, 0.0), costates = values;
+      const auto at = [&](int i, int k, int lane) -> double& {
+        return values[(static_cast<std::size_t>(i) * qp.stride() + k) * response_batch + lane];
+      };
+      at(stage, place, number) = 1.0;
+      // Where there are no gradients, what is in their place is not looked at.
+      std::vector<unsigned char> has_gradient(N + 1, 0);
+      has_gradient[stage] = 1;
+      for (int i = 0; i <= N; ++i)
+        for (int k = 0; i != stage && k < states + qp.controls(i); ++k) at(i, k, number) = 3.0;
+      set.riccati->respond_backward(before.view, stage, has_gradient.data(), values.data());
+      for (int j = 0; j < states; ++j)
+        for (int other = 0; other < response_batch; ++other) at(0, j, other) = 0.0;
+      set.riccati->respond_forward(before.view, stage, values.data(), costates.data());
+
+      StageQp moved = qp;
+      moved.h(stage)[place] += 1.0;
+      Recursion after(moved, active);
+      after.solve(*set.riccati);
+      for (int i = 0; i <= N; ++i) {
+        for (int k = 0; k < states + qp.controls(i); ++k) {
+          const bool is_fixed = k >= states && active.row(i)[k] != 0;
+          const auto of = [&](const Recursion& r) { return is_fixed ? r.step.bound_row(i)[k] : r.step.row(i)[k]; };
+          ASSERT_NEAR(at(i, k, number), of(after) - of(before), 1e-8) << set.instruction_set << ", " << i << ", " << k;
+        }
+        for (int j = 0; i > 0 && j < states; ++j)
+          ASSERT_NEAR(costates[(static_cast<std::size_t>(i) * qp.stride() + j) * response_batch + number],
+                      after.step.costate(i)[j] - before.step.costate(i)[j], 1e-8)
+              << set.instruction_set << ", " << i << ", " << j;
+      }
+    }
+  }
+}
+
+TEST(RiccatiKernels, OfTheRecursionStopWhereTheReducedHessianIsNotDefinite) {
+  RandomQp random(8);
+  for (int trial = 0; trial < 20; ++trial) {
+    StageQp qp = random.make(5, trial % 2 == 0 ? 6 : 4, 2, true);
+    int bent = -1;
+    for (int i = 0; i < qp.intervals(); ++i)
+      if (qp.controls(i) > 0) bent = i;
+    if (bent < 0) continue;
+    qp.R_of(bent)(0, 0) = -1e4;
+    const ActiveSet none(qp.capacity());
+    for (const KernelSet& set : runnable_kernels()) {
+      Recursion recursion(qp, none);
+      EXPECT_EQ(set.riccati->factor(recursion.view, qp.intervals() - 1, 1e-11), bent) << set.instruction_set;
+    }
+  }
+}
+
+TEST(RiccatiKernels, InvertAndSolveSymmetricSystems) {
+  RandomQp random(13);
+  for (int trial = 0; trial < 60; ++trial) {
+    const int n = trial < 20 ? 6 : random.integer(1, 16), stride = trial % 2 == 0 && n <= 8 ? 8 : 16;
+    Eigen::MatrixXd root(n, n), P = Eigen::MatrixXd::Zero(n, n);
+    for (double& entry : root.reshaped()) entry = random.uniform(-1.0, 1.0);
+    P = root * root.transpose() + 0.1 * Eigen::MatrixXd::Identity(n, n);
+    // What rows have beyond the matrix is not theirs.
+    AlignedDoubles matrix(static_cast<std::size_t>(n) * stride, 7.0), inverse(matrix.size(), 0.0), p(stride, 3.0),
+        x(stride, 0.0), batch(static_cast<std::size_t>(n) * response_batch);
+    for (int r = 0; r < n; ++r)
+      for (int c = 0; c < n; ++c) matrix[r * stride + c] = P(r, c);
+    Eigen::VectorXd right(n);
+    for (int j = 0; j < n; ++j) p[j] = right[j] = random.uniform(-1.0, 1.0);
+    for (double& entry : batch) entry = random.uniform(-1.0, 1.0);
+    const Eigen::MatrixXd expected = P.inverse();
+    const Eigen::VectorXd solution = -P.ldlt().solve(right);
+    for (const KernelSet& set : runnable_kernels()) {
+      ASSERT_TRUE(set.riccati->invert(matrix.data(), n, stride, 1e-11, inverse.data())) << set.instruction_set;
+      for (int r = 0; r < n; ++r)
+        for (int c = 0; c < n; ++c)
+          EXPECT_NEAR(inverse[r * stride + c], expected(r, c), 1e-9 * expected.norm()) << set.instruction_set;
+      set.riccati->solve(matrix.data(), inverse.data(), n, stride, p.data(), x.data());
+      for (int j = 0; j < n; ++j) EXPECT_NEAR(x[j], solution[j], 1e-11 * (1.0 + solution.norm()));
+      AlignedDoubles answers = batch;
+      set.riccati->answer(inverse.data(), n, stride, answers.data());
+      for (int r = 0; r < n; ++r) {
+        for (int k = 0; k < response_batch; ++k) {
+          double sum = 0.0;
+          for (int c = 0; c < n; ++c) sum -= inverse[r * stride + c] * batch[c * response_batch + k];
+          EXPECT_NEAR(answers[r * response_batch + k], sum, 1e-11 * (1.0 + expected.norm())) << set.instruction_set;
+        }
+      }
+      // Not positive definite, or hardly so.
+      AlignedDoubles bad = matrix;
+      bad[0] = -1.0;
+      EXPECT_FALSE(set.riccati->invert(bad.data(), n, stride, 1e-11, inverse.data())) << set.instruction_set;
+      bad[0] = std::nan("");
+      EXPECT_FALSE(set.riccati->invert(bad.data(), n, stride, 1e-11, inverse.data())) << set.instruction_set;
+    }
+  }
+}
+
+AlignedDoubles numbers(RandomQp& random, std::size_t count) {
+  AlignedDoubles v(count);
+  for (double& entry : v) entry = random.uniform(-2.0, 2.0);
+  return v;
+}
+
+TEST(RiccatiKernels, CombineABatchByItsWeights) {
+  RandomQp random(14);
+  for (int trial = 0; trial < 40; ++trial) {
+    const int count = random.integer(1, 20);
+    const AlignedDoubles batch = numbers(random, static_cast<std::size_t>(padded(count)) * response_batch),
+                         of_batch = numbers(random, response_batch);
+    for (const KernelSet& set : runnable_kernels()) {
+      AlignedDoubles sums(padded(count), 0.5);
+      set.riccati->combine(batch.data(), of_batch.data(), sums.data(), padded(count));
+      for (int j = 0; j < count; ++j) {
+        double expected = 0.5;
+        for (int k = 0; k < response_batch; ++k) expected += batch[j * response_batch + k] * of_batch[k];
+        EXPECT_NEAR(sums[j], expected, 1e-12) << set.instruction_set;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rhec

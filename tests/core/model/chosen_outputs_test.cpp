@@ -1,0 +1,136 @@
+// A vehicle with some of its sensors: what is observed is what was chosen of all, and all else is untouched.
+#include "rhec/core/model/chosen_outputs.hpp"
+
+#include <gmock/gmock.h>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/yaml.hpp"
+#include "support/random_problem.hpp"
+
+namespace rhec {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+const Host& host() {
+  static const Host found;
+  return found;
+}
+
+std::shared_ptr<Model> model_with(const std::string& options) {
+  return host().make_model("tractor_trailer", parse_yaml(options, "robot.yaml"));
+}
+
+std::string error_of(const std::string& options) {
+  try {
+    model_with(options);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// All that can be observed at random nodes.
+struct Observation {
+  std::vector<double> outputs, jacobians, hessians;
+};
+Observation observe(const Model& model, const std::vector<double>& states, const std::vector<double>& multipliers) {
+  const std::size_t nx = model.state_count(), ny = model.output_count(), count = states.size() / nx;
+  Observation seen{std::vector<double>(count * ny), std::vector<double>(count * ny * nx),
+                   std::vector<double>(count * nx * nx)};
+  model.observe({.count = static_cast<int>(count),
+                 .states = states.data(),
+                 .outputs = seen.outputs.data(),
+                 .jacobians = seen.jacobians.data(),
+                 .multipliers = multipliers.data(),
+                 .hessians = seen.hessians.data()});
+  return seen;
+}
+
+TEST(ChosenOutputs, AreThoseOfAllOutputsInTheOrderAskedFor) {
+  const auto all = model_with("outputs: all");
+  const std::vector<int> picked = {7, 0, 5};  // tractor_heading, x_trailer_gps, articulation
+  const auto some = model_with("outputs: [tractor_heading, x_trailer_gps, articulation]");
+  ASSERT_THAT(names_of(some->description().outputs), ElementsAre("tractor_heading", "x_trailer_gps", "articulation"));
+  const std::size_t nx = all->state_count(), ny = all->output_count(), chosen = picked.size();
+  ASSERT_EQ(ny, 8U);
+  testing::RandomProblem random(all, 1);
+  // More nodes than are evaluated at a time.
+  for (const std::size_t count : {0U, 1U, 3U, 72U, 73U, 500U}) {
+    std::vector<double> states(count * nx), multipliers(count * chosen), spread(count * ny, 0.0);
+    for (double& value : states) value = random.uniform(-2.0, 2.0);
+    for (std::size_t k = 0; k < multipliers.size(); ++k) {
+      multipliers[k] = random.normal();
+      spread[k / chosen * ny + static_cast<std::size_t>(picked[k % chosen])] = multipliers[k];
+    }
+    const Observation whole = observe(*all, states, spread), part = observe(*some, states, multipliers);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t j = 0; j < chosen; ++j) {
+        const auto from = static_cast<std::size_t>(picked[j]);
+        EXPECT_EQ(part.outputs[i * chosen + j], whole.outputs[i * ny + from]);
+        for (std::size_t c = 0; c < nx; ++c)
+          EXPECT_EQ(part.jacobians[(i * nx + c) * chosen + j], whole.jacobians[(i * nx + c) * ny + from]);
+      }
+    }
+    EXPECT_EQ(part.hessians, whole.hessians);
+  }
+}
+
+TEST(ChosenOutputs, AskForNoMoreThanIsAskedFor) {
+  const auto some = model_with("outputs: [articulation]");
+  const std::vector<double> state = {1.0, 2.0, 0.3, 0.5, 0.1};
+  double output = 0.0;
+  some->observe({.count = 1, .states = state.data(), .outputs = &output});
+  EXPECT_DOUBLE_EQ(output, 0.2);
+  std::vector<double> jacobian(5, 9.0);
+  some->observe({.count = 1, .states = state.data(), .jacobians = jacobian.data()});
+  EXPECT_THAT(jacobian, ElementsAre(0.0, 0.0, -1.0, 1.0, 0.0));
+}
+
+TEST(ChosenOutputs, AreTheUsualOnesWhereNoneAreNamed) {
+  EXPECT_THAT(names_of(host().make_model("bicycle_slip")->description().outputs),
+              ElementsAre("x_gps", "y_gps", "delta"));
+  EXPECT_THAT(
+      names_of(host().make_model("bicycle_slip", parse_yaml("outputs: all", "robot.yaml"))->description().outputs),
+      ElementsAre("x_gps", "y_gps", "delta", "heading"));
+}
+
+TEST(ChosenOutputs, LeaveTheVehicleAsItIs) {
+  const auto all = model_with("{outputs: all, hitch: -0.7}"), some = model_with("{outputs: [delta], hitch: -0.7}");
+  const std::vector<double> x = {1.0, 2.0, 0.3, 0.5, 0.1}, u = {2.0, 0.1}, p = {0.8, 0.7, 0.9};
+  std::vector<double> first(5), second(5);
+  all->rates(x.data(), u.data(), p.data(), first.data());
+  some->rates(x.data(), u.data(), p.data(), second.data());
+  EXPECT_EQ(first, second);
+  const double dt = 0.2;
+  Model::Intervals request{
+      .count = 1, .states = x.data(), .inputs = u.data(), .parameters = p.data(), .durations = &dt};
+  request.next_states = first.data();
+  all->integrate(request);
+  request.next_states = second.data();
+  some->integrate(request);
+  EXPECT_EQ(first, second);
+  std::vector<double> straight(2), same(2);
+  all->straight_motion(3.0, p.data(), first.data(), straight.data());
+  some->straight_motion(3.0, p.data(), second.data(), same.data());
+  EXPECT_EQ(straight, same);
+  EXPECT_EQ(all->instruction_sets(), some->instruction_sets());
+  EXPECT_EQ(all->has_second_derivatives(), some->has_second_derivatives());
+}
+
+TEST(ChosenOutputs, MistakesAreNamedWithTheirPlace) {
+  EXPECT_THAT(error_of("outputs:\n  - delta\n  - x_gps"),
+              HasSubstr("robot.yaml:3: outputs[1]: found 'x_gps', expected an output of the model 'tractor_trailer': "
+                        "x_trailer_gps, "));
+  EXPECT_THAT(error_of("outputs: [delta, delta]"), HasSubstr("outputs[1]: this output is named twice"));
+  EXPECT_THAT(error_of("outputs: []"), HasSubstr("expected 'all' or a list of outputs"));
+  EXPECT_THAT(error_of("outputs: delta"), HasSubstr("expected 'all' or a list of outputs"));
+  EXPECT_THROW(with_outputs(host().make_model("bicycle_slip"), {3}), Error);
+  EXPECT_THROW(with_outputs(host().make_model("bicycle_slip"), {-1}), Error);
+  EXPECT_THROW(with_outputs(host().make_model("bicycle_slip"), {0, 0}), Error);
+}
+
+}  // namespace
+}  // namespace rhec

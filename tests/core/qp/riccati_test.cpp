@@ -1,0 +1,293 @@
+#include "rhec/core/qp/riccati.hpp"
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "support/random_qp.hpp"
+
+namespace rhec {
+namespace {
+
+using testing::DenseQp;
+using testing::RandomQp;
+
+void expect_same_as_dense(const StageQp& qp, const ActiveSet& active, const Iterate& step, double tolerance) {
+  const DenseQp dense(qp, active);
+  const Eigen::VectorXd z = dense.solve();
+  const int N = qp.intervals();
+  int row = 0;
+  const auto size = dense.H.rows();
+  for (int i = 0; i <= N; ++i) {
+    for (int j = 0; j < qp.states(i); ++j)
+      ASSERT_NEAR(step.state(i)[j], z[dense.state_at[i] + j], tolerance) << "state " << i << "," << j;
+    for (int j = 0; j < qp.controls(i); ++j)
+      ASSERT_NEAR(step.control(i)[j], z[dense.control_at[i] + j], tolerance) << "control " << i << "," << j;
+    if (i == N) break;
+    for (int j = 0; j < qp.states(i + 1); ++j)
+      ASSERT_NEAR(step.costate(i + 1)[j], z[size + row++], tolerance) << "costate " << i + 1 << "," << j;
+  }
+  row = dense.dynamics_rows;
+  for (int i = 0; i <= N; ++i) {
+    if (i > 0 || !qp.initial_state_is_given) {
+      for (int j = 0; j < qp.states(i); ++j) {
+        ASSERT_NEAR(step.state_bound(i)[j], active.state(i)[j] ? z[size + row++] : 0.0, tolerance);
+      }
+    }
+    for (int j = 0; j < qp.controls(i); ++j) {
+      ASSERT_NEAR(step.control_bound(i)[j], active.control(i)[j] ? z[size + row++] : 0.0, tolerance);
+    }
+  }
+}
+
+TEST(ActiveSet, NamesTheBoundsThatAreHeldInTheirOrder) {
+  RandomQp random(17);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Capacity capacity{random.integer(1, 6), random.integer(1, 12), random.integer(1, 6)};
+    ActiveSet active(capacity);
+    std::vector<std::array<int, 3>> expected, found;
+    for (int i = 0; i <= capacity.intervals; ++i)
+      for (int k = 0; k < capacity.states + capacity.controls; ++k) {
+        if (random.integer(0, 5) > 0) continue;
+        const int side = random.integer(0, 1) == 0 ? -1 : 1;
+        active.row(i)[k] = static_cast<std::int8_t>(side);
+        expected.push_back({i, k, side});
+      }
+    active.for_each([&](int stage, int column, std::int8_t side) { found.push_back({stage, column, side}); });
+    EXPECT_EQ(found, expected);
+    active.clear();
+    active.for_each([](int, int, std::int8_t) { ADD_FAILURE() << "nothing is held"; });
+  }
+}
+
+TEST(Riccati, AgreesWithTheDenseSystemWithoutActiveBounds) {
+  RandomQp random(1);
+  for (int trial = 0; trial < 60; ++trial) {
+    StageQp qp = random.make(random.integer(1, 8), random.integer(1, 5), random.integer(1, 4), trial % 2 == 0);
+    if (trial % 3 == 0) random.carry(qp);
+    Riccati riccati(qp.capacity());
+    const ActiveSet active(qp.capacity());
+    Iterate step(qp.capacity());
+    riccati.factor(qp, active);
+    EXPECT_FALSE(riccati.was_convexified());
+    ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
+    expect_same_as_dense(qp, active, step, 1e-9);
+  }
+}
+
+TEST(Riccati, AgreesWithTheDenseSystemWithActiveControlsAndStates) {
+  RandomQp random(2);
+  int compared = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    StageQp qp = random.make(random.integer(1, 8), random.integer(1, 5), random.integer(1, 4), trial % 2 == 0);
+    ActiveSet active(qp.capacity());
+    for (int i = 0; i <= qp.intervals(); ++i) {
+      for (int j = 0; j < qp.states(i); ++j) {
+        if ((i == 0 && qp.initial_state_is_given) || random.uniform(0.0, 1.0) > 0.12) continue;
+        active.state(i)[j] = 1;
+        qp.state_upper(i)[j] = random.uniform(-0.5, 0.5);
+      }
+      for (int j = 0; j < qp.controls(i); ++j) {
+        if (random.uniform(0.0, 1.0) > 0.2) continue;
+        active.control(i)[j] = -1;
+        qp.control_lower(i)[j] = random.uniform(-0.5, 0.5);
+      }
+    }
+    // Where the active rows depend on each other there is no unique answer to compare with.
+    const DenseQp dense(qp, active);
+    if (dense.E.rows() > dense.E.cols()) continue;
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(dense.E);
+    if (svd.singularValues().tail(1)[0] < 1e-2) continue;
+    ++compared;
+    Riccati riccati(qp.capacity());
+    Iterate step(qp.capacity());
+    riccati.factor(qp, active);
+    ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
+    expect_same_as_dense(qp, active, step, 1e-7);
+  }
+  EXPECT_GT(compared, 150);
+}
+
+TEST(Riccati, RespondsToAGradientAsTheSolutionChangesWithIt) {
+  RandomQp random(8);
+  for (int trial = 0; trial < 60; ++trial) {
+    StageQp qp = random.make(random.integer(1, 8), random.integer(1, 7), random.integer(1, 11), trial % 2 == 0);
+    const int N = qp.intervals(), ns = qp.capacity().states, stride = qp.stride();
+    ActiveSet active(qp.capacity());
+    std::vector<Riccati::Entry> places;
+    for (int i = 0; i <= N; ++i) {
+      for (int j = 0; j < qp.states(i); ++j) places.push_back({i, j});
+      for (int j = 0; j < qp.controls(i); ++j) {
+        active.control(i)[j] = random.uniform(0.0, 1.0) < 0.3 ? -1 : 0;
+        qp.control_lower(i)[j] = -0.2;
+        if (active.control(i)[j] == 0) places.push_back({i, ns + j});
+      }
+    }
+    Riccati riccati(qp.capacity());
+    riccati.factor(qp, active);
+    Iterate before(qp.capacity()), after(qp.capacity());
+    ASSERT_EQ(riccati.solve(qp, active, before), Riccati::Outcome::done);
+    std::vector<Riccati::Entry> gradients;
+    for (int c = random.integer(1, Riccati::Responses::size); c > 0; --c)
+      gradients.push_back(places[random.integer(0, static_cast<int>(places.size()) - 1)]);
+    const int count = static_cast<int>(gradients.size());
+    Riccati::Responses responses(qp.capacity());
+    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), count, responses));
+    for (int c = 0; c < count; ++c) {
+      StageQp changed = qp;
+      changed.h(gradients[c].stage)[gradients[c].place] += 1.0;
+      ASSERT_EQ(riccati.solve(changed, active, after), Riccati::Outcome::done);
+      for (int i = 0; i <= N; ++i) {
+        const auto expect_response = [&](int place, double difference) {
+          ASSERT_NEAR(responses.values[(i * stride + place) * Riccati::Responses::size + c], difference, 1e-9)
+              << "trial " << trial << ", stage " << i << ", place " << place;
+        };
+        for (int j = 0; j < qp.states(i); ++j) expect_response(j, after.state(i)[j] - before.state(i)[j]);
+        for (int j = 0; j < qp.controls(i); ++j)
+          expect_response(ns + j, active.control(i)[j] ? after.control_bound(i)[j] - before.control_bound(i)[j]
+                                                       : after.control(i)[j] - before.control(i)[j]);
+      }
+    }
+  }
+}
+
+TEST(Riccati, CombinesResponsesToTheSolutionWithTheirGradients) {
+  RandomQp random(10);
+  for (int trial = 0; trial < 60; ++trial) {
+    StageQp qp = random.make(random.integer(1, 8), random.integer(1, 7), random.integer(1, 11), trial % 2 == 0);
+    if (trial % 4 < 2) random.carry(qp);
+    ActiveSet active(qp.capacity());
+    for (int i = 0; i < qp.intervals(); ++i) {
+      for (int j = 0; j < qp.controls(i); ++j) {
+        active.control(i)[j] = random.uniform(0.0, 1.0) < 0.3 ? 1 : 0;
+        qp.control_upper(i)[j] = 0.3;
+      }
+    }
+    Riccati riccati(qp.capacity());
+    riccati.factor(qp, active);
+    Riccati::Responses responses(qp.capacity());
+    alignas(64) double weights[Riccati::Responses::size] = {};
+    StageQp changed = qp;
+    std::vector<Riccati::Entry> gradients;
+    for (int c = 0; c < trial % (Riccati::Responses::size + 1); ++c) {
+      const int stage = random.integer(0, qp.intervals());
+      gradients.push_back({stage, random.integer(0, qp.states(stage) - 1)});
+      weights[c] = random.uniform(-2.0, 2.0);
+      changed.h(stage)[gradients[c].place] += weights[c];
+    }
+    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), static_cast<int>(gradients.size()), responses));
+    Iterate expected(qp.capacity()), step(qp.capacity());
+    ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
+    std::vector<double> values(step.row(0),
+                               step.row(0) + static_cast<std::ptrdiff_t>(qp.intervals() + 1) * qp.stride());
+    riccati.add_values(responses, weights, static_cast<int>(values.size()), values.data());
+    riccati.combine(qp, active, responses, weights, step);
+    ASSERT_EQ(riccati.solve(changed, active, expected), Riccati::Outcome::done);
+    for (int i = 0; i <= qp.intervals(); ++i) {
+      for (int j = 0; j < qp.states(i); ++j) {
+        ASSERT_NEAR(step.state(i)[j], expected.state(i)[j], 1e-9);
+        ASSERT_EQ(values[i * qp.stride() + j], step.state(i)[j]);
+        ASSERT_NEAR(step.costate(i)[j], expected.costate(i)[j], 1e-9) << "trial " << trial << ", node " << i;
+        ASSERT_EQ(step.state_bound(i)[j], 0.0);
+      }
+      for (int j = 0; j < qp.controls(i); ++j) {
+        ASSERT_NEAR(step.control(i)[j], expected.control(i)[j], 1e-9);
+        ASSERT_NEAR(step.control_bound(i)[j], expected.control_bound(i)[j], 1e-9);
+      }
+    }
+  }
+}
+
+TEST(Riccati, HasNoResponsesWhereStateBoundsHold) {
+  RandomQp random(9);
+  const StageQp qp = random.make(4, 3, 2, true);
+  ActiveSet active(qp.capacity());
+  active.state(2)[1] = 1;
+  Riccati riccati(qp.capacity());
+  riccati.factor(qp, active);
+  Riccati::Responses responses(qp.capacity());
+  const Riccati::Entry gradient{1, 0};
+  EXPECT_FALSE(riccati.respond(qp, active, &gradient, 1, responses));
+}
+
+TEST(Riccati, RefusesActiveBoundsThatContradictEachOther) {
+  RandomQp random(3);
+  StageQp qp = random.make(2, 1, 1, true);
+  for (int i = 0; i < 2; ++i) {
+    qp.set_sizes(i, 1, 0);
+    qp.AB(i)[0] = 1.0;
+    qp.b(i)[0] = 0.0;
+  }
+  ActiveSet active(qp.capacity());
+  active.state(2)[0] = 1;
+  qp.state_upper(2)[0] = qp.initial_step()[0] - 1.0;
+  Riccati riccati(qp.capacity());
+  Iterate step(qp.capacity());
+  riccati.factor(qp, active);
+  EXPECT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::inconsistent);
+}
+
+TEST(Riccati, TheCovarianceIsThatOfTheDenseInverse) {
+  RandomQp random(4);
+  for (int trial = 0; trial < 60; ++trial) {
+    // Six states have kernels of their own, with two to four controls.
+    const bool is_usual = trial % 2 == 0;
+    StageQp qp = random.make(random.integer(1, 9), is_usual ? 6 : random.integer(1, 4),
+                             is_usual ? random.integer(2, 4) : random.integer(1, 3), false);
+    if (trial % 3 != 0) random.carry(qp);
+    const int ns = qp.capacity().states;
+    Riccati riccati(qp.capacity());
+    const ActiveSet none(qp.capacity());
+    riccati.factor(qp, none);
+    std::vector<double> blocks(static_cast<std::size_t>(qp.intervals() + 1) * ns * ns), last(ns * ns);
+    riccati.covariances(qp, blocks.data(), last.data());
+    const DenseQp dense(qp, none);
+    const Eigen::MatrixXd null_space = dense.E.fullPivLu().kernel();
+    const Eigen::MatrixXd covariance =
+        2.0 * null_space * (null_space.transpose() * dense.H * null_space).inverse() * null_space.transpose();
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int c = 0; c < ns; ++c)
+        for (int r = 0; r < ns; ++r)
+          ASSERT_NEAR(blocks[(i * ns + c) * ns + r], covariance(dense.state_at[i] + r, dense.state_at[i] + c), 1e-8);
+    EXPECT_EQ(last[0], blocks[static_cast<std::size_t>(qp.intervals()) * ns * ns]);
+    // The last one alone, from as much of the factorisation as it takes; a step is found all the same.
+    Iterate step(qp.capacity()), after(qp.capacity());
+    ASSERT_EQ(riccati.solve(qp, none, step), Riccati::Outcome::done);
+    std::vector<double> alone(ns * ns);
+    riccati.factor_for_covariances(qp, none);
+    riccati.covariances(qp, nullptr, alone.data());
+    for (int k = 0; k < ns * ns; ++k) ASSERT_NEAR(alone[k], last[k], 1e-12 * (1.0 + std::abs(last[k])));
+    ASSERT_EQ(riccati.solve(qp, none, after), Riccati::Outcome::done);
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int k = 0; k < qp.stride(); ++k) ASSERT_EQ(after.row(i)[k], step.row(i)[k]);
+  }
+}
+
+TEST(Riccati, ConvexifiesWhatIsNotPositiveDefiniteAndCanWriteItBack) {
+  RandomQp random(5);
+  int convexified = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    StageQp qp = random.make(5, 3, 2, true);
+    for (int i = 0; i < 5; ++i)
+      for (int j = 0; j < qp.controls(i); ++j) qp.R_of(i)(j, j) -= 4.0;
+    Riccati riccati(qp.capacity());
+    const ActiveSet none(qp.capacity());
+    Iterate step(qp.capacity()), again(qp.capacity());
+    riccati.factor(qp, none);
+    convexified += riccati.was_convexified();
+    ASSERT_EQ(riccati.solve(qp, none, step), Riccati::Outcome::done);
+    ASSERT_TRUE(step.is_finite());
+    riccati.write_convexified(qp);
+    riccati.factor(qp, none);
+    EXPECT_FALSE(riccati.was_convexified());
+    ASSERT_EQ(riccati.solve(qp, none, again), Riccati::Outcome::done);
+    for (int i = 0; i <= 5; ++i)
+      for (int j = 0; j < 3; ++j) EXPECT_NEAR(step.state(i)[j], again.state(i)[j], 1e-6);
+  }
+  EXPECT_GT(convexified, 25);
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,71 @@
+#include "rhec/core/qp/stage_qp.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "support/random_qp.hpp"
+
+namespace rhec {
+namespace {
+
+using testing::RandomQp;
+
+/// All that a program holds of one stage and that moves.
+std::vector<double> contents(const StageQp& qp, int i) {
+  const Capacity& capacity = qp.capacity();
+  std::vector<double> all;
+  const auto add = [&](const double* rows, int count) { all.insert(all.end(), rows, rows + count * qp.stride()); };
+  add(qp.AB(i), capacity.states);
+  add(qp.H(i), capacity.states + capacity.controls);
+  add(qp.h(i), 1);
+  add(qp.b(i), 1);
+  return all;
+}
+
+TEST(StageQp, MovesTowardsTheFrontAndLeavesZerosBehind) {
+  RandomQp random(31);
+  for (int trial = 0; trial < 20; ++trial) {
+    const int most = random.integer(1, 7), states = random.integer(1, 7), controls = random.integer(1, 4);
+    StageQp qp({most, states, controls});
+    int intervals = 0;
+    std::vector<std::vector<double>> stages;
+    std::vector<int> control_counts, identity_counts;
+    double number = 1.0;
+    const auto write = [&](int i) {
+      const int m = random.integer(0, controls), carried = random.integer(0, states);
+      qp.set_sizes(i, states, m, carried);
+      for (int k = 0; k < (states + m) * qp.stride(); ++k) qp.H(i)[k] = number++;
+      for (double* row : {qp.AB(i), qp.h(i), qp.b(i)}) std::fill_n(row, states, number++);
+      stages.push_back(contents(qp, i));
+      control_counts.push_back(m);
+      identity_counts.push_back(carried);
+    };
+    qp.set_intervals(0);
+    write(0);
+    for (int move = 0; move < 60; ++move) {
+      // Now and then a shorter horizon begins, and grows to what there is room for.
+      const int steps = random.integer(0, 9) == 0 ? intervals : std::min(intervals, random.integer(0, 2));
+      qp.drop_first(steps);
+      stages.erase(stages.begin(), stages.begin() + steps);
+      control_counts.erase(control_counts.begin(), control_counts.begin() + steps);
+      identity_counts.erase(identity_counts.begin(), identity_counts.begin() + steps);
+      intervals -= steps;
+      for (int i = 0; i <= intervals; ++i) {
+        ASSERT_EQ(contents(qp, i), stages[i]) << "trial " << trial << ", move " << move << ", stage " << i;
+        ASSERT_EQ(qp.control_counts()[i], control_counts[i]);
+        ASSERT_EQ(qp.identity_counts()[i], identity_counts[i]);
+      }
+      for (int i = intervals + 1; steps > 0 && i <= most; ++i)
+        for (const double entry : contents(qp, i)) ASSERT_EQ(entry, 0.0) << "move " << move << ", stage " << i;
+      if (intervals < most) write(++intervals);
+      qp.set_intervals(intervals);
+    }
+    qp.drop_identity_rows();
+    for (int i = 0; i <= most; ++i) EXPECT_EQ(qp.identity_counts()[i], 0);
+  }
+}
+
+}  // namespace
+}  // namespace rhec
