@@ -36,7 +36,7 @@ Run = collections.namedtuple("Run", "kappa mu position heading tracking median p
 
 
 class Mistake(Exception):
-    """Something that whoever calls can mend; the text says how."""
+    """A mistake that the caller can mend; the text says how."""
 
 
 def rate(setting, speed, step=0.2):
@@ -134,7 +134,7 @@ class Study:
     def __init__(self):
         self.runs, self.programs, self.days = {}, set(), set()
         self.count, self.bytes, self.seconds = 0, 0, 0.0
-        self.remarks = []  # what whoever reads a page of it must know
+        self.remarks = []  # what a reader of its page must know
 
     def put(self, setting, speed, path, method, seed, run):
         methods = self.runs.setdefault((setting, speed), {}).setdefault(path, {})

@@ -21,7 +21,7 @@ def assess_all(study, claims=CLAIMS, level=PAGE_LEVEL):
 
 
 def as_json(assessed):
-    """All that verdicts rest on, for whoever wants to look at it with a program of their own."""
+    """All numbers behind the verdicts, for other programs to read."""
     def known(value):
         return value if value is None or math.isfinite(value) else None
 
