@@ -76,7 +76,7 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
 }
 
 void RhcProblem::write_state_bounds() noexcept {
-  // Node 0 and what the channels carry stay without bounds, as they were made.
+  // Node 0 and the lifted variables stay without bounds, as they were made.
   clear_bounds();
   for (int i = 1; i <= intervals(); ++i) {
     std::copy_n(setup_.state_lower.begin(), nx(), lower_row(i));

@@ -10,11 +10,11 @@ struct DynamicsView {
   int first, last;             ///< intervals
   int states, stride;          ///< of the capacity
   int vehicle_states, lifted;  ///< what a state is made of
-  const int* control_of;       ///< of each interval's channels: the control that starts it, or -1
+  const int* control_of;       ///< of each interval's lifted variables: the control that starts its block, or -1
   const double* values;        ///< rows of the point
   double *AB, *b;
   bool has_lifted_rows;  ///< those of lifted variables are there already
-  bool any_start;        ///< some channel starts somewhere
+  bool any_start;        ///< a block starts somewhere
 };
 
 /// Where costs go: their matrices, their vectors, or both. What is not wanted is null.
@@ -74,7 +74,7 @@ struct TranscriptionKernels {
   /// weights (z - reference)^2 of stages first .. last; returns the sum where vectors are wanted. Differences of
   /// entries whose turn is not 0 are taken on a circle of that length.
   double (*write_tracking)(const CostView& view, const TrackingView& tracked, int first, int last);
-  /// Rows of carried channels in AB, and b = F(s, w) - s_next.
+  /// Rows of lifted variables in AB, and b = F(s, w) - s_next.
   void (*complete_dynamics)(const DynamicsView& view);
   /// Zeros to what is used of stages first .. last.
   void (*clear_costs)(const CostView& view, int first, int last);
