@@ -64,7 +64,7 @@ struct TranscriptionKernels {
   /// entries are, 0 otherwise. Rows of a go to `kept`, which may begin with, or before, those of b.
   void (*match)(const double* a, const double* b, double* kept, int count, int stride, int columns,
                 unsigned char* marks);
-  /// Copies rows: of controls what their bounds allow, of multipliers those whose bound there is; of carried channels
+  /// Copies rows: of controls what their bounds allow, of multipliers those whose bound there is; of lifted variables
   /// no multiplier, and nothing of columns that are not used.
   void (*adopt)(const GuessView& from, double* values, double* multipliers);
   /// H += sum_j weights_j J_j J_j' over its first `columns` columns and h += sum_j pulls_j J_j (null: not), with the
