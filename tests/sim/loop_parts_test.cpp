@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 
 namespace rhec::sim {

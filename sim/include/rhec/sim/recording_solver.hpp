@@ -8,7 +8,7 @@
 
 #include "rhec/core/horizon/horizon_problem.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
-#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 
 namespace rhec::sim {
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "rhec/core/config/options.hpp"
-#include "rhec/plugins/fingerprint.hpp"
-#include "rhec/plugins/manifest.hpp"
+#include "rhec/plugins/kit/fingerprint.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 
 /// All that a plugin's author needs. A plugin is a class and one line:
 ///

@@ -1,4 +1,4 @@
-#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
 namespace {

@@ -1,5 +1,5 @@
 // A manifest of another time that ends after its head, or even before: what comes behind it may not be read.
-#include "rhec/plugins/manifest.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 
 extern "C" {
 #if defined(ENDS_AFTER_HEAD)

@@ -1,5 +1,5 @@
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/manifest.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 
 #include <elf.h>
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@
 
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/model/model.hpp"
-#include "rhec/plugins/fingerprint.hpp"
+#include "rhec/plugins/kit/fingerprint.hpp"
 
 namespace rhec {
 namespace {

@@ -1,5 +1,5 @@
 // Needs a library that the loader will not find.
-#include "rhec/plugins/manifest.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 
 extern "C" int rhec_test_gone();
 

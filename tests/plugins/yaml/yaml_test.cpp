@@ -1,4 +1,4 @@
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/manifest.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 
 namespace rhec {
 

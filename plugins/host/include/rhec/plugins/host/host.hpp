@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "rhec/core/config/settings.hpp"
-#include "rhec/plugins/manifest.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 
 namespace rhec {
 

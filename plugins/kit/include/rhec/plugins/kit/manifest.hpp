@@ -37,7 +37,7 @@ struct ManifestHead {
 /// to bottom, and only as far as what it has read allows: the texts that name the plugin, for what is said of it, as
 /// soon as ABI and size are right. No function of the plugin is called before all of it has been checked. Texts are
 /// UTF-8, end with a zero, live as long as the plugin, and are never null (empty if there is nothing to say). Authors
-/// do not write it by hand: see rhec/plugins/sdk.hpp.
+/// do not write it by hand: see rhec/plugins/kit/sdk.hpp.
 ///
 /// Exceptions do not cross: the functions answer by their result and put a text into `error` (`error_size` bytes, cut
 /// there, ended with a zero).

@@ -2,7 +2,7 @@
 #include <stdexcept>
 
 #include "rhec/core/horizon/blocking.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace {
 

@@ -12,7 +12,7 @@
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/core/estimation/full_information.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 
 namespace rhec {
 

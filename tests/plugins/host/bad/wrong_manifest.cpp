@@ -1,8 +1,8 @@
 // Manifests that are wrong in one field, chosen by a macro. None of its functions may be called.
 #include <cstdlib>
 
-#include "rhec/plugins/fingerprint.hpp"
-#include "rhec/plugins/manifest.hpp"
+#include "rhec/plugins/kit/fingerprint.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 
 namespace {
 

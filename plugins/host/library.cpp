@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "elf_file.hpp"
-#include "rhec/plugins/fingerprint.hpp"
+#include "rhec/plugins/kit/fingerprint.hpp"
 
 namespace rhec {
 namespace {
