@@ -65,7 +65,7 @@ class RHEC_EXPORT Robot {
   /// Of the section `blocking`, by parameter.
   std::vector<std::shared_ptr<const Blocking>> make_blockings() const { return blocking_.make(); }
 
-  /// From now on these are made, and by copies of the robot too: the names are those that it was made with, or fewer.
+  /// Takes the place of the estimators that it was made with, e.g. with one that knows what exists only by now.
   void use_estimators(EstimatorMakers estimators);
   /// Hung into all that is made from now on, round what is hung in already; copies of the robot have them too.
   void add_hooks(std::shared_ptr<const RobotHooks> hooks);
