@@ -49,7 +49,8 @@ smoother: {deadline: 3})");
   EXPECT_FALSE(made.make_blockings()[1]->is_one_block());
   EXPECT_EQ(made.smoother_options().deadline, 3.0);
   EXPECT_EQ(made.solver_choice("rhe").options.find("iterations")->as_integer(), 2);
-  EXPECT_TRUE(made.solver_choice("rhc").options.members().empty());
+  const PluginChoice plain = made.solver_choice("rhc");
+  EXPECT_TRUE(plain.options.members().empty());
 
   const auto estimator = made.make_estimator();
   const auto& window = dynamic_cast<const RecedingHorizonEstimation&>(estimator->method()).problem().setup();
