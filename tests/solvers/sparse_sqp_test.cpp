@@ -14,7 +14,7 @@
 
 #include <Eigen/Dense>
 
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -77,8 +77,8 @@ class Shape final : public Ocp {
 };
 
 /// A stage program as a sparse one, and as dense matrices.
-struct Program {
-  explicit Program(const StageQp& stages) : qp(stages), shape(qp) {
+struct Data {
+  explicit Data(const StageQp& stages) : qp(stages), shape(qp) {
     nlp.take_structure(shape);
     n = nlp.variables();
     m = nlp.constraints();
@@ -117,7 +117,7 @@ struct Program {
                                                           Eigen::MatrixXd::Identity(Z.rows(), Z.cols());
     return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Q.transpose() * H * Q).eigenvalues()[0];
   }
-  SparseQp::Program view(bool is_convex) const {
+  SparseQp::Data view(bool is_convex) const {
     return {hessian.data(), jacobian.data(), gradient.data(), constraints.data(),
             lower.data(),   upper.data(),    is_convex};
   }
@@ -137,14 +137,14 @@ StageQp random_stages(RandomQp& random) {
 }
 
 /// The whole matrix K, dense.
-Eigen::MatrixXd dense_kkt(const Program& program, const Eigen::VectorXd& primal, const Eigen::VectorXd& dual,
+Eigen::MatrixXd dense_kkt(const Data& qp, const Eigen::VectorXd& primal, const Eigen::VectorXd& dual,
                           const std::vector<std::uint8_t>& fixed) {
-  const int n = program.n, m = program.m;
+  const int n = qp.n, m = qp.m;
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(n + m, n + m);
-  K.topLeftCorner(n, n) = program.H;
+  K.topLeftCorner(n, n) = qp.H;
   K.topLeftCorner(n, n).diagonal() += primal;
-  K.bottomLeftCorner(m, n) = program.J;
-  K.topRightCorner(n, m) = program.J.transpose();
+  K.bottomLeftCorner(m, n) = qp.J;
+  K.topRightCorner(n, m) = qp.J.transpose();
   K.bottomRightCorner(m, m).diagonal() = -dual;
   for (int k = 0; k < n; ++k) {
     if (!fixed[k]) continue;
@@ -159,8 +159,8 @@ TEST(KktFactor, SolvesWhatDenseAlgebraSolves) {
   RandomQp random(1);
   int had_fixed = 0;
   for (int trial = 0; trial < 60; ++trial) {
-    const Program program(random_stages(random));
-    const int n = program.n, m = program.m;
+    const Data qp_data(random_stages(random));
+    const int n = qp.n, m = qp.m;
     // Barrier terms of very different sizes; equations are relaxed only where variables are fixed, since those might
     // contradict them.
     Eigen::VectorXd primal = Eigen::VectorXd::Zero(n), dual = Eigen::VectorXd::Zero(m);
@@ -173,10 +173,10 @@ TEST(KktFactor, SolvesWhatDenseAlgebraSolves) {
       ++had_fixed;
     }
     KktFactor factor;
-    factor.take_structure(program.nlp);
+    factor.take_structure(qp.nlp);
     KktFactor::Numbers numbers;
-    numbers.hessian = program.hessian.data();
-    numbers.jacobian = program.jacobian.data();
+    numbers.hessian = qp.hessian.data();
+    numbers.jacobian = qp.jacobian.data();
     numbers.primal = primal.data();
     numbers.dual = dual.data();
     numbers.fixed = fixed.data();
@@ -185,7 +185,7 @@ TEST(KktFactor, SolvesWhatDenseAlgebraSolves) {
     Eigen::VectorXd x(n + m);
     const double remaining = factor.solve(rhs.data(), x.data());
     EXPECT_LT(remaining, 1e-12) << trial;
-    const Eigen::VectorXd expected = dense_kkt(program, primal, dual, fixed).fullPivLu().solve(rhs);
+    const Eigen::VectorXd expected = dense_kkt(qp, primal, dual, fixed).fullPivLu().solve(rhs);
     EXPECT_LT((x - expected).lpNorm<Eigen::Infinity>(), 1e-8 * (1.0 + expected.lpNorm<Eigen::Infinity>())) << trial;
     for (int k = 0; k < n; ++k) EXPECT_TRUE(!fixed[k] || x[k] == rhs[k]) << trial;
   }
@@ -196,15 +196,15 @@ TEST(KktFactor, KnowsTheInertia) {
   RandomQp random(2);
   int right = 0, wrong = 0;
   for (int trial = 0; trial < 80; ++trial) {
-    Program program(random_stages(random));
-    program.shift_hessian(-random.uniform(0.0, 3.0));
-    const double least = program.least_reduced_eigenvalue();
+    Data qp_data(random_stages(random));
+    qp.shift_hessian(-random.uniform(0.0, 3.0));
+    const double least = qp.least_reduced_eigenvalue();
     if (std::abs(least) < 1e-3) continue;  // too near to singular to have an answer
     KktFactor factor;
-    factor.take_structure(program.nlp);
+    factor.take_structure(qp.nlp);
     KktFactor::Numbers numbers;
-    numbers.hessian = program.hessian.data();
-    numbers.jacobian = program.jacobian.data();
+    numbers.hessian = qp.hessian.data();
+    numbers.jacobian = qp.jacobian.data();
     EXPECT_EQ(factor.factor(numbers), least > 0.0) << trial << ": " << least;
     ++(least > 0.0 ? right : wrong);
   }
@@ -214,34 +214,34 @@ TEST(KktFactor, KnowsTheInertia) {
 
 TEST(KktFactor, ANumberThatIsNoneIsNoFactor) {
   RandomQp random(3);
-  Program program(random_stages(random));
-  program.hessian.back() = std::nan("");
+  Data qp_data(random_stages(random));
+  qp.hessian.back() = std::nan("");
   KktFactor factor;
-  factor.take_structure(program.nlp);
+  factor.take_structure(qp.nlp);
   KktFactor::Numbers numbers;
-  numbers.hessian = program.hessian.data();
-  numbers.jacobian = program.jacobian.data();
+  numbers.hessian = qp.hessian.data();
+  numbers.jacobian = qp.jacobian.data();
   EXPECT_FALSE(factor.factor(numbers));
 }
 
 /// The residual of a solve with the matrix of a program, whatever the factor was used for before.
-double solve_residual(KktFactor& factor, const Program& program) {
-  factor.take_structure(program.nlp);
+double solve_residual(KktFactor& factor, const Data& qp) {
+  factor.take_structure(qp.nlp);
   KktFactor::Numbers numbers;
-  numbers.hessian = program.hessian.data();
-  numbers.jacobian = program.jacobian.data();
+  numbers.hessian = qp.hessian.data();
+  numbers.jacobian = qp.jacobian.data();
   if (!factor.factor(numbers)) return infinity;
-  const Eigen::VectorXd rhs = Eigen::VectorXd::LinSpaced(program.n + program.m, -1.0, 1.0);
+  const Eigen::VectorXd rhs = Eigen::VectorXd::LinSpaced(qp.n + qp.m, -1.0, 1.0);
   Eigen::VectorXd x(rhs.size());
   factor.solve(rhs.data(), x.data());
-  const Eigen::MatrixXd K = dense_kkt(program, Eigen::VectorXd::Zero(program.n), Eigen::VectorXd::Zero(program.m),
-                                      std::vector<std::uint8_t>(program.n, 0));
+  const Eigen::MatrixXd K =
+      dense_kkt(qp, Eigen::VectorXd::Zero(qp.n), Eigen::VectorXd::Zero(qp.m), std::vector<std::uint8_t>(qp.n, 0));
   return (K * x - rhs).lpNorm<Eigen::Infinity>() / (1.0 + x.lpNorm<Eigen::Infinity>());
 }
 
 /// Programs of structures that are all different.
-std::vector<std::unique_ptr<Program>> structures(int count) {
-  std::vector<std::unique_ptr<Program>> all;
+std::vector<std::unique_ptr<Data>> structures(int count) {
+  std::vector<std::unique_ptr<Data>> all;
   RandomQp random(4);
   for (int k = 0; k < count; ++k) {
     StageQp qp = random.make(8, 2, 1, false);
@@ -252,7 +252,7 @@ std::vector<std::unique_ptr<Program>> structures(int count) {
       qp.S_transposed_of(i).setConstant(0.1);
       qp.Q_of(i).diagonal().array() += 1.0;
     }
-    all.push_back(std::make_unique<Program>(qp));
+    all.push_back(std::make_unique<Data>(qp));
   }
   return all;
 }
@@ -261,7 +261,7 @@ TEST(KktFactor, KeepsTheAnalysisOfStructuresThatComeBack) {
   const auto programs = structures(7);
   KktFactor factor;
   for (int round = 0; round < 5; ++round)
-    for (const auto& program : programs) EXPECT_LT(solve_residual(factor, *program), 1e-11);
+    for (const auto& qp : programs) EXPECT_LT(solve_residual(factor, *qp), 1e-11);
   EXPECT_EQ(factor.analyses(), 7);
   EXPECT_EQ(factor.symbolic_factors(), 7);
   factor.forget();
@@ -287,15 +287,15 @@ TEST(KktFactor, DropsTheStructureThatWasUsedLongestAgo) {
 TEST(StageCovariances, AreThoseOfTheDenseInverse) {
   RandomQp random(5);
   for (int trial = 0; trial < 40; ++trial) {
-    const Program program(random_stages(random));
-    const int stride = program.qp.capacity().states, N = program.qp.intervals();
+    const Data qp_data(random_stages(random));
+    const int stride = qp.qp.capacity().states, N = qp.qp.intervals();
     std::vector<double> blocks(static_cast<std::size_t>(N + 1) * stride * stride, -7.0);
-    ASSERT_TRUE(stage_covariances(program.qp, blocks)) << trial;
-    const Eigen::MatrixXd K = dense_kkt(program, Eigen::VectorXd::Zero(program.n), Eigen::VectorXd::Zero(program.m),
-                                        std::vector<std::uint8_t>(program.n, 0)),
+    ASSERT_TRUE(stage_covariances(qp.qp, blocks)) << trial;
+    const Eigen::MatrixXd K = dense_kkt(qp, Eigen::VectorXd::Zero(qp.n), Eigen::VectorXd::Zero(qp.m),
+                                        std::vector<std::uint8_t>(qp.n, 0)),
                           inverse = K.fullPivLu().inverse();
     for (int i = 0; i <= N; ++i) {
-      const int start = program.nlp.state_start(i);
+      const int start = qp.nlp.state_start(i);
       for (int c = 0; c < stride; ++c)
         for (int r = 0; r < stride; ++r) {
           const double expected = start < 0 ? 0.0 : 2.0 * inverse(start + r, start + c);
@@ -320,25 +320,24 @@ struct QpSolution {
   SparseQp::Outcome outcome = SparseQp::Outcome::failed;
 
   /// What is left of the optimality conditions; with a penalty, of the program with relaxed equations.
-  double residual(const Program& program) const {
-    double worst =
-        (program.H * step + program.g() + program.J.transpose() * multipliers + bounds).lpNorm<Eigen::Infinity>();
-    worst = std::max(worst, (program.J * step + program.c()).lpNorm<Eigen::Infinity>());
-    for (int k = 0; k < program.n; ++k) {
-      worst = std::max({worst, program.lower[k] - step[k], step[k] - program.upper[k]});
-      if (bounds[k] > 0.0) worst = std::max(worst, bounds[k] * (program.upper[k] - step[k]));
-      if (bounds[k] < 0.0) worst = std::max(worst, -bounds[k] * (step[k] - program.lower[k]));
+  double residual(const Data& qp) const {
+    double worst = (qp.H * step + qp.g() + qp.J.transpose() * multipliers + bounds).lpNorm<Eigen::Infinity>();
+    worst = std::max(worst, (qp.J * step + qp.c()).lpNorm<Eigen::Infinity>());
+    for (int k = 0; k < qp.n; ++k) {
+      worst = std::max({worst, qp.lower[k] - step[k], step[k] - qp.upper[k]});
+      if (bounds[k] > 0.0) worst = std::max(worst, bounds[k] * (qp.upper[k] - step[k]));
+      if (bounds[k] < 0.0) worst = std::max(worst, -bounds[k] * (step[k] - qp.lower[k]));
     }
     return worst;
   }
 };
-QpSolution start_of(const Program& program) {
-  return {Eigen::VectorXd::Zero(program.n), Eigen::VectorXd::Zero(program.m), Eigen::VectorXd::Zero(program.n)};
+QpSolution start_of(const Data& qp) {
+  return {Eigen::VectorXd::Zero(qp.n), Eigen::VectorXd::Zero(qp.m), Eigen::VectorXd::Zero(qp.n)};
 }
-QpSolution solve(SparseQp& qp, const Program& program, bool is_convex = true) {
-  QpSolution solution = start_of(program);
-  qp.take_structure(program.nlp);
-  solution.outcome = qp.solve(program.view(is_convex), solution.step.data(), solution.multipliers.data(),
+QpSolution solve(SparseQp& qp, const Data& qp, bool is_convex = true) {
+  QpSolution solution = start_of(qp);
+  qp.take_structure(qp.nlp);
+  solution.outcome = qp.solve(qp.view(is_convex), solution.step.data(), solution.multipliers.data(),
                               solution.bounds.data(), no_deadline);
   return solution;
 }
@@ -359,11 +358,11 @@ void bound(StageQp& qp, RandomQp& random, double controls, double states) {
 }
 
 /// The least eigenvalue of the reduced Hessian where some variables do not move.
-double least_reduced_eigenvalue(const Program& program, const std::vector<std::uint8_t>& fixed) {
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(program.m + std::count(fixed.begin(), fixed.end(), 1), program.n);
-  rows.topRows(program.m) = program.J;
-  Eigen::Index row = program.m;
-  for (int k = 0; k < program.n; ++k)
+double least_reduced_eigenvalue(const Data& qp, const std::vector<std::uint8_t>& fixed) {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(qp.m + std::count(fixed.begin(), fixed.end(), 1), qp.n);
+  rows.topRows(qp.m) = qp.J;
+  Eigen::Index row = qp.m;
+  for (int k = 0; k < qp.n; ++k)
     if (fixed[k] != 0) rows(row++, k) = 1.0;
   const Eigen::FullPivLU<Eigen::MatrixXd> lu(rows);
   EXPECT_EQ(lu.rank(), rows.rows()) << "what is fixed contradicts the equations";
@@ -371,7 +370,7 @@ double least_reduced_eigenvalue(const Program& program, const std::vector<std::u
   const Eigen::MatrixXd Z = lu.kernel();
   const Eigen::MatrixXd Q =
       Eigen::HouseholderQR<Eigen::MatrixXd>(Z).householderQ() * Eigen::MatrixXd::Identity(Z.rows(), Z.cols());
-  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Q.transpose() * program.H * Q).eigenvalues()[0];
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Q.transpose() * qp.H * Q).eigenvalues()[0];
 }
 
 TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
@@ -387,7 +386,7 @@ TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
       exact.Q_of(i).diagonal().array() -= shift;
       exact.R_of(i).diagonal().array() -= shift;
     }
-    const Program before(exact);
+    const Data before(exact);
     std::vector<std::uint8_t> fixed(before.n, 0);
     // Controls, or states in place of them: of a node as many as there are controls that lead to it.
     std::ptrdiff_t variable = exact.initial_state_is_given ? 0 : exact.states(0);
@@ -407,7 +406,7 @@ TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
       ++untouched;
     } else {
       EXPECT_GT(taken, 0) << trial;
-      EXPECT_GT(least_reduced_eigenvalue(Program(convex), fixed), 0.0) << trial;
+      EXPECT_GT(least_reduced_eigenvalue(Data(convex), fixed), 0.0) << trial;
       ++bent;
       stages_seen += N + 1;
       stages_taken += taken;
@@ -436,17 +435,17 @@ TEST(SparseQp, SolvesRandomProgramsToTheirOptimalityConditions) {
   for (int trial = 0; trial < 150; ++trial) {
     StageQp stages = random_stages(random);
     bound(stages, random, std::pow(10.0, random.uniform(-1.0, 0.5)), 4.0);
-    const Program program(stages);
-    const QpSolution solution = solve(qp, program);
+    const Data qp_data(stages);
+    const QpSolution solution = solve(qp, qp);
     ASSERT_EQ(solution.outcome, SparseQp::Outcome::solved) << trial;
-    EXPECT_LT(solution.residual(program), 1e-8) << trial;
+    EXPECT_LT(solution.residual(qp), 1e-8) << trial;
     active += (solution.bounds.array() != 0.0).any();
     by_interior_point += qp.used_interior_point();
     // Its own active set as the guess: one factorisation says that it is right.
     QpSolution again = solution;
     const int factorisations = qp.factorisations();
     again.outcome =
-        qp.solve(program.view(true), again.step.data(), again.multipliers.data(), again.bounds.data(), no_deadline);
+        qp.solve(qp.view(true), again.step.data(), again.multipliers.data(), again.bounds.data(), no_deadline);
     ASSERT_EQ(again.outcome, SparseQp::Outcome::solved) << trial;
     EXPECT_LT((again.step - solution.step).lpNorm<Eigen::Infinity>(), 1e-8) << trial;
     EXPECT_LE(qp.factorisations() - factorisations, 3) << trial;
@@ -464,25 +463,25 @@ TEST(SparseQp, RelaxedEquationsAreMetAsNearlyAsBoundsAllow) {
     bound(stages, random, 0.05, 0.1);
     for (int i = 0; i < stages.intervals(); ++i)
       for (int j = 0; j < stages.states(i + 1); ++j) stages.b(i)[j] = random.uniform(-1.0, 1.0);
-    const Program program(stages);
-    if (solve(qp, program).outcome == SparseQp::Outcome::solved) continue;
+    const Data qp_data(stages);
+    if (solve(qp, qp).outcome == SparseQp::Outcome::solved) continue;
     ++infeasible;
-    QpSolution solution = start_of(program);
+    QpSolution solution = start_of(qp);
     const double penalty = 1e5;
-    solution.outcome = qp.solve_relaxed(program.view(true), penalty, solution.step.data(), solution.multipliers.data(),
+    solution.outcome = qp.solve_relaxed(qp.view(true), penalty, solution.step.data(), solution.multipliers.data(),
                                         solution.bounds.data(), no_deadline);
     ASSERT_EQ(solution.outcome, SparseQp::Outcome::relaxed) << trial;
-    const double reached = (program.J * solution.step + program.c()).lpNorm<1>();
-    for (int k = 0; k < program.n; ++k) {
-      EXPECT_GE(solution.step[k], program.lower[k] - 1e-9);
-      EXPECT_LE(solution.step[k], program.upper[k] + 1e-9);
+    const double reached = (qp.J * solution.step + qp.c()).lpNorm<1>();
+    for (int k = 0; k < qp.n; ++k) {
+      EXPECT_GE(solution.step[k], qp.lower[k] - 1e-9);
+      EXPECT_LE(solution.step[k], qp.upper[k] + 1e-9);
     }
     // For every y with |y| <= 1 and every step within the bounds, |J d + c|_1 >= y'(J d + c): the least value over the
     // bounds' box is a limit that no step goes below. The multipliers give the best such y.
     const Eigen::VectorXd y = (solution.multipliers / penalty).cwiseMax(-1.0).cwiseMin(1.0),
-                          slope = program.J.transpose() * y;
-    double limit = y.dot(program.c());
-    for (int k = 0; k < program.n; ++k) limit += slope[k] * (slope[k] > 0.0 ? program.lower[k] : program.upper[k]);
+                          slope = qp.J.transpose() * y;
+    double limit = y.dot(qp.c());
+    for (int k = 0; k < qp.n; ++k) limit += slope[k] * (slope[k] > 0.0 ? qp.lower[k] : qp.upper[k]);
     EXPECT_GT(limit, 0.0) << trial << ": the equations can be met";
     EXPECT_NEAR(reached, limit, 1e-3 * (1.0 + limit)) << trial;
   }
@@ -494,17 +493,17 @@ TEST(SparseQp, SaysWhereCurvatureIsMissing) {
   SparseQp qp;
   int indefinite = 0;
   for (int trial = 0; trial < 30; ++trial) {
-    Program program(random_stages(random));  // without bounds, which could help
-    program.shift_hessian(-random.uniform(0.0, 3.0));
-    const double least = program.least_reduced_eigenvalue();
+    Data qp_data(random_stages(random));  // without bounds, which could help
+    qp.shift_hessian(-random.uniform(0.0, 3.0));
+    const double least = qp.least_reduced_eigenvalue();
     if (std::abs(least) < 1e-3) continue;
-    const QpSolution solution = solve(qp, program, false);
+    const QpSolution solution = solve(qp, qp, false);
     if (least < 0.0) {
       ++indefinite;
       EXPECT_EQ(solution.outcome, SparseQp::Outcome::indefinite) << trial;
     } else {
       ASSERT_EQ(solution.outcome, SparseQp::Outcome::solved) << trial;
-      EXPECT_LT(solution.residual(program), 1e-7) << trial;
+      EXPECT_LT(solution.residual(qp), 1e-7) << trial;
     }
   }
   EXPECT_GT(indefinite, 5);
@@ -514,11 +513,11 @@ TEST(SparseQp, KeepsADeadlineThatIsPast) {
   RandomQp random(9);
   StageQp stages = random.make(10, 4, 2, true);
   bound(stages, random, 0.05, 0.1);
-  const Program program(stages);
+  const Data qp_data(stages);
   SparseQp qp;
-  qp.take_structure(program.nlp);
-  QpSolution solution = start_of(program);
-  EXPECT_EQ(qp.solve_relaxed(program.view(true), 1e5, solution.step.data(), solution.multipliers.data(),
+  qp.take_structure(qp.nlp);
+  QpSolution solution = start_of(qp);
+  EXPECT_EQ(qp.solve_relaxed(qp.view(true), 1e5, solution.step.data(), solution.multipliers.data(),
                              solution.bounds.data(), Clock::now() - std::chrono::seconds(1)),
             SparseQp::Outcome::deadline);
 }

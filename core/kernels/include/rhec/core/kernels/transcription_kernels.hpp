@@ -13,7 +13,7 @@ struct DynamicsView {
   const int* control_of;       ///< of each interval's channels: the control that starts it, or -1
   const double* values;        ///< rows of the point
   double *AB, *b;
-  bool has_lifted_rows;  ///< those of carried channels are there already
+  bool has_lifted_rows;  ///< those of lifted variables are there already
   bool any_start;        ///< some channel starts somewhere
 };
 
@@ -55,7 +55,7 @@ struct GuessView {
   const double *values, *multipliers, *lower, *upper;
 };
 
-/// Inner loops that turn a model, a point and data into the stages of a quadratic program.
+/// Inner loops that turn a model, a point and data into the stages of a QP.
 struct TranscriptionKernels {
   /// Bounds of steps from a point: lower - point and upper - point.
   void (*write_bounds)(const double* lower, const double* upper, const double* point, double* step_lower,
@@ -71,14 +71,14 @@ struct TranscriptionKernels {
   /// `count` rows J_j of one stage; rows are as long as `columns` needs in multiples of eight.
   void (*add_products)(const double* J, const double* weights, const double* pulls, int count, int columns, int stride,
                        double* H, double* h);
-  /// weights (z - reference)^2 of stages first .. last; reperiods the sum where vectors are wanted. Differences of
+  /// weights (z - reference)^2 of stages first .. last; returns the sum where vectors are wanted. Differences of
   /// entries whose turn is not 0 are taken on a circle of that length.
   double (*write_tracking)(const CostView& view, const TrackingView& tracked, int first, int last);
   /// Rows of carried channels in AB, and b = F(s, w) - s_next.
   void (*complete_dynamics)(const DynamicsView& view);
   /// Zeros to what is used of stages first .. last.
   void (*clear_costs)(const CostView& view, int first, int last);
-  /// Squares of measured outputs and inputs, without the curvature of anything; reperiods their sum.
+  /// Squares of measured outputs and inputs, without the curvature of anything; returns their sum.
   double (*write_measurements)(const CostView& view, const MeasurementView& measured, int first, int last);
 };
 
