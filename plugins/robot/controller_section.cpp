@@ -23,29 +23,34 @@ bool is_position(const ModelDescription& about, std::size_t state) {
   return j == about.roles.position_x || j == about.roles.position_y;
 }
 
+DefaultByName<double> stage_default() {
+  return {fmt::format("{} for the position, {} for a speed, else 0", position_weight, input_weight),
+          [](const ModelDescription& about, const Variable&, std::size_t j) {
+            if (static_cast<int>(j) == about.roles.speed_state) return input_weight;
+            return is_position(about, j) ? position_weight : 0.0;
+          }};
+}
+
 const NumbersByName& stage_by_name() {
-  const DefaultByName<double> of_state = {
-      fmt::format("{} for the position, {} for a speed, else 0", position_weight, input_weight),
-      [](const ModelDescription& about, const Variable&, std::size_t j) {
-        if (static_cast<int>(j) == about.roles.speed_state) return input_weight;
-        return is_position(about, j) ? position_weight : 0.0;
-      }};
   static const NumbersByName map(
       "weights: stage", {at_least(0.0)},
-      {{"STATE", &ModelDescription::states, of_state, "of the squared distance from the reference at a node"},
+      {{"STATE", &ModelDescription::states, stage_default(), "of the squared distance from the reference at a node"},
        {"INPUT", &ModelDescription::inputs, constant_default(input_weight),
         "of the squared distance from the reference on an interval"}});
   return map;
 }
 
+DefaultByName<double> terminal_default() {
+  return {fmt::format("{} for the position, else 0", terminal_weight),
+          [](const ModelDescription& about, const Variable&, std::size_t j) {
+            return is_position(about, j) ? terminal_weight : 0.0;
+          }};
+}
+
 const NumbersByName& terminal_by_name() {
-  const DefaultByName<double> of_state = {fmt::format("{} for the position, else 0", terminal_weight),
-                                          [](const ModelDescription& about, const Variable&, std::size_t j) {
-                                            return is_position(about, j) ? terminal_weight : 0.0;
-                                          }};
-  static const NumbersByName map(
-      "weights: terminal", {at_least(0.0)},
-      {{"STATE", &ModelDescription::states, of_state, "of the squared distance from the reference at the last node"}});
+  static const NumbersByName map("weights: terminal", {at_least(0.0)},
+                                 {{"STATE", &ModelDescription::states, terminal_default(),
+                                   "of the squared distance from the reference at the last node"}});
   return map;
 }
 

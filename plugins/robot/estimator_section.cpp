@@ -56,27 +56,35 @@ const ByName<NumberValue>& block_sigma_by_name() {
   return map;
 }
 
-const NumbersByName& initial_state_by_name() {
+DefaultByName<double> at_the_origin() {
   DefaultByName<double> origin = constant_default(0.0);
   origin.text += "; in a simulation the true start";
+  return origin;
+}
+
+const NumbersByName& initial_state_by_name() {
   static const NumbersByName map("initial state", {any()},
-                                 {{"STATE", &ModelDescription::states, origin, "mean at the start"}});
+                                 {{"STATE", &ModelDescription::states, at_the_origin(), "mean at the start"}});
   return map;
 }
 
+DefaultByName<double> middle_of_bounds() {
+  return {"the middle of its bounds, else where nothing slips",
+          [](const ModelDescription&, const Variable& parameter, std::size_t) {
+            const double middle = 0.5 * (parameter.lower + parameter.upper);
+            return std::isfinite(middle) ? middle : parameter.nominal;
+          }};
+}
+
 const NumbersByName& initial_parameters_by_name() {
-  const DefaultByName<double> middle = {"the middle of its bounds, else where nothing slips",
-                                        [](const ModelDescription&, const Variable& parameter, std::size_t) {
-                                          const double between_bounds = 0.5 * (parameter.lower + parameter.upper);
-                                          return std::isfinite(between_bounds) ? between_bounds : parameter.nominal;
-                                        }};
-  static const NumbersByName map("initial parameters", {any()},
-                                 {{"PARAMETER", &ModelDescription::parameters, middle, "mean at the start"}});
+  static const NumbersByName map(
+      "initial parameters", {any()},
+      {{"PARAMETER", &ModelDescription::parameters, middle_of_bounds(), "mean at the start"}});
   return map;
 }
 
 const NumbersByName& initial_sigma_by_name() {
-  const char* meaning = "standard deviation at the start";
+  constexpr const char* meaning = "standard deviation at the start";
   static const NumbersByName map(
       "initial sigma", {greater_than(0.0)},
       {{"STATE", &ModelDescription::states, scaled_default(state_share), meaning},

@@ -53,11 +53,12 @@ const OptionTable<PathOptions>& path_table() {
 
 /// The values of constant terrain.
 const NumbersByName& values_by_name() {
-  const DefaultByName<double> no_slip = {
-      "", [](const ModelDescription&, const Variable& parameter, std::size_t) { return parameter.nominal; }};
-  static const NumbersByName map("terrain values", {any()},
-                                 {{"PARAMETER", &ModelDescription::parameters, no_slip,
-                                   "of constant; where nothing slips (1, or 0 of an angle)"}});
+  static const NumbersByName map(
+      "terrain values", {any()},
+      {{"PARAMETER",
+        &ModelDescription::parameters,
+        {"", [](const ModelDescription&, const Variable& parameter, std::size_t) { return parameter.nominal; }},
+        "of constant; where nothing slips (1, or 0 of an angle)"}});
   return map;
 }
 

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/estimation/estimator.hpp"

@@ -2,7 +2,6 @@
 
 #include <memory>
 
-#include "rhec/core/estimation/estimator.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/robot/noise_section.hpp"
