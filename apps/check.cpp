@@ -13,8 +13,8 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
-#include "rhec/sim/model_check.hpp"
-#include "rhec/sim/scenario.hpp"
+#include "rhec/sim/check/model_check.hpp"
+#include "rhec/sim/loop/scenario.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -21,7 +21,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
 #include "ticks.hpp"
 
 namespace rhec::bench {

@@ -11,8 +11,8 @@
 
 #include "bicycle.hpp"
 #include "rhec/core/control/path.hpp"
-#include "rhec/sim/paths.hpp"
-#include "rhec/sim/truth.hpp"
+#include "rhec/sim/world/paths.hpp"
+#include "rhec/sim/world/truth.hpp"
 
 namespace {
 std::atomic<long> allocations{0};

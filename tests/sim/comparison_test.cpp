@@ -1,4 +1,4 @@
-#include "rhec/sim/comparison.hpp"
+#include "rhec/sim/comparison/comparison.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/csv.hpp"
-#include "rhec/sim/output_folder.hpp"
+#include "rhec/sim/files/csv.hpp"
+#include "rhec/sim/files/output_folder.hpp"
 
 namespace rhec::sim {
 namespace {

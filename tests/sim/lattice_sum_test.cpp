@@ -1,4 +1,4 @@
-#include "sim/src/lattice_sum.hpp"
+#include "sim/world/lattice_sum.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "rhec/sim/random.hpp"
+#include "rhec/sim/numbers/random.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "rhec/plugins/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -1,5 +1,5 @@
 // Models with one fault each: every check finds its own fault, and nothing else.
-#include "rhec/sim/model_check.hpp"
+#include "rhec/sim/check/model_check.hpp"
 
 #include <gmock/gmock.h>
 
@@ -10,7 +10,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/formula_model.hpp"
-#include "rhec/sim/derivative_check.hpp"
+#include "rhec/sim/check/derivative_check.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -1,4 +1,4 @@
-#include "rhec/sim/paths.hpp"
+#include "rhec/sim/world/paths.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/random.hpp"
+#include "rhec/sim/numbers/random.hpp"
 
 namespace rhec::sim {
 namespace {

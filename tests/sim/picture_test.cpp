@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/run_picture.hpp"
+#include "rhec/sim/figures/run_picture.hpp"
 
 namespace rhec::sim {
 namespace {

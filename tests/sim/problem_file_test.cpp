@@ -1,4 +1,4 @@
-#include "rhec/sim/problem_file.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

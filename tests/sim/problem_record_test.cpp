@@ -15,9 +15,9 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
-#include "rhec/sim/problem_file.hpp"
-#include "rhec/sim/recording_solver.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
+#include "rhec/sim/problems/recording_solver.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec::sim {

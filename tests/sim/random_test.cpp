@@ -1,4 +1,4 @@
-#include "rhec/sim/random.hpp"
+#include "rhec/sim/numbers/random.hpp"
 
 #include <gtest/gtest.h>
 

@@ -12,7 +12,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
-#include "rhec/sim/recorded_log.hpp"
+#include "rhec/sim/logs/recorded_log.hpp"
 
 namespace rhec::sim {
 namespace {

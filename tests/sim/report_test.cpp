@@ -12,12 +12,12 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
-#include "rhec/sim/horizon_log.hpp"
-#include "rhec/sim/report.hpp"
-#include "sim/src/number_text.hpp"
-#include "sim/src/report_files.hpp"
-#include "sim/src/report_statistics.hpp"
+#include "rhec/sim/files/number_text.hpp"
+#include "rhec/sim/horizons/horizon_log.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
+#include "rhec/sim/numbers/statistics.hpp"
+#include "rhec/sim/report/report.hpp"
+#include "sim/report/report_files.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -1,4 +1,4 @@
-#include "rhec/sim/slip_field.hpp"
+#include "rhec/sim/world/slip_field.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/random.hpp"
+#include "rhec/sim/numbers/random.hpp"
 
 namespace rhec::sim {
 namespace {

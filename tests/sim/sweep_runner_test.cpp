@@ -1,4 +1,4 @@
-#include "rhec/sim/sweep_runner.hpp"
+#include "rhec/sim/study/sweep_runner.hpp"
 
 #include <unistd.h>
 
@@ -11,7 +11,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
 
 namespace rhec::sim {
 namespace {

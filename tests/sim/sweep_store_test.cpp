@@ -1,4 +1,4 @@
-#include "rhec/sim/sweep_store.hpp"
+#include "rhec/sim/store/sweep_store.hpp"
 
 #include <sqlite3.h>
 

@@ -1,4 +1,4 @@
-#include "rhec/sim/sweep.hpp"
+#include "rhec/sim/study/sweep.hpp"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-#include "rhec/sim/truth.hpp"
+#include "rhec/sim/world/truth.hpp"
 
 #include <gtest/gtest.h>
 

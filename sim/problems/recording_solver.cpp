@@ -1,0 +1,62 @@
+#include "rhec/sim/problems/recording_solver.hpp"
+
+#include <utility>
+
+#include "rhec/core/ocp/timed_solver.hpp"
+
+namespace rhec::sim {
+
+RecordingSolver::RecordingSolver(std::shared_ptr<Solver> solver, std::function<std::int64_t()> step, Callback callback)
+    : SolverDecorator(std::move(solver)), step_(std::move(step)), callback_(std::move(callback)) {}
+
+void RecordingSolver::setup(const Ocp& ocp) {
+  SolverDecorator::setup(ocp);
+  problem_ = callback_ ? dynamic_cast<const HorizonProblem*>(&ocp) : nullptr;
+  guess_ = Iterate(ocp.capacity());
+  is_pending_ = false;
+}
+
+/// False where nobody is to be told: an iterate of another capacity is refused by the solver, and could not be kept
+/// without allocation.
+bool RecordingSolver::keep_guess(const Iterate& guess) noexcept {
+  is_pending_ = false;
+  if (!problem_ || guess.capacity() != guess_.capacity()) return false;
+  guess_ = guess;
+  asked_at_ = step_();
+  return true;
+}
+
+Report RecordingSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
+  const bool is_told = keep_guess(iterate);
+  const Report report = inner().solve(iterate, deadline);
+  if (is_told) callback_(asked_at_, *problem_, guess_, iterate, report);
+  return report;
+}
+
+Report RecordingSolver::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
+  const bool is_told = keep_guess(iterate);
+  const Report report = inner().feedback(iterate, deadline);
+  // Who got no usable iterate will not finish it.
+  is_pending_ = is_told && is_usable(report.status);
+  if (is_told && !is_pending_) callback_(asked_at_, *problem_, guess_, iterate, report);
+  return report;
+}
+
+void RecordingSolver::finish(Iterate& iterate, Report& report) noexcept {
+  inner().finish(iterate, report);
+  if (std::exchange(is_pending_, false)) callback_(asked_at_, *problem_, guess_, iterate, report);
+}
+
+Robot with_hooks(Robot robot, const LoopHooks& hooks, std::function<std::int64_t()> step) {
+  robot.wrap_solvers([](std::string_view, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
+    return std::make_shared<TimedSolver>(std::move(solver));
+  });
+  if (!hooks.solved) return robot;
+  robot.wrap_solvers([solved = hooks.solved, step = std::move(step)](
+                         std::string_view, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
+    return std::make_shared<RecordingSolver>(std::move(solver), step, solved);
+  });
+  return robot;
+}
+
+}  // namespace rhec::sim
