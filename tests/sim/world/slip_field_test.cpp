@@ -6,28 +6,16 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
 
-#include "rhec/core/base/error.hpp"
 #include "rhec/sim/numbers/random.hpp"
+#include "sim/support/message_of.hpp"
 
 namespace rhec::sim {
 namespace {
-
-#define EXPECT_CONTAINS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 std::filesystem::path file_with(const std::string& content, const std::string& name = "rhec_raster.csv") {
   const auto file = std::filesystem::path(testing::TempDir()) / name;

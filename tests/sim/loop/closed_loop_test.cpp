@@ -6,12 +6,13 @@
 
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
+#include "rhec/sim/loop/run_files.hpp"
 
 namespace rhec::sim {
 namespace {
 
 Scenario scenario_with(const std::vector<std::string>& assignments) {
-  Settings settings = load_yaml(SCENARIO);
+  Settings settings = load_yaml(SCENARIOS "/figure8.yaml");
   for (const std::string& assignment : assignments) apply_assignment(settings, assignment);
   return {Host(), settings};
 }

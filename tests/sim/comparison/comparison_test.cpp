@@ -7,13 +7,12 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include <nlohmann/json.hpp>
-
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/qp/kkt.hpp"
 #include "rhec/plugins/yaml.hpp"
+#include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -31,7 +30,7 @@ const Host& host() {
 
 /// A run of a second at most.
 Settings short_scenario() {
-  Settings settings = load_yaml(SCENARIO);
+  Settings settings = load_yaml(SCENARIOS "/figure8.yaml");
   for (const char* assignment : {"speed=10", "path.laps=1", "path.radius=8"}) apply_assignment(settings, assignment);
   return settings;
 }
@@ -161,7 +160,7 @@ TEST(Comparison, ARefusalIsToldAndTheOthersGoOn) {
   EXPECT_THAT(result.loops[0].refusal, HasSubstr("estimation problems: a toy cannot look back"));
   EXPECT_TRUE(result.loops[0].runs.empty());
   EXPECT_TRUE(result.loops[1].runs.front().completed);
-  const auto json = nlohmann::json::parse(comparison_json(result));
+  const auto json = Json::parse(comparison_json(result));
   EXPECT_EQ(json["same_problems"]["rhe"]["solvers"][0]["refusal"], "a toy cannot look back");
   EXPECT_TRUE(json["closed_loop"][1]["errors"]["kappa"]["difference"].is_null());
   EXPECT_THAT(comparison_svg(result), HasSubstr("refused"));
@@ -304,7 +303,7 @@ TEST(Comparison, TheNoiseIsTheSameWhoeverDrives) {
   EXPECT_GT(largest, 0.01);
 }
 
-void strip_times(nlohmann::json& node) {
+void strip_times(Json& node) {
   if (node.is_object()) node.erase("time_us");
   if (node.is_structured())
     for (auto& item : node) strip_times(item);
@@ -316,8 +315,8 @@ TEST(Comparison, ASecondRunGivesTheSameBytesButForTimes) {
   options.seeds = 2;
   options.every = 5;
   options.accuracy = 1e-5;
-  auto first = nlohmann::json::parse(comparison_json(compare(host(), short_scenario(), options)));
-  auto second = nlohmann::json::parse(comparison_json(compare(host(), short_scenario(), options)));
+  auto first = Json::parse(comparison_json(compare(host(), short_scenario(), options)));
+  auto second = Json::parse(comparison_json(compare(host(), short_scenario(), options)));
   strip_times(first);
   strip_times(second);
   EXPECT_EQ(first.dump(1), second.dump(1));

@@ -8,8 +8,8 @@
 #include <memory>
 #include <utility>
 
-#include "bicycle.hpp"
 #include "rhec/core/base/error.hpp"
+#include "sim/support/bicycle.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -7,13 +7,13 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/model/formula_model.hpp"
+#include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -207,7 +207,7 @@ TEST(ProblemFile, AnEstimatorsFirstWindowHasNoInterval) {
   EXPECT_EQ(point.state(0)[2], 1.0) << "the prior, clipped";
   std::vector<double> scratch(problem->scratch_size());
   EXPECT_DOUBLE_EQ(problem->evaluate(point, nullptr, scratch), 100.0 + 2.0 * 0.75 * 0.75);
-  EXPECT_EQ(nlohmann::json::parse(solution_line(record, *problem, point, {}))["states"].size(), 1u);
+  EXPECT_EQ(Json::parse(solution_line(record, *problem, point, {}))["states"].size(), 1u);
 }
 
 TEST(ProblemFile, RefillsInPlaceWhatFits) {
@@ -242,7 +242,7 @@ TEST(ProblemFile, SolutionLinesKeepEveryBit) {
   const std::string line =
       solution_line(record, *problem, point, {"a \"solver\"", Status::iteration_limit, 7, 1e-300 / 3, 2.0 / 3e9, 12.5});
   EXPECT_EQ(line.find('\n'), std::string::npos);
-  const auto read = nlohmann::json::parse(line);
+  const auto read = Json::parse(line);
   EXPECT_EQ(read["id"], record.id);
   EXPECT_EQ(read["solver"], "a \"solver\"");
   EXPECT_EQ(read["status"], "iteration_limit");
@@ -260,7 +260,7 @@ TEST(ProblemFile, SolutionLinesKeepEveryBit) {
 }
 
 TEST(ProblemFile, ReadsWholeFilesAndCountsTheirLines) {
-  const std::string one = nlohmann::json::parse(rhe_line).dump(), two = nlohmann::json::parse(rhc_line).dump();
+  const std::string one = Json::parse(rhe_line).dump(), two = Json::parse(rhc_line).dump();
   const auto records = read_problems("\n" + one + "\r\n  \n" + two, "set.jsonl");
   ASSERT_EQ(records.size(), 2u);
   EXPECT_EQ(records[0].where, "set.jsonl:2");

@@ -9,10 +9,10 @@
 #include <new>
 #include <vector>
 
-#include "bicycle.hpp"
 #include "rhec/core/control/path.hpp"
 #include "rhec/sim/world/paths.hpp"
 #include "rhec/sim/world/truth.hpp"
+#include "sim/support/bicycle.hpp"
 
 namespace {
 std::atomic<long> allocations{0};
