@@ -17,8 +17,8 @@
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"
 #include "rhec/sim/comparison/comparison.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/files/output_folder.hpp"
-#include "rhec/sim/problems/problem_file.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
 namespace {
