@@ -18,7 +18,7 @@ Json json_of(const Backend& backend) {
   Json json;
   json["label"] = backend.label;
   json["solver"] = backend.solver;
-  json["options"] = backend.options.is_null() ? Json::object() : json_of(backend.options);
+  json["options"] = backend.options.is_null() ? Json::object() : sim::json_of(backend.options);
   return json;
 }
 

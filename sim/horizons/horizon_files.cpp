@@ -73,7 +73,7 @@ Json json_of(const Robot& robot) {
 
 Json json_of(const PluginChoice& choice) {
   Json json = {{"name", choice.name}};
-  json["options"] = choice.options.is_null() ? Json::object() : json_of(choice.options);
+  json["options"] = choice.options.is_null() ? Json::object() : sim::json_of(choice.options);
   std::string text = choice.name;
   for (const auto& [key, value] : json["options"].items())
     text += fmt::format(", {} {}", key, value.is_string() ? value.get<std::string>() : value.dump());
@@ -103,7 +103,7 @@ Json settings_of(const Robot& robot, bool has_controller) {
   return json;
 }
 
-Json json_or_null(const Settings& settings) { return settings.is_null() ? Json(nullptr) : json_of(settings); }
+Json json_or_null(const Settings& settings) { return settings.is_null() ? Json(nullptr) : sim::json_of(settings); }
 
 /// `"key":` and what `write` appends.
 template <class Function>

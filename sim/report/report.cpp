@@ -96,7 +96,7 @@ std::string report_document(const fs::path& source, const std::string& program) 
   }
   document["source"] = source.string();
   document["program"] = program;
-  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return document.dump();
 }
 
 }  // namespace rhec::sim

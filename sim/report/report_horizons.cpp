@@ -45,7 +45,9 @@ void complete_window(Json& window, const Json& nodes, const std::vector<std::vec
   const auto first = window.at("first").get<std::int64_t>();
   const std::int64_t last = first + window.at("intervals").get<std::int64_t>();
   window.erase("intervals");
-  window["time"] = std::move(cut(Json::array({nodes.at("node_time")}), first, last)[0]);
+  Json times = Json::array();
+  times.push_back(nodes.at("node_time"));
+  window["time"] = cut(times, first, last)[0];
   window["measured"] = cut(nodes.at("output"), first, last);
   window["measured_input"] = cut(nodes.at("input"), first, last - 1);
   if (truth.empty()) return;
