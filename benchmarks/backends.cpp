@@ -15,7 +15,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 #include "solvers/ipopt/ipopt_solver.hpp"
 

@@ -21,7 +21,8 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
+#include "rhec/sim/loop/run_files.hpp"
 #include "ticks.hpp"
 
 namespace rhec::bench {

@@ -11,8 +11,8 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/scenario.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/loop/scenario.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "ticks.hpp"
 
 namespace rhec::bench {

@@ -12,7 +12,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
 namespace rhec::bench {

@@ -13,7 +13,7 @@
 #include "long_problems.hpp"
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
 // The C library's functions behind malloc and its like, which those of this program take the place of, in every library

@@ -8,7 +8,7 @@
 
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
 namespace rhec::bench {

@@ -13,7 +13,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/chosen_outputs.hpp"
 #include "rhec/plugins/kit/manifest.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
 // The manifests of the sources that are linked in, whose symbol CMakeLists.txt renames.

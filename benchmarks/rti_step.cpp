@@ -10,7 +10,7 @@
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
 namespace rhec::bench {

@@ -15,8 +15,8 @@
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
-#include "rhec/sim/csv.hpp"
+#include "rhec/sim/files/csv.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
 
 namespace rhec::bench {
 namespace {

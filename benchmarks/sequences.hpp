@@ -7,7 +7,7 @@
 
 #include "rhec/core/horizon/horizon_problem.hpp"
 #include "rhec/plugins/host/host.hpp"
-#include "rhec/sim/problem_file.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
 
 namespace rhec::bench {
 
