@@ -103,14 +103,11 @@ SweepRuns read_sweep_runs(const std::filesystem::path& file) {
     ++runs.statuses[status];
     ++programs[select.text(8)];
     const auto [entry, is_new] = known.try_emplace(without_seed(select.text(1)), runs.groups.size());
-    const auto refuse = [&](const std::string& what) {
-      throw Error(
-          fmt::format("{}: run {}: {}; delete the run and start the sweep again", file.string(), select.text(0), what));
-    };
     const auto parsed = [&](int column, const char* name) {
       std::optional<Json> json = Json::parse_if_valid(select.text(column));
-      if (!json || !json->is_object()) refuse(fmt::format("{} is no map of JSON", name));
-      return std::move(*json);
+      if (json && json->is_object()) return std::move(*json);
+      throw Error(fmt::format("{}: run {}: {} is no map of JSON; delete the run and start the sweep again",
+                              file.string(), select.text(0), name));
     };
     if (is_new) {
       RunGroup& group = runs.groups.emplace_back();

@@ -14,6 +14,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
 #include "rhec/sim/problems/problem_file.hpp"
 #include "sim/support/same_point.hpp"
@@ -253,7 +254,6 @@ TEST(ProblemRecord, RefusesWhatTheFormatHasNoWordsFor) {
 
 TEST(ProblemRecord, OptionsKeepTheirMeaning) {
   const Settings options = parse_yaml("{a: 1.50, b: true, c: text, d: '007', e: [1, .inf], f: {g: null}}", "options");
-  EXPECT_EQ(json_text(options), R"({"a":1.5,"b":true,"c":"text","d":"007","e":[1,".inf"],"f":{"g":null}})");
   RandomProblem random(host().make_model("bicycle_slip"), 3);
   ProblemRecord record = record_of(*random.rhc({}), nullptr, "run/8", "bicycle_slip", options);
   record.origin = {{"run", "a \"name\""}, {"status", "infeasible"}};
