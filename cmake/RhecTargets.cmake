@@ -19,6 +19,13 @@ if(RHEC_SANITIZE)
   target_compile_options(rhec_flags INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
   target_link_options(rhec_flags INTERFACE -fsanitize=address,undefined)
 endif()
+if(RHEC_SANITIZE_THREADS)
+  if(RHEC_SANITIZE)
+    message(FATAL_ERROR "RHEC_SANITIZE and RHEC_SANITIZE_THREADS are both ON; the compiler can do one of them at a time")
+  endif()
+  target_compile_options(rhec_flags INTERFACE -fsanitize=thread)
+  target_link_options(rhec_flags INTERFACE -fsanitize=thread)
+endif()
 
 # rhec_add_room(FLOOR ROOM [INTERNAL] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
 #   A room of a floor's library, in its own folder: the target `rhec_<FLOOR>_<ROOM>`. It sees the public headers of the rooms
