@@ -54,8 +54,8 @@ TEST(NloptRun, EndsWhereTheGradientVanishesWhateverTheScaling) {
       SmallProblem small;
       const Transformation transformation = transformation_for(small.problem, is_full);
       small.options.ftol_rel = 1e-12;
-      Run run(small.problem, small.options, algorithm, Run::Goal::objective, transformation,
-              {Clock::time_point::max(), 1000, 0, 1.0});
+      nlopt::Run run(small.problem, small.options, algorithm, Run::Goal::objective, transformation,
+                     {Clock::time_point::max(), 1000, 0, 1.0});
       EXPECT_EQ(run.optimise(), Run::Outcome::ended) << name_of(algorithm);
       EXPECT_GT(run.iterations(), 1);
       ASSERT_TRUE(small.problem.move_to(run.x()));
@@ -67,15 +67,15 @@ TEST(NloptRun, EndsWhereTheGradientVanishesWhateverTheScaling) {
 TEST(NloptRun, StopsWithTheBestPointAtItsLimits) {
   SmallProblem small;
   const Transformation transformation = transformation_for(small.problem, false);
-  Run late(small.problem, small.options, NLOPT_LD_SLSQP, Run::Goal::objective, transformation,
-           {Clock::time_point::min(), 1000, 0, 1.0});
+  nlopt::Run late(small.problem, small.options, NLOPT_LD_SLSQP, Run::Goal::objective, transformation,
+                  {Clock::time_point::min(), 1000, 0, 1.0});
   EXPECT_EQ(late.optimise(), Run::Outcome::deadline);
   EXPECT_EQ(late.iterations(), 0);
   EXPECT_EQ(late.x(), transformation.centre);
   ASSERT_TRUE(small.problem.move_to(transformation.centre));
   const double before = small.problem.objective();
-  Run brief(small.problem, small.options, NLOPT_LD_SLSQP, Run::Goal::objective, transformation,
-            {Clock::time_point::max(), 2, 0, 1.0});
+  nlopt::Run brief(small.problem, small.options, NLOPT_LD_SLSQP, Run::Goal::objective, transformation,
+                   {Clock::time_point::max(), 2, 0, 1.0});
   EXPECT_EQ(brief.optimise(), Run::Outcome::iteration_limit);
   EXPECT_EQ(brief.iterations(), 2);
   ASSERT_TRUE(small.problem.move_to(brief.x()));
@@ -94,8 +94,8 @@ TEST(NloptRun, ForViolationAloneLooksForAFeasiblePoint) {
   transformation.centre.tail(problem.variables() - 1).setConstant(-0.9);
   ASSERT_TRUE(problem.move_to(transformation.centre));
   ASSERT_GT(problem.violation(), 0.5);
-  Run run(problem, options, NLOPT_LD_SLSQP, Run::Goal::violation, transformation,
-          {Clock::time_point::max(), 1000, 0, 1e-4});
+  nlopt::Run run(problem, options, NLOPT_LD_SLSQP, Run::Goal::violation, transformation,
+                 {Clock::time_point::max(), 1000, 0, 1e-4});
   run.optimise();
   ASSERT_TRUE(problem.move_to(run.x()));
   EXPECT_LT(problem.violation(), 1e-3);

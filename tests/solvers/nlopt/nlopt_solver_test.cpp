@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "problems.hpp"
+#include "solvers/nlopt/condensed.hpp"
 
 namespace rhec::nlopt {
 namespace {
