@@ -81,7 +81,7 @@ TEST(Structured, ABorderThatExistsStaysWhereItIs) {
       for (const std::int64_t border : before.borders) {
         const bool in_view = border > k - 15;
         if (in_view) {
-          EXPECT_THAT(now.borders, testing::Contains(border));
+          EXPECT_THAT(now.borders, ::testing::Contains(border));
         } else {
           EXPECT_EQ(now.first_start, border) << "the block that slid to the edge is the first one";
         }
@@ -100,7 +100,7 @@ TEST(Structured, AWindowThatGrowsFromTheStartOfTheRun) {
   EXPECT_EQ(view(*blocking, 6, 6), (View{0, {2}}));
   for (int k = 2; k <= 15; ++k) {
     const auto before = view(*blocking, k - 1, k - 1).borders;
-    EXPECT_THAT(view(*blocking, k, k).borders, testing::IsSupersetOf(before));
+    EXPECT_THAT(view(*blocking, k, k).borders, ::testing::IsSupersetOf(before));
   }
 }
 
