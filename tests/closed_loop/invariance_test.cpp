@@ -110,7 +110,7 @@ class Drive {
   }
 
  private:
-  static Settings solver() { return parse_yaml("{mode: converge, tolerance: 1.0e-11, max_iterations: 300}", "solver"); }
+  static Settings solver() { return parse_yaml("{mode: converge, tolerance: 1.0e-9, max_iterations: 300}", "solver"); }
   static Robot make_robot(const Frame& frame, const Design& design) {
     const Point start = frame.to({0.0, 0.0});
     const double unit = frame.unit;
@@ -122,7 +122,7 @@ class Drive {
         " estimator: {{horizon: 12, {} initial: {{"
         "   state: {{x_pos: {:.17g}, y_pos: {:.17g}, beta: {:.17g}, delta: 0.0}},"
         "   sigma: {{x_pos: {:.17g}, y_pos: {:.17g}, beta: 0.3, delta: 0.05}}}},"
-        "   solver: {{name: gn_rti, mode: converge, tolerance: 1.0e-11, max_iterations: 300}}}}}}",
+        "   solver: {{name: gn_rti, mode: converge, tolerance: 1.0e-9, max_iterations: 300}}}}}}",
         1.4 * unit, 0.4 * unit, 0.05 * unit, 0.05 * unit, 0.02 * unit, design.blocking, step, design.estimator,
         start.real(), start.imag(), frame.turn, unit, unit);
     return {host(), RobotOptions::table().parse(parse_yaml(text, "robot.yaml"), "robot")};
@@ -131,7 +131,7 @@ class Drive {
   Path path() const {
     std::vector<Waypoint> waypoints;
     for (int i = 0; i <= 12; ++i) {
-      const Point p = frame_.to({5.0 * i, i % 2 == 0 ? 0.0 : 3.0});
+      const Point p = frame_.to({5.0 * i, i % 2 == 0 ? 0.0 : 4.0});
       waypoints.push_back({p.real(), p.imag(), speed * frame_.unit});
     }
     return Path(waypoints);
