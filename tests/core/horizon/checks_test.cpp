@@ -15,7 +15,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr double infinity = HUGE_VAL;
-const std::vector<Variable> variables = {{.name = "x", .lower = -1.0, .upper = 2.0}, {.name = "v", .lower = 0.0}};
+const std::vector<Variable> variables = {{.name = "x", .unit = "m", .meaning = "place", .lower = -1.0, .upper = 2.0},
+                                         {.name = "v", .unit = "m/s", .meaning = "speed", .lower = 0.0}};
 
 template <class Call>
 std::string message(const Call& call) {

@@ -17,7 +17,7 @@ using ::testing::ElementsAre;
 using Numbers = std::vector<double>;
 
 TEST(Variables, AreListedInTheirOrder) {
-  const ModelDescription& about = cart()->description();
+  const ModelDescription about = cart()->description();
   EXPECT_THAT(names_of(about.states), ElementsAre("x", "v"));
   EXPECT_THAT(nominal_values(about.parameters), ElementsAre(0.0, 1.0));
   EXPECT_TRUE(names_of({}).empty());

@@ -103,7 +103,9 @@ TEST(Ocp, MayDependOnEverythingUnlessItSaysOtherwise) {
   EXPECT_THAT(controls, Each(1));
   problem->mark_dynamics(1, states.data(), controls.data());
   EXPECT_EQ(states[1 * ns + 0], 1) << "the speed changes the position";
-  EXPECT_EQ(states[0 * ns + 1], 0) << "the position does not change the speed";
+  EXPECT_EQ(states[2 * ns + 2], 1) << "a parameter is carried along";
+  EXPECT_EQ(states[1 * ns + 2], 0) << "and the speed does not change it";
+  EXPECT_EQ(controls[2], 0);
 }
 
 TEST(Ocp, RefreshesByLinearisingAnewUnlessItKnowsBetter) {
