@@ -26,6 +26,7 @@ using Point = std::complex<double>;
 
 constexpr double step = 0.2, speed = 2.0;
 constexpr int samples = 100;
+constexpr double tolerance = 1e-6;  // [m], [rad], [1]
 
 /// In which coordinates a drive is written down: p' = unit e^(i turn) p + origin.
 struct Frame {
@@ -33,7 +34,6 @@ struct Frame {
   double turn = 0.0;          ///< [rad]
   Point origin = {0.0, 0.0};  ///< [m]
   double unit = 1.0;          ///< numbers that a metre is
-  double tolerance = 1e-6;    ///< [m], [rad], [1]
   Point to(Point p) const { return unit * (std::polar(1.0, turn) * p + origin); }
   Point from(Point p) const { return (p / unit - origin) * std::polar(1.0, -turn); }
 };
@@ -210,7 +210,7 @@ TEST_P(Invariance, OfAClosedLoopRun) {
     EXPECT_EQ(other[k].estimator, Status::solved) << k << ": " << name_of(other[k].estimator);
     EXPECT_EQ(other[k].controller, Status::solved) << k << ": " << name_of(other[k].controller);
     worst = std::max(worst, distance(plain[k], other[k]));
-    ASSERT_LT(worst, frame.tolerance) << "at sample " << k;
+    ASSERT_LT(worst, tolerance) << "at sample " << k;
     at_limit += std::abs(plain[k].inputs[1]) > 0.61;
     learnt = std::max(learnt, std::abs(plain[k].parameters[0] - plain[0].parameters[0]));
   }
