@@ -9,8 +9,11 @@ endif()
 set(RHEC_WIDE_FLAGS_avx2 -mavx2 -mfma)
 set(RHEC_WIDE_FLAGS_avx512 ${RHEC_WIDE_FLAGS_avx2} -mavx512f -mavx512cd -mavx512dq -mavx512bw -mavx512vl)
 
+set(RHEC_MODEL_INSTRUCTION_SETS generic avx2 avx512 CACHE STRING
+  "Instruction sets that models are compiled for; generic is always among them. One is enough to try a model out.")
+
 # rhec_add_wide_kernels(TARGET PREFIX FORMULA_HEADER header FORMULA class)
-#   Compiles the kernels of a formula for every instruction set into TARGET, and with them a function
+#   Compiles the kernels of a formula for every set of RHEC_MODEL_INSTRUCTION_SETS into TARGET, and with them a function
 #   `rhec::WideKernels <PREFIX>_wide_kernels()` in namespace rhec that returns them (none without xsimd or off x86-64).
 function(rhec_add_wide_kernels TARGET PREFIX)
   cmake_parse_arguments(PARSE_ARGV 2 ARG "" "FORMULA_HEADER;FORMULA" "")
@@ -22,7 +25,12 @@ function(rhec_add_wide_kernels TARGET PREFIX)
   set(DECLARATIONS "")
   set(MEMBERS "")
   if(xsimd_FOUND AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
-    foreach(SET IN ITEMS avx2 avx512)
+    foreach(SET IN LISTS RHEC_MODEL_INSTRUCTION_SETS)
+      if(SET STREQUAL "generic")
+        continue()  # the model's own source
+      elseif(NOT DEFINED RHEC_WIDE_FLAGS_${SET})
+        message(FATAL_ERROR "RHEC_MODEL_INSTRUCTION_SETS: '${SET}' is none of generic, avx2, avx512")
+      endif()
       set(UNIT "${FOLDER}/${SET}.cpp")
       set(TABLE ${PREFIX}_kernels_${SET})
       file(CONFIGURE OUTPUT "${UNIT}" CONTENT "\
@@ -68,7 +76,7 @@ WideKernels ${PREFIX}_wide_kernels() { return {${MEMBERS}}; }
 endfunction()
 
 # rhec_add_model(NAME SOURCES ... FORMULA_HEADER header FORMULA class [PRIVATE ...])
-#   The plugin NAME of a model, with the kernels of its formula for every instruction set: its source declares
+#   The plugin NAME of a model, with the kernels of its formula for the instruction sets: its source declares
 #   `rhec::WideKernels <NAME>_wide_kernels()` in namespace rhec and hands them to rhec::FormulaModel. The header holds the
 #   formula alone, and includes nothing but what that needs.
 function(rhec_add_model NAME)

@@ -1,4 +1,4 @@
-# Targets of the house: one function a kind, so that every library and plugin is built alike.
+# One function for each kind of target, so that all libraries and plugins are built alike.
 
 # Flags that every target of ours shares.
 add_library(rhec_flags INTERFACE)
@@ -7,7 +7,7 @@ target_compile_options(rhec_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -W
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   target_compile_options(rhec_flags INTERFACE -march=x86-64-v2)
 endif()
-# IEEE semantics stay; only what costs speed and that nobody reads (errno, floating-point traps) goes.
+# IEEE semantics stay; only what costs speed and is never read (errno, floating-point traps) goes.
 target_compile_options(rhec_flags INTERFACE -fno-math-errno -fno-trapping-math)
 # Nobody replaces single functions of our libraries, so calls within one need not go through its tables.
 target_compile_options(rhec_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>)
@@ -89,7 +89,7 @@ endfunction()
 include("${CMAKE_CURRENT_LIST_DIR}/RhecPlugin.cmake")
 
 # rhec_add_plugin(NAME SOURCES ... PRIVATE ...)
-#   A plugin of the house: a module `<NAME>.so` in the plugin directory, built with the flags that all our targets share.
+#   A plugin that comes with rhec: a module `<NAME>.so` in the plugin directory, built with the flags that all our targets share.
 function(rhec_add_plugin NAME)
   rhec_plugin_module(${NAME} ${ARGN})
   target_link_libraries(${NAME} PRIVATE rhec_flags)

@@ -6,8 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 
 namespace rhec {
 namespace {
@@ -191,6 +192,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   for (std::size_t j = 0; j < command_.inputs.size(); ++j)
     command_.inputs[j] = std::min(std::max(command_.inputs[j], problem_.input_lower(0, static_cast<int>(j))),
                                   problem_.input_upper(0, static_cast<int>(j)));
+  RHEC_ASSERT(all_finite(command_.inputs), "a command is finite");
   is_finished_ = false;
   return command_;
 }

@@ -99,7 +99,7 @@ void fill_data(const NodeLog& log, RheProblem& problem) {
   }
 }
 
-/// The log's own estimates as a point; the value of a block is that of its last interval, which had seen most of it.
+/// The log's own estimates as an iterate; the value of a block is that of its last interval, which had seen most of it.
 Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
   const int nx = problem.model().state_count(), np = problem.model().parameter_count(), N = log.intervals();
   Iterate guess(problem.capacity());
@@ -149,29 +149,29 @@ SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point d
     throw Error("smoother: the solver cannot take this problem: " + reason);
   solver_->setup(problem);
 
-  Iterate point = guess_from(log, problem);
+  Iterate iterate = guess_from(log, problem);
   SmoothedRun run;
   const auto start = Clock::now();
-  run.report = solver_->solve(point, deadline);
+  run.report = solver_->solve(iterate, deadline);
   run.solve_seconds = 1e-6 * microseconds_since(start);
   run.times.assign(1, 0.0);
   run.inputs.resize(static_cast<std::size_t>(N) * nu);
   run.parameters.resize(static_cast<std::size_t>(N) * np);
   for (std::ptrdiff_t i = 0; i <= N; ++i) {
     const int node = static_cast<int>(i);
-    run.states.insert(run.states.end(), point.state(node), point.state(node) + nx);
+    run.states.insert(run.states.end(), iterate.state(node), iterate.state(node) + nx);
     if (i == N) break;
     run.times.push_back(run.times.back() + log.durations[i]);
-    problem.structure().inputs_on(point, node, run.inputs.data() + i * nu);
-    problem.structure().parameters_on(point, node, run.parameters.data() + i * np);
+    problem.structure().inputs_on(iterate, node, run.inputs.data() + i * nu);
+    problem.structure().parameters_on(iterate, node, run.parameters.data() + i * np);
     for (int j = 0; j < np; ++j) {
       const bool ramp = setup_.blockings[j]->transition() == Transition::ramp;
-      run.start_parameters.push_back(ramp ? point.state(node)[nx + j] : run.parameters[i * np + j]);
+      run.start_parameters.push_back(ramp ? iterate.state(node)[nx + j] : run.parameters[i * np + j]);
     }
   }
   const std::size_t n = static_cast<std::size_t>(nx) + static_cast<std::size_t>(np);
   run.covariances.resize((static_cast<std::size_t>(N) + 1) * n * n);
-  if (!solver_->covariances(point, all_stages(problem), run.covariances)) run.covariances.clear();
+  if (!solver_->covariances(iterate, all_stages(problem), run.covariances)) run.covariances.clear();
   return run;
 }
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "block_structure.hpp"
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/measurement.hpp"
 #include "rhec/core/qp/kkt.hpp"
@@ -123,7 +124,7 @@ void RecedingHorizonEstimation::start_cold() noexcept {
   problem_.simulate(point_, scratch_);
 }
 
-/// After a solve that came to nothing: leaves a guess that is finite, and from which the next solve starts anew.
+/// After a solve that failed: leaves a guess that is finite, and from which the next solve starts anew.
 void RecedingHorizonEstimation::recover() noexcept {
   const int N = window_.intervals;
   const auto is_finite = [&] {
@@ -285,15 +286,15 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
   point_ = best_;
 }
 
-/// The objective of what a point really says: its states are simulated from the first one.
-double RecedingHorizonEstimation::objective_from_start(const Iterate& point) noexcept {
-  trial_ = point;
+/// The objective of what an iterate really says: its states are simulated from the first one.
+double RecedingHorizonEstimation::objective_from_start(const Iterate& iterate) noexcept {
+  trial_ = iterate;
   problem_.simulate(trial_, scratch_);
   const double objective = problem_.evaluate(trial_, nullptr, scratch_);
   return std::isnan(objective) ? std::numeric_limits<double>::infinity() : objective;
 }
 
-/// A solve that has come to no end may have been led astray by its guess, window after window. Where the prior explains
+/// A solve that did not converge may have been led astray by its guess, window after window. Where the prior explains
 /// the measurements better than what came of it, the solve starts from there; the best of the three is taken.
 void RecedingHorizonEstimation::reconsider(Report& report, Clock::time_point deadline) noexcept {
   const double found = objective_from_start(point_);
@@ -349,6 +350,7 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   result.state = last_state_.head(nx);
   result.parameters = last_state_.tail(np);
   write_covariance(newest, result);
+  RHEC_ASSERT(result.state.allFinite() && result.parameters.allFinite(), "an estimate is finite");
   // An arrival cost that learns nothing never knows the heading: there the window has to.
   if (searching_ && !remembers && is_known(result.covariance)) searching_ = false;
 }

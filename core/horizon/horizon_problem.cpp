@@ -6,6 +6,7 @@
 
 #include "horizon_linearisation.hpp"
 #include "interval_dynamics.hpp"
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/kernels/transcription_kernels.hpp"
@@ -19,6 +20,14 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// there.
 bool uses_carried_value(const HorizonStructure& structure, int interval, int lifted) noexcept {
   return structure.control_of_lifted(interval, lifted) < 0 || structure.is_ramp(lifted);
+}
+
+/// What every evaluation takes: a structure that is finished, an iterate and scratch of the problem's sizes.
+void assert_ready([[maybe_unused]] const HorizonProblem& problem, [[maybe_unused]] const Iterate& iterate,
+                  [[maybe_unused]] std::span<double> scratch) {
+  RHEC_ASSERT(problem.structure().is_finished(), "`finish` comes after every change of the structure");
+  RHEC_ASSERT(iterate.capacity() == problem.capacity(), "an iterate of the problem's capacity");
+  RHEC_ASSERT(scratch.size() >= problem.scratch_size(), "scratch of `scratch_size()`");
 }
 
 }  // namespace
@@ -70,6 +79,7 @@ void HorizonProblem::mark_dynamics(int i, std::uint8_t* state_flags, std::uint8_
 
 double HorizonProblem::evaluate_stages(const Iterate& iterate, double* defects, double* stage_costs,
                                        std::span<double> scratch) const noexcept {
+  assert_ready(*this, iterate, scratch);
   if (defects)
     IntervalDynamics{*model_, structure_, durations_.data(), substeps_}.write_defects(iterate, defects, scratch.data());
   if (stage_costs) std::fill_n(stage_costs, intervals() + 1, 0.0);
@@ -77,11 +87,16 @@ double HorizonProblem::evaluate_stages(const Iterate& iterate, double* defects, 
 }
 
 void HorizonProblem::simulate_interval(int interval, Iterate& iterate, std::span<double> scratch) const noexcept {
+  assert_ready(*this, iterate, scratch);
+  RHEC_ASSERT(interval >= 0 && interval < intervals(), "an interval of the horizon");
   IntervalDynamics{*model_, structure_, durations_.data(), substeps_}.simulate(interval, iterate, scratch.data());
 }
 
 double HorizonProblem::linearise(StageRange range, const Iterate& iterate, Hessian hessian, StageQp& qp,
                                  std::span<double> scratch) const noexcept {
+  assert_ready(*this, iterate, scratch);
+  RHEC_ASSERT(range.first >= 0 && range.first <= range.last && range.last <= intervals(), "stages of the horizon");
+  RHEC_ASSERT(qp.capacity() == capacity(), "a QP of the problem's capacity");
   const IntervalDynamics dynamics{*model_, structure_, durations_.data(), substeps_};
   dynamics.write_sizes(range, initial_state() != nullptr, qp);
   const StageRange steps{range.first, std::min(range.last, intervals() - 1)};
@@ -92,6 +107,8 @@ double HorizonProblem::linearise(StageRange range, const Iterate& iterate, Hessi
 }
 
 void HorizonProblem::refresh(const Iterate& iterate, StageQp& qp, std::span<double> scratch) const noexcept {
+  assert_ready(*this, iterate, scratch);
+  RHEC_ASSERT(qp.capacity() == capacity() && qp.intervals() == intervals(), "the QP that `linearise` has filled");
   if (has_late_bounds()) write_bounds(iterate, all_stages(*this), qp);
   write_cost(all_stages(*this), iterate, Hessian::none, CostParts::vectors, qp, scratch);
 }

@@ -76,7 +76,7 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
 }
 
 void RhcProblem::write_state_bounds() noexcept {
-  // Node 0 and what the channels carry stay without bounds, as they were made.
+  // Node 0 and the lifted variables stay without bounds, as they were made.
   clear_bounds();
   for (int i = 1; i <= intervals(); ++i) {
     std::copy_n(setup_.state_lower.begin(), nx(), lower_row(i));
@@ -177,7 +177,7 @@ int RhcProblem::relax_unreachable_bounds(std::span<double> scratch) noexcept {
       for (int i = first; i < end; ++i) {
         step(x, i);
         if (violation(x) <= 0.0) continue;
-        // A hair of slack keeps the feasible set from being a single iterate.
+        // A hair of slack keeps the feasible set from being a single point.
         const double slack = 1e-6 * (1.0 + std::abs(x[j]));
         double &lower = lower_row(i + 1)[j], &upper = upper_row(i + 1)[j];
         lower = std::min(lower, x[j] - slack);

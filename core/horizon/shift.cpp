@@ -29,16 +29,16 @@ GuessShifter::GuessShifter(const HorizonProblem& like)
       shares_(like.capacity().intervals),
       scratch_(like.scratch_size()) {}
 
-void GuessShifter::take(const HorizonProblem& problem, const Iterate& point) noexcept {
+void GuessShifter::take(const HorizonProblem& problem, const Iterate& iterate) noexcept {
   const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(problem.intervals() + 1) * kept_.capacity().row();
-  std::copy_n(point.row(0), entries, kept_.row(0));
-  std::copy_n(point.costate(0), entries, kept_.costate(0));
-  std::copy_n(point.bound_row(0), entries, kept_.bound_row(0));
+  std::copy_n(iterate.row(0), entries, kept_.row(0));
+  std::copy_n(iterate.costate(0), entries, kept_.costate(0));
+  std::copy_n(iterate.bound_row(0), entries, kept_.bound_row(0));
   take_structure(problem);
 }
 
-void GuessShifter::take(const HorizonProblem& problem, Iterate&& point) noexcept {
-  std::swap(kept_, point);
+void GuessShifter::take(const HorizonProblem& problem, Iterate&& iterate) noexcept {
+  std::swap(kept_, iterate);
   take_structure(problem);
 }
 
@@ -116,7 +116,8 @@ double GuessShifter::gradient(int i, int lifted) const noexcept {
   return control >= 0 ? -next - kept_.control_bound(i)[control] : kept_.costate(i)[nx_ + lifted] - next;
 }
 
-/// A lifted that has one block in both horizons and is pulled at by no end: rows have been moved as the vehicle's.
+/// A lifted variable that has one block in both horizons and is pulled at by no end: rows have been moved as the
+/// vehicle's.
 void GuessShifter::extend_lifted(int lifted, int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
   const int N = to.intervals(), at = nx_ + lifted;
   const double value = kept_.state(std::min(steps, intervals_ - 1))[at];
@@ -124,7 +125,7 @@ void GuessShifter::extend_lifted(int lifted, int steps, const HorizonProblem& to
   for (int i = std::min(N, intervals_ - steps); i <= N; ++i) guess.costate(i)[at] = 0.0;
 }
 
-/// The values of a lifted and their costates.
+/// The values of a lifted variable and their costates.
 void GuessShifter::move_lifted(int lifted, int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
   const int N = to.intervals(), at = nx_ + lifted;
   const auto value_on = [&](int interval) {
@@ -153,8 +154,8 @@ void GuessShifter::move_lifted(int lifted, int steps, const HorizonProblem& to, 
   if (!to.initial_state()) guess.costate(0)[at] = 0.0;
 }
 
-/// Multipliers of a lifted's bounds: each interval has its share of its block's, so that blocks that are split or
-/// joined keep the sum.
+/// Multipliers of a lifted variable's bounds: each interval has its share of its block's, so that blocks that are split
+/// or joined keep the sum.
 void GuessShifter::move_lifted_bounds(int lifted, int steps, const HorizonProblem& to, Iterate& guess) noexcept {
   const auto bound_at = [&](int first) {
     const int control = kept_control(first, lifted);

@@ -14,7 +14,7 @@ RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants
 }
 
 /// What is known of a stage when its kernel is compiled: how many times eight entries a row has, how many states and
-/// controls (unknown: 0), how many of the states are carried, and how long the program's rows are (unknown: 0). Its
+/// controls (unknown: 0), how many of the states are carried, and how long the QP's rows are (unknown: 0). Its
 /// loops are written out where that is asked for.
 template <int eights, int state_count, int control_count, bool is_written_out = true, int carried_count = 0,
           int known_stride = 0>
@@ -418,12 +418,12 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
   if (view.fixes[i]) write_multipliers(view, i, stage, at);
 }
 
-/// One entry of the rows of a batch of responses.
+/// One entry of the rows of a batch of sensitivities.
 using Batch = Row<response_batch / lane_count>;
 
 template <class Stage>
-inline void respond_stage_backward(const RiccatiView& view, int i, bool has_gradient, bool has_next,
-                                   double* gradients) {
+inline void sensitivities_stage_backward(const RiccatiView& view, int i, bool has_gradient, bool has_next,
+                                         double* gradients) {
   const Stage stage(view, i);
   const long stride = view.stride;
   const double* AB = view.AB + i * view.states * stride;
@@ -457,14 +457,15 @@ inline void respond_stage_backward(const RiccatiView& view, int i, bool has_grad
 }
 
 template <class Stage>
-inline void respond_stage_forward(const RiccatiView& view, int i, int last, double* responses, double* costates) {
+inline void sensitivities_stage_forward(const RiccatiView& view, int i, int last, double* sensitivities,
+                                        double* costates) {
   const Stage stage(view, i);
   const long stride = view.stride;
   const double* AB = view.AB + i * view.states * stride;
   const double* U = view.U + i * view.controls * stride;
   const double* inverse = view.inverse + i * view.controls;
   const std::int8_t* sides = view.sides + i * stride;
-  double* own = responses + i * stride * response_batch;
+  double* own = sensitivities + i * stride * response_batch;
   double* next = own + stride * response_batch;
   // Behind the last gradient those of the value functions are zero, and so are those of controls.
   const auto gradient_at = [](const double* row, int entry, bool is_there) RHEC_ALWAYS_INLINE {
@@ -516,7 +517,7 @@ inline void respond_stage_forward(const RiccatiView& view, int i, int last, doub
 /// Calls `function` with the type of a stage's shape: one of the sizes that kernels are compiled for, or any. Those are
 /// the stages of estimators and controllers with two inputs: of vehicles with three to five states, whose other states
 /// are parameters, between the starts of blocks, which hand those on; and of the most usual ones where blocks start.
-/// How long rows are decides nothing else: a program gives the same bits in one of another capacity.
+/// How long rows are decides nothing else: a QP gives the same bits in one of another capacity.
 template <bool is_written_out, class Function>
 inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
   const int states = view.states, controls = view.control_counts[i], carried = view.identity_counts[i];
@@ -605,16 +606,17 @@ int solve_forward(const RiccatiView& view, int first) {
   return view.intervals;
 }
 
-void respond_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
+void sensitivities_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
   for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0; --i)
     with_shape<true>(view, i, [&]<class Stage>() {
-      respond_stage_backward<Stage>(view, i, has_gradient[i] != 0, i < last, gradients);
+      sensitivities_stage_backward<Stage>(view, i, has_gradient[i] != 0, i < last, gradients);
     });
 }
 
-void respond_forward(const RiccatiView& view, int last, double* responses, double* costates) {
+void sensitivities_forward(const RiccatiView& view, int last, double* sensitivities, double* costates) {
   for (int i = 0; i < view.intervals; ++i)
-    with_shape<true>(view, i, [&]<class Stage>() { respond_stage_forward<Stage>(view, i, last, responses, costates); });
+    with_shape<true>(
+        view, i, [&]<class Stage>() { sensitivities_stage_forward<Stage>(view, i, last, sensitivities, costates); });
 }
 
 void combine(const double* batch, const double* weights, double* sums, long count) {
@@ -831,8 +833,8 @@ extern const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET);
 constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {&kernels::factor,
                                                                          &kernels::solve_backward,
                                                                          &kernels::solve_forward,
-                                                                         &kernels::respond_backward,
-                                                                         &kernels::respond_forward,
+                                                                         &kernels::sensitivities_backward,
+                                                                         &kernels::sensitivities_forward,
                                                                          &kernels::combine,
                                                                          &kernels::carry_covariance,
                                                                          &kernels::form,

@@ -3,12 +3,17 @@
 #include <algorithm>
 #include <cstring>
 
+#include "rhec/core/base/assertion.hpp"
+
 namespace rhec {
 
 Linearisation::Linearisation(const Ocp& ocp)
     : qp_(ocp.capacity()), scratch_(ocp.scratch_size(), 0.0), ocp_(ocp), iterate_(ocp.capacity()) {}
 
 double Linearisation::linearise(const Iterate& iterate, Hessian hessian) noexcept {
+  RHEC_ASSERT(iterate.capacity() == qp_.capacity() && ocp_.capacity() == qp_.capacity(),
+              "the OCP's capacity as it was");
+  RHEC_ASSERT(ocp_.scratch_size() <= scratch_.size(), "the OCP's scratch as it was");
   remember(iterate);
   return ocp_.linearise(all_stages(ocp_), iterate, hessian, qp_, scratch_);
 }
@@ -19,7 +24,10 @@ double Linearisation::linearise_for_residual(const Iterate& iterate, Hessian /*n
 
 void Linearisation::prepare(const Iterate& iterate, Hessian hessian) noexcept { linearise(iterate, hessian); }
 
-void Linearisation::refresh(const Iterate& iterate) noexcept { ocp_.refresh(iterate, qp_, scratch_); }
+void Linearisation::refresh(const Iterate& iterate) noexcept {
+  RHEC_ASSERT(is_at(iterate), "`prepare` at the same iterate comes first");
+  ocp_.refresh(iterate, qp_, scratch_);
+}
 
 void Linearisation::remember(const Iterate& iterate) noexcept {
   is_known_ = true;

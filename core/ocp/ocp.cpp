@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/ocp/linearisation.hpp"
 
 namespace rhec {
@@ -13,17 +14,20 @@ void Ocp::mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* c
 
 std::unique_ptr<Linearisation> Ocp::make_linearisation() const { return std::make_unique<Linearisation>(*this); }
 
-void roll_out(const Ocp& ocp, Iterate& point, std::span<double> scratch) noexcept {
+void roll_out(const Ocp& ocp, Iterate& iterate, std::span<double> scratch) noexcept {
+  RHEC_ASSERT(iterate.capacity() == ocp.capacity(), "an iterate of the OCP's capacity");
+  RHEC_ASSERT(scratch.size() >= ocp.scratch_size(), "scratch of the OCP's `scratch_size()`");
   for (int i = 0; i < ocp.intervals(); ++i)
     for (int j = 0; j < ocp.control_count(i); ++j)
-      point.control(i)[j] = std::min(std::max(point.control(i)[j], ocp.control_lower(i)[j]), ocp.control_upper(i)[j]);
+      iterate.control(i)[j] =
+          std::min(std::max(iterate.control(i)[j], ocp.control_lower(i)[j]), ocp.control_upper(i)[j]);
   if (ocp.initial_state()) {
-    std::copy_n(ocp.initial_state(), ocp.state_count(0), point.state(0));
+    std::copy_n(ocp.initial_state(), ocp.state_count(0), iterate.state(0));
   } else {
     for (int j = 0; j < ocp.state_count(0); ++j)
-      point.state(0)[j] = std::min(std::max(point.state(0)[j], ocp.state_lower(0)[j]), ocp.state_upper(0)[j]);
+      iterate.state(0)[j] = std::min(std::max(iterate.state(0)[j], ocp.state_lower(0)[j]), ocp.state_upper(0)[j]);
   }
-  ocp.simulate(point, scratch);
+  ocp.simulate(iterate, scratch);
 }
 
 }  // namespace rhec

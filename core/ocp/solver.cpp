@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "rhec/core/base/assertion.hpp"
+
 namespace rhec {
 
 const char* name_of(Status status) noexcept {
@@ -46,16 +48,21 @@ const char* advice_for(Status status) noexcept {
 
 bool is_usable(Status status) noexcept { return status != Status::infeasible && status != Status::bad_input; }
 
-KktResidual kkt_residual(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch) noexcept {
-  ocp.linearise(all_stages(ocp), point, Hessian::none, qp, scratch);
-  return kkt_residual(qp, point);
+KktResidual kkt_residual(const Ocp& ocp, const Iterate& iterate, StageQp& qp, std::span<double> scratch) noexcept {
+  RHEC_ASSERT(iterate.capacity() == ocp.capacity() && qp.capacity() == ocp.capacity(), "the OCP's capacity");
+  RHEC_ASSERT(scratch.size() >= ocp.scratch_size(), "scratch of the OCP's `scratch_size()`");
+  ocp.linearise(all_stages(ocp), iterate, Hessian::none, qp, scratch);
+  return kkt_residual(qp, iterate);
 }
 
-void judge(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch, Report& report) noexcept {
+void assess(const Ocp& ocp, const Iterate& iterate, StageQp& qp, std::span<double> scratch, Report& report) noexcept {
+  RHEC_ASSERT(iterate.capacity() == ocp.capacity() && qp.capacity() == ocp.capacity(), "the OCP's capacity");
+  RHEC_ASSERT(scratch.size() >= ocp.scratch_size(), "scratch of the OCP's `scratch_size()`");
+  RHEC_ASSERT(qp.window() == 0 || qp.window() >= 2, "a window of at least two stages");
   const int N = ocp.intervals();
   if (qp.window() == 0) {
-    report.objective = ocp.linearise(all_stages(ocp), point, Hessian::none, qp, scratch);
-    report.kkt = kkt_residual(qp, point);
+    report.objective = ocp.linearise(all_stages(ocp), iterate, Hessian::none, qp, scratch);
+    report.kkt = kkt_residual(qp, iterate);
     return;
   }
   report.objective = 0.0;
@@ -64,9 +71,9 @@ void judge(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> 
     // With the sizes of the stage behind it, which its equations lead to.
     piece.last = piece.first + qp.window() > N ? N : piece.first + qp.window() - 2;
     qp.look_at(piece.first);
-    report.objective += ocp.linearise(piece, point, Hessian::none, qp, scratch);
+    report.objective += ocp.linearise(piece, iterate, Hessian::none, qp, scratch);
     if (piece.last < N) qp.set_sizes(piece.last + 1, ocp.state_count(piece.last + 1), 0);
-    terms.add(qp, point, piece);
+    terms.add(qp, iterate, piece);
   }
   report.kkt = terms.residual();
 }

@@ -163,7 +163,7 @@ void SparseNlp::Sources::gather(const double* rows, int stage, double* __restric
 
 // State and control of a stage follow each other in z, and in a row where the state is of the capacity's size.
 
-void SparseNlp::read(const Ocp& ocp, const Iterate& point, double* z, double* multipliers,
+void SparseNlp::read(const Ocp& ocp, const Iterate& iterate, double* z, double* multipliers,
                      double* bound_multipliers) const noexcept {
   const int ns = ocp.capacity().states;
   for (int i = 0; i <= ocp.intervals(); ++i) {
@@ -174,18 +174,18 @@ void SparseNlp::read(const Ocp& ocp, const Iterate& point, double* z, double* mu
       copy(row, n == ns ? n + m : n, to + start);
       if (n != ns) copy(row + ns, m, to + start + n);
     };
-    take(point.row(i), z);
-    take(point.bound_row(i), bound_multipliers);
-    if (multipliers && i > 0) copy(point.costate(i), state_counts_[i], multipliers + constraint_starts_[i - 1]);
+    take(iterate.row(i), z);
+    take(iterate.bound_row(i), bound_multipliers);
+    if (multipliers && i > 0) copy(iterate.costate(i), state_counts_[i], multipliers + constraint_starts_[i - 1]);
   }
 }
 
 void SparseNlp::write(const Ocp& ocp, StageRange range, const double* z, const double* multipliers,
-                      const double* bound_multipliers, Iterate& point) const noexcept {
+                      const double* bound_multipliers, Iterate& iterate) const noexcept {
   const int ns = ocp.capacity().states;
   if (range.first == 0 && ocp.initial_state()) {
-    copy(ocp.initial_state(), state_counts_[0], point.state(0));
-    if (bound_multipliers) std::fill_n(point.state_bound(0), state_counts_[0], 0.0);
+    copy(ocp.initial_state(), state_counts_[0], iterate.state(0));
+    if (bound_multipliers) std::fill_n(iterate.state_bound(0), state_counts_[0], 0.0);
   }
   for (int i = range.first; i <= range.last; ++i) {
     const int n = state_starts_[i] >= 0 ? state_counts_[i] : 0, m = i < ocp.intervals() ? control_counts_[i] : 0;
@@ -195,21 +195,21 @@ void SparseNlp::write(const Ocp& ocp, StageRange range, const double* z, const d
       copy(from + start, n == ns ? n + m : n, row);
       if (n != ns) copy(from + start + n, m, row + ns);
     };
-    put(z, point.row(i));
-    put(bound_multipliers, point.bound_row(i));
-    if (multipliers && i > 0) copy(multipliers + constraint_starts_[i - 1], state_counts_[i], point.costate(i));
+    put(z, iterate.row(i));
+    put(bound_multipliers, iterate.bound_row(i));
+    if (multipliers && i > 0) copy(multipliers + constraint_starts_[i - 1], state_counts_[i], iterate.costate(i));
   }
 }
 
-void SparseNlp::set_costate_0(const StageQp& qp, Iterate& point) noexcept {
+void SparseNlp::set_costate_0(const StageQp& qp, Iterate& iterate) noexcept {
   for (int j = 0; j < qp.states(0); ++j) {
     double costate = 0.0;
     if (qp.initial_state_is_given) {
-      costate = qp.q(0)[j] + point.state_bound(0)[j];
+      costate = qp.q(0)[j] + iterate.state_bound(0)[j];
       if (qp.intervals() > 0)
-        for (int r = 0; r < qp.states(1); ++r) costate += qp.AB(0)[r * qp.stride() + j] * point.costate(1)[r];
+        for (int r = 0; r < qp.states(1); ++r) costate += qp.AB(0)[r * qp.stride() + j] * iterate.costate(1)[r];
     }
-    point.costate(0)[j] = costate;
+    iterate.costate(0)[j] = costate;
   }
 }
 

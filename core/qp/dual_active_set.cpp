@@ -6,39 +6,20 @@
 #include <utility>
 
 #include "rhec/core/qp/stage_checks.hpp"
+#include "sensitivity_sums.hpp"
 #include "tolerances.hpp"
 
 namespace rhec {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// A bound whose gradient is, to this part of its own curvature, one of the others' depends on them.
-constexpr double dependence = 1e-10;
 // Active bounds are met to this part of the tolerance for violated ones before a solution is taken.
 constexpr double exactness = 0.1;
 // With more violated at once there is little hope to be done within the changes that are provided for.
 constexpr int max_violated = 2 * DualActiveSet::max_columns;
 // Solutions with a set that does not change any more, before rounding is to blame; of those, first ones that are put
-// together from responses.
+// together from sensitivities.
 constexpr int max_refinements = 4, max_combined = 2;
-
-/// In four sums, none of which waits for the others.
-double dot(const double* a, const double* b, int count) noexcept {
-  double sums[4] = {};
-  int k = 0;
-  for (; k + 4 <= count; k += 4)
-    for (int j = 0; j < 4; ++j) sums[j] += a[k + j] * b[k + j];
-  for (; k < count; ++k) sums[0] += a[k] * b[k];
-  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
-}
-
-/// Calls function(number) for the batches of which something is wanted.
-template <class Weights, class Function>
-void for_each_weighted(const Weights& weights, const Function& function) {
-  const auto is_zero = [](double weight) { return weight == 0.0; };
-  for (std::size_t k = 0; k < weights.size(); ++k)
-    if (!std::all_of(weights[k].begin(), weights[k].end(), is_zero)) function(static_cast<int>(k));
-}
 
 }  // namespace
 
@@ -51,7 +32,7 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
   number_.assign(most, none);
   held_places_.reserve(most);
   batches_.resize(batch_count);
-  for (Batch& batch : batches_) batch.responses = Riccati::Responses(capacity);
+  for (Batch& batch : batches_) batch.sensitivities = Riccati::Sensitivities(capacity);
   for (auto* places : {&columns_, &base_places_}) places->reserve(max_columns);
   for (auto* v : {&multipliers_, &base_multipliers_}) v->assign(max_columns, 0.0);
   factor_.assign(static_cast<std::size_t>(max_columns) * max_columns, 0.0);
@@ -135,15 +116,15 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   if (qp.initial_state_is_given && column_count() < batch_size) {
     std::fill_n(value_.data(), places_, 0.0);
     find_violations();
-    find_responses_of_next(qp, riccati, columns_.data(), column_count());
+    find_sensitivities_of_next(qp, riccati, columns_.data(), column_count());
   } else {
-    find_responses_of_columns(qp, riccati, 0);
+    find_sensitivities_of_columns(qp, riccati, 0);
   }
   has_bounds_ = false;
 }
 
 /// Factorises anew without the held bounds that have been released; columns of controls are held from now on, and those
-/// that are left have no responses yet.
+/// that are left have no sensitivities yet.
 bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
   held_.clear();
   int kept = 0;
@@ -164,145 +145,19 @@ bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
   return is_convex_;
 }
 
-/// Of one batch, which takes the place of one that no column needs.
-bool DualActiveSet::find_responses(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept {
-  const auto choose = [&] {
-    int batch = 0;
-    while (batch < batch_count && is_needed(batch, places, count)) ++batch;
-    return batch;
-  };
-  int chosen = choose();
-  if (chosen == batch_count) {
-    // Columns are everywhere: put together, they leave a batch.
-    for (int k = 0; k < batch_count; ++k) forget(k);
-    if (!find_responses_of_columns(qp, riccati, 0)) return false;
-    chosen = choose();
-  }
-  Batch& batch = batches_[chosen];
-  Riccati::Entry gradients[batch_size] = {};
-  for (int c = 0; c < count; ++c) gradients[c] = {places[c] / stride_, places[c] % stride_};
-  if (!riccati.respond(qp, held_, gradients, count, batch.responses)) return false;
-  forget(chosen);
-  batch.count = count;
-  std::copy_n(places, count, batch.of.begin());
-  for (int c = 0; c < count; ++c) number_[places[c]] = chosen * batch_size + c;
-  return true;
-}
-
-/// Whether a column has its responses there, other than those that are asked for anew.
-bool DualActiveSet::is_needed(int batch, const int* places, int count) const noexcept {
-  for (int c = 0; c < batches_[batch].count; ++c) {
-    const int place = batches_[batch].of[c];
-    if (hold_[place] == Hold::column && number_[place] == batch * batch_size + c &&
-        std::find(places, places + count, place) == places + count)
-      return true;
-  }
-  return false;
-}
-
-void DualActiveSet::forget(int batch) noexcept {
-  for (int c = 0; c < batches_[batch].count; ++c) {
-    int& number = number_[batches_[batch].of[c]];
-    if (number == batch * batch_size + c) number = none;
-  }
-  batches_[batch].count = 0;
-}
-
-bool DualActiveSet::find_responses_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept {
-  for (; first < column_count(); first += batch_size)
-    if (!find_responses(qp, riccati, columns_.data() + first, std::min(batch_size, column_count() - first)))
-      return false;
-  return true;
-}
-
-/// Of the first ones, and in the same time of those that may be next: the most violated ones, or nearest to being so.
-/// `find_violations` has looked at all.
-bool DualActiveSet::find_responses_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count) noexcept {
-  std::array<int, batch_size> places{};
-  std::copy_n(first, count, places.begin());
-  const int given = count;
-  double least = -infinity;  // of those that have been chosen, once there is no room
-  for (int place = 0; place < places_; ++place) {
-    if (!(violation_[place] > least) || number_[place] != none) continue;
-    if (std::find(first, first + given, place) != first + given) continue;
-    if (count < batch_size) ++count;
-    int at = count - 1;
-    for (; at > given && violation_[places[at - 1]] < violation_[place]; --at) places[at] = places[at - 1];
-    places[at] = place;
-    if (count == batch_size) least = violation_[places[batch_size - 1]];
-  }
-  return find_responses(qp, riccati, places.data(), count);
-}
-
-/// Adds to values the responses, each by its weight.
-void DualActiveSet::add_responses(const Riccati& riccati, const Weights& weights,
-                                  std::vector<double>& sums) const noexcept {
-  for_each_weighted(weights,
-                    [&](int k) { riccati.add_values(batches_[k].responses, weights[k].data(), places_, sums.data()); });
-}
-
-/// The row of the factor that a bound would add below `count` others; returns the square of its diagonal entry, or 0
-/// where it depends on them.
-double DualActiveSet::eliminate(int entering, int count, double* row) const noexcept {
-  double left = -response(entering, entering);
-  const double least = dependence * left;
-  for (int k = 0; k < count; ++k) {
-    const double* above = factor_row(k);
-    row[k] = (-response(entering, columns_[k]) - dot(above, row, k)) * above[k];
-    left -= row[k] * row[k];
-  }
-  return left > least && least > 0.0 ? left : 0.0;
-}
-
-/// x := L'^-1 x.
-void DualActiveSet::back_substitute(double* x) const noexcept {
-  for (int k = column_count() - 1; k >= 0; --k) {
-    const double* row = factor_row(k);
-    x[k] *= row[k];
-    for (int l = 0; l < k; ++l) x[l] -= row[l] * x[k];
-  }
-}
-
-/// The Cholesky factor of S from row `first` on, with reciprocals on its diagonal. Columns that depend on those before
-/// are left out, or make this fail.
-bool DualActiveSet::factor_columns(int first, bool may_leave_out) noexcept {
-  int kept = first;
-  for (int k = first; k < column_count(); ++k) {
-    double* row = factor_row(kept);
-    const double square = eliminate(columns_[k], kept, row);
-    if (square == 0.0) {
-      if (!may_leave_out) return false;
-      let_go(columns_[k]);
-      continue;
-    }
-    row[kept] = 1.0 / std::sqrt(square);
-    columns_[kept] = columns_[k];
-    multipliers_[kept++] = multipliers_[k];
-  }
-  columns_.resize(kept);
-  return true;
-}
-
-void DualActiveSet::drop_column(int k) noexcept {
-  let_go(columns_[k]);
-  columns_.erase(columns_.begin() + k);
-  std::copy(multipliers_.begin() + k + 1, multipliers_.begin() + column_count() + 1, multipliers_.begin() + k);
-  // What is left of a positive definite system is no less so.
-  factor_columns(k, true);
-}
-
-/// Brings a step from the multipliers that it was found with to the present ones; false where some have no responses.
+/// Brings a step from the multipliers that it was found with to the present ones; false where some have no
+/// sensitivities.
 bool DualActiveSet::combine(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept {
   if (!has_base_) return false;
-  const auto has_responses = [this](int place) { return number_[place] != none; };
-  if (!std::all_of(columns_.begin(), columns_.end(), has_responses) ||
-      !std::all_of(base_places_.begin(), base_places_.end(), has_responses))
+  const auto has_sensitivities = [this](int place) { return number_[place] != none; };
+  if (!std::all_of(columns_.begin(), columns_.end(), has_sensitivities) ||
+      !std::all_of(base_places_.begin(), base_places_.end(), has_sensitivities))
     return false;
   Weights weights{};
   for (int k = 0; k < column_count(); ++k) weight_of(columns_[k], weights) += multipliers_[k];
   for (std::size_t k = 0; k < base_places_.size(); ++k) weight_of(base_places_[k], weights) -= base_multipliers_[k];
   for_each_weighted(weights,
-                    [&](int k) { riccati.combine(qp, held_, batches_[k].responses, weights[k].data(), step); });
+                    [&](int k) { riccati.combine(qp, held_, batches_[k].sensitivities, weights[k].data(), step); });
   has_policy_ = false;
   return true;
 }
@@ -347,7 +202,7 @@ void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
     multipliers_[k] += change[k];
     weight_of(columns_[k], weights) = change[k];
   }
-  add_responses(riccati, weights, value_);
+  add_sensitivities(riccati, weights, value_);
 }
 
 bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
@@ -361,7 +216,7 @@ bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
     any = true;
     ++changes_;
   }
-  if (any) add_responses(riccati, weights, value_);
+  if (any) add_sensitivities(riccati, weights, value_);
   return any;
 }
 
@@ -389,10 +244,10 @@ DualActiveSet::Violations DualActiveSet::find_violations() noexcept {
   return {static_cast<int>(worst - violation_.begin()), count};
 }
 
-/// All violated bounds of controls that have responses become columns at once: those are mostly right. Not so with
+/// All violated bounds of controls that have sensitivities become columns at once: those are mostly right. Not so with
 /// states, of which one bound often keeps a whole run.
 bool DualActiveSet::add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept {
-  if (number_[worst] == none && !find_responses_of_next(qp, riccati, &worst, 1)) return false;
+  if (number_[worst] == none && !find_sensitivities_of_next(qp, riccati, &worst, 1)) return false;
   for (const Batch& batch : batches_) {
     for (int c = 0; c < batch.count && column_count() < max_columns; ++c) {
       const int place = batch.of[c];
@@ -429,7 +284,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
   for (;;) {
     if (++changes_ > max_changes) return Outcome::too_much;
     if (is_past(deadline)) return Outcome::out_of_time;
-    if (number_[entering] == none && !find_responses_of_next(qp, riccati, &entering, 1)) return Outcome::too_much;
+    if (number_[entering] == none && !find_sensitivities_of_next(qp, riccati, &entering, 1)) return Outcome::too_much;
     // How values and multipliers change while that of the entering bound grows and the active ones stay met.
     const int count = column_count();
     double pull[max_columns], row[max_columns];
@@ -443,7 +298,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       weight_of(columns_[k], weights) = -pull[k];
     }
     std::fill_n(direction_.data(), places_, 0.0);
-    add_responses(riccati, weights, direction_);
+    add_sensitivities(riccati, weights, direction_);
     // Until its bound is met, or a multiplier has gone.
     double length = square > 0.0 ? side * (value_[entering] - bound(entering)) / square : infinity;
     int blocking_column = none, blocking_held = none;
@@ -470,7 +325,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       value_[blocking_held] = bound(blocking_held);
       if (!refactor(qp, riccati)) return Outcome::not_convex;
       find_violations();
-      if (!find_responses_of_columns(qp, riccati, 0) || !factor_columns(0, false)) return Outcome::too_much;
+      if (!find_sensitivities_of_columns(qp, riccati, 0) || !factor_columns(0, false)) return Outcome::too_much;
     } else if (blocking_column != none) {
       drop_column(blocking_column);
     } else {
@@ -486,7 +341,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
 /// Where the present multipliers lead.
 DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& riccati, bool may_combine,
                                                 Iterate& step) noexcept {
-  if (column_count() > 0 && number_[columns_[0]] == none && !find_responses_of_columns(qp, riccati, 0))
+  if (column_count() > 0 && number_[columns_[0]] == none && !find_sensitivities_of_columns(qp, riccati, 0))
     return Found::nothing;
   if (!has_base_) factor_columns(0, true);
   if (!(may_combine && combine(qp, riccati, step)) && !solve_with_multipliers(qp, riccati, step)) return Found::nothing;

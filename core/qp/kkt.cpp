@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "qp_view.hpp"
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
 
 namespace rhec {
@@ -36,8 +37,10 @@ void KktTerms::add(const KktTerms& others) noexcept {
   take(largest_term, others.largest_term);
 }
 
-void KktTerms::add(const StageQp& qp, const Iterate& point, StageRange range) noexcept {
-  QpView view = view_of(qp, point);
+void KktTerms::add(const StageQp& qp, const Iterate& iterate, StageRange range) noexcept {
+  RHEC_ASSERT(qp.capacity() == iterate.capacity(), "an iterate of the QP's capacity");
+  RHEC_ASSERT(range.first >= 0 && range.last <= qp.intervals(), "stages of the QP");
+  QpView view = view_of(qp, iterate);
   view.first = range.first;
   view.last = range.last;
   const KktParts parts = qp_kernels().kkt(view);
@@ -52,22 +55,22 @@ KktResidual KktTerms::residual() const noexcept {
   return {stationarity / size, defect, bound_violation, complementarity / size};
 }
 
-KktResidual kkt_residual(const StageQp& qp, const Iterate& point) noexcept {
+KktResidual kkt_residual(const StageQp& qp, const Iterate& iterate) noexcept {
   KktTerms terms;
-  terms.add(qp, point, {0, qp.intervals()});
+  terms.add(qp, iterate, {0, qp.intervals()});
   return terms.residual();
 }
 
-void set_costates(const StageQp& qp, Iterate& point) noexcept {
+void set_costates(const StageQp& qp, Iterate& iterate) noexcept {
   const int N = qp.intervals();
   for (int i = N; i >= 0; --i) {
-    double* costate = point.costate(i);
+    double* costate = iterate.costate(i);
     for (int j = 0; j < qp.states(i); ++j) {
-      costate[j] = qp.q(i)[j] + point.state_bound(i)[j];
-      if (i < N) costate[j] += pull_of(qp, i, j, point.costate(i + 1));
+      costate[j] = qp.q(i)[j] + iterate.state_bound(i)[j];
+      if (i < N) costate[j] += pull_of(qp, i, j, iterate.costate(i + 1));
     }
   }
-  if (!qp.initial_state_is_given) std::fill_n(point.costate(0), qp.states(0), 0.0);
+  if (!qp.initial_state_is_given) std::fill_n(iterate.costate(0), qp.states(0), 0.0);
 }
 
 }  // namespace rhec

@@ -5,7 +5,7 @@
 
 namespace rhec {
 
-inline QpView view_of(const StageQp& qp, const Iterate& point) noexcept {
+inline QpView view_of(const StageQp& qp, const Iterate& iterate) noexcept {
   return {.intervals = qp.intervals(),
           .last = qp.intervals(),
           .states = qp.capacity().states,
@@ -20,9 +20,9 @@ inline QpView view_of(const StageQp& qp, const Iterate& point) noexcept {
           .b = qp.b(0),
           .lower = qp.lower(0),
           .upper = qp.upper(0),
-          .values = point.row(0),
-          .costates = point.costate(0),
-          .bounds = point.bound_row(0)};
+          .values = iterate.row(0),
+          .costates = iterate.costate(0),
+          .bounds = iterate.bound_row(0)};
 }
 
 }  // namespace rhec

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/with_size.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
@@ -117,6 +118,7 @@ void Riccati::factor_for_covariances(const StageQp& qp, const ActiveSet& active)
 }
 
 void Riccati::factor_stages(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept {
+  RHEC_ASSERT(qp.capacity() == capacity_ && qp.window() == 0, "a whole QP of the capacity");
   const int N = qp.intervals(), n = qp.states(N);
   convexified_ = false;
   std::copy_n(qp.state_counts(), N + 1, state_counts_.data());
@@ -176,24 +178,24 @@ Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iter
   return Outcome::done;
 }
 
-Riccati::Responses::Responses(const Capacity& capacity) {
+Riccati::Sensitivities::Sensitivities(const Capacity& capacity) {
   for (auto* v : {&values, &costates})
     v->assign(static_cast<std::size_t>(capacity.intervals + 1) * capacity.row() * size, 0.0);
   control_counts.assign(capacity.intervals, 0);
 }
 
-bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
-                      Responses& responses) noexcept {
-  constexpr int size = Responses::size;
+bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
+                                 Sensitivities& sensitivities) noexcept {
+  constexpr int size = Sensitivities::size;
   static_assert(size == response_batch);
   const int N = qp.intervals(), n = qp.states(0);
   const auto is_set = [](std::uint8_t flag) { return flag != 0; };
   if (std::any_of(is_special_.data(), is_special_.data() + N, is_set) || reductions_[N].rows > 0) return false;
-  double *values = responses.values.data(), *costates = responses.costates.data();
+  double *values = sensitivities.values.data(), *costates = sensitivities.costates.data();
   // What stages do not use stays zero.
-  if (!std::equal(qp.control_counts(), qp.control_counts() + N, responses.control_counts.begin())) {
-    for (auto* v : {&responses.values, &responses.costates}) std::fill(v->begin(), v->end(), 0.0);
-    std::copy_n(qp.control_counts(), N, responses.control_counts.begin());
+  if (!std::equal(qp.control_counts(), qp.control_counts() + N, sensitivities.control_counts.begin())) {
+    for (auto* v : {&sensitivities.values, &sensitivities.costates}) std::fill(v->begin(), v->end(), 0.0);
+    std::copy_n(qp.control_counts(), N, sensitivities.control_counts.begin());
   }
   int last = 0;
   for (int c = 0; c < count; ++c) last = std::max(last, gradients[c].stage);
@@ -209,7 +211,7 @@ bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* g
     values[(static_cast<std::ptrdiff_t>(stage) * stride_ + place) * size + c] = 1.0;
   }
   const RiccatiView view = view_of(qp, active.row(0));
-  kernels_->respond_backward(view, last, has_gradient_.data(), values);
+  kernels_->sensitivities_backward(view, last, has_gradient_.data(), values);
   if (qp.initial_state_is_given) {
     std::copy_n(values, n * size, costates);
     std::fill_n(values, n * size, 0.0);
@@ -234,12 +236,12 @@ bool Riccati::respond(const StageQp& qp, const ActiveSet& active, const Entry* g
       scale(j, -1.0 / G[j * width_ + j]);
     }
   }
-  kernels_->respond_forward(view, last, values, costates);
+  kernels_->sensitivities_forward(view, last, values, costates);
   return true;
 }
 
-void Riccati::combine(const StageQp& qp, const ActiveSet& active, const Responses& responses, const double* weights,
-                      Iterate& step) noexcept {
+void Riccati::combine(const StageQp& qp, const ActiveSet& active, const Sensitivities& sensitivities,
+                      const double* weights, Iterate& step) noexcept {
   const long entries = static_cast<long>(qp.intervals() + 1) * stride_;
   const auto each_fixed = [&](const auto& function) {
     for (int i = 0; i < qp.intervals(); ++i) {
@@ -248,18 +250,19 @@ void Riccati::combine(const StageQp& qp, const ActiveSet& active, const Response
         if (const std::int8_t side = active.control(i)[j]; side != 0) function(i, j, side);
     }
   };
-  // There the responses are those of multipliers.
+  // There the sensitivities are those of multipliers.
   each_fixed([&](int i, int j, std::int8_t /*side*/) { step.control(i)[j] = step.control_bound(i)[j]; });
-  kernels_->combine(responses.values.data(), weights, step.row(0), entries);
-  kernels_->combine(responses.costates.data(), weights, step.costate(0), entries);
+  kernels_->combine(sensitivities.values.data(), weights, step.row(0), entries);
+  kernels_->combine(sensitivities.costates.data(), weights, step.costate(0), entries);
   each_fixed([&](int i, int j, std::int8_t side) {
     step.control_bound(i)[j] = step.control(i)[j];
     step.control(i)[j] = (side < 0 ? qp.control_lower(i) : qp.control_upper(i))[j];
   });
 }
 
-void Riccati::add_values(const Responses& responses, const double* weights, int places, double* sums) const noexcept {
-  kernels_->combine(responses.values.data(), weights, sums, places);
+void Riccati::add_values(const Sensitivities& sensitivities, const double* weights, int places,
+                         double* sums) const noexcept {
+  kernels_->combine(sensitivities.values.data(), weights, sums, places);
 }
 
 void Riccati::feedback(const StageQp& qp, int i, const double* s, double* w) noexcept {

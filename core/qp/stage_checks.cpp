@@ -11,8 +11,8 @@ StepCheck check_step(const StageQp& qp, const Iterate& step, double tolerance) n
   return {.is_finite = is_finite, .violates = violates, .largest_costate = largest_costate};
 }
 
-bool mark_bounds(const StageQp& qp, const Iterate& point, double tolerance, std::uint8_t* marks) noexcept {
-  return qp_kernels().mark_bounds(view_of(qp, point), tolerance, marks);
+bool mark_bounds(const StageQp& qp, const Iterate& iterate, double tolerance, std::uint8_t* marks) noexcept {
+  return qp_kernels().mark_bounds(view_of(qp, iterate), tolerance, marks);
 }
 
 ViolatedBounds find_violations(const double* values, const double* least, const double* most, int count,

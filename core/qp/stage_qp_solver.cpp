@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/qp/stage_checks.hpp"
 #include "tolerances.hpp"
 
 namespace rhec {
 namespace {
 
-constexpr int claimed_rounds = 1;  // tries of the claimed set where the program is not convex
+constexpr int claimed_rounds = 1;  // tries of the claimed set where the QP is not convex
 constexpr int warm_rounds = 8;     // corrections of the active set before the interior-point method is called
 constexpr int polish_rounds = 6;   // the same from the interior-point method's active set
 constexpr int few_states = 2;
@@ -41,7 +42,7 @@ void StageQpSolver::reset() noexcept {
   factorisations_ = 0;
 }
 
-void StageQpSolver::guess_from(const StageQp& qp, const Iterate& point) noexcept {
+void StageQpSolver::guess_from(const StageQp& qp, const Iterate& iterate) noexcept {
   active_.clear();
   factored_ = prepared_ = was_convexified_ = false;
   factorisations_ = 0;
@@ -51,16 +52,16 @@ void StageQpSolver::guess_from(const StageQp& qp, const Iterate& point) noexcept
     if (multiplier < 0.0 && std::isfinite(lower)) return -1;
     return 0;
   };
-  mark_bounds(qp, point, bound_tolerance, marks_.data());
+  mark_bounds(qp, iterate, bound_tolerance, marks_.data());
   any_active_ = false;
   for (int i = 0; i <= qp.intervals(); ++i) {
     if (marks_[i] == 0) continue;
     any_active_ = true;
     if (i > 0 || !qp.initial_state_is_given)
       for (int j = 0; j < qp.states(i); ++j)
-        active_.state(i)[j] = side(point.state_bound(i)[j], qp.state_lower(i)[j], qp.state_upper(i)[j]);
+        active_.state(i)[j] = side(iterate.state_bound(i)[j], qp.state_lower(i)[j], qp.state_upper(i)[j]);
     for (int j = 0; j < qp.controls(i); ++j)
-      active_.control(i)[j] = side(point.control_bound(i)[j], qp.control_lower(i)[j], qp.control_upper(i)[j]);
+      active_.control(i)[j] = side(iterate.control_bound(i)[j], qp.control_lower(i)[j], qp.control_upper(i)[j]);
   }
 }
 
@@ -71,7 +72,7 @@ void StageQpSolver::factor(const StageQp& qp) noexcept {
 }
 
 /// Few state bounds of an estimator: those stay from sample to sample, mostly, and are cheap inside the factorisation.
-/// A controller's move with its horizon, so that their responses are needed in most samples.
+/// A controller's move with its horizon, so that their sensitivities are needed in most samples.
 bool StageQpSolver::claim_is_likely(const StageQp& qp) const noexcept {
   if (!any_active_ || qp.initial_state_is_given) return false;
   int states = 0;
@@ -139,6 +140,7 @@ bool StageQpSolver::try_active_sets(const StageQp& qp, Iterate& step, int rounds
 }
 
 StageQpSolver::Outcome StageQpSolver::solve(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept {
+  RHEC_ASSERT(qp.capacity() == capacity_ && step.capacity() == capacity_, "a QP and a step of the capacity");
   is_dual_ = is_convexified_ = false;
   if (!factored_ && !prepared_) prepare(qp);
   if (factored_) {

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "merit.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/riccati.hpp"
 

@@ -52,7 +52,7 @@ class PlainSqp : public rhec::Solver {
     if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), newton_.best.state(0));
     report.status = newton_.minimise(*ocp_, options_.tolerance, options_.max_iterations, deadline, report);
     if (report.status != rhec::Status::infeasible) iterate = newton_.best;
-    judge(*ocp_, iterate, newton_.qp, newton_.merit.scratch, report);  // the core says what the iterate is worth
+    assess(*ocp_, iterate, newton_.qp, newton_.merit.scratch, report);  // the core says what the iterate is worth
     return report;
   }
 

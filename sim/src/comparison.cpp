@@ -14,7 +14,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/kkt.hpp"
 
 namespace rhec::sim {

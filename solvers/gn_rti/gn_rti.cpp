@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/stage_checks.hpp"
 #include "rhec/plugins/sdk.hpp"
 
@@ -39,10 +39,10 @@ void for_each_dual_row(const Ocp& ocp, Iterate& to, const Iterate& from, const F
 }
 
 /// Whether any costate is other than zero (which a number that is none is, too).
-bool has_costates(const Ocp& ocp, const Iterate& point) noexcept {
+bool has_costates(const Ocp& ocp, const Iterate& iterate) noexcept {
   for (int i = 1; i <= ocp.intervals(); ++i)
     for (int j = 0; j < ocp.state_count(i); ++j)
-      if (point.costate(i)[j] != 0.0) return true;
+      if (iterate.costate(i)[j] != 0.0) return true;
   return false;
 }
 

@@ -33,7 +33,7 @@ struct GnRtiOptions {
 /// Sequential quadratic programming on the stages of an Ocp, with a Riccati recursion inside.
 ///
 /// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers claim; `feedback`
-/// then needs only vectors, unless the newest data change the active set. `finish` linearises at the new point, of
+/// then needs only vectors, unless the newest data change the active set. `finish` linearises at the new iterate, of
 /// which the next guess is the same a stage later: `prepare` has one interval left to evaluate, or none. Estimation
 /// problems have small residuals and take Gauss-Newton's Hessian; control problems under slip have large ones, on which
 /// Gauss-Newton does not even converge locally, and take the exact one with the guess' costates, convexified inside the

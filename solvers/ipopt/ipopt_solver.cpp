@@ -8,7 +8,7 @@
 #include <IpoptConfig.h>
 
 #include "native_options.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec::ipopt {
@@ -148,7 +148,7 @@ void IpoptSolver::setup(const Ocp& ocp) {
   if (const std::string reason = why_not(ocp); !reason.empty()) throw Error("solver 'ipopt': " + reason);
   ocp_ = &ocp;
   scratch_.assign(ocp.scratch_size(), 0.0);
-  judge_ = StageQp(ocp.capacity(), OcpNlp::window);
+  assessed_ = StageQp(ocp.capacity(), OcpNlp::window);
   guess_ = best_ = Iterate(ocp.capacity());
   const std::lock_guard hold(backend_lock());
   nlp_ = new OcpNlp(ocp, options_.hessian);
@@ -201,7 +201,7 @@ void IpoptSolver::set_run_options(Start start, double barrier) {
 
 /// The best iterate is that of the least residual; among those within the tolerance, the last, whose barrier is least.
 void IpoptSolver::keep_if_better(const PrimalDual& iterate) noexcept {
-  seen_kkt_ = nlp_->judge(iterate);
+  seen_kkt_ = nlp_->residual_at(iterate);
   const double residual = seen_kkt_.largest();
   if (!(residual <= options_.tolerance || residual < best_kkt_.largest())) return;
   best_kkt_ = seen_kkt_;
@@ -250,14 +250,14 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   return best_kkt_.largest() <= near_solution ? Ending::near : Ending::lost;
 }
 
-/// True where the point is the best iterate, with the report of that.
-bool IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
+/// True where the iterate is the best iterate, with the report of that.
+bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
   nlp_->take(ocp);
   // The guess is the first candidate, with the initial state that is given.
-  guess_ = point;
+  guess_ = iterate;
   if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), guess_.state(0));
   Report of_guess;
-  judge(ocp, guess_, judge_, scratch_, of_guess);
+  assess(ocp, guess_, assessed_, scratch_, of_guess);
   if (!std::isfinite(of_guess.objective)) return false;
   best_ = guess_;
   best_kkt_ = of_guess.kkt;
@@ -311,7 +311,7 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& point, Report& report) {
       break;
   }
   if (report.status == Status::infeasible || !is_finite(ocp, best_)) return false;
-  std::swap(point, best_);
+  std::swap(iterate, best_);
   report.objective = best_objective_;
   report.kkt = best_kkt_;
   return true;
@@ -324,7 +324,7 @@ Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
   iterations_ = 0;
   backend_us_ = 0.0;
   stopped_late_ = false;
-  bool is_judged = false;
+  bool is_assessed = false;
   try {
     std::unique_lock hold(backend_lock(), std::defer_lock);
     if (deadline == Clock::time_point::max()) {
@@ -334,19 +334,19 @@ Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
     }
     if (hold.owns_lock()) {
       nlp_->set_spectator(this);
-      is_judged = improve(*ocp_, iterate, report);
+      is_assessed = improve(*ocp_, iterate, report);
       nlp_->release();
       if (report.status == Status::bad_input) return report;
     }
   } catch (const std::exception&) {
-    // Memory that ran out: the point is the guess still.
+    // Memory that ran out: the iterate is the guess still.
     report.status = Status::stalled;
   } catch (...) {
     // Ipopt's exceptions have no base class of the standard's.
     report.status = Status::stalled;
   }
   report.iterations = iterations_;
-  if (!is_judged) judge(*ocp_, iterate, judge_, scratch_, report);
+  if (!is_assessed) assess(*ocp_, iterate, assessed_, scratch_, report);
   return std::isfinite(report.objective) ? report : Report{};
 }
 

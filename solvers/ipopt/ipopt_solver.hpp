@@ -22,7 +22,7 @@ struct IpoptOptions {
   static const OptionTable<IpoptOptions>& table();
 };
 
-/// Multiple shooting: all states and controls are variables of one sparse nonlinear program, solved by Ipopt's filter
+/// Multiple shooting: all states and controls are variables of one sparse NLP, solved by Ipopt's filter
 /// interior-point method.
 ///
 /// Ipopt runs until the core's own residual is within the tolerance and what the barrier adds to the objective is
@@ -68,7 +68,7 @@ class IpoptSolver final : public Solver, private Spectator {
   };
   enum class Ending { converged, out_of_time, out_of_iterations, infeasible, near, lost };
 
-  bool improve(const Ocp& ocp, Iterate& point, Report& report);
+  bool improve(const Ocp& ocp, Iterate& iterate, Report& report);
   Ending run(Start start, const Iterate& from);
   Start start_after(Start start, Ending ending) const noexcept;
   int iterations_of(Start start) const noexcept;
@@ -88,7 +88,7 @@ class IpoptSolver final : public Solver, private Spectator {
   Ipopt::SmartPtr<Ipopt::IpoptApplication> application_;  ///< touched under the lock only
   Ipopt::SmartPtr<OcpNlp> nlp_;
   const Ocp* ocp_ = nullptr;
-  StageQp judge_;
+  StageQp assessed_;
   std::vector<double> scratch_;
 
   // Of the solve under way.

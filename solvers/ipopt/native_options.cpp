@@ -25,7 +25,7 @@ constexpr auto ours = std::to_array<std::pair<std::string_view, std::string_view
      {"warm_start_entire_iterate"sv, "set the solver's option 'warm_start'"sv},
      {"warm_start_same_structure"sv, "structures change from sample to sample"sv},
      {"skip_finalize_solution_call"sv, "the solution would be lost"sv},
-     {"replace_bounds"sv, "iterates could not be judged"sv},
+     {"replace_bounds"sv, "iterates could not be compared"sv},
      {"option_file_name"sv, "write what is in that file here instead"sv},
      {"output_file"sv, "a solver writes no file"sv},
      {"file_print_level"sv, "a solver writes no file"sv},

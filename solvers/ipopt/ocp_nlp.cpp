@@ -10,7 +10,7 @@
 #include <IpOrigIpoptNLP.hpp>
 #include <IpTNLPAdapter.hpp>
 
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 
 namespace rhec::ipopt {
 namespace {
@@ -97,14 +97,14 @@ void OcpNlp::set_curvature(Curvature curvature) noexcept {
   curvature_ = curvature;
 }
 
-void OcpNlp::set_start(const Iterate& point, double barrier) noexcept {
+void OcpNlp::set_start(const Iterate& iterate, double barrier) noexcept {
   iterates_ = {};
   forget_seen();
   starts_with_multipliers_ = barrier > 0.0;
   const double least_multiplier = std::sqrt(barrier);
   std::vector<double>& z = start_.z;
   Multipliers& multipliers = start_.multipliers;
-  nlp_.read(*ocp_, point, z.data(), multipliers.of_constraints.data(), multipliers.of_bounds.data());
+  nlp_.read(*ocp_, iterate, z.data(), multipliers.of_constraints.data(), multipliers.of_bounds.data());
   for (auto* vector : {&start_lower_, &start_upper_}) std::fill(vector->begin(), vector->end(), 1.0);
   if (barrier <= 0.0) return;
   for (const int j : bounded_) {
@@ -162,7 +162,7 @@ bool OcpNlp::linearise_at(const double* z, unsigned visit) {
   return linearised_.is_sound;
 }
 
-/// Goes through the stages at a point, from one piece to the next, and lets `take` have each; returns the objective.
+/// Goes through the stages at an iterate, from one piece to the next, and lets `take` have each; returns the objective.
 template <class Take>
 double OcpNlp::linearise(const double* z, const double* multipliers, const double* bound_multipliers, Hessian hessian,
                          const Take& take) noexcept {
@@ -245,7 +245,7 @@ bool OcpNlp::has_judged(const PrimalDual& iterate) const noexcept {
          are_equal(linear_iterate_->multipliers.of_bounds, of_bounds.data());
 }
 
-KktResidual OcpNlp::judge(const PrimalDual& iterate) noexcept {
+KktResidual OcpNlp::residual_at(const PrimalDual& iterate) noexcept {
   if (has_judged(iterate)) return linear_kkt_;
   for (std::size_t j = 0; j < clipped_.size(); ++j)
     clipped_[j] = std::min(std::max(iterate.z[j], lower_[j]), upper_[j]);
@@ -254,8 +254,8 @@ KktResidual OcpNlp::judge(const PrimalDual& iterate) noexcept {
   return linear_kkt_;
 }
 
-void OcpNlp::exchange_judged(Iterate& point) noexcept {
-  std::swap(linear_, point);
+void OcpNlp::exchange_judged(Iterate& iterate) noexcept {
+  std::swap(linear_, iterate);
   is_judged_ = false;
 }
 

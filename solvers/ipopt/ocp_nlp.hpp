@@ -42,13 +42,13 @@ class Spectator {
   virtual void see_last(const PrimalDual& iterate) noexcept = 0;
 };
 
-/// An Ocp as the sparse nonlinear program that Ipopt solves. Every point is evaluated once, whoever asks: objective and
-/// constraints together; then, in one passage through the stages, gradient, Jacobian, the Hessian for the iterate's
-/// multipliers and the judgement of the iterate.
+/// An Ocp as the sparse nonlinear program that Ipopt solves. Every iterate is evaluated once, whoever asks: objective
+/// and constraints together; then, in one passage through the stages, gradient, Jacobian, the Hessian for the iterate's
+/// multipliers and the KKT residual.
 class OcpNlp final : public Ipopt::TNLP {
  public:
   /// Of a long horizon, as many stages as a processor's cache has room for, the one behind a piece among them: pieces
-  /// are those of the core's `judge`, and so are their sums.
+  /// are those of the core's `assess`, and so are their sums.
   static constexpr int window = 16;
 
   OcpNlp(const Ocp& ocp, Curvature curvature);
@@ -62,9 +62,9 @@ class OcpNlp final : public Ipopt::TNLP {
   int constraints() const noexcept { return nlp_.constraints(); }
   bool has_empty_bounds() const noexcept;
 
-  /// Where Ipopt starts. With a barrier parameter above zero the point's multipliers count too: each variable and the
+  /// Where Ipopt starts. With a barrier parameter above zero the iterate's multipliers count too: each variable and the
   /// multiplier of its bound are moved until their product is that parameter or more, as little as that takes.
-  void set_start(const Iterate& point, double barrier) noexcept;
+  void set_start(const Iterate& iterate, double barrier) noexcept;
   /// From the next run on.
   void set_curvature(Curvature curvature) noexcept;
   /// For the length of a solve.
@@ -72,10 +72,10 @@ class OcpNlp final : public Ipopt::TNLP {
 
   /// Judges an iterate, with its states and controls clipped to their bounds. Multipliers of variables that have one
   /// value only follow from stationarity: Ipopt does not see such variables.
-  KktResidual judge(const PrimalDual& iterate) noexcept;
-  // Of the iterate that was judged last:
-  /// Gives it away, once, and gets a point of the same capacity for it.
-  void exchange_judged(Iterate& point) noexcept;
+  KktResidual residual_at(const PrimalDual& iterate) noexcept;
+  // Of the iterate whose residual was computed last:
+  /// Gives it away, once, and gets an iterate of the same capacity for it.
+  void exchange_judged(Iterate& iterate) noexcept;
   /// Sum of |bound multiplier| x distance from the bound: what the barrier still adds to the objective.
   double complementarity_gap() const noexcept;
   double objective() const noexcept { return linear_objective_; }
@@ -125,7 +125,7 @@ class OcpNlp final : public Ipopt::TNLP {
     std::vector<double> z;
     unsigned visit = 0;  ///< of Ipopt's, in which it was last asked for
     bool is_known = false, is_sound = false;
-    /// Whether it is here, at `at`; what Ipopt says to be the same point need not be compared.
+    /// Whether it is here, at `at`; what Ipopt says to be the same iterate need not be compared.
     bool is_at(const double* at, unsigned now) noexcept;
     void move_to(const double* at, unsigned now) noexcept;
   };
@@ -172,7 +172,7 @@ class OcpNlp final : public Ipopt::TNLP {
   const PrimalDual* linear_iterate_ = nullptr;  ///< whose multipliers were taken
   Ipopt::TaggedObject::Tag linear_tag_ = 0;     ///< its number, where it is at this place itself
   StageQp pieces_;                              ///< of the passage under way; only the vectors are kept
-  Iterate linear_;                              ///< the point; with its multipliers as long as it is judged
+  Iterate linear_;  ///< the iterate; with its multipliers as long as its residual is computed
   std::vector<double> gradient_, jacobian_, hessian_;
   KktResidual linear_kkt_;
   double linear_objective_ = 0.0;

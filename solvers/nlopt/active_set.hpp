@@ -7,7 +7,7 @@
 
 namespace rhec::nlopt {
 
-/// A condensed problem at one point, in steps d from there:
+/// A condensed problem at one iterate, in steps d from there:
 ///
 ///     minimise g'd + 1/2 d'Hd  subject to  lower <= d <= upper,  row_lower <= J d <= row_upper
 ///

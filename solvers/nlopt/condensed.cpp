@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/kkt.hpp"
 
 namespace rhec::nlopt {
@@ -68,11 +68,11 @@ bool CondensedProblem::take(const Ocp& ocp) {
   return consistent;
 }
 
-CondensedProblem::Vector CondensedProblem::read(const Iterate& point) const {
+CondensedProblem::Vector CondensedProblem::read(const Iterate& iterate) const {
   Vector x(variables());
   for (int k = 0; k < variables(); ++k) {
     const Entry& e = variables_[static_cast<std::size_t>(k)];
-    const double value = e.is_state ? point.state(0)[e.component] : point.control(e.stage)[e.component];
+    const double value = e.is_state ? iterate.state(0)[e.component] : iterate.control(e.stage)[e.component];
     x[k] = std::min(std::max(value, lower_[k]), upper_[k]);
   }
   return x;

@@ -34,8 +34,8 @@ class CondensedProblem {
   const Vector& row_lower() const noexcept { return row_lower_; }
   const Vector& row_upper() const noexcept { return row_upper_; }
 
-  /// x of a point, within the bounds.
-  Vector read(const Iterate& point) const;
+  /// x of an iterate, within the bounds.
+  Vector read(const Iterate& iterate) const;
   /// Simulates, unless x is where the last call led. False where that leads to numbers that are not finite.
   bool move_to(const Vector& x);
   const Vector& x() const noexcept { return x_; }
@@ -54,11 +54,11 @@ class CondensedProblem {
   const Matrix& hessian(Hessian kind);
 
   /// Multipliers of the bounds of x and then of the rows, positive at upper bounds, in units of the objective. Sets the
-  /// point's bound multipliers and costates, those of fixed variables too.
+  /// iterate's bound multipliers and costates, those of fixed variables too.
   void set_multipliers(const Vector& multipliers);
-  /// The core's judgement of the present x with the multipliers last set.
+  /// The core's residual at the present x with the multipliers last set.
   KktResidual residual();
-  const Iterate& point() const noexcept { return point_; }
+  const Iterate& iterate() const noexcept { return point_; }
 
   long simulations() const noexcept { return simulations_; }
   long linearisations() const noexcept { return linearisations_; }
@@ -76,7 +76,7 @@ class CondensedProblem {
   }
   void linearise();
   void compute_sensitivities();
-  /// The reduced gradient in one entry of s_0 or w, with the point's present costates.
+  /// The reduced gradient in one entry of s_0 or w, with the iterate's present costates.
   double reduced_gradient(const Entry& entry) const noexcept;
 
   const Ocp* ocp_ = nullptr;

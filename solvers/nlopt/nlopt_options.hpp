@@ -19,7 +19,7 @@ struct Traits {
   bool bounds = true;            ///< takes bounds of variables
   bool finite_bounds = false;    ///< needs all of them finite
   bool local_optimiser = false;  ///< hands sub-problems to `local_algorithm`
-  bool from_start = true;        ///< begins at the start; a restart from its last point makes sense
+  bool from_start = true;        ///< begins at the start; a restart from its last iterate makes sense
   int fewest_variables = 1;
 };
 Traits traits_of(nlopt_algorithm algorithm);

@@ -18,7 +18,7 @@ using Optimiser = std::unique_ptr<nlopt_opt_s, Destroy>;
 constexpr double far_outside = 1e10;
 // Asking for less than this of NLopt would be asking for rounding errors.
 constexpr double least_allowed_violation = 1e-10;
-// How often a run may come back to one and the same point: more often than for its objective and its constraints.
+// How often a run may come back to one and the same iterate: more often than for its objective and its constraints.
 constexpr int most_returns = 100;
 
 }  // namespace
@@ -82,7 +82,7 @@ bool Run::go_to(const double* y, bool with_gradient) {
 bool Run::may_count(const Vector& x, bool with_gradient) {
   if (with_gradient != uses_gradients_) return true;
   if (iterations_ > 0 && x == last_counted_) {
-    // LD_CCSAQ and LD_MMA try the point of their step again and again where rounding keeps it from being good enough.
+    // LD_CCSAQ and LD_MMA try the iterate of their step again and again where rounding keeps it from being good enough.
     if (++returns_ <= most_returns) return true;
     stop(Outcome::ended);
     return false;

@@ -42,9 +42,9 @@ class Run {
       const Transformation& transformation, const Limits& limits);
 
   Outcome optimise();
-  /// The best point that was met: feasible and of the lowest objective, or the least infeasible.
+  /// The best iterate that was met: feasible and of the lowest objective, or the least infeasible.
   const Eigen::VectorXd& x() const noexcept { return best_x_; }
-  /// The last point that was counted as an iteration, feasible or not.
+  /// The last iterate that was counted as an iteration, feasible or not.
   const Eigen::VectorXd& last_x() const noexcept { return last_counted_; }
   /// Points at which NLopt asked for derivatives or, where it never does, for values.
   long iterations() const noexcept { return iterations_; }
@@ -82,7 +82,7 @@ class Run {
   Limits limits_;
   bool uses_gradients_;
   long iterations_ = 0;
-  int returns_ = 0;  ///< to the point that was counted last
+  int returns_ = 0;  ///< to the iterate that was counted last
   nlopt_opt optimiser_ = nullptr;
   Outcome outcome_ = Outcome::ended;
   bool was_stopped_ = false;

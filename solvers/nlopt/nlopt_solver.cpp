@@ -8,7 +8,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "active_set.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/plugins/sdk.hpp"
 
 namespace rhec::nlopt {
@@ -136,7 +136,7 @@ Report NloptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
       report = optimise(*ocp_, iterate, deadline);
     } catch (const std::exception&) {  // memory ran out; `iterate` is written last
       report.status = Status::stalled;
-      rhec::judge(*ocp_, iterate, qp_, scratch_, report);
+      rhec::assess(*ocp_, iterate, qp_, scratch_, report);
     }
     report.factorisations = factorisations_;
     report.fallback_used = fallback_used_;
@@ -144,19 +144,19 @@ Report NloptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
   return report;
 }
 
-Report NloptSolver::optimise(const Ocp& ocp, Iterate& point, Clock::time_point deadline) {
+Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point deadline) {
   Report report;
   const auto leave_as_it_was = [&](Status status) {
     report.status = status;
-    rhec::judge(ocp, point, qp_, scratch_, report);
+    rhec::assess(ocp, iterate, qp_, scratch_, report);
     return report;
   };
   if (!problem_.take(ocp)) return leave_as_it_was(Status::infeasible);
   if (Clock::now() > deadline) return leave_as_it_was(Status::deadline);
   // The structure may have changed since setup.
-  if (!why_not(ocp).empty() || !find_start(ocp, point)) return leave_as_it_was(Status::stalled);
+  if (!why_not(ocp).empty() || !find_start(ocp, iterate)) return leave_as_it_was(Status::stalled);
 
-  Answer answer = judge(problem_.x());
+  Answer answer = assess(problem_.x());
   const Status status = improve(ocp, answer, deadline);
   report.iterations = static_cast<int>(iterations_);
   if (status == Status::infeasible) return leave_as_it_was(status);
@@ -165,14 +165,14 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& point, Clock::time_point d
   report.status = status;
   report.objective = problem_.objective();
   report.kkt = problem_.residual();
-  point = problem_.point();
+  iterate = problem_.iterate();
   return report;
 }
 
 /// The guess, simulated. Where that leaves the numbers, controls closer to zero are tried.
-bool NloptSolver::find_start(const Ocp& ocp, const Iterate& point) {
-  if (problem_.move_to(problem_.read(point))) return true;
-  Iterate smaller = point;
+bool NloptSolver::find_start(const Ocp& ocp, const Iterate& iterate) {
+  if (problem_.move_to(problem_.read(iterate))) return true;
+  Iterate smaller = iterate;
   for (int attempt = 0; attempt < 8; ++attempt) {
     for (int i = 0; i < ocp.intervals(); ++i)
       for (int j = 0; j < ocp.control_count(i); ++j) smaller.control(i)[j] *= attempt < 7 ? 0.5 : 0.0;
@@ -216,7 +216,7 @@ Vector NloptSolver::within_bounds(const Vector& x) const {
   return x.cwiseMax(problem_.lower()).cwiseMin(problem_.upper());
 }
 
-NloptSolver::Answer NloptSolver::judge(const Vector& x) {
+NloptSolver::Answer NloptSolver::assess(const Vector& x) {
   problem_.move_to(x);
   const CondensedQp qp = qp_at(problem_);
   const Vector scale = problem_.hessian(Hessian::gauss_newton).diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
@@ -323,7 +323,7 @@ Status NloptSolver::restore_feasibility(const Ocp& ocp, Answer& answer, Clock::t
             {deadline, iterations_left(), 0, 1e-4});
     const Run::Outcome outcome = run.optimise();
     iterations_ += run.iterations();
-    answer = judge(run.x());
+    answer = assess(run.x());
     if (outcome == Run::Outcome::deadline) return Status::deadline;
     if (outcome == Run::Outcome::iteration_limit) return Status::iteration_limit;
     if (outcome == Run::Outcome::failed) return Status::stalled;
@@ -367,12 +367,12 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
             {deadline, iterations_left(), quota, strictness});
     const Run::Outcome outcome = run.optimise();
     iterations_ += run.iterations();
-    Answer next = judge(run.x());
+    Answer next = assess(run.x());
     // From far off, the rounding errors of a large step leave it slightly infeasible, and yet next to a solution. NLopt
     // then ends for rounding, and with the start, which was feasible.
     const double wanted = 0.1 * std::min(next.kkt.largest(), least_residual);
     if (run.last_x() != run.x() && problem_.move_to(within_bounds(run.last_x())) && problem_.violation() < wanted) {
-      Answer last = judge(problem_.x());
+      Answer last = assess(problem_.x());
       if (last.kkt.largest() < wanted) next = std::move(last);
     }
     const bool stopped = outcome == Run::Outcome::deadline || outcome == Run::Outcome::iteration_limit;

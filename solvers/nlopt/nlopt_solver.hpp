@@ -14,7 +14,7 @@ namespace rhec::nlopt {
 /// constraints, see the option `scaling`); bounds of later states are nonlinear constraints with exact Jacobians.
 ///
 /// NLopt tells neither multipliers nor how far it is from an optimum. So after each run multipliers are recovered from
-/// the bounds that are active, the core's residual is computed with them, and the run is repeated from its last point
+/// the bounds that are active, the core's residual is computed with them, and the run is repeated from its last iterate
 /// (scaled anew) until that residual is met. By default each run is also finished by Newton steps on the condensed
 /// problem with its active bounds (`polish`): quasi-Newton methods that compare objectives end where these differ by
 /// rounding only, which is about half of the digits. With few decisions, an attempt that gets stuck is followed by one
@@ -36,21 +36,21 @@ class NloptSolver final : public Solver {
   void reset() noexcept override;
 
  private:
-  /// A point with what it is worth.
+  /// An iterate with what it is worth.
   struct Answer {
     Eigen::VectorXd x, multipliers;
     double objective = 0.0, violation = 0.0;
     KktResidual kkt;
     double merit = 0.0;  ///< the objective, and what the violations are worth by their multipliers
   };
-  Report optimise(const Ocp& ocp, Iterate& point, Clock::time_point deadline);
+  Report optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point deadline);
   Status improve(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
   Status attempt(const Ocp& ocp, Answer& answer, long quota, Clock::time_point deadline);
   Status restore_feasibility(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
-  bool find_start(const Ocp& ocp, const Iterate& point);
+  bool find_start(const Ocp& ocp, const Iterate& iterate);
   Eigen::VectorXd within_bounds(const Eigen::VectorXd& x) const;
-  Answer judge(const Eigen::VectorXd& x);
-  /// What there is at the problem's present point with given multipliers.
+  Answer assess(const Eigen::VectorXd& x);
+  /// What there is at the problem's present iterate with given multipliers.
   Answer answer_with(const Eigen::VectorXd& multipliers);
   bool is_better(const Answer& one, const Answer& other) const noexcept;
   bool polish(const Ocp& ocp, Answer& answer, Clock::time_point deadline);

@@ -8,7 +8,7 @@
 
 namespace rhec::sparse_sqp {
 
-/// Factors the symmetric matrix of a sparse quadratic program with equality constraints,
+/// Factors the symmetric matrix of a sparse QP with equality constraints,
 ///
 ///     K = [ H + diag(primal)   J'          ]
 ///         [ J                 -diag(dual)  ]      with primal, dual >= 0,

@@ -25,7 +25,7 @@ constexpr double active_set_tolerance = 1e-11;
 constexpr double believable = 1e-8;
 constexpr double accurate = 1e-11;
 constexpr double longest_step = 1e10;
-// Interior point: residuals relative to the program's sizes.
+// Interior point: residuals relative to the QP's sizes.
 constexpr double interior_tolerance = 1e-12;
 constexpr double good_enough_interior = 1e-6;
 constexpr double to_the_boundary = 0.995;
@@ -56,41 +56,41 @@ void SparseQp::forget() noexcept {
   nlp_ = nullptr;
 }
 
-void SparseQp::multiply_hessian(const Program& program, const double* x, double* y) const noexcept {
+void SparseQp::multiply_hessian(const Data& qp, const double* x, double* y) const noexcept {
   const auto& H = nlp_->hessian();
   std::fill_n(y, n_, 0.0);
   for (int c = 0; c < n_; ++c) {
     double sum = 0.0;
     for (int k = H.starts[c]; k < H.starts[c + 1]; ++k) {
       const int r = H.row_indices[k];
-      sum += program.hessian[k] * x[r];
-      if (r != c) y[r] += program.hessian[k] * x[c];
+      sum += qp.hessian[k] * x[r];
+      if (r != c) y[r] += qp.hessian[k] * x[c];
     }
     y[c] += sum;
   }
 }
 
-void SparseQp::multiply_jacobian(const Program& program, const double* x, double* y) const noexcept {
+void SparseQp::multiply_jacobian(const Data& qp, const double* x, double* y) const noexcept {
   const auto& J = nlp_->jacobian();
   std::fill_n(y, m_, 0.0);
   for (int c = 0; c < n_; ++c)
-    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) y[J.row_indices[k]] += program.jacobian[k] * x[c];
+    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) y[J.row_indices[k]] += qp.jacobian[k] * x[c];
 }
 
-void SparseQp::add_jacobian_transposed(const Program& program, const double* y, double* x) const noexcept {
+void SparseQp::add_jacobian_transposed(const Data& qp, const double* y, double* x) const noexcept {
   const auto& J = nlp_->jacobian();
   for (int c = 0; c < n_; ++c)
-    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) x[c] += program.jacobian[k] * y[J.row_indices[k]];
+    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) x[c] += qp.jacobian[k] * y[J.row_indices[k]];
 }
 
-void SparseQp::guess_active(const Program& program, const double* bound_multipliers) {
+void SparseQp::guess_active(const Data& qp, const double* bound_multipliers) {
   for (int k = 0; k < n_; ++k) {
     active_[k] = 0;
-    if (program.lower[k] == program.upper[k]) {
+    if (qp.lower[k] == qp.upper[k]) {
       active_[k] = 2;
-    } else if (bound_multipliers[k] < 0.0 && std::isfinite(program.lower[k])) {
+    } else if (bound_multipliers[k] < 0.0 && std::isfinite(qp.lower[k])) {
       active_[k] = -1;
-    } else if (bound_multipliers[k] > 0.0 && std::isfinite(program.upper[k])) {
+    } else if (bound_multipliers[k] > 0.0 && std::isfinite(qp.upper[k])) {
       active_[k] = 1;
     }
   }
@@ -98,11 +98,11 @@ void SparseQp::guess_active(const Program& program, const double* bound_multipli
 
 /// Factors with `primal_`, `dual_` and the active set; false where the inertia is wrong. Of a semidefinite Hessian that
 /// can only be rounding, against which a larger regularisation helps; refinement takes care of the rest.
-bool SparseQp::factor_with(const Program& program) {
+bool SparseQp::factor_with(const Data& qp) {
   for (int k = 0; k < n_; ++k) fixed_[k] = active_[k] != 0;
   KktFactor::Numbers numbers;
-  numbers.hessian = program.hessian;
-  numbers.jacobian = program.jacobian;
+  numbers.hessian = qp.hessian;
+  numbers.jacobian = qp.jacobian;
   numbers.primal = primal_.data();
   numbers.dual = dual_.data();
   numbers.fixed = fixed_.data();
@@ -111,7 +111,7 @@ bool SparseQp::factor_with(const Program& program) {
   for (;;) {
     ++factorisations_;
     if (factor_.factor(numbers_)) return true;
-    if (!program.is_convex || numbers_.regularisation >= largest_regularisation) return false;
+    if (!qp.is_convex || numbers_.regularisation >= largest_regularisation) return false;
     numbers_.regularisation *= 10.0;
   }
 }
@@ -143,18 +143,18 @@ double SparseQp::solve_system() {
 /// Refines `d_` and `lambda_` until the equations are met: beside weights that are large, what the solution of the
 /// whole system leaves of them can be small and yet more than the next iterate should start from. False where they stay
 /// unmet: equations that contradict the active bounds give a solution that is only small beside huge multipliers.
-bool SparseQp::meet_equations(const Program& program) {
+bool SparseQp::meet_equations(const Data& qp) {
   const auto unmet = [&] {
-    multiply_jacobian(program, d_.data(), work_m_.data());
+    multiply_jacobian(qp, d_.data(), work_m_.data());
     double largest = 0.0;
-    for (int r = 0; r < m_; ++r) largest = std::max(largest, std::abs(work_m_[r] + program.constraints[r]));
+    for (int r = 0; r < m_; ++r) largest = std::max(largest, std::abs(work_m_[r] + qp.constraints[r]));
     return largest;
   };
-  const double size = max_abs(program.constraints, m_), well_met = least_reduction * size + rounding_of_equations;
+  const double size = max_abs(qp.constraints, m_), well_met = least_reduction * size + rounding_of_equations;
   double remaining = unmet();
   for (int round = 0; round < equation_refinements && !(remaining <= well_met); ++round) {
     std::fill_n(rhs_.data(), n_, 0.0);
-    for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -program.constraints[r] - work_m_[r];
+    for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -qp.constraints[r] - work_m_[r];
     if (solve_system() > believable) return false;
     for (int k = 0; k < n_; ++k) d_[k] += solution_[k];
     for (int r = 0; r < m_; ++r) lambda_[r] += solution_[n_ + r];
@@ -176,27 +176,27 @@ bool SparseQp::meet_equations(const Program& program) {
 
 /// Rounds of the primal-dual active set method from `active_`. Unless it is unknown or indefinite, what was found is in
 /// `d_`, `lambda_`, `mu_`.
-SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
+SparseQp::ActiveSet SparseQp::solve_active(const Data& qp, int rounds) {
   std::fill(primal_.begin(), primal_.end(), 0.0);
   std::fill(dual_.begin(), dual_.end(), 0.0);
   int released_before = 0, peeled = 0;  // the latter: rounds in a row that only let go
   for (int round = 0; round < rounds; ++round) {
-    if (!factor_with(program)) return program.is_convex ? ActiveSet::unknown : ActiveSet::indefinite;
-    const auto value_at = [&](int k) { return active_[k] == 1 ? program.upper[k] : program.lower[k]; };
+    if (!factor_with(qp)) return qp.is_convex ? ActiveSet::unknown : ActiveSet::indefinite;
+    const auto value_at = [&](int k) { return active_[k] == 1 ? qp.upper[k] : qp.lower[k]; };
     // What the fixed steps contribute to the rows of the others.
     for (int k = 0; k < n_; ++k) d_[k] = active_[k] != 0 ? value_at(k) : 0.0;
-    multiply_hessian(program, d_.data(), mu_.data());
-    multiply_jacobian(program, d_.data(), work_m_.data());
-    for (int k = 0; k < n_; ++k) rhs_[k] = active_[k] != 0 ? d_[k] : -program.gradient[k] - mu_[k];
-    for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -program.constraints[r] - work_m_[r];
+    multiply_hessian(qp, d_.data(), mu_.data());
+    multiply_jacobian(qp, d_.data(), work_m_.data());
+    for (int k = 0; k < n_; ++k) rhs_[k] = active_[k] != 0 ? d_[k] : -qp.gradient[k] - mu_[k];
+    for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -qp.constraints[r] - work_m_[r];
     if (solve_system() > believable) return ActiveSet::unknown;
     std::copy_n(solution_.data(), n_, d_.data());
     std::copy_n(solution_.data() + n_, m_, lambda_.data());
-    if (!meet_equations(program)) return ActiveSet::unknown;
-    multiply_hessian(program, d_.data(), mu_.data());
-    for (int k = 0; k < n_; ++k) mu_[k] += program.gradient[k];
+    if (!meet_equations(qp)) return ActiveSet::unknown;
+    multiply_hessian(qp, d_.data(), mu_.data());
+    for (int k = 0; k < n_; ++k) mu_[k] += qp.gradient[k];
     const double gradient_size = 1.0 + max_abs(mu_.data(), n_);
-    add_jacobian_transposed(program, lambda_.data(), mu_.data());
+    add_jacobian_transposed(qp, lambda_.data(), mu_.data());
     const double step_size = 1.0 + max_abs(d_.data(), n_);
     bool settled = true;
     int added = 0, released = 0;
@@ -205,8 +205,8 @@ SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
       if (active_[k] == 2) continue;
       std::int8_t next = active_[k];
       if (active_[k] == 0) {
-        if (d_[k] < program.lower[k] - active_set_tolerance * step_size) next = -1;
-        if (d_[k] > program.upper[k] + active_set_tolerance * step_size) next = 1;
+        if (d_[k] < qp.lower[k] - active_set_tolerance * step_size) next = -1;
+        if (d_[k] > qp.upper[k] + active_set_tolerance * step_size) next = 1;
       } else if (mu_[k] * active_[k] < -active_set_tolerance * gradient_size) {
         next = 0;
       }
@@ -222,7 +222,7 @@ SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
     if (settled || is_peeling) {
       factor_is_final_ = settled;
       for (int k = 0; k < n_; ++k) {
-        d_[k] = std::clamp(d_[k], program.lower[k], program.upper[k]);
+        d_[k] = std::clamp(d_[k], qp.lower[k], qp.upper[k]);
         if (active_[k] != 2) mu_[k] = active_[k] * std::max(0.0, mu_[k] * active_[k]);
       }
       // A direction that nothing determines, neither cost nor equations nor bounds.
@@ -233,14 +233,14 @@ SparseQp::ActiveSet SparseQp::solve_active(const Program& program, int rounds) {
   return ActiveSet::unknown;
 }
 
-SparseQp::Outcome SparseQp::solve(const Program& program, double* step, double* multipliers, double* bound_multipliers,
+SparseQp::Outcome SparseQp::solve(const Data& qp, double* step, double* multipliers, double* bound_multipliers,
                                   Clock::time_point deadline) {
   regularisation_ = first_regularisation;
   used_interior_point_ = false;
   factor_is_final_ = false;
-  guess_active(program, bound_multipliers);
+  guess_active(qp, bound_multipliers);
   Outcome outcome = Outcome::solved;
-  switch (solve_active(program, active_set_rounds)) {
+  switch (solve_active(qp, active_set_rounds)) {
     case ActiveSet::optimal:
       break;
     case ActiveSet::feasible:
@@ -251,7 +251,7 @@ SparseQp::Outcome SparseQp::solve(const Program& program, double* step, double* 
       for (int k = 0; k < n_; ++k) bound_multipliers[k] = active_[k] == 2 ? 0.0 : active_[k];
       return Outcome::indefinite;
     case ActiveSet::unknown:
-      outcome = interior_point(program, 0.0, deadline);
+      outcome = interior_point(qp, 0.0, deadline);
       if (outcome != Outcome::solved) return outcome;
   }
   std::copy_n(d_.data(), n_, step);
@@ -260,10 +260,10 @@ SparseQp::Outcome SparseQp::solve(const Program& program, double* step, double* 
   return outcome;
 }
 
-SparseQp::Outcome SparseQp::solve_relaxed(const Program& program, double penalty, double* step, double* multipliers,
+SparseQp::Outcome SparseQp::solve_relaxed(const Data& qp, double penalty, double* step, double* multipliers,
                                           double* bound_multipliers, Clock::time_point deadline) {
   factor_is_final_ = false;
-  const Outcome outcome = interior_point(program, penalty, deadline);
+  const Outcome outcome = interior_point(qp, penalty, deadline);
   if (outcome != Outcome::solved) return outcome;
   std::copy_n(d_.data(), n_, step);
   std::copy_n(lambda_.data(), m_, multipliers);
@@ -273,22 +273,22 @@ SparseQp::Outcome SparseQp::solve_relaxed(const Program& program, double penalty
 
 /// Mehrotra's predictor-corrector. With a penalty the equations are J d + c = p - q with p, q > 0 and the cost
 /// penalty * sum(p + q); the multipliers of p and q are penalty - lambda and penalty + lambda.
-SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalty, Clock::time_point deadline) {
+SparseQp::Outcome SparseQp::interior_point(const Data& qp, double penalty, Clock::time_point deadline) {
   used_interior_point_ = true;
-  for (int k = 0; k < n_; ++k) active_[k] = program.lower[k] == program.upper[k] ? 2 : 0;
-  const double gradient_size = 1.0 + max_abs(program.gradient, n_);
-  start_interior(program, penalty, std::clamp(0.1 * gradient_size, 1e-2, 1e4));
-  const double constraint_size = 1.0 + max_abs(program.constraints, m_);
+  for (int k = 0; k < n_; ++k) active_[k] = qp.lower[k] == qp.upper[k] ? 2 : 0;
+  const double gradient_size = 1.0 + max_abs(qp.gradient, n_);
+  start_interior(qp, penalty, std::clamp(0.1 * gradient_size, 1e-2, 1e4));
+  const double constraint_size = 1.0 + max_abs(qp.constraints, m_);
   double best_residual = infinity;
   int no_progress = 0;
   for (int iteration = 0;; ++iteration) {
     if (Clock::now() > deadline) return Outcome::deadline;
-    multiply_hessian(program, d_.data(), dual_residual_.data());
-    for (int k = 0; k < n_; ++k) dual_residual_[k] += program.gradient[k];
+    multiply_hessian(qp, d_.data(), dual_residual_.data());
+    for (int k = 0; k < n_; ++k) dual_residual_[k] += qp.gradient[k];
     const double terms = std::max(gradient_size, max_abs(dual_residual_.data(), n_)) + max_abs(lambda_.data(), m_);
-    add_jacobian_transposed(program, lambda_.data(), dual_residual_.data());
-    multiply_jacobian(program, d_.data(), primal_residual_.data());
-    for (int r = 0; r < m_; ++r) primal_residual_[r] += program.constraints[r];
+    add_jacobian_transposed(qp, lambda_.data(), dual_residual_.data());
+    multiply_jacobian(qp, d_.data(), primal_residual_.data());
+    for (int r = 0; r < m_; ++r) primal_residual_[r] += qp.constraints[r];
     double mu = 0.0, dual_error = 0.0;
     std::copy(dual_residual_.begin(), dual_residual_.end(), mu_.begin());
     for (const Pair& pair : pairs_) {
@@ -343,7 +343,7 @@ SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalt
       }
     }
     // Of bounds that hold back a negative curvature, the barrier has enough of a positive one.
-    if (!factor_with(program)) return program.is_convex ? Outcome::failed : Outcome::indefinite;
+    if (!factor_with(qp)) return qp.is_convex ? Outcome::failed : Outcome::indefinite;
     double target = 0.0;
     if (!pairs_.empty()) {
       interior_direction(0.0);
@@ -368,28 +368,28 @@ SparseQp::Outcome SparseQp::interior_point(const Program& program, double penalt
       pair.correction = 0.0;
     }
   }
-  finish_interior(program, penalty > 0.0);
+  finish_interior(qp, penalty > 0.0);
   return Outcome::solved;
 }
 
-void SparseQp::start_interior(const Program& program, double penalty, double multiplier) {
+void SparseQp::start_interior(const Data& qp, double penalty, double multiplier) {
   pairs_.clear();
   for (int k = 0; k < n_; ++k) {
     if (active_[k] == 2) {
-      d_[k] = program.lower[k];
+      d_[k] = qp.lower[k];
       continue;
     }
     // A start well inside, as near to no step as that allows.
-    const double margin = std::min(0.1, 0.25 * (program.upper[k] - program.lower[k]));
-    d_[k] = std::min(std::max(0.0, program.lower[k] + margin), program.upper[k] - margin);
-    if (std::isfinite(program.lower[k])) pairs_.push_back({Pair::Kind::lower, k, d_[k] - program.lower[k], multiplier});
-    if (std::isfinite(program.upper[k])) pairs_.push_back({Pair::Kind::upper, k, program.upper[k] - d_[k], multiplier});
+    const double margin = std::min(0.1, 0.25 * (qp.upper[k] - qp.lower[k]));
+    d_[k] = std::min(std::max(0.0, qp.lower[k] + margin), qp.upper[k] - margin);
+    if (std::isfinite(qp.lower[k])) pairs_.push_back({Pair::Kind::lower, k, d_[k] - qp.lower[k], multiplier});
+    if (std::isfinite(qp.upper[k])) pairs_.push_back({Pair::Kind::upper, k, qp.upper[k] - d_[k], multiplier});
   }
   std::fill(lambda_.begin(), lambda_.end(), 0.0);
   if (penalty == 0.0) return;
-  multiply_jacobian(program, d_.data(), primal_residual_.data());
+  multiply_jacobian(qp, d_.data(), primal_residual_.data());
   for (int r = 0; r < m_; ++r) {
-    const double value = primal_residual_[r] + program.constraints[r], excess = std::max(value, 0.0) + 0.1;
+    const double value = primal_residual_[r] + qp.constraints[r], excess = std::max(value, 0.0) + 0.1;
     pairs_.push_back({Pair::Kind::excess, r, excess, penalty});
     pairs_.push_back({Pair::Kind::lack, r, excess - value, penalty});
   }
@@ -441,12 +441,12 @@ double SparseQp::interior_length(double share) const noexcept {
 }
 
 /// Turns the interior solution into one with bounds that are active or not: exactly, where solving with them settles.
-void SparseQp::finish_interior(const Program& program, bool relaxed) {
+void SparseQp::finish_interior(const Data& qp, bool relaxed) {
   if (!relaxed) {
     const auto d = d_, lambda = lambda_;
     for (const Pair& pair : pairs_)
       if (pair.z > pair.s) active_[pair.index] = pair.kind == Pair::Kind::lower ? -1 : 1;
-    const ActiveSet found = solve_active(program, polishing_rounds);
+    const ActiveSet found = solve_active(qp, polishing_rounds);
     if (found == ActiveSet::optimal || found == ActiveSet::feasible) return;
     d_ = d;
     lambda_ = lambda;
@@ -458,14 +458,14 @@ void SparseQp::finish_interior(const Program& program, bool relaxed) {
   }
   // Of what is fixed, the interior point had no multiplier: it is what stationarity lacks.
   for (int k = 0; k < n_; ++k)
-    if (program.lower[k] == program.upper[k]) mu_[k] = -dual_residual_[k];
+    if (qp.lower[k] == qp.upper[k]) mu_[k] = -dual_residual_[k];
 }
 
-bool SparseQp::correct(const Program& program, const double* constraints, double* step) {
+bool SparseQp::correct(const Data& qp, const double* constraints, double* step) {
   if (!factor_is_final_) {
     std::fill(primal_.begin(), primal_.end(), 0.0);
     std::fill(dual_.begin(), dual_.end(), 0.0);
-    if (!factor_with(program)) return false;
+    if (!factor_with(qp)) return false;
     factor_is_final_ = true;
   }
   std::fill_n(rhs_.data(), n_, 0.0);

@@ -9,7 +9,7 @@
 
 namespace rhec::sparse_sqp {
 
-/// Solves the quadratic programs of an SQP method,
+/// Solves the QPs of an SQP method,
 ///
 ///     minimise 1/2 d'H d + g'd   subject to   J d + c = 0,   lower <= d <= upper,
 ///
@@ -17,7 +17,7 @@ namespace rhec::sparse_sqp {
 ///
 /// 1. The active set that the caller guesses is tried and mended for some rounds (primal-dual active set method): near
 ///    the solution of the nonlinear program that is one factorisation. Where all that is left is to let go many bounds,
-///    one after another, a nonlinear program is better served by what there is, now, than by the best step much later.
+///    one after another, an NLP is better served by what there is, now, than by the best step much later.
 /// 2. Otherwise a primal-dual interior-point method (Mehrotra 1992) finds the active set, which is then polished to the
 ///    exact solution.
 /// 3. Where no step satisfies the equations, they are relaxed: minimise also penalty * |J d + c|_1 (Fletcher's
@@ -35,7 +35,7 @@ class SparseQp {
     failed,      ///< nothing came out that could be used
     deadline
   };
-  struct Program {
+  struct Data {
     const double *hessian, *jacobian, *gradient, *constraints, *lower, *upper;
     bool is_convex;  ///< the Hessian is known to be positive semidefinite
   };
@@ -45,15 +45,15 @@ class SparseQp {
 
   /// `step` (n), `multipliers` (m) and `bound_multipliers` (n, signs as Iterate's) are the guess for the active set and
   /// get the solution.
-  Outcome solve(const Program& program, double* step, double* multipliers, double* bound_multipliers,
+  Outcome solve(const Data& qp, double* step, double* multipliers, double* bound_multipliers,
                 Clock::time_point deadline);
   /// The same with equations relaxed from the start.
-  Outcome solve_relaxed(const Program& program, double penalty, double* step, double* multipliers,
-                        double* bound_multipliers, Clock::time_point deadline);
+  Outcome solve_relaxed(const Data& qp, double penalty, double* step, double* multipliers, double* bound_multipliers,
+                        Clock::time_point deadline);
 
-  /// A step of least length, in the metric of the last program's Hessian and on its active set, that takes J d + c to
+  /// A step of least length, in the metric of the last QP's Hessian and on its active set, that takes J d + c to
   /// zero for other constraint values: the second-order correction.
-  bool correct(const Program& program, const double* constraints, double* step);
+  bool correct(const Data& qp, const double* constraints, double* step);
 
   int factorisations() const noexcept { return factorisations_; }  ///< so far
   bool used_interior_point() const noexcept { return used_interior_point_; }
@@ -72,20 +72,20 @@ class SparseQp {
     double ds = 0.0, dz = 0.0, correction = 0.0;
     bool is_bound() const noexcept { return kind == Kind::lower || kind == Kind::upper; }
   };
-  bool factor_with(const Program& program);
+  bool factor_with(const Data& qp);
   double solve_system();
   enum class ActiveSet { optimal, feasible, unknown, indefinite };
-  bool meet_equations(const Program& program);
-  ActiveSet solve_active(const Program& program, int rounds);
-  Outcome interior_point(const Program& program, double penalty, Clock::time_point deadline);
-  void start_interior(const Program& program, double penalty, double multiplier);
+  bool meet_equations(const Data& qp);
+  ActiveSet solve_active(const Data& qp, int rounds);
+  Outcome interior_point(const Data& qp, double penalty, Clock::time_point deadline);
+  void start_interior(const Data& qp, double penalty, double multiplier);
   void interior_direction(double target);
   double interior_length(double share) const noexcept;
-  void finish_interior(const Program& program, bool relaxed);
-  void guess_active(const Program& program, const double* bound_multipliers);
-  void multiply_hessian(const Program& program, const double* x, double* y) const noexcept;
-  void multiply_jacobian(const Program& program, const double* x, double* y) const noexcept;
-  void add_jacobian_transposed(const Program& program, const double* y, double* x) const noexcept;
+  void finish_interior(const Data& qp, bool relaxed);
+  void guess_active(const Data& qp, const double* bound_multipliers);
+  void multiply_hessian(const Data& qp, const double* x, double* y) const noexcept;
+  void multiply_jacobian(const Data& qp, const double* x, double* y) const noexcept;
+  void add_jacobian_transposed(const Data& qp, const double* y, double* x) const noexcept;
 
   KktFactor factor_;
   const SparseNlp* nlp_ = nullptr;

@@ -8,7 +8,7 @@
 #include <new>
 #include <utility>
 
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/plugins/sdk.hpp"
 #include "stage_convexity.hpp"
 #include "stage_covariances.hpp"
@@ -52,11 +52,12 @@ bool is_step(SparseQp::Outcome outcome) {
 }
 
 /// Linearises a horizon piece by piece, each small enough for a processor's cache. Returns the objective.
-double linearise_stages(const Ocp& ocp, const Iterate& point, Hessian hessian, StageQp& qp, std::span<double> scratch) {
+double linearise_stages(const Ocp& ocp, const Iterate& iterate, Hessian hessian, StageQp& qp,
+                        std::span<double> scratch) {
   double objective = 0.0;
   for (int first = 0; first <= ocp.intervals(); first += stages_at_once) {
     const int last = std::min(first + stages_at_once - 1, ocp.intervals());
-    objective += ocp.linearise({first, last}, point, hessian, qp, scratch);
+    objective += ocp.linearise({first, last}, iterate, hessian, qp, scratch);
   }
   return objective;
 }
@@ -126,7 +127,7 @@ void SparseSqp::take_structure(const Ocp& ocp) {
   jacobian_.assign(nlp_.jacobian().entries(), 0.0);
 }
 
-SparseQp::Program SparseSqp::program() const noexcept {
+SparseQp::Data SparseSqp::qp_data() const noexcept {
   return {hessian_.data(), jacobian_.data(), gradient_.data(),  constraints_.data(),
           lower_.data(),   upper_.data(),    hessian_is_convex_};
 }
@@ -144,8 +145,8 @@ void SparseSqp::linearise(const Ocp& ocp, Hessian hessian) {
   }
 }
 
-double SparseSqp::merit(const Ocp& ocp, const Iterate& point) noexcept {
-  const double objective = ocp.evaluate_stages(point, defects_.data(), stage_merits_.data(), scratch_);
+double SparseSqp::merit(const Ocp& ocp, const Iterate& iterate) noexcept {
+  const double objective = ocp.evaluate_stages(iterate, defects_.data(), stage_merits_.data(), scratch_);
   nlp_.constraints(ocp, defects_.data(), trial_constraints_.data());
   for (std::size_t r = 0; r < trial_constraints_.size(); ++r)
     stage_merits_[stage_of_row_[r]] += penalty_ * std::abs(trial_constraints_[r]);
@@ -164,7 +165,7 @@ void SparseSqp::move(const Ocp& ocp) {
   nlp_.write(ocp, trial_z_.data(), trial_multipliers_.data(), trial_bound_multipliers_.data(), trial_);
 }
 
-/// Makes the program's reduced Hessian positive definite on the active set that showed that it is not; in the last
+/// Makes the QP's reduced Hessian positive definite on the active set that showed that it is not; in the last
 /// round, whatever is active.
 void SparseSqp::convexify(const Ocp& ocp, int round) {
   const bool for_all = round == convexifications;
@@ -174,13 +175,13 @@ void SparseSqp::convexify(const Ocp& ocp, int round) {
   hessian_is_convex_ = for_all;
 }
 
-/// Finds the step of the quadratic program, with relaxed equations where there is no other.
+/// Finds the step of the QP, with relaxed equations where there is no other.
 SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::time_point deadline) {
-  auto outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
+  auto outcome = qp_.solve(qp_data(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
   for (int round = 1; outcome == SparseQp::Outcome::indefinite && round <= convexifications; ++round) {
     if (Clock::now() > deadline) return SparseQp::Outcome::deadline;
     convexify(ocp, round);
-    outcome = qp_.solve(program(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
+    outcome = qp_.solve(qp_data(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
   }
   predicted_defect_ = 0.0;
   if (outcome != SparseQp::Outcome::failed) {
@@ -212,7 +213,7 @@ SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::ti
 
 /// The step with relaxed equations; `predicted_defect_` gets what it leaves of them.
 SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point deadline) {
-  const auto outcome = qp_.solve_relaxed(program(), penalty, step_.data(), step_multipliers_.data(),
+  const auto outcome = qp_.solve_relaxed(qp_data(), penalty, step_.data(), step_multipliers_.data(),
                                          step_bound_multipliers_.data(), deadline);
   if (outcome != SparseQp::Outcome::relaxed) return outcome;
   const auto& J = nlp_.jacobian();
@@ -223,7 +224,7 @@ SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point dea
   return outcome;
 }
 
-/// Searches along the step; the accepted point goes to `trial_`, its merit to `after`. False where no length will do.
+/// Searches along the step; the accepted iterate goes to `trial_`, its merit to `after`. False where no length will do.
 bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
   // A direction that nothing determines: no length of it is worth trying.
   if (!(max_abs(step_) <= longest_step * (1.0 + max_abs(z_)))) return false;
@@ -250,7 +251,7 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     if (!std::isfinite(after) || predicted_defect_ > 0.0) return false;
     double remaining = norm1(trial_constraints_);
     for (int round = 0; round < corrections; ++round) {
-      if (!qp_.correct(program(), trial_constraints_.data(), correction_.data())) break;
+      if (!qp_.correct(qp_data(), trial_constraints_.data(), correction_.data())) break;
       // What is longer than the step itself corrects nothing, as where equations and active bounds depend on each
       // other.
       if (!(max_abs(correction_) <= max_abs(step_))) break;
@@ -337,7 +338,7 @@ Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point dea
   double last_residual = std::numeric_limits<double>::infinity();
   int slow = 0;
   bool has_costates = max_abs(multipliers_) > 0.0;
-  // The first program's active set is guessed from the point's multipliers, each later one's from the program before.
+  // The first QP's active set is guessed from the iterate's multipliers, each later one's from the QP before.
   step_bound_multipliers_ = bound_multipliers_;
   for (;; ++report.iterations) {
     if (use_exact && !has_costates) {
@@ -406,7 +407,7 @@ Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
     for (std::size_t k = 0; k < z_.size(); ++k) bounds_cross = bounds_cross || lower_z_[k] > upper_z_[k];
     if (bounds_cross) {
       report.status = Status::infeasible;
-      judge(ocp, iterate, stages_, scratch_, report);
+      assess(ocp, iterate, stages_, scratch_, report);
       return report;
     }
     nlp_.read(ocp, iterate, z_.data(), multipliers_.data(), bound_multipliers_.data());
@@ -419,7 +420,7 @@ Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
   }
   report.factorisations = qp_.factorisations() - factorisations_before;
   if (report.status != Status::infeasible && is_sound_start(ocp, current_, scratch_)) std::swap(iterate, current_);
-  judge(ocp, iterate, stages_, scratch_, report);
+  assess(ocp, iterate, stages_, scratch_, report);
   return report;
 }
 

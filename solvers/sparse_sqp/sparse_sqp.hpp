@@ -25,11 +25,11 @@ struct SparseSqpOptions {
 /// Sequential quadratic programming on the sparse view of an Ocp, for horizons of thousands of intervals and for
 /// vehicles with many states: every step costs a number of operations that is linear in the horizon.
 ///
-/// Bounds hold at every iterate. Steps are those of a sparse quadratic program (SparseQp), judged by the l1 merit
+/// Bounds hold at every iterate. Steps are those of a sparse QP (SparseQp), accepted by the l1 merit
 /// f + penalty * |c|_1: taken with lengths that are shorter around stages where the merit would rise, with second-order
 /// corrections of what equations bend. Curvature that is not convex enough is given up at the stages that it fails at
 /// (convexify_by_stages). Where linearised equations contradict the bounds, they are relaxed (Fletcher's Sl1QP), and a
-/// point at which nothing reduces |c|_1 is reported as infeasible.
+/// iterate at which nothing reduces |c|_1 is reported as infeasible.
 class SparseSqp final : public Solver {
  public:
   using Options = SparseSqpOptions;
@@ -47,7 +47,7 @@ class SparseSqp final : public Solver {
   void take_structure(const Ocp& ocp);
   void linearise(const Ocp& ocp, Hessian hessian);
   void convexify(const Ocp& ocp, int round);
-  double merit(const Ocp& ocp, const Iterate& point) noexcept;
+  double merit(const Ocp& ocp, const Iterate& iterate) noexcept;
   void move(const Ocp& ocp);
   bool shorten_locally();
   bool search(const Ocp& ocp, double residual, double& after);
@@ -55,7 +55,7 @@ class SparseSqp final : public Solver {
   Status converge(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome find_step(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);
-  SparseQp::Program program() const noexcept;
+  SparseQp::Data qp_data() const noexcept;
 
   Options options_;
   const Ocp* ocp_ = nullptr;
@@ -66,14 +66,14 @@ class SparseSqp final : public Solver {
   std::vector<double> scratch_, defects_;
   std::vector<double> hessian_, jacobian_, gradient_, constraints_, lower_, upper_;
   std::vector<double> z_, multipliers_, bound_multipliers_;               ///< of `current_`
-  std::vector<double> step_, step_multipliers_, step_bound_multipliers_;  ///< what the quadratic program said
+  std::vector<double> step_, step_multipliers_, step_bound_multipliers_;  ///< what the QP said
   std::vector<double> correction_, trial_z_, trial_multipliers_, trial_bound_multipliers_, trial_constraints_;
   std::vector<double> lower_z_, upper_z_;
   std::vector<double> relaxed_step_, relaxed_multipliers_, relaxed_bound_multipliers_;
   double objective_ = 0.0;  ///< at `current_`
   bool hessian_is_convex_ = false;
   std::vector<int> stage_of_variable_, stage_of_row_;  ///< a defect belongs to the stage that its interval starts at
-  std::vector<double> stage_merits_, merits_before_;   ///< of the point looked at last, and of `current_`
+  std::vector<double> stage_merits_, merits_before_;   ///< of the iterate looked at last, and of `current_`
   std::vector<double> merit_sums_;                     ///< of their differences, over the first stages
   std::vector<double> lengths_;                        ///< of the step, by stage
   double penalty_ = 0.0;

@@ -12,7 +12,7 @@
 namespace rhec::sparse_sqp {
 namespace {
 
-// This part of the terms that a pivot is made of counts as zero, which a pivot may be in a Gauss-Newton program.
+// This part of the terms that a pivot is made of counts as zero, which a pivot may be in a Gauss-Newton QP.
 constexpr double rounding = 1e-13;
 // Where stages have been recursed over this often on average, all of them take Gauss-Newton's.
 constexpr int most_work = 8;

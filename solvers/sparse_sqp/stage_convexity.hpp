@@ -8,7 +8,7 @@
 namespace rhec::sparse_sqp {
 
 /// Makes the reduced Hessian of `qp` positive definite by taking over the cost matrices of `gauss_newton`, the same
-/// program with another curvature, at those stages where it is needed; elsewhere the curvature stays exact. `fixed`
+/// QP with another curvature, at those stages where it is needed; elsewhere the curvature stays exact. `fixed`
 /// flags the variables, in the order of SparseNlp, that do not move; empty: all do. Returns the number of stages taken
 /// over.
 ///

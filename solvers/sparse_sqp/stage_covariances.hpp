@@ -6,7 +6,7 @@
 
 namespace rhec::sparse_sqp {
 
-/// Marginal covariances of all stage states when a program's objective is twice a negative log-likelihood's quadratic
+/// Marginal covariances of all stage states when a QP's objective is twice a negative log-likelihood's quadratic
 /// and its bounds are ignored: column-major blocks of the capacity's n_s x n_s, one a node; zeros where a state is
 /// given. False, with nothing written, where the Hessian has no inverse.
 ///

@@ -24,7 +24,7 @@ async function open(options, what) {
     findings.push(`${what}: asks the network for ${route.request().url()}`);
     return route.abort();
   });
-  context.setDefaultTimeout(180000);  // a busy machine is no fault of the page; scripts/measure-report takes its time
+  context.setDefaultTimeout(180000);  // a busy machine is no fault of the page; scripts/measure/report-page takes its time
   const view = await context.newPage();
   view.on("console", (message) => ["error", "warning"].includes(message.type()) && findings.push(`${what}: console: ${message.text()}`));
   view.on("pageerror", (error) => findings.push(`${what}: ${error.message}`));

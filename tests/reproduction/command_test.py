@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""scripts/reproduce --quick from end to end, scripts/judge-claims on what is no whole study, and their messages.
+"""scripts/study/reproduce --quick from end to end, scripts/study/assess-claims on what is no whole study, and their messages.
 
     command_test.py <rhec>
 """
@@ -15,14 +15,14 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-sys.path[:0] = [str(ROOT / "tests" / "cli"), str(HERE), str(ROOT / "scripts" / "reproduction")]
+sys.path[:0] = [str(ROOT / "tests" / "cli"), str(HERE), str(ROOT / "scripts" / "study" / "reproduction")]
 
 import claims     # noqa: E402
 import cli        # noqa: E402
 import synthetic  # noqa: E402
 import tables     # noqa: E402
 
-REPRODUCE, JUDGE, PAGE = ROOT / "scripts" / "reproduce", ROOT / "scripts" / "judge-claims", ROOT / "docs" / "reproduction.md"
+REPRODUCE, ASSESS, PAGE = ROOT / "scripts" / "study" / "reproduce", ROOT / "scripts" / "study" / "assess-claims", ROOT / "docs" / "reproduction.md"
 
 
 def call(*words):
@@ -38,7 +38,7 @@ class Test(cli.Findings):
     def refused(self, name, code, expected, *words):
         """The exit code, all of the message's parts, no page, and no traceback."""
         page = self.work / "refused.md"
-        result = call(JUDGE, *words, "--page", page) if words[0] != REPRODUCE else call(*words)
+        result = call(ASSESS, *words, "--page", page) if words[0] != REPRODUCE else call(*words)
         message = result.stderr.strip()
         self.expect(result.returncode == code, name, f"{result.returncode}: {message}")
         for part in expected:
@@ -66,7 +66,7 @@ class Test(cli.Findings):
         again = call(REPRODUCE, "--quick", "--program", self.rhec, "--out", out)
         self.expect(again.returncode == 0 and ": 0 runs made" in again.stdout, "again", again.stdout + again.stderr)
         self.expect((out / "reproduction.md").read_text() == page, "again", "another page came out")
-        shuffled = call(JUDGE, out / "paper.sqlite", "--partial", "--shuffle", 1)
+        shuffled = call(ASSESS, out / "paper.sqlite", "--partial", "--shuffle", 1)
         self.expect(shuffled.returncode == 0 and "held " not in shuffled.stdout, "--shuffle", shuffled.stdout + shuffled.stderr)
         self.expect(PAGE.read_bytes() == self.committed, "quick", "docs/reproduction.md was changed")
         self.database = out / "paper.sqlite"
@@ -94,7 +94,7 @@ class Test(cli.Findings):
                         f"{found} in the database, {mine} in verdicts.json")
 
     def bad_databases(self):
-        self.refused("none", 1, ["none.sqlite: no such database", "scripts/reproduce"], self.work / "none.sqlite")
+        self.refused("none", 1, ["none.sqlite: no such database", "scripts/study/reproduce"], self.work / "none.sqlite")
         text = self.work / "text.sqlite"
         text.write_text("no database " * 1000)
         self.refused("text", 1, ["text.sqlite: cannot be read as a database", "make it anew"], text)
@@ -107,10 +107,10 @@ class Test(cli.Findings):
         with sqlite3.connect(empty) as database:
             database.executescript(synthetic.SCHEMA)
         database.close()
-        self.refused("empty", 1, ["empty.sqlite: has no runs", "scripts/reproduce"], empty)
+        self.refused("empty", 1, ["empty.sqlite: has no runs", "scripts/study/reproduce"], empty)
         whole = self.work / "whole.sqlite"
         synthetic.write(whole, synthetic.as_claimed, seeds=4)
-        good = call(JUDGE, whole, "--partial")
+        good = call(ASSESS, whole, "--partial")
         self.expect(good.returncode == 0, "whole", good.stderr)
 
         def changed(name, *statements):
@@ -128,7 +128,7 @@ class Test(cli.Findings):
             self.refused(f"cut at {length}", 1, ["cut.sqlite: cannot be read as a database"], cut, "--partial")
         self.refused("failed", 1, ["seed 3", "failed: it broke", "delete such rows"],
                      changed("failed", "UPDATE runs SET status = 'failed', reason = 'it broke', mae = NULL WHERE seed = 3"), "--partial")
-        self.refused("a seed", 1, ["base at 8 m/s", "SB-O on kappa (2, 4) has no runs of seeds zigzag: 2", "scripts/reproduce"],
+        self.refused("a seed", 1, ["base at 8 m/s", "SB-O on kappa (2, 4) has no runs of seeds zigzag: 2", "scripts/study/reproduce"],
                      changed("seed", "DELETE FROM runs WHERE seed = 2 AND configuration ->> '$.path.name' = 'zigzag' AND configuration ->> "
                              "'$.blocking.kappa.size' = 2 AND configuration ->> '$.blocking.kappa.overlap' = 4 AND configuration ->> "
                              "'$.blocking.mu.name' = 'full_horizon'"), "--partial")
@@ -168,7 +168,7 @@ class Test(cli.Findings):
                     database.execute("UPDATE runs SET " + ", ".join(f"{name} = ?" for name in columns.split(", ")) + " WHERE identity = ?",
                                      (*results, identity))
         database.close()
-        result = call(JUDGE, file, "--partial", "--page", page)
+        result = call(ASSESS, file, "--partial", "--page", page)
         self.expect(result.returncode == 0, "dealt", result.stderr)
         self.expect(page.read_text().count("**did not hold**") == len(claims.CLAIMS) and page.read_text().count("**held**") == 0, "dealt", result.stdout)
 
@@ -176,7 +176,7 @@ class Test(cli.Findings):
         for words in ([REPRODUCE, "--quick", "--page", PAGE], [REPRODUCE, "--threads", "0"], [REPRODUCE, "--quik"]):
             result = call(*words)
             self.expect(result.returncode == 2 and "Traceback" not in result.stderr, f"{words}", f"{result.returncode}: {result.stderr}")
-        result = call(JUDGE, self.work / "whole.sqlite", "--partial", "--page", PAGE)
+        result = call(ASSESS, self.work / "whole.sqlite", "--partial", "--page", PAGE)
         self.expect(result.returncode == 2 and "is for the whole study" in result.stderr, "committed page", result.stderr)
         result = call(REPRODUCE, "--quick", "--program", self.work / "none", "--out", self.work / "out")
         self.expect(result.returncode == 1 and "there is no program" in result.stderr, "no program", result.stderr)

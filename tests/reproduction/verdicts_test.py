@@ -9,7 +9,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-sys.path.insert(0, str(ROOT / "scripts" / "reproduction"))
+sys.path.insert(0, str(ROOT / "scripts" / "study" / "reproduction"))
 
 import claims    # noqa: E402
 import database  # noqa: E402
@@ -27,30 +27,30 @@ class Databases(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.file = pathlib.Path(folder.name) / "runs.sqlite"
 
-    def judged(self, figures, shuffle=(), **options):
+    def assessed(self, figures, shuffle=(), **options):
         synthetic.write(self.file, figures, **options)
         study = database.Study.read(self.file)
         if shuffle:
-            return [{each.claim.key: each.verdict for each in page.judge_all(study.shuffled(seed))} for seed in shuffle]
-        return {each.claim.key: each for each in page.judge_all(study)}
+            return [{each.claim.key: each.verdict for each in page.assess_all(study.shuffled(seed))} for seed in shuffle]
+        return {each.claim.key: each for each in page.assess_all(study)}
 
     def test_claims_that_are_so(self):
-        judged = self.judged(synthetic.as_claimed, conditions=CONDITIONS, spread=0.01)
-        for key, each in judged.items():
+        assessed = self.assessed(synthetic.as_claimed, conditions=CONDITIONS, spread=0.01)
+        for key, each in assessed.items():
             self.assertEqual(each.verdict, HELD, f"{key}: {[(c.speed, c.p()) for c in each.conditions]}")
             self.assertEqual(len(each.conditions), 5, key)
 
     def test_claims_that_are_the_other_way_round(self):
-        for key, each in self.judged(synthetic.contrary, conditions=CONDITIONS).items():
+        for key, each in self.assessed(synthetic.contrary, conditions=CONDITIONS).items():
             self.assertEqual(each.verdict, FAILED, f"{key}: {[(c.speed, c.p()) for c in each.conditions]}")
 
     def test_methods_that_are_alike(self):
-        for key, each in self.judged(synthetic.alike, conditions=CONDITIONS).items():
+        for key, each in self.assessed(synthetic.alike, conditions=CONDITIONS).items():
             self.assertEqual(each.verdict, FAILED, f"{key}: {[(c.speed, c.p()) for c in each.conditions]}")
 
     def test_shuffled_methods(self):
         """Of effects that all claims hold for without."""
-        for seed, found in enumerate(self.judged(synthetic.as_claimed, conditions=CONDITIONS, shuffle=range(1, 21)), 1):
+        for seed, found in enumerate(self.assessed(synthetic.as_claimed, conditions=CONDITIONS, shuffle=range(1, 21)), 1):
             self.assertEqual({key: verdict for key, verdict in found.items() if verdict != FAILED}, {}, f"shuffled by {seed}")
 
     def test_shuffling_permutes(self):
@@ -70,14 +70,14 @@ class Databases(unittest.TestCase):
             self.assertGreater(moved, 500)
 
     def test_effects_are_those_that_were_put_in(self):
-        judged = self.judged(synthetic.as_claimed, spread=0.02)
+        assessed = self.assessed(synthetic.as_claimed, spread=0.02)
         for key, part, expected in (("5b", 0, 1 / 1.3), ("6", 0, 0.8), ("7", 0, 1.04), ("6b", 0, 0.4), ("9", 0, 0.03 / 0.08),
                                     ("1", 0, 1500.0), ("4", 0, 1 / 1.5), ("5a", 0, 1.3)):
-            effect, low, high = judged[key].conditions[0].parts[part].estimate()
+            effect, low, high = assessed[key].conditions[0].parts[part].estimate()
             self.assertLess(abs(math.log(effect / expected)), 0.03, key)
             self.assertTrue(low < effect < high and math.log(high / low) < 0.1, f"{key}: {low} to {high}")
-        self.assertEqual(judged["2"].conditions[0].parts[0].estimate(), (1.0, 1.0, 1.0))
-        self.assertEqual(judged["2"].conditions[0].runs, 2 * 20 * 25)
+        self.assertEqual(assessed["2"].conditions[0].parts[0].estimate(), (1.0, 1.0, 1.0))
+        self.assertEqual(assessed["2"].conditions[0].runs, 2 * 20 * 25)
 
     def test_holds_when(self):
         """kappa is better only where v N_e dt / L is 2 or more; the words say so."""
@@ -87,7 +87,7 @@ class Databases(unittest.TestCase):
             return known(quantity, method, path, changes, speed)
         lengths = [({}, speed) for speed in (1, 2, 5, 8)]
         lengths += [({"terrain.correlation_length": length}, speed) for length in (5, 40) for speed in (2, 8)]
-        each = self.judged(figures, conditions=lengths)["2"]
+        each = self.assessed(figures, conditions=lengths)["2"]
         self.assertEqual(each.verdict, PARTLY)
         words = verdicts.describe(each.conditions, database.BASE, database.setting_name, database.rate)
         self.assertIn("base: at 5, 8 m/s of 1, 2, 5, 8", words)
@@ -99,11 +99,11 @@ class Databases(unittest.TestCase):
 
         def figures(quantity, method, path, changes, speed):
             return synthetic.as_claimed(quantity, method, path, changes, speed) * (4.0 if method in more and quantity == "kappa" else 1.0)
-        lattice = self.judged(synthetic.as_claimed, conditions=CONDITIONS[:2])
+        lattice = self.assessed(synthetic.as_claimed, conditions=CONDITIONS[:2])
         self.file.unlink()
         synthetic.write(self.file, figures, conditions=CONDITIONS[:2])
         synthetic.add(self.file, figures, conditions=CONDITIONS[1:2], methods=more)
-        found = {each.claim.key: each for each in page.judge_all(database.Study.read(self.file))}
+        found = {each.claim.key: each for each in page.assess_all(database.Study.read(self.file))}
         self.assertEqual([(each.speed, each.points, each.is_map, each.confirmed) for each in found["2"].conditions],
                          [(None, 24, False, True), (2, 24, False, True), (8, 24, False, True), (8, 56, True, False)])
         self.assertEqual(found["2"].conditions[3].parts[0].estimate()[0], 24 / 56)
@@ -112,7 +112,7 @@ class Databases(unittest.TestCase):
         self.assertEqual(len(lattice["2"].conditions), 3)
 
     def test_few_seeds_confirm_nothing(self):
-        for key, each in self.judged(synthetic.as_claimed, seeds=4).items():
+        for key, each in self.assessed(synthetic.as_claimed, seeds=4).items():
             self.assertEqual(each.verdict, FAILED, key)
 
     def test_methods_without_blocks_take_part_in_settings_of_blocks(self):
@@ -133,14 +133,14 @@ class Databases(unittest.TestCase):
             open_file.execute("UPDATE runs SET status = 'not completed' WHERE configuration ->> '$.blocking.kappa.size' = 1 AND "
                               "configuration ->> '$.blocking.kappa.overlap' = 0")
         open_file.close()
-        found = {each.claim.key: each for each in page.judge_all(database.Study.read(self.file))}
+        found = {each.claim.key: each for each in page.assess_all(database.Study.read(self.file))}
         self.assertEqual(found["2"].verdict, HELD)
         self.assertEqual(found["2"].conditions[0].parts[0].estimate()[0], 23 / 24)
         self.assertEqual(found["2"].conditions[0].lost, 40)
         with sqlite3.connect(self.file) as open_file:
             open_file.execute("UPDATE runs SET status = 'not completed' WHERE configuration ->> '$.blocking.kappa.size' = 2")
         open_file.close()
-        found = {each.claim.key: each for each in page.judge_all(database.Study.read(self.file))}
+        found = {each.claim.key: each for each in page.assess_all(database.Study.read(self.file))}
         self.assertEqual(found["2"].verdict, FAILED)
 
 
@@ -149,9 +149,9 @@ class Rules(unittest.TestCase):
         chance = random.Random(5)
         good, bad = [chance.gauss(1.0, 0.1) for _ in range(20)], [chance.gauss(0.0, 0.1) for _ in range(20)]
         condition = Condition(database.BASE, 8, [Part("a", good, 1, 0.0), Part("b", bad, 1, 0.0)], 40)
-        self.assertEqual(verdicts.judge([condition], 0.01), FAILED)
+        self.assertEqual(verdicts.assess([condition], 0.01), FAILED)
         condition = Condition(database.BASE, 8, [Part("a", good, 1, 0.0), Part("b", bad, -1, 0.5)], 40)
-        self.assertEqual(verdicts.judge([condition], 0.01), HELD)
+        self.assertEqual(verdicts.assess([condition], 0.01), HELD)
 
     def test_levels(self):
         """The first by itself, the others by Holm's procedure: a p-value of 1/128 passes a level of 0.01, but not half of it."""
@@ -159,13 +159,13 @@ class Rules(unittest.TestCase):
         condition = lambda: Condition(database.BASE, 8, [Part("a", values, 1, 0.0)], 14)
         self.assertEqual(condition().p(), 0.5 ** 7)  # 0.0078
         three = [condition(), condition(), condition()]
-        self.assertEqual(verdicts.judge(three, 0.01), PARTLY)
+        self.assertEqual(verdicts.assess(three, 0.01), PARTLY)
         self.assertEqual([each.confirmed for each in three], [True, False, False])
-        self.assertEqual(verdicts.judge(three, 0.016), HELD)
-        self.assertEqual(verdicts.judge(three, 0.007), FAILED)
+        self.assertEqual(verdicts.assess(three, 0.016), HELD)
+        self.assertEqual(verdicts.assess(three, 0.007), FAILED)
 
     def test_no_conditions(self):
-        self.assertEqual(verdicts.judge([], 0.01), FAILED)
+        self.assertEqual(verdicts.assess([], 0.01), FAILED)
 
     def test_equal_values_prove_no_more_than_their_number(self):
         self.assertEqual(Part("a", [1.0] * 5, 1, 0.0).p(), 0.5 ** 5)

@@ -10,7 +10,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/control/controller.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
 #include "rhec/plugins/robot.hpp"
 #include "rhec/plugins/yaml.hpp"

@@ -12,7 +12,7 @@ namespace {
 using testing::DenseQp;
 using testing::RandomQp;
 
-/// What the recursion keeps of a program.
+/// What the recursion keeps of a QP.
 struct Recursion {
   AlignedDoubles P, U, V, closed, T, inverse, drift, g, p;
   std::vector<std::uint8_t> fixes, special;
@@ -140,10 +140,10 @@ TEST(RiccatiKernels, OfResponsesAreWhatAStepDiffersBy) {
       has_gradient[stage] = 1;
       for (int i = 0; i <= N; ++i)
         for (int k = 0; i != stage && k < states + qp.controls(i); ++k) at(i, k, number) = 3.0;
-      set.riccati->respond_backward(before.view, stage, has_gradient.data(), values.data());
+      set.riccati->sensitivities_backward(before.view, stage, has_gradient.data(), values.data());
       for (int j = 0; j < states; ++j)
         for (int other = 0; other < response_batch; ++other) at(0, j, other) = 0.0;
-      set.riccati->respond_forward(before.view, stage, values.data(), costates.data());
+      set.riccati->sensitivities_forward(before.view, stage, values.data(), costates.data());
 
       StageQp moved = qp;
       moved.h(stage)[place] += 1.0;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "rhec/core/ocp/linearisation.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "support/cart.hpp"
 #include "support/test_models.hpp"
 

@@ -46,7 +46,7 @@ TEST(Judgement, IsTheSameThroughAWindowOfTheHorizon) {
     std::vector<double> scratch(ocp->scratch_size());
     StageQp whole(ocp->capacity());
     Report expected;
-    judge(*ocp, point, whole, scratch, expected);
+    assess(*ocp, point, whole, scratch, expected);
     EXPECT_DOUBLE_EQ(expected.objective, ocp->evaluate(point, nullptr, scratch));
     EXPECT_GT(expected.kkt.stationarity, 0.01);
     EXPECT_GT(expected.kkt.defect, 0.01);
@@ -56,7 +56,7 @@ TEST(Judgement, IsTheSameThroughAWindowOfTheHorizon) {
     for (const int stages : {2, 3, 7}) {
       StageQp window(ocp->capacity(), stages);
       Report report;
-      judge(*ocp, point, window, scratch, report);
+      assess(*ocp, point, window, scratch, report);
       EXPECT_NEAR(report.objective, expected.objective, 1e-12 * expected.objective) << stages;
       EXPECT_NEAR(report.kkt.stationarity, expected.kkt.stationarity, 1e-13) << stages;
       EXPECT_NEAR(report.kkt.defect, expected.kkt.defect, 1e-13) << stages;

@@ -282,7 +282,7 @@ TEST(SparseNlp, PiecesOfALinearisationAreThoseOfTheWhole) {
       EXPECT_EQ(pieces.jacobian, jacobian) << size;
       EXPECT_EQ(pieces.hessian, hessian) << size;
       Report report;
-      judge(*problem, point, window, view.scratch, report);
+      assess(*problem, point, window, view.scratch, report);
       EXPECT_NEAR(report.objective, objective, 1e-12 * std::abs(objective)) << size;
       expect_same(report.kkt, kkt);
     }
@@ -315,8 +315,8 @@ TEST(SparseNlp, AWindowHasNothingLeftOfWhatItHeldBefore) {
       EXPECT_EQ(again.hessian, once.hessian) << size;
       std::vector<double> scratch(problem->scratch_size());
       Report of_window, of_unused;
-      judge(*problem, point, window, scratch, of_window);
-      judge(*problem, point, unused, scratch, of_unused);
+      assess(*problem, point, window, scratch, of_window);
+      assess(*problem, point, unused, scratch, of_unused);
       EXPECT_EQ(of_window.objective, of_unused.objective) << size;
       EXPECT_EQ(of_window.kkt.largest(), of_unused.kkt.largest()) << size;
       // All of the first stages' rows, used or not.

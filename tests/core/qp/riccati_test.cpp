@@ -71,18 +71,18 @@ TEST(Riccati, RespondsToAGradientAsTheSolutionChangesWithIt) {
     Iterate before(qp.capacity()), after(qp.capacity());
     ASSERT_EQ(riccati.solve(qp, active, before), Riccati::Outcome::done);
     std::vector<Riccati::Entry> gradients;
-    for (int c = random.integer(1, Riccati::Responses::size); c > 0; --c)
+    for (int c = random.integer(1, Riccati::Sensitivities::size); c > 0; --c)
       gradients.push_back(places[random.integer(0, static_cast<int>(places.size()) - 1)]);
     const int count = static_cast<int>(gradients.size());
-    Riccati::Responses responses(qp.capacity());
-    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), count, responses));
+    Riccati::Sensitivities sensitivities(qp.capacity());
+    ASSERT_TRUE(riccati.find_sensitivities(qp, active, gradients.data(), count, sensitivities));
     for (int c = 0; c < count; ++c) {
       StageQp changed = qp;
       changed.h(gradients[c].stage)[gradients[c].place] += 1.0;
       ASSERT_EQ(riccati.solve(changed, active, after), Riccati::Outcome::done);
       for (int i = 0; i <= N; ++i) {
         const auto expect_response = [&](int place, double difference) {
-          ASSERT_NEAR(responses.values[(i * stride + place) * Riccati::Responses::size + c], difference, 1e-9)
+          ASSERT_NEAR(sensitivities.values[(i * stride + place) * Riccati::Sensitivities::size + c], difference, 1e-9)
               << "trial " << trial << ", stage " << i << ", place " << place;
         };
         for (int j = 0; j < qp.states(i); ++j) expect_response(j, after.state(i)[j] - before.state(i)[j]);
@@ -108,23 +108,23 @@ TEST(Riccati, CombinesResponsesToTheSolutionWithTheirGradients) {
     }
     Riccati riccati(qp.capacity());
     riccati.factor(qp, active);
-    Riccati::Responses responses(qp.capacity());
-    alignas(64) double weights[Riccati::Responses::size] = {};
+    Riccati::Sensitivities sensitivities(qp.capacity());
+    alignas(64) double weights[Riccati::Sensitivities::size] = {};
     StageQp changed = qp;
     std::vector<Riccati::Entry> gradients;
-    for (int c = 0; c < trial % (Riccati::Responses::size + 1); ++c) {
+    for (int c = 0; c < trial % (Riccati::Sensitivities::size + 1); ++c) {
       const int stage = random.integer(0, qp.intervals());
       gradients.push_back({stage, random.integer(0, qp.states(stage) - 1)});
       weights[c] = random.uniform(-2.0, 2.0);
       changed.h(stage)[gradients[c].place] += weights[c];
     }
-    ASSERT_TRUE(riccati.respond(qp, active, gradients.data(), static_cast<int>(gradients.size()), responses));
+    ASSERT_TRUE(riccati.find_sensitivities(qp, active, gradients.data(), static_cast<int>(gradients.size()), sensitivities));
     Iterate expected(qp.capacity()), step(qp.capacity());
     ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
     std::vector<double> values(step.row(0),
                                step.row(0) + static_cast<std::ptrdiff_t>(qp.intervals() + 1) * qp.stride());
-    riccati.add_values(responses, weights, static_cast<int>(values.size()), values.data());
-    riccati.combine(qp, active, responses, weights, step);
+    riccati.add_values(sensitivities, weights, static_cast<int>(values.size()), values.data());
+    riccati.combine(qp, active, sensitivities, weights, step);
     ASSERT_EQ(riccati.solve(changed, active, expected), Riccati::Outcome::done);
     for (int i = 0; i <= qp.intervals(); ++i) {
       for (int j = 0; j < qp.states(i); ++j) {

@@ -56,9 +56,9 @@ TEST(SpecialStages, HasNoResponsesWhereStateBoundsHold) {
   active.state(2)[1] = 1;
   Riccati riccati(qp.capacity());
   riccati.factor(qp, active);
-  Riccati::Responses responses(qp.capacity());
+  Riccati::Sensitivities sensitivities(qp.capacity());
   const Riccati::Entry gradient{1, 0};
-  EXPECT_FALSE(riccati.respond(qp, active, &gradient, 1, responses));
+  EXPECT_FALSE(riccati.find_sensitivities(qp, active, &gradient, 1, sensitivities));
 }
 
 TEST(SpecialStages, RefusesActiveBoundsThatContradictEachOther) {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <random>
 
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 
 namespace rhec::conformance {
 namespace {

@@ -91,7 +91,7 @@ struct Program {
                                                           Eigen::MatrixXd::Identity(Z.rows(), Z.cols());
     return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Q.transpose() * H * Q).eigenvalues()[0];
   }
-  SparseQp::Program view(bool is_convex) const {
+  SparseQp::Data view(bool is_convex) const {
     return {hessian.data(), jacobian.data(), gradient.data(), constraints.data(),
             lower.data(),   upper.data(),    is_convex};
   }

@@ -13,7 +13,7 @@
 
 #include <Eigen/Dense>
 
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/host.hpp"
 #include "rhec/plugins/yaml.hpp"

@@ -18,7 +18,7 @@ enum class ReferenceSpeed {
   literal  ///< the path's speed is the wheels' (the paper's; under slip the vehicle lags and cuts corners)
 };
 
-/// Drives along a path: estimate in, input out (METHOD, receding horizon control with a space-based reference).
+/// Drives along a path: estimate in, input out (docs/method.md, section 3).
 ///
 /// At each call the closest point of the path is searched for ahead of the last one; the local reference is that point
 /// and the next N_c, each dt * u1ref metres further on. Where the solver fails, and fails again from a simulation, the

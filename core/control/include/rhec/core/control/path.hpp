@@ -63,7 +63,7 @@ class RHEC_EXPORT Path {
 };
 
 /// Goes along a path with a vehicle: each time the closest point is searched for only near the last one, so that a path
-/// that crosses or nears itself is never cut short (METHOD: space-based reference).
+/// that crosses or nears itself is never cut short (docs/method.md, section 3).
 class RHEC_EXPORT PathFollower {
  public:
   struct Window {

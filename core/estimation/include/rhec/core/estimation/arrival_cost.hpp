@@ -9,7 +9,7 @@
 
 namespace rhec {
 
-/// How what has left the window is remembered (METHOD, arrival cost). The prior of the window's first node is the
+/// How what has left the window is remembered (docs/method.md, section 5). The prior of the window's first node is the
 /// predicted one, before that node's measurement, so that no measurement counts twice.
 enum class ArrivalKind {
   ekf,  ///< filtering update: an extended Kalman filter runs along at the window's edge, linearised at its own mean

@@ -12,8 +12,9 @@
 
 namespace rhec {
 
-/// Receding horizon estimation with structured blocking (METHOD): a window of at most `problem.max_intervals` intervals
-/// that grows from the start of the run and then slides, with an arrival cost before it.
+/// Receding horizon estimation with structured blocking (docs/method.md, sections 2, 4 and 5): a window of at most
+/// `problem.max_intervals` intervals that grows from the start of the run and then slides, with an arrival cost before
+/// it.
 ///
 /// Blocks that no random walk links (`Blocking::neighbour_sigma` off) still get a wide prior, `block_sigma`, about the
 /// block before: what the data determine is theirs, and a block that they say little about keeps near its neighbour's
@@ -59,7 +60,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   void take_inputs(int interval, const double* inputs) noexcept;
   void start_cold() noexcept;
   void recover() noexcept;
-  double objective_from_start(const Iterate& point) noexcept;
+  double objective_from_start(const Iterate& iterate) noexcept;
   void reconsider(Report& report, Clock::time_point deadline) noexcept;
   void write_covariance(int node, Estimate& result) noexcept;
 

@@ -22,8 +22,8 @@ enum class Transition {
   ramp   ///< it runs linearly to its new value over the interval that starts the block
 };
 
-/// Says, for one parameter or input and one window, which consecutive intervals share one value (METHOD: structured
-/// blocking with overlap, Wallace et al.). Const, thread-safe, allocation-free.
+/// Says, for one parameter or input and one window, which consecutive intervals share one value (docs/method.md,
+/// section 4; Wallace et al.). Const, thread-safe, allocation-free.
 class RHEC_EXPORT Blocking {
  public:
   virtual ~Blocking() = default;

@@ -38,6 +38,8 @@ class RHEC_EXPORT HorizonStructure {
   void set_intervals(int intervals) noexcept;
   void set_block_start(int interval, int lifted, bool starts) noexcept;
   void set_ramp(int lifted, bool is_ramp) noexcept;
+  /// Whether nothing has changed since `finish`; what is counted may be asked for then only.
+  bool is_finished() const noexcept { return is_finished_; }
   /// Counts the controls of every interval. False where nothing has changed since the last call.
   bool finish() noexcept;
 

@@ -11,7 +11,8 @@ namespace rhec {
 
 struct CostView;
 
-/// Receding horizon control over N intervals (METHOD; Wallace et al., eq. 4), x_0 and the parameters p given:
+/// Receding horizon control over N intervals (docs/method.md, section 3; Wallace et al., eq. 4), x_0 and the parameters
+/// p given:
 ///
 ///     minimise  sum_{i=0}^{N-1} || x_i - xref_i ||^2_Vx + || u_i - uref_i ||^2_Vu  +  || x_N - xref_N ||^2_VN
 ///     subject to the dynamics, bounds on the states of nodes 1 .. N and on the inputs.

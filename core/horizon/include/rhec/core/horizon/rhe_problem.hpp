@@ -23,7 +23,7 @@ struct RobustLoss {
   double delta = 3.0;        ///< in standard deviations: where the loss turns from quadratic to linear
 };
 
-/// Receding horizon estimation over N intervals (METHOD; Wallace et al., eq. 2):
+/// Receding horizon estimation over N intervals (docs/method.md, section 2; Wallace et al., eq. 2):
 ///
 ///     minimise  || [chi_0; rho_first] - [xbar; pbar] ||^2_P            arrival cost
 ///             + sum over nodes      || h(chi_i) - y_i ||^2_Ry          what is missing (NaN) is left out
@@ -77,7 +77,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   /// they are until they are overwritten.
   void drop_first_interval() noexcept;
 
-  /// Weight in (0, 1] that the robust loss gives an output at a point: derivative of the loss by s.
+  /// Weight in (0, 1] that the robust loss gives an output at an iterate: derivative of the loss by s.
   void robust_weights(const Iterate& iterate, int node, double* weights, std::span<double> scratch) const noexcept;
 
   std::string_view kind() const noexcept override { return "rhe"; }

@@ -22,16 +22,16 @@ class RHEC_EXPORT GuessShifter {
   /// For problems of the capacity and with the model and the blocked inputs of this one.
   explicit GuessShifter(const HorizonProblem& like);
 
-  void take(const HorizonProblem& problem, const Iterate& point) noexcept;
-  /// The same without a copy: what is left in the point is of no use until `apply` has written to it.
-  void take(const HorizonProblem& problem, Iterate&& point) noexcept;
+  void take(const HorizonProblem& problem, const Iterate& iterate) noexcept;
+  /// The same without a copy: what is left in the iterate is of no use until `apply` has written to it.
+  void take(const HorizonProblem& problem, Iterate&& iterate) noexcept;
   void forget() noexcept { intervals_ = 0; }
 
-  /// Writes into `guess` (which may be the point that was taken) the kept solution, seen from `steps` intervals further
-  /// on. What the kept horizon does not reach: inputs as measured (RHE, where there is a measurement) or as last,
-  /// clipped to their bounds; parameters as last; states by integration; multipliers of bounds zero. Interval 0 of `to`
-  /// is interval `steps` of the kept horizon: 0 while an estimator's horizon grows. False, with the guess left as it
-  /// was, where nothing of the kept horizon is left, nothing was kept or `to` is too large: start cold.
+  /// Writes into `guess` (which may be the iterate that was taken) the kept solution, seen from `steps` intervals
+  /// further on. What the kept horizon does not reach: inputs as measured (RHE, where there is a measurement) or as
+  /// last, clipped to their bounds; parameters as last; states by integration; multipliers of bounds zero. Interval 0
+  /// of `to` is interval `steps` of the kept horizon: 0 while an estimator's horizon grows. False, with the guess left
+  /// as it was, where nothing of the kept horizon is left, nothing was kept or `to` is too large: start cold.
   bool apply(int steps, HorizonProblem& to, Iterate& guess) noexcept;
 
  private:

@@ -5,7 +5,7 @@ namespace rhec {
 // Views are made by naming their members, all at once: what is cleared first and filled then has to reach the cache
 // before it can be read, which takes longer than most kernels.
 
-/// What the kernels over stage programs and iterates work on: rows of `stride` entries, one a stage, 0 .. N.
+/// What the kernels over stage QPs and iterates work on: rows of `stride` entries, one a stage, 0 .. N.
 struct QpView {
   int intervals = 0;
   int first = 0, last = 0;                   ///< stages to be looked at
@@ -23,7 +23,7 @@ struct KktParts {
   double stationarity, defect, bound_violation, complementarity, largest_term;
 };
 
-/// What a step that solves a program without its inactive bounds does to them.
+/// What a step that solves a QP without its inactive bounds does to them.
 struct StepParts {
   bool is_finite;  ///< and no bound is not a number
   bool violates;   ///< some bound, by more than the tolerance
@@ -36,7 +36,7 @@ struct ViolationParts {
   int count;
 };
 
-/// Inner loops over the stages of a quadratic program and an iterate.
+/// Inner loops over the stages of a QP and an iterate.
 struct QpKernels {
   KktParts (*kkt)(const QpView& view);
   StepParts (*check_step)(const QpView& view, double tolerance);

@@ -7,7 +7,7 @@ namespace rhec {
 constexpr int response_batch = 8;
 
 /// What the kernels of the Riccati recursion work on: plain pointers, so that units for different instruction sets
-/// share nothing else. All rows have `stride` entries; see StageQp for the program and Riccati for the rest.
+/// share nothing else. All rows have `stride` entries; see StageQp for the QP and Riccati for the rest.
 struct RiccatiView {
   int intervals = 0;
   int states = 0;    ///< of the capacity: where the controls begin in a row
@@ -48,13 +48,14 @@ struct RiccatiKernels {
   int (*solve_backward)(const RiccatiView& view, int first);
   /// Control, next state and costate of stages first, first + 1, ...; returns the special one, or N.
   int (*solve_forward)(const RiccatiView& view, int first);
-  /// Responses to `response_batch` gradients at once, each entry of a row beside those of the others: from gradients of
-  /// the stages up to `last` (0 where `has_gradient` is) to the value functions' gradients (in place), and from those
-  /// and the initial states to the responses (in place) and their costates. What lies in rows without gradients is not
-  /// looked at. There must be no special stage.
-  void (*respond_backward)(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients);
-  void (*respond_forward)(const RiccatiView& view, int last, double* responses, double* costates);
-  /// sums += those of a batch, each response by its weight, over `count` entries, which are whole eights.
+  /// Sensitivities to `response_batch` gradients at once, each entry of a row beside those of the others: from
+  /// gradients of the stages up to `last` (0 where `has_gradient` is) to the value functions' gradients (in place), and
+  /// from those and the initial states to the sensitivities (in place) and their costates. What lies in rows without
+  /// gradients is not looked at. There must be no special stage.
+  void (*sensitivities_backward)(const RiccatiView& view, int last, const unsigned char* has_gradient,
+                                 double* gradients);
+  void (*sensitivities_forward)(const RiccatiView& view, int last, double* sensitivities, double* costates);
+  /// sums += those of a batch, each sensitivity by its weight, over `count` entries, which are whole eights.
   void (*combine)(const double* batch, const double* weights, double* sums, long count);
   /// The covariance (rows of the stride) of node `first` carried on to the special stage that is returned, or to node
   /// N; on the way those of all nodes go to `all`, blocks of n_s x n_s, if it is not null.
@@ -64,7 +65,7 @@ struct RiccatiKernels {
   /// The inverse of a symmetric matrix; both are `count` rows of `stride` entries. False where the matrix is not
   /// positive definite (as in `factor`) or has more than sixteen rows.
   bool (*invert)(const double* matrix, int count, int stride, double tolerance, double* inverse);
-  /// batch := -inverse batch, of `count` rows of responses.
+  /// batch := -inverse batch, of `count` rows of sensitivities.
   void (*answer)(const double* inverse, int count, int stride, double* batch);
   /// The solution x of matrix x = -p, by that inverse and one correction.
   void (*solve)(const double* matrix, const double* inverse, int count, int stride, const double* p, double* x);

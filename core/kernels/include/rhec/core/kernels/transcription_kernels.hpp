@@ -10,11 +10,11 @@ struct DynamicsView {
   int first, last;             ///< intervals
   int states, stride;          ///< of the capacity
   int vehicle_states, lifted;  ///< what a state is made of
-  const int* control_of;       ///< of each interval's channels: the control that starts it, or -1
+  const int* control_of;       ///< of each interval's lifted variables: the control that starts its block, or -1
   const double* values;        ///< rows of the point
   double *AB, *b;
-  bool has_lifted_rows;  ///< those of carried channels are there already
-  bool any_start;        ///< some channel starts somewhere
+  bool has_lifted_rows;  ///< those of lifted variables are there already
+  bool any_start;        ///< a block starts somewhere
 };
 
 /// Where costs go: their matrices, their vectors, or both. What is not wanted is null.
@@ -55,7 +55,7 @@ struct GuessView {
   const double *values, *multipliers, *lower, *upper;
 };
 
-/// Inner loops that turn a model, a point and data into the stages of a quadratic program.
+/// Inner loops that turn a model, a point and data into the stages of a QP.
 struct TranscriptionKernels {
   /// Bounds of steps from a point: lower - point and upper - point.
   void (*write_bounds)(const double* lower, const double* upper, const double* point, double* step_lower,
@@ -64,21 +64,21 @@ struct TranscriptionKernels {
   /// entries are, 0 otherwise. Rows of a go to `kept`, which may begin with, or before, those of b.
   void (*match)(const double* a, const double* b, double* kept, int count, int stride, int columns,
                 unsigned char* marks);
-  /// Copies rows: of controls what their bounds allow, of multipliers those whose bound there is; of carried channels
+  /// Copies rows: of controls what their bounds allow, of multipliers those whose bound there is; of lifted variables
   /// no multiplier, and nothing of columns that are not used.
   void (*adopt)(const GuessView& from, double* values, double* multipliers);
   /// H += sum_j weights_j J_j J_j' over its first `columns` columns and h += sum_j pulls_j J_j (null: not), with the
   /// `count` rows J_j of one stage; rows are as long as `columns` needs in multiples of eight.
   void (*add_products)(const double* J, const double* weights, const double* pulls, int count, int columns, int stride,
                        double* H, double* h);
-  /// weights (z - reference)^2 of stages first .. last; reperiods the sum where vectors are wanted. Differences of
+  /// weights (z - reference)^2 of stages first .. last; returns the sum where vectors are wanted. Differences of
   /// entries whose turn is not 0 are taken on a circle of that length.
   double (*write_tracking)(const CostView& view, const TrackingView& tracked, int first, int last);
-  /// Rows of carried channels in AB, and b = F(s, w) - s_next.
+  /// Rows of lifted variables in AB, and b = F(s, w) - s_next.
   void (*complete_dynamics)(const DynamicsView& view);
   /// Zeros to what is used of stages first .. last.
   void (*clear_costs)(const CostView& view, int first, int last);
-  /// Squares of measured outputs and inputs, without the curvature of anything; reperiods their sum.
+  /// Squares of measured outputs and inputs, without the curvature of anything; returns their sum.
   double (*write_measurements)(const CostView& view, const MeasurementView& measured, int first, int last);
 };
 

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/model/row_kernels.hpp"
 
 namespace rhec {
@@ -70,8 +71,17 @@ class FormulaModel : public Model {
   }
 
   const ModelDescription& description() const noexcept override { return description_; }
-  void integrate(const Intervals& request) const noexcept override { kernels_->integrate(&formula_, request); }
-  void observe(const Nodes& request) const noexcept override { kernels_->observe(&formula_, request); }
+  void integrate(const Intervals& request) const noexcept override {
+    RHEC_ASSERT(request.count >= 0 && request.substeps >= 1, "whole intervals and Runge-Kutta steps");
+    RHEC_ASSERT(request.states && request.inputs && request.parameters && request.durations, "where to integrate");
+    RHEC_ASSERT(!request.hessians || request.multipliers, "second derivatives are weighted by multipliers");
+    kernels_->integrate(&formula_, request);
+  }
+  void observe(const Nodes& request) const noexcept override {
+    RHEC_ASSERT(request.count >= 0 && request.states, "where to observe");
+    RHEC_ASSERT(!request.hessians || request.multipliers, "second derivatives are weighted by multipliers");
+    kernels_->observe(&formula_, request);
+  }
   void integrate_rows(const IntervalRows& request) const noexcept override {
     if (!kernels_->integrate_rows || request.substeps != 1 || request.ramp || !request.jacobians)
       return Model::integrate_rows(request);

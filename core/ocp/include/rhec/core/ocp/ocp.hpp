@@ -17,7 +17,7 @@ class Linearisation;
 enum class Hessian {
   none,          ///< H is not wanted, and may be left as it is
   gauss_newton,  ///< of the squared residuals only; positive semidefinite
-  exact          ///< of the Lagrangian, with the point's costates; may be indefinite
+  exact          ///< of the Lagrangian, with the iterate's costates; may be indefinite
 };
 
 /// What is asked over a horizon, stage by stage, and nothing of who solves it:
@@ -25,7 +25,7 @@ enum class Hessian {
 ///     minimise    sum_{i=0}^{N} l_i(s_i, w_i)
 ///     subject to  s_{i+1} = F_i(s_i, w_i),   bounds on every s_i and w_i,   s_0 given or free
 ///
-/// A stage state s_i holds the vehicle's state and the values of blocked channels that are carried along; a stage
+/// A stage state s_i holds the vehicle's state and the values of the lifted (blocked) variables; a stage
 /// control w_i holds the inputs and the values of the blocks that start there. So unblocked, blocked and full-horizon
 /// structures are all this one form. Evaluation is const, thread-safe and
 /// allocation-free; `scratch` is the caller's, of `scratch_size()` doubles.
@@ -47,44 +47,44 @@ class RHEC_EXPORT Ocp {
   /// Whether the cost is a sum of squares whose residuals are small at the solution, so that full Gauss-Newton steps
   /// converge to it. True of estimation; not of control, where a reference may be out of reach.
   virtual bool has_small_residuals() const noexcept { return false; }
-  /// The curvature that quadratic programs of this problem should carry.
+  /// The curvature that QPs of this problem should carry.
   Hessian preferred_hessian() const noexcept {
     return has_second_derivatives() && !has_small_residuals() ? Hessian::exact : Hessian::gauss_newton;
   }
-  /// Whether the states of a point are best found by simulation with its controls, from the given initial state. Not
+  /// Whether the states of an iterate are best found by simulation with its controls, from the given initial state. Not
   /// where data determine the states of every node, as in estimation.
   virtual bool can_roll_out() const noexcept { return initial_state() != nullptr; }
   virtual std::size_t scratch_size() const noexcept = 0;
 
-  /// Marks which derivatives of F_i can be other than zero, whatever the point: entry [c * state_count(i + 1) + r] of
+  /// Marks which derivatives of F_i can be other than zero, whatever the iterate: entry [c * state_count(i + 1) + r] of
   /// `state_flags` for dF_r/ds_c, of `control_flags` for dF_r/dw_c. By default all can.
   virtual void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept;
 
-  /// The objective at a point; `defects` (N rows of capacity().states, or null) gets F_i(s_i, w_i) - s_{i+1},
+  /// The objective at an iterate; `defects` (N rows of capacity().states, or null) gets F_i(s_i, w_i) - s_{i+1},
   /// `stage_costs` (N + 1, or null) gets the l_i.
-  virtual double evaluate_stages(const Iterate& point, double* defects, double* stage_costs,
+  virtual double evaluate_stages(const Iterate& iterate, double* defects, double* stage_costs,
                                  std::span<double> scratch) const noexcept = 0;
-  double evaluate(const Iterate& point, double* defects, std::span<double> scratch) const noexcept {
-    return evaluate_stages(point, defects, nullptr, scratch);
+  double evaluate(const Iterate& iterate, double* defects, std::span<double> scratch) const noexcept {
+    return evaluate_stages(iterate, defects, nullptr, scratch);
   }
 
   /// Overwrites the state of node `interval` + 1 by simulation of one interval.
-  virtual void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept = 0;
-  /// Overwrites the states of nodes 1 .. N by simulation from node 0 with the point's controls.
-  void simulate(Iterate& point, std::span<double> scratch) const noexcept {
-    for (int i = 0; i < intervals(); ++i) simulate_interval(i, point, scratch);
+  virtual void simulate_interval(int interval, Iterate& iterate, std::span<double> scratch) const noexcept = 0;
+  /// Overwrites the states of nodes 1 .. N by simulation from node 0 with the iterate's controls.
+  void simulate(Iterate& iterate, std::span<double> scratch) const noexcept {
+    for (int i = 0; i < intervals(); ++i) simulate_interval(i, iterate, scratch);
   }
 
-  /// Fills the stages of a range of the quadratic program at a point: sizes, dynamics, costs and bounds. Returns the
+  /// Fills the stages of a range of the QP at an iterate: sizes, dynamics, costs and bounds. Returns the
   /// objective's part of these stages.
-  virtual double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
+  virtual double linearise(StageRange range, const Iterate& iterate, Hessian hessian, StageQp& qp,
                            std::span<double> scratch) const noexcept = 0;
 
-  /// Fills again what depends on data that may have come since `linearise` at the same point (measurements, references,
-  /// the initial state, bounds): h, the bounds and the initial step. F, b and H stay. As it is, b and F are evaluated
-  /// anew.
-  virtual void refresh(const Iterate& point, StageQp& qp, std::span<double> scratch) const noexcept {
-    linearise({0, intervals()}, point, Hessian::none, qp, scratch);
+  /// Fills again what depends on data that may have come since `linearise` at the same iterate (measurements,
+  /// references, the initial state, bounds): h, the bounds and the initial step. F, b and H stay. As it is, b and F are
+  /// evaluated anew.
+  virtual void refresh(const Iterate& iterate, StageQp& qp, std::span<double> scratch) const noexcept {
+    linearise({0, intervals()}, iterate, Hessian::none, qp, scratch);
   }
 
   /// What a solver linearises this problem with, sample after sample. Throws std::bad_alloc.
@@ -96,6 +96,6 @@ inline StageRange all_stages(const Ocp& ocp) { return {0, ocp.intervals()}; }
 
 /// States from the controls by simulation; the first stage state is taken as it is. Controls are clipped to their
 /// bounds first, so that the result has no defect.
-RHEC_EXPORT void roll_out(const Ocp& ocp, Iterate& point, std::span<double> scratch) noexcept;
+RHEC_EXPORT void roll_out(const Ocp& ocp, Iterate& iterate, std::span<double> scratch) noexcept;
 
 }  // namespace rhec

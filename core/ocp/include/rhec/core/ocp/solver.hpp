@@ -13,8 +13,8 @@ namespace rhec {
 enum class Status {
   solved,           ///< KKT residual within the tolerance
   step_taken,       ///< the one real-time iteration asked for was done
-  iteration_limit,  ///< stopped at max_iterations; the best point is returned
-  deadline,         ///< stopped at the deadline; the best point so far is returned
+  iteration_limit,  ///< stopped at max_iterations; the best iterate is returned
+  deadline,         ///< stopped at the deadline; the best iterate so far is returned
   infeasible,       ///< no point satisfies the constraints, as far as the method can tell
   stalled,          ///< no further progress is possible above the tolerance
   bad_input         ///< a number in the problem or the guess is not finite; nothing was changed
@@ -22,7 +22,7 @@ enum class Status {
 RHEC_EXPORT const char* name_of(Status status) noexcept;
 /// One sentence on what to do about it.
 RHEC_EXPORT const char* advice_for(Status status) noexcept;
-/// True where the returned point is the best found and may be used for control: all but infeasible and bad_input.
+/// True where the returned iterate is the best found and may be used for control: all but infeasible and bad_input.
 RHEC_EXPORT bool is_usable(Status status) noexcept;
 
 struct Report {
@@ -30,21 +30,21 @@ struct Report {
   int iterations = 0;           ///< of the nonlinear method
   int factorisations = 0;       ///< of the linear algebra below it
   bool fallback_used = false;   ///< a robust path had to take over from the fast one
-  double objective = 0.0;       ///< at the returned point
-  KktResidual kkt;              ///< the core's own judgement of the returned point
+  double objective = 0.0;       ///< at the returned iterate
+  KktResidual kkt;              ///< the core's own measure of the returned iterate
   double preparation_us = 0.0;  ///< time spent in prepare, and before it in finish [us]; for TimedSolver to say
   double feedback_us = 0.0;     ///< time spent in solve, or in feedback [us]; for TimedSolver to say
 };
 
-/// The KKT residual of an Ocp at a point. `qp` is used as workspace: it holds the Gauss-Newton linearisation at the
-/// point afterwards.
-RHEC_EXPORT KktResidual kkt_residual(const Ocp& ocp, const Iterate& point, StageQp& qp,
+/// The KKT residual of an Ocp at an iterate. `qp` is used as workspace: it holds the Gauss-Newton linearisation at the
+/// iterate afterwards.
+RHEC_EXPORT KktResidual kkt_residual(const Ocp& ocp, const Iterate& iterate, StageQp& qp,
                                      std::span<double> scratch) noexcept;
 
-/// Writes what the core says of a point that a solver returns: its objective and its KKT residual. `qp` and `scratch`
-/// (of the Ocp's `scratch_size()`) are workspace; of the former a window of two stages will do.
-RHEC_EXPORT void judge(const Ocp& ocp, const Iterate& point, StageQp& qp, std::span<double> scratch,
-                       Report& report) noexcept;
+/// Writes what the core says of an iterate that a solver returns: its objective and its KKT residual. `qp` and
+/// `scratch` (of the Ocp's `scratch_size()`) are workspace; of the former a window of two stages will do.
+RHEC_EXPORT void assess(const Ocp& ocp, const Iterate& iterate, StageQp& qp, std::span<double> scratch,
+                        Report& report) noexcept;
 
 /// Solves an OCP from a guess. One instance serves one caller at a time; two instances never disturb each other.
 ///

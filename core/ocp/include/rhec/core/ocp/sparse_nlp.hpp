@@ -7,7 +7,7 @@
 
 namespace rhec {
 
-/// An Ocp seen as one sparse nonlinear program, for solvers that know no stages:
+/// An Ocp seen as one sparse NLP, for solvers that know no stages:
 ///
 ///     minimise f(z)  subject to  c(z) = 0,  lower <= z <= upper
 ///
@@ -15,8 +15,8 @@ namespace rhec {
 /// s_{i+1}, interval after interval. With L = f + multipliers' c + bound_multipliers' z the multipliers are the
 /// costates of nodes 1 .. N, and bound multipliers have the signs of Iterate's.
 ///
-/// Patterns hold for every point of one structure; values are scattered from the Ocp's own linearisation (StageQp), so
-/// nothing is evaluated twice. Matrices are in compressed columns with rows in order.
+/// Patterns hold for every iterate of one structure; values are scattered from the Ocp's own linearisation (StageQp),
+/// so nothing is evaluated twice. Matrices are in compressed columns with rows in order.
 class RHEC_EXPORT SparseNlp {
  public:
   struct Pattern {
@@ -41,26 +41,27 @@ class RHEC_EXPORT SparseNlp {
   int state_start(int node) const noexcept { return state_starts_[node]; }
 
   // Between points and vectors. Multipliers and bound multipliers may be null.
-  void read(const Ocp& ocp, const Iterate& point, double* z, double* multipliers,
+  void read(const Ocp& ocp, const Iterate& iterate, double* z, double* multipliers,
             double* bound_multipliers) const noexcept;
   /// All stages, or those of a range: their states, controls and costates. A given s_0 is written too. costate_0 is
   /// left as it is: it follows from the stationarity in s_0 (`set_costate_0`).
   void write(const Ocp& ocp, StageRange range, const double* z, const double* multipliers,
-             const double* bound_multipliers, Iterate& point) const noexcept;
+             const double* bound_multipliers, Iterate& iterate) const noexcept;
   void write(const Ocp& ocp, const double* z, const double* multipliers, const double* bound_multipliers,
-             Iterate& point) const noexcept {
-    write(ocp, all_stages(ocp), z, multipliers, bound_multipliers, point);
+             Iterate& iterate) const noexcept {
+    write(ocp, all_stages(ocp), z, multipliers, bound_multipliers, iterate);
   }
-  /// The costate of a given initial state, from a linearisation at the point; zero where the initial state is free.
-  static void set_costate_0(const StageQp& linearisation, Iterate& point) noexcept;
+  /// The costate of a given initial state, from a linearisation at the iterate; zero where the initial state is free.
+  static void set_costate_0(const StageQp& linearisation, Iterate& iterate) noexcept;
 
   /// Bounds of z; infinite where there is none.
   void bounds(const Ocp& ocp, double* lower, double* upper) const noexcept;
   /// c from the defects that Ocp::evaluate gives (rows of the capacity's states).
   void constraints(const Ocp& ocp, const double* defects, double* c) const noexcept;
 
-  // Values at the point of a linearisation, of all stages or of those of a range, to their places in the whole vectors.
-  // The Hessian is that of the Lagrangian if the linearisation was made with Hessian::exact and the point's costates.
+  // Values at the iterate of a linearisation, of all stages or of those of a range, to their places in the whole
+  // vectors. The Hessian is that of the Lagrangian if the linearisation was made with Hessian::exact and the iterate's
+  // costates.
   void constraints(const StageQp& linearisation, StageRange range, double* c) const noexcept;
   void gradient(const StageQp& linearisation, StageRange range, double* g) const noexcept;
   void jacobian(const StageQp& linearisation, StageRange range, double* values) const noexcept;

@@ -18,9 +18,9 @@ namespace rhec {
 /// comes to zero first. The dual objective grows with each step, so that this ends.
 ///
 /// A change of the set costs no factorisation, in general. Claimed bounds of controls are held inside the Riccati
-/// factorisation, at no cost. Every other active bound is a multiplier in the gradient: with the responses W of the
+/// factorisation, at no cost. Every other active bound is a multiplier in the gradient: with the sensitivities W of the
 /// minimiser to the gradients A of these bounds, the multipliers solve the small dense system S = -A'W, whose Cholesky
-/// factor grows and shrinks with the set. Only where a held bound is dropped is the program factorised anew. Responses
+/// factor grows and shrinks with the set. Only where a held bound is dropped is the QP factorised anew. Sensitivities
 /// come in batches, at once those of the bounds that may be next; where there is a claim, before the vectors are known.
 ///
 /// A variable is known by its place in the rows of all stages, as those of an Iterate.
@@ -28,7 +28,7 @@ class RHEC_EXPORT DualActiveSet {
  public:
   enum class Outcome {
     solved,
-    not_convex,   ///< without its state bounds the program has no minimiser: it has to be convexified first
+    not_convex,   ///< without its state bounds the QP has no minimiser: it has to be convexified first
     no_solution,  ///< the bounds contradict each other, as far as can be seen here
     too_much,     ///< more changes than are provided for, or rounding: another method has to do it
     out_of_time
@@ -39,9 +39,9 @@ class RHEC_EXPORT DualActiveSet {
   DualActiveSet() = default;
   explicit DualActiveSet(const Capacity& capacity);
 
-  /// What needs the program's matrices only: the factorisation with the claimed set (null: none), and responses.
+  /// What needs the QP's matrices only: the factorisation with the claimed set (null: none), and sensitivities.
   void prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed) noexcept;
-  /// After `prepare`, with the program's vectors as they are now. Where solved, the set goes to `active` and the
+  /// After `prepare`, with the QP's vectors as they are now. Where solved, the set goes to `active` and the
   /// minimiser, its costates and multipliers to `step`. The deadline is looked at before every change of the set.
   Outcome solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
                 Clock::time_point deadline) noexcept;
@@ -53,11 +53,11 @@ class RHEC_EXPORT DualActiveSet {
  private:
   enum class Hold : std::uint8_t { free, held, column };
   enum class Found { nothing, values, step };
-  static constexpr int none = -1, batch_size = Riccati::Responses::size;
+  static constexpr int none = -1, batch_size = Riccati::Sensitivities::size;
   /// Room for all columns and for those that may be next.
   static constexpr int batch_count = max_columns / batch_size + 1;
   struct Batch {
-    Riccati::Responses responses;
+    Riccati::Sensitivities sensitivities;
     std::array<int, batch_size> of{};  ///< places
     int count = 0;
   };
@@ -78,21 +78,21 @@ class RHEC_EXPORT DualActiveSet {
     return std::max(least_[place] - value_[place], value_[place] - most_[place]);
   }
 
-  bool find_responses(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept;
+  bool find_sensitivities(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept;
   bool is_needed(int batch, const int* places, int count) const noexcept;
   void forget(int batch) noexcept;
-  bool find_responses_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept;
-  bool find_responses_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count) noexcept;
-  /// What the variable at one place answers to the gradient of another, which has responses.
-  double response(int of, int at) const noexcept {
+  bool find_sensitivities_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept;
+  bool find_sensitivities_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count) noexcept;
+  /// What the variable at one place answers to the gradient of another, which has sensitivities.
+  double sensitivity(int of, int at) const noexcept {
     const int number = number_[of];
     return batches_[number / batch_size]
-        .responses.values[static_cast<std::ptrdiff_t>(at) * batch_size + number % batch_size];
+        .sensitivities.values[static_cast<std::ptrdiff_t>(at) * batch_size + number % batch_size];
   }
   double& weight_of(int place, Weights& weights) const noexcept {
     return weights[number_[place] / batch_size][number_[place] % batch_size];
   }
-  void add_responses(const Riccati& riccati, const Weights& weights, std::vector<double>& sums) const noexcept;
+  void add_sensitivities(const Riccati& riccati, const Weights& weights, std::vector<double>& sums) const noexcept;
   double* factor_row(int k) noexcept { return factor_.data() + static_cast<std::ptrdiff_t>(k) * max_columns; }
   const double* factor_row(int k) const noexcept {
     return factor_.data() + static_cast<std::ptrdiff_t>(k) * max_columns;
@@ -119,7 +119,7 @@ class RHEC_EXPORT DualActiveSet {
   void write(ActiveSet& active, Iterate& step) const noexcept;
 
   int factorisations_ = 0, changes_ = 0;
-  int states_ = 0, stride_ = 0, places_ = 0;  ///< as many places as the program has
+  int states_ = 0, stride_ = 0, places_ = 0;  ///< as many places as the QP has
   bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
   double pull_tolerance_ = 0.0;
   const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the program that is being solved
@@ -130,7 +130,7 @@ class RHEC_EXPORT DualActiveSet {
   std::vector<double> least_, most_;
   std::vector<Hold> hold_;
   std::vector<std::int8_t> side_;  ///< of the active bound
-  std::vector<int> number_;        ///< among the responses, or none
+  std::vector<int> number_;        ///< among the sensitivities, or none
   std::vector<int> held_places_;
   std::vector<Batch> batches_;
   std::vector<int> columns_;  ///< active bounds that are not held, in the order of the factor
@@ -138,7 +138,7 @@ class RHEC_EXPORT DualActiveSet {
   /// Which multipliers the step was found with.
   std::vector<int> base_places_;
   std::vector<double> base_multipliers_;
-  std::vector<double> h_;  ///< the program's gradient with the multipliers of the columns
+  std::vector<double> h_;  ///< the QP's gradient with the multipliers of the columns
   Iterate policy_step_;
 };
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include "rhec/core/base/aligned.hpp"
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/export.hpp"
 #include "rhec/core/base/padded.hpp"
 
@@ -30,7 +31,7 @@ struct StageRange {
   int last = 0;
 };
 
-/// A primal-dual point of an Ocp. Rows have the capacity's length, whatever a stage really uses. With the Lagrangian
+/// A primal-dual iterate of an Ocp. Rows have the capacity's length, whatever a stage really uses. With the Lagrangian
 ///
 ///     L = sum_i l_i(s_i, w_i) + sum_i costate_{i+1}' (F_i(s_i, w_i) - s_{i+1}) + sum_i state_bound_i' s_i +
 ///     control_bound_i' w_i
@@ -65,8 +66,12 @@ class RHEC_EXPORT Iterate {
   void clear_multipliers() noexcept;
 
  private:
-  double* at(AlignedDoubles& v, int i) const noexcept { return v.data() + static_cast<std::ptrdiff_t>(i) * row_; }
+  double* at(AlignedDoubles& v, int i) const noexcept {
+    RHEC_ASSERT(i >= 0 && i <= capacity_.intervals, "a stage of the capacity");
+    return v.data() + static_cast<std::ptrdiff_t>(i) * row_;
+  }
   const double* at(const AlignedDoubles& v, int i) const noexcept {
+    RHEC_ASSERT(i >= 0 && i <= capacity_.intervals, "a stage of the capacity");
     return v.data() + static_cast<std::ptrdiff_t>(i) * row_;
   }
 

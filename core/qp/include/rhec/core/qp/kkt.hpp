@@ -4,7 +4,7 @@
 
 namespace rhec {
 
-/// How far a primal-dual point is from a first-order optimum: the one judge of every backend.
+/// How far a primal-dual iterate is from a first-order optimum: the one judge of every backend.
 ///
 /// Stationarity and complementarity are relative to 1 + the largest term of the Lagrangian's gradient (objective,
 /// costates and bound multipliers each count), so that scaling the objective does not change the verdict. Defect and
@@ -18,23 +18,23 @@ struct RHEC_EXPORT KktResidual {
   double largest() const noexcept;
 };
 
-/// The residual at the point that the program was linearised at.
-RHEC_EXPORT KktResidual kkt_residual(const StageQp& linearisation, const Iterate& point) noexcept;
+/// The residual at the iterate that the QP was linearised at.
+RHEC_EXPORT KktResidual kkt_residual(const StageQp& linearisation, const Iterate& iterate) noexcept;
 
 /// What a residual is made of, for who goes through a long horizon piece by piece: largest absolute values.
 struct RHEC_EXPORT KktTerms {
   double stationarity = 0.0, defect = 0.0, bound_violation = 0.0, complementarity = 0.0;
   double largest_term = 0.0;  ///< of the Lagrangian's gradient
 
-  /// Those of the stages of a range, where the program holds the linearisation at the point. Of the stage behind a
+  /// Those of the stages of a range, where the QP holds the linearisation at the iterate. Of the stage behind a
   /// range that does not reach the end its sizes must be known.
-  void add(const StageQp& linearisation, const Iterate& point, StageRange range) noexcept;
+  void add(const StageQp& linearisation, const Iterate& iterate, StageRange range) noexcept;
   void add(const KktTerms& others) noexcept;
   KktResidual residual() const noexcept;
 };
 
-/// Costates that make the point stationary in all states, by one backward sweep; bound multipliers are taken as they
+/// Costates that make the iterate stationary in all states, by one backward sweep; bound multipliers are taken as they
 /// are.
-RHEC_EXPORT void set_costates(const StageQp& linearisation, Iterate& point) noexcept;
+RHEC_EXPORT void set_costates(const StageQp& linearisation, Iterate& iterate) noexcept;
 
 }  // namespace rhec

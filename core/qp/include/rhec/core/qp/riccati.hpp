@@ -68,55 +68,55 @@ class RHEC_EXPORT Riccati {
   Riccati() = default;
   explicit Riccati(const Capacity& capacity);
 
-  /// `diagonal`, if not null, is added to the diagonals of H (barrier terms): a row of the program's stride a stage.
+  /// `diagonal`, if not null, is added to the diagonals of H (barrier terms): a row of the QP's stride a stage.
   void factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
   void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, nullptr); }
   /// As much of it as `covariances` needs; a `solve` that follows factorises again.
   void factor_for_covariances(const StageQp& qp, const ActiveSet& active) noexcept;
   bool was_convexified() const noexcept { return convexified_; }
-  /// After a `factor` without active bounds: puts what convexification changed into the program's R, whose reduced
+  /// After a `factor` without active bounds: puts what convexification changed into the QP's R, whose reduced
   /// Hessian is positive definite from then on, whichever bounds become active.
   void write_convexified(StageQp& qp) noexcept;
 
   /// The minimiser as a step, with costates and the multipliers of the active bounds, for vectors that may be newer
-  /// than `factor`; the gradients h may be replaced by rows of the caller (null: those of the program).
+  /// than `factor`; the gradients h may be replaced by rows of the caller (null: those of the QP).
   Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* h) noexcept;
   Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept {
     return solve(qp, active, step, nullptr);
   }
 
-  /// What the minimiser answers to gradients of one entry each: with h = e_k and all else of the program's vectors 0,
+  /// What the minimiser answers to gradients of one entry each: with h = e_k and all else of the QP's vectors 0,
   /// the values z of all stages, and in the places of active controls their multipliers. All in the time of one:
   /// entry c of the row of stage i is at values[(i * stride + c) * size + (number of the gradient)].
-  struct Responses {
+  struct Sensitivities {
     static constexpr int size = 8;
     AlignedDoubles values, costates;
     std::vector<int> control_counts;  ///< of the program that they are for
-    Responses() = default;
-    explicit Responses(const Capacity& capacity);
+    Sensitivities() = default;
+    explicit Sensitivities(const Capacity& capacity);
   };
   struct Entry {
     int stage, place;
   };
-  /// Of at most Responses::size gradients. False where the last factorisation holds state bounds or was convexified:
-  /// those have no responses here.
-  bool respond(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
-               Responses& responses) noexcept;
-  /// Adds the responses, each by its weight (there are Responses::size), to a minimiser that `solve` has found: as if
-  /// it had been asked with those gradients, but for `feedback`.
-  void combine(const StageQp& qp, const ActiveSet& active, const Responses& responses, const double* weights,
+  /// Of at most Sensitivities::size gradients. False where the last factorisation holds state bounds or was
+  /// convexified: those have no sensitivities here.
+  bool find_sensitivities(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
+                          Sensitivities& sensitivities) noexcept;
+  /// Adds the sensitivities, each by its weight (there are Sensitivities::size), to a minimiser that `solve` has found:
+  /// as if it had been asked with those gradients, but for `feedback`.
+  void combine(const StageQp& qp, const ActiveSet& active, const Sensitivities& sensitivities, const double* weights,
                Iterate& step) noexcept;
 
-  /// sums += the values of the responses, each by its weight, over the first `places` entries of the rows of all
+  /// sums += the values of the sensitivities, each by its weight, over the first `places` entries of the rows of all
   /// stages.
-  void add_values(const Responses& responses, const double* weights, int places, double* sums) const noexcept;
+  void add_values(const Sensitivities& sensitivities, const double* weights, int places, double* sums) const noexcept;
 
   /// The control of stage i as the last `solve` would choose it for any stage-state step: w = T v(s) + Y s + y0.
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
 
-  /// Marginal covariances of all states when the objective is twice a negative log-likelihood's quadratic (METHOD: no
-  /// factor 1/2), from the last factorisation: node i's n_s x n_s block goes to covariance + i * n_s^2, if not null;
-  /// the last node's to `last`.
+  /// Marginal covariances of all states when the objective is twice a negative log-likelihood's quadratic, as RHE's is
+  /// (docs/method.md, section 2: no factor 1/2), from the last factorisation: node i's n_s x n_s block goes to
+  /// covariance + i * n_s^2, if not null; the last node's to `last`.
   void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
 
   /// The largest number of controls, and of states, that one stage may have.

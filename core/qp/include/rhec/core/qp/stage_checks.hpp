@@ -7,7 +7,7 @@
 
 namespace rhec {
 
-// Looks at whole stage programs and points, on registers as wide as the machine has.
+// Looks at whole stage QPs and points, on registers as wide as the machine has.
 
 /// What a step that was found without some of the bounds says of them.
 struct StepCheck {
@@ -17,10 +17,10 @@ struct StepCheck {
 };
 RHEC_EXPORT StepCheck check_step(const StageQp& qp, const Iterate& step, double tolerance) noexcept;
 
-/// Marks each of the N + 1 stages with 1 at which a bound multiplier of the point is not zero, or two bounds of the
-/// program coincide, and 0 otherwise. True where a lower bound is above its upper one by more than tolerance (1 +
+/// Marks each of the N + 1 stages with 1 at which a bound multiplier of the iterate is not zero, or two bounds of the
+/// QP coincide, and 0 otherwise. True where a lower bound is above its upper one by more than tolerance (1 +
 /// |bound|), or one of them is not a number.
-RHEC_EXPORT bool mark_bounds(const StageQp& qp, const Iterate& point, double tolerance, std::uint8_t* marks) noexcept;
+RHEC_EXPORT bool mark_bounds(const StageQp& qp, const Iterate& iterate, double tolerance, std::uint8_t* marks) noexcept;
 
 struct ViolatedBounds {
   double largest = 0.0;  ///< violation, if it is above 0
@@ -35,7 +35,7 @@ RHEC_EXPORT ViolatedBounds find_violations(const double* values, const double* l
 RHEC_EXPORT void widen_bounds(const double* lower, const double* upper, double tolerance, int count, double* least,
                               double* most) noexcept;
 
-/// Makes of a step the point that it leads to, all of it: values are added, its multipliers are those of the point
+/// Makes of a step the iterate that it leads to, all of it: values are added, its multipliers are those of the iterate
 /// already. Both are of one capacity.
 RHEC_EXPORT void add_to_step(int intervals, const Iterate& from, Iterate& step) noexcept;
 

@@ -5,11 +5,12 @@
 
 #include <Eigen/Core>
 
+#include "rhec/core/base/assertion.hpp"
 #include "rhec/core/qp/iterate.hpp"
 
 namespace rhec {
 
-/// An Ocp linearised at a point, in the steps z_i = [ds_i; dw_i] from there:
+/// An Ocp linearised at an iterate, in the steps z_i = [ds_i; dw_i] from there:
 ///
 ///     minimise    sum_{i=0}^{N} 1/2 z_i' H_i z_i + h_i' z_i                           (no dw at node N)
 ///     subject to  ds_{i+1} = AB_i z_i + b_i,   lower_i <= z_i <= upper_i
@@ -47,10 +48,16 @@ class RHEC_EXPORT StageQp {
   const int* state_counts() const noexcept { return state_counts_.data(); }
   const int* control_counts() const noexcept { return control_counts_.data(); }  ///< of intervals 0 .. N - 1
   const int* identity_counts() const noexcept { return identity_counts_.data(); }
-  void set_intervals(int intervals) noexcept { intervals_ = intervals; }
+  void set_intervals(int intervals) noexcept {
+    RHEC_ASSERT(intervals >= 0 && intervals <= capacity_.intervals, "at most the capacity");
+    intervals_ = intervals;
+  }
   /// Clears what a stage that has become smaller does not use any more. The last `identities` states are those that the
   /// interval hands on as they are: their rows of AB are, or will be, rows of the identity, and solvers may rely on it.
   void set_sizes(int node, int states, int controls, int identities = 0) noexcept {
+    RHEC_ASSERT(node >= 0 && node <= capacity_.intervals, "a node of the capacity");
+    RHEC_ASSERT(states <= capacity_.states && controls <= capacity_.controls && identities <= states,
+                "at most the capacity");
     if (states < state_counts_[node] || controls < control_counts_[node]) clear(node);
     state_counts_[node] = states;
     control_counts_[node] = controls;
@@ -108,10 +115,15 @@ class RHEC_EXPORT StageQp {
 
  private:
   double* at(AlignedDoubles& v, int i, int rows) const noexcept {
+    RHEC_ASSERT(is_held(v, i, rows), "a stage that is held");
     return v.data() + static_cast<std::ptrdiff_t>(i) * rows * stride_;
   }
   const double* at(const AlignedDoubles& v, int i, int rows) const noexcept {
+    RHEC_ASSERT(is_held(v, i, rows), "a stage that is held");
     return v.data() + static_cast<std::ptrdiff_t>(i) * rows * stride_;
+  }
+  bool is_held(const AlignedDoubles& v, int i, int rows) const noexcept {
+    return i >= 0 && (static_cast<std::ptrdiff_t>(i) + 1) * rows * stride_ <= std::ssize(v);
   }
   double* control_rows(int i) noexcept { return H(i) + static_cast<std::ptrdiff_t>(capacity_.states) * stride_; }
   const double* control_rows(int i) const noexcept {

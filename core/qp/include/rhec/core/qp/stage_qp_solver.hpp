@@ -32,8 +32,8 @@ class RHEC_EXPORT StageQpSolver {
   StageQpSolver() = default;
   explicit StageQpSolver(const Capacity& capacity);
 
-  /// The active set that a point's bound multipliers claim.
-  void guess_from(const StageQp& qp, const Iterate& point) noexcept;
+  /// The active set that an iterate's bound multipliers claim.
+  void guess_from(const StageQp& qp, const Iterate& iterate) noexcept;
   /// Factorises with the guess, so that `solve` needs no factorisation if the guess is right.
   void prepare(const StageQp& qp) noexcept;
 
@@ -53,7 +53,7 @@ class RHEC_EXPORT StageQpSolver {
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept {
     riccati_.feedback(solved(qp), i, state_step, control_step);
   }
-  /// Covariances by the program's Hessian without any bounds (Riccati::covariances), of all nodes or the last one;
+  /// Covariances by the QP's Hessian without any bounds (Riccati::covariances), of all nodes or the last one;
   /// false where it is not positive definite.
   bool covariances(const StageQp& qp, double* all, double* last) noexcept;
   /// The QP that the last solution is of: the one that `solve` was given, or its convexified copy.
@@ -107,7 +107,7 @@ class RHEC_EXPORT StageQpSolver {
   double gradient_scale_ = 1.0;      ///< of the last interior-point solution: what a slack of one weighs
   std::vector<std::uint8_t> marks_;  ///< stages at which a bound may be active
   std::vector<Bounded> bounded_;
-  std::vector<double> diagonal_, h_;  ///< rows of the program's stride: barrier terms
+  std::vector<double> diagonal_, h_;  ///< rows of the QP's stride: barrier terms
 };
 
 }  // namespace rhec

@@ -1,11 +1,11 @@
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 namespace rhec {
 
-bool is_finite(const Ocp& ocp, const Iterate& point) noexcept {
+bool is_finite(const Ocp& ocp, const Iterate& iterate) noexcept {
   double rest = 0.0;  // stays 0 as long as all is finite
   const auto check = [&](const double* row, int n) {
     double of_row = 0.0;  // no row waits for another
@@ -14,9 +14,9 @@ bool is_finite(const Ocp& ocp, const Iterate& point) noexcept {
   };
   for (int i = 0; i <= ocp.intervals(); ++i) {
     const int n = ocp.state_count(i), m = i < ocp.intervals() ? ocp.control_count(i) : 0;
-    for (const double* row : {point.state(i), point.costate(i), point.state_bound(i)}) check(row, n);
+    for (const double* row : {iterate.state(i), iterate.costate(i), iterate.state_bound(i)}) check(row, n);
     if (m == 0) continue;
-    for (const double* row : {point.control(i), point.control_bound(i)}) check(row, m);
+    for (const double* row : {iterate.control(i), iterate.control_bound(i)}) check(row, m);
   }
   return rest == 0.0;
 }
@@ -38,39 +38,39 @@ bool bounds_are_numbers(const Ocp& ocp) noexcept {
 
 }  // namespace
 
-bool has_sound_numbers(const Ocp& ocp, const Iterate& point) noexcept {
-  return point.capacity() == ocp.capacity() && is_finite(ocp, point) && bounds_are_numbers(ocp);
+bool has_sound_numbers(const Ocp& ocp, const Iterate& iterate) noexcept {
+  return iterate.capacity() == ocp.capacity() && is_finite(ocp, iterate) && bounds_are_numbers(ocp);
 }
 
-bool is_sound_start(const Ocp& ocp, const Iterate& point, std::span<double> scratch) noexcept {
-  return has_sound_numbers(ocp, point) && std::isfinite(ocp.evaluate(point, nullptr, scratch));
+bool is_sound_start(const Ocp& ocp, const Iterate& iterate, std::span<double> scratch) noexcept {
+  return has_sound_numbers(ocp, iterate) && std::isfinite(ocp.evaluate(iterate, nullptr, scratch));
 }
 
-double largest_costate(const Ocp& ocp, const Iterate& point) noexcept {
+double largest_costate(const Ocp& ocp, const Iterate& iterate) noexcept {
   double largest = 0.0;
   for (int i = 1; i <= ocp.intervals(); ++i)
-    for (int j = 0, n = ocp.state_count(i); j < n; ++j) largest = std::max(largest, std::abs(point.costate(i)[j]));
+    for (int j = 0, n = ocp.state_count(i); j < n; ++j) largest = std::max(largest, std::abs(iterate.costate(i)[j]));
   return largest;
 }
 
-double largest_bound_multiplier(const Ocp& ocp, const Iterate& point) noexcept {
+double largest_bound_multiplier(const Ocp& ocp, const Iterate& iterate) noexcept {
   double largest = 0.0;
   for (int i = 0; i <= ocp.intervals(); ++i) {
     const int n = ocp.state_count(i), m = i < ocp.intervals() ? ocp.control_count(i) : 0;
-    for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(point.state_bound(i)[j]));
-    for (int j = 0; j < m; ++j) largest = std::max(largest, std::abs(point.control_bound(i)[j]));
+    for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(iterate.state_bound(i)[j]));
+    for (int j = 0; j < m; ++j) largest = std::max(largest, std::abs(iterate.control_bound(i)[j]));
   }
   return largest;
 }
 
-double total_violation(const Ocp& ocp, const Iterate& point) noexcept {
+double total_violation(const Ocp& ocp, const Iterate& iterate) noexcept {
   double total = 0.0;
   const auto add = [&](const double* value, const double* lower, const double* upper, int n) {
     for (int j = 0; j < n; ++j) total += std::max({0.0, lower[j] - value[j], value[j] - upper[j]});
   };
   for (int i = 0; i <= ocp.intervals(); ++i) {
-    add(point.state(i), ocp.state_lower(i), ocp.state_upper(i), ocp.state_count(i));
-    if (i < ocp.intervals()) add(point.control(i), ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
+    add(iterate.state(i), ocp.state_lower(i), ocp.state_upper(i), ocp.state_count(i));
+    if (i < ocp.intervals()) add(iterate.control(i), ocp.control_lower(i), ocp.control_upper(i), ocp.control_count(i));
   }
   return total;
 }

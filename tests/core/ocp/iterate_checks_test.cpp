@@ -1,4 +1,4 @@
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 
 #include <gtest/gtest.h>
 

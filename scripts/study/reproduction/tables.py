@@ -1,4 +1,4 @@
-"""The tables of docs/reproduction.md, one function each: from the study and the judged claims to Markdown."""
+"""The tables of docs/reproduction.md, one function each: from the study and the assessed claims to Markdown."""
 import collections
 import math
 import statistics
@@ -7,7 +7,7 @@ from database import BASE, FHB, IGNORED, PATHS, TRUTH, UNBLOCKED, rate, setting_
 from slices import Slice, mean
 from verdicts import PARTLY, describe
 
-Judged = collections.namedtuple("Judged", "claim verdict conditions")
+Assessed = collections.namedtuple("Assessed", "claim verdict conditions")
 SHOWN_SIZES, SHOWN_OVERLAPS = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30), (0, 2, 3, 4, 6, 8, 10, 12, 15)
 SHORT_BLOCKS = ((1, 0), (1, 2), (2, 0), (2, 2), (3, 0), (3, 2))
 STEP = 0.2  # dt [s]
@@ -82,7 +82,7 @@ def average(at, quantity, method, paths):
 
 # --- One function a table --------------------------------------------------------------------------------------------
 
-def study(study, judged):
+def study(study, assessed):
     every = [run for paths in study.runs.values() for methods in paths.values() for runs in methods.values() for run in runs.values()]
     seeds = [len(Slice(setting, speed, paths).seeds) for (setting, speed), paths in study.runs.items()]
     unique = {id(run): run for run in every}.values()
@@ -99,9 +99,9 @@ def study(study, judged):
     ])
 
 
-def verdicts(study, judged):
+def verdicts(study, assessed):
     rows = []
-    for claim, verdict, conditions in judged:
+    for claim, verdict, conditions in assessed:
         main = next((each for each in conditions if each.speed is None), conditions[0])
         parts = distinct(main.parts)
         confirmed, alone = (sum(found) for found in zip(*((each.confirmed, each.claimed_side()) for each in conditions)))
@@ -113,15 +113,15 @@ def verdicts(study, judged):
                   "conditions: confirmed, by interval alone", "holds when"), rows)
 
 
-def tests(study, judged):
+def tests(study, assessed):
     return table(("", "what is tested"), [(claim.key, claim.test + (f"; {claim.paths[0]} alone" if len(claim.paths) == 1 else ""))
-                                          for claim, _, _ in judged])
+                                          for claim, _, _ in assessed])
 
 
-def speeds(study, judged):
+def speeds(study, assessed):
     speeds = speeds_of(study)
     rows = []
-    for claim, _, conditions in judged:
+    for claim, _, conditions in assessed:
         for is_map in (False, True):
             found = {each.speed: each for each in conditions if each.setting == BASE and each.is_map == is_map and each.speed}
             if found:
@@ -130,11 +130,11 @@ def speeds(study, judged):
     return table(("", "(S, o)", *(f"{speed:g} m/s" for speed in speeds)), rows)
 
 
-def settings(study, judged):
+def settings(study, assessed):
     others = settings_of(study)
     speeds = sorted({speed for setting, speed in study.runs if setting != BASE}) or speeds_of(study)
     rows = []
-    for claim, _, conditions in judged:
+    for claim, _, conditions in assessed:
         found = {(condition.setting, condition.speed): condition for condition in conditions if not condition.is_map}
         for setting in others:
             rows.append((claim.key, setting_name(setting), *(cell(found[setting, speed]) if (setting, speed) in found else ""
@@ -142,7 +142,7 @@ def settings(study, judged):
     return table(("", "setting", *(f"{speed:g} m/s" for speed in speeds)), rows)
 
 
-def rates(study, judged):
+def rates(study, assessed):
     """By v N_e dt / L, over the settings that change L alone, at the (S, o) that all of them have."""
     found = [Slice(setting, speed, paths) for (setting, speed), paths in study.runs.items() if setting[1:] == BASE[1:]]
     if not found:
@@ -163,7 +163,7 @@ def rates(study, judged):
                   "least kappa at (S, o)"), rows)
 
 
-def block_rates(study, judged):
+def block_rates(study, assessed):
     """Ratio of kappa to FHB by v S dt / L, in steps of a factor 2."""
     found = [Slice(setting, speed, paths) for (setting, speed), paths in study.runs.items() if setting[1:] == BASE[1:]]
     if not found:
@@ -181,7 +181,7 @@ def block_rates(study, judged):
     return table(("v S dt / L", *(f"o = {overlap}" for overlap in overlaps), "conditions and S"), rows)
 
 
-def map_of(study, judged):
+def map_of(study, assessed):
     """kappa's ratio to FHB over (S, o), at the speeds that have the whole map with all seeds."""
     texts = []
     for speed in speeds_of(study):
@@ -197,7 +197,7 @@ def map_of(study, judged):
     return "\n\n".join(texts) or table((), [])
 
 
-def shares(study, judged):
+def shares(study, assessed):
     """Of the whole map at each speed, with the one seed that it was run with everywhere."""
     rows = []
     for speed in speeds_of(study):
@@ -217,7 +217,7 @@ def shares(study, judged):
                   "(S, o)"), rows)
 
 
-def tracking(study, judged):
+def tracking(study, assessed):
     rows = []
     for setting in settings_of(study):
         if setting[2] == BASE[2] and setting != BASE:
@@ -231,7 +231,7 @@ def tracking(study, judged):
                  rows)
 
 
-def convergence(study, judged):
+def convergence(study, assessed):
     rows = []
     for setting in settings_of(study):
         for speed in speeds_of(study, setting):
@@ -246,7 +246,7 @@ def convergence(study, judged):
     return table(("setting", "v [m/s]", *(f"({size}, {overlap})" for size, overlap in SHORT_BLOCKS)), rows)
 
 
-def times(study, judged):
+def times(study, assessed):
     rows = []
     for speed in speeds_of(study):
         at = slice_of(study, speed)
@@ -261,7 +261,7 @@ def times(study, judged):
     return table(("v [m/s]", "method", "median solve [us]", "99th percentile [us]", "... of the worst run [us]", "median / FHB"), rows)
 
 
-def ratios(study, judged):
+def ratios(study, assessed):
     """The error of kappa as a ratio to FHB at the (S, o) that docs/ratios.md shows as well."""
     places = [((2, 4), "SB-O (2, 4)"), ((5, 4), "SB-O (5, 4)"), ((3, 2), "SB-O (3, 2)"), ((3, 0), "SB (3, 0)"), ((5, 8), "SB-O (5, 8)")]
     rows = []

@@ -1,4 +1,4 @@
-"""Judges every claim, and rewrites the tables of a page between their marks."""
+"""Assesses every claim, and rewrites the tables of a page between their marks."""
 import json
 import math
 import os
@@ -7,21 +7,21 @@ import re
 
 from claims import CLAIMS, conditions_of
 from database import BASE, AXES, Mistake, setting_name
-from tables import TABLES, Judged
-from verdicts import PAGE_LEVEL, judge
+from tables import TABLES, Assessed
+from verdicts import PAGE_LEVEL, assess
 
 
-def judge_all(study, claims=CLAIMS, level=PAGE_LEVEL):
+def assess_all(study, claims=CLAIMS, level=PAGE_LEVEL):
     """Every claim with its verdict and its conditions; the page's level is shared evenly."""
     found = []
     for claim in claims:
         conditions = conditions_of(study, claim)
-        found.append(Judged(claim, judge(conditions, level / len(claims)), conditions))
+        found.append(Assessed(claim, assess(conditions, level / len(claims)), conditions))
     return found
 
 
-def as_json(judged):
-    """All that verdicts rest on, for whoever wants to look at it with a program of their own."""
+def as_json(assessed):
+    """All numbers behind the verdicts, for other programs to read."""
     def known(value):
         return value if value is None or math.isfinite(value) else None
 
@@ -34,7 +34,7 @@ def as_json(judged):
                              "speed": each.speed, "points": each.points, "whole_map": each.is_map, "runs": each.runs,
                              "without_end": each.lost, "p": each.p(), "confirmed": each.confirmed,
                              "parts": [part(one) for one in each.parts]} for each in conditions]}
-            for claim, verdict, conditions in judged]
+            for claim, verdict, conditions in assessed]
 
 
 def write_aside(path, text):
@@ -52,16 +52,16 @@ def rewrite(text, name, content, page):
     return pattern.sub(lambda match: match[1] + content + "\n<!-- end -->", text)
 
 
-def write_page(template, page, study, judged):
+def write_page(template, page, study, assessed):
     """The template's text with all tables anew; nothing is written unless all of them could be made."""
     text = pathlib.Path(template).read_text(encoding="utf-8")
     for name, make in TABLES.items():
-        text = rewrite(text, name, make(study, judged), template)
+        text = rewrite(text, name, make(study, assessed), template)
     write_aside(page, text)
 
 
-def write_json(path, judged):
-    write_aside(path, json.dumps(as_json(judged), indent=1) + "\n")
+def write_json(path, assessed):
+    write_aside(path, json.dumps(as_json(assessed), indent=1) + "\n")
 
 
 EXPECTED_SPEEDS, SETTING_SPEEDS, MAP_SPEEDS, EXPECTED_SEEDS = range(1, 11), (2, 5, 8), (5, 8), 20
@@ -87,4 +87,4 @@ def require_whole(study):
             absent.append(f"the map of SB-O on kappa at {speed} m/s: {len(whole)} of {30 * 16} (S, o)")
     if absent:
         raise Mistake("the study is not whole, so that verdicts would be of something else:\n  " + "\n  ".join(absent) +
-                      "\nscripts/reproduce makes what is missing; --partial judges what is there")
+                      "\nscripts/study/reproduce makes what is missing; --partial assesses what is there")

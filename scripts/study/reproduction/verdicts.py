@@ -70,7 +70,7 @@ class Condition:
         return all(part.claimed_side() for part in self.parts if part.bound is not None)
 
 
-def judge(conditions, level):
+def assess(conditions, level):
     """Marks the conditions that confirm the claim, and returns held, holds when or did not hold."""
     p_values = [condition.p() for condition in conditions]
     for condition, confirmed in zip(conditions, student.holm(p_values[:1], level) + student.holm(p_values[1:], level)):

@@ -249,7 +249,8 @@ def points_of(at, claim):
     found = [at.points(kind) for kind in claim.kinds]
     points = sorted(set(found[0]).intersection(*found[1:]))
     if not points:
-        raise Mistake(f"{at}: no (S, o) of SB-O on {' and on '.join(claim.kinds)} with all seeds; scripts/reproduce makes what is missing")
+        raise Mistake(f"{at}: no (S, o) of SB-O on {' and on '.join(claim.kinds)} with all seeds; "
+                      "scripts/study/reproduce makes what is missing")
     return points
 
 
@@ -280,13 +281,13 @@ def conditions_of(study, claim):
               sorted(study.runs.items(), key=lambda item: (item[0][0] != BASE, repr(item[0][0]), item[0][1]))]
     base = [at for at in slices if at.setting == BASE]
     if not base:
-        raise Mistake("the database has no run of the base settings; scripts/reproduce makes what is missing")
+        raise Mistake("the database has no run of the base settings; scripts/study/reproduce makes what is missing")
     known = {at: points_of(at, claim) for at in slices}
     common = sorted(set.intersection(*(set(known[at]) for at in base)))
     conditions = [together(base, claim, common)] if len(base) > 1 else []
     for at in slices:
         shared = [point for point in known[at] if point in common]
         if not shared:
-            raise Mistake(f"{at}: none of the (S, o) {common} of the base; scripts/reproduce makes what is missing")
+            raise Mistake(f"{at}: none of the (S, o) {common} of the base; scripts/study/reproduce makes what is missing")
         conditions.append(condition(at, claim, shared))
     return conditions + [condition(at, claim, known[at], True) for at in base if claim.over_map and len(known[at]) > len(common)]

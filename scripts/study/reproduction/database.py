@@ -12,7 +12,7 @@ import urllib.parse
 
 APPLICATION, VERSION = 1919444323, 1  # docs/sweep.md
 PATHS = ("figure8", "zigzag")
-AGAIN = "scripts/reproduce makes what is missing"
+AGAIN = "scripts/study/reproduce makes what is missing"
 
 # What the settings of the study change one at a time. A base value is that of scenarios/paper/; where a configuration
 # says nothing, rhec's default holds (docs/configuration.md).
@@ -36,7 +36,7 @@ Run = collections.namedtuple("Run", "kappa mu position heading tracking median p
 
 
 class Mistake(Exception):
-    """Something that whoever calls can mend; the text says how."""
+    """A mistake that the caller can mend; the text says how."""
 
 
 def rate(setting, speed, step=0.2):
@@ -113,9 +113,9 @@ def rows_of(file):
         try:
             pragma = lambda name: database.execute(f"PRAGMA {name}").fetchone()[0]
             if pragma("application_id") != APPLICATION:
-                raise Mistake(f"{file}: is a database, but not one of rhec's sweeps; give the one that scripts/reproduce made")
+                raise Mistake(f"{file}: is a database, but not one of rhec's sweeps; give the one that scripts/study/reproduce made")
             if pragma("user_version") != VERSION:
-                raise Mistake(f"{file}: has version {pragma('user_version')} of the schema, expected {VERSION}; judge it with "
+                raise Mistake(f"{file}: has version {pragma('user_version')} of the schema, expected {VERSION}; assess it with "
                               "the program that made it, or make it anew")
             if path.stat().st_size < pragma("page_count") * pragma("page_size"):
                 raise sqlite3.DatabaseError("the file is shorter than it says")
@@ -124,7 +124,7 @@ def rows_of(file):
         finally:
             database.close()
     except sqlite3.Error as problem:
-        raise Mistake(f"{file}: cannot be read as a database ({problem}); give the one that scripts/reproduce made, or remove "
+        raise Mistake(f"{file}: cannot be read as a database ({problem}); give the one that scripts/study/reproduce made, or remove "
                       "it and make it anew") from None
 
 
@@ -134,7 +134,7 @@ class Study:
     def __init__(self):
         self.runs, self.programs, self.days = {}, set(), set()
         self.count, self.bytes, self.seconds = 0, 0, 0.0
-        self.remarks = []  # what whoever reads a page of it must know
+        self.remarks = []  # what a reader of its page must know
 
     def put(self, setting, speed, path, method, seed, run):
         methods = self.runs.setdefault((setting, speed), {}).setdefault(path, {})
@@ -158,7 +158,7 @@ class Study:
             path = configuration["path"]["name"]
             if status in ("failed", "refused"):
                 raise Mistake(f"{where} (path {path}, seed {seed}): {status}: {reason}; mend the cause, delete such rows "
-                              "(docs/sweep.md), and start scripts/reproduce again")
+                              "(docs/sweep.md), and start scripts/study/reproduce again")
             rest = without(configuration, VARIED)
             if rests.setdefault(path, rest) != rest:
                 raise Mistake(f"{where} (path {path}, seed {seed}): differs from others in a key that the study does not vary; "
