@@ -12,8 +12,8 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/blocking.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::testing {
 

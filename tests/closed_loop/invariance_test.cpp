@@ -16,8 +16,8 @@
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/control/controller.hpp"
 #include "rhec/core/estimation/estimator.hpp"
-#include "rhec/plugins/robot.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/robot/robot.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
 namespace {

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "rhec/core/control/path.hpp"
-#include "rhec/plugins/robot.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/robot/robot.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec {

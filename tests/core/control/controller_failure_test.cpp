@@ -12,8 +12,8 @@
 #include "rhec/core/control/controller.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
-#include "rhec/plugins/robot.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/robot/robot.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
 namespace {

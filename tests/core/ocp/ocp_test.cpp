@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "rhec/core/ocp/linearisation.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
+#include "rhec/core/ocp/linearisation.hpp"
 #include "support/cart.hpp"
 #include "support/test_models.hpp"
 

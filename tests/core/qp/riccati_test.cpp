@@ -118,7 +118,8 @@ TEST(Riccati, CombinesResponsesToTheSolutionWithTheirGradients) {
       weights[c] = random.uniform(-2.0, 2.0);
       changed.h(stage)[gradients[c].place] += weights[c];
     }
-    ASSERT_TRUE(riccati.find_sensitivities(qp, active, gradients.data(), static_cast<int>(gradients.size()), sensitivities));
+    ASSERT_TRUE(
+        riccati.find_sensitivities(qp, active, gradients.data(), static_cast<int>(gradients.size()), sensitivities));
     Iterate expected(qp.capacity()), step(qp.capacity());
     ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
     std::vector<double> values(step.row(0),

@@ -8,8 +8,8 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/ocp/solver.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec::ipopt::testing {

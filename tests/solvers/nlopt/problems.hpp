@@ -11,8 +11,8 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/core/ocp/solver.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "support/random_problem.hpp"
 #include "support/test_models.hpp"
 

@@ -15,8 +15,8 @@
 
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/riccati.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "support/random_problem.hpp"
 #include "support/test_models.hpp"
 
