@@ -19,6 +19,13 @@ if(RHEC_SANITIZE)
   target_compile_options(rhec_flags INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
   target_link_options(rhec_flags INTERFACE -fsanitize=address,undefined)
 endif()
+if(RHEC_SANITIZE_THREADS)
+  if(RHEC_SANITIZE)
+    message(FATAL_ERROR "RHEC_SANITIZE and RHEC_SANITIZE_THREADS are both ON; the compiler can do one of them at a time")
+  endif()
+  target_compile_options(rhec_flags INTERFACE -fsanitize=thread)
+  target_link_options(rhec_flags INTERFACE -fsanitize=thread)
+endif()
 
 # rhec_set_up_shared_library(NAME): what all shared libraries of ours have. The target is `rhec_<NAME>`, its alias and its
 # name in the package are `rhec::<NAME>`.

@@ -32,7 +32,7 @@ MAY_USE = {
 }
 PLUGIN_FOLDERS = ("solvers", "models", "blocking")
 CORE_THIRD_PARTY = ("Eigen", "unsupported/Eigen", "fmt", "xsimd")
-CORE_LIBRARIES = ("libfmt", "libstdc++", "libm.", "libgcc_s", "libc.", "ld-linux", "libasan", "libubsan")
+CORE_LIBRARIES = ("libfmt", "libstdc++", "libm.", "libgcc_s", "libc.", "ld-linux", "libasan", "libubsan", "libtsan")
 STANDARD = set("""
 algorithm any array atomic barrier bit bitset charconv chrono codecvt compare complex concepts condition_variable
 coroutine deque exception execution filesystem format forward_list fstream functional future initializer_list iomanip

@@ -21,8 +21,9 @@ enum class ReferenceSpeed {
 /// Drives along a path: estimate in, input out (docs/method.md, section 3).
 ///
 /// At each call the closest point of the path is searched for ahead of the last one; the local reference is that point
-/// and the next N_c, each dt * u1ref metres further on. Where the solver fails, the plan of the last sample goes on,
-/// and is counted. Allocates in its constructor only.
+/// and the next N_c, each dt * u1ref metres further on. Where the solver fails, and fails again from a simulation, the
+/// plan of the last sample goes on, and is counted: its inputs one after the other, in the end the last of them. Where
+/// there is no plan yet, the vehicle goes straight ahead. Allocates in its constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {
@@ -46,7 +47,7 @@ class RHEC_EXPORT Controller {
     std::vector<double> inputs;  ///< u_k, n_u: to be applied until the next call
     PathPoint reference;         ///< the closest point of the path
     Report report;               ///< its objective and KKT residual need not be there before `finish`
-    bool fallback = false;       ///< the solver failed: this is the last plan's
+    bool fallback = false;       ///< the solver failed: this is the last plan's, if there is one
     bool softened = false;       ///< a state bound was out of the estimate's reach and was moved
   };
   /// The input for an estimate. Valid until the next call.
@@ -72,6 +73,7 @@ class RHEC_EXPORT Controller {
   void bound_speed(double most) noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
   void start_cold() noexcept;
+  bool find_plan(Clock::time_point deadline) noexcept;
 
   Setup setup_;
   Path path_;

@@ -1,7 +1,7 @@
 // A formula with all that formulas may use, compiled for every instruction set as models are.
-#include "every_function.hpp"
+#include "support/every_function.hpp"
 
-#include "model_checks.hpp"
+#include "models/model_checks.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/formula_model.hpp"
 
