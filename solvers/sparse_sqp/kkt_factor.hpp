@@ -38,7 +38,7 @@ class KktFactor {
   int analyses() const noexcept { return analyses_; }  ///< symbolic factors made so far
   std::int64_t entries() const noexcept;               ///< of L, for the structure taken
 
-  /// The values of a matrix. The arrays must stay valid and unchanged while the factor is used.
+  /// The values of a matrix. The arrays must stay valid while the factor is used.
   struct Numbers {
     const double* hessian = nullptr;      ///< in the pattern of SparseNlp::hessian()
     const double* jacobian = nullptr;     ///< in the pattern of SparseNlp::jacobian()

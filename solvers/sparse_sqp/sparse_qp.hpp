@@ -51,7 +51,7 @@ class SparseQp {
                         Clock::time_point deadline);
 
   /// Second-order correction: the shortest step, in the metric of the last QP's Hessian and on its active set, that
-  /// satisfies J d + c = 0 for other constraint values c. False if there is none.
+  /// satisfies J d + c = 0 for other constraint values c. False if the linear system cannot be solved accurately.
   bool correct(const Data& qp, const double* constraints, double* step);
 
   int factorisations() const noexcept { return factorisations_; }  ///< since construction

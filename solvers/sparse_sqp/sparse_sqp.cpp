@@ -236,7 +236,7 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
   if (penalty_ < least_penalty) {
     penalty_ = least_penalty;
   } else if (penalty_ > 4.0 * least_penalty && penalty_cuts_left_ > 0 && predicted_defect_ == 0.0) {
-    // Multipliers can be huge far from the solution; a penalty that kept up with them would shorten every later step.
+    // Multipliers can be huge far from the solution; a penalty that stayed that large would shorten every later step.
     penalty_ = 2.0 * least_penalty;
     --penalty_cuts_left_;
   }
