@@ -37,7 +37,7 @@ class Pattern : public LinkedBlocking {
     std::fill_n(begins, window.intervals, std::uint8_t{0});
     begins[0] = 1;
     if (anchor_ == Anchor::horizon) {
-      // Not the last border: behind it, the last block goes on.
+      // Not the last border: the last block continues beyond it.
       for (auto border = borders_.begin(); border + 1 != borders_.end() && *border < window.intervals; ++border) {
         begins[*border] = 1;
       }

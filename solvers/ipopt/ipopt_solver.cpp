@@ -20,7 +20,7 @@ constexpr double smallest_inner_tolerance = 1e-14;
 /// Relative contribution of the barrier to the objective that is negligible, as a multiple of the tolerance.
 constexpr double negligible_gap = 1.0;
 constexpr int most_spare_iterations = 6;
-/// Below this residual Newton's method converges locally.
+/// Below this residual another run polishes the best iterate.
 constexpr double near_solution = 1e-4;
 constexpr int most_polishes = 2;
 /// Iterations after which another kind of start is more promising. Runs that take longer are mostly those that wander

@@ -83,7 +83,7 @@ bool Run::go_to(const double* y, bool with_gradient) {
 bool Run::may_count(const Vector& x, bool with_gradient) {
   if (with_gradient != uses_gradients_) return true;
   if (iterations_ > 0 && x == last_counted_) {
-    // LD_CCSAQ and LD_MMA retry the same point endlessly if rounding keeps it from being accepted.
+    // LD_CCSAQ and LD_MMA retry the same point again and again if rounding keeps it from being accepted.
     if (++returns_ <= most_returns) return true;
     stop(Outcome::ended);
     return false;
