@@ -11,7 +11,7 @@ namespace rhec {
 ///     psi_i' = mu v / L_i (sin(eta beta) - l / L_t tan(kappa delta) cos(eta beta))
 ///     delta' = delta_rate
 ///
-/// The tractor's rear axle moves at mu v along psi_t. The position to follow the path is that of the trailer's axle,
+/// The tractor's rear axle moves at mu v along psi_t. The position that follows the path is that of the trailer's axle,
 ///
 ///     x_i = x_t - l cos(psi_t) - L_i cos(psi_i),      y_i = y_t - l sin(psi_t) - L_i sin(psi_i)
 ///

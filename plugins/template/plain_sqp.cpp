@@ -2,9 +2,9 @@
 // replace newton.hpp, and change the options and the names in RHEC_PLUGIN. rhec/core/ocp/solver.hpp says what a solver
 // must do.
 //
-// This one does not prepare before the newest data arrive, keeps nothing from one solve to the next, computes no
-// covariances, and takes no stages wider than the Riccati recursion does. With distant guesses on long horizons, or
-// with many active bounds, it may end with iteration_limit or stalled.
+// This one does not prepare before the newest data arrive, keeps nothing but the iterate from one solve to the next,
+// computes no covariances, and takes no stages wider than the Riccati recursion does. With distant guesses on long
+// horizons, or with many active bounds, it may end with iteration_limit or stalled.
 #include "newton.hpp"
 #include "rhec/plugins/sdk.hpp"
 

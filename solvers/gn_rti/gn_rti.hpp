@@ -31,7 +31,7 @@ struct GnRtiOptions {
 };
 
 /// Sequential quadratic programming on the stages of an Ocp; the QPs are solved by a Riccati recursion (docs/method.md,
-/// "Riccati recursion" and "Real-time iteration" [9]).
+/// section 7 [9]).
 ///
 /// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers imply; `feedback`
 /// then needs vector operations only, unless the newest data change the active set. `finish` linearises at the new

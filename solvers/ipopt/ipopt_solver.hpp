@@ -23,7 +23,7 @@ struct IpoptOptions {
 };
 
 /// Multiple shooting: all states and controls are variables of one sparse NLP, solved by Ipopt's interior-point filter
-/// method [16] (docs/method.md, "Sparse and dense forms").
+/// method [16] (docs/method.md, section 7).
 ///
 /// Ipopt runs until the core's KKT residual is within the tolerance and the barrier's contribution to the objective is
 /// negligible; Ipopt's own convergence test does not decide. A guess with multipliers is a warm start: its multipliers

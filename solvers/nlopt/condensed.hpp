@@ -9,7 +9,7 @@
 
 namespace rhec::nlopt {
 
-/// An Ocp with its states eliminated by simulation (single shooting; docs/method.md, "Sparse and dense forms"):
+/// An Ocp with its states eliminated by simulation (single shooting; docs/method.md, section 7):
 ///
 ///     minimise f(x)  subject to  lower <= x <= upper,  row_lower <= c(x) <= row_upper
 ///

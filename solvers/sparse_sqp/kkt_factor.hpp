@@ -13,11 +13,11 @@ namespace rhec::sparse_sqp {
 ///     K = [ H + diag(primal)   J'          ]
 ///         [ J                 -diag(dual)  ]      with primal, dual >= 0,
 ///
-/// as L D L' without pivoting, in an order that CHOLMOD chooses (AMD); docs/method.md, "Sparse and dense forms". Rows
-/// and columns of fixed variables are replaced by those of the identity, so the pattern never changes. K is
-/// equilibrated, and a small regularisation makes it quasi-definite: then any ordering is stable enough for iterative
-/// refinement against K itself [13, 14]. The reduced Hessian is positive definite if and only if D has as many negative
-/// entries as there are constraints.
+/// as L D L' without pivoting, in an order that CHOLMOD chooses (AMD); docs/method.md, section 7. Rows and columns of
+/// fixed variables are replaced by those of the identity, so the pattern never changes. K is equilibrated, and a small
+/// regularisation makes it quasi-definite: then any ordering is stable enough for iterative refinement against K itself
+/// [13, 14]. The reduced Hessian is positive definite if and only if D has as many negative entries as there are
+/// constraints.
 ///
 /// Orderings and symbolic factors are cached for each structure seen, up to a limit.
 class KktFactor {

@@ -9,7 +9,7 @@
 
 namespace rhec::sparse_sqp {
 
-/// Solves the QPs of an SQP method (docs/method.md, "Sparse and dense forms"),
+/// Solves the QPs of an SQP method (docs/method.md, section 7),
 ///
 ///     minimise 1/2 d'H d + g'd   subject to   J d + c = 0,   lower <= d <= upper,
 ///

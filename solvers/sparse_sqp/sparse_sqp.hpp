@@ -22,8 +22,8 @@ struct SparseSqpOptions {
   static const OptionTable<SparseSqpOptions>& table();
 };
 
-/// Sequential quadratic programming on the sparse NLP of an Ocp (docs/method.md, "Sparse and dense forms"), for
-/// horizons of thousands of intervals and for vehicles with many states. The cost of a step is linear in the horizon.
+/// Sequential quadratic programming on the sparse NLP of an Ocp (docs/method.md, section 7), for horizons of thousands
+/// of intervals and for vehicles with many states. The cost of a step is linear in the horizon.
 ///
 /// Every iterate satisfies the bounds. Steps come from a sparse QP (SparseQp) and are accepted by the l1 merit function
 /// f + penalty * |c|_1. Step lengths are shorter around stages where the merit would rise, and second-order corrections
