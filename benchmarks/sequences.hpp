@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "rhec/core/horizon/horizon_problem.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/problem_file.hpp"
 
 namespace rhec::bench {
 
-/// Problems that follow each other in time, and the guess for the first one.
+/// Problems of one structure that follow each other in time, and the guess for the first one.
 struct Sequence {
   std::string name;  ///< "gentle/rhe/fhb", "figure8/rhc"
   std::string kind;

@@ -6,7 +6,7 @@
 // computes no covariances, and takes no stages wider than the Riccati recursion does. With distant guesses on long
 // horizons, or with many active bounds, it may end with iteration_limit or stalled.
 #include "newton.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace {
 

@@ -21,7 +21,7 @@ struct Origin {
 ///
 /// A node is null, a scalar (text, not interpreted until it is read), a list, or a map that keeps the order of its
 /// keys. A node that is copied out of a tree still knows its key path in that tree. It knows nothing of files: see
-/// rhec/plugins/yaml.hpp for reading them.
+/// rhec/plugins/yaml/yaml.hpp for reading them.
 class RHEC_EXPORT Settings {
  public:
   enum class Kind { null, scalar, list, map };
