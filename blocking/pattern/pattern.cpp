@@ -1,4 +1,4 @@
-// Blocks of given lengths: move blocking as it is usually written, e.g. [1, 1, 3, 5].
+// Blocks of given lengths, the usual form of move blocking, e.g. [1, 1, 3, 5].
 #include <algorithm>
 
 #include "rhec/core/horizon/linked_blocking.hpp"

@@ -270,7 +270,7 @@ bool GnRti::covariances(const Iterate& iterate, StageRange nodes, std::span<doub
                                 is_last ? blocks.data() : nullptr);
 }
 
-/// The report on an iterate that no step has improved.
+/// Reports on an iterate that no step has improved.
 void GnRti::give_up(const Iterate& iterate, Report& report) noexcept {
   // The first check for numbers that are not finite on this path.
   if (is_sound_start(*ocp_, iterate, scratch_)) {

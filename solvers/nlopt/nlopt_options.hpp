@@ -14,9 +14,9 @@ namespace rhec::nlopt {
 /// What an algorithm of NLopt supports and requires.
 struct Traits {
   bool gradients = false;        ///< uses derivatives
-  bool inequalities = false;     ///< takes inequality constraints
-  bool equalities = false;       ///< takes equality constraints
-  bool bounds = true;            ///< takes bounds of variables
+  bool inequalities = false;     ///< supports inequality constraints
+  bool equalities = false;       ///< supports equality constraints
+  bool bounds = true;            ///< supports bounds of variables
   bool finite_bounds = false;    ///< requires finite bounds on all variables
   bool local_optimiser = false;  ///< solves subproblems with `local_algorithm`
   bool from_start = true;        ///< starts at the given point, so a restart from its last iterate makes sense
