@@ -11,10 +11,11 @@
 
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/model_check.hpp"
 #include "rhec/sim/scenario.hpp"
+#include "rhec/sim/truth_estimator.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -123,7 +124,7 @@ int check(const CheckArguments& arguments) {
   options.speed = arguments.speed;
   const RobotOptions robot =
       is_file(arguments.model) ? robot_of_scenario(arguments, options.speed) : robot_of_model(arguments);
-  const sim::ModelCheck found = sim::check_model(host, Robot(host, robot), options);
+  const sim::ModelCheck found = sim::check_model(host, Robot(host, robot, sim::scenario_estimators()), options);
   if (arguments.json) {
     fmt::print("{}\n", sim::check_json(found));
   } else {

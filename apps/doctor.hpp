@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 
 namespace rhec::apps {
 

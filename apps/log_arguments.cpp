@@ -6,8 +6,8 @@
 
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -12,7 +12,7 @@
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::apps {
 

@@ -8,7 +8,7 @@
 
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/scenario.hpp"
 
 namespace rhec::apps {

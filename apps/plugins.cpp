@@ -1,4 +1,4 @@
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 
 #include <fmt/format.h>
 

@@ -20,7 +20,7 @@
 #include "commands.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/sweep.hpp"
 #include "rhec/sim/sweep_runner.hpp"
 #include "rhec/sim/sweep_store.hpp"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/sweep.hpp"
 #include "rhec/sim/sweep_runner.hpp"
 

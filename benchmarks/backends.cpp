@@ -14,7 +14,7 @@
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"
 #include "solvers/ipopt/ipopt_solver.hpp"

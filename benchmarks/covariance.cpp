@@ -10,7 +10,7 @@
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/scenario.hpp"
 #include "rhec/sim/spread.hpp"
 #include "ticks.hpp"
@@ -73,16 +73,26 @@ class TimedMethod final : public EstimationMethod {
   std::shared_ptr<Times> times_;
 };
 
+/// Takes the times of an estimator and of its solver.
+class TimingHooks final : public RobotHooks {
+ public:
+  explicit TimingHooks(std::shared_ptr<Times> times) : times_(std::move(times)) {}
+  std::shared_ptr<Solver> wrap_solver(std::string_view, std::shared_ptr<Solver> solver) const override {
+    return std::make_shared<TickedSolver>(std::move(solver), times_);
+  }
+  std::unique_ptr<EstimationMethod> wrap_method(std::unique_ptr<EstimationMethod> method) const override {
+    return std::make_unique<TimedMethod>(std::move(method), times_);
+  }
+
+ private:
+  std::shared_ptr<Times> times_;
+};
+
 /// Estimates along a drive that winds about.
 void run(benchmark::State& state, Robot robot) {
   constexpr int settling = 30, steps = 200;
   const auto times = std::make_shared<Times>();
-  robot.wrap_solvers([times](std::string_view, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
-    return std::make_shared<TickedSolver>(std::move(solver), times);
-  });
-  robot.wrap_methods([times](std::unique_ptr<EstimationMethod> method) {
-    return std::make_unique<TimedMethod>(std::move(method), times);
-  });
+  robot.add_hooks(std::make_shared<TimingHooks>(times));
   const Model& model = *robot.model();
   const double step = robot.step();
   while (state.KeepRunning()) {

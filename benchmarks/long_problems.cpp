@@ -6,7 +6,7 @@
 
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::bench {
 namespace {

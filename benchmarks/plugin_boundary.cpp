@@ -12,7 +12,7 @@
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/chosen_outputs.hpp"
-#include "rhec/plugins/manifest.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"
 

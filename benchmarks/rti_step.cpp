@@ -9,7 +9,7 @@
 
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/spread.hpp"
 #include "rti_loop.hpp"
 

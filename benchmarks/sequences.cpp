@@ -14,7 +14,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/csv.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "rhec/core/horizon/horizon_problem.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/problem_file.hpp"
 
 namespace rhec::bench {

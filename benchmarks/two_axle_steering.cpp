@@ -3,7 +3,7 @@
 #include "two_axle_steering.hpp"
 
 #include "rhec/core/model/formula_model.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
 WideKernels two_axle_steering_wide_kernels();  // defined by rhec_add_wide_kernels

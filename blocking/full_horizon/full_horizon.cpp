@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "rhec/core/horizon/blocking.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
 namespace {

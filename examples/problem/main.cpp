@@ -2,7 +2,7 @@
 #include <cstdio>
 
 #include "parking_problem.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 
 int main(int count, char** words) try {
   const rhec::Host host;

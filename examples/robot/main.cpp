@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 
 int main(int count, char** words) try {
   if (count != 2) throw rhec::Error("expected one argument, a file such as robot.yaml");

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "rhec/core/model/formula_model.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
 

@@ -2,7 +2,7 @@
 #include "unicycle_traction.hpp"
 
 #include "rhec/core/model/formula_model.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
 

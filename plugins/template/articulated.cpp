@@ -3,7 +3,7 @@
 #include "articulated.hpp"
 
 #include "rhec/core/model/formula_model.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
 WideKernels articulated_wide_kernels();  // rhec_add_model(articulated ...) in CMakeLists.txt defines it

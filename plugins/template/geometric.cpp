@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "rhec/core/horizon/linked_blocking.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 // does, give covariances, take stages wider than the Riccati recursion does, or solve everything: from far guesses over
 // long horizons, and where many bounds are active, it may end with iteration_limit or stalled, and says so.
 #include "newton.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace {
 

@@ -10,6 +10,7 @@
 
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/sim/truth_estimator.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -113,15 +114,15 @@ Spread spread_of_times(std::vector<double> times) {
 
 RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   std::int64_t k = 0;
-  const Robot robot = with_hooks(scenario.robot(), hooks, [&k] { return k; });
+  Robot robot = with_hooks(scenario.robot(), hooks, [&k] { return k; });
   const Model& model = *robot.model();
   const Roles& roles = model.description().roles;
   const int nx = model.state_count(), np = model.parameter_count();
-  const bool oracle = robot.estimator_options().name == EstimatorOptions::Name::truth;
   const auto seed = static_cast<std::uint64_t>(scenario.options().seed);
   TruthVehicle truth(model, scenario.terrain(), scenario.initial_state(), scenario.vehicle());
+  robot.use_estimators(scenario_estimators(&truth));
   Sensors sensors(model, {robot.output_sigmas(), robot.input_sigmas()}, seed);
-  const auto estimator = oracle ? nullptr : robot.make_estimator(scenario.initial_state());
+  const auto estimator = robot.make_estimator(scenario.initial_state());
   const auto controller = robot.make_controller(scenario.path());
   PathFollower true_follower(scenario.path());
 
@@ -131,9 +132,6 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
       static_cast<std::int64_t>(3.0 * scenario.path().length() / (scenario.options().speed * step)) + 100;
   std::vector<double> outputs(model.output_count()), measured(model.input_count());
   Nees nees(nx + np);
-  Estimate known;
-  known.state.resize(nx);
-  known.parameters.resize(np);
   RunLog log;
   log.samples.reserve(static_cast<std::size_t>(limit));
   const auto begin = [&hooks](LoopPart part) {
@@ -142,20 +140,12 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   begin(LoopPart::simulate);
   for (;; ++k) {
     const double time = static_cast<double>(k) * step;
-    const Estimate* estimate = &known;
-    if (oracle) {
-      known.time = time;
-      known.state = truth.state();
-      known.parameters = truth.parameters();
-      known.report.status = Status::solved;
-    } else {
-      sensors.observe(truth.state().data(), outputs.data());
-      begin(LoopPart::estimate);
-      estimator->push_measurement(time, outputs.data());
-      estimate = &estimator->estimate(time);
-    }
+    sensors.observe(truth.state().data(), outputs.data());
+    begin(LoopPart::estimate);
+    estimator->push_measurement(time, outputs.data());
+    const Estimate& estimate = estimator->estimate(time);
     begin(LoopPart::control);
-    const Controller::Command& command = controller->control(*estimate);
+    const Controller::Command& command = controller->control(estimate);
     begin(LoopPart::log_sample);
     true_follower.advance(truth.state()[roles.position_x], truth.state()[roles.position_y]);
 
@@ -164,30 +154,30 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.time = time;
     sample.true_state = truth.state();
     sample.true_parameters = truth.parameters();
-    sample.state = estimate->state;
-    sample.parameters = estimate->parameters;
+    sample.state = estimate.state;
+    sample.parameters = estimate.parameters;
     sample.nees = std::numeric_limits<double>::quiet_NaN();
-    if (!oracle) {
-      sample.sigma = estimate->covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+    if (estimate.covariance.size() > 0) {
+      sample.sigma = estimate.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
       nees.error << sample.state - sample.true_state, sample.parameters - sample.true_parameters;
       for (int j = 0; j < nx; ++j)
         if (model.description().states[j].is_angle)
           nees.error[j] = angle_difference(sample.state[j], sample.true_state[j]);
-      sample.nees = nees.with(estimate->covariance);
+      sample.nees = nees.with(estimate.covariance);
     }
     sample.inputs = command.inputs;
     sample.reference = command.reference;
     sample.tracking = true_follower.lateral();
-    sample.estimator_status = estimate->report.status;
+    sample.estimator_status = estimate.report.status;
     sample.controller_status = command.report.status;
-    sample.estimator_fallback = estimate->fallback;
+    sample.estimator_fallback = estimate.fallback;
     sample.controller_fallback = command.fallback;
     sample.softened = command.softened;
-    sample.estimator_us = estimate->report.preparation_us + estimate->report.feedback_us;
-    sample.estimator_feedback_us = estimate->report.feedback_us;
+    sample.estimator_us = estimate.report.preparation_us + estimate.report.feedback_us;
+    sample.estimator_feedback_us = estimate.report.feedback_us;
     sample.controller_us = command.report.preparation_us + command.report.feedback_us;
     log.samples.push_back(std::move(sample));
-    if (hooks.sampled) hooks.sampled({k, time, estimator.get(), estimate, controller.get(), &command});
+    if (hooks.sampled) hooks.sampled({k, time, estimator.get(), &estimate, controller.get(), &command});
     if (hooks.progress) hooks.progress(std::min(1.0, true_follower.arc_length() / scenario.path().length()));
 
     if (controller->finished() || true_follower.finished()) {
@@ -209,10 +199,8 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     begin(LoopPart::prepare_control);
     controller->prepare();
     begin(LoopPart::prepare_estimate);
-    if (!oracle) {
-      estimator->push_input(time, measured.data());
-      estimator->prepare();
-    }
+    estimator->push_input(time, measured.data());
+    estimator->prepare();
     begin(LoopPart::simulate);
   }
   controller->finish();
@@ -231,7 +219,7 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
   std::map<Status, std::int64_t> estimator_statuses, controller_statuses;
   double nees = 0.0;
   std::int64_t with_nees = 0;
-  const bool solves_estimation = scenario.robot().estimator_options().name == EstimatorOptions::Name::rhe;
+  const bool solves_estimation = scenario.robot().estimator_options().name == "rhe";
   for (const Sample& sample : log.samples) {
     all.add(sample);
     if (sample.step >= scenario.robot().estimator_options().horizon) after_start.add(sample);

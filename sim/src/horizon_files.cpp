@@ -88,10 +88,7 @@ Json json_of(const PluginChoice& choice) {
 Json settings_of(const Robot& robot, bool has_controller) {
   Json json;
   json["step"] = robot.step();
-  const EstimatorOptions::Name name = robot.estimator_options().name;
-  json["estimator"] = name == EstimatorOptions::Name::rhe   ? "rhe"
-                      : name == EstimatorOptions::Name::ekf ? "ekf"
-                                                            : "truth";
+  json["estimator"] = robot.estimator_options().name;
   json["estimation_horizon"] = robot.estimator_options().horizon;
   const std::vector<std::shared_ptr<const Blocking>> blockings = robot.make_blockings();
   Json& list = json["blocking"] = Json::array();

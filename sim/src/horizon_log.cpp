@@ -328,8 +328,7 @@ const std::string& HorizonLog::records() const noexcept { return parts_->records
 
 void HorizonLog::take(const LoopSample& sample) {
   Parts& parts = *parts_;
-  const auto* window =
-      sample.estimator ? dynamic_cast<const RecedingHorizonEstimation*>(&sample.estimator->method()) : nullptr;
+  const auto* window = dynamic_cast<const RecedingHorizonEstimation*>(&sample.estimator->method());
   if (window) {
     parts.note_nodes(*window, sample.time);
     const Status status = sample.estimate->report.status;

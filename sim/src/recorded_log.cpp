@@ -11,6 +11,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/sim/csv.hpp"
+#include "rhec/sim/truth_estimator.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -305,7 +306,7 @@ LogScenario::LogScenario(const Host& host, const Settings& settings, const std::
   log_ = LogOptions::table().parse(base.log, "log");
   const auto add = [&](const std::string& name, const Settings& with) {
     const LogScenarioOptions options = LogScenarioOptions::table().parse(with, "scenario");
-    variants_.push_back({name, Robot(host, options)});
+    variants_.push_back({name, Robot(host, options, scenario_estimators())});
     check_names(log_, variants_.back().robot.model()->description(), base.log);
     const Settings* wheelbase = options.model.find("wheelbase");
     wheelbase_ = wheelbase ? wheelbase->as_number() : 0.0;

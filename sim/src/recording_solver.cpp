@@ -1,10 +1,30 @@
 #include "rhec/sim/recording_solver.hpp"
 
+#include <string_view>
 #include <utility>
 
 #include "rhec/core/ocp/timed_solver.hpp"
 
 namespace rhec::sim {
+namespace {
+
+/// Takes the times of solvers, and records them where somebody wants to be told.
+class SolverHooks final : public RobotHooks {
+ public:
+  SolverHooks(RecordingSolver::Callback solved, std::function<std::int64_t()> step)
+      : solved_(std::move(solved)), step_(std::move(step)) {}
+  std::shared_ptr<Solver> wrap_solver(std::string_view, std::shared_ptr<Solver> solver) const override {
+    auto timed = std::make_shared<TimedSolver>(std::move(solver));
+    if (!solved_) return timed;
+    return std::make_shared<RecordingSolver>(std::move(timed), step_, solved_);
+  }
+
+ private:
+  RecordingSolver::Callback solved_;
+  std::function<std::int64_t()> step_;
+};
+
+}  // namespace
 
 RecordingSolver::RecordingSolver(std::shared_ptr<Solver> solver, std::function<std::int64_t()> step, Callback callback)
     : SolverDecorator(std::move(solver)), step_(std::move(step)), callback_(std::move(callback)) {}
@@ -48,14 +68,7 @@ void RecordingSolver::finish(Iterate& iterate, Report& report) noexcept {
 }
 
 Robot with_hooks(Robot robot, const LoopHooks& hooks, std::function<std::int64_t()> step) {
-  robot.wrap_solvers([](std::string_view, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
-    return std::make_shared<TimedSolver>(std::move(solver));
-  });
-  if (!hooks.solved) return robot;
-  robot.wrap_solvers([solved = hooks.solved, step = std::move(step)](
-                         std::string_view, std::shared_ptr<Solver> solver) -> std::shared_ptr<Solver> {
-    return std::make_shared<RecordingSolver>(std::move(solver), step, solved);
-  });
+  robot.add_hooks(std::make_shared<SolverHooks>(hooks.solved, std::move(step)));
   return robot;
 }
 

@@ -9,8 +9,10 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/plugins/robot/by_name.hpp"
 #include "rhec/sim/paths.hpp"
 #include "rhec/sim/recorded_log.hpp"
+#include "rhec/sim/truth_estimator.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -49,6 +51,17 @@ const OptionTable<PathOptions>& path_table() {
   return rows;
 }
 
+/// The values of constant terrain.
+const NumbersByName& values_by_name() {
+  static const NumbersByName map(
+      "terrain values", {any()},
+      {{"PARAMETER",
+        &ModelDescription::parameters,
+        {"", [](const ModelDescription&, const Variable& parameter, std::size_t) { return parameter.nominal; }},
+        "of constant; where nothing slips (1, or 0 of an angle)"}});
+  return map;
+}
+
 const OptionTable<TerrainOptions>& terrain_table() {
   using T = TerrainOptions;
   static const auto rows =
@@ -64,8 +77,9 @@ const OptionTable<TerrainOptions>& terrain_table() {
           .number("patch_size", &T::patch_size, "of patches [m]", greater_than(0.0))
           .number("lower", &T::lower, "least value of gaussian and patches, of ratios (1 where nothing slips)")
           .number("upper", &T::upper, "largest value of gaussian and patches, of ratios")
-          .subtree("ranges", &T::ranges, "of gaussian and patches: [lower, upper] by parameter, in place of these")
-          .subtree("values", &T::values, "of constant: by parameter (where nothing slips)")
+          .map("ranges", &T::ranges,
+               {{"PARAMETER", "[lower, upper]", "", "", "of gaussian and patches, in place of lower and upper"}})
+          .map("values", &T::values, values_by_name().rows())
           .names("files", &T::files, "of raster: one a parameter")
           .choice(
               "interpolation", &T::interpolation,
@@ -131,7 +145,7 @@ std::vector<Waypoint> make_waypoints(const ScenarioOptions& options) {
 
 std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDescription& about,
                                    const Settings& section) {
-  require_known_keys(terrain.ranges, names_of(about.parameters), "terrain ranges");
+  check_keys(terrain.ranges, names_of(about.parameters), "terrain ranges");
   std::vector<SlipRange> ranges(about.parameters.size(), SlipRange{terrain.lower, terrain.upper});
   const bool varies = terrain.name == TerrainOptions::Name::gaussian || terrain.name == TerrainOptions::Name::patches;
   for (std::size_t j = 0; j < ranges.size(); ++j) {
@@ -146,7 +160,7 @@ std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDes
                                "upper] under ranges.{}",
                                parameter.name, parameter.name));
     }
-    if (pair) std::tie(ranges[j].lower, ranges[j].upper) = bounds_in(*pair);
+    if (pair) std::tie(ranges[j].lower, ranges[j].upper) = BoundsValue{}.read(*pair, {});
     if (pair && !(std::isfinite(ranges[j].lower) && std::isfinite(ranges[j].upper)))
       throw pair->mismatch("two finite numbers [lower, upper]");
   }
@@ -158,8 +172,7 @@ std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, co
   if (!(terrain.lower <= terrain.upper))
     throw key_or_section(options.terrain, "lower")
         .error(fmt::format("lower is {} and upper is {}; expected lower <= upper", terrain.lower, terrain.upper));
-  const std::vector<double> constant =
-      numbers_by_name(terrain.values, about.parameters, nominal_values(about.parameters), any(), "terrain values");
+  const std::vector<double> constant = values_by_name().read(terrain.values, about);
   const std::vector<SlipRange> ranges = slip_ranges(terrain, about, options.terrain);
   const auto seed = static_cast<std::uint64_t>(options.seed);
   switch (terrain.name) {
@@ -209,13 +222,7 @@ std::vector<OptionSection> scenario_sections() {
       {"terrain", "The ground: the true parameters of the model as a function of position.", terrain_table().schema()},
       {"vehicle", "The vehicle as it really moves.", vehicle_table().schema()},
   };
-  for (OptionRow& row : sections[2].rows) {
-    if (row.name == "ranges")
-      row = {"ranges.PARAMETER", "[lower, upper]", "", "", "of gaussian and patches, in place of lower and upper"};
-    if (row.name == "values")
-      row = {"values.PARAMETER", "number", "", "", "of constant; where nothing slips (1, or 0 of an angle)"};
-  }
-  for (OptionSection& section : robot_sections()) sections.push_back(std::move(section));
+  for (OptionSection& section : robot_sections(scenario_estimators())) sections.push_back(std::move(section));
   sections.push_back({"log", "For `rhec estimate`: how a drive was recorded, and what its columns mean to the model.",
                       LogOptions::table().schema()});
   sections.push_back(
@@ -227,7 +234,7 @@ std::vector<OptionSection> scenario_sections() {
 
 Scenario::Scenario(const Host& host, const Settings& settings)
     : options_(ScenarioOptions::table().parse(settings, "scenario")),
-      robot_(host, options_),
+      robot_(host, options_, scenario_estimators()),
       path_(make_waypoints(options_)),
       terrain_(make_terrain(options_, robot_.model()->description())) {
   vehicle_ = vehicle_table().parse(options_.vehicle, "vehicle");

@@ -21,6 +21,18 @@ std::ptrdiff_t node_at(const SmoothedRun& run, double time) {
   return std::max<std::ptrdiff_t>(0, after - run.times.begin() - 1);
 }
 
+/// Keeps what an estimator is given and answers.
+class NodeHooks final : public RobotHooks {
+ public:
+  explicit NodeHooks(std::shared_ptr<NodeLog> nodes) : nodes_(std::move(nodes)) {}
+  std::unique_ptr<EstimationMethod> wrap_method(std::unique_ptr<EstimationMethod> method) const override {
+    return std::make_unique<NodeRecorder>(std::move(method), nodes_);
+  }
+
+ private:
+  std::shared_ptr<NodeLog> nodes_;
+};
+
 }  // namespace
 
 SmoothedReplay smooth(const std::string& name, const Robot& robot, const RecordedLog& log, const LogOptions& options,
@@ -28,9 +40,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
   SmoothedReplay result;
   const auto nodes = std::make_shared<NodeLog>();
   Robot recorded = robot;
-  recorded.wrap_methods([nodes](std::unique_ptr<EstimationMethod> method) -> std::unique_ptr<EstimationMethod> {
-    return std::make_unique<NodeRecorder>(std::move(method), nodes);
-  });
+  recorded.add_hooks(std::make_shared<NodeHooks>(nodes));
   result.causal = replay(recorded, log, options, hold_out, hooks);
   result.causal.name = name + causal_suffix;
   if (result.causal.estimates.empty()) throw Error("the log has no fix that is not withheld: nothing can be estimated");

@@ -9,7 +9,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/options.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -13,6 +13,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/sim/scenario.hpp"
 #include "rhec/sim/sweep.hpp"
+#include "rhec/sim/truth_estimator.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -73,8 +74,10 @@ void append_canonical(const Settings& settings, std::string& text) {
 /// What a run makes before its first sample; throws Error for what is wrong with its settings.
 void make_parts(const Host& host, const Settings& settings) {
   const Scenario scenario(host, settings);
-  const Robot& robot = scenario.robot();
-  if (robot.estimator_options().name != EstimatorOptions::Name::truth) robot.make_estimator(scenario.initial_state());
+  Robot robot = scenario.robot();
+  const TruthVehicle truth(*robot.model(), scenario.terrain(), scenario.initial_state(), scenario.vehicle());
+  robot.use_estimators(scenario_estimators(&truth));
+  robot.make_estimator(scenario.initial_state());
   robot.make_controller(scenario.path());
 }
 

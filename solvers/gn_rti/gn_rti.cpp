@@ -7,7 +7,7 @@
 
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/stage_checks.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec::gn_rti {
 namespace {

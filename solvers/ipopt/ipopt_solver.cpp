@@ -9,7 +9,7 @@
 
 #include "native_options.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec::ipopt {
 namespace {

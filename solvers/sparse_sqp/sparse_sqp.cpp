@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "rhec/core/ocp/iterate_checks.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 #include "stage_convexity.hpp"
 #include "stage_covariances.hpp"
 

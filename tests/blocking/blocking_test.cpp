@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
 namespace {

@@ -6,7 +6,8 @@
 
 A folder includes folders on lower floors, and itself; a plugin includes its own folder, core and plugins. Benchmarks look
 into plugins too, as "solvers/gn_rti/gn_rti.hpp". A room includes its own files and the public headers of the rooms that it
-comes after: `rhec_add_room(<floor> <room> AFTER <room> ...)` in its CMakeLists.txt says which.
+comes after: `rhec_add_room(<floor> <room> AFTER <room> ...)` in its CMakeLists.txt says which. A folder of a floor that is a
+project of its own (the template of plugins) is no room: it includes what the floor has for others.
 """
 import argparse
 import pathlib
@@ -42,6 +43,7 @@ cassert cctype cerrno cfenv cfloat cinttypes climits clocale cmath csetjmp csign
 cstdlib cstring ctime cuchar cwchar cwctype
 """.split())
 ROOM = re.compile(r"^rhec_add_room\((\w+)\s+(\w+)([^)]*)\)", re.MULTILINE)
+PROJECT = re.compile(r"^project\(", re.MULTILINE)
 ROOM_KEYWORDS = ("INTERNAL", "AFTER", "SOURCES", "PUBLIC", "PRIVATE")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
@@ -50,9 +52,12 @@ class Rooms:
     """The rooms of all floors: which rooms of its floor each may include, and which are not to be seen from other floors."""
 
     def __init__(self, root):
-        self.after, self.internal, self.violations = {}, set(), []
+        self.after, self.internal, self.projects, self.violations = {}, set(), set(), []
         for file in sorted(root.glob("*/*/CMakeLists.txt")):
-            for floor, room, words in ROOM.findall(file.read_text(encoding="utf-8")):
+            text = file.read_text(encoding="utf-8")
+            if PROJECT.search(text):
+                self.projects.add(file.parent.parts[-2:])
+            for floor, room, words in ROOM.findall(text):
                 self._add(file, floor, room, words.split())
         for floor, room in self.after:
             for other in sorted(self.reach(floor, room) - {room}):
@@ -92,6 +97,9 @@ class Rooms:
         parts = file.relative_to(root).parts
         return parts[1] if len(parts) > 2 and (parts[0], parts[1]) in self.after else None
 
+    def is_own_project(self, root, file):
+        return file.relative_to(root).parts[:2] in self.projects
+
     def why_not(self, root, file, name):
         """`name` is "rhec/<floor>/..." of a floor that may be included."""
         floor, rest = name.split("/")[1], name.split("/")[2:]
@@ -100,7 +108,7 @@ class Rooms:
         if len(rest) != 2 or rest[0] not in self.of_floor(floor):
             return f'public headers of {floor}/ are named "rhec/{floor}/<room>/<header>.hpp"'
         own_floor, own_room = file.relative_to(root).parts[0], self.of_file(root, file)
-        if own_floor != floor:
+        if own_floor != floor or self.is_own_project(root, file):
             return f"{floor}/{rest[0]} is not to be seen from other floors" if (floor, rest[0]) in self.internal else None
         reach = self.reach(floor, own_room)
         if rest[0] not in reach:
@@ -122,7 +130,8 @@ def allowed_text(folder):
 def own_folder(root, rooms, file):
     """The folder within which a file may include by relative name: its plugin's or its room's, else that of the floor."""
     parts = file.relative_to(root).parts
-    is_inner = len(parts) > 2 and (parts[0] in PLUGIN_FOLDERS or rooms.of_file(root, file))
+    is_inner = len(parts) > 2 and (
+        parts[0] in PLUGIN_FOLDERS or rooms.of_file(root, file) or rooms.is_own_project(root, file))
     return root.joinpath(*parts[: 2 if is_inner else 1])
 
 
@@ -162,7 +171,7 @@ def include_violations(root):
             reason = match and why_not_include(root, rooms, file, *match.groups())
             if reason:
                 violations.append(f"{file}:{number}: {reason}; allowed: {allowed_text(folder)}")
-        if rooms.of_floor(folder) and not rooms.of_file(root, file):
+        if rooms.of_floor(folder) and not rooms.of_file(root, file) and not rooms.is_own_project(root, file):
             violations.append(f"{file}:1: lies in no room of {folder}/; its rooms are {', '.join(sorted(rooms.of_floor(folder)))}")
     return violations, looked_at
 
@@ -213,7 +222,7 @@ def library_violations(lib, plugins):
 def self_test():
     """Plants violations, and things that are none, in a small tree; each must be told apart."""
     wrong = {
-        "core/low/up.cpp": '#include "rhec/plugins/host.hpp"',
+        "core/low/up.cpp": '#include "rhec/plugins/host/host.hpp"',
         "core/low/angle.cpp": "#include <rhec/core/low/model.hpp>",
         "core/low/boost.cpp": "#include <boost/dll.hpp>",
         "core/low/include/rhec/core/low/escapes.hpp": '#include "../../../../../../sim/src/own.hpp"',
@@ -225,8 +234,9 @@ def self_test():
         "core/round/CMakeLists.txt": "rhec_add_room(core round AFTER trip)",
         "core/trip/CMakeLists.txt": "rhec_add_room(core trip AFTER round)",
         "core/lost/CMakeLists.txt": "rhec_add_room(core lost AFTER nowhere)",
-        "plugins/src/up.cpp": '  #  include "rhec/sim/world.hpp"',
-        "plugins/src/internal.cpp": '#include "rhec/core/inner/lanes.hpp"',
+        "plugins/host/up.cpp": '  #  include "rhec/sim/world.hpp"',
+        "plugins/host/internal.cpp": '#include "rhec/core/inner/lanes.hpp"',
+        "plugins/template/peeks.cpp": '#include "../host/own.hpp"',
         "models/a/other.cpp": '#include "../b/b.hpp"',
         "solvers/s/sim.cpp": '#include "rhec/sim/world.hpp"',
         "sim/src/model.cpp": '#include "rhec/models/a.hpp"',
@@ -243,10 +253,15 @@ def self_test():
         "core/high/inner.cpp": '#include "rhec/core/inner/lanes.hpp"\n#include "rhec/core/high/model.hpp"',
         "core/low/own_user.cpp": '#include "own.hpp"',
         "core/low/own.hpp": "#pragma once\n// #include \"rhec/sim/world.hpp\"",
-        "plugins/src/good.cpp": '#include <boost/dll.hpp>\n#include "rhec/core/high/model.hpp"',
-        "models/b/b.hpp": '#include "rhec/plugins/sdk.hpp"',
+        "plugins/kit/CMakeLists.txt": "rhec_add_room(plugins kit)",
+        "plugins/host/CMakeLists.txt": "rhec_add_room(plugins host AFTER kit)",
+        "plugins/host/own.hpp": "#pragma once",
+        "plugins/template/CMakeLists.txt": "project(template)",
+        "plugins/template/user.cpp": '#include "rhec/plugins/host/host.hpp"\n#include "rhec/core/high/model.hpp"',
+        "plugins/host/good.cpp": '#include <boost/dll.hpp>\n#include "rhec/core/high/model.hpp"',
+        "models/b/b.hpp": '#include "rhec/plugins/kit/sdk.hpp"',
         "models/b/b.cpp": '#include "b.hpp"',
-        "sim/src/own.hpp": '#include "rhec/plugins/host.hpp"\n#include "rhec/sim/world.hpp"',
+        "sim/src/own.hpp": '#include "rhec/plugins/host/host.hpp"\n#include "rhec/sim/world.hpp"',
         "benchmarks/all.cpp": '#include <benchmark/benchmark.h>\n#include "models/b/b.hpp"\n#include "rhec/sim/world.hpp"',
         "apps/main.cpp": '#include <CLI/CLI.hpp>\n#include "rhec/sim/world.hpp"',
     }

@@ -7,7 +7,7 @@
 #include <new>
 
 #include "model_checks.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/model_check.hpp"
 
 namespace {

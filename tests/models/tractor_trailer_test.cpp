@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "rhec/core/model/model.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
 namespace {

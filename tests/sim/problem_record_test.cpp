@@ -13,8 +13,8 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/problem_file.hpp"
 #include "rhec/sim/recording_solver.hpp"

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/recorded_log.hpp"
 
 namespace rhec::sim {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/horizon_log.hpp"
 #include "rhec/sim/report.hpp"

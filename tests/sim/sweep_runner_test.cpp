@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/closed_loop.hpp"
 
 namespace rhec::sim {

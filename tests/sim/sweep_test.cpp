@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::sim {
 namespace {

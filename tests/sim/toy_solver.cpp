@@ -6,7 +6,7 @@
 
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/kkt.hpp"
-#include "rhec/plugins/sdk.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace {
 

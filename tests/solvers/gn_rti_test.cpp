@@ -11,8 +11,8 @@
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/core/horizon/shift.hpp"
 #include "rhec/core/qp/riccati.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "support/other_model.hpp"
 #include "support/random_problem.hpp"
 

@@ -13,8 +13,8 @@
 #include <thread>
 
 #include "rhec/core/ocp/solver.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "solvers/ipopt/ocp_nlp.hpp"
 #include "support/random_problem.hpp"
 

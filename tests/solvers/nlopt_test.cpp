@@ -8,8 +8,8 @@
 
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/core/ocp/solver.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "solvers/nlopt/active_set.hpp"
 #include "solvers/nlopt/condensed.hpp"
 #include "support/random_problem.hpp"

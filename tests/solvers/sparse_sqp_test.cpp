@@ -16,8 +16,8 @@
 
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/riccati.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "solvers/sparse_sqp/stage_convexity.hpp"
 #include "solvers/sparse_sqp/stage_covariances.hpp"
 #include "support/random_problem.hpp"

@@ -14,8 +14,8 @@
 
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/core/model/formula_model.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::testing {
 

@@ -197,6 +197,32 @@ TEST(Options, TheSchemaShowsDefaultsAndConstraints) {
   EXPECT_EQ(Options::table().schema()[1].meaning, "block length [intervals]");
 }
 
+struct Weights {
+  Settings by_name, list;
+  static const OptionTable<Weights>& table() {
+    static const auto options =
+        OptionTable<Weights>()
+            .map("by_name", &Weights::by_name,
+                 {{"STATE", "number", "1", "at least 0", "of a state"}, {"INPUT", "number", "5", "", "of an input"}})
+            .map("list", &Weights::list, {{"", "list of texts", "[]", "", "which count"}});
+    return options;
+  }
+};
+
+TEST(Options, AMapIsPassedThroughAndDocumentedByItsRows) {
+  Settings from;
+  from.set("by_name.x", line(3, "2"));
+  EXPECT_EQ(Weights::table().parse(from, "weights").by_name.find("x")->as_number(), 2.0);
+  EXPECT_TRUE(Weights::table().parse({}, "weights").list.is_null());
+  const std::vector<OptionRow> rows = Weights::table().schema();
+  ASSERT_EQ(rows.size(), 3U);
+  EXPECT_EQ(rows[0].name, "by_name.STATE");
+  EXPECT_EQ(rows[0].constraint, "at least 0");
+  EXPECT_EQ(rows[1].name, "by_name.INPUT");
+  EXPECT_EQ(rows[1].default_value, "5");
+  EXPECT_EQ(rows[2].name, "list");
+}
+
 TEST(Nearest, FindsSlipsOfTheHand) {
   const std::vector<std::string> words = {"overlap", "size", "transition"};
   EXPECT_EQ(nearest("ovrelap", words), "overlap");

@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "rhec/core/model/formula_model.hpp"
-#include "rhec/plugins/robot.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/robot/robot.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
 namespace {

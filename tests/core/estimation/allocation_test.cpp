@@ -13,8 +13,8 @@
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/paths.hpp"
 #include "rhec/sim/truth.hpp"
 

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 
 namespace rhec {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec {

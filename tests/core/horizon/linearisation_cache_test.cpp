@@ -8,8 +8,8 @@
 
 #include "rhec/core/horizon/shift.hpp"
 #include "rhec/core/ocp/linearisation.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "support/other_model.hpp"
 #include "support/random_problem.hpp"
 

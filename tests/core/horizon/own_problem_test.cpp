@@ -7,8 +7,8 @@
 #include "examples/problem/parking_problem.hpp"
 #include "rhec/core/horizon/shift.hpp"
 #include "rhec/core/ocp/linearisation.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
 namespace {

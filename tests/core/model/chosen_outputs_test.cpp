@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/host.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec {

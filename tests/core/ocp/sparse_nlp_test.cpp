@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "rhec/core/ocp/solver.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec {

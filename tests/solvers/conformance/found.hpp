@@ -7,7 +7,7 @@
 
 #include "rhec/core/config/settings.hpp"
 #include "rhec/core/ocp/solver.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 
 namespace rhec::conformance {
 

@@ -13,7 +13,7 @@
 
 #include "found.hpp"
 #include "judge.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/problem_file.hpp"
 #include "verdicts.hpp"
 

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/plugins/yaml.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::conformance {
 namespace {

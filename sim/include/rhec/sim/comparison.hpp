@@ -10,7 +10,7 @@
 
 #include "rhec/core/config/settings.hpp"
 #include "rhec/core/ocp/solver.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/spread.hpp"
 

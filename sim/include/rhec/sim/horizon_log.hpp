@@ -7,7 +7,7 @@
 
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/core/qp/riccati.hpp"
-#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 #include "rhec/sim/closed_loop.hpp"
 #include "rhec/sim/recorded_log.hpp"
 #include "rhec/sim/recording_solver.hpp"

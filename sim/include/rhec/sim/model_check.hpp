@@ -11,7 +11,7 @@
 #include "rhec/core/base/export.hpp"
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/model/model.hpp"
-#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 #include "rhec/sim/spread.hpp"
 
 /// What the author of a model wants to know before a first run; docs/check.md explains each check.

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "rhec/core/estimation/estimator.hpp"
-#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 #include "rhec/sim/recording_solver.hpp"
 
 namespace rhec::sim {

@@ -8,7 +8,7 @@
 
 #include "rhec/core/horizon/horizon_problem.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
-#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 
 namespace rhec::sim {
 
@@ -54,7 +54,7 @@ enum class LoopPart {
 struct LoopSample {
   std::int64_t step = 0;                         ///< absolute index of the newest node
   double time = 0.0;                             ///< [s]
-  const Estimator* estimator = nullptr;          ///< null where the truth takes its place
+  const Estimator* estimator = nullptr;          ///< never null
   const Estimate* estimate = nullptr;            ///< never null
   const Controller* controller = nullptr;        ///< null in the replay of a log
   const Controller::Command* command = nullptr;  ///< the same

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "rhec/core/control/path.hpp"
-#include "rhec/plugins/robot.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 #include "rhec/sim/slip_field.hpp"
 #include "rhec/sim/truth.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "rhec/core/base/export.hpp"
 #include "rhec/core/config/settings.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 
 namespace rhec::sim {
 

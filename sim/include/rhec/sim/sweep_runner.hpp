@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "rhec/core/base/export.hpp"
-#include "rhec/plugins/host.hpp"
+#include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/sweep.hpp"
 #include "rhec/sim/sweep_store.hpp"
 

@@ -55,7 +55,7 @@ RHEC_EXPORT Error wrong_option(const Settings& at, const std::string& type, cons
                                const OptionContext& context);
 /// Throws Error unless `from` is a map (or null) whose keys are all in `known` or `skip`.
 RHEC_EXPORT void check_keys(const Settings& from, const std::vector<std::string>& known, std::string_view owner,
-                            std::initializer_list<std::string_view> skip);
+                            std::initializer_list<std::string_view> skip = {});
 /// Throws Error if a table gets the same name twice.
 RHEC_EXPORT void check_new_name(const std::string& name, const std::vector<std::string>& known);
 

@@ -70,6 +70,17 @@ class OptionTable {
   OptionTable& subtree(std::string name, Settings T::*member, std::string meaning) {
     return leaf(std::move(name), member, SubtreeValue{}, std::move(meaning));
   }
+  /// The same for a subtree with a known structure: `details` are its rows, named "name.detail", or "name" if a detail
+  /// has no name.
+  OptionTable& map(std::string name, Settings T::*member, std::vector<OptionRow> details) {
+    return entry({std::move(name), [=](T& into, const Settings& from, std::string_view) { into.*member = from; },
+                  [details = std::move(details)](const T&, const std::string& full_name, std::vector<OptionRow>& rows) {
+                    for (const OptionRow& detail : details) {
+                      rows.push_back(detail);
+                      rows.back().name = detail.name.empty() ? full_name : full_name + "." + detail.name;
+                    }
+                  }});
+  }
   /// A nested struct with its own table; its options become rows "name.option".
   template <class Group>
   OptionTable& group(std::string name, Group T::*member, OptionTable<Group> table) {

@@ -20,7 +20,8 @@ struct Origin {
 /// A configuration tree in which each node knows where it was written, so that every error can say so.
 ///
 /// A node is null, a scalar (text, interpreted only when it is read), a list, or a map that keeps the order of its
-/// keys. A node copied out of a tree keeps its key path. This class does not read files: see rhec/plugins/yaml.hpp.
+/// keys. A node copied out of a tree keeps its key path. This class does not read files: see
+/// rhec/plugins/yaml/yaml.hpp.
 class RHEC_EXPORT Settings {
  public:
   enum class Kind { null, scalar, list, map };

@@ -1,0 +1,343 @@
+#include "rhec/plugins/host/host.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <mutex>
+
+#include "library.hpp"
+#include "rhec/core/config/options.hpp"
+#include "rhec/core/model/chosen_outputs.hpp"
+
+namespace rhec {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// `rhec/plugins` beside the library that this function is in; empty if the loader does not know it.
+fs::path installed_directory() {
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<const void*>(&installed_directory), &info) == 0 || info.dli_fname == nullptr) return {};
+  std::error_code problem;
+  const fs::path library = fs::canonical(info.dli_fname, problem);
+  return problem ? fs::path() : library.parent_path() / "rhec" / "plugins";
+}
+
+class PlaceList {
+ public:
+  void add(const fs::path& directory, const std::string& origin) {
+    std::error_code problem;
+    const fs::path canonical = fs::canonical(directory, problem);
+    if (problem == std::errc::no_such_file_or_directory) return skip(directory, origin, "no such directory");
+    if (problem) return skip(directory, origin, problem.message());
+    if (!fs::is_directory(canonical, problem)) return skip(canonical, origin, "a file, not a directory");
+    const fs::directory_iterator readable(canonical, problem);
+    if (problem) return skip(canonical, origin, problem.message());
+    const bool seen = std::any_of(places_.begin(), places_.end(), [&](const PluginPlace& place) {
+      return place.skipped.empty() && place.directory == canonical;
+    });
+    if (seen) return skip(canonical, origin, "searched already");
+    places_.push_back({canonical, origin, {}});
+  }
+
+  void skip(const fs::path& directory, const std::string& origin, const std::string& reason) {
+    places_.push_back({directory, origin, reason});
+  }
+
+  std::vector<PluginPlace> take() { return std::move(places_); }
+
+ private:
+  std::vector<PluginPlace> places_;
+};
+
+std::vector<PluginPlace> places_of(const std::vector<fs::path>& given) {
+  PlaceList places;
+  for (const fs::path& directory : given) {
+    if (directory.empty()) {
+      places.skip(directory, "given", "an empty name");
+    } else {
+      places.add(directory, "given");
+    }
+  }
+  const std::string variable = "RHEC_PLUGIN_PATH";
+  if (const char* value = secure_getenv(variable.c_str())) {
+    std::string_view rest = value;
+    while (true) {
+      const std::size_t colon = rest.find(':');
+      const fs::path directory(rest.substr(0, colon));
+      if (directory.is_absolute()) {
+        places.add(directory, variable);
+      } else {
+        places.skip(directory, variable,
+                    directory.empty() ? "an empty entry, which would mean the working directory; remove it"
+                                      : "a relative entry, which would mean the working directory; make it absolute");
+      }
+      if (colon == std::string_view::npos) break;
+      rest.remove_prefix(colon + 1);
+    }
+  }
+  const fs::path installed = installed_directory();
+  if (!installed.empty()) places.add(installed, "installed");
+  return places.take();
+}
+
+std::vector<fs::path> libraries_in(const fs::path& directory) {
+  std::vector<fs::path> files;
+  std::error_code problem;
+  for (fs::directory_iterator entry(directory, problem), end; !problem && entry != end; entry.increment(problem)) {
+    if (entry->path().extension() == ".so") files.push_back(entry->path());
+  }
+  std::sort(files.begin(), files.end());  // a directory has no order of its own
+  return files;
+}
+
+/// All lines after the first one moved to the right.
+std::string indented(const std::string& text, std::size_t indent) {
+  std::string result;
+  for (const char c : text) {
+    result += c;
+    if (c == '\n') result.append(indent, ' ');
+  }
+  return result;
+}
+
+/// An error about the plugin that `settings` names, at the place where it does.
+Error plugin_error(const Settings& settings, const std::string& text) {
+  const Settings* name = settings.find("name");
+  return name != nullptr ? name->error(text) : Error(text);
+}
+
+/// The model with the outputs that its section names; the usual ones where it names none.
+std::shared_ptr<Model> choose_outputs(std::shared_ptr<Model> model, const Settings& section) {
+  const ModelDescription& about = model->description();
+  const Settings* wanted = section.find("outputs");
+  if (!wanted) {
+    const std::vector<int> usual = usual_outputs(about);
+    return with_outputs(std::move(model), usual);
+  }
+  if (wanted->kind() == Settings::Kind::scalar && wanted->text() == "all") return model;
+  const std::vector<std::string> known = names_of(about.outputs);
+  if (wanted->kind() != Settings::Kind::list || wanted->items().empty())
+    throw wanted->mismatch(fmt::format("'all' or a list of outputs: {}", fmt::join(known, ", ")));
+  std::vector<int> chosen;
+  for (const Settings& item : wanted->items()) {
+    const auto found = std::find(known.begin(), known.end(), item.as_text());
+    if (found == known.end())
+      throw item.mismatch(fmt::format("an output of the model '{}': {}", about.name, fmt::join(known, ", ")));
+    const auto output = static_cast<int>(found - known.begin());
+    if (std::find(chosen.begin(), chosen.end(), output) != chosen.end()) throw item.error("this output is named twice");
+    chosen.push_back(output);
+  }
+  return with_outputs(std::move(model), chosen);
+}
+
+/// True if an option has no default, and `error` names it as a key.
+bool is_told_as_missing(const OptionRow& option, std::string_view error) {
+  if (!option.default_value.empty() && option.default_value != "[]") return false;
+  const std::string key = option.name + ": ";
+  const std::size_t place = error.find(key);
+  return place == 0 || (place != std::string_view::npos && error[place - 1] == ' ');
+}
+
+std::string numbers_of_variables(const Model& model) {
+  return fmt::format("{} states, {} inputs, {} parameters, {} outputs", model.state_count(), model.input_count(),
+                     model.parameter_count(), model.output_count());
+}
+
+/// Room for what a plugin's function says when it fails.
+using ErrorText = std::array<char, 4096>;
+
+std::string said(const ErrorText& text) {
+  return text[0] != '\0' ? std::string(text.data()) : "it gave no reason; tell its author";
+}
+
+}  // namespace
+
+struct Host::Search {
+  std::vector<PluginPlace> places;
+
+  const std::vector<PluginRecord>& records() {
+    std::call_once(done_, [this] { run(); });
+    return records_;
+  }
+
+  /// The library of a plugin; throws Error with the whole diagnosis where there is none.
+  const Library& require(PluginKind kind, std::string_view name, const Settings& settings, const Host& host) {
+    for (std::size_t i = 0; i < records().size(); ++i) {
+      const PluginRecord& record = records_[i];
+      if (record.accepted() && record.kind == kind && record.name == name) return libraries_[i];
+    }
+    const std::vector<std::string> known = host.names(kind);
+    const std::string near = nearest(name, known);
+    std::string text = fmt::format("there is no {} plugin '{}'", word_of(kind), name);
+    if (!near.empty()) text += fmt::format("; did you mean '{}'?", near);
+    text +=
+        fmt::format("\navailable: {}\nsearched:\n  {}",
+                    known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", ")), indented(host.diagnosis(), 2));
+    text.erase(text.find_last_not_of(" \n") + 1);
+    throw plugin_error(settings, text);
+  }
+
+  template <class Interface>
+  std::shared_ptr<Interface> make(PluginKind kind, std::string_view name, const Settings& settings, const Host& host) {
+    const Library& library = require(kind, name, settings, host);
+    ErrorText error{};
+    void* object = library.manifest->create(&settings, error.data(), error.size());
+    if (object == nullptr && error[0] != '\0') throw Error(error.data());  // says already whose error it is
+    if (object == nullptr) {
+      throw plugin_error(settings, fmt::format("{} '{}' could not be made: {}", word_of(kind), name, said(error)));
+    }
+    return {static_cast<Interface*>(object),
+            [destroy = library.manifest->destroy, pinned = library.pinned](Interface* made) { destroy(made); }};
+  }
+
+ private:
+  void run() {
+    records_.clear();
+    libraries_.clear();
+    for (const PluginPlace& place : places) {
+      if (!place.skipped.empty()) continue;
+      for (const fs::path& file : libraries_in(place.directory)) {
+        Library library = load_library(file);
+        PluginRecord record = std::move(library.record);
+        shadow(record);
+        libraries_.push_back(std::move(library));
+        records_.push_back(std::move(record));
+      }
+    }
+  }
+
+  void shadow(PluginRecord& record) const {
+    if (!record.accepted()) return;
+    for (const PluginRecord& before : records_) {
+      if (!before.accepted() || before.kind != record.kind || before.name != record.name) continue;
+      const bool together = before.path.parent_path() == record.path.parent_path();
+      record.used_instead = before.path;
+      record.refusal =
+          fmt::format("shadowed: {} is {} too and was found first, since {}", before.path.string(), before.title(),
+                      together ? "its file name sorts before" : "its directory is searched before");
+      record.remedy = fmt::format("remove one of the two files, or give one of the plugins another name{}",
+                                  together ? "" : ", or have the other directory searched first (--plugin-path)");
+      return;
+    }
+  }
+
+  std::once_flag done_;
+  std::vector<PluginRecord> records_;
+  std::vector<Library> libraries_;  ///< one a record
+};
+
+std::string PluginRecord::explanation() const { return remedy.empty() ? refusal : refusal + "; " + remedy; }
+
+std::string PluginRecord::title() const {
+  if (name.empty()) return "the plugin";
+  return fmt::format("{} '{}'{}{}", word_of(kind), name, version.empty() ? "" : " ", version);
+}
+
+Host::Host(const std::vector<fs::path>& given) : search_(std::make_shared<Search>()) {
+  search_->places = places_of(given);
+}
+
+const std::vector<PluginPlace>& Host::places() const { return search_->places; }
+
+const std::vector<PluginRecord>& Host::discover() const { return search_->records(); }
+
+std::vector<PluginRecord> Host::found_in(const PluginPlace& place) const {
+  std::vector<PluginRecord> found;
+  if (!place.skipped.empty()) return found;
+  for (const PluginRecord& record : discover()) {
+    if (record.path.parent_path() == place.directory) found.push_back(record);
+  }
+  return found;
+}
+
+std::vector<std::string> Host::names(PluginKind kind) const {
+  std::vector<std::string> all;
+  for (const PluginRecord& record : discover()) {
+    if (record.accepted() && record.kind == kind) all.push_back(record.name);
+  }
+  return all;
+}
+
+std::string Host::diagnosis() const {
+  std::string text;
+  for (const PluginPlace& place : places()) {
+    text += fmt::format("{} ({}){}\n", place.directory.empty() ? "''" : place.directory.string(), place.origin,
+                        place.skipped.empty() ? "" : ": " + place.skipped);
+    if (!place.skipped.empty()) continue;
+    const std::vector<PluginRecord> found = found_in(place);
+    for (const PluginRecord& record : found) {
+      const std::string file = record.path.filename().string();
+      text += record.accepted()
+                  ? fmt::format("  {}: {} '{}' {}\n", file, word_of(record.kind), record.name, record.version)
+                  : fmt::format("  {}: refused: {}\n", file, indented(record.explanation(), 4));
+    }
+    if (found.empty()) text += "  no file that ends in .so\n";
+  }
+  return text;
+}
+
+std::vector<OptionRow> Host::options(PluginKind kind, std::string_view name) const {
+  const Library& library = search_->require(kind, name, {}, *this);
+  std::vector<OptionRow> rows;
+  ErrorText error{};
+  if (!library.manifest->schema(&rows, error.data(), error.size())) {
+    throw Error(fmt::format("the options of {} '{}' cannot be told: {}", word_of(kind), name, said(error)));
+  }
+  if (kind == PluginKind::model)
+    rows.push_back({"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"});
+  return rows;
+}
+
+PluginTrial Host::try_out(const PluginRecord& plugin) const {
+  if (!plugin.accepted()) throw Error(fmt::format("{}: {}", plugin.path.string(), plugin.explanation()));
+  std::vector<OptionRow> rows;
+  try {
+    rows = options(plugin.kind, plugin.name);
+    switch (plugin.kind) {
+      case PluginKind::model:
+        return {PluginTrial::Outcome::made, numbers_of_variables(*make_model(plugin.name))};
+      case PluginKind::blocking:
+        make_blocking(plugin.name);
+        break;
+      case PluginKind::solver:
+        make_solver(plugin.name);
+        break;
+    }
+  } catch (const Error& error) {
+    const bool needs = std::any_of(rows.begin(), rows.end(),
+                                   [&](const OptionRow& row) { return is_told_as_missing(row, error.what()); });
+    return {needs ? PluginTrial::Outcome::needs_options : PluginTrial::Outcome::failed, error.what()};
+  }
+  return {};
+}
+
+std::shared_ptr<Model> Host::make_model(std::string_view name, const Settings& settings) const {
+  return choose_outputs(search_->make<Model>(PluginKind::model, name, settings, *this), settings);
+}
+
+std::shared_ptr<Blocking> Host::make_blocking(std::string_view name, const Settings& settings) const {
+  return search_->make<Blocking>(PluginKind::blocking, name, settings, *this);
+}
+
+std::shared_ptr<Solver> Host::make_solver(std::string_view name, const Settings& settings) const {
+  return search_->make<Solver>(PluginKind::solver, name, settings, *this);
+}
+
+std::string_view word_of(PluginKind kind) {
+  switch (kind) {
+    case PluginKind::model:
+      return "model";
+    case PluginKind::blocking:
+      return "blocking";
+    case PluginKind::solver:
+      return "solver";
+  }
+  return "plugin of an unknown kind";
+}
+
+}  // namespace rhec

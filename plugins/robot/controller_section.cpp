@@ -1,0 +1,155 @@
+#include "rhec/plugins/robot/controller_section.hpp"
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "rhec/plugins/robot/bounds_section.hpp"
+#include "rhec/plugins/robot/by_name.hpp"
+
+#include "default_solver.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr double position_weight = 1.0, terminal_weight = 10.0, input_weight = 5.0;
+constexpr PluginOption<Blocking> of_input{.otherwise = "unblocked"};
+
+bool is_position(const ModelDescription& about, std::size_t state) {
+  const int j = static_cast<int>(state);
+  return j == about.roles.position_x || j == about.roles.position_y;
+}
+
+DefaultByName<double> stage_default() {
+  return {fmt::format("{} for the position, {} for a speed, else 0", position_weight, input_weight),
+          [](const ModelDescription& about, const Variable&, std::size_t j) {
+            if (static_cast<int>(j) == about.roles.speed_state) return input_weight;
+            return is_position(about, j) ? position_weight : 0.0;
+          }};
+}
+
+const NumbersByName& stage_by_name() {
+  static const NumbersByName map(
+      "weights: stage", {at_least(0.0)},
+      {{"STATE", &ModelDescription::states, stage_default(), "of the squared distance from the reference at a node"},
+       {"INPUT", &ModelDescription::inputs, constant_default(input_weight),
+        "of the squared distance from the reference on an interval"}});
+  return map;
+}
+
+DefaultByName<double> terminal_default() {
+  return {fmt::format("{} for the position, else 0", terminal_weight),
+          [](const ModelDescription& about, const Variable&, std::size_t j) {
+            return is_position(about, j) ? terminal_weight : 0.0;
+          }};
+}
+
+const NumbersByName& terminal_by_name() {
+  static const NumbersByName map("weights: terminal", {at_least(0.0)},
+                                 {{"STATE", &ModelDescription::states, terminal_default(),
+                                   "of the squared distance from the reference at the last node"}});
+  return map;
+}
+
+struct WeightOptions {
+  Settings stage, terminal;
+
+  static const OptionTable<WeightOptions>& table() {
+    static const auto rows = OptionTable<WeightOptions>()
+                                 .map("stage", &WeightOptions::stage, stage_by_name().rows())
+                                 .map("terminal", &WeightOptions::terminal, terminal_by_name().rows());
+    return rows;
+  }
+};
+
+OptionRow blocking_row() {
+  OptionRow row = of_input.row(
+      "move blocking; its options stand beside the name; an input that is not named is free on every interval");
+  row.name = "INPUT." + row.name;
+  return row;
+}
+
+}  // namespace
+
+const OptionTable<ControllerOptions>& ControllerOptions::table() {
+  using C = ControllerOptions;
+  static const auto rows =
+      OptionTable<C>()
+          .integer("horizon", &C::horizon, "N_c, intervals", between(1, 100000))
+          .integer("substeps", &C::substeps, "Runge-Kutta steps per interval", between(1, 1000))
+          .choice("reference_speed", &C::reference_speed,
+                  {{"ground", ReferenceSpeed::ground}, {"literal", ReferenceSpeed::literal}},
+                  "ground: wheels turn faster by the estimated slip; literal: the path's speed is the wheels'")
+          .number("least_speed_factor", &C::least_speed_factor, "the estimated speed factor is not trusted below this",
+                  greater_than(0.0))
+          .number("speed_bound_factor", &C::speed_bound_factor,
+                  "a wheel speed that is an input is at most this times the reference plus speed_bound_offset",
+                  at_least(0.0))
+          .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", at_least(0.0))
+          .map("weights", &C::weights, WeightOptions::table().schema())
+          .map("blocking", &C::blocking, {blocking_row()})
+          .map("solver", &C::solver, {default_solver.row()});
+  return rows;
+}
+
+ControllerSection::ControllerSection(std::shared_ptr<const RobotContext> context, const Settings& section)
+    : context_(std::move(context)), options_(ControllerOptions::table().parse(section, "controller")) {}
+
+OptionSection ControllerSection::documentation() {
+  return {"controller", "How the path is followed.", ControllerOptions::table().schema()};
+}
+
+PluginChoice ControllerSection::solver_choice() const { return default_solver.choice(options_.solver); }
+
+RhcProblem::Setup ControllerSection::problem() const {
+  const ModelDescription& about = context_->about;
+  RhcProblem::Setup problem;
+  problem.max_intervals = options_.horizon;
+  problem.substeps = options_.substeps;
+  const WeightOptions weights = WeightOptions::table().parse(options_.weights, "controller: weights");
+  const std::vector<double> stage = stage_by_name().read(weights.stage, about);
+  const auto first_input = stage.begin() + static_cast<std::ptrdiff_t>(about.states.size());
+  problem.state_weights.assign(stage.begin(), first_input);
+  problem.input_weights.assign(first_input, stage.end());
+  problem.terminal_weights = terminal_by_name().read(weights.terminal, about);
+  problem.state_lower = lower_bounds_of(about.states);
+  problem.state_upper = upper_bounds_of(about.states);
+  problem.input_lower = lower_bounds_of(about.inputs);
+  problem.input_upper = upper_bounds_of(about.inputs);
+  return problem;
+}
+
+void ControllerSection::add_blockings(Controller::Setup& setup) const {
+  const std::vector<Variable>& inputs = context_->about.inputs;
+  check_keys(options_.blocking, names_of(inputs), "controller: blocking");
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    const Settings* section = options_.blocking.find(inputs[j].name);
+    if (!section) continue;
+    auto blocking = of_input.make(context_->host, *section);
+    if (const std::string reason = blocking->why_not(options_.horizon); !reason.empty())
+      throw section->error(fmt::format("{}; change it or controller.horizon", reason));
+    if (blocking->transition() != Transition::step || blocking->neighbour_sigma())
+      throw section->error(
+          "an input jumps from block to block and no walk links its blocks; drop transition and neighbour_sigma");
+    setup.problem.blocked_inputs.push_back(static_cast<int>(j));
+    setup.blockings.push_back(std::move(blocking));
+  }
+}
+
+std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks) const {
+  Controller::Setup setup;
+  setup.problem = problem();
+  setup.interval = context_->step;
+  setup.reference_speed = options_.reference_speed;
+  setup.least_speed_factor = options_.least_speed_factor;
+  setup.speed_bound_factor = options_.speed_bound_factor;
+  setup.speed_bound_offset = options_.speed_bound_offset;
+  add_blockings(setup);
+  auto solver = hooks.wrap_solver("rhc", default_solver.make(context_->host, options_.solver));
+  return std::make_unique<Controller>(context_->model, std::move(solver), path, std::move(setup));
+}
+
+}  // namespace rhec

@@ -1,0 +1,78 @@
+#include "rhec/plugins/robot/estimator_makers.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/plugins/robot/bounds_section.hpp"
+
+namespace rhec {
+namespace {
+
+std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& parts) {
+  RecedingHorizonEstimation::Setup setup;
+  setup.problem = parts.problem();
+  setup.arrival = parts.arrival;
+  setup.blockings = parts.blocking.make_for(parts.horizon, "estimator.horizon");
+  setup.walks = parts.walks;
+  setup.initial_mean = parts.initial_mean;
+  setup.initial_covariance = parts.initial_covariance;
+  setup.heading_starts = parts.heading_starts;
+  return std::make_unique<RecedingHorizonEstimation>(parts.context->model, parts.make_solver(), std::move(setup));
+}
+
+std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts) {
+  const RobotContext& context = *parts.context;
+  FilterEstimation::Setup setup;
+  for (const double sigma : context.noise.output_sigmas) setup.noise.output_variances.push_back(sigma * sigma);
+  for (const double sigma : context.noise.input_sigmas) setup.noise.input_variances.push_back(sigma * sigma);
+  setup.noise.parameter_lower = lower_bounds_of(context.about.parameters);
+  setup.noise.parameter_upper = upper_bounds_of(context.about.parameters);
+  for (const ParameterWalk& walk : parts.walks) setup.walk.push_back(walk.forgetting);
+  setup.initial_mean = parts.initial_mean;
+  setup.initial_covariance = parts.initial_covariance;
+  setup.substeps = parts.substeps;
+  setup.heading_starts = parts.heading_starts;
+  return std::make_unique<FilterEstimation>(context.model, std::move(setup));
+}
+
+}  // namespace
+
+RheProblem::Setup EstimatorParts::problem() const {
+  RheProblem::Setup setup;
+  setup.max_intervals = horizon;
+  setup.substeps = substeps;
+  for (const double sigma : context->noise.output_sigmas) setup.output_weights.push_back(1.0 / (sigma * sigma));
+  for (const double sigma : context->noise.input_sigmas) setup.input_weights.push_back(1.0 / (sigma * sigma));
+  setup.robust = robust;
+  setup.state_lower = lower_bounds_of(context->about.states);
+  setup.state_upper = upper_bounds_of(context->about.states);
+  setup.parameter_lower = lower_bounds_of(context->about.parameters);
+  setup.parameter_upper = upper_bounds_of(context->about.parameters);
+  return setup;
+}
+
+EstimatorMakers::EstimatorMakers()
+    : all_({{"rhe", "receding horizon", make_receding_horizon},
+            {"ekf", "extended Kalman filter", make_kalman_filter}}) {}
+
+EstimatorMakers& EstimatorMakers::add(EstimatorMaker maker) {
+  for (const EstimatorMaker& other : all_)
+    if (other.name == maker.name)
+      throw Error(fmt::format("there is an estimator '{}' already; give each a name of its own", maker.name));
+  all_.push_back(std::move(maker));
+  return *this;
+}
+
+const EstimatorMaker& EstimatorMakers::named(std::string_view name) const {
+  const auto found = std::find_if(all_.begin(), all_.end(), [&](const auto& maker) { return maker.name == name; });
+  if (found != all_.end()) return *found;
+  std::vector<std::string> names;
+  for (const EstimatorMaker& maker : all_) names.push_back(maker.name);
+  throw Error(fmt::format("there is no estimator '{}'; expected {}", name, one_of(names)));
+}
+
+}  // namespace rhec

@@ -1,0 +1,192 @@
+#include "rhec/plugins/robot/estimator_section.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/plugins/robot/by_name.hpp"
+#include "rhec/plugins/robot/plugin_option.hpp"
+#include "rhec/plugins/robot/robust_losses.hpp"
+
+#include "default_solver.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr double state_share = 0.1, parameter_share = 1.0;  // of a variable's typical magnitude
+
+struct ArrivalOptions {
+  ArrivalKind name = RecedingHorizonEstimation::Setup{}.arrival;
+
+  static const OptionTable<ArrivalOptions>& table() {
+    static const auto rows = OptionTable<ArrivalOptions>().choice("name", &ArrivalOptions::name,
+                                                                  {{"ekf", ArrivalKind::ekf},
+                                                                   {"smoothing", ArrivalKind::smoothing},
+                                                                   {"constant", ArrivalKind::constant},
+                                                                   {"off", ArrivalKind::off}},
+                                                                  "how what has left the window is remembered");
+    return rows;
+  }
+};
+
+const NumbersByName& forgetting_by_name() {
+  static const NumbersByName map(
+      "forgetting", {at_least(0.0)},
+      {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.forgetting),
+        "standard deviation per square root of a step, added at each slide"}});
+  return map;
+}
+
+const NumbersByName& restart_sigma_by_name() {
+  static const NumbersByName map(
+      "restart_sigma", {greater_than(0.0)},
+      {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.restart_sigma),
+        "standard deviation with which an unlinked block starts once it is the window's first"}});
+  return map;
+}
+
+const ByName<NumberValue>& block_sigma_by_name() {
+  static const ByName<NumberValue> map(
+      "block_sigma", {greater_than(0.0)},
+      {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.block_sigma),
+        "standard deviation of an unlinked block inside the window about the block before; .inf: none, as in the "
+        "paper"}});
+  return map;
+}
+
+DefaultByName<double> at_the_origin() {
+  DefaultByName<double> origin = constant_default(0.0);
+  origin.text += "; in a simulation the true start";
+  return origin;
+}
+
+const NumbersByName& initial_state_by_name() {
+  static const NumbersByName map("initial state", {any()},
+                                 {{"STATE", &ModelDescription::states, at_the_origin(), "mean at the start"}});
+  return map;
+}
+
+DefaultByName<double> middle_of_bounds() {
+  return {"the middle of its bounds, else where nothing slips",
+          [](const ModelDescription&, const Variable& parameter, std::size_t) {
+            const double middle = 0.5 * (parameter.lower + parameter.upper);
+            return std::isfinite(middle) ? middle : parameter.nominal;
+          }};
+}
+
+const NumbersByName& initial_parameters_by_name() {
+  static const NumbersByName map(
+      "initial parameters", {any()},
+      {{"PARAMETER", &ModelDescription::parameters, middle_of_bounds(), "mean at the start"}});
+  return map;
+}
+
+const NumbersByName& initial_sigma_by_name() {
+  constexpr const char* meaning = "standard deviation at the start";
+  static const NumbersByName map(
+      "initial sigma", {greater_than(0.0)},
+      {{"STATE", &ModelDescription::states, scaled_default(state_share), meaning},
+       {"PARAMETER", &ModelDescription::parameters, scaled_default(parameter_share), meaning}});
+  return map;
+}
+
+struct InitialOptions {
+  Settings state, parameters, sigma;
+
+  static const OptionTable<InitialOptions>& table() {
+    static const auto rows = OptionTable<InitialOptions>()
+                                 .map("state", &InitialOptions::state, initial_state_by_name().rows())
+                                 .map("parameters", &InitialOptions::parameters, initial_parameters_by_name().rows())
+                                 .map("sigma", &InitialOptions::sigma, initial_sigma_by_name().rows());
+    return rows;
+  }
+};
+
+}  // namespace
+
+OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& makers) {
+  std::vector<std::pair<std::string, std::string>> names;
+  std::string meanings;
+  for (const EstimatorMaker& maker : makers.all()) {
+    names.emplace_back(maker.name, maker.name);
+    meanings += fmt::format("{}{}: {}", meanings.empty() ? "" : "; ", maker.name, maker.meaning);
+  }
+  using E = EstimatorOptions;
+  return OptionTable<E>()
+      .choice("name", &E::name, std::move(names), std::move(meanings))
+      .integer("horizon", &E::horizon, "N_e, intervals", between(1, 100000))
+      .integer("substeps", &E::substeps, "Runge-Kutta steps per interval", between(1, 1000))
+      .integer("heading_starts", &E::heading_starts,
+               "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
+      .map("arrival", &E::arrival, ArrivalOptions::table().schema())
+      .map("forgetting", &E::forgetting, forgetting_by_name().rows())
+      .map("restart_sigma", &E::restart_sigma, restart_sigma_by_name().rows())
+      .map("block_sigma", &E::block_sigma, block_sigma_by_name().rows())
+      .map("initial", &E::initial, InitialOptions::table().schema())
+      .map("robust", &E::robust, robust_rows("[]"))
+      .map("solver", &E::solver, {default_solver.row()});
+}
+
+EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, BlockingSection blocking,
+                                   const Settings& section, EstimatorMakers makers)
+    : makers_(std::move(makers)),
+      options_(EstimatorOptions::table(makers_).parse(section, "estimator")),
+      parts_{.context = std::move(context),
+             .section = section,
+             .horizon = options_.horizon,
+             .substeps = options_.substeps,
+             .heading_starts = options_.heading_starts,
+             .arrival = ArrivalOptions::table().parse(options_.arrival, "estimator: arrival").name,
+             .robust = {},
+             .walks = {},
+             .initial_mean = {},
+             .initial_covariance = {},
+             .blocking = std::move(blocking),
+             .make_solver = {}} {
+  const ModelDescription& about = parts_.context->about;
+  parts_.robust = robust_losses(options_.robust, about, "estimator");
+  const auto forgetting = forgetting_by_name().read(options_.forgetting, about);
+  const auto restart = restart_sigma_by_name().read(options_.restart_sigma, about);
+  const auto alone = block_sigma_by_name().read(options_.block_sigma, about);
+  for (std::size_t j = 0; j < about.parameters.size(); ++j)
+    parts_.walks.push_back({forgetting[j], restart[j], alone[j]});
+
+  const InitialOptions initial = InitialOptions::table().parse(options_.initial, "estimator: initial");
+  has_initial_state_ = options_.initial.find("state") != nullptr;
+  std::vector<double> mean = initial_state_by_name().read(initial.state, about);
+  for (const double value : initial_parameters_by_name().read(initial.parameters, about)) mean.push_back(value);
+  const std::vector<double> sigma = initial_sigma_by_name().read(initial.sigma, about);
+  const auto size = static_cast<Eigen::Index>(mean.size());
+  parts_.initial_mean = Eigen::Map<const Eigen::VectorXd>(mean.data(), size);
+  parts_.initial_covariance.setZero(size, size);
+  for (Eigen::Index j = 0; j < size; ++j) parts_.initial_covariance(j, j) = sigma[j] * sigma[j];
+  parts_.make_solver = [host = parts_.context->host, named = options_.solver] {
+    return default_solver.make(host, named);
+  };
+}
+
+OptionSection EstimatorSection::documentation(const EstimatorMakers& makers) {
+  return {"estimator", "How state and parameters are estimated.", EstimatorOptions::table(makers).schema()};
+}
+
+PluginChoice EstimatorSection::solver_choice() const { return default_solver.choice(options_.solver); }
+
+EstimatorParts EstimatorSection::parts(const std::optional<Eigen::VectorXd>& initial_state) const {
+  EstimatorParts parts = parts_;
+  if (initial_state && !has_initial_state_)
+    parts.initial_mean.head(parts.context->model->state_count()) = *initial_state;
+  return parts;
+}
+
+std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::VectorXd>& initial_state,
+                                                  const RobotHooks& hooks) const {
+  EstimatorParts with_hooks = parts(initial_state);
+  with_hooks.make_solver = [&] { return hooks.wrap_solver("rhe", parts_.make_solver()); };
+  Estimator::Timeline timeline;
+  timeline.longest_interval = parts_.context->step;
+  return std::make_unique<Estimator>(hooks.wrap_method(makers_.named(options_.name).make(with_hooks)), timeline);
+}
+
+}  // namespace rhec

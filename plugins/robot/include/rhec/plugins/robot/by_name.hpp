@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rhec/core/config/option_values.hpp"
+#include "rhec/core/model/model.hpp"
+
+namespace rhec {
+
+/// A number that may not be infinite, whatever its range.
+struct RHEC_EXPORT FiniteValue {
+  Range range;
+  double read(const Settings& from, const OptionContext& context) const;
+  std::string type() const { return NumberValue{range}.type(); }
+  std::string constraint() const { return NumberValue{range}.constraint(); }
+};
+
+/// [lower, upper] as it is written in a configuration; null stands for no bound.
+struct RHEC_EXPORT BoundsValue {
+  std::pair<double, double> read(const Settings& from, const OptionContext& context) const;
+  std::string type() const { return "list of 2 numbers"; }
+  std::string constraint() const { return "lower <= upper; null for none"; }
+};
+
+/// What a variable has that is not named, in words and as a value.
+template <class Item>
+struct DefaultByName {
+  std::string text;
+  std::function<Item(const ModelDescription& about, const Variable& variable, std::size_t index)> value;
+};
+/// The same number for all.
+RHEC_EXPORT DefaultByName<double> constant_default(double number);
+/// A share of the variable's typical magnitude.
+RHEC_EXPORT DefaultByName<double> scaled_default(double share);
+
+/// A map of a configuration from names of a model's variables to values of one kind, e.g. `forgetting: {kappa: 0.03}`:
+/// what may be named, what holds for those that are not, and how both are documented.
+template <class Value>
+class ByName {
+ public:
+  using Item = decltype(std::declval<const Value&>().read(std::declval<const Settings&>(), OptionContext{}));
+
+  /// Variables that the map may name.
+  struct Kind {
+    std::string placeholder;  ///< "PARAMETER": stands for the names in the documentation; kinds that share it, share it
+    std::vector<Variable> ModelDescription::*variables;
+    DefaultByName<Item> otherwise;
+    std::string meaning;
+  };
+
+  /// `owner` is whose values they are, for errors.
+  ByName(std::string owner, Value value, std::vector<Kind> kinds)
+      : owner_(std::move(owner)), value_(std::move(value)), kinds_(std::move(kinds)) {}
+
+  /// The values of a model's variables, kind after kind. Throws Error for unknown names, with the nearest, and for
+  /// values that cannot be read.
+  std::vector<Item> read(const Settings& map, const ModelDescription& about) const {
+    std::vector<std::string> known;
+    for (const Kind& kind : kinds_)
+      for (const Variable& variable : about.*kind.variables) known.push_back(variable.name);
+    check_keys(map, known, owner_);
+    std::vector<Item> items;
+    items.reserve(known.size());
+    for (const Kind& kind : kinds_) {
+      const std::vector<Variable>& variables = about.*kind.variables;
+      for (std::size_t j = 0; j < variables.size(); ++j) {
+        const Settings* given = map.find(variables[j].name);
+        items.push_back(given ? value_.read(*given, OptionContext{owner_, variables[j].unit})
+                              : kind.otherwise.value(about, variables[j], j));
+      }
+    }
+    return items;
+  }
+
+  /// One row a placeholder.
+  std::vector<OptionRow> rows() const {
+    std::vector<OptionRow> rows;
+    for (const Kind& kind : kinds_)
+      if (rows.empty() || rows.back().name != kind.placeholder)
+        rows.push_back({kind.placeholder, value_.type(), kind.otherwise.text, value_.constraint(), kind.meaning});
+    return rows;
+  }
+
+ private:
+  std::string owner_;
+  Value value_;
+  std::vector<Kind> kinds_;
+};
+
+using NumbersByName = ByName<FiniteValue>;
+
+}  // namespace rhec

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+
+#include "rhec/core/config/options.hpp"
+#include "rhec/core/control/controller.hpp"
+#include "rhec/plugins/robot/hooks.hpp"
+#include "rhec/plugins/robot/option_section.hpp"
+#include "rhec/plugins/robot/plugin_option.hpp"
+#include "rhec/plugins/robot/robot_context.hpp"
+
+namespace rhec {
+
+/// The keys of the section `controller`.
+struct RHEC_EXPORT ControllerOptions {
+  int horizon = RhcProblem::Setup{}.max_intervals;
+  int substeps = RhcProblem::Setup{}.substeps;
+  ReferenceSpeed reference_speed = Controller::Setup{}.reference_speed;
+  double least_speed_factor = Controller::Setup{}.least_speed_factor;
+  double speed_bound_factor = Controller::Setup{}.speed_bound_factor;
+  double speed_bound_offset = Controller::Setup{}.speed_bound_offset;
+  Settings weights, blocking, solver;
+  static const OptionTable<ControllerOptions>& table();
+};
+
+/// The section `controller`: how the path is followed.
+class RHEC_EXPORT ControllerSection {
+ public:
+  ControllerSection(std::shared_ptr<const RobotContext> context, const Settings& section);
+  static OptionSection documentation();
+
+  const ControllerOptions& options() const noexcept { return options_; }
+  PluginChoice solver_choice() const;
+  /// Weights and blocking are read here, since a robot that only estimates may be of a vehicle that they do not fit.
+  std::unique_ptr<Controller> make(const Path& path, const RobotHooks& hooks = {}) const;
+
+ private:
+  RhcProblem::Setup problem() const;
+  void add_blockings(Controller::Setup& setup) const;
+
+  std::shared_ptr<const RobotContext> context_;
+  ControllerOptions options_;
+};
+
+}  // namespace rhec

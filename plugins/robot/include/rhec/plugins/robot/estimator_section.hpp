@@ -1,0 +1,51 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "rhec/core/config/options.hpp"
+#include "rhec/core/estimation/estimator.hpp"
+#include "rhec/plugins/robot/estimator_makers.hpp"
+#include "rhec/plugins/robot/hooks.hpp"
+
+namespace rhec {
+
+/// The keys of the section `estimator`.
+struct RHEC_EXPORT EstimatorOptions {
+  std::string name = "rhe";
+  int horizon = RheProblem::Setup{}.max_intervals;
+  int substeps = RheProblem::Setup{}.substeps;
+  int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
+  Settings arrival, forgetting, restart_sigma, block_sigma, initial, robust, solver;
+  static OptionTable<EstimatorOptions> table(const EstimatorMakers& makers);
+};
+
+/// The section `estimator`: how state and parameters are estimated.
+class RHEC_EXPORT EstimatorSection {
+ public:
+  /// Checks what the estimator of this name does not use, too: a mistake there would show only once another one is
+  /// chosen.
+  EstimatorSection(std::shared_ptr<const RobotContext> context, BlockingSection blocking, const Settings& section,
+                   EstimatorMakers makers = {});
+  static OptionSection documentation(const EstimatorMakers& makers = {});
+
+  const EstimatorOptions& options() const noexcept { return options_; }
+  PluginChoice solver_choice() const;
+  /// Takes the place of the makers so far.
+  void use(EstimatorMakers makers) { makers_ = std::move(makers); }
+
+  /// The initial state, where given, takes the place of a default one, not of the section's.
+  EstimatorParts parts(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
+  std::unique_ptr<Estimator> make(const std::optional<Eigen::VectorXd>& initial_state = {},
+                                  const RobotHooks& hooks = {}) const;
+
+ private:
+  EstimatorMakers makers_;
+  EstimatorOptions options_;
+  EstimatorParts parts_;
+  bool has_initial_state_ = false;  ///< the section says where the robot starts
+};
+
+}  // namespace rhec

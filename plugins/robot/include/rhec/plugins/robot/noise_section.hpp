@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "rhec/core/config/settings.hpp"
+#include "rhec/core/model/model.hpp"
+#include "rhec/plugins/robot/option_section.hpp"
+
+namespace rhec {
+
+/// The section `noise`: standard deviations of what is measured.
+struct RHEC_EXPORT NoiseSection {
+  NoiseSection(const Settings& section, const ModelDescription& about);
+  static OptionSection documentation();
+
+  std::vector<double> output_sigmas, input_sigmas;
+};
+
+/// Standard deviations of measured variables where a configuration gives none: a share of their typical magnitudes.
+RHEC_EXPORT std::vector<double> default_sigmas(const std::vector<Variable>& variables);
+
+}  // namespace rhec

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "rhec/core/config/option_values.hpp"
+#include "rhec/core/config/settings.hpp"
+#include "rhec/plugins/host/host.hpp"
+
+namespace rhec {
+
+/// A plugin as a configuration names it.
+struct PluginChoice {
+  std::string name;
+  Settings options;  ///< a map, without the name
+};
+
+/// A part of a configuration that names a plugin: a map of `name` and, beside it, the plugin's options; or the name
+/// alone. Product is Model, Blocking or Solver.
+template <class Product>
+struct RHEC_EXPORT PluginOption {
+  const char* otherwise;  ///< the plugin where none is named
+
+  /// Throws Error as the host does, and with the section's place where a plugin finds its options at odds with each
+  /// other.
+  std::shared_ptr<Product> make(const Host& host, const Settings& section) const;
+  PluginChoice choice(const Settings& section) const;
+  /// For the documentation, named "name".
+  OptionRow row(std::string meaning = "its options stand beside the name") const;
+};
+
+}  // namespace rhec

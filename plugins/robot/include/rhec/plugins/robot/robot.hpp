@@ -1,0 +1,89 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rhec/plugins/robot/blocking_section.hpp"
+#include "rhec/plugins/robot/controller_section.hpp"
+#include "rhec/plugins/robot/estimator_section.hpp"
+#include "rhec/plugins/robot/hooks.hpp"
+#include "rhec/plugins/robot/model_section.hpp"
+#include "rhec/plugins/robot/robot_context.hpp"
+#include "rhec/plugins/robot/smoother_section.hpp"
+
+namespace rhec {
+
+/// What of a configuration file a robot needs; each is a section of its own, described in docs/configuration.md.
+struct RobotOptions {
+  double step = Estimator::Timeline{}.longest_interval;  ///< dt [s]
+  Settings model, noise, bounds, blocking, estimator, controller, smoother;
+
+  RHEC_EXPORT static const OptionTable<RobotOptions>& table();
+  /// The same rows for a struct that has more keys beside them.
+  template <class Derived>
+  static OptionTable<Derived>& add_to(OptionTable<Derived>& rows) {
+    return rows
+        .number("step", &Derived::step, "longest interval of the estimator, interval of the controller [s]",
+                greater_than(0.0))
+        .subtree("model", &Derived::model, "the vehicle: name and options of a model plugin")
+        .subtree("noise", &Derived::noise, "standard deviations: outputs and inputs, by the variable's name")
+        .subtree("bounds", &Derived::bounds,
+                 "[lower, upper] by the variable's name; the model's own where none is given")
+        .subtree("blocking", &Derived::blocking, "by parameter: name and options of a blocking plugin")
+        .subtree("estimator", &Derived::estimator, "how state and parameters are estimated")
+        .subtree("controller", &Derived::controller, "how the path is followed")
+        .subtree("smoother", &Derived::smoother, "how a whole log is estimated at once; see 'rhec smooth'");
+  }
+};
+
+/// The sections of RobotOptions: model, noise, bounds, blocking, estimator, controller, smoother.
+RHEC_EXPORT std::vector<OptionSection> robot_sections(const EstimatorMakers& estimators = {});
+
+/// Makes models, estimators and controllers from configuration, with plugins by name.
+class RHEC_EXPORT Robot {
+ public:
+  /// Throws Error, naming file, line and key, for whatever is wrong in any section.
+  Robot(const Host& host, const RobotOptions& options, EstimatorMakers estimators = {});
+  /// From a file that has just the keys of RobotOptions.
+  static Robot from_file(const Host& host, const std::string& yaml_file);
+
+  const std::shared_ptr<const Model>& model() const noexcept { return context_->model; }
+  PluginChoice model_choice() const { return model_.choice(); }
+  /// Of the estimator (rhe) or the controller (rhc).
+  PluginChoice solver_choice(std::string_view kind) const;
+  PluginChoice blocking_choice(int parameter) const { return blocking_.choice(parameter); }
+  double step() const noexcept { return context_->step; }
+  const EstimatorOptions& estimator_options() const noexcept { return estimator_.options(); }
+  const SmootherOptions& smoother_options() const noexcept { return smoother_.options(); }
+  const std::vector<double>& output_sigmas() const noexcept { return context_->noise.output_sigmas; }
+  const std::vector<double>& input_sigmas() const noexcept { return context_->noise.input_sigmas; }
+  /// What the model says of itself, with the bounds of this configuration.
+  const ModelDescription& bounded_description() const noexcept { return context_->about; }
+  /// Of the section `blocking`, by parameter.
+  std::vector<std::shared_ptr<const Blocking>> make_blockings() const { return blocking_.make(); }
+
+  /// Takes the place of the estimators that it was made with, e.g. with one that knows what exists only by now.
+  void use_estimators(EstimatorMakers estimators);
+  /// Hung into all that is made from now on, round what is hung in already; copies of the robot have them too.
+  void add_hooks(std::shared_ptr<const RobotHooks> hooks);
+
+  /// The estimator of the section `estimator`; the initial state, where given, is used if that section has none.
+  std::unique_ptr<Estimator> make_estimator(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
+  std::unique_ptr<Controller> make_controller(const Path& path) const;
+  /// What estimates a whole log at once (sections `smoother` and `estimator`).
+  FullInformationEstimation make_smoother(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
+
+ private:
+  ModelSection model_;
+  std::shared_ptr<const RobotContext> context_;
+  BlockingSection blocking_;
+  EstimatorSection estimator_;
+  ControllerSection controller_;
+  SmootherSection smoother_;
+  RobotHookChain hooks_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <memory>
+
+#include "rhec/core/model/model.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/noise_section.hpp"
+
+namespace rhec {
+
+/// What the sections `model`, `bounds` and `noise` say, which all others are read with.
+struct RobotContext {
+  Host host;
+  double step;  ///< longest interval of the estimator, interval of the controller [s]
+  std::shared_ptr<const Model> model;
+  ModelDescription about;  ///< what the model says of itself, with the bounds of the configuration
+  NoiseSection noise;
+};
+
+}  // namespace rhec

@@ -1,0 +1,23 @@
+#include "rhec/plugins/robot/model_section.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr PluginOption<Model> vehicle{.otherwise = "bicycle_slip"};
+
+}  // namespace
+
+ModelSection::ModelSection(const Host& host, const Settings& section)
+    : section_(section), model_(vehicle.make(host, section)) {}
+
+OptionSection ModelSection::documentation() {
+  // The outputs are chosen by the host, for any model.
+  return {"model",
+          "The vehicle.",
+          {vehicle.row(),
+           {"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"}}};
+}
+
+PluginChoice ModelSection::choice() const { return vehicle.choice(section_); }
+
+}  // namespace rhec

@@ -1,0 +1,85 @@
+#include "rhec/plugins/robot/plugin_option.hpp"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/horizon/blocking.hpp"
+#include "rhec/core/model/model.hpp"
+#include "rhec/core/ocp/solver.hpp"
+
+namespace rhec {
+namespace {
+
+/// How the host makes a product, and what it is called.
+template <class Product>
+struct Maker;
+template <>
+struct Maker<Model> {
+  static constexpr auto make = &Host::make_model;
+  static constexpr const char* word = "a model plugin";
+};
+template <>
+struct Maker<Blocking> {
+  static constexpr auto make = &Host::make_blocking;
+  static constexpr const char* word = "a blocking plugin";
+};
+template <>
+struct Maker<Solver> {
+  static constexpr auto make = &Host::make_solver;
+  static constexpr const char* word = "a solver plugin";
+};
+
+std::string name_in(const Settings& section, const char* otherwise) {
+  if (section.is_null()) return otherwise;
+  if (section.kind() == Settings::Kind::scalar) return section.text();
+  if (section.kind() != Settings::Kind::map)
+    throw section.mismatch("the name of a plugin, or a map with the key 'name' and the plugin's options");
+  const Settings* name = section.find("name");
+  return name ? name->as_text() : otherwise;
+}
+
+/// True where a message begins with a place that is written in this part of the settings.
+bool names_place_of(const Settings& settings, std::string_view message) {
+  const std::string& file = settings.origin().file;
+  if (!file.empty() && message.starts_with(file + ":")) return true;
+  const auto in_item = [&](const Settings& item) { return names_place_of(item, message); };
+  const auto in_member = [&](const auto& member) { return names_place_of(member.second, message); };
+  return std::any_of(settings.items().begin(), settings.items().end(), in_item) ||
+         std::any_of(settings.members().begin(), settings.members().end(), in_member);
+}
+
+}  // namespace
+
+template <class Product>
+std::shared_ptr<Product> PluginOption<Product>::make(const Host& host, const Settings& section) const {
+  try {
+    const bool is_name = section.kind() == Settings::Kind::scalar;
+    return (host.*Maker<Product>::make)(name_in(section, otherwise),
+                                        is_name ? Settings::map(section.origin()) : section);
+  } catch (const Error& mistake) {
+    // A plugin that finds its options at odds with each other does not know where they are written.
+    if (section.is_null() || names_place_of(section, mistake.what())) throw;
+    throw section.error(mistake.what());
+  }
+}
+
+template <class Product>
+PluginChoice PluginOption<Product>::choice(const Settings& section) const {
+  PluginChoice choice{name_in(section, otherwise), Settings::map(section.origin())};
+  for (const auto& [key, value] : section.members())
+    if (key != "name") choice.options.add(key, value);
+  return choice;
+}
+
+template <class Product>
+OptionRow PluginOption<Product>::row(std::string meaning) const {
+  return {"name", TextValue{}.type(), otherwise, Maker<Product>::word, std::move(meaning)};
+}
+
+template struct PluginOption<Model>;
+template struct PluginOption<Blocking>;
+template struct PluginOption<Solver>;
+
+}  // namespace rhec

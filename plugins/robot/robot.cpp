@@ -1,0 +1,69 @@
+#include "rhec/plugins/robot/robot.hpp"
+
+#include <utility>
+
+#include "rhec/plugins/robot/bounds_section.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+
+namespace rhec {
+namespace {
+
+std::shared_ptr<const RobotContext> context_of(const Host& host, const RobotOptions& options,
+                                               const std::shared_ptr<const Model>& model) {
+  const NoiseSection noise(options.noise, model->description());
+  const BoundsSection bounds(options.bounds, model->description());
+  return std::make_shared<const RobotContext>(RobotContext{host, options.step, model, bounds.bounded(), noise});
+}
+
+}  // namespace
+
+const OptionTable<RobotOptions>& RobotOptions::table() {
+  static const auto rows = [] {
+    OptionTable<RobotOptions> table;
+    add_to(table);
+    return table;
+  }();
+  return rows;
+}
+
+std::vector<OptionSection> robot_sections(const EstimatorMakers& estimators) {
+  return {ModelSection::documentation(),
+          NoiseSection::documentation(),
+          BoundsSection::documentation(),
+          BlockingSection::documentation(),
+          EstimatorSection::documentation(estimators),
+          ControllerSection::documentation(),
+          SmootherSection::documentation()};
+}
+
+Robot::Robot(const Host& host, const RobotOptions& options, EstimatorMakers estimators)
+    : model_(host, options.model),
+      context_(context_of(host, options, model_.model())),
+      blocking_(context_, options.blocking),
+      estimator_(context_, blocking_, options.estimator, std::move(estimators)),
+      controller_(context_, options.controller),
+      smoother_(context_, options.smoother) {}
+
+Robot Robot::from_file(const Host& host, const std::string& yaml_file) {
+  return {host, RobotOptions::table().parse(load_yaml(yaml_file), yaml_file)};
+}
+
+PluginChoice Robot::solver_choice(std::string_view kind) const {
+  return kind == "rhe" ? estimator_.solver_choice() : controller_.solver_choice();
+}
+
+void Robot::use_estimators(EstimatorMakers estimators) { estimator_.use(std::move(estimators)); }
+
+void Robot::add_hooks(std::shared_ptr<const RobotHooks> hooks) { hooks_.add(std::move(hooks)); }
+
+std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::VectorXd>& initial_state) const {
+  return estimator_.make(initial_state, hooks_);
+}
+
+std::unique_ptr<Controller> Robot::make_controller(const Path& path) const { return controller_.make(path, hooks_); }
+
+FullInformationEstimation Robot::make_smoother(const std::optional<Eigen::VectorXd>& initial_state) const {
+  return smoother_.make(estimator_.parts(initial_state));
+}
+
+}  // namespace rhec

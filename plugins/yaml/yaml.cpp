@@ -1,0 +1,139 @@
+#include "rhec/plugins/yaml/yaml.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <fstream>
+#include <iterator>
+
+namespace rhec {
+namespace {
+
+/// Where the text came from, and whether its lines mean something to the user.
+struct Source {
+  std::string name;
+  bool has_lines;
+
+  Origin at(const YAML::Mark& mark) const { return {name, has_lines && !mark.is_null() ? mark.line + 1 : 0}; }
+  Error error(const YAML::Mark& mark, const std::string& what) const { return Settings::null(at(mark)).error(what); }
+};
+
+/// Turns yaml-cpp's graph into a tree. Aliases may make a small graph a huge or endless tree, so both depth and size
+/// end.
+class Converter {
+ public:
+  explicit Converter(const Source& source) : source_(source) {}
+
+  Settings convert(const YAML::Node& node, const YAML::Mark& mark) {
+    constexpr int most_nodes = 1000000, most_levels = 100;
+    if (++nodes_ > most_nodes || levels_ >= most_levels) {
+      throw source_.error(mark, fmt::format("more than {} nodes or {} levels; does an alias (*) stand within its own "
+                                            "anchor (&)?",
+                                            most_nodes, most_levels));
+    }
+    refuse_tags(node);
+    ++levels_;
+    Settings result = convert_inner(node, source_.at(mark));
+    --levels_;
+    return result;
+  }
+
+ private:
+  Settings convert_inner(const YAML::Node& node, const Origin& origin) {
+    if (node.IsScalar()) return Settings::scalar(node.Scalar(), origin);
+    if (node.IsSequence()) {
+      Settings list = Settings::list(origin);
+      for (const YAML::Node& item : node) list.append(convert(item, item.Mark()));
+      return list;
+    }
+    if (node.IsMap()) return convert_map(node, origin);
+    return Settings::null(origin);
+  }
+
+  Settings convert_map(const YAML::Node& node, const Origin& origin) {
+    Settings map = Settings::map(origin);
+    for (const auto& member : node) {
+      const YAML::Node& key = member.first;
+      if (!key.IsScalar() || key.Scalar().empty()) throw source_.error(key.Mark(), "a key must be a plain text");
+      // A member is where its key is: the value may start lines below, or be an alias of something far away.
+      if (key.Scalar() != "<<") map.add(key.Scalar(), convert(member.second, key.Mark()));
+    }
+    // What is merged yields to what is written here, and what is merged first wins.
+    for (const auto& member : node) {
+      if (member.first.Scalar() == "<<") merge(map, member.second, member.first.Mark());
+    }
+    return map;
+  }
+
+  void merge(Settings& into, const YAML::Node& from, const YAML::Mark& mark) {
+    if (from.IsSequence()) {
+      for (const YAML::Node& each : from) merge_one(into, each, mark);
+    } else {
+      merge_one(into, from, mark);
+    }
+  }
+
+  void merge_one(Settings& into, const YAML::Node& from, const YAML::Mark& mark) {
+    if (!from.IsMap()) throw source_.error(mark, "'<<' merges maps; write an alias of a map, or a list of them");
+    const Settings merged = convert(from, mark);
+    for (const auto& [key, value] : merged.members()) {
+      if (into.find(key) == nullptr) into.add(key, value);
+    }
+  }
+
+  void refuse_tags(const YAML::Node& node) const {
+    const std::string& tag = node.Tag();
+    const bool is_yamls_own = tag.empty() || tag == "?" || tag == "!" || tag.rfind("tag:yaml.org,2002:", 0) == 0;
+    if (!is_yamls_own) throw source_.error(node.Mark(), fmt::format("the tag '{}' means nothing here; remove it", tag));
+  }
+
+  const Source& source_;
+  int nodes_ = 0;
+  int levels_ = 0;
+};
+
+Settings parse(const std::string& text, const Source& source) {
+  std::vector<YAML::Node> documents;
+  try {
+    documents = YAML::LoadAll(text);
+  } catch (const YAML::Exception& problem) {
+    throw source.error(problem.mark, fmt::format("not valid YAML: {}", problem.msg));
+  }
+  if (documents.size() > 1) {
+    throw source.error(documents[1].Mark(),
+                       fmt::format("found {} documents, expected one; remove the lines '---'", documents.size()));
+  }
+  if (documents.empty()) return Settings::null({source.name, source.has_lines ? 1 : 0});
+  return Converter(source).convert(documents[0], documents[0].Mark());
+}
+
+}  // namespace
+
+Settings load_yaml(const std::filesystem::path& file) {
+  std::error_code problem;
+  const std::filesystem::file_status status = std::filesystem::status(file, problem);
+  if (!std::filesystem::exists(status)) {
+    throw Error(fmt::format("{}: no such file; give the path of a YAML file", file.string()));
+  }
+  if (std::filesystem::is_directory(status)) {
+    throw Error(fmt::format("{}: is a directory; give the path of a YAML file in it", file.string()));
+  }
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) throw Error(fmt::format("{}: cannot be read; check its permissions", file.string()));
+  return parse_yaml(text, file.string());
+}
+
+Settings parse_yaml(const std::string& text, const std::string& name) { return parse(text, {name, true}); }
+
+void apply_assignment(Settings& settings, std::string_view assignment) {
+  const std::size_t equals = assignment.find('=');
+  const Source source{fmt::format("--set {}", assignment), false};
+  if (equals == std::string_view::npos || equals == 0) {
+    throw source.error(YAML::Mark::null_mark(), "expected key.path=value, e.g. horizon.length=25");
+  }
+  Settings value = parse(std::string(assignment.substr(equals + 1)), source);
+  settings.set(assignment.substr(0, equals), std::move(value));
+}
+
+}  // namespace rhec

@@ -1,0 +1,47 @@
+#include "rhec/plugins/robot/blocking_section.hpp"
+
+#include <gmock/gmock.h>
+
+#include "plugins/robot/robots.hpp"
+
+namespace rhec {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+BlockingSection blocking(const std::string& text) { return {context_with(), settings(text)}; }
+
+TEST(BlockingSection, HasOneValueAHorizonWhereNoneIsGiven) {
+  const auto made = blocking("").make();
+  ASSERT_EQ(made.size(), 2U);
+  for (const auto& each : made) EXPECT_TRUE(each->is_one_block());
+  EXPECT_EQ(blocking("").choice(1).name, documented_default(BlockingSection::documentation(), "PARAMETER.name"));
+}
+
+TEST(BlockingSection, IsReadByParameter) {
+  const BlockingSection section = blocking("{mu: {name: structured, size: 3}}");
+  const auto made = section.make();
+  EXPECT_TRUE(made[0]->is_one_block());
+  EXPECT_FALSE(made[1]->is_one_block());
+  EXPECT_EQ(section.choice(0).name, "full_horizon");
+  EXPECT_EQ(section.choice(1).name, "structured");
+  EXPECT_EQ(section.choice(1).options.find("size")->as_integer(), 3);
+}
+
+TEST(BlockingSection, RefusesUnknownNamesAndWrongOptionsAtOnce) {
+  EXPECT_THAT(error_of([] { blocking("kappa: unblocked\nmuu: unblocked"); }),
+              AllOf(StartsWith("robot.yaml:2: muu: blocking has no option"), HasSubstr("did you mean 'mu'?")));
+  EXPECT_THAT(error_of([] { blocking("mu:\n  name: structured\n  size: 0"); }), StartsWith("robot.yaml:3: mu.size"));
+}
+
+TEST(BlockingSection, SaysWhichHorizonDoesNotFit) {
+  const BlockingSection section = blocking("kappa: {name: structured, size: 3, overlap: 16}");
+  EXPECT_EQ(section.make_for(20, "estimator.horizon").size(), 2U);
+  EXPECT_THAT(error_of([&] { section.make_for(15, "estimator.horizon"); }),
+              AllOf(StartsWith("robot.yaml:1: kappa: "), HasSubstr("change it or estimator.horizon")));
+}
+
+}  // namespace
+}  // namespace rhec
