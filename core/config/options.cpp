@@ -9,7 +9,7 @@
 namespace rhec {
 namespace {
 
-/// The number of letters to insert, drop, change or swap with their neighbour to get from one word to the other.
+/// The number of letters to insert, drop, change or swap with a neighbour to turn one word into the other.
 std::size_t edit_distance(std::string_view from, std::string_view to) {
   std::vector<std::size_t> before_last, last(to.size() + 1), row(to.size() + 1);
   for (std::size_t j = 0; j <= to.size(); ++j) last[j] = j;
@@ -45,7 +45,7 @@ std::string Range::text() const {
 
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates) {
   std::string best;
-  // More than a third of the letters wrong is another word, not a slip.
+  // If more than a third of the letters differ, it is another word, not a typing error.
   std::size_t fewest = std::max<std::size_t>(1, (word.size() + 2) / 3) + 1;
   for (const std::string& candidate : candidates) {
     const std::size_t distance = edit_distance(word, candidate);
@@ -76,6 +76,13 @@ void check_keys(const Settings& from, const std::vector<std::string>& known, std
     throw value.error(fmt::format("{} has no option '{}'{} Its options are: {}", owner, key,
                                   nearest(key, known).empty() ? "." : suggestion(key, known), fmt::join(known, ", ")));
   }
+}
+
+void check_old_names(const Settings& from, const std::vector<std::pair<std::string, std::string>>& renamed,
+                     std::string_view owner) {
+  for (const auto& [old_name, new_name] : renamed)
+    if (const Settings* value = from.find(old_name))
+      throw value->error(fmt::format("'{}' of {} is called '{}' now; rename the key", old_name, owner, new_name));
 }
 
 void check_new_name(const std::string& name, const std::vector<std::string>& known) {

@@ -16,7 +16,7 @@ std::string key_path(const std::string& parent, std::string_view key) {
 
 std::string item_path(const std::string& parent, std::size_t index) { return fmt::format("{}[{}]", parent, index); }
 
-/// Reads the whole of `text`; a leading plus is allowed, which from_chars does not know.
+/// Reads the whole of `text`. Accepts a leading plus, unlike from_chars.
 template <class Number>
 std::optional<Number> read_whole(std::string_view text) noexcept {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
@@ -104,7 +104,7 @@ void Settings::set(std::string_view dotted, Settings value) {
   if (at != members_.end()) return at->second.set(dotted.substr(dot + 1), std::move(value));
   Settings child = map(value.origin_);
   child.path_ = key_path(path_, key);
-  child.set(dotted.substr(dot + 1), std::move(value));  // before it is attached: nothing changes if this throws
+  child.set(dotted.substr(dot + 1), std::move(value));  // before it is attached, so that nothing changes if this throws
   members_.emplace_back(key, std::move(child));
 }
 
@@ -134,7 +134,7 @@ std::optional<double> Settings::number() const noexcept {
   if (text_ == ".inf" || text_ == "+.inf" || text_ == "inf" || text_ == "+inf") return infinity;
   if (text_ == "-.inf" || text_ == "-inf") return -infinity;
   const std::optional<double> value = read_whole<double>(text_);
-  // from_chars reads 'nan' and 'infinity' too; neither is what a user means by a number here.
+  // from_chars also reads 'nan' and 'infinity'; neither is accepted as a number here.
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
 

@@ -44,7 +44,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   problem_.set_intervals(N);
   begins_.assign(N, 0);
   for (int i = 0; i < N; ++i) problem_.set_duration(i, setup_.interval);
-  // Move blocking is counted from the start of the horizon, so it is the same at every sample.
+  // Move blocking is counted from the start of the horizon, so it is the same in every sample.
   for (std::size_t b = 0; b < setup_.blockings.size(); ++b) {
     setup_.blockings[b]->starts({0, N}, begins_.data());
     problem_.set_blocks(setup_.problem.blocked_inputs[b], begins_.data());
@@ -76,14 +76,14 @@ void Controller::reset() noexcept {
   fallbacks_ = 0;
 }
 
-/// Speeds among the states, then inputs.
+/// Writes the speeds among the states, then the inputs.
 void Controller::go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept {
   const Model& vehicle = problem_.model();
   std::fill(motion.begin(), motion.end(), 0.0);
   vehicle.straight_motion(ground_speed, parameters, motion.data(), motion.data() + vehicle.state_count());
 }
 
-/// What goes straight on at a speed over ground, on ground that slips like the estimate, as far as that is trusted.
+/// Inputs and speeds for straight motion at a ground speed, with the estimated slip as far as it is trusted.
 void Controller::choose_straight_motion(double ground_speed, const double* parameters) noexcept {
   go_straight(ground_speed, nominal_parameters_.data(), slipless_);
   straight_ = slipless_;
@@ -92,7 +92,7 @@ void Controller::choose_straight_motion(double ground_speed, const double* param
   for (std::size_t j = 0; j < straight_.size(); ++j) {
     const double most = slipless_[j] / setup_.least_speed_factor;
     const bool trusted = straight_[j] * most >= 0.0 && std::abs(straight_[j]) <= std::abs(most);
-    if (!trusted) straight_[j] = most;  // also where it is not a number
+    if (!trusted) straight_[j] = most;  // also if it is NaN
   }
 }
 
@@ -118,7 +118,7 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
   }
 }
 
-/// Inputs that drive the vehicle ahead at most as fast as a speed over ground without slip asks for.
+/// Bounds the forward inputs by those for the given ground speed without slip.
 void Controller::bound_speed(double most) noexcept {
   if (!std::isfinite(most) || most == bounded_speed_) return;
   bounded_speed_ = most;
@@ -134,7 +134,7 @@ void Controller::bound_speed(double most) noexcept {
   }
 }
 
-/// A first plan: the reference inputs, rolled out.
+/// Cold start: the reference inputs, rolled out.
 void Controller::start_cold() noexcept {
   const int nu = problem_.model().input_count();
   for (int i = 0; i < problem_.intervals(); ++i)
@@ -164,7 +164,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   std::copy_n(estimate.state.data(), nx, problem_.given_state());
   std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
   set_reference(follower_.arc_length(), estimate.parameters.data());
-  command_.softened = problem_.finish(scratch_) > 0;
+  command_.relaxed = problem_.finish(scratch_) > 0;
   bool from_plan = has_plan_;
   if (!has_plan_) {
     start_cold();
@@ -172,10 +172,9 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     from_plan = shifter_.apply(1, problem_, point_);
     if (!from_plan) start_cold();
   }
-  // An estimate that has jumped is no small step for the plan of the last sample: start it from a simulation instead.
   bool is_found = find_plan(deadline);
   if (!is_found && from_plan) {
-    // The plan may have led astray; a fresh start may not.
+    // The last plan may be a bad guess, e.g. after a jump of the estimate: try a simulation instead.
     start_cold();
     is_found = find_plan(deadline);
     command_.report.fallback_used = true;
@@ -197,7 +196,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   return command_;
 }
 
-/// What the robot need not wait for: the plan is judged and kept, before the problem becomes that of the next sample.
+/// Work that the robot need not wait for: assess and keep the plan before the problem changes to the next sample.
 void Controller::finish() noexcept {
   if (is_finished_) return;
   is_finished_ = true;
@@ -210,7 +209,7 @@ void Controller::finish() noexcept {
 void Controller::prepare() noexcept {
   finish();
   if (!has_plan_ || prepared_) return;
-  // What the next sample will probably be: the plan's second node, the reference one step further on.
+  // Prediction of the next sample: the plan's second node, and the reference one step further on.
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
   std::copy_n(point_.state(1), nx, problem_.given_state());
   std::copy_n(problem_.given_parameters(), np, reference_parameters_.data());

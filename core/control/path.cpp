@@ -11,9 +11,9 @@
 namespace rhec {
 namespace {
 
-// Waypoints closer than this are one point: a segment so short has no heading worth following.
+// Waypoints closer than this are one point: the heading of so short a segment is meaningless.
 constexpr double smallest_segment = 1e-9;  // [m]
-// Segments that are walked along before a search.
+// Number of segments to step along before a binary search.
 constexpr int near = 32;
 
 void check(const Waypoint& waypoint, std::size_t number) {
@@ -52,12 +52,12 @@ Path::Path(const std::vector<Waypoint>& waypoints) {
 }
 
 int Path::segment_at(double arc_length) const noexcept {
-  // The first and the last waypoint are left out of the search, so that the end segments reach beyond the ends.
+  // The first and the last waypoint are not searched, so that the end segments extend beyond the ends.
   const auto after = std::upper_bound(arc_lengths_.begin() + 1, arc_lengths_.end() - 1, arc_length);
   return static_cast<int>(after - arc_lengths_.begin()) - 1;
 }
 
-/// The same, by a few steps from where it would be if all segments were as long as one that lies near.
+/// The same by a few steps from the segment expected if all segments were as long as the nearby one.
 int Path::segment_near(int known, double arc_length) const noexcept {
   const int last = size() - 2;
   known = std::clamp(known, 0, last);
@@ -89,10 +89,10 @@ PathProjection Path::closest(double x, double y, double from, double to) const n
     double along, off_x, off_y, square;
   };
   const int last = size() - 2;
-  const double evenly = from / length() * (last + 1);  // where it would be if all segments were of one length
+  const double evenly = from / length() * (last + 1);  // the segment if all were of equal length
   const int first = segment_near(static_cast<int>(std::min(std::max(0.0, evenly), static_cast<double>(last))), from);
   const auto nearest_on = [&](int i) -> Nearest {
-    // The part of this segment that lies in the stretch, as distances from the segment's start.
+    // The part of this segment within the range, as distances from the segment's start.
     const double begin = from - arc_lengths_[i];
     const double end = i == last ? to - arc_lengths_[i] : std::min(to, arc_lengths_[i + 1]) - arc_lengths_[i];
     const double dx = x - x_[i], dy = y - y_[i];
@@ -101,8 +101,8 @@ PathProjection Path::closest(double x, double y, double from, double to) const n
     const double off_x = dx - along * direction_x_[i], off_y = dy - along * direction_y_[i];
     return {along, off_x, off_y, off_x * off_x + off_y * off_y};
   };
-  // The best point is at most as far as any: as one about as far on as the position is away, which on a path that does
-  // not wind is near it.
+  // Upper bound on the smallest distance: that of a point about as far along as the position is away, which is close to
+  // the best one unless the path winds.
   double at_most = std::sqrt(nearest_on(first).square);
   const double ahead = std::min(at_most * (last + 1) / length(), static_cast<double>(last - first));
   if (const int guess = first + static_cast<int>(ahead); arc_lengths_[guess] <= to)
@@ -120,8 +120,8 @@ PathProjection Path::closest(double x, double y, double from, double to) const n
       at_most = std::min(at_most, distance);
     }
     if (to <= arc_lengths_[i + 1]) break;
-    // Whoever goes on for some length comes nearer by no more than that: segments from which the best point is out of
-    // reach are passed over.
+    // The distance to the path changes by at most the arc length travelled: skip segments that cannot come closer than
+    // the best point so far.
     const double reach = std::min(arc_lengths_[i + 1] + distance - at_most - smallest_segment, to);
     while (i + 1 < last && arc_lengths_[i + 2] < reach) ++i;
   }

@@ -11,9 +11,9 @@
 namespace rhec {
 namespace {
 
-// A variable that is known exactly is given this part of its typical magnitude as a standard deviation.
+// Standard deviation of a variable that is known exactly, as a fraction of its typical magnitude.
 constexpr double least_sigma = 1e-9;
-// Pivots of a correlation matrix below this are rounding.
+// Pivots of a correlation matrix below this are rounding errors.
 constexpr double least_pivot = 1e-15;
 
 KalmanFilter make_filter(const RheProblem& like) {
@@ -26,8 +26,8 @@ KalmanFilter make_filter(const RheProblem& like) {
   return {like.shared_model(), std::move(noise), like.substeps()};
 }
 
-/// Householder reduction of the columns but the last one, in place: afterwards the upper triangle holds R, and the last
-/// column Q' times what was there.
+/// Householder reduction of all columns but the last, in place: afterwards the upper triangle holds R, and the last
+/// column is multiplied by Q'.
 void triangularise(Eigen::MatrixXd& rows) noexcept {
   const Eigen::Index m = rows.rows(), n = rows.cols() - 1;
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -79,7 +79,7 @@ void ArrivalCost::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& cova
   filter_.covariance = initial_covariance_ = covariance;
 }
 
-/// Where rounding has made the covariance singular it gets the least ridge that lets it be factorised.
+/// If rounding has made the covariance singular, increases its diagonal just enough to factorise it.
 void ArrivalCost::factor_covariance() noexcept {
   const ModelDescription& about = filter_.model().description();
   const int n = static_cast<int>(scale_.size()), nx = filter_.model().state_count();
@@ -123,7 +123,7 @@ void ArrivalCost::write(RheProblem& problem) noexcept {
   });
 }
 
-/// Of the factor L, in the lower triangle.
+/// Inverts the factor L in the lower triangle.
 void ArrivalCost::invert_factor() noexcept {
   with_size(static_cast<int>(scale_.size()), [&](auto n) {
     const double* factor = factor_.data();
@@ -157,7 +157,7 @@ void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, cons
   }
   for (int j = 0; j < np; ++j) {
     const Border& border = borders[j];
-    filter_.add_parameter_variance(j, walks_[j].forgetting * walks_[j].forgetting);
+    filter_.add_parameter_variance(j, walks_[j].process_noise * walks_[j].process_noise);
     if (!border.reached) continue;
     if (border.neighbour_sigma) {
       filter_.add_parameter_variance(j, *border.neighbour_sigma * *border.neighbour_sigma * border.steps);
@@ -177,7 +177,7 @@ void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate
 }
 
 /// Rows in [dx; du; dp; dramp] about the solution: prior, outputs, measured inputs, ramp. Their QR factor R gives the
-/// covariance R^-1 R^-T of what leaves, which the linearised dynamics carry over to the next node.
+/// covariance R^-1 R^-T of these variables, which the linearised dynamics propagate to the next node.
 void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate& solution) noexcept {
   const Model& model = problem.model();
   const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(), ny = model.output_count();
@@ -210,7 +210,7 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
 
   rows_.setZero();
   auto right = rows_.col(unknowns);
-  // Prior: L^-1 D^-1 ([x; p] + [dx; dp] - mean). Columns of p stand behind those of u.
+  // Prior: L^-1 D^-1 ([x; p] + [dx; dp] - mean). The columns of p follow those of u.
   factor_covariance();
   invert_factor();
   const auto column_of = [&](int j) { return j < nx ? j : nu + j; };
@@ -230,7 +230,7 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
     right[row] = missing ? 0.0 : (measured - inputs_[j]) / sigma;
   }
   for (int j = 0; j < np; ++j, ++row) {
-    // No ramp: no change, by a row of any weight, since nothing else speaks of that column.
+    // Without a ramp there is no change: a row of any weight, since nothing else involves that column.
     const double sigma = ramp_variances_[j] > 0.0 ? std::sqrt(ramp_variances_[j]) : 1.0;
     rows_(row, nx + nu + np + j) = 1.0 / sigma;
     right[row] = (p[j] - ends_[j]) / sigma;
@@ -275,7 +275,7 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
   inverse_.noalias() = spread_.lazyProduct(spread_.transpose());
   for (int r = 0; r < n; ++r) next_mean_[r] = (r < nx ? next_[r] : ends_[r - nx]) + map_.row(r).dot(shift_);
   if (!next_mean_.allFinite() || !inverse_.allFinite()) {
-    // A solution that is not one tells nothing of the next node: begin anew from what is known of this one.
+    // The result is not finite: keep the present mean and restart with the initial covariance.
     filter_.covariance = initial_covariance_;
     return;
   }

@@ -13,7 +13,7 @@ void set_block_structure(const Window& window, const std::vector<std::shared_ptr
     const Blocking& blocking = *blockings[k];
     const bool ramp = blocking.transition() == Transition::ramp;
     const std::int64_t first_start = blocking.starts(window, begins.data());
-    // A ramp can start at the window's edge, but not before the run itself.
+    // A ramp can start at the start of the horizon, but not before the run itself.
     begins[0] = ramp && first_start == window.first && window.first > 0;
     problem.set_blocks(j, begins.data(), blocking.transition());
     std::int64_t block = begins[0] ? first_starts[k] : first_start;

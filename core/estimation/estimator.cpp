@@ -14,9 +14,9 @@ namespace rhec {
 namespace {
 
 constexpr std::size_t remembered_nodes = 1024;
-constexpr int most_parts = 1000;  // that one gap, or one prediction, is divided into
+constexpr int most_parts = 1000;  // largest number of parts of one gap, or of one prediction
 
-/// Intervals of at most a length that a time is divided into.
+/// Number of equal parts of a duration, each at most `longest`.
 int parts_of(double duration, double longest) noexcept {
   const double parts = std::ceil(duration / longest - 1e-6);
   return parts < most_parts ? std::max(1, static_cast<int>(parts)) : most_parts;
@@ -25,7 +25,7 @@ int parts_of(double duration, double longest) noexcept {
 }  // namespace
 
 Estimator::Rows::Rows(std::size_t capacity, int width)
-    // Twice the room, so that rows are moved to the front once in `capacity` drops only.
+    // Space for twice the rows, so that rows are moved to the front only once in `capacity` drops.
     : capacity_(capacity), width_(width), times_(2 * capacity), values_(2 * capacity * width) {}
 
 bool Estimator::Rows::insert(double time, const double* values) noexcept {
@@ -128,7 +128,7 @@ void Estimator::push_input(double time, const double* inputs) noexcept {
   inputs_.insert(time, values_.data());
 }
 
-/// Mean over an interval of inputs that hold from their stamps on; NaN where none is known.
+/// Mean over an interval of inputs that hold from their stamps on; NaN if none is known.
 void Estimator::mean_input(double from, double to) noexcept {
   std::fill(mean_.begin(), mean_.end(), 0.0);
   std::fill(weight_.begin(), weight_.end(), 0.0);
@@ -163,7 +163,7 @@ void Estimator::add_node(double time, const double* outputs) noexcept {
   node_times_[newest_ % remembered_nodes] = time;
   ++counts_.nodes;
   stale_ = true;
-  // Of the rows of inputs before this node, only the last one still holds.
+  // Of the input rows before this node, only the last one still holds.
   std::size_t used = 0;
   while (used + 1 < inputs_.size() && inputs_.time(used + 1) <= time) ++used;
   inputs_.drop_front(used);
@@ -203,7 +203,7 @@ void Estimator::predict_to(double time) noexcept {
 const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noexcept {
   while (measurements_.size() > 0 && measurements_.time(0) <= time + timeline_.tolerance) {
     const double stamp = measurements_.time(0);
-    // Measurements with one stamp, such as those of two sensors, make one node.
+    // Measurements with the same stamp, e.g. of two sensors, make one node.
     std::size_t same = 1;
     double* merged = measurements_.values(0);
     while (same < measurements_.size() && measurements_.time(same) <= stamp + timeline_.tolerance) {

@@ -15,7 +15,7 @@
 namespace rhec {
 namespace {
 
-// Once the best hypothesis explains the data e^25 times better than any that differs, the others are dropped.
+// Once the best hypothesis explains the data e^25 times better than every different one, the others are dropped.
 constexpr double decisive = 25.0;
 
 }  // namespace
@@ -54,7 +54,7 @@ void FilterEstimation::reset() noexcept {
   }
 }
 
-/// Of the measured outputs given the past, each by itself.
+/// Log-likelihood of the measured outputs given the past, each on its own.
 double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double* outputs) noexcept {
   const Model& m = filter.model();
   const int ny = m.output_count(), nx = m.state_count();
@@ -72,7 +72,7 @@ double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double
     double variance = filter.noise().output_variances[j];
     for (int c = 0; c < nx; ++c)
       for (int r = 0; r < nx; ++r) variance += jacobian_[c * ny + j] * filter.covariance(r, c) * jacobian_[r * ny + j];
-    // A single wild fix must not decide.
+    // A single outlier must not decide.
     sum -= 0.5 * std::min(error * error / variance, 16.0) + 0.5 * std::log(variance);
   }
   return sum;
@@ -116,7 +116,7 @@ void FilterEstimation::add_node(double duration, const double* inputs, const dou
 }
 
 bool FilterEstimation::amend(int back, const double* outputs) noexcept {
-  if (back != 0) return false;  // a filter has no memory of older nodes
+  if (back != 0) return false;  // a filter cannot use measurements of older nodes
   take(outputs);
   return true;
 }

@@ -76,7 +76,7 @@ FullInformationEstimation::FullInformationEstimation(std::shared_ptr<const Model
 
 namespace {
 
-/// Rows that were not estimated take over those before them (at the start: after them).
+/// Rows without an estimate copy the row before them (at the start: the row after them).
 void fill_gaps(std::vector<double>& rows, int width) {
   const std::ptrdiff_t count = width > 0 ? static_cast<std::ptrdiff_t>(rows.size()) / width : 0;
   const auto is_known = [&](std::ptrdiff_t i) {
@@ -99,7 +99,8 @@ void fill_data(const NodeLog& log, RheProblem& problem) {
   }
 }
 
-/// The log's own estimates as an iterate; the value of a block is that of its last interval, which had seen most of it.
+/// The estimates in the log as an iterate; a block gets the value of its last interval, which is based on most of its
+/// data.
 Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
   const int nx = problem.model().state_count(), np = problem.model().parameter_count(), N = log.intervals();
   Iterate guess(problem.capacity());
@@ -189,7 +190,7 @@ void state_at(const SmoothedRun& run, const Model& model, int substeps, double t
   request.count = 1;
   request.states = from;
   request.inputs = run.inputs.data() + node * model.input_count();
-  // Of a ramp, the part that the time is into the interval.
+  // On a ramp: the fraction of the interval that has elapsed.
   const int np = model.parameter_count();
   const double share = duration / (run.times[node + 1] - run.times[node]);
   std::vector<double> ends(np);

@@ -47,7 +47,7 @@ void KalmanFilter::update(const double* y, const double* robust_weights) noexcep
   request.outputs = predicted_.data();
   request.jacobians = output_jacobian_.data();
   model_->observe(request);
-  // One output after the other, all linearised at the same point; noises are independent.
+  // One output after the other, all linearised at the same point; the noises are independent.
   correction_.setZero();
   for (int j = 0; j < ny_; ++j)
     if (!std::isnan(y[j]))
@@ -77,13 +77,13 @@ void KalmanFilter::take_output(int output, double measured, double variance) noe
     for (int c = 0; c < nx_; ++c) total += of_output[c * ny_] * image[c];
     if (!(total > 0.0)) return false;
     for (int r = 0; r < n; ++r) gain[r] = image[r] / total;
-    // Joseph's form, (I - k h') Pi (I - k h')' + k r k': it stays positive semidefinite, and exact where a vague prior
-    // meets a good measurement. One factor after the other, it takes no product of matrices (Bierman 1977).
+    // Joseph's form, (I - k h') Pi (I - k h')' + k r k': it stays positive semidefinite, and accurate if a vague prior
+    // meets an accurate measurement. Applied factor by factor, without matrix products (Bierman 1977).
     for (int c = 0; c < n; ++c)
       for (int r = 0; r < n; ++r) work[c * n + r] = P[c * n + r] - gain[r] * image[c];
     multiply_row(work);
     for (int r = 0; r < n; ++r) image[r] = variance * gain[r] - image[r];
-    double* __restrict zeros = zeros_.data();  // as long as every number is finite, else NaN
+    double* __restrict zeros = zeros_.data();  // stays 0 as long as every number is finite, else NaN
     std::fill_n(zeros, n, 0.0 * innovation);
     for (int c = 0; c < n; ++c) {
       for (int r = 0; r < n; ++r) {
@@ -99,7 +99,7 @@ void KalmanFilter::take_output(int output, double measured, double variance) noe
   if (taken) make_symmetric();
 }
 
-/// covariance = the symmetric part of the next one.
+/// Replaces the covariance by the symmetric part of the next one.
 void KalmanFilter::make_symmetric() noexcept {
   with_size(nx_ + np_, [&](auto n) {
     double* __restrict P = covariance.data();
@@ -131,7 +131,7 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   } else {
     differentiate(duration);
   }
-  // Of the transition [F_x F_p; 0 I] only the vehicle's rows are worth a product.
+  // Only the vehicle's rows of the transition [F_x F_p; 0 I] need a product.
   if (ramp_variances)
     for (int c = 0; c < np_; ++c)
       for (int r = 0; r < nx_; ++r) jacobian_[(nx_ + nu_ + c) * nx_ + r] += jacobian_[(nx_ + nu_ + np_ + c) * nx_ + r];
@@ -180,7 +180,7 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   std::copy(next_.begin(), next_.end(), mean.data());
 }
 
-/// Next state and its Jacobian where parameters stay what they are, by the faster of the model's functions.
+/// Next state and its Jacobian for constant parameters, by the faster of the model's functions.
 void KalmanFilter::differentiate(double duration) noexcept {
   std::copy_n(mean.data(), nx_ + np_, row_.data());
   std::copy_n(input_.data(), nu_, row_.data() + nx_ + np_);
@@ -199,7 +199,7 @@ void KalmanFilter::differentiate(double duration) noexcept {
   request.scratch = scratch_.data();
   model_->integrate_rows(request);
   std::copy_n(next_row_.data(), nx_, next_.data());
-  // From rows by [x; p; u] to columns by [x; u; p].
+  // From rows in the order [x; p; u] to columns in the order [x; u; p].
   for (int r = 0; r < nx_; ++r) {
     const double* row = jacobian_rows_.data() + r * width;
     for (int c = 0; c < nx_; ++c) jacobian_[c * nx_ + r] = row[c];

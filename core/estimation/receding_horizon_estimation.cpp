@@ -17,11 +17,11 @@
 namespace rhec {
 namespace {
 
-// Above this standard deviation an angle is searched for around the circle rather than refined [rad].
+// Above this standard deviation an angle is searched around the circle instead of refined [rad].
 constexpr double uncertain_angle = 0.35;
-// Iterations that a start of that search is given.
+// Iterations for each start of that search.
 constexpr int search_iterations = 12;
-// Durations that differ by less than this part of themselves are the same.
+// Durations that differ by less than this fraction are equal.
 constexpr double same_time = 1e-9;
 
 RheProblem make_problem(std::shared_ptr<const Model> model, const RecedingHorizonEstimation::Setup& setup) {
@@ -103,7 +103,7 @@ void RecedingHorizonEstimation::take_inputs(int interval, const double* inputs) 
   std::copy_n(inputs, inputs_.size(), problem_.measured_input(interval));
 }
 
-/// A guess out of nothing: the prior, rolled out with the inputs as measured.
+/// Cold start: the prior, rolled out with the measured inputs.
 void RecedingHorizonEstimation::start_cold() noexcept {
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
   const auto& lower = problem_.setup().parameter_lower;
@@ -124,7 +124,7 @@ void RecedingHorizonEstimation::start_cold() noexcept {
   problem_.simulate(point_, scratch_);
 }
 
-/// After a solve that failed: leaves a guess that is finite, and from which the next solve starts anew.
+/// After a failed solve: leaves a finite guess from which the next solve starts anew.
 void RecedingHorizonEstimation::recover() noexcept {
   const int N = window_.intervals;
   const auto is_finite = [&] {
@@ -138,7 +138,7 @@ void RecedingHorizonEstimation::recover() noexcept {
   };
   if (!is_finite()) start_cold();
   if (!is_finite()) {
-    // Not even the prior leads anywhere: the vehicle is where it was last.
+    // The simulation from the prior is not finite either: keep the vehicle where it was last.
     for (int i = 0; i <= N; ++i) std::copy_n(last_state_.data(), last_state_.size(), point_.state(i));
     for (int i = 0; i < N; ++i) std::fill_n(point_.control(i), problem_.control_count(i), 0.0);
   }
@@ -158,7 +158,7 @@ void RecedingHorizonEstimation::slide_arrival() noexcept {
     border.neighbour_sigma = blocking.neighbour_sigma();
     border.leaves_as_ramp = ramp && problem_.structure().starts_block(0, static_cast<int>(j));
     border.ramp_variance = border.leaves_as_ramp ? problem_.link_variance(0, static_cast<int>(j)) : 0.0;
-    // What leaves has to have a covariance, so here a block that nothing links is only as free as one that restarts.
+    // What leaves needs a finite covariance, so an unlinked block has that of a restarted one here.
     if (!std::isfinite(border.ramp_variance))
       border.ramp_variance = setup_.walks[j].restart_sigma * setup_.walks[j].restart_sigma;
   }
@@ -211,10 +211,11 @@ void RecedingHorizonEstimation::add_node(double duration, const double* inputs, 
     advance_window(duration, inputs, outputs);
     return;
   }
-  // The window has moved already, with placeholders for what is now known. Where it fits, the linearisation stays good.
+  // The horizon has already moved, with placeholders for the data that are now known. If these fit, the linearisation
+  // remains valid.
   prepared_ = false;
   const int last = window_.intervals;
-  // Stamps that are sums or multiples of one step differ in their last digits, and no vehicle moves in those.
+  // Stamps computed as sums or multiples of one step differ in their last digits, which does not matter here.
   const bool same_duration = std::abs(problem_.duration(last - 1) - duration) <= same_time * duration;
   // The weights of robust losses were those of the predicted outputs, so with them the matrices change too.
   bool fits = same_duration && setup_.problem.robust.empty();
@@ -248,7 +249,7 @@ void RecedingHorizonEstimation::prepare() noexcept {
   if (!started_ || prepared_ || window_.intervals == 0 || !solved_) return;
   const int last = window_.intervals;
   std::copy_n(problem_.measured_input(last - 1), inputs_.size(), inputs_.data());
-  // Placeholders that leave no residual, and the same mask as before.
+  // Placeholders with zero residuals and the previous mask.
   Model::Nodes request;
   request.count = 1;
   request.states = point_.state(last);
@@ -262,12 +263,12 @@ void RecedingHorizonEstimation::prepare() noexcept {
   prepared_ = true;
 }
 
-/// Starts around the circle, each solved from a roll-out; the best objective wins.
+/// Solves from headings around the circle, each rolled out; keeps the best objective.
 void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexcept {
   double best_objective = std::numeric_limits<double>::infinity();
   best_ = point_;
   for (int start = 0; start <= setup_.heading_starts; ++start) {
-    trial_ = point_;  // the last start is the guess as it is
+    trial_ = point_;  // the last start is the present guess
     if (start < setup_.heading_starts) {
       trial_.clear_multipliers();
       for (int j = 0; j < problem_.model().state_count(); ++j) trial_.state(0)[j] = problem_.arrival_mean[j];
@@ -286,7 +287,7 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
   point_ = best_;
 }
 
-/// The objective of what an iterate really says: its states are simulated from the first one.
+/// The objective with the states simulated from the first one, i.e. without defects.
 double RecedingHorizonEstimation::objective_from_start(const Iterate& iterate) noexcept {
   trial_ = iterate;
   problem_.simulate(trial_, scratch_);
@@ -294,12 +295,12 @@ double RecedingHorizonEstimation::objective_from_start(const Iterate& iterate) n
   return std::isnan(objective) ? std::numeric_limits<double>::infinity() : objective;
 }
 
-/// A solve that did not converge may have been led astray by its guess, window after window. Where the prior explains
-/// the measurements better than what came of it, the solve starts from there; the best of the three is taken.
+/// A solve that did not converge may have a bad guess, which would persist from sample to sample. If the prior explains
+/// the measurements better than the result, solve again from the prior, and keep the best of the three.
 void RecedingHorizonEstimation::reconsider(Report& report, Clock::time_point deadline) noexcept {
   const double found = objective_from_start(point_);
   best_ = point_;
-  start_cold();  // simulated already
+  start_cold();  // already simulated
   const double prior = problem_.evaluate(point_, nullptr, scratch_);
   if (!(prior < found)) {
     point_ = best_;
@@ -324,15 +325,15 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   result.state.resize(nx);
   result.parameters.resize(np);
   result.covariance.resize(nx + np, nx + np);
-  // A window that was moved in advance ends in a node that is not there yet. What stands for it says nothing of the
-  // nodes before, once nothing is measured there.
+  // A horizon that was moved in advance ends in a node that does not exist yet. Without its outputs, this node does not
+  // affect the others.
   const int newest = prepared_ ? N - 1 : N;
   if (prepared_) {
     std::fill_n(problem_.output(N), outputs_.size(), missing_value);
     solver_->prepare(point_);
   }
-  // Once found, a heading is followed, even where it grows uncertain again in a gap: it cannot have turned about
-  // unseen.
+  // Once found, a heading is tracked, even if it becomes uncertain again in a gap: the vehicle cannot have turned
+  // around unseen.
   const bool remembers = setup_.arrival == ArrivalKind::ekf || setup_.arrival == ArrivalKind::smoothing;
   const auto is_known = [&](const Eigen::MatrixXd& covariance) {
     return covariance(heading, heading) <= uncertain_angle * uncertain_angle;
@@ -351,11 +352,11 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   result.parameters = last_state_.tail(np);
   write_covariance(newest, result);
   RHEC_ASSERT(result.state.allFinite() && result.parameters.allFinite(), "an estimate is finite");
-  // An arrival cost that learns nothing never knows the heading: there the window has to.
+  // An arrival cost without memory never determines the heading; use the covariance of the estimate instead.
   if (searching_ && !remembers && is_known(result.covariance)) searching_ = false;
 }
 
-/// Of the state of a node and the parameters before it. Where it comes to nothing, the last one stays.
+/// Covariance of the state of a node and the parameters before it. If it is not finite, the last one is kept.
 void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noexcept {
   const int n = static_cast<int>(last_state_.size()), ns = problem_.capacity().states;
   const bool is_last = node == window_.intervals;

@@ -15,10 +15,10 @@ using Point = std::complex<double>;
 
 constexpr double shortest_reach = 5.0, longest_reach = 40.0;  // of a piece to each side, along the track [m]
 constexpr int fewest_fixes = 4;
-constexpr double least_spread = 1.5;                       // of a piece's fixes, root mean square [m]
-constexpr double least_stretch = 0.5, most_stretch = 2.0;  // beyond, something else is wrong
+constexpr double least_spread = 1.5;                       // of the fixes of a piece, root mean square [m]
+constexpr double least_stretch = 0.5, most_stretch = 2.0;  // beyond these, something else is wrong
 constexpr int reweightings = 20;
-constexpr double least_jump = 1.0;  // of a gap; below, linearisation is good enough [m]
+constexpr double least_jump = 1.0;  // of a gap; for less, linearisation is good enough [m]
 
 struct Pose {
   Point position;
@@ -40,7 +40,7 @@ class Track {
         inputs_(inputs),
         parameters_(parameters),
         count_(problem.intervals() + 1) {
-    // What drives, among states and inputs, is what going straight on sets.
+    // The driving states and inputs are those that straight motion sets.
     const std::vector<double> nominal = nominal_values(model_.description().parameters);
     std::vector<double> state(model_.state_count(), 0.0), input(model_.input_count(), 0.0);
     model_.straight_motion(1.0, nominal.data(), state.data(), input.data());
@@ -72,7 +72,7 @@ class Track {
         continue;
       }
       if (k > last_known + 1) close_gap(last_known, k, reached.position, poses);
-      // Turns are counted along the track, not by the fit.
+      // Full turns are counted along the track, not by the fit.
       const double expected = chained(poses[k - 1], motions_[k - 1]).heading;
       poses[k].heading = expected + angle_difference(poses[k].heading, expected);
       last_known = k;
@@ -89,7 +89,7 @@ class Track {
     roles_.turn(pose.heading - state(node)[roles_.heading], state(node));
   }
 
-  /// The outputs that move one to one with the position's x and y.
+  /// Finds the outputs that equal the position's x and y up to an offset.
   bool find_outputs() {
     const int ny = model_.output_count();
     std::vector<double> jacobian(static_cast<std::size_t>(ny) * model_.state_count());
@@ -107,7 +107,7 @@ class Track {
     return x_output_ >= 0 && y_output_ >= 0;
   }
 
-  /// The track by its motions alone, with what is observed along it and how far the vehicle has gone.
+  /// Chains the motions to a track, with the outputs observed along it and the distance travelled.
   void chain() {
     const std::ptrdiff_t nx = model_.state_count(), nu = model_.input_count(), np = model_.parameter_count();
     std::vector<double> next(nx), outputs(model_.output_count());
@@ -149,7 +149,7 @@ class Track {
 
   Point measured(int node) const { return {problem_.output(node)[x_output_], problem_.output(node)[y_output_]}; }
 
-  /// The pose of a node from the fixes around it.
+  /// Finds the pose of a node from the position fixes around it.
   bool fit(int node, Pose& pose) {
     for (double reach = shortest_reach; reach <= longest_reach; reach *= 2.0) {
       const auto from =
@@ -194,7 +194,7 @@ class Track {
     return false;
   }
 
-  /// A piece tells of what is between its fixes, not of what lies beyond.
+  /// A piece determines the poses between its fixes, not beyond.
   bool surrounds(int first, int last, int node) const {
     return (first <= node || node == 0 || first == fixes_.front()) && (last >= node || last == fixes_.back());
   }
@@ -222,9 +222,9 @@ class Track {
   int count_;
   std::vector<int> driving_states_, driving_inputs_;
   int x_output_ = -1, y_output_ = -1;
-  std::vector<Pose> motions_, chain_;  ///< of each interval in its start's frame; all chained from the origin
+  std::vector<Pose> motions_, chain_;  ///< per interval, relative to its start; chained from the origin
   std::vector<Point> observed_;        ///< position outputs along the chain
-  std::vector<double> gone_;           ///< distance along the chain [m]
+  std::vector<double> gone_;           ///< distance travelled along the chain [m]
   std::vector<int> fixes_;             ///< nodes with a measured position
   std::vector<double> weights_;
 };

@@ -5,7 +5,7 @@
 
 namespace rhec {
 
-/// What the kernels of costs write to: H and h of stage 0 (null: not wanted).
+/// View for the cost kernels to write to: H and h of stage 0 (null: not wanted).
 inline CostView cost_view(const HorizonStructure& structure, double* H, double* h, bool adds_to_curvature) noexcept {
   return {.intervals = structure.intervals(),
           .states = structure.capacity().states,

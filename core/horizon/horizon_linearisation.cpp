@@ -12,7 +12,7 @@
 namespace rhec {
 namespace {
 
-/// Where more intervals than this are not known, all are evaluated anew.
+/// If more intervals than this are not in the cache, all are evaluated anew.
 constexpr int most_unknown = 8;
 
 }  // namespace
@@ -72,12 +72,12 @@ void HorizonLinearisation::refresh(const Iterate& iterate) noexcept {
 }
 
 bool HorizonLinearisation::is_at(const Iterate& iterate) const noexcept {
-  // Behind the last state there may be inputs of the interval behind the horizon.
+  // The last row also holds inputs of the interval behind the horizon.
   const std::size_t entries = static_cast<std::size_t>(problem_.intervals()) * qp_.stride() + qp_.capacity().states;
   return has_structure() && std::memcmp(rows_.data(), iterate.row(0), entries * sizeof(double)) == 0;
 }
 
-/// Whether the QP was made for today's blocks.
+/// Whether the QP was made for the present blocks.
 bool HorizonLinearisation::has_structure() const noexcept {
   const HorizonStructure& structure = problem_.structure_;
   const int N = structure.intervals();
@@ -85,12 +85,12 @@ bool HorizonLinearisation::has_structure() const noexcept {
                                               static_cast<std::size_t>(N) * structure.lifted_count()) == 0;
 }
 
-/// Whether AB has the rows that lifted variables have in today's structure.
+/// Whether AB already has the rows of lifted variables for the present structure.
 bool HorizonLinearisation::has_lifted_rows() const noexcept {
   return problem_.structure_.is_direct() && !problem_.structure_.any_ramp() && has_structure();
 }
 
-/// Sizes, dynamics with their curvature, and bounds, all evaluated anew.
+/// Evaluates sizes, dynamics with their curvature, and bounds anew.
 void HorizonLinearisation::linearise_stages(const Iterate& iterate, Hessian hessian) noexcept {
   const int N = problem_.intervals();
   const StageRange all{0, N};
@@ -110,7 +110,7 @@ void HorizonLinearisation::linearise_stages(const Iterate& iterate, Hessian hess
   problem_.write_bounds(iterate, all, qp_);
 }
 
-/// That AB and b were made at this iterate, of which the first rows are known.
+/// Records that AB and b belong to this iterate; its rows before `first` are already in the cache.
 void HorizonLinearisation::remember(const Iterate& iterate, int first) noexcept {
   const int N = problem_.intervals();
   known_intervals_ = N;
@@ -122,7 +122,7 @@ void HorizonLinearisation::remember(const Iterate& iterate, int first) noexcept 
               starts_.data());
 }
 
-/// What is remembered goes on for one interval, with the last inputs.
+/// Extends the cache by one interval behind the horizon, with the last inputs.
 void HorizonLinearisation::extend_horizon() noexcept {
   const int N = known_intervals_, states = qp_.capacity().states, lifted = problem_.structure_.lifted_count();
   std::copy_n(row(rows_, N - 1) + states, qp_.capacity().controls, row(rows_, N) + states);
@@ -132,7 +132,7 @@ void HorizonLinearisation::extend_horizon() noexcept {
   is_extended_ = true;
 }
 
-/// By how many intervals the horizon has moved on since: to the first known node that its first node is at.
+/// By how many intervals the horizon has moved: the first cached node that matches the first node.
 int HorizonLinearisation::find_steps(const Iterate& iterate) const noexcept {
   const std::size_t bytes = problem_.nx() * sizeof(double);
   int steps = 0;
@@ -140,8 +140,8 @@ int HorizonLinearisation::find_steps(const Iterate& iterate) const noexcept {
   return steps;
 }
 
-/// Marks what is found again, `steps` intervals earlier, and moves the rows there. Returns the number of intervals that
-/// could be known.
+/// Marks the rows that match the cached ones of `steps` intervals later, and moves those rows. Returns the number of
+/// intervals that can be known.
 int HorizonLinearisation::match(const Iterate& iterate, int steps, bool is_exact) noexcept {
   const int N = problem_.intervals(), end = known_intervals_ - steps, states = qp_.capacity().states;
   const int count = std::min(N, is_extended_ ? end + 1 : end);
@@ -158,7 +158,7 @@ int HorizonLinearisation::match(const Iterate& iterate, int steps, bool is_exact
 
 bool HorizonLinearisation::is_known(int interval, int steps, int count, bool is_exact) const noexcept {
   if (interval >= count || same_[interval] != 2) return false;
-  // Of the interval behind the horizon, the next state is not known.
+  // For the interval behind the horizon, the next state is not cached.
   const bool is_behind = interval == known_intervals_ - steps;
   if (!is_behind && same_[interval + 1] == 0) return false;
   if (is_exact && same_costate_[interval] == 0) return false;
@@ -168,8 +168,8 @@ bool HorizonLinearisation::is_known(int interval, int steps, int count, bool is_
   return std::memcmp(problem_.structure_.block_starts(interval), known, lifted) == 0;
 }
 
-/// Does what `linearise_stages` does with what is remembered; only intervals that are not known are evaluated. The
-/// exact Hessian is complete afterwards, costs and all. False, with nothing done, where most is not known.
+/// As `linearise_stages`, but from the cache: only unknown intervals are evaluated. The exact Hessian is then complete,
+/// including costs. Returns false and does nothing if too many intervals are unknown.
 bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) noexcept {
   const HorizonStructure& structure = problem_.structure_;
   const bool is_exact = hessian == Hessian::exact;
@@ -178,7 +178,7 @@ bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) n
     return false;
   if (!is_exact && !problem_.has_late_bounds() && is_at(iterate) &&
       std::equal(durations_.begin(), durations_.begin() + N, problem_.durations_.begin()))
-    return true;  // as it was made
+    return true;  // unchanged
 
   const int steps = find_steps(iterate), end = known_intervals_ - steps, count = match(iterate, steps, is_exact);
   std::array<int, most_unknown> unknown;
@@ -191,9 +191,9 @@ bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) n
   const bool was_behind = end < N && is_known(end, steps, count, is_exact);
   const std::ptrdiff_t curvature_size = static_cast<std::ptrdiff_t>(curvature_behind_.size());
   if (steps > 0) qp_.drop_first(steps);
-  // The last node stays the last one.
+  // The last node remains the last one.
   if (steps > 0 && is_exact) std::copy_n(qp_.H(end), curvature_size, qp_.H(known_intervals_));
-  // Stages that are known have their sizes.
+  // Known stages already have their sizes.
   const IntervalDynamics dynamics = this->dynamics();
   const auto write_sizes = [&](int stage) {
     dynamics.write_sizes({stage, stage}, problem_.initial_state() != nullptr, qp_);
@@ -233,7 +233,7 @@ void HorizonLinearisation::evaluate_unknown(const Iterate& iterate, Hessian hess
   }
 }
 
-/// Whether the problem has simulated this interval at the same numbers.
+/// Whether the problem has simulated this interval from the same numbers.
 bool HorizonLinearisation::has_simulated(int interval, const Iterate& iterate) noexcept {
   const HorizonProblem::SimulatedInterval& simulated = problem_.simulated_;
   if (simulated.duration != problem_.durations_[interval]) return false;

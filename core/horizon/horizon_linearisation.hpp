@@ -11,12 +11,13 @@ namespace rhec {
 
 struct IntervalDynamics;
 
-/// The linearisation of a horizon that moves on: it remembers the iterate that it was made at, and evaluates only the
-/// intervals that it does not find again at the same numbers, be it some intervals earlier. Nobody has to say that the
-/// horizon has moved; comparing rows is cheap, and cannot be wrong.
+/// The linearisation cache of a moving horizon. It keeps the iterate at which it was made and evaluates only intervals
+/// whose numbers have changed, even if the horizon has moved by some intervals. It detects this by comparing rows,
+/// which is cheap and always correct.
 ///
-/// Where the exact Hessian depends on no data (HorizonProblem::has_constant_cost_hessian), it is kept as well, and the
-/// interval behind the horizon is evaluated with the others: with the last inputs, as a controller's plan is moved on.
+/// If the exact Hessian depends on no data (HorizonProblem::has_constant_cost_hessian), it is cached too, and the
+/// interval behind the horizon is evaluated in advance, with the last inputs, as a shifted plan of a controller has
+/// them.
 class HorizonLinearisation : public Linearisation {
  public:
   explicit HorizonLinearisation(const HorizonProblem& problem);
@@ -35,10 +36,11 @@ class HorizonLinearisation : public Linearisation {
   virtual double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts) noexcept {
     return problem_.write_cost(range, iterate, hessian, parts, qp_, scratch_);
   }
-  /// What is remembered of nodes is now `steps` earlier; `same_node(i)` says whether node i is still at the same state.
+  /// Data kept for nodes move `steps` nodes towards the front; `same_node(i)` says whether node i still has the same
+  /// state.
   virtual void move_nodes(int /*steps*/) noexcept {}
   bool same_node(int node) const noexcept { return same_[node] != 0; }
-  /// Nodes that are remembered, if anything is: 0 .. N.
+  /// Number of cached nodes, if there are any: 0 .. N.
   int known_nodes() const noexcept { return known_intervals_ + 1; }
   bool knows_anything() const noexcept { return known_intervals_ >= 0; }
 
@@ -61,14 +63,14 @@ class HorizonLinearisation : public Linearisation {
   void take_simulated(int interval, const Iterate& iterate) noexcept;
 
   const HorizonProblem& problem_;
-  int known_intervals_ = -1;          ///< of the QP; -1: nothing is remembered
-  bool is_extended_ = false;          ///< the interval behind the horizon is known: in AB, b and `curvature_behind_`
-  bool has_curvature_ = false;        ///< H is that of all costs and of the dynamics, at `costates_`
-  AlignedDoubles rows_, costates_;    ///< of the iterate that the QP was made at
+  int known_intervals_ = -1;          ///< of the QP; -1: the cache is empty
+  bool is_extended_ = false;          ///< the interval behind the horizon is cached: in AB, b and `curvature_behind_`
+  bool has_curvature_ = false;        ///< H holds all costs and the curvature of the dynamics at `costates_`
+  AlignedDoubles rows_, costates_;    ///< of the iterate at which the QP was made
   AlignedDoubles curvature_behind_;   ///< H of the interval behind the horizon
   std::vector<double> durations_;     ///< of the intervals
   std::vector<std::uint8_t> starts_;  ///< of each interval's lifted variables
-  /// Of nodes: 2 where the whole row was found again, 1 where the state was; of intervals, the same of their costates.
+  /// Per node: 2 if the whole row matches, 1 if the state does; per interval, the same for costates.
   std::vector<std::uint8_t> same_, same_costate_;
 };
 

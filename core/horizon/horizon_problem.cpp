@@ -16,13 +16,12 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Whether an interval uses the value that its first stage carries: where no block starts, and where a ramp starts
-/// there.
+/// Whether an interval uses the value in its stage state: if no block starts, or a ramp starts there.
 bool uses_carried_value(const HorizonStructure& structure, int interval, int lifted) noexcept {
   return structure.control_of_lifted(interval, lifted) < 0 || structure.is_ramp(lifted);
 }
 
-/// What every evaluation takes: a structure that is finished, an iterate and scratch of the problem's sizes.
+/// Preconditions of every evaluation: a finished structure, an iterate and scratch of matching sizes.
 void assert_ready([[maybe_unused]] const HorizonProblem& problem, [[maybe_unused]] const Iterate& iterate,
                   [[maybe_unused]] std::span<double> scratch) {
   RHEC_ASSERT(problem.structure().is_finished(), "`finish` comes after every change of the structure");
@@ -64,7 +63,7 @@ std::size_t HorizonProblem::scratch_size() const noexcept {
 
 void HorizonProblem::mark_dynamics(int i, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept {
   const int ns = structure_.capacity().states, free_count = structure_.free_input_count();
-  // The model's next state depends on all of its own, and on a lifted variable where that is in use.
+  // The model's next state depends on all of its own states, and on a lifted variable if the interval uses it.
   for (int c = 0; c < ns; ++c) {
     const int lifted = c - nx();
     const bool is_carried = lifted >= 0 && structure_.control_of_lifted(i, lifted) < 0;
@@ -129,7 +128,7 @@ void HorizonProblem::clear_cost(StageRange range, Hessian hessian, CostParts par
   for (int i = range.first; i <= range.last; ++i) {
     const int used = ns + (i < intervals() ? structure_.control_count(i) : 0);
     if (parts != CostParts::matrices) std::fill_n(qp.h(i), stride(), 0.0);
-    // No dynamics have written to the last node's.
+    // The dynamics write no H for the last node.
     if (parts != CostParts::vectors && !(keeps_H && i < intervals())) std::fill_n(qp.H(i), used * stride(), 0.0);
   }
 }
@@ -146,12 +145,12 @@ void HorizonProblem::simulate_new_interval(int interval, Iterate& iterate, std::
   const int row = IntervalDynamics::row_length(structure_);
   const IntervalDynamics dynamics{*model_, structure_, durations_.data(), substeps_};
   if (keeps_curvature()) {
-    // A linearisation that keeps curvature has evaluated the interval behind its horizon already.
+    // A linearisation that keeps curvature has already evaluated the interval behind its horizon.
     dynamics.simulate(interval, iterate, scratch.data());
     return;
   }
   dynamics.gather_rows(iterate, {interval, interval}, simulated_.z.data());
-  // With a ramp, derivatives are by both its ends: a linearisation makes no use of those.
+  // With a ramp, derivatives are with respect to both its ends, which a linearisation cannot reuse.
   simulated_.duration = structure_.any_ramp() ? 0.0 : durations_[interval];
   model_->integrate_rows({.count = 1,
                           .z = simulated_.z.data(),

@@ -9,7 +9,7 @@
 namespace rhec {
 namespace {
 
-/// Intervals that are integrated at once, and whose rows stay in the processor's cache until their defects are known.
+/// Number of intervals integrated at once, so that their rows stay in the cache until the defects are computed.
 constexpr int evaluated_at_once = 64;
 
 /// Dense rows for a range of intervals.
@@ -144,7 +144,7 @@ void IntervalDynamics::linearise(StageRange range, const Iterate& iterate, const
   Scratch memory(scratch);
   double *z = memory.take(count * row), *jacobians = memory.take(count * nx * row),
          *hessians = memory.take(count * row * row);
-  // Without lifted inputs and ramps the model's rows are those of the QP, but where blocks start.
+  // Without lifted inputs and ramps, the model's rows are those of the QP, except where blocks start.
   const bool in_place = structure.is_direct() && !structure.any_ramp();
   const bool is_exact = options.hessian == Hessian::exact;
   const Extension* extension = options.extension;
@@ -233,7 +233,7 @@ void IntervalDynamics::place_starts(int i, Hessian hessian, StageQp& qp) const n
   }
 }
 
-/// From the model's rows to those of the QP, whatever is lifted.
+/// Copies the model's rows to those of the QP, for any lifted variables.
 void IntervalDynamics::scatter(int i, const double* jacobian, const double* hessian, StageQp& qp) const noexcept {
   const int nx = structure.vehicle_states(), nu = structure.inputs(), np = structure.parameters();
   const int row = row_length(structure), stride = structure.stride(), ns = structure.capacity().states;
@@ -243,7 +243,7 @@ void IntervalDynamics::scatter(int i, const double* jacobian, const double* hess
     if (z >= nx + np && z < nx + np + nu) return structure.column_of_input(i, z - nx - np);
     const bool is_end = z >= nx + np + nu;
     const int parameter = z - nx - (is_end ? np + nu : 0), control = structure.control_of_lifted(i, parameter);
-    // A jump is seen by the whole interval; of a ramp, only the end is new.
+    // A jump affects the whole interval; of a ramp, only the end is new.
     return control >= 0 && (is_end || !structure.is_ramp(parameter)) ? ns + control : nx + parameter;
   };
   for (int r = 0; r < nx; ++r)

@@ -10,8 +10,8 @@
 
 namespace rhec {
 
-/// The intervals of a model as the dynamics of stages: F_i(s_i, w_i), and AB and b of a stage QP. Refers to what it is
-/// made of, and is made anew for each use.
+/// The dynamics of stages from the intervals of a model: F_i(s_i, w_i), and AB and b of a stage QP. It only refers to
+/// its parts, and is made anew for each use.
 struct IntervalDynamics {
   const Model& model;
   const HorizonStructure& structure;
@@ -20,35 +20,35 @@ struct IntervalDynamics {
 
   /// Length of a row [x; p; u (; p at the end)] as the model takes it.
   static int row_length(const HorizonStructure& structure) noexcept;
-  /// Doubles of scratch that a call over so many intervals takes.
+  /// Doubles of scratch for a call over this many intervals.
   static std::size_t scratch_size(const Model& model, const HorizonStructure& structure,
                                   std::size_t intervals) noexcept;
 
   /// F_i(s_i, w_i) - s_{i+1} of all intervals, as rows of the capacity's states.
   void write_defects(const Iterate& iterate, double* defects, double* scratch) const noexcept;
-  /// Overwrites the state of the node behind an interval.
+  /// Overwrites the state of the node after an interval.
   void simulate(int interval, Iterate& iterate, double* scratch) const noexcept;
 
   /// Numbers of states and controls of the stages of a range, and whether the initial state is given.
   void write_sizes(StageRange range, bool initial_state_is_given, StageQp& qp) const noexcept;
 
-  /// One more interval, behind a range that reaches the horizon's end, and an iterate that has its rows.
+  /// One more interval, for a range that reaches the end of the horizon.
   struct Extension {
     const double *rows, *costates;  ///< of all stages and the one behind
     const double* durations;
-    double* curvature;  ///< of the interval behind
+    double* curvature;  ///< Hessian of the interval behind
   };
   struct Options {
     Hessian hessian = Hessian::gauss_newton;
-    bool has_lifted_rows = false;          ///< AB has the rows of lifted variables already
+    bool has_lifted_rows = false;          ///< AB already has the rows of lifted variables
     const Extension* extension = nullptr;  ///< null: none
   };
   /// AB and b of the intervals of a range; with Hessian::exact also H, which becomes the curvature of the dynamics.
   void linearise(StageRange range, const Iterate& iterate, const Options& options, StageQp& qp,
                  double* scratch) const noexcept;
-  /// What the model does not know: the rows of lifted variables, and s_{i+1} in b.
+  /// Completes what the model does not provide: the rows of lifted variables, and s_{i+1} in b.
   void complete(StageRange range, const Iterate& iterate, bool has_lifted_rows, StageQp& qp) const noexcept;
-  /// Moves what the model says of parameters to the controls that start their blocks.
+  /// Moves the model's derivatives with respect to parameters to the controls that start their blocks.
   void place_starts(int interval, Hessian hessian, StageQp& qp) const noexcept;
   /// z = [x; p; u (; p at the end)] of each interval of a range.
   void gather_rows(const Iterate& iterate, StageRange range, double* rows) const noexcept;

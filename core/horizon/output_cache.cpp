@@ -6,7 +6,7 @@ namespace rhec {
 
 OutputCache::OutputCache(int nodes, std::ptrdiff_t outputs, std::ptrdiff_t jacobians)
     : output_size_(outputs), jacobian_size_(jacobians) {
-  // Room for twice the nodes, so that rows move back to the front once in so many steps only.
+  // Space for twice the nodes, so that rows are copied back to the front only once in many steps.
   outputs_.assign(2 * nodes * output_size_, 0.0);
   jacobians_.assign(2 * nodes * jacobian_size_, 0.0);
   for (auto* marks : {&is_known_, &is_clean_}) marks->assign(nodes, 0);

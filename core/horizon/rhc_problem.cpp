@@ -68,7 +68,7 @@ void RhcProblem::take_data(const RhcProblem& from) noexcept {
 }
 
 int RhcProblem::finish(std::span<double> scratch) noexcept {
-  // Bounds of states stay as they were written, unless one was moved.
+  // State bounds stay as written, unless one was relaxed.
   if (changing_structure().finish() || moved_bounds_ > 0) write_state_bounds();
   write_input_bounds();
   moved_bounds_ = relax_unreachable_bounds(scratch);
@@ -76,7 +76,7 @@ int RhcProblem::finish(std::span<double> scratch) noexcept {
 }
 
 void RhcProblem::write_state_bounds() noexcept {
-  // Node 0 and the lifted variables stay without bounds, as they were made.
+  // Node 0 and the lifted variables keep no bounds.
   clear_bounds();
   for (int i = 1; i <= intervals(); ++i) {
     std::copy_n(setup_.state_lower.begin(), nx(), lower_row(i));
@@ -101,7 +101,7 @@ void RhcProblem::write_input_bounds() noexcept {
     for (int j = 0; j < inputs; ++j) {
       const int control = structure().control_of_input(i, j);
       if (control < 0) continue;
-      // A block keeps the bounds of every interval that it covers.
+      // A block satisfies the bounds of every interval that it covers.
       double lower = input_lower(i, j), upper = input_upper(i, j);
       for (int later = i + 1; later < intervals() && structure().control_of_input(later, j) < 0; ++later) {
         lower = std::max(lower, input_lower(later, j));
@@ -113,8 +113,8 @@ void RhcProblem::write_input_bounds() noexcept {
   }
 }
 
-/// For each state that starts outside its bounds: drive it back as fast as the corners of the input box (and standing
-/// still) allow, block by block, and let the bound follow that trajectory until it is kept.
+/// Relaxes bounds for each state that starts outside of them: drives it back as fast as the corners of the input box
+/// (and standing still) allow, block by block, and relaxes the bound along this trajectory until it is satisfied.
 int RhcProblem::relax_unreachable_bounds(std::span<double> scratch) noexcept {
   const int n = nx(), inputs = nu();
   double* x = scratch.data();
@@ -130,7 +130,7 @@ int RhcProblem::relax_unreachable_bounds(std::span<double> scratch) noexcept {
       u[k] = std::isfinite(wanted) ? wanted : std::min(std::max(input_reference(interval)[k], lower), upper);
     }
   };
-  // A stretch ends where every input may change.
+  // A section ends where every input may change.
   const auto stretch_end = [&](int interval) {
     int end = interval + 1;
     const auto all_change = [&](int at) {
@@ -177,7 +177,7 @@ int RhcProblem::relax_unreachable_bounds(std::span<double> scratch) noexcept {
       for (int i = first; i < end; ++i) {
         step(x, i);
         if (violation(x) <= 0.0) continue;
-        // A hair of slack keeps the feasible set from being a single point.
+        // A small slack keeps the feasible set from being a single point.
         const double slack = 1e-6 * (1.0 + std::abs(x[j]));
         double &lower = lower_row(i + 1)[j], &upper = upper_row(i + 1)[j];
         lower = std::min(lower, x[j] - slack);
@@ -195,7 +195,7 @@ std::size_t RhcProblem::cost_scratch_size() const noexcept {
 }
 
 double RhcProblem::cost(const Iterate& iterate, double* stage_costs, std::span<double> scratch) const noexcept {
-  double* const gradients = Scratch(scratch.data()).rest();  // that nobody asks for
+  double* const gradients = Scratch(scratch.data()).rest();  // written, but not used
   const CostView view = cost_view(structure(), nullptr, gradients, false);
   if (structure().is_direct() && !stage_costs) return write_tracking({0, intervals()}, iterate, view);
   double total = 0.0;

@@ -6,7 +6,7 @@
 
 namespace rhec {
 
-/// The linearisation of an estimation horizon, which remembers what the model's sensors say at its nodes too.
+/// The linearisation cache of an estimation horizon, which also keeps the outputs at its nodes.
 class RheLinearisation final : public HorizonLinearisation {
  public:
   explicit RheLinearisation(const RheProblem& problem);

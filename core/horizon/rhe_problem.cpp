@@ -22,7 +22,7 @@ namespace rhec {
 
 namespace {
 
-/// Of the outputs at the nodes of a range, each weighted by its multiplier.
+/// Adds the second derivatives of the outputs at the nodes of a range, each times its multiplier.
 void add_curvature_of_outputs(const Model& model, StageRange range, const Iterate& iterate, const double* multipliers,
                               std::ptrdiff_t step, const CostView& view, double* rest) noexcept {
   const std::ptrdiff_t of_node = static_cast<std::ptrdiff_t>(view.states + view.controls) * view.stride;
@@ -102,8 +102,8 @@ void RheProblem::set_blocks(int parameter, const std::uint8_t* begins, Transitio
   const bool ramp = transition == Transition::ramp && !is_one_block;
   HorizonStructure& structure = changing_structure();
   structure.set_ramp(parameter, ramp);
-  if (is_one_block) return;  // no interval was ever marked
-  // Node 0 carries the first block's value, so the first interval has nothing to decide, unless a ramp starts there.
+  if (is_one_block) return;  // no interval has ever been marked
+  // Node 0 holds the first block's value, so the first interval has no block control unless a ramp starts there.
   for (int i = 0; i < intervals(); ++i) structure.set_block_start(i, parameter, begins[i] && (i > 0 || ramp));
   for (int i = 0; i < intervals(); ++i) link_information_[i * np() + parameter] = 0.0;
 }
@@ -114,7 +114,7 @@ void RheProblem::link(int interval, int parameter, double variance) noexcept {
 
 void RheProblem::finish() noexcept {
   if (!changing_structure().finish()) return;
-  // Most rows are as they were: bounds of blocks are where those start.
+  // Most rows are unchanged: blocks have bounds only where they start.
   const bool is_new = bounded_intervals_ != intervals();
   bounded_intervals_ = intervals();
   for (int i = 0; i <= intervals(); ++i) {
@@ -131,7 +131,7 @@ void RheProblem::write_bounds(int i) noexcept {
     lower[k] = lower_pattern_[k];
     upper[k] = upper_pattern_[k];
   }
-  // A block is bounded once, where its value is decided: at node 0 or by the control that starts it.
+  // A block has bounds once, where its value is decided: at node 0 or by the control that starts it.
   if (i == 0) {
     std::copy_n(setup_.parameter_lower.data(), np(), lower + nx());
     std::copy_n(setup_.parameter_upper.data(), np(), upper + nx());
@@ -170,8 +170,8 @@ void RheProblem::drop_first_interval() noexcept {
 std::size_t RheProblem::cost_scratch_size() const noexcept {
   const std::size_t nodes = static_cast<std::size_t>(capacity().intervals) + 1, outputs = output_row_, ny = ny_,
                     width = padded(nx());
-  // Of all nodes Jacobians, outputs and their pulls, and what the model needs; of one, the kernels' room and three
-  // rows of outputs.
+  // Per node: Jacobians, outputs, their gradients and the model's scratch. Once: the kernels' scratch and three rows of
+  // outputs.
   return nodes * (ny * width + 2 * outputs) + model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 16;
 }
 
@@ -283,7 +283,7 @@ std::unique_ptr<Linearisation> RheProblem::make_linearisation() const {
   return std::make_unique<RheLinearisation>(*this);
 }
 
-/// Outputs at the nodes of a range and their Jacobians: those that are remembered, or else rows of the caller's.
+/// Outputs and their Jacobians at the nodes of a range: from the cache, or else in the caller's rows.
 RheProblem::Observed RheProblem::observe(StageRange range, const Iterate& iterate, OutputCache* known, double* outputs,
                                          double* jacobians, double* room) const noexcept {
   const std::ptrdiff_t jacobian_row = padded(nx());
@@ -340,13 +340,13 @@ double RheProblem::write_measurements(StageRange range, const Iterate& iterate, 
     add_curvature_of_outputs(model(), range, iterate, measured.pulls, output_row_, view, memory.rest());
   } else if (known && view.H) {
     std::fill_n(known->is_clean() + range.first, count, std::uint8_t{1});
-    // Of the last node, only the rows of states were cleared.
+    // At the last node, only the rows of states were cleared.
     known->is_clean()[intervals()] = 0;
   }
   return total;
 }
 
-/// The same with losses that bend.
+/// The same with robust losses, or for the exact Hessian alone.
 double RheProblem::write_general_measurements(StageRange range, const Iterate& iterate, Hessian hessian,
                                               const CostView& view, const double* predicted, const double* jacobians,
                                               double* rest) const noexcept {
@@ -382,7 +382,7 @@ double RheProblem::write_general_measurements(StageRange range, const Iterate& i
     }
     transcription_kernels().add_products(J, w, multipliers + i * output_row_, ny_, n, stride(), H, h_of(node));
     if (!exact) continue;
-    // The loss itself bends: 4 rho'' (J' W r)(J' W r)'.
+    // Second derivative of the loss: 4 rho'' (J' W r)(J' W r)'.
     for (const RobustLoss& loss : setup_.robust) {
       for (int c = 0; c < n; ++c) {
         for (int r = 0; r < n; ++r) {
@@ -400,7 +400,7 @@ double RheProblem::write_general_measurements(StageRange range, const Iterate& i
   return total;
 }
 
-/// The terms of measured inputs of one interval; adds to H and h, where they are not null.
+/// The terms of measured inputs on one interval; adds to H and h if they are not null.
 double RheProblem::inputs(int i, const Iterate& iterate, double* H, double* h) const noexcept {
   const int ns = capacity().states;
   const double *u = iterate.control(i), *measured = measured_input(i);
@@ -415,7 +415,7 @@ double RheProblem::inputs(int i, const Iterate& iterate, double* H, double* h) c
   return total;
 }
 
-/// The same for linked blocks that start there.
+/// The same for the links of blocks that start there.
 double RheProblem::links(int i, const Iterate& iterate, double* H, double* h) const noexcept {
   const int ns = capacity().states;
   const double* u = iterate.control(i);

@@ -10,7 +10,7 @@
 namespace rhec {
 namespace {
 
-/// A multiplier claims a bound to be active: it is dropped where there is no such bound.
+/// A multiplier indicates an active bound: it is dropped if there is no such bound.
 double multiplier_of(double multiplier, double lower, double upper) noexcept {
   return std::isfinite(multiplier > 0.0 ? upper : lower) ? multiplier : 0.0;
 }
@@ -69,7 +69,7 @@ bool GuessShifter::apply(int steps, HorizonProblem& to, Iterate& guess) noexcept
   return true;
 }
 
-/// What does not depend on blocks: states, costates, free inputs, and the multipliers of their bounds.
+/// Moves what does not depend on blocks: states, costates, free inputs, and the multipliers of their bounds.
 void GuessShifter::move_rows(int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
   const int N = to.intervals(), ns = kept_.capacity().states, row = kept_.capacity().row();
   const int moved = std::min(N, intervals_ - steps);
@@ -92,7 +92,7 @@ void GuessShifter::move_rows(int steps, const HorizonProblem& to, Iterate& guess
   std::fill_n(guess.row(moved) + row, rest, 0.0);
   std::fill_n(guess.bound_row(moved) + row, rest, 0.0);
   std::copy_n(kept_.costate(steps), static_cast<std::ptrdiff_t>(moved + 1) * row, guess.costate(0));
-  // Beyond what was kept an estimator expects to be right, and a controller to be off as it was at the end.
+  // Beyond the kept horizon an estimator gets zero costates (no residuals), a controller the last ones.
   const bool given = to.initial_state() != nullptr;
   for (int i = moved + 1; i <= N; ++i)
     for (int j = 0; j < row; ++j) guess.costate(i)[j] = given ? kept_.costate(intervals_)[j] : 0.0;
@@ -111,13 +111,13 @@ double GuessShifter::gradient(int i, int lifted) const noexcept {
   if (i >= intervals_) return 0.0;
   const int control = kept_control(i, lifted);
   const double next = kept_.costate(i + 1)[nx_ + lifted];
-  // Where the value is carried, the costates' change is what interval i adds; where it is decided, stationarity says
-  // it.
+  // If the value is carried, interval i adds the change of the costates; if it is decided here, the gradient follows
+  // from stationarity.
   return control >= 0 ? -next - kept_.control_bound(i)[control] : kept_.costate(i)[nx_ + lifted] - next;
 }
 
-/// A lifted variable that has one block in both horizons and is pulled at by no end: rows have been moved as the
-/// vehicle's.
+/// For a lifted variable with one block in both horizons and zero costate at the end: its rows are moved like those of
+/// the vehicle's states.
 void GuessShifter::extend_lifted(int lifted, int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
   const int N = to.intervals(), at = nx_ + lifted;
   const double value = kept_.state(std::min(steps, intervals_ - 1))[at];
@@ -132,7 +132,7 @@ void GuessShifter::move_lifted(int lifted, int steps, const HorizonProblem& to, 
     const int kept = std::min(interval + steps, intervals_ - 1), control = kept_control(kept, lifted);
     return control >= 0 ? kept_.control(kept)[control] : kept_.state(kept)[at];
   };
-  // Where a block starts at once, node 0 has the value before it: that of a ramp's beginning, or one that nobody uses.
+  // If a block starts at interval 0, node 0 has the value before it: the start of a ramp, or a value that is not used.
   if (!to.structure().starts_block(0, lifted)) {
     guess.state(0)[at] = value_on(0);
   } else {
@@ -154,8 +154,8 @@ void GuessShifter::move_lifted(int lifted, int steps, const HorizonProblem& to, 
   if (!to.initial_state()) guess.costate(0)[at] = 0.0;
 }
 
-/// Multipliers of a lifted variable's bounds: each interval has its share of its block's, so that blocks that are split
-/// or joined keep the sum.
+/// Bound multipliers of a lifted variable: each interval has its share of its block's multiplier, so that splitting or
+/// joining blocks keeps the sum.
 void GuessShifter::move_lifted_bounds(int lifted, int steps, const HorizonProblem& to, Iterate& guess) noexcept {
   const auto bound_at = [&](int first) {
     const int control = kept_control(first, lifted);
@@ -191,7 +191,7 @@ void GuessShifter::move_lifted_bounds(int lifted, int steps, const HorizonProble
   }
 }
 
-/// What the kept horizon does not reach: inputs as measured, or as last; states by integration.
+/// Fills the end beyond the kept horizon: inputs as measured, or the last ones; states by integration.
 void GuessShifter::add_intervals(int steps, HorizonProblem& to, Iterate& guess) noexcept {
   for (int i = intervals_ - steps; i < to.intervals(); ++i) {
     double* w = guess.control(i);

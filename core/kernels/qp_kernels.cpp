@@ -1,4 +1,4 @@
-// Compiled once for every instruction set RHEC_SET; its table is qp_kernels_<RHEC_SET>.
+// Compiled once per instruction set RHEC_SET; its table is qp_kernels_<RHEC_SET>.
 #include "rhec/core/kernels/qp_kernels.hpp"
 
 #include "rhec/core/kernels/lanes.hpp"
@@ -7,21 +7,21 @@ namespace rhec {
 namespace kernels {
 namespace {
 
-/// The parts of a row that a stage uses.
+/// The number of registers of a row that a stage uses.
 inline int parts_of(const QpView& view, int stage) {
   const int controls = stage < view.intervals ? view.control_counts[stage] : 0;
   return (view.states + controls + lane_count - 1) / lane_count;
 }
 
-/// Of a row, in parts of which a known number is used, or as many as it takes; the same for the rows of AB, of which at
-/// least a known number is not carried.
+/// For rows with a known number of used registers and states (0: unknown), and AB with at least `known_moved` rows that
+/// are not rows of the identity.
 template <int known_parts, int known_states, int known_moved>
 KktParts kkt_of(const QpView& view) {
   const long stride = known_parts > 0 ? known_parts * lane_count : view.stride;
   const int states = known_states > 0 ? known_states : view.states,
             state_parts = (states + lane_count - 1) / lane_count;
   Lanes stationarity{}, defect{}, complementarity{}, highest_lower{}, lowest_upper{};
-  Lanes gradients{}, bounds{}, costates{}, rest{};  // rest stays 0 as long as all is finite
+  Lanes gradients{}, bounds{}, costates{}, rest{};  // rest stays 0 as long as everything is finite
   for (int i = view.first; i <= view.last; ++i) {
     const double* row_AB = view.AB + i * states * stride;
     const double* next_costate = view.costates + (i + 1) * stride;
@@ -39,7 +39,7 @@ KktParts kkt_of(const QpView& view) {
       };
       for (int l = 0; l < known_moved && !is_last; ++l) add(l);
       for (int l = known_moved; l < moved; ++l) add(l);
-      // Of what is carried, AB has rows of the identity.
+      // The last rows of AB are rows of the identity.
       if (v < state_parts && moved < next_states)
         sums[0] += between(load(next_costate + v * lane_count), v, moved, next_states);
       Lanes sum = sums[0] + sums[1];
@@ -56,7 +56,7 @@ KktParts kkt_of(const QpView& view) {
       bounds = larger(bounds, pull);
       highest_lower = larger(highest_lower, lower);
       lowest_upper = smaller(lowest_upper, upper);
-      // A multiplier at a bound that does not exist is as wrong as it is large.
+      // The complementarity of a multiplier at a bound that does not exist is the multiplier itself.
       const Lanes gap = absolute(bound > 0.0 ? upper : lower);
       complementarity = larger(complementarity, pull * smaller(all(1.0), gap));
     }
@@ -71,7 +71,7 @@ KktParts kkt_of(const QpView& view) {
           largest_of(complementarity), largest_of(larger(larger(gradients, bounds), costates))};
 }
 
-/// Whether all stages have all states, of which no more than so many are carried.
+/// Whether all stages have all states, with at most `most_carried` identity rows.
 inline bool is_full(const QpView& view, int most_carried) {
   const int end = view.last < view.intervals ? view.last + 1 : view.last;
   for (int i = view.first; i <= end; ++i)
@@ -79,7 +79,7 @@ inline bool is_full(const QpView& view, int most_carried) {
   return true;
 }
 
-/// Of a known number of states, where that is all that stages have.
+/// With a known number of states, if all stages have it.
 template <int known_states, int most_carried>
 KktParts kkt_of_states(const QpView& view) {
   if (is_full(view, most_carried)) {
@@ -89,7 +89,7 @@ KktParts kkt_of_states(const QpView& view) {
   return kkt_of<0, 0, 0>(view);
 }
 
-/// By the sizes that the recursion is compiled for.
+/// Selects one of the sizes for which the recursion is compiled.
 KktParts kkt(const QpView& view) {
   switch (view.states) {
     case 5:
@@ -105,12 +105,12 @@ KktParts kkt(const QpView& view) {
   }
 }
 
-/// Rows in parts of which one is all there is, or as many as it takes.
+/// For rows that fit into one register, or rows of any length.
 template <bool is_one_part>
 StepParts check_step_of(const QpView& view, double tolerance) {
   const long stride = is_one_part ? lane_count : view.stride;
   const int state_parts = is_one_part ? 1 : (view.states + lane_count - 1) / lane_count;
-  Lanes excess = all(-1.0), costates{}, rest{}, unordered{};  // the last two stay 0 as long as all is finite
+  Lanes excess = all(-1.0), costates{}, rest{}, unordered{};  // the last two stay 0 as long as everything is finite
   for (int i = 0; i <= view.intervals; ++i) {
     const int parts = is_one_part ? 1 : parts_of(view, i);
     for (int v = 0; v < parts; ++v) {
@@ -140,7 +140,7 @@ StepParts check_step(const QpView& view, double tolerance) {
   return view.stride == lane_count ? check_step_of<true>(view, tolerance) : check_step_of<false>(view, tolerance);
 }
 
-/// Whether there is nothing to mark: all multipliers are 0, all bounds apart.
+/// Whether there is nothing to mark: all multipliers are zero and no bounds coincide.
 template <bool is_one_part>
 inline bool is_unmarked(const QpView& view) {
   const long stride = is_one_part ? lane_count : view.stride;

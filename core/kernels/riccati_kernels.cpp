@@ -1,4 +1,4 @@
-// Compiled once for every instruction set RHEC_SET; its table is riccati_kernels_<RHEC_SET>.
+// Compiled once per instruction set RHEC_SET; its table is riccati_kernels_<RHEC_SET>.
 #include "rhec/core/kernels/riccati_kernels.hpp"
 
 #include "rhec/core/kernels/lanes.hpp"
@@ -7,15 +7,15 @@ namespace rhec {
 namespace kernels {
 namespace {
 
-/// Calls function(first), function(first + step), ... with constants; no loop is left of it.
+/// Calls function(first), function(first + step), ... with compile-time constants; no loop remains.
 template <int first, int step, class Function, int... k>
 RHEC_ALWAYS_INLINE inline void each_constant(const Function& function, Constants<k...> /*numbers*/) {
   (function(Constant<first + step * k>()), ...);
 }
 
-/// What is known of a stage when its kernel is compiled: how many times eight entries a row has, how many states and
-/// controls (unknown: 0), how many of the states are carried, and how long the QP's rows are (unknown: 0). Its
-/// loops are written out where that is asked for.
+/// Compile-time knowledge about a stage: the length of a row in multiples of eight, the numbers of states and controls
+/// (unknown: 0), the number of carried states (identity rows of AB), and the stride of the QP's rows (unknown: 0). If
+/// `is_written_out`, loops are unrolled.
 template <int eights, int state_count, int control_count, bool is_written_out = true, int carried_count = 0,
           int known_stride = 0>
 struct Shape {
@@ -26,10 +26,10 @@ struct Shape {
   static constexpr int state_registers = is_known ? (state_count + lane_count - 1) / lane_count : registers;
   static constexpr int most_states = is_known ? state_count : (most_columns < 32 ? most_columns : 32);
   using R = Row<registers>;
-  /// Next state and control together fill no more than one register: a step is carried on in it.
+  /// Next state and control together fit into one register, which then holds the whole step.
   static constexpr bool is_compact = is_known && registers == 1;
   int states, next_states, offset, columns;
-  int moved;  ///< next states that are more than carried: of the others AB has rows of the identity
+  int moved;  ///< number of next states that are not merely carried; the other rows of AB are rows of the identity
 
   Shape(const RiccatiView& view, int i)
       : states(is_known ? state_count : view.state_counts[i]),
@@ -39,13 +39,13 @@ struct Shape {
         moved(next_states - (is_known ? carried_count : view.identity_counts[i])) {}
 
   static long stride_of(const RiccatiView& view) { return known_stride > 0 ? known_stride : view.stride; }
-  /// States and controls that there is room for.
+  /// Allocated numbers of states and controls.
   static long room_for_states(const RiccatiView& view) { return is_known ? state_count : view.states; }
   static long room_for_controls(const RiccatiView& view) {
     return is_known && state_count + control_count == known_stride ? control_count : view.controls;
   }
 
-  /// Of so many states, and nothing else.
+  /// A shape with this many states and no controls.
   explicit Shape(int count)
       : states(is_known ? state_count : count), next_states(states), offset(states), columns(states), moved(states) {}
 
@@ -69,7 +69,7 @@ struct Shape {
   RHEC_ALWAYS_INLINE void each_control(const Function& function) const {
     each<state_count, control_count>(offset, columns, function);
   }
-  /// Of the controls before another one.
+  /// Visits the controls before control k.
   template <class Control, class Function>
   RHEC_ALWAYS_INLINE void each_control_before(Control k, const Function& function) const {
     if constexpr (is_straight)
@@ -87,7 +87,7 @@ struct Shape {
 
  private:
   static constexpr bool is_straight = is_known && is_written_out;
-  /// function(first), ..., function(end - 1): `known_count` times from `known_first`, where that is written out.
+  /// Calls function(first), ..., function(end - 1); if unrolled, `known_count` times from `known_first`.
   template <int known_first, int known_count, class Function>
   RHEC_ALWAYS_INLINE static void each(int first, int end, const Function& function) {
     if constexpr (is_straight)
@@ -102,7 +102,7 @@ inline double bound_of(const RiccatiView& view, int i, int k) {
   return (view.sides[at] < 0 ? view.lower : view.upper)[at];
 }
 
-/// Where a stage's rows are.
+/// Pointers to the rows of a stage.
 template <class Stage>
 struct Memory {
   using R = typename Stage::R;
@@ -134,15 +134,15 @@ struct Memory {
   RHEC_ALWAYS_INLINE R row(const double* rows, int r) const { return R::from(rows + r * stride); }
 };
 
-/// Rows of H + [A B]'P[A B]; those of the controls first, since what follows waits for them.
+/// Rows of H + [A B]'P[A B]. The rows of the controls come first, since the elimination depends on them.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at,
                                          typename Stage::R* X) {
   using R = typename Stage::R;
   R W[Stage::most_states];  // rows of P [A B]
   stage.each_next_state([&](auto j) RHEC_ALWAYS_INLINE {
-    // Of what is moved, P is read from its lower triangle alone, and of what is carried beside it from its upper one,
-    // so that it stays symmetric.
+    // For moved states P is read from its lower triangle only, and for the carried ones beside them from its upper
+    // triangle, so that it stays symmetric.
     R sums[2] = {at.row(at.P_next, j).between(stage.moved, stage.next_states), R{}};
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE {
       const bool is_above = l < j || j >= stage.moved;
@@ -168,9 +168,9 @@ RHEC_ALWAYS_INLINE inline void form_rows(const RiccatiView& view, int i, const S
   }
 }
 
-/// What a solution needs of a stage, in an order in which one stage need not wait long for another: rows of the closed
-/// loop for gradients, columns of the dynamics and of the policy for steps. (Steps by the closed loop would be faster
-/// still, but where a policy is strong, next states would differ from what the dynamics make of state and control.)
+/// Stores what solutions need of a stage so that dependencies between stages stay short: rows of the closed loop for
+/// gradients, columns of the dynamics and of the policy for steps. (Steps by the closed loop would be faster still, but
+/// with a strong policy the next states would not match the dynamics at the computed state and control.)
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void close_loop(const Stage& stage, const Memory<Stage>& at, const typename Stage::R* policy,
                                           bool for_steps) {
@@ -188,8 +188,8 @@ RHEC_ALWAYS_INLINE inline void close_loop(const Stage& stage, const Memory<Stage
   for (int k = 0; k < stage.columns; ++k) store(columns[k], at.T + k * 8);
 }
 
-/// Takes the controls out of X, one by one: what they owe to the state and to the controls before them goes to U, and X
-/// keeps their policies. False where they have no minimiser.
+/// Eliminates the controls from X, one by one. U gets their coupling to the state and to the controls before them; X
+/// keeps their policies. False if they have no minimiser.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline bool eliminate_controls(const Stage& stage, const Memory<Stage>& at, bool any_fixed,
                                                   double tolerance, typename Stage::R* X) {
@@ -225,7 +225,7 @@ RHEC_ALWAYS_INLINE inline bool eliminate_controls(const Stage& stage, const Memo
     stage.each_state(eliminate);
     X[k] = scaled;
   });
-  // From what each control owes to the state and to the controls before it, to what it owes to the state alone.
+  // From a policy in terms of the state and the controls before, to a policy in terms of the state alone.
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     R policy = X[k].first(stage.states);
     stage.each_control_before(k, [&](auto j) RHEC_ALWAYS_INLINE { policy.add(X[j], -X[k].splat(j)); });
@@ -234,7 +234,7 @@ RHEC_ALWAYS_INLINE inline bool eliminate_controls(const Stage& stage, const Memo
   return is_definite;
 }
 
-/// The same of two free controls at once: what comes after waits for one division, and for little beside it.
+/// The same for two free controls at once: the dependency chain has only one division.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline bool eliminate_pair(const Stage& stage, const Memory<Stage>& at, double tolerance,
                                               typename Stage::R* X) {
@@ -291,7 +291,8 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
   return true;
 }
 
-/// Takes p of the next node and leaves p of this one: what was just written to memory takes a while to come back.
+/// Replaces p of the next node by p of this one. It stays in registers, since a value just written to memory takes a
+/// while to be readable.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int i, typename Stage::R& p) {
   using R = typename Stage::R;
@@ -302,7 +303,7 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
   };
   R costate = p;
   costate.add(R::from(at.drift));
-  R gradient;  // by the state (but in a closed loop) and the controls
+  R gradient;  // with respect to the state (closed loop only) and the controls
   if (Stage::is_compact && !view.fixes[i]) {
     const R h = R::from(at.h);
     R sums[2] = {h, costate.between(stage.moved, stage.next_states)};
@@ -326,7 +327,7 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
     subtract_policy(p, gradient);
   }
   p.to(at.p);
-  // What the controls do where the state does not step: eliminated from the last to the first, found in their order.
+  // The controls at state step zero: eliminated from last to first, then computed from first to last.
   double own[Stage::most_columns];
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { own[k] = gradient.entry(k); });
   stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
@@ -347,7 +348,7 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
       if (at.sides[k] != 0) at.p[k] = bound_of(view, i, k);
 }
 
-/// Multipliers of the bounds at which a stage's controls are held.
+/// Multipliers of the active bounds of a stage's controls.
 template <class Stage>
 inline void write_multipliers(const RiccatiView& view, int i, const Stage& stage, const Memory<Stage>& at) {
   const double* z = view.values + i * at.stride;
@@ -362,7 +363,7 @@ inline void write_multipliers(const RiccatiView& view, int i, const Stage& stage
   }
 }
 
-/// Takes the state's step s and leaves that of the next node.
+/// Replaces the step s of the state by that of the next node.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, double* s) {
   using R = typename Stage::R;
@@ -370,7 +371,7 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
   const Memory<Stage> at(view, i);
   double *z = view.values + i * at.stride, *next = z + at.stride;
   double w[Stage::most_columns], reached[Stage::most_states];
-  // In two sums, which do not wait for each other.
+  // Two independent partial sums.
   const auto dot = [&](const double* row) RHEC_ALWAYS_INLINE {
     double sums[2] = {0.0, 0.0};
     stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % 2] += row[j] * s[j]; });
@@ -394,8 +395,8 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
   if (view.fixes[i]) write_multipliers(view, i, stage, at);
 }
 
-/// The same in one register: [next state; control] is a sum of columns. What is carried is in a register of its own,
-/// too, for which nothing else has to wait.
+/// The same in one register: [next state; control] is a sum of columns. Carried states are kept in a register of their
+/// own, so that they add no latency.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int i, Row<1>& carried, Row<1>& s) {
   const Stage stage(view, i);
@@ -467,7 +468,7 @@ inline void sensitivities_stage_forward(const RiccatiView& view, int i, int last
   const std::int8_t* sides = view.sides + i * stride;
   double* own = sensitivities + i * stride * response_batch;
   double* next = own + stride * response_batch;
-  // Behind the last gradient those of the value functions are zero, and so are those of controls.
+  // Behind the last stage with a gradient, the gradients of value functions and controls are zero.
   const auto gradient_at = [](const double* row, int entry, bool is_there) RHEC_ALWAYS_INLINE {
     return is_there ? Batch::from(row + entry * response_batch) : Batch{};
   };
@@ -502,7 +503,7 @@ inline void sensitivities_stage_forward(const RiccatiView& view, int i, int last
   for (int k = stage.offset; k < stage.columns; ++k) {
     Batch answer = z[k];
     if (sides[k] != 0) {
-      // What a fixed control answers with is its multiplier.
+      // The sensitivity of a fixed control is that of its multiplier.
       const double* column = U + (k - stage.offset) * stride;
       Batch sum = gradient_at(own, k, i <= last);
       for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
@@ -514,10 +515,10 @@ inline void sensitivities_stage_forward(const RiccatiView& view, int i, int last
   }
 }
 
-/// Calls `function` with the type of a stage's shape: one of the sizes that kernels are compiled for, or any. Those are
-/// the stages of estimators and controllers with two inputs: of vehicles with three to five states, whose other states
-/// are parameters, between the starts of blocks, which hand those on; and of the most usual ones where blocks start.
-/// How long rows are decides nothing else: a QP gives the same bits in one of another capacity.
+/// Calls `function` with the type of a stage's shape: one of the sizes for which kernels are compiled, or a general
+/// one. The compiled sizes are those of estimators and controllers with two inputs: vehicles with three to five states
+/// plus parameters, between the starts of blocks, where the parameters are carried; and the most common ones where
+/// blocks start. The row length has no other effect: a QP gives the same bits with another capacity.
 template <bool is_written_out, class Function>
 inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
   const int states = view.states, controls = view.control_counts[i], carried = view.identity_counts[i];
@@ -541,16 +542,15 @@ inline auto with_shape(const RiccatiView& view, int i, const Function& function)
   const int columns = states + controls;
   if (columns <= 8) return function.template operator()<Shape<1, 0, 0>>();
   if (columns <= 16) return function.template operator()<Shape<2, 0, 0>>();
-  if (columns <= 24) return function.template operator()<Shape<3, 0, 0>>();  // rows are no longer than that then
+  if (columns <= 24) return function.template operator()<Shape<3, 0, 0>>();  // rows are not longer than that here
   if (columns <= 32) return function.template operator()<Shape<4, 0, 0>>();
   return function.template operator()<Shape<8, 0, 0>>();
 }
 
-// Whole matrices of long rows fit into the widest registers only; written out for others, they are moved to memory and
-// back.
+// Whole matrices of long rows fit only into the widest registers; unrolled for others, they are spilled to memory.
 constexpr bool matrices_fit = lane_count == 8;
 
-/// Whether stage j can be treated in one go with stage i.
+/// Whether stage j can be processed in the same loop as stage i.
 inline bool is_alike(const RiccatiView& view, int i, int j) {
   return view.special[j] == 0 && view.control_counts[j] == view.control_counts[i] &&
          view.identity_counts[j] == view.identity_counts[i] && view.state_counts[j] == view.state_counts[i] &&
@@ -633,18 +633,17 @@ void combine(const double* batch, const double* weights, double* sums, long coun
   }
 }
 
-/// Of a row, what belongs to states.
+/// The part of a row that holds states.
 template <class Stage>
 using StateRow = Row<Stage::state_registers>;
 
-/// Sigma of the next node from that of stage i, in its place: A Sigma A' + B cov(w | s) B', with A the dynamics under
-/// the policy.
+/// Replaces Sigma of stage i by that of the next node: A Sigma A' + B cov(w | s) B', with A the closed-loop dynamics.
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, StateRow<Stage>* rows) {
   using R = StateRow<Stage>;
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
-  // The dynamics under the policy, in memory: from there single entries cost no more than whole registers.
+  // The closed-loop dynamics in memory: loading a single entry from there costs no more than a whole register.
   alignas(64) double closed_rows[Stage::is_compact ? 1 : Stage::most_states * Stage::most_columns];
   const double* const closed = Stage::is_compact ? at.closed : closed_rows;
   constexpr int width = Stage::is_compact ? 8 : Stage::most_columns;
@@ -657,7 +656,7 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
       row.to(closed_rows + l * width);
     });
   }
-  // What the controls bring in, which waits for no stage before this one.
+  // The contribution of the controls, which does not depend on earlier stages.
   R next[Stage::most_states] = {};
   R effects[Stage::most_columns];  // columns of B
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
@@ -671,7 +670,7 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
       effects[k] = R::from(column);
     }
   });
-  // What is left of a control's variance when those before it are known moves the later ones too.
+  // The conditional variance of a control given those before it also acts through the later ones.
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     double moved[Stage::most_columns] = {};
     moved[k] = 1.0;
@@ -684,7 +683,7 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
     const double variance = 2.0 * at.inverse[k - stage.offset];
     stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { next[l].add(noise, noise.splat(l) * variance); });
   });
-  // Of a row of the dynamics, `start` and the sum of `terms`, each by its entry.
+  // `start` plus the sum of `terms`, each times its entry of row l of the dynamics.
   const auto combine_by = [&](auto l, const R* terms, const R& start) RHEC_ALWAYS_INLINE {
     R sums[2] = {start, R{}};
     stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { sums[j % R::chains].add(terms[j], closed[l * width + j]); });
@@ -694,7 +693,7 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
   R products[Stage::most_columns] = {};
   stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { products[l] = combine_by(l, rows, R{}); });
   stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { products[l] = rows[l]; });
-  // Of the products, columns are needed.
+  // The products are needed by columns.
   constexpr bool is_one_register = Stage::state_registers == 1 && lane_count == 8;
   R columns[Stage::most_columns] = {};
   if constexpr (is_one_register) {
@@ -790,7 +789,7 @@ RHEC_ALWAYS_INLINE inline void solve_rows(const Stage& stage, const double* matr
   solution.first(stage.states).to(x);
 }
 
-/// Calls `function` with a shape of `count` states, however long their rows are; false where those are too many.
+/// Calls `function` with a shape of `count` states, for any stride; false if there are too many.
 template <class Function>
 inline bool with_states(int count, const Function& function) {
   if (count == 5) return function.template operator()<Shape<1, 5, 0>>();

@@ -1,4 +1,4 @@
-// Compiled once for every instruction set RHEC_SET; its table is transcription_kernels_<RHEC_SET>.
+// Compiled once per instruction set RHEC_SET; its table is transcription_kernels_<RHEC_SET>.
 #include "rhec/core/kernels/transcription_kernels.hpp"
 
 #include "rhec/core/kernels/lanes.hpp"
@@ -68,17 +68,17 @@ void add_products(const double* J, const double* weights, const double* pulls, i
   }
 }
 
-/// What is left of differences on circles: `error` less the nearest whole number of periods.
+/// Differences on circles: `error` minus the nearest multiple of the period.
 inline Lanes on_circle(const Lanes& error, const Lanes& period, const Lanes& inverse_period) {
-  constexpr double to_integer = 6755399441055744.0;  // 1.5 * 2^52: what is added to it is rounded to an integer
+  constexpr double to_integer = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer
   return error - ((error * inverse_period + to_integer) - to_integer) * period;
 }
 
-/// Of rows of a known length, or of any (0).
+/// For rows of a known stride, or any (0).
 template <int known_stride>
 double write_tracking(const CostView& view, const TrackingView& tracked, int first, int last) {
   const long stride = known_stride > 0 ? known_stride : view.stride, wide = view.states + view.controls;
-  double total = 0.0;  // stage by stage, so that it is the same however the stages are asked for
+  double total = 0.0;  // summed stage by stage, so that the result does not depend on how the range is split
   for (int i = first; i <= last; ++i) {
     Lanes of_stage{};
     const bool is_last = i == view.intervals;
@@ -110,7 +110,7 @@ double write_tracking(const CostView& view, const TrackingView& tracked, int fir
                           : write_tracking<0>(view, tracked, first, last);
 }
 
-/// Of rows of a known length, or of any (0).
+/// For rows of a known stride, or any (0).
 template <int known_stride>
 void complete_dynamics(const DynamicsView& view) {
   const long stride = known_stride > 0 ? known_stride : view.stride;
@@ -154,7 +154,7 @@ void clear_costs(const CostView& view, int first, int last) {
 }
 
 /// Rows of eight entries, which are enough for most vehicles and their sensors, with a number of outputs that may be
-/// known (else 0); or rows of as many as it takes.
+/// known (otherwise 0); or rows of any length.
 template <int known_outputs>
 struct OneEight {
   static constexpr bool is_known = true;
@@ -167,7 +167,7 @@ struct AnyEights {
   static int count(int outputs) { return outputs; }
 };
 
-/// What is measured at one node of the range, of which `seen` was. Reperiods the sum of squares.
+/// The measurements at one node of the range; `seen` are the measured outputs. Returns the sum of squares.
 template <bool matrices, bool vectors, class Width>
 RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, long node, const double* seen,
                                            const double* predicted, const double* J, int stride, int used,
@@ -199,7 +199,7 @@ RHEC_ALWAYS_INLINE inline Lanes write_node(const MeasurementView& measured, long
     add_products(J, weights, nullptr, count, measured.vehicle_states, stride, H, nullptr);
     return total;
   }
-  // Rows by weight, to which single entries come from memory at no cost.
+  // Rows times their weights; single entries of J are then loaded from memory at no extra cost.
   constexpr int most_known = Width::is_known ? 8 : 1;
   Lanes weighted[most_known][8 / lane_count];
   if (Width::is_known)
@@ -275,9 +275,9 @@ template <bool matrices, bool vectors>
 double write_measurements(const CostView& view, const MeasurementView& measured, int first, int last) {
   if (measured.output_count <= 8 && measured.vehicle_states <= 8) {
     switch (measured.output_count) {
-      case 2:  // a position
+      case 2:  // position
         return write_nodes<matrices, vectors, OneEight<2>>(view, measured, first, last);
-      case 3:  // and a heading or a speed
+      case 3:  // position and heading or speed
         return write_nodes<matrices, vectors, OneEight<3>>(view, measured, first, last);
       case 4:
         return write_nodes<matrices, vectors, OneEight<4>>(view, measured, first, last);

@@ -12,7 +12,7 @@
 namespace rhec {
 namespace {
 
-/// Asks the model for all of its outputs, some nodes at a time, and hands on those that were chosen.
+/// Evaluates all outputs of the model, some nodes at a time, and returns the chosen ones.
 class ChosenOutputs final : public Model {
  public:
   ChosenOutputs(std::shared_ptr<Model> model, std::vector<int> chosen)
@@ -79,13 +79,13 @@ class ChosenOutputs final : public Model {
  private:
   static constexpr std::size_t room = 4096;  ///< doubles on the stack
 
-  /// Some of the chosen ones.
+  /// For some of the chosen outputs.
   void observe_some(const NodeRows& request) const noexcept {
     std::array<int, room> chosen;
     for (int j = 0; j < request.chosen_count; ++j) chosen[j] = chosen_[request.chosen[j]];
     observe_of_all(request, chosen.data(), request.chosen_count);
   }
-  /// Member by member: a copy of what has just been written waits until that has reached the cache.
+  /// Sets members one by one: a copy of a freshly written struct would have to wait until it reaches the cache.
   void observe_of_all(const NodeRows& request, const int* chosen, int count) const noexcept {
     model_->observe_rows({.count = request.count,
                           .states = request.states,
@@ -103,7 +103,7 @@ class ChosenOutputs final : public Model {
                           .hessian_row = request.hessian_row,
                           .scratch = request.scratch});
   }
-  /// Columns of all outputs -> columns of the chosen ones.
+  /// From columns of all outputs to columns of the chosen ones.
   void pick(const double* all, int columns, double* chosen) const noexcept {
     for (int c = 0; c < columns; ++c, all += all_)
       for (const int output : chosen_) *chosen++ = all[output];

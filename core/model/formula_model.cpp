@@ -39,7 +39,7 @@ void check_description(const ModelDescription& description, const FormulaCounts&
 }
 
 namespace {
-constexpr std::uint64_t unwritten = 0x7ff8'dead'0bad'f00d;  // a NaN that no operation gives
+constexpr std::uint64_t unwritten = 0x7ff8'dead'0bad'f00d;  // a NaN that no operation returns
 }
 
 double unwritten_result() noexcept { return std::bit_cast<double>(unwritten); }

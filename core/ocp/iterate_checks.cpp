@@ -6,9 +6,9 @@
 namespace rhec {
 
 bool is_finite(const Ocp& ocp, const Iterate& iterate) noexcept {
-  double rest = 0.0;  // stays 0 as long as all is finite
+  double rest = 0.0;  // stays 0 as long as everything is finite
   const auto check = [&](const double* row, int n) {
-    double of_row = 0.0;  // no row waits for another
+    double of_row = 0.0;  // a separate sum per row, so that rows are independent
     for (int j = 0; j < n; ++j) of_row += 0.0 * row[j];
     rest += of_row;
   };

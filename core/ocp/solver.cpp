@@ -68,7 +68,7 @@ void assess(const Ocp& ocp, const Iterate& iterate, StageQp& qp, std::span<doubl
   report.objective = 0.0;
   KktTerms terms;
   for (StageRange piece{0, 0}; piece.first <= N; piece.first = piece.last + 1) {
-    // With the sizes of the stage behind it, which its equations lead to.
+    // The next stage is needed too, for its sizes.
     piece.last = piece.first + qp.window() > N ? N : piece.first + qp.window() - 2;
     qp.look_at(piece.first);
     report.objective += ocp.linearise(piece, iterate, Hessian::none, qp, scratch);

@@ -6,10 +6,10 @@
 namespace rhec {
 namespace {
 
-/// Of rows, which are short.
+/// Copies a row, which is short.
 void copy(const double* from, int count, double* to) noexcept { std::memcpy(to, from, count * sizeof(double)); }
 
-/// Adds the columns of another stage, which are those of the stage before in rows further down.
+/// Repeats the columns of the last stage for the next one, with their rows further down.
 void repeat_columns(SparseNlp::Pattern& pattern, int columns, int rows) {
   const auto first = static_cast<std::ptrdiff_t>(pattern.starts.size()) - 1 - columns;
   const int begin = pattern.starts[first], end = pattern.starts.back();
@@ -25,15 +25,16 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
   const Capacity capacity = ocp.capacity();
   state_flags_.resize(static_cast<std::size_t>(capacity.states) * capacity.states);
   control_flags_.resize(static_cast<std::size_t>(capacity.states) * capacity.controls);
-  // What tells structures apart: sizes, and the flags of each interval packed into words.
+  // A signature identifies a structure: sizes, and the flags of each interval packed into words.
   next_signature_.assign({N, given ? 1 : 0, capacity.states, capacity.controls, ocp.state_count(0)});
   next_signature_.reserve(signature_.size());
   const auto pack = [&](const std::uint8_t* flags, int count) {
     for (int first = 0; first < count; first += 8) {
-      // Eight bytes, of which any bit may be set, to eight bits.
+      // Eight bytes with any bits set, to eight bits.
       std::uint64_t eight = 0;
       std::memcpy(&eight, flags + first, std::min(count - first, 8));
-      for (const int half : {4, 2, 1}) eight |= eight >> half;  // bits of the byte above stay above the lowest one
+      for (const int half : {4, 2, 1})
+        eight |= eight >> half;  // the lowest bit of each byte is not affected by the byte above
       eight &= 0x0101'0101'0101'0101U;
       next_signature_.push_back(static_cast<std::int32_t>((eight * 0x0102'0408'1020'4080U) >> 56));
     }
@@ -103,7 +104,7 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
         if (flags[column * next + r]) add(constraint_starts_[i] + r, r * stride + first + column);
     };
     for (int c = 0; c < n; ++c) {
-      if (i > 0) add(constraint_starts_[i - 1] + c, 0);  // s_i itself: `jacobian` knows
+      if (i > 0) add(constraint_starts_[i - 1] + c, 0);  // entry of s_i itself, known to `jacobian`
       add_dynamics(state_flags_.data(), c, 0);
       end_column(jacobian_);
     }
@@ -111,7 +112,7 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
       add_dynamics(control_flags_.data(), c, ns);
       end_column(jacobian_);
     }
-    const auto place = [&](int k) { return k < n ? k : ns + k - n; };  // among the stage's rows
+    const auto place = [&](int k) { return k < n ? k : ns + k - n; };  // column in the stage's rows
     for (int c = 0; c < n + m; ++c) {
       for (int r = c; r < n + m; ++r) {
         hessian_.row_indices.push_back(stage + r);
@@ -125,7 +126,7 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
   return true;
 }
 
-/// Whether a stage's columns are those of the stage before, further down: of equal stages, to and from equal ones.
+/// Whether a stage's columns repeat those of the stage before: equal stages between equal neighbours.
 bool SparseNlp::is_like_before(int i) const noexcept {
   const int N = static_cast<int>(control_counts_.size());
   if (i < 2 || i == N) return false;
@@ -141,14 +142,14 @@ void SparseNlp::Sources::clear() noexcept {
   starts.assign(1, 0);
 }
 
-/// What was added to the list is that of another stage.
+/// Closes a stage whose entries were appended to the list.
 void SparseNlp::Sources::end_stage() {
   const int shared = firsts.empty() ? 0 : firsts.back() + starts.back() - starts[starts.size() - 2];
   firsts.push_back(shared);
   starts.push_back(starts.back() + static_cast<int>(offsets.size()) - shared);
 }
 
-/// Another stage like the one before.
+/// Adds a stage with the same entries as the last one.
 void SparseNlp::Sources::repeat_stage() {
   firsts.push_back(firsts.back());
   starts.push_back(2 * starts.back() - starts[starts.size() - 2]);
@@ -161,7 +162,7 @@ void SparseNlp::Sources::gather(const double* rows, int stage, double* __restric
   for (int k = 0; k < count; ++k) values[k] = rows[from[k]];
 }
 
-// State and control of a stage follow each other in z, and in a row where the state is of the capacity's size.
+// State and control of a stage are contiguous in z, and in a row if the state has the capacity's size.
 
 void SparseNlp::read(const Ocp& ocp, const Iterate& iterate, double* z, double* multipliers,
                      double* bound_multipliers) const noexcept {
@@ -245,7 +246,7 @@ void SparseNlp::gradient(const StageQp& qp, StageRange range, double* g) const n
 void SparseNlp::jacobian(const StageQp& qp, StageRange range, double* values) const noexcept {
   for (int i = range.first; i <= range.last; ++i) {
     jacobian_sources_.gather(qp.AB(i), i, values);
-    // Columns of states begin with s_i itself, in the equation that leads to it.
+    // Columns of states begin with the entry of s_i itself, in the equation that leads to it.
     const int* const starts = jacobian_.starts.data() + state_starts_[i];
     for (int c = 0; i > 0 && c < state_counts_[i]; ++c) values[starts[c]] = -1.0;
   }

@@ -1,5 +1,5 @@
-// The bounds of the dual active set that are columns: the sensitivities to their gradients, and the factor of the small
-// dense system for their multipliers.
+// The columns of the dual active set: the sensitivities to the gradients of these bounds, and the Cholesky factor of
+// the small dense system for their multipliers.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,12 +12,12 @@ namespace rhec {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// A bound whose gradient is, to this part of its own curvature, one of the others' depends on them.
+// A bound is linearly dependent on the others if at most this fraction of its own curvature is left.
 constexpr double dependence = 1e-10;
 
 }  // namespace
 
-/// Of one batch, which takes the place of one that no column needs.
+/// Finds one batch of sensitivities; it replaces a batch that no column needs.
 bool DualActiveSet::find_sensitivities(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept {
   const auto choose = [&] {
     int batch = 0;
@@ -26,7 +26,7 @@ bool DualActiveSet::find_sensitivities(const StageQp& qp, Riccati& riccati, cons
   };
   int chosen = choose();
   if (chosen == batch_count) {
-    // Columns are everywhere: put together, they leave a batch.
+    // Columns are spread over all batches: recomputing them together frees a batch.
     for (int k = 0; k < batch_count; ++k) forget(k);
     if (!find_sensitivities_of_columns(qp, riccati, 0)) return false;
     chosen = choose();
@@ -42,7 +42,7 @@ bool DualActiveSet::find_sensitivities(const StageQp& qp, Riccati& riccati, cons
   return true;
 }
 
-/// Whether a column has its sensitivities there, other than those that are asked for anew.
+/// Whether a column has its sensitivities in this batch and is not among `places`, which are recomputed.
 bool DualActiveSet::is_needed(int batch, const int* places, int count) const noexcept {
   for (int c = 0; c < batches_[batch].count; ++c) {
     const int place = batches_[batch].of[c];
@@ -68,14 +68,14 @@ bool DualActiveSet::find_sensitivities_of_columns(const StageQp& qp, Riccati& ri
   return true;
 }
 
-/// Of the first ones, and in the same time of those that may be next: the most violated ones, or nearest to being so.
-/// `find_violations` has looked at all.
+/// For the given places and, at no extra cost, for the bounds that are likely to follow: the most violated ones, or
+/// those closest to violation, as found by `find_violations`.
 bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& riccati, const int* first,
                                                int count) noexcept {
   std::array<int, batch_size> places{};
   std::copy_n(first, count, places.begin());
   const int given = count;
-  double least = -infinity;  // of those that have been chosen, once there is no room
+  double least = -infinity;  // smallest violation among the chosen ones, once the batch is full
   for (int place = 0; place < places_; ++place) {
     if (!(violation_[place] > least) || number_[place] != none) continue;
     if (std::find(first, first + given, place) != first + given) continue;
@@ -88,15 +88,15 @@ bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& ricca
   return find_sensitivities(qp, riccati, places.data(), count);
 }
 
-/// Adds to values the sensitivities, each by its weight.
+/// sums += weighted sum of the sensitivities.
 void DualActiveSet::add_sensitivities(const Riccati& riccati, const Weights& weights,
                                       std::vector<double>& sums) const noexcept {
   for_each_weighted(
       weights, [&](int k) { riccati.add_values(batches_[k].sensitivities, weights[k].data(), places_, sums.data()); });
 }
 
-/// The row of the factor that a bound would add below `count` others; returns the square of its diagonal entry, or 0
-/// where it depends on them.
+/// Computes the row that a bound would add to the factor below `count` others. Returns the square of its diagonal
+/// entry, or 0 if it depends on them linearly.
 double DualActiveSet::eliminate(int entering, int count, double* row) const noexcept {
   double left = -sensitivity(entering, entering);
   const double least = dependence * left;
@@ -117,8 +117,8 @@ void DualActiveSet::back_substitute(double* x) const noexcept {
   }
 }
 
-/// The Cholesky factor of S from row `first` on, with reciprocals on its diagonal. Columns that depend on those before
-/// are left out, or make this fail.
+/// Computes the Cholesky factor of S from row `first` on, with reciprocals on its diagonal. Linearly dependent columns
+/// are omitted, or make this fail.
 bool DualActiveSet::factor_columns(int first, bool may_leave_out) noexcept {
   int kept = first;
   for (int k = first; k < column_count(); ++k) {
@@ -141,7 +141,7 @@ void DualActiveSet::drop_column(int k) noexcept {
   let_go(columns_[k]);
   columns_.erase(columns_.begin() + k);
   std::copy(multipliers_.begin() + k + 1, multipliers_.begin() + column_count() + 1, multipliers_.begin() + k);
-  // What is left of a positive definite system is no less so.
+  // A principal submatrix of a positive definite matrix is positive definite.
   factor_columns(k, true);
 }
 

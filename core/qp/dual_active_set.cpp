@@ -13,12 +13,12 @@ namespace rhec {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// Active bounds are met to this part of the tolerance for violated ones before a solution is taken.
+// A solution is accepted if active bounds are met to within this fraction of the tolerance for violations.
 constexpr double exactness = 0.1;
-// With more violated at once there is little hope to be done within the changes that are provided for.
+// With more violated bounds, the allowed number of changes is unlikely to suffice.
 constexpr int max_violated = 2 * DualActiveSet::max_columns;
-// Solutions with a set that does not change any more, before rounding is to blame; of those, first ones that are put
-// together from sensitivities.
+// Number of solutions with an unchanged active set before rounding errors are assumed, and how many of them are
+// combined from sensitivities.
 constexpr int max_refinements = 4, max_combined = 2;
 
 }  // namespace
@@ -40,7 +40,7 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
 
 bool DualActiveSet::is_equality_bound(int place) const noexcept { return is_equality(lower_[place], upper_[place]); }
 
-/// A bound is active no more. What its tolerance is, `take_bounds` will say, or says so here.
+/// Makes a bound inactive. Its widened bounds are set by `take_bounds`, or here.
 void DualActiveSet::let_go(int place) noexcept {
   hold_[place] = Hold::free;
   if (!has_bounds_) return;
@@ -67,7 +67,7 @@ void DualActiveSet::take_claims(const StageQp& qp, const ActiveSet& claimed) noe
   });
 }
 
-/// The bounds as they are now; false where one that is active has gone.
+/// Reads the present bounds; false if an active one no longer exists.
 bool DualActiveSet::take_bounds(const StageQp& qp) noexcept {
   has_bounds_ = true;
   lower_ = qp.lower(0);
@@ -111,8 +111,8 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   if (claimed) take_claims(qp, *claimed);
   factor(qp, riccati);
   if (!claimed || !is_convex_ || !take_bounds(qp)) return;
-  // Claims are mostly those of a sample before: in control some bound beside them will be next. Where the vehicle was
-  // going to be is known, and how near that is to its bounds.
+  // Claims are mostly those of the last sample, and in control further bounds are likely to follow: those to which the
+  // last trajectory came closest.
   if (qp.initial_state_is_given && column_count() < batch_size) {
     std::fill_n(value_.data(), places_, 0.0);
     find_violations();
@@ -123,8 +123,8 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   has_bounds_ = false;
 }
 
-/// Factorises anew without the held bounds that have been released; columns of controls are held from now on, and those
-/// that are left have no sensitivities yet.
+/// Factorises anew without the released bounds. Columns of controls are held from now on; the remaining columns have no
+/// sensitivities yet.
 bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
   held_.clear();
   int kept = 0;
@@ -145,7 +145,7 @@ bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
   return is_convex_;
 }
 
-/// Brings a step from the multipliers that it was found with to the present ones; false where some have no
+/// Updates a step from the multipliers with which it was found to the present ones; false if some have no
 /// sensitivities.
 bool DualActiveSet::combine(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept {
   if (!has_base_) return false;
@@ -162,7 +162,7 @@ bool DualActiveSet::combine(const StageQp& qp, Riccati& riccati, Iterate& step) 
   return true;
 }
 
-/// The minimiser for the held bounds and the multipliers of the columns, by the factorisation; false where there is
+/// The minimiser for the held bounds and the multipliers of the columns, from the factorisation; false if there is
 /// none.
 bool DualActiveSet::solve_with_multipliers(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept {
   const double* h = nullptr;
@@ -179,7 +179,7 @@ void DualActiveSet::complete_policy(const StageQp& qp, Riccati& riccati) noexcep
   if (!has_policy_) solve_with_multipliers(qp, riccati, policy_step_);
 }
 
-/// By how much the bound of a column is missed, relative to what a bound may be violated by.
+/// The largest distance of a column from its bound, relative to the tolerance for violations.
 double DualActiveSet::largest_miss() const noexcept {
   double largest = 0.0;
   for (const int place : columns_)
@@ -188,7 +188,7 @@ double DualActiveSet::largest_miss() const noexcept {
   return largest;
 }
 
-/// Moves the multipliers of the columns so that their bounds are met.
+/// Changes the multipliers of the columns so that their bounds are met.
 void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
   double change[max_columns];
   const int count = column_count();
@@ -229,13 +229,13 @@ bool DualActiveSet::release_wrong_held() noexcept {
          }) > 0;
 }
 
-/// Makes the set dual feasible; true where that takes another factorisation.
+/// Makes the active set dual feasible; true if this needs another factorisation.
 bool DualActiveSet::drop_wrong(const Riccati& riccati) noexcept {
   while (drop_wrong_columns(riccati)) return_to_bounds(riccati);
   return release_wrong_held();
 }
 
-/// Of the bounds that are not active.
+/// Violations of the bounds that are not active.
 DualActiveSet::Violations DualActiveSet::find_violations() noexcept {
   const auto [largest, count] =
       rhec::find_violations(value_.data(), least_.data(), most_.data(), places_, violation_.data());
@@ -244,8 +244,8 @@ DualActiveSet::Violations DualActiveSet::find_violations() noexcept {
   return {static_cast<int>(worst - violation_.begin()), count};
 }
 
-/// All violated bounds of controls that have sensitivities become columns at once: those are mostly right. Not so with
-/// states, of which one bound often keeps a whole run.
+/// Makes columns of all violated bounds of controls that have sensitivities: most of these will be active. This does
+/// not hold for states, where a single active bound often prevents a series of violations.
 bool DualActiveSet::add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept {
   if (number_[worst] == none && !find_sensitivities_of_next(qp, riccati, &worst, 1)) return false;
   for (const Batch& batch : batches_) {
@@ -265,7 +265,7 @@ bool DualActiveSet::add_controls_together(const StageQp& qp, Riccati& riccati, i
   return true;
 }
 
-/// The row of the factor is there but for its diagonal.
+/// The row of the factor is complete except for its diagonal.
 void DualActiveSet::append_column(int place, double square, double multiplier) noexcept {
   const int count = column_count();
   hold_[place] = Hold::column;
@@ -285,7 +285,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     if (++changes_ > max_changes) return Outcome::too_much;
     if (is_past(deadline)) return Outcome::out_of_time;
     if (number_[entering] == none && !find_sensitivities_of_next(qp, riccati, &entering, 1)) return Outcome::too_much;
-    // How values and multipliers change while that of the entering bound grows and the active ones stay met.
+    // Change of values and multipliers while the entering multiplier grows and the active bounds stay met.
     const int count = column_count();
     double pull[max_columns], row[max_columns];
     const double square = eliminate(entering, count, row);
@@ -299,7 +299,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     }
     std::fill_n(direction_.data(), places_, 0.0);
     add_sensitivities(riccati, weights, direction_);
-    // Until its bound is met, or a multiplier has gone.
+    // Until the entering bound is met, or a multiplier reaches zero.
     double length = square > 0.0 ? side * (value_[entering] - bound(entering)) / square : infinity;
     int blocking_column = none, blocking_held = none;
     for (int k = 0; k < count; ++k) {
@@ -338,7 +338,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
   }
 }
 
-/// Where the present multipliers lead.
+/// Finds the values at the present multipliers.
 DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& riccati, bool may_combine,
                                                 Iterate& step) noexcept {
   if (column_count() > 0 && number_[columns_[0]] == none && !find_sensitivities_of_columns(qp, riccati, 0))

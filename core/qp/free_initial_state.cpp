@@ -1,4 +1,4 @@
-// The recursion's last step where the initial state is free: its states are decided as the controls of a stage are.
+// The last step of the recursion with a free initial state: its states are decided like the controls of a stage.
 #include <algorithm>
 #include <cmath>
 
@@ -10,7 +10,7 @@
 namespace rhec {
 namespace {
 
-// For the initial state, whose prior may be ill-conditioned for good reasons, only rounding counts as not definite.
+// The prior of the initial state may legitimately be ill-conditioned: only rounding counts as indefinite.
 constexpr double initial_definite_tolerance = 1e-14;
 
 }  // namespace
@@ -46,7 +46,7 @@ void Riccati::factor_initial(const StageQp& qp, const ActiveSet& /*active*/) noe
   factor_reduced(reduced, reduction.free, initial_definite_tolerance, v.factor);
 }
 
-/// The initial state, given or free; false where active bounds contradict each other or what is given.
+/// The initial state, given or free; false if active bounds contradict each other or the given state.
 bool Riccati::solve_initial(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept {
   const Special first = special(0);
   const int N = qp.intervals(), n0 = qp.states(0);
@@ -87,7 +87,7 @@ bool Riccati::solve_initial(const StageQp& qp, const ActiveSet& active, Iterate&
       small::add_transposed_product(v.T, width_, gradient, free_step, n0, initial.free, -1.0);
       small::solve(v.factor, width_, initial.free, free_step);
       small::add_product(v.T, width_, free_step, s0, n0, initial.free);
-      // P s + p + C' nu = 0 gives the multipliers of the pivot rows, and through the row operations those of all.
+      // P s + p + C' nu = 0 gives the multipliers of the pivot rows; the row operations give those of all rows.
       std::copy_n(p(0), n0, gradient);
       small::add_product(P(0), stride_, s0, gradient, n0, n0);
       double reduced[3 * max_width] = {};

@@ -26,7 +26,7 @@ double pull_of(const StageQp& qp, int i, int c, const double* costate) noexcept 
 }  // namespace
 
 void KktTerms::add(const KktTerms& others) noexcept {
-  // What is no number must not get lost.
+  // NaN must be kept.
   const auto take = [](double& largest, double value) {
     if (!std::isnan(largest) && !(value <= largest)) largest = value;
   };

@@ -21,7 +21,7 @@ ActiveSet::ActiveSet(const Capacity& capacity)
       sides_(static_cast<std::size_t>(capacity.intervals + 1) * capacity.row(), 0) {}
 
 bool ActiveSet::is_empty() const noexcept {
-  // Rows are whole eights.
+  // Rows are padded to multiples of eight.
   std::uint64_t any = 0;
   for (std::size_t k = 0; k < sides_.size(); k += sizeof any) {
     std::uint64_t eight = 0;
@@ -44,8 +44,8 @@ Riccati::Riccati(const Capacity& capacity)
   if (width_ > max_width)
     throw Error(fmt::format("a stage has {} states and {} controls; the Riccati recursion takes at most {} of each",
                             ns_, nw_, max_width));
-  // Node 0 is kept as one more special stage, whose 'controls' are the initial state: hence matrices of the larger
-  // width.
+  // Node 0 is stored as one more special stage whose 'controls' are the initial state, so matrices have the larger of
+  // the two widths.
   const auto stages = static_cast<std::size_t>(capacity.intervals) + 1;
   const std::size_t wide = width_, rows = max_rows_, row = stride_;
   P_.assign(stages * ns_ * row, 0.0);
@@ -125,7 +125,7 @@ void Riccati::factor_stages(const StageQp& qp, const ActiveSet& active, const do
   std::copy_n(qp.control_counts(), N, control_counts_.data());
   control_counts_[N] = 0;
   std::fill_n(is_special_.data(), N + 1, std::uint8_t{0});
-  // What the controls of a stage have to keep: bounds of the next state.
+  // A stage is special if bounds of the next state are active, which its controls must satisfy.
   if (!active.is_empty())
     for (int i = 0; i < N; ++i) is_special_[i] = holds_any(active.state(i + 1), ns_);
   RiccatiView view = view_of(qp, active.row(0));
@@ -192,7 +192,7 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
   const auto is_set = [](std::uint8_t flag) { return flag != 0; };
   if (std::any_of(is_special_.data(), is_special_.data() + N, is_set) || reductions_[N].rows > 0) return false;
   double *values = sensitivities.values.data(), *costates = sensitivities.costates.data();
-  // What stages do not use stays zero.
+  // Entries that stages do not use stay zero.
   if (!std::equal(qp.control_counts(), qp.control_counts() + N, sensitivities.control_counts.begin())) {
     for (auto* v : {&sensitivities.values, &sensitivities.costates}) std::fill(v->begin(), v->end(), 0.0);
     std::copy_n(qp.control_counts(), N, sensitivities.control_counts.begin());
@@ -218,7 +218,7 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
   } else if (std::fill_n(costates, n * size, 0.0); has_initial_inverse_) {
     kernels_->answer(initial_inverse_.data(), n, stride_, values);
   } else {
-    // -(G G')^-1 of the gradients, with the factor's lower triangle.
+    // Multiplies the gradients by -(G G')^-1, with the factor's lower triangle.
     const double* G = special(N).factor;
     const auto row = [values](int j) { return values + static_cast<std::ptrdiff_t>(j) * size; };
     const auto subtract = [&row](int from, int other, double factor) {
@@ -250,7 +250,7 @@ void Riccati::combine(const StageQp& qp, const ActiveSet& active, const Sensitiv
         if (const std::int8_t side = active.control(i)[j]; side != 0) function(i, j, side);
     }
   };
-  // There the sensitivities are those of multipliers.
+  // For fixed controls, the sensitivities are those of the multipliers.
   each_fixed([&](int i, int j, std::int8_t /*side*/) { step.control(i)[j] = step.control_bound(i)[j]; });
   kernels_->combine(sensitivities.values.data(), weights, step.row(0), entries);
   kernels_->combine(sensitivities.costates.data(), weights, step.costate(0), entries);
@@ -316,7 +316,7 @@ void Riccati::covariances(const StageQp& qp, double* covariance, double* last) n
     });
   };
   store(0, covariance);
-  const RiccatiView view = view_of(qp, nullptr);  // no bound is looked at
+  const RiccatiView view = view_of(qp, nullptr);  // bounds are ignored
   for (int i = kernels_->carry_covariance(view, 0, now, covariance); i < N;
        i = kernels_->carry_covariance(view, i + 1, now, covariance)) {
     const int n = qp.states(i), n_next = qp.states(i + 1), m = qp.controls(i);

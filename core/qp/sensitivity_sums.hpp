@@ -5,7 +5,7 @@
 
 namespace rhec {
 
-/// In four sums, none of which waits for the others.
+/// Four independent partial sums.
 inline double dot(const double* a, const double* b, int count) noexcept {
   double sums[4] = {};
   int k = 0;
@@ -15,7 +15,7 @@ inline double dot(const double* a, const double* b, int count) noexcept {
   return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-/// Calls function(number) for the batches of which something is wanted.
+/// Calls function(number) for the batches with a non-zero weight.
 template <class Weights, class Function>
 void for_each_weighted(const Weights& weights, const Function& function) {
   const auto is_zero = [](double weight) { return weight == 0.0; };

@@ -1,5 +1,5 @@
-// The stages of the recursion that the kernels leave out: those whose next state is held at bounds, which their
-// controls have to keep, and those whose reduced Hessian is not positive definite.
+// The stages that the kernels skip: those with active bounds of the next state, which their controls must satisfy, and
+// those whose reduced Hessian is not positive definite.
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +13,7 @@
 namespace rhec {
 namespace {
 
-// Entries of a constraint row below this part of its largest one are rounding.
+// Entries of a constraint row below this fraction of its largest one are rounding errors.
 constexpr double pivot_tolerance = 1e-9;
 
 double bound_of(std::int8_t side, double lower, double upper) { return side < 0 ? lower : upper; }
@@ -56,8 +56,8 @@ void Riccati::write_active_bounds(const StageQp& qp, const ActiveSet& active, in
       d[row++] = bound_of(side, qp.state_lower(node)[j], qp.state_upper(node)[j]);
 }
 
-/// Gauss-Jordan elimination with complete pivoting of D w + E s = e on the columns of w that are not fixed. Afterwards
-/// the pivot rows have a unit column for their control and the left rows none; `eliminator` holds the row operations.
+/// Gauss-Jordan elimination with complete pivoting of D w + E s = e on the columns of free controls. Afterwards the
+/// pivot rows have a unit column for their control and the remaining rows none; `eliminator` holds the row operations.
 void Riccati::eliminate(double* D, double* E, int rows, int width, const bool* fixed, Reduction& reduction,
                         Special& v) noexcept {
   const int ld = max_rows_;
@@ -94,7 +94,7 @@ void Riccati::eliminate(double* D, double* E, int rows, int width, const bool* f
           if (r != row) entries[r] -= D[column * ld + r] * entries[row];
       }
     };
-    // The pivot column itself goes last: the others need its entries.
+    // The pivot column goes last, since the others need its entries.
     reduce(E, ns_);
     reduce(M, rows);
     for (int c = 0; c < width; ++c) {
@@ -112,8 +112,8 @@ void Riccati::eliminate(double* D, double* E, int rows, int width, const bool* f
     if (done[r]) continue;
     double largest = 0.0;
     for (int c = 0; c < ns_; ++c) largest = std::max(largest, std::abs(E[c * ld + r]));
-    // Rows that say nothing about s either are copies of others; whether they agree is checked with the right-hand
-    // side.
+    // Rows that do not involve s either depend on other rows; whether they are consistent is checked with the
+    // right-hand side.
     if (largest > pivot_tolerance * size[r]) v.left_row[reduction.left++] = r;
   }
 }
@@ -138,7 +138,7 @@ void Riccati::null_space(const double* D, const double* E, int width, const bool
     for (int c = 0; c < ns_; ++c) v.Y[c * width_ + v.pivot_column[k]] = -E[c * ld + v.pivot_row[k]];
 }
 
-/// Cholesky factor of a reduced Hessian, which is made positive definite first where it is not.
+/// Cholesky factor of a reduced Hessian, which is convexified first if necessary.
 void Riccati::factor_reduced(double* reduced, int n, double tolerance, double* factor) noexcept {
   for (int j = 0; j < n; ++j) std::copy_n(reduced + j * width_, n, factor + j * width_);
   if (small::factor(factor, width_, n, tolerance)) return;
@@ -152,7 +152,7 @@ void Riccati::factor_reduced(double* reduced, int n, double tolerance, double* f
       finite = finite && std::isfinite(matrix(r, c));
     }
   }
-  if (!finite) {  // nothing sensible can come of it: the caller sees that the step is not finite
+  if (!finite) {  // no sensible result is possible: the caller will find that the step is not finite
     for (int j = 0; j < n; ++j) factor[j * width_ + j] = std::nan("");
     return;
   }
@@ -237,7 +237,7 @@ void Riccati::factor_special(const StageQp& qp, const ActiveSet& active, const R
     for (int k = 0; k < reduction.left; ++k)
       for (int c = 0; c < n; ++c) v.C[c * max_rows_ + offset + k] = E[c * max_rows_ + v.left_row[k]];
 
-    double* GT = own;  // the rows are done with
+    double* GT = own;  // the rows are no longer needed
     double* GY = GT + width_ * width_;
     double* G = GY + width_ * width_;
     double* L = G + width_ * width_;
@@ -269,7 +269,7 @@ void Riccati::factor_special(const StageQp& qp, const ActiveSet& active, const R
       H[c * stride_ + r] = H[r * stride_ + c] = 0.5 * (H[c * stride_ + r] + H[r * stride_ + c]);
 }
 
-/// Right-hand sides through the row operations; false where a row that says nothing contradicts itself.
+/// Applies the row operations to right-hand sides; false if an empty row has a non-zero right-hand side.
 bool Riccati::transform_rows(const double* right_hand_side, const Reduction& reduction, const Special& v,
                              double* transformed, double scale) const noexcept {
   const int rows = reduction.rows;
@@ -308,7 +308,7 @@ bool Riccati::solve_special_backward(const StageQp& qp, const ActiveSet& active,
     for (int j = 0; j < m; ++j)
       if (const std::int8_t side = active.control(i)[j])
         y0[j] = bound_of(side, qp.control_lower(i)[j], qp.control_upper(i)[j]);
-    // d - C (b + B y0), with the fixed controls alone in y0
+    // d - C (b + B y0), with only the fixed controls in y0
     double image[max_width], scale = 0.0, right_hand_side[3 * max_width], transformed[3 * max_width];
     for (int l = 0; l < n_next; ++l) {
       image[l] = qp.b(i)[l];
@@ -341,7 +341,8 @@ bool Riccati::solve_special_backward(const StageQp& qp, const ActiveSet& active,
   return true;
 }
 
-/// The rows and columns of a stage's controls in the covariance of z = [s; w], from w = -K s and G^-1; no bound holds.
+/// The rows and columns of a stage's controls in the covariance of z = [s; w], from w = -K s and G^-1, without active
+/// bounds.
 void Riccati::add_special_controls(int i, int n, int m, double* covariance) noexcept {
   const Special v = special(i);
   for (int k = 0; k < m; ++k) {
@@ -393,7 +394,7 @@ void Riccati::solve_special_forward(const StageQp& qp, const ActiveSet& active, 
   std::fill_n(step.control_bound(i), m, 0.0);
   double* of_rows = row_multipliers_.data() + static_cast<std::ptrdiff_t>(i + 1) * max_rows_;
   if (!reduction.plain) {
-    // Gradient by w without the rows: G w + L s + g.
+    // Gradient with respect to w without the rows: G w + L s + g.
     double gradient[max_width];
     std::copy_n(special_g_.data() + i * width_, m, gradient);
     small::add_product(v.G, width_, w, gradient, m, m);

@@ -12,7 +12,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 StageQp::StageQp(const Capacity& capacity) : StageQp(capacity, capacity.intervals + 1) {
   window_ = 0;
-  // Room for twice the stages, so that they move back to the front once in so many drops only.
+  // Space for twice the stages, so that they are copied back to the front only once in many drops.
   for (auto* v : {&AB_, &H_, &h_, &b_}) v->resize(2 * v->size(), 0.0);
 }
 
@@ -22,7 +22,7 @@ StageQp::StageQp(const Capacity& capacity, int stages)
       wide_(capacity.states + capacity.controls),
       window_(std::min(stages, capacity.intervals + 1)) {
   const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1, held = static_cast<std::size_t>(window_);
-  // With those of places behind the last stage, which a window that ends there has.
+  // Includes places behind the last stage, for a window that ends there.
   for (auto* counts : {&state_counts_, &control_counts_, &identity_counts_}) counts->assign(nodes + held, 0);
   AB_.assign(held * capacity.states * stride_, 0.0);
   H_.assign(held * wide_ * stride_, 0.0);
@@ -33,7 +33,7 @@ StageQp::StageQp(const Capacity& capacity, int stages)
 }
 
 void StageQp::look_at(int first) noexcept {
-  // Each place keeps its contents, and the sizes of the stage that they were of: `set_sizes` clears what is too much.
+  // Each place keeps its content and the sizes of its former stage: `set_sizes` clears what is no longer used.
   for (auto* counts : {&state_counts_, &control_counts_}) {
     const auto held = counts->begin() - first_, end = held + window_;
     if (first > -first_)
@@ -66,7 +66,7 @@ void StageQp::drop_first(int stages) noexcept {
   const auto move = [&](AlignedDoubles& v, int rows) {
     const std::ptrdiff_t slot = static_cast<std::ptrdiff_t>(rows) * stride_;
     if (!has_room) std::copy_n(v.data() + (first_ + stages) * slot, kept * slot, v.data());
-    // Also what a longer horizon has left there once.
+    // Includes what a longer horizon has left there.
     std::fill_n(v.data() + (first + kept) * slot, (capacity_.intervals + 1 - kept) * slot, 0.0);
   };
   move(AB_, capacity_.states);

@@ -10,14 +10,14 @@
 namespace rhec {
 namespace {
 
-constexpr int claimed_rounds = 1;  // tries of the claimed set where the QP is not convex
-constexpr int warm_rounds = 8;     // corrections of the active set before the interior-point method is called
-constexpr int polish_rounds = 6;   // the same from the interior-point method's active set
+constexpr int claimed_rounds = 1;  // tries of the warm-started set if the QP is not convex
+constexpr int warm_rounds = 8;     // corrections of the active set before the interior-point method
+constexpr int polish_rounds = 6;   // the same, from the interior-point method's active set
 constexpr int few_states = 2;
 constexpr int max_interior_iterations = 60;
-// The interior point stops well before rounding spoils its Newton systems; polishing does the rest.
+// The interior-point method stops well before rounding spoils its Newton systems; polishing does the rest.
 constexpr StageQpSolver::Accuracy ready_to_polish{1e-8, 1e-7};
-// Where polishing does not settle, the interior point itself has to be accurate.
+// If polishing does not settle, the interior-point method itself must be accurate.
 constexpr StageQpSolver::Accuracy on_its_own{1e-12, 1e-10};
 constexpr double divergence = 1e10;
 
@@ -71,8 +71,8 @@ void StageQpSolver::factor(const StageQp& qp) noexcept {
   ++factorisations_;
 }
 
-/// Few state bounds of an estimator: those stay from sample to sample, mostly, and are cheap inside the factorisation.
-/// A controller's move with its horizon, so that their sensitivities are needed in most samples.
+/// Few active state bounds in estimation: these usually persist from sample to sample and are cheap inside the
+/// factorisation. In control they move with the horizon, so that most samples need their sensitivities.
 bool StageQpSolver::claim_is_likely(const StageQp& qp) const noexcept {
   if (!any_active_ || qp.initial_state_is_given) return false;
   int states = 0;
@@ -112,11 +112,11 @@ StageQpSolver::Violations StageQpSolver::correct_active_set(const StageQp& qp, c
     for (int j = 0; (i > 0 || !qp.initial_state_is_given) && j < qp.states(i); ++j) hold_violated(i, j);
     for (int j = 0; j < qp.controls(i); ++j) hold_violated(i, capacity_.states + j);
   }
-  // Of those that are held by now, multipliers may be wrong; new ones have none yet.
+  // Multipliers of bounds that were already active may have the wrong sign; new ones have none yet.
   const double pull_tolerance = multiplier_tolerance * (1.0 + check.largest_costate);
   active_.for_each([&](int stage, int j, std::int8_t side) {
     const double lower = qp.lower(stage)[j], upper = qp.upper(stage)[j];
-    // The value is at one side, whatever the other is.
+    // The value is at one bound, regardless of the other one.
     found.cross |= !(lower - upper <= bound_tolerance * (1.0 + std::abs(lower)));
     if (!(side * step.bound_row(stage)[j] < -pull_tolerance) || is_equality(lower, upper)) return;
     active_.row(stage)[j] = 0;
@@ -153,7 +153,7 @@ StageQpSolver::Outcome StageQpSolver::solve(const StageQp& qp, Iterate& step, Cl
   if (outcome != DualActiveSet::Outcome::solved && mark_bounds(qp, step, bound_tolerance, marks_.data()))
     return Outcome::infeasible;
   if (outcome == DualActiveSet::Outcome::not_convex) {
-    // State bounds may hold what has no minimiser without them.
+    // Active state bounds may give the QP a minimiser that it does not have without them.
     if (try_active_sets(qp, step, claimed_rounds, deadline)) return Outcome::active_set;
     if (out_of_time_) return Outcome::out_of_time;
     const StageQp& convex = convexify(qp);
@@ -186,14 +186,14 @@ StageQpSolver::Outcome StageQpSolver::solve_by_interior_point(const StageQp& qp,
 
 StageQpSolver::Outcome StageQpSolver::solve_robustly(const StageQp& given, Iterate& step,
                                                      Clock::time_point deadline) noexcept {
-  // From here on one fixed, convex QP is solved.
+  // From here on the QP is fixed and convex.
   const StageQp& qp = convexify(given);
   if (!interior_point(qp, step, ready_to_polish, deadline)) {
     active_.clear();
     factored_ = false;
     return out_of_time_ ? Outcome::out_of_time : Outcome::infeasible;
   }
-  // The set on which the interior point has settled; kept only if it leads to the exact solution.
+  // The active set of the interior-point method, kept only if it leads to the exact solution.
   active_.clear();
   any_active_ = true;
   for (const Bounded& v : bounded_) {
@@ -206,7 +206,7 @@ StageQpSolver::Outcome StageQpSolver::solve_robustly(const StageQp& given, Itera
   }
   factored_ = false;
   if (try_active_sets(qp, step, polish_rounds, deadline)) return Outcome::interior_point;
-  // Polishing has overwritten the step. If rounding keeps the second run from its accuracy, the first one's must do.
+  // Polishing has overwritten the step. If rounding prevents the higher accuracy, repeat the first run.
   factored_ = false;
   if (!out_of_time_ && !interior_point(qp, step, on_its_own, deadline) && !out_of_time_)
     interior_point(qp, step, ready_to_polish, deadline);
@@ -251,8 +251,7 @@ void StageQpSolver::collect_bounded(const StageQp& qp) noexcept {
   }
 }
 
-/// Barrier Hessian and gradient for the Newton system that aims at complementarity `target`, in terms of the new
-/// values.
+/// Barrier Hessian and gradient of the Newton system for complementarity `target`, in terms of the new values.
 void StageQpSolver::barrier_terms(const StageQp& qp, double target) noexcept {
   const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(qp.intervals() + 1) * qp.stride();
   std::fill_n(diagonal_.data(), entries, 0.0);
@@ -304,7 +303,7 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accur
   const auto value_in = [](const Iterate& trial, const Bounded& v) {
     return v.is_state ? trial.state(v.stage)[v.component] : trial.control(v.stage)[v.component];
   };
-  // Newton's direction for both sides of every bounded variable, given the new values.
+  // Newton directions for both sides of every bounded variable, given the new values.
   const auto directions = [&](double target) {
     for (Bounded& v : bounded_) {
       const double value = value_in(step, v);
@@ -370,7 +369,7 @@ bool StageQpSolver::interior_point(const StageQp& qp, Iterate& step, const Accur
       gap = std::max(gap, s.slack * s.multiplier);
       largest_multiplier = std::max(largest_multiplier, s.multiplier);
     });
-    // Multipliers that grow without end are the certificate of bounds that contradict each other.
+    // Multipliers that grow without limit certify that bounds contradict each other.
     if (largest_multiplier > divergence * scale) return false;
     if (gap < wanted.gap * scale && infeasibility < wanted.infeasibility) {
       for (int i = 0; i <= qp.intervals(); ++i) {

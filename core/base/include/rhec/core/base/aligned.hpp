@@ -6,7 +6,7 @@
 
 namespace rhec {
 
-/// Memory that begins where the widest registers and cache lines do (64 bytes).
+/// Allocator of memory aligned to 64 bytes: the size of a cache line and of the widest registers.
 template <class T>
 struct AlignedAllocator {
   using value_type = T;

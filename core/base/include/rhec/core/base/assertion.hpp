@@ -9,15 +9,15 @@
 
 namespace rhec {
 
-/// Throws std::logic_error, which says what did not hold and where. In a noexcept function, as all that run in a
-/// control loop are, the program ends there with that message.
+/// Throws std::logic_error, which says what did not hold and where. In a noexcept function, such as all that run in a
+/// control loop, the program ends there with that message.
 [[noreturn, gnu::cold, gnu::noinline]] inline void assertion_failed(
     const char* condition, const char* meaning, const std::source_location& place = std::source_location::current()) {
   throw std::logic_error(std::string(place.file_name()) + ":" + std::to_string(place.line()) + ": " +
                          place.function_name() + ": not true: " + condition + " (" + meaning + ")");
 }
 
-/// Whether all of so many numbers are finite; true of null, which stands for 'not asked for'.
+/// Whether all `count` numbers are finite; true for null, which means 'not requested'.
 inline bool all_finite(const double* values, std::ptrdiff_t count) noexcept {
   for (std::ptrdiff_t k = 0; values && k < count; ++k)
     if (!std::isfinite(values[k])) return false;
@@ -29,9 +29,9 @@ inline bool all_finite(std::span<const double> values) noexcept {
 
 }  // namespace rhec
 
-/// RHEC_ASSERT(condition, meaning): a mistake of ours or of who calls, not of the user's data, unless the condition
-/// holds. Stands where one room calls another: sizes of spans, what must be set up before it is used, finite results.
-/// Builds with NDEBUG (release) do not evaluate it, at no cost.
+/// RHEC_ASSERT(condition, meaning) reports a programming error, in rhec or in its caller, never an error in the user's
+/// data. It guards the interfaces between components: sizes of spans, what must be set up before use, finite results.
+/// Builds with NDEBUG (release) do not evaluate it.
 #ifdef NDEBUG
 #define RHEC_ASSERT(condition, meaning) static_cast<void>(0)
 #else

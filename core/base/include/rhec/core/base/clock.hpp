@@ -4,10 +4,10 @@
 
 namespace rhec {
 
-/// The clock of all deadlines; `Clock::time_point::max()` stands for none.
+/// The clock of all deadlines; `Clock::time_point::max()` means no deadline.
 using Clock = std::chrono::steady_clock;
 
-/// Whether a deadline is over. Does not read the clock where there is none.
+/// Whether a deadline has passed. Does not read the clock if there is no deadline.
 inline bool is_past(Clock::time_point deadline) {
   return deadline != Clock::time_point::max() && Clock::now() > deadline;
 }

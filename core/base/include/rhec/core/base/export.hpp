@@ -1,4 +1,4 @@
 #pragma once
 
-/// Marks what a library of rhec shows to others; everything else is hidden.
+/// Marks the exported symbols of a rhec library; all others are hidden.
 #define RHEC_EXPORT __attribute__((visibility("default")))

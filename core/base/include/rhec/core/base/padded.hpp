@@ -2,7 +2,7 @@
 
 namespace rhec {
 
-/// How long a row of `size` doubles is in memory: as long as registers of eight are wide.
+/// Length in memory of a row of `size` doubles: rounded up to a multiple of eight, the widest register.
 [[gnu::always_inline]] constexpr int padded(int size) { return (size + 7) / 8 * 8; }
 
 }  // namespace rhec

@@ -6,8 +6,8 @@
 
 namespace rhec {
 
-/// Arrays one after the other, cut out of memory that the caller lends. The first begins where registers and cache
-/// lines do, so that whole rows of eight stay aligned; seven doubles more than what is taken are enough.
+/// Hands out consecutive arrays from memory that the caller provides. The first one is aligned to 64 bytes, so that
+/// rows of multiples of eight stay aligned. The memory must hold seven doubles more than the arrays in total.
 class Scratch {
  public:
   explicit Scratch(double* memory) : next_(memory) {
@@ -15,7 +15,7 @@ class Scratch {
     if (beyond != 0) next_ += (64 - beyond) / sizeof(double);
   }
   double* take(std::ptrdiff_t size) { return std::exchange(next_, next_ + size); }
-  /// What nobody has taken yet.
+  /// The memory not taken yet.
   double* rest() const { return next_; }
 
  private:

@@ -4,8 +4,8 @@
 
 namespace rhec {
 
-/// Calls `function` with a number: as a constant of the compiler for those that vehicles usually have, so that short
-/// loops to it become straight code, else as an int.
+/// Calls `function` with a size: as a compile-time constant for the sizes common in vehicle models (3 to 8), so that
+/// short loops are unrolled, otherwise as an int.
 template <class Function>
 decltype(auto) with_size(int size, const Function& function) {
   switch (size) {

@@ -11,40 +11,40 @@
 
 #include "rhec/core/config/settings.hpp"
 
-/// The kinds of values that an option may have (rhec/core/config/options.hpp puts them together): each reads itself
-/// from Settings, prints itself, and says its type and its constraint in words.
+/// The kinds of option values that rhec/core/config/options.hpp combines. Each reads itself from Settings, prints
+/// itself, and describes its type and constraint in words.
 namespace rhec {
 
-/// One option, for people.
+/// One option, as shown to users.
 struct OptionRow {
-  std::string name;           ///< with the names of the groups it is in: "line_search.steps"
+  std::string name;           ///< with the names of its groups: "line_search.steps"
   std::string type;           ///< "number", "integer", "flag", "text", "choice", "list of numbers", "map", ...
-  std::string default_value;  ///< as one would write it
-  std::string constraint;     ///< "at least 1"; empty where all values are fine
-  std::string meaning;        ///< one phrase, with the unit
+  std::string default_value;  ///< as written in a configuration
+  std::string constraint;     ///< "at least 1"; empty if all values are allowed
+  std::string meaning;        ///< short description, with the unit
 };
 
-/// The values that a number may have.
+/// The allowed values of a number.
 struct RHEC_EXPORT Range {
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
-  bool lower_is_open = false;  ///< `lower` itself is outside
+  bool lower_is_open = false;  ///< `lower` itself is not allowed
 
   bool contains(double value) const noexcept {
     return (lower_is_open ? value > lower : value >= lower) && value <= upper;
   }
-  std::string text() const;  ///< "greater than 0"; empty where every number is inside
+  std::string text() const;  ///< "greater than 0"; empty if every number is allowed
 };
 constexpr Range any() { return {}; }
 constexpr Range at_least(double lower) { return {.lower = lower}; }
 constexpr Range greater_than(double lower) { return {.lower = lower, .lower_is_open = true}; }
 constexpr Range between(double lower, double upper) { return {.lower = lower, .upper = upper}; }
 
-/// Of `candidates` the one that `word` was most likely meant to be (fewest letters inserted, dropped, changed or
-/// swapped); empty where none is near.
+/// The candidate that `word` was most likely meant to be (fewest letters inserted, dropped, changed or swapped); empty
+/// if none is close.
 RHEC_EXPORT std::string nearest(std::string_view word, const std::vector<std::string>& candidates);
 
-/// Whose option is read and what it means: the end of every error.
+/// Which option is read and what it means: the end of every error message.
 struct OptionContext {
   std::string_view owner;
   std::string_view meaning;
@@ -56,7 +56,10 @@ RHEC_EXPORT Error wrong_option(const Settings& at, const std::string& type, cons
 /// Throws Error unless `from` is a map (or null) whose keys are all in `known` or `skip`.
 RHEC_EXPORT void check_keys(const Settings& from, const std::vector<std::string>& known, std::string_view owner,
                             std::initializer_list<std::string_view> skip = {});
-/// Throws Error where a table gets one name twice.
+/// Throws Error if `from` has a key that is called otherwise now. `renamed` has old and new names.
+RHEC_EXPORT void check_old_names(const Settings& from, const std::vector<std::pair<std::string, std::string>>& renamed,
+                                 std::string_view owner);
+/// Throws Error if a table gets the same name twice.
 RHEC_EXPORT void check_new_name(const std::string& name, const std::vector<std::string>& known);
 
 struct RHEC_EXPORT NumberValue {
@@ -96,7 +99,7 @@ struct RHEC_EXPORT SubtreeValue {
   std::string constraint() const { return "passed through as it is"; }
 };
 
-/// The index in `names` of what is written at `from`; throws Error with the names and the nearest one.
+/// The index in `names` of the value at `from`. Otherwise throws Error with the names and the nearest one.
 RHEC_EXPORT std::size_t read_choice(const Settings& from, const std::vector<std::string>& names,
                                     const OptionContext& context);
 /// "one of step, ramp"

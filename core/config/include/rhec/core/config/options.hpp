@@ -14,7 +14,7 @@
 
 namespace rhec {
 
-/// The options of a struct T: for each a name, a member, what it means and what values it may have. It reads T from
+/// The options of a struct T: a name, a member, a meaning and the allowed values for each. The table reads T from
 /// Settings and documents itself; the defaults are those of a default-constructed T.
 ///
 ///     struct StructuredOptions {
@@ -48,7 +48,7 @@ class OptionTable {
                       std::vector<std::pair<std::string, std::type_identity_t<Enum>>> choices, std::string meaning) {
     return leaf(std::move(name), member, ChoiceValue<Enum>{std::move(choices)}, std::move(meaning));
   }
-  /// `none` or an empty value stand for no number.
+  /// `none` or an empty value means 'no number'.
   OptionTable& optional_number(std::string name, std::optional<double> T::*member, std::string meaning,
                                Range range = any()) {
     return leaf(std::move(name), member, OptionalValue<NumberValue>{{range}}, std::move(meaning));
@@ -66,12 +66,12 @@ class OptionTable {
   OptionTable& names(std::string name, std::vector<std::string> T::*member, std::string meaning) {
     return leaf(std::move(name), member, ListValue<TextValue>{}, std::move(meaning));
   }
-  /// Whatever is written there, passed through as it is: e.g. the native options of a backend.
+  /// A subtree that is passed on as it is, e.g. the native options of a backend.
   OptionTable& subtree(std::string name, Settings T::*member, std::string meaning) {
     return leaf(std::move(name), member, SubtreeValue{}, std::move(meaning));
   }
-  /// The same where it is known what is written there: `details` are its rows, named "name.detail", or "name" where a
-  /// detail has no name.
+  /// The same for a subtree with a known structure: `details` are its rows, named "name.detail", or "name" if a detail
+  /// has no name.
   OptionTable& map(std::string name, Settings T::*member, std::vector<OptionRow> details) {
     return entry({std::move(name), [=](T& into, const Settings& from, std::string_view) { into.*member = from; },
                   [details = std::move(details)](const T&, const std::string& full_name, std::vector<OptionRow>& rows) {
@@ -81,7 +81,7 @@ class OptionTable {
                     }
                   }});
   }
-  /// A nested struct with a table of its own; its options are rows "name.option".
+  /// A nested struct with its own table; its options become rows "name.option".
   template <class Group>
   OptionTable& group(std::string name, Group T::*member, OptionTable<Group> table) {
     auto shared = std::make_shared<const OptionTable<Group>>(std::move(table));
@@ -94,33 +94,39 @@ class OptionTable {
                   }});
   }
 
-  /// The options written in `from` (a map, or null for all defaults). `context` says whose options they are, e.g.
-  /// "blocking 'structured'"; keys of `skip` (e.g. the "name" that chose the plugin) are passed over. Throws Error with
-  /// the place, the key path, what was found and what was expected; an unknown key is answered with the nearest known
-  /// one.
+  /// An option that had another name once. The old name is refused with an error that gives the new one.
+  OptionTable& renamed(std::string old_name, std::string new_name) {
+    renamed_.emplace_back(std::move(old_name), std::move(new_name));
+    return *this;
+  }
+
+  /// The options in `from` (a map, or null for all defaults). `context` names their owner, e.g. "blocking
+  /// 'structured'"; keys in `skip` (e.g. the "name" that selects the plugin) are ignored. Throws Error with the place,
+  /// the key path, what was found and what was expected; for an unknown key it suggests the nearest known one.
   T parse(const Settings& from, std::string_view context, std::initializer_list<std::string_view> skip = {}) const {
     T result{};
     parse_into(result, from, context, skip);
     return result;
   }
 
-  /// The same, on top of the values that `into` has.
+  /// The same, starting from the values in `into`.
   void parse_into(T& into, const Settings& from, std::string_view context,
                   std::initializer_list<std::string_view> skip = {}) const {
+    check_old_names(from, renamed_, context);
     check_keys(from, names_, context, skip);
     for (const Entry& option : entries_) {
       if (const Settings* value = from.find(option.name)) option.read(into, *value, context);
     }
   }
 
-  /// One row an option, in the order of the table.
+  /// One row per option, in the order of the table.
   std::vector<OptionRow> schema() const {
     std::vector<OptionRow> rows;
     describe(T{}, "", rows);
     return rows;
   }
 
-  /// Appends the rows with the defaults that `defaults` has.
+  /// Appends the rows, with the default values in `defaults`.
   void describe(const T& defaults, const std::string& prefix, std::vector<OptionRow>& rows) const {
     for (const Entry& option : entries_) option.describe(defaults, prefix + option.name, rows);
   }
@@ -151,6 +157,7 @@ class OptionTable {
   }
 
   std::vector<std::string> names_;
+  std::vector<std::pair<std::string, std::string>> renamed_;  ///< old and new names
   std::vector<Entry> entries_;
 };
 

@@ -11,17 +11,17 @@
 
 namespace rhec {
 
-/// Where a piece of configuration was written.
+/// Where a part of the configuration was written.
 struct Origin {
-  std::string file;  ///< a file's name, or what stands for one, e.g. "--set horizon.length=25"
-  int line = 0;      ///< counted from 1; 0 where lines mean nothing
+  std::string file;  ///< a file name or its equivalent, e.g. "--set horizon.length=25"
+  int line = 0;      ///< counted from 1; 0 if there are no lines
 };
 
-/// A tree of configuration that knows where each of its nodes was written, so that every error can say it.
+/// A configuration tree in which each node knows where it was written, so that every error can say so.
 ///
-/// A node is null, a scalar (text, not interpreted until it is read), a list, or a map that keeps the order of its
-/// keys. A node that is copied out of a tree still knows its key path in that tree. It knows nothing of files: see
-/// rhec/plugins/yaml/yaml.hpp for reading them.
+/// A node is null, a scalar (text, interpreted only when it is read), a list, or a map that keeps the order of its
+/// keys. A node copied out of a tree keeps its key path. This class does not read files: see
+/// rhec/plugins/yaml/yaml.hpp.
 class RHEC_EXPORT Settings {
  public:
   enum class Kind { null, scalar, list, map };
@@ -42,16 +42,16 @@ class RHEC_EXPORT Settings {
   void items() && = delete;
   void members() && = delete;
 
-  /// The map's value at `key`; null where there is none.
+  /// The map's value at `key`; null if there is none.
   const Settings* find(std::string_view key) const noexcept;
-  /// The node at a dotted path such as "estimator.horizon.length"; null where there is none.
+  /// The node at a dotted path such as "estimator.horizon.length"; null if there is none.
   const Settings* find_path(std::string_view dotted) const noexcept;
 
-  /// Puts `value` at a dotted path, in the place of what was there; makes maps of what is missing or null on the way.
-  /// Throws Error where the path is malformed or leads through a scalar or a list.
+  /// Sets the value at a dotted path, replacing what was there; missing or null nodes on the way become maps. Throws
+  /// Error if the path is malformed or leads through a scalar or a list.
   void set(std::string_view dotted, Settings value);
-  /// Adds one key (taken as it is, dots and all) to a map; null becomes a map. Throws Error where the key is there
-  /// already, naming both places.
+  /// Adds one key (verbatim, dots included) to a map; null becomes a map. Throws Error if the key already exists,
+  /// naming both places.
   void add(std::string key, Settings value);
   /// Adds an item to a list; null becomes a list. Throws Error on anything else.
   void append(Settings value);
@@ -60,13 +60,13 @@ class RHEC_EXPORT Settings {
   std::string where() const;                                  ///< "scenarios/figure8.yaml:12"
   const std::string& path() const noexcept { return path_; }  ///< "estimator.noise[2]"; empty at the root
 
-  /// Readings of a scalar; none where it cannot be read so. Numbers are read whole, in C notation; infinity is written
-  /// `.inf` or `inf`; not-a-number is no number.
+  /// Scalar values; empty if the text cannot be read as such. Numbers must be complete, in C notation; infinity is
+  /// written `.inf` or `inf`; NaN is not a number.
   std::optional<double> number() const noexcept;
   std::optional<int> integer() const noexcept;
   std::optional<bool> flag() const noexcept;  ///< `true` or `false`
 
-  /// The same, but throwing Error that says where and what was found and expected.
+  /// The same, but throw Error that says where it is, what was found and what was expected.
   double as_number() const;
   int as_integer() const;
   bool as_flag() const;
@@ -75,11 +75,11 @@ class RHEC_EXPORT Settings {
   std::vector<int> as_integers() const;       ///< of a list
   std::vector<std::string> as_names() const;  ///< of a list of scalars
 
-  /// What stands here, for people: "'five'", "nothing", "a list of 3", "a map".
+  /// Describes the node in messages: "'five'", "nothing", "a list of 3", "a map".
   std::string found() const;
-  /// An error that stands at this node: "file:12: key.path: " and then `what`.
+  /// An error at this node: "file:12: key.path: " followed by `what`.
   Error error(std::string_view what) const;
-  /// An error of the common kind: "file:12: key.path: found 'five', expected a number".
+  /// An error of the common form: "file:12: key.path: found 'five', expected a number".
   Error mismatch(std::string_view expected) const;
 
  private:

@@ -14,23 +14,23 @@
 namespace rhec {
 
 enum class ReferenceSpeed {
-  ground,  ///< the path's speed is meant over ground: the wheels turn as much faster as they slip by the estimate
-  literal  ///< the path's speed is the wheels' (the paper's; under slip the vehicle lags and cuts corners)
+  ground,  ///< the path's speed is over ground: the wheels turn faster by the estimated slip
+  literal  ///< the path's speed is the wheels' speed (as in the paper; under slip the vehicle lags and cuts corners)
 };
 
-/// Drives along a path: estimate in, input out (docs/method.md, section 3).
+/// Path-following controller: estimate in, input out (docs/method.md, section 3).
 ///
-/// At each call the closest point of the path is searched for ahead of the last one; the local reference is that point
-/// and the next N_c, each dt * u1ref metres further on. Where the solver fails, and fails again from a simulation, the
-/// plan of the last sample goes on, and is counted: its inputs one after the other, in the end the last of them. Where
-/// there is no plan yet, the vehicle goes straight ahead. Allocates in its constructor only.
+/// At each call the closest point of the path is searched for ahead of the last one. The local reference is that point
+/// and the next N_c, each dt * u1ref metres further on. If the solver fails, and fails again from a simulation, the
+/// plan of the last sample is continued and the failure is counted: its inputs one after the other, then the last of
+/// them. Without a plan the vehicle goes straight ahead. Allocates in its constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {
     RhcProblem::Setup problem;
     double interval = 0.2;  ///< dt [s]
     ReferenceSpeed reference_speed = ReferenceSpeed::ground;
-    /// An estimate by which the wheels keep less than this of their speed is not trusted.
+    /// Estimated speed factors below this are not trusted.
     double least_speed_factor = 0.3;
     /// The inputs that drive straight ahead are bounded between 0 and what they would be at a speed of
     /// factor * speed + offset without slip; an infinite factor leaves the model's bounds.
@@ -38,7 +38,7 @@ class RHEC_EXPORT Controller {
     std::vector<std::shared_ptr<const Blocking>> blockings;  ///< one for each of problem.blocked_inputs
     PathFollower::Window search;
   };
-  /// Throws Error where the model has no position or speed to follow a path with, or sizes do not fit.
+  /// Throws Error if the model has no position or speed to follow a path with, or sizes do not match.
   Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Path path, Setup setup);
   Controller(const Controller&) = delete;  // the follower points into the path
   Controller& operator=(const Controller&) = delete;
@@ -46,16 +46,16 @@ class RHEC_EXPORT Controller {
   struct Command {
     std::vector<double> inputs;  ///< u_k, n_u: to be applied until the next call
     PathPoint reference;         ///< the closest point of the path
-    Report report;               ///< its objective and KKT residual need not be there before `finish`
-    bool fallback = false;       ///< the solver failed: this is the last plan's, if there is one
-    bool softened = false;       ///< a state bound was out of the estimate's reach and was moved
+    Report report;               ///< objective and KKT residual may be missing before `finish`
+    bool fallback = false;       ///< the solver failed; the last plan is continued, if there is one
+    bool relaxed = false;        ///< a state bound was out of reach from the estimate and was relaxed
   };
   /// The input for an estimate. Valid until the next call.
   const Command& control(const Estimate& estimate, Clock::time_point deadline = Clock::time_point::max()) noexcept;
-  /// Completes the last command's report by the objective and the KKT residual of its plan. `prepare` and the next
-  /// `control` do that too; the last command of a run has neither behind it.
+  /// Completes the last command's report with the objective and the KKT residual of its plan. `prepare` and the next
+  /// `control` do that too; only the last command of a run needs this call.
   void finish() noexcept;
-  /// Work for the next sample that can be done now; calling it is never needed.
+  /// Does work for the next sample in advance; calling it is optional.
   void prepare() noexcept;
   void reset() noexcept;
 
@@ -84,9 +84,9 @@ class RHEC_EXPORT Controller {
   Iterate point_;
   Command command_;
   bool has_plan_ = false, prepared_ = false;
-  bool is_finished_ = true;  ///< the last sample's plan was judged and is kept for the next one
-  double bounded_speed_ = std::numeric_limits<double>::quiet_NaN();  ///< that the inputs' bounds are made for [m/s]
-  int reference_segment_ = 0;                                        ///< of the path, where the last reference began
+  bool is_finished_ = true;  ///< the last sample's plan was assessed and kept for the next one
+  double bounded_speed_ = std::numeric_limits<double>::quiet_NaN();  ///< for which the inputs' bounds were made [m/s]
+  int reference_segment_ = 0;  ///< segment of the path where the last reference began
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_;
   std::vector<double> nominal_parameters_, reference_parameters_;

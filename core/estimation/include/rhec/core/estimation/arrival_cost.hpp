@@ -9,24 +9,24 @@
 
 namespace rhec {
 
-/// How what has left the window is remembered (docs/method.md, section 5). The prior of the window's first node is the
+/// How data that have left the horizon are summarised (docs/method.md, section 5). The prior of the first node is the
 /// predicted one, before that node's measurement, so that no measurement counts twice.
 enum class ArrivalKind {
-  ekf,  ///< filtering update: an extended Kalman filter runs along at the window's edge, linearised at its own mean
-  smoothing,  ///< one QR factorisation of what leaves, linearised at the window's solution (Kuehl et al. 2011)
-  constant,   ///< the window's own estimate of its next node, with the initial covariance for ever
-  off         ///< no memory
+  ekf,        ///< filtering update: an extended Kalman filter at the start of the horizon, linearised at its own mean
+  smoothing,  ///< one QR factorisation of the terms that leave, linearised at the solution (Kuehl et al. 2011)
+  constant,   ///< the solution at the next node, always with the initial covariance
+  off         ///< no arrival cost
 };
 
-/// How a parameter may change outside what the window sees.
+/// How a parameter may change outside the horizon and from block to block.
 struct ParameterWalk {
-  double forgetting = 0.03;    ///< standard deviation per square root of a step, added at each slide
-  double restart_sigma = 1.0;  ///< standard deviation with which an unlinked block starts
-  /// Standard deviation of an unlinked block inside the window about the block before it; infinite: none.
+  double process_noise = 0.03;  ///< standard deviation per square root of a step, added at each slide
+  double restart_sigma = 1.0;   ///< standard deviation with which an unlinked block starts
+  /// Standard deviation between an unlinked block inside the horizon and the previous block; infinite: none.
   double block_sigma = 0.25;
 };
 
-/// The prior [xbar; pbar], Pi of the window's first node, as the window slides. Allocates in its constructor only.
+/// The prior [xbar; pbar], Pi of the horizon's first node as the horizon slides. Allocates in its constructor only.
 class RHEC_EXPORT ArrivalCost {
  public:
   ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<ParameterWalk> walks);
@@ -36,20 +36,20 @@ class RHEC_EXPORT ArrivalCost {
   const Eigen::VectorXd& mean() const noexcept { return filter_.mean; }
   const Eigen::MatrixXd& covariance() const noexcept { return filter_.covariance; }
 
-  /// What happens to one parameter when the window's first node reaches a new interval.
+  /// What happens to one parameter when the horizon's first node reaches a new interval.
   struct Border {
-    bool reached = false;                                  ///< that interval starts a block
-    double steps = 0.0;                                    ///< s_b - s_a: since the start of the block before
+    bool reached = false;  ///< this interval starts a block
+    double steps = 0.0;    ///< s_b - s_a: intervals since the start of the previous block
     std::optional<double> neighbour_sigma = std::nullopt;  ///< the link between the blocks, if any
-    bool leaves_as_ramp = false;  ///< the interval that leaves was a ramp into its block, of this variance
+    bool leaves_as_ramp = false;  ///< the interval that leaves was a ramp into its block, with this variance
     double ramp_variance = 0.0;
   };
-  /// Moves the prior over the first interval of a problem, whose newest solution is given. `borders` has n_p entries.
-  /// `mean_is_lost`: the filter's own mean is too far off to linearise at; smoothing takes its place for this slide.
+  /// Moves the prior over the first interval of a problem, given its newest solution. `borders` has n_p entries.
+  /// `mean_is_lost`: the filter's own mean is too inaccurate to linearise at, so this slide uses the smoothing update.
   void slide(const RheProblem& problem, const Iterate& solution, const std::vector<Border>& borders,
              bool mean_is_lost = false) noexcept;
 
-  /// Puts mean and information into a problem.
+  /// Writes mean and information matrix into a problem.
   void write(RheProblem& problem) noexcept;
 
  private:
@@ -60,11 +60,11 @@ class RHEC_EXPORT ArrivalCost {
 
   ArrivalKind kind_;
   std::vector<ParameterWalk> walks_;
-  KalmanFilter filter_;  ///< owns mean and covariance for every kind
+  KalmanFilter filter_;  ///< holds mean and covariance for every kind
   Eigen::MatrixXd initial_covariance_;
   std::vector<double> robust_, inputs_, ends_, scratch_, ramp_variances_, next_, jacobian_, predicted_,
       output_jacobian_;
-  /// Pi = D L L' D with D diagonal, so that the units of one variable do not decide about the precision of another.
+  /// Pi = D L L' D with D diagonal, so that the units of one variable do not affect the precision of another.
   Eigen::VectorXd scale_;
   Eigen::MatrixXd factor_;
   Eigen::MatrixXd rows_, map_, spread_, inverse_;

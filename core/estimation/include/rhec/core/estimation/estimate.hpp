@@ -6,16 +6,16 @@
 
 namespace rhec {
 
-/// What an estimator knows at a time. Valid until the estimator is asked again.
+/// An estimate at one time. Valid until the next call of the estimator.
 struct Estimate {
   double time = 0.0;
   Eigen::VectorXd state;       ///< x_k, n_x
   Eigen::VectorXd parameters;  ///< the value of the newest interval, n_p
-  /// Of [x_k; p], from the information in the measurements and the prior; bounds do not narrow it.
+  /// Covariance of [x_k; p], from the information in the measurements and the prior; bounds do not narrow it.
   Eigen::MatrixXd covariance;
   Report report;          ///< of the solver; trivial for a filter
-  bool fallback = false;  ///< the solver failed, and the prediction from earlier samples took its place
-  /// The time lies beyond the newest node: integrated from there. The covariance is still that of the newest node.
+  bool fallback = false;  ///< the solver failed; this is the prediction from earlier samples
+  /// The time is beyond the newest node: the state is integrated from there, and the covariance is that node's.
   bool predicted = false;
 };
 

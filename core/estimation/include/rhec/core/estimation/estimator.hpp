@@ -9,53 +9,53 @@
 
 namespace rhec {
 
-/// The estimator of a robot: push stamped measurements and inputs as they come, ask for the estimate at a time.
+/// The estimator of a robot: push stamped measurements and inputs as they arrive, and ask for the estimate at a time.
 ///
-/// Nodes lie where measurements do, and at most `longest_interval` apart. An input holds from its stamp until the next;
-/// what an interval uses is the mean over it of all rows. A measurement may lack any of its outputs (NaN). One that
-/// comes late is merged into the node at its time, if that is still in the window; otherwise it is dropped and counted.
-/// An input that comes late counts from the newest node on; intervals that are made already keep their means. Works
-/// with any EstimationMethod: RecedingHorizonEstimation or FilterEstimation. Throws nothing after its construction.
+/// Nodes are at the times of measurements, and at most `longest_interval` apart. An input holds from its stamp until
+/// the next; an interval uses the mean over its duration. A measurement may lack any of its outputs (NaN). A late
+/// measurement is merged into the node at its time if that is still in the horizon; otherwise it is dropped and
+/// counted. A late input counts from the newest node on; existing intervals keep their means. Works with any
+/// EstimationMethod: RecedingHorizonEstimation or FilterEstimation. Nothing throws after construction.
 class RHEC_EXPORT Estimator {
  public:
   struct Timeline {
-    double longest_interval = 0.2;  ///< [s]; a gap so long that it needs more than 1000 nodes is divided into 1000
-    double tolerance = 1e-6;        ///< two stamps closer than this are one node [s]
-    std::size_t capacity = 4096;    ///< rows of inputs, and of measurements, that can wait to be used
+    double longest_interval = 0.2;  ///< [s]; a gap that would need more than 1000 nodes is divided into 1000
+    double tolerance = 1e-6;        ///< stamps closer than this belong to one node [s]
+    std::size_t capacity = 4096;    ///< rows of inputs, and of measurements, that can wait for processing
   };
   explicit Estimator(std::unique_ptr<EstimationMethod> method) : Estimator(std::move(method), Timeline{}) {}
-  /// Throws Error where a number of the timeline makes no sense.
+  /// Throws Error if a number of the timeline is out of range.
   Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline);
 
-  /// y (n_y, NaN where missing) at a time [s].
+  /// Measured y (n_y, NaN where missing) at a time [s].
   void push_measurement(double time, const double* outputs) noexcept;
-  /// u (n_u, NaN where missing), holding from a time [s] on.
+  /// Measured u (n_u, NaN where missing), which holds from a time [s] on.
   void push_input(double time, const double* inputs) noexcept;
 
-  /// The estimate at a time, from all that was pushed with stamps up to it. Beyond the newest node it is integrated
-  /// with the newest inputs; a time before the newest node, or none, gives the newest node's. Before the first
-  /// measurement it is empty (`has_started` says so).
+  /// The estimate at a time [s], from all that was pushed with stamps up to it. Beyond the newest node it is integrated
+  /// with the newest inputs; for an earlier or undefined time it is the newest node's. Before the first measurement it
+  /// is empty (see `has_started`).
   const Estimate& estimate(double time, Clock::time_point deadline = Clock::time_point::max()) noexcept;
   bool has_started() const noexcept { return started_; }
 
-  /// Work for the next sample that can be done now; calling it is never needed, and always saves time later.
+  /// Does work for the next sample in advance; optional, but always saves time later.
   void prepare() noexcept { method_->prepare(); }
   void reset() noexcept;
 
   struct Counts {
-    std::int64_t nodes = 0;      ///< with those that fill gaps
-    std::int64_t estimates = 0;  ///< solves
-    std::int64_t fallbacks = 0;  ///< of those, failed
+    std::int64_t nodes = 0;      ///< including those that fill gaps
+    std::int64_t estimates = 0;  ///< estimates computed
+    std::int64_t fallbacks = 0;  ///< estimates for which the solver failed
     std::int64_t late = 0;       ///< measurements merged into an older node
     std::int64_t dropped = 0;    ///< measurements too late, too many, or with a stamp that is not finite
-    std::int64_t missing = 0;    ///< single outputs that were NaN or otherwise no measurement
+    std::int64_t missing = 0;    ///< single outputs that were NaN or otherwise not valid
   };
   const Counts& counts() const noexcept { return counts_; }
   const EstimationMethod& method() const noexcept { return *method_; }
   const Model& model() const noexcept { return method_->model(); }
 
  private:
-  /// Stamped rows in the order of their stamps; the oldest give way when it is full.
+  /// Stamped rows in the order of their stamps; the oldest are dropped when it is full.
   class Rows {
    public:
     Rows(std::size_t capacity, int width);
@@ -80,7 +80,7 @@ class RHEC_EXPORT Estimator {
   std::unique_ptr<EstimationMethod> method_;
   Timeline timeline_;
   Rows measurements_, inputs_;
-  std::vector<double> node_times_;  ///< of the newest nodes, in a ring
+  std::vector<double> node_times_;  ///< of the newest nodes, in a ring buffer
   std::size_t newest_ = 0;
   bool started_ = false, stale_ = false;
   Estimate estimate_, predicted_;

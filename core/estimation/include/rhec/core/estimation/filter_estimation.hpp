@@ -8,13 +8,14 @@
 
 namespace rhec {
 
-/// Extended Kalman filter with random-walk parameters behind the Estimator: the baseline. Where the heading at the
-/// start is unknown, a bank of filters with starts around the circle runs until one explains the measurements best.
+/// Extended Kalman filter with random-walk parameters for the Estimator: the baseline (docs/method.md, section 5). If
+/// the initial heading is unknown, a bank of filters with headings around the circle runs until one explains the
+/// measurements best.
 class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
  public:
   struct Setup {
     KalmanFilter::Noise noise;
-    std::vector<double> walk;  ///< n_p, standard deviation of a parameter per square root of a step
+    std::vector<double> walk;  ///< n_p, process noise: standard deviation of a parameter per square root of a step
     Eigen::VectorXd initial_mean;
     Eigen::MatrixXd initial_covariance;
     int substeps = 1;

@@ -10,35 +10,33 @@
 
 namespace rhec {
 
-/// Extended Kalman filter on z = [x; p], p a random walk: the baseline that estimators are compared with, and the
-/// filtering update of the arrival cost. The covariance is kept (not its inverse), so that noise may be singular. What
-/// is not a number, or leads to none, is passed over: mean and covariance stay finite. Allocates in its constructor
-/// only.
+/// Extended Kalman filter on z = [x; p] with random-walk parameters p (docs/method.md, section 5): the baseline for
+/// estimators, and the filtering update of the arrival cost. It stores the covariance, not its inverse, so that noise
+/// may be singular. Values that are not finite, or lead to such, are skipped: mean and covariance stay finite.
+/// Allocates in its constructor only.
 class RHEC_EXPORT KalmanFilter {
  public:
   struct Noise {
     std::vector<double> output_variances;                  ///< n_y
-    std::vector<double> input_variances;                   ///< n_u, of a measured input
-    std::vector<double> parameter_lower, parameter_upper;  ///< the mean is kept inside
+    std::vector<double> input_variances;                   ///< n_u, of measured inputs
+    std::vector<double> parameter_lower, parameter_upper;  ///< bounds of the mean
   };
   KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps);
 
   Eigen::VectorXd mean;        ///< n_x + n_p
   Eigen::MatrixXd covariance;  ///< symmetric positive semidefinite
 
-  /// Takes a measurement y (n_y, NaN where missing) into account. `robust_weights` (n_y, or null) scale the
-  /// information.
+  /// Measurement update with y (n_y, NaN where missing). `robust_weights` (n_y, or null) scale the information.
   void update(const double* y, const double* robust_weights) noexcept;
-  /// Moves on by `duration` with a measured input (n_u, NaN where missing: the guess takes its place, with a standard
-  /// deviation of a hundred of the variable's typical magnitudes).
+  /// Time update by `duration` [s] with a measured input (n_u). Where it is missing (NaN), the guess replaces it, with
+  /// a standard deviation of a hundred times the variable's typical magnitude.
   void predict(const double* measured_input, const double* input_guess, double duration) noexcept;
-  /// The same where parameters jump or ramp during the interval: variances (n_p, 0 where there is no jump) of the
-  /// change.
+  /// The same if parameters jump or ramp during the interval: variances (n_p, 0 without a jump) of the change.
   void predict(const double* measured_input, const double* input_guess, double duration,
                const double* ramp_variances) noexcept;
-  /// Random walk of a parameter.
+  /// Adds random-walk variance to a parameter.
   void add_parameter_variance(int parameter, double variance) noexcept;
-  /// Forgets what is known of a parameter: it keeps its mean, is independent of all else, and has this variance.
+  /// Restarts a parameter: it keeps its mean and gets this variance, without correlation to anything else.
   void restart_parameter(int parameter, double variance) noexcept;
 
   const Model& model() const noexcept { return *model_; }

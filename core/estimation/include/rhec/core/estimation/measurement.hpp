@@ -5,15 +5,15 @@
 
 namespace rhec {
 
-/// Stands for an output or input that was not measured.
+/// Marks an output or input that was not measured.
 inline constexpr double missing_value = std::numeric_limits<double>::quiet_NaN();
 
-/// False for what cannot be a measurement: NaN, infinities, and numbers so large that the arithmetic of a whole horizon
-/// would suffer from them.
+/// False for values that cannot be a measurement: NaN, infinity, and numbers so large that they would spoil the
+/// arithmetic of the whole horizon.
 inline bool is_measurement(double value) noexcept { return std::abs(value) < 1e15; }
 
-/// The value, or `missing_value` where it cannot be a measurement. Data are cleaned by this where they come in: by
-/// Estimator, and of a recorded run by FullInformationEstimation. Behind them a value is finite or NaN.
+/// The value, or `missing_value` if it cannot be a measurement. Data are cleaned where they enter: in Estimator, and
+/// for recorded runs in FullInformationEstimation. Behind these a value is finite or NaN.
 inline double cleaned(double value) noexcept { return is_measurement(value) ? value : missing_value; }
 
 }  // namespace rhec

@@ -12,28 +12,27 @@
 
 namespace rhec {
 
-/// Receding horizon estimation with structured blocking (docs/method.md, sections 2, 4 and 5): a window of at most
-/// `problem.max_intervals` intervals that grows from the start of the run and then slides, with an arrival cost before
-/// it.
+/// Receding horizon estimation with structured blocking (docs/method.md, sections 2, 4 and 5). The horizon of at most
+/// `problem.max_intervals` intervals grows from the start of the run and then slides, with an arrival cost before it.
 ///
-/// Blocks that no random walk links (`Blocking::neighbour_sigma` off) still get a wide prior, `block_sigma`, about the
-/// block before: what the data determine is theirs, and a block that they say little about keeps near its neighbour's
-/// value rather than being thrown to a bound by noise. Infinite, it reproduces the paper, which reports that blocks of
-/// one and three intervals then do not converge.
+/// Blocks that are not linked by a random walk (`Blocking::neighbour_sigma` is empty) still have a weak prior,
+/// `block_sigma`, about the previous block: what the data determine is unaffected, and a weakly determined block stays
+/// near its neighbour's value instead of being driven to a bound by noise. If it is infinite, the method is that of the
+/// paper, which reports that blocks of one and three intervals then do not converge.
 class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
  public:
   struct Setup {
     RheProblem::Setup problem;
     ArrivalKind arrival = ArrivalKind::ekf;
-    std::vector<std::shared_ptr<const Blocking>> blockings;  ///< one a parameter
-    std::vector<ParameterWalk> walks;                        ///< one a parameter
+    std::vector<std::shared_ptr<const Blocking>> blockings;  ///< one per parameter
+    std::vector<ParameterWalk> walks;                        ///< one per parameter
     Eigen::VectorXd initial_mean;                            ///< of [x; p] at the first node
     Eigen::MatrixXd initial_covariance;
-    /// Where the heading is unknown at the start: while the window still grows, that many starts around the circle are
-    /// tried and the best is kept.
+    /// If the initial heading is unknown: this many headings around the circle are tried while the horizon still grows,
+    /// and the best is kept.
     int heading_starts = 1;
   };
-  /// Throws Error where sizes do not fit or a blocking cannot take the horizon.
+  /// Throws Error if sizes do not match or a blocking cannot take the horizon.
   RecedingHorizonEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Setup setup);
 
   const Model& model() const noexcept override { return problem_.model(); }
@@ -45,7 +44,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   void prepare() noexcept override;
   void reset() noexcept override;
 
-  /// The window as it stands, for those who want to look inside.
+  /// The present horizon, for inspection.
   const RheProblem& problem() const noexcept { return problem_; }
   const Iterate& solution() const noexcept { return point_; }
   const Window& window() const noexcept { return window_; }
@@ -72,7 +71,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   Iterate point_, trial_, best_;
   Window window_;
   bool started_ = false, solved_ = false, prepared_ = false;
-  bool searching_ = false;  ///< the heading has not been found yet
+  bool searching_ = false;  ///< the heading has not been determined yet
   std::vector<std::uint8_t> begins_, next_begins_;
   std::vector<std::int64_t> first_starts_;
   std::vector<ArrivalCost::Border> borders_;

@@ -14,20 +14,20 @@
 
 namespace rhec {
 
-/// A model over a horizon: the structure, the dynamics and the bounds that all kinds of problems share.
+/// A model over a horizon: the structure, dynamics and bounds common to all kinds of problems.
 ///
-/// Stages are those of HorizonStructure; interval i leads from s_i to s_{i+1} by the model's integration over
-/// `duration(i)` in `substeps` Runge-Kutta steps. What makes a kind of problem is its cost: a class derives from this
-/// one and implements `cost` and `write_cost`. RheProblem and RhcProblem are such classes; others may be written
-/// outside of rhec, against this header alone.
+/// Stages are those of HorizonStructure; interval i leads from s_i to s_{i+1} by integrating the model over
+/// `duration(i)` in `substeps` Runge-Kutta steps. A kind of problem is defined by its cost: a derived class implements
+/// `cost` and `write_cost`. RheProblem and RhcProblem are such classes; others can be written outside of rhec with this
+/// header alone.
 ///
-/// Data are set in place, without allocation. A problem can be copied, but not assigned or moved: whoever has been set
-/// up with it refers to it.
+/// Data are set in place, without allocation. A problem can be copied, but not assigned or moved, since solvers and
+/// linearisations that were set up with it keep a reference.
 class RHEC_EXPORT HorizonProblem : public Ocp {
  public:
   HorizonProblem& operator=(const HorizonProblem&) = delete;
 
-  /// The name of the kind of problem, by which files and reports know it: "rhe", "rhc", ...
+  /// The kind of problem, as named in files and reports: "rhe", "rhc", ...
   virtual std::string_view kind() const noexcept = 0;
   const Model& model() const noexcept { return *model_; }
   std::shared_ptr<const Model> shared_model() const noexcept { return model_; }
@@ -37,7 +37,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   /// Length of an interval [s].
   double duration(int interval) const noexcept { return durations_[interval]; }
   void set_duration(int interval, double seconds) noexcept { durations_[interval] = seconds; }
-  /// What is known of the inputs of an interval (n_u, NaN where nothing is), for a first guess; null: nothing.
+  /// The known inputs of an interval (n_u, NaN where unknown), for an initial guess; null if none is known.
   virtual const double* known_inputs(int /*interval*/) const noexcept { return nullptr; }
 
   Capacity capacity() const noexcept override { return structure_.capacity(); }
@@ -57,11 +57,12 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   double linearise(StageRange range, const Iterate& iterate, Hessian hessian, StageQp& qp,
                    std::span<double> scratch) const noexcept override;
   void refresh(const Iterate& iterate, StageQp& qp, std::span<double> scratch) const noexcept override;
-  /// One that evaluates again only what has changed since the iterate before, be it some intervals earlier.
+  /// A linearisation cache: it evaluates only what has changed since the last iterate, even if that has moved along by
+  /// some intervals.
   std::unique_ptr<Linearisation> make_linearisation() const override;
 
-  /// As `simulate_interval`, for an interval that is new at the end of a horizon that has moved on: keeps its
-  /// derivatives, which the next `Linearisation::prepare` will need.
+  /// As `simulate_interval`, for a new interval at the end of a horizon that has moved on. Keeps the derivatives for
+  /// the next `Linearisation::prepare`.
   void simulate_new_interval(int interval, Iterate& iterate, std::span<double> scratch) noexcept;
 
  protected:
@@ -69,7 +70,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
     HorizonStructure::Setup structure;
     int substeps = 1;
   };
-  /// Throws Error where a number of the set-up makes no sense.
+  /// Throws Error if a number of the set-up is out of range.
   HorizonProblem(std::shared_ptr<const Model> model, const Setup& setup);
   HorizonProblem(const HorizonProblem&) = default;
 
@@ -78,32 +79,32 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   int np() const noexcept { return structure_.parameters(); }
   int stride() const noexcept { return structure_.stride(); }
   HorizonStructure& changing_structure() noexcept { return structure_; }
-  /// Structure, durations and bounds of a problem of the same capacity.
+  /// Copies structure, durations and bounds of a problem of the same capacity.
   void take_horizon(const HorizonProblem& from) noexcept;
 
-  /// Bounds of z = [s; w] at every stage, as rows of `stride()` entries. They begin as none.
+  /// Bounds of z = [s; w] at every stage, as rows of `stride()` entries. Initially there are none.
   double* lower_row(int stage) noexcept { return at(lower_, stage); }
   double* upper_row(int stage) noexcept { return at(upper_, stage); }
   void clear_bounds() noexcept;
 
-  /// Which part of a cost a call of `write_cost` is to write: H and h, H alone, or h alone.
+  /// Which part of a cost `write_cost` is to write: H and h, H alone, or h alone.
   enum class CostParts { all, matrices, vectors };
 
-  /// The sum of the stages' costs; adds those of single stages to `stage_costs` (N + 1), if not null.
+  /// The sum of the stage costs; adds those of single stages to `stage_costs` (N + 1), if not null.
   virtual double cost(const Iterate& iterate, double* stage_costs, std::span<double> scratch) const noexcept = 0;
-  /// Writes the cost of a range of stages into h (gradient) and H (Hessian) of a QP at an iterate; what was there
-  /// before is no more. With Hessian::exact, H holds the curvature of the intervals' dynamics already, which stays: the
-  /// cost's is added to it. Returns the costs of these stages, where vectors are wanted.
+  /// Writes the cost of a range of stages into h (gradient) and H (Hessian) of a QP at an iterate, overwriting what was
+  /// there. With Hessian::exact, H already holds the curvature of the dynamics, to which that of the cost is added.
+  /// Returns the costs of these stages, if vectors are wanted.
   virtual double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
                             std::span<double> scratch) const noexcept = 0;
-  /// What the two need of scratch, which lies behind what the dynamics need.
+  /// Scratch that these two need, behind the scratch of the dynamics.
   virtual std::size_t cost_scratch_size() const noexcept { return 0; }
-  /// Zeros to what `write_cost` is about to write, for one that adds term by term.
+  /// Zeros what `write_cost` is about to write, for a cost that adds term by term.
   void clear_cost(StageRange range, Hessian hessian, CostParts parts, StageQp& qp) const noexcept;
 
-  /// Whether bounds are data that may come between `Linearisation::prepare` and `refresh`.
+  /// Whether bounds are data that may change between `Linearisation::prepare` and `refresh`.
   virtual bool has_late_bounds() const noexcept { return false; }
-  /// Whether the cost's Hessian depends on no data, so that a linearisation may keep that of intervals that it knows.
+  /// Whether the cost's Hessian depends on no data, so that a linearisation cache may keep it for known intervals.
   virtual bool has_constant_cost_hessian() const noexcept { return false; }
 
  private:
@@ -126,7 +127,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   /// The interval that `simulate_new_interval` has simulated, with its derivatives.
   struct SimulatedInterval {
     double duration = 0.0;                      ///< 0: none
-    AlignedDoubles z, next, jacobian, scratch;  ///< rows as Model::integrate_rows has them
+    AlignedDoubles z, next, jacobian, scratch;  ///< rows as in Model::integrate_rows
   };
   SimulatedInterval simulated_;
 };

@@ -7,8 +7,8 @@
 
 namespace rhec {
 
-/// How the value of a block follows from that of the block before: what the options of every strategy with more than
-/// one block begin with. A strategy's options derive from it and add it to their table:
+/// How the value of a block is related to that of the previous block: options common to all strategies with more than
+/// one block. A strategy's options derive from it and add it to their table:
 ///
 ///     struct MyOptions : BlockLink {
 ///       int size = 5;
@@ -22,10 +22,10 @@ struct BlockLink {
   std::optional<double> neighbour_sigma;  ///< [unit of the parameter per square root of a step]
 };
 
-/// The table with the options of BlockLink behind its own.
+/// The table followed by the options of BlockLink.
 template <class Options>
 OptionTable<Options> with_block_link(OptionTable<Options> table) {
-  // A member of the base is one of the options, but templates do not deduce that by themselves.
+  // The option is a member of the base class, which template deduction does not find by itself.
   Transition Options::*const transition = &BlockLink::transition;
   table
       .choice("transition", transition, {{"step", Transition::step}, {"ramp", Transition::ramp}},
@@ -49,10 +49,10 @@ class LinkedBlocking : public Blocking {
   BlockLink link_;
 };
 
-/// What borders between blocks are counted from.
+/// Reference point from which block borders are counted.
 enum class Anchor {
-  time,    ///< the start of the run: borders slide through the window (estimation)
-  horizon  ///< the start of the window: borders move with it (move blocking of inputs)
+  time,    ///< the start of the run: borders slide through the horizon (estimation)
+  horizon  ///< the start of the horizon: borders move with it (move blocking of inputs)
 };
 
 }  // namespace rhec

@@ -11,15 +11,15 @@ namespace rhec {
 
 struct CostView;
 
-/// Receding horizon control over N intervals (docs/method.md, section 3; Wallace et al., eq. 4), x_0 and the parameters
-/// p given:
+/// Receding horizon control over N intervals (docs/method.md, section 3; Wallace et al., eq. 4), with given x_0 and
+/// parameters p:
 ///
 ///     minimise  sum_{i=0}^{N-1} || x_i - xref_i ||^2_Vx + || u_i - uref_i ||^2_Vu  +  || x_N - xref_N ||^2_VN
 ///     subject to the dynamics, bounds on the states of nodes 1 .. N and on the inputs.
 ///
 /// p is embedded like the initial state: it is part of the given initial stage state, so that both may arrive after the
 /// problem has been linearised. Inputs may be blocked. Data are set in place, without allocation; call `finish` after
-/// the structure, the initial state, or the bounds have changed.
+/// changing the structure, the initial state, or the bounds.
 class RHEC_EXPORT RhcProblem final : public HorizonProblem {
  public:
   struct Setup {
@@ -30,7 +30,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
     std::vector<double> terminal_weights;          ///< n_x, diagonal of VN
     std::vector<double> state_lower, state_upper;  ///< n_x; empty: the model's own bounds
     std::vector<double> input_lower, input_upper;  ///< n_u; empty: the model's own bounds
-    std::vector<int> blocked_inputs;               ///< inputs that get blocks of their own
+    std::vector<int> blocked_inputs;               ///< inputs that are blocked
   };
   RhcProblem(std::shared_ptr<const Model> model, Setup setup);
 
@@ -44,19 +44,19 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   const double* input_reference(int interval) const noexcept {
     return reference_.data() + at(interval) + capacity().states;
   }
-  /// Bounds of an input, per interval; they start as the set-up's.
+  /// Bounds of an input, per interval; initially those of the set-up.
   double& input_lower(int interval, int input) noexcept { return input_lower_[interval * nu() + input]; }
   double& input_upper(int interval, int input) noexcept { return input_upper_[interval * nu() + input]; }
   double input_lower(int interval, int input) const noexcept { return input_lower_[interval * nu() + input]; }
   double input_upper(int interval, int input) const noexcept { return input_upper_[interval * nu() + input]; }
 
   void set_intervals(int intervals) noexcept { changing_structure().set_intervals(intervals); }
-  /// Marks where the blocks of a blocked input start; begins[0] is taken as 1.
+  /// Marks where the blocks of a blocked input start; begins[0] counts as 1.
   void set_blocks(int input, const std::uint8_t* begins) noexcept;
-  /// Takes on the data and the structure of a problem with the same model and set-up, without allocation.
+  /// Copies data and structure of a problem with the same model and set-up, without allocation.
   void take_data(const RhcProblem& from) noexcept;
-  /// Ends a change. A state bound that no admissible input can keep from the given initial state (the estimate may
-  /// violate it) is moved to the nearest value within reach, node by node; returns how many were moved.
+  /// Ends a change. A state bound that no admissible input can satisfy from the given initial state (the estimate may
+  /// violate it) is relaxed, node by node, to the nearest value within reach. Returns the number of relaxed bounds.
   int finish(std::span<double> scratch) noexcept;
 
   std::string_view kind() const noexcept override { return "rhc"; }
@@ -78,10 +78,10 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
 
   Setup setup_;
   std::vector<double> initial_, input_lower_, input_upper_;
-  int moved_bounds_ = 0;      ///< of states, by the last `finish`
-  AlignedDoubles reference_;  ///< of [x; p; u], a row a stage
+  int moved_bounds_ = 0;      ///< state bounds relaxed by the last `finish`
+  AlignedDoubles reference_;  ///< one row [x; p; u] per stage
   AlignedDoubles stage_weights_, terminal_weights_, periods_,
-      inverse_periods_;  ///< rows of [x; p; u]; the period where it is an angle
+      inverse_periods_;  ///< rows [x; p; u]; the period of angles and its inverse, else 0
 };
 
 }  // namespace rhec

@@ -16,11 +16,11 @@ namespace rhec {
 class OutputCache;
 struct CostView;
 
-/// A pseudo-Huber loss on a group of outputs: with s the weighted squared residual of the group,
-/// 2 delta^2 (sqrt(1 + s / delta^2) - 1) takes the place of s. Smooth, so that its exact Hessian exists.
+/// Pseudo-Huber loss on a group of outputs: with s the weighted squared residual of the group, 2 delta^2 (sqrt(1 + s /
+/// delta^2) - 1) replaces s. It is smooth, so that its exact Hessian exists.
 struct RobustLoss {
-  std::vector<int> outputs;  ///< they share one loss, such as the two coordinates of a fix
-  double delta = 3.0;        ///< in standard deviations: where the loss turns from quadratic to linear
+  std::vector<int> outputs;  ///< these share one loss, e.g. the two coordinates of a position fix
+  double delta = 3.0;        ///< in standard deviations: transition from quadratic to linear
 };
 
 /// Receding horizon estimation over N intervals (docs/method.md, section 2; Wallace et al., eq. 2):
@@ -31,8 +31,8 @@ struct RobustLoss {
 ///             + sum over block starts (rho_b - rho_a)^2 / variance     where neighbouring blocks are linked
 ///     subject to the dynamics, bounds on states at every node, on inputs, and on every parameter block.
 ///
-/// Data are set in place, without allocation; after the structure (the number of intervals or the block starts) has
-/// changed, `finish` must be called.
+/// Data are set in place, without allocation. After a change of the structure (the number of intervals or the block
+/// starts), `finish` must be called.
 class RHEC_EXPORT RheProblem final : public HorizonProblem {
  public:
   struct Setup {
@@ -41,9 +41,9 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
     std::vector<double> output_weights;  ///< n_y, diagonal of Ry = 1 / sigma^2
     std::vector<double> input_weights;   ///< n_u, diagonal of Ru
     std::vector<RobustLoss> robust;
-    std::vector<int> one_block;                            ///< parameters with one value over every horizon
+    std::vector<int> one_block;                            ///< parameters with one value over the whole horizon
     std::vector<double> state_lower, state_upper;          ///< n_x; empty: the model's own bounds
-    std::vector<double> input_lower, input_upper;          ///< n_u; empty: none, since the input was measured
+    std::vector<double> input_lower, input_upper;          ///< n_u; empty: none, since inputs are measured
     std::vector<double> parameter_lower, parameter_upper;  ///< n_p; empty: the model's own bounds
   };
   RheProblem(std::shared_ptr<const Model> model, Setup setup);
@@ -61,23 +61,24 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   const double* measured_input(int interval) const noexcept { return measured_inputs_.data() + at_input(interval); }
 
   void set_intervals(int intervals) noexcept { changing_structure().set_intervals(intervals); }
-  /// Marks where a parameter's blocks start. `begins` has an entry an interval; the first interval's block is that of
-  /// node 0's value, so begins[0] matters only for a ramp that starts there. Of a parameter that was set up as one
-  /// block, none counts.
+  /// Marks where a parameter's blocks start. `begins` has one entry per interval. The first interval uses the value of
+  /// node 0, so begins[0] matters only for a ramp that starts there. Ignored for a parameter that was set up as one
+  /// block.
   void set_blocks(int parameter, const std::uint8_t* begins, Transition transition) noexcept;
-  /// Links the block that starts at an interval to the one before it; infinite variance: not linked.
+  /// Links the block that starts at an interval to the previous one; infinite variance: not linked.
   void link(int interval, int parameter, double variance) noexcept;
   double link_variance(int interval, int parameter) const noexcept {
     return 1.0 / link_information_[interval * np() + parameter];
   }
   void finish() noexcept;
-  /// Takes on the data and the structure of a problem with the same model and set-up, without allocation.
+  /// Copies data and structure of a problem with the same model and set-up, without allocation.
   void take_data(const RheProblem& from) noexcept;
-  /// Moves durations, outputs and measured inputs one interval towards the window's start; the last ones stay where
-  /// they are until they are overwritten.
+  /// Moves durations, outputs and measured inputs one interval towards the start of the horizon; the last ones stay
+  /// until they are overwritten.
   void drop_first_interval() noexcept;
 
-  /// Weight in (0, 1] that the robust loss gives an output at an iterate: derivative of the loss by s.
+  /// Weights in (0, 1] that the robust losses give to the outputs at an iterate: derivative of the loss with respect to
+  /// s.
   void robust_weights(const Iterate& iterate, int node, double* weights, std::span<double> scratch) const noexcept;
 
   std::string_view kind() const noexcept override { return "rhe"; }
@@ -99,7 +100,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
                     std::span<double> scratch) const noexcept override {
     return write_cost(range, iterate, hessian, parts, qp, nullptr, scratch);
   }
-  /// The same with outputs that are known already, or will be from now on; null: none.
+  /// The same with a cache of outputs, which is read and completed; null: none.
   double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
                     OutputCache* known, std::span<double> scratch) const noexcept;
   std::size_t cost_scratch_size() const noexcept override;
@@ -107,7 +108,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void residual(int node, const double* predicted, double* difference) const noexcept;
   double losses(const double* difference, double* weight, double* curvature) const noexcept;
   struct Observed {
-    const double *outputs, *jacobians;  ///< rows of a range's nodes
+    const double *outputs, *jacobians;  ///< rows of the nodes of a range
   };
   Observed observe(StageRange range, const Iterate& iterate, OutputCache* known, double* outputs, double* jacobians,
                    double* room) const noexcept;
@@ -122,14 +123,14 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
 
   Setup setup_;
   int ny_, output_row_;
-  int bounded_intervals_ = -1;                    ///< that bounds were written for
-  std::vector<std::uint8_t> has_block_bounds_;    ///< of a stage
-  std::vector<std::uint8_t> is_one_block_;        ///< of a parameter
-  std::vector<int> robust_group_;                 ///< of an output, or -1
+  int bounded_intervals_ = -1;                    ///< for which bounds were written
+  std::vector<std::uint8_t> has_block_bounds_;    ///< per stage
+  std::vector<std::uint8_t> is_one_block_;        ///< per parameter
+  std::vector<int> robust_group_;                 ///< per output, or -1
   AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
-  AlignedDoubles outputs_;                        ///< a row a node, NaN where nothing was measured
-  AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period where it is an angle
-  AlignedDoubles measured_inputs_, input_weights_;  ///< rows as those of an Iterate, NaN and 0 but for the inputs
+  AlignedDoubles outputs_;                        ///< one row per node, NaN where nothing was measured
+  AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period of angles, else 0
+  AlignedDoubles measured_inputs_, input_weights_;  ///< rows as in Iterate; NaN and 0 outside of the inputs
   std::vector<double> link_information_;
 };
 

@@ -6,37 +6,37 @@
 
 namespace rhec {
 
-/// The guess for a horizon out of the solution of an earlier one, moved along by the steps between them.
+/// The initial guess for a horizon: the solution of an earlier one, shifted by the steps between them.
 ///
-/// `take` keeps a solution in the vehicle's terms: states and costates per node; inputs, parameters and their bounds'
-/// multipliers per interval. So the problem may be filled anew, with blocks that start elsewhere or a horizon that has
-/// grown, before `apply` writes the guess for what it is then:
+/// `take` keeps a solution in terms of the vehicle: states and costates per node; inputs, parameters and their bound
+/// multipliers per interval. The problem may then be filled for the next sample, with other block starts or a longer
+/// horizon, before `apply` writes the guess:
 ///
 ///     shifter.take(problem, solution);
 ///     ... fill `problem` for the next sample ...
 ///     shifter.apply(1, problem, guess);
 ///
-/// Memory is set aside by the constructor; nothing else allocates. An instance belongs to one caller.
+/// The constructor allocates, nothing else does. One caller at a time.
 class RHEC_EXPORT GuessShifter {
  public:
-  /// For problems of the capacity and with the model and the blocked inputs of this one.
+  /// For problems with the capacity, model and blocked inputs of this one.
   explicit GuessShifter(const HorizonProblem& like);
 
   void take(const HorizonProblem& problem, const Iterate& iterate) noexcept;
-  /// The same without a copy: what is left in the iterate is of no use until `apply` has written to it.
+  /// The same without a copy: the iterate has no useful content until `apply` has written to it.
   void take(const HorizonProblem& problem, Iterate&& iterate) noexcept;
   void forget() noexcept { intervals_ = 0; }
 
-  /// Writes into `guess` (which may be the iterate that was taken) the kept solution, seen from `steps` intervals
-  /// further on. What the kept horizon does not reach: inputs as measured (RHE, where there is a measurement) or as
-  /// last, clipped to their bounds; parameters as last; states by integration; multipliers of bounds zero. Interval 0
-  /// of `to` is interval `steps` of the kept horizon: 0 while an estimator's horizon grows. False, with the guess left
-  /// as it was, where nothing of the kept horizon is left, nothing was kept or `to` is too large: start cold.
+  /// Writes into `guess` (which may be the iterate that was taken) the kept solution, shifted by `steps` intervals.
+  /// Beyond its end: inputs as measured (RHE, if there is a measurement) or the last ones, clipped to their bounds; the
+  /// last parameters; states by integration; zero bound multipliers. Interval 0 of `to` is interval `steps` of the kept
+  /// horizon: 0 while an estimator's horizon grows. Returns false and leaves the guess unchanged if the horizons do not
+  /// overlap, nothing was kept, or `to` is too large: use a cold start.
   bool apply(int steps, HorizonProblem& to, Iterate& guess) noexcept;
 
  private:
   void take_structure(const HorizonProblem& problem) noexcept;
-  /// Of the kept horizon: what a lifted variable's interval contributes to the costates of its block.
+  /// Contribution of an interval of the kept horizon to the costates of a lifted variable's block.
   double gradient(int interval, int lifted) const noexcept;
   int kept_control(int interval, int lifted) const noexcept { return controls_[interval * lifted_ + lifted]; }
   void move_rows(int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
@@ -47,10 +47,10 @@ class RHEC_EXPORT GuessShifter {
   void add_intervals(int steps, HorizonProblem& to, Iterate& guess) noexcept;
 
   int nx_, nu_, lifted_, free_count_;
-  int intervals_ = 0;           ///< of what is kept; 0: nothing
-  bool any_start_ = false;      ///< of a block within what is kept
-  Iterate kept_;                ///< as it was taken
-  std::vector<int> controls_;   ///< per interval and lifted variable: the control that starts it there, or -1
+  int intervals_ = 0;           ///< of the kept horizon; 0: nothing is kept
+  bool any_start_ = false;      ///< whether a block starts within the kept horizon
+  Iterate kept_;                ///< as taken
+  std::vector<int> controls_;   ///< per interval and lifted variable: the control that starts its block there, or -1
   std::vector<double> shares_;  ///< per interval: its share of a block's multiplier
   std::vector<double> scratch_;
 };

@@ -15,10 +15,10 @@ struct KernelSet {
   const QpKernels* qp;
   const TranscriptionKernels* transcription;
 };
-/// Those that this machine can run, narrowest first.
+/// The sets that this machine can run, narrowest first.
 std::span<const KernelSet> runnable_kernels() noexcept;
 
-/// Of the widest of them.
+/// The kernels of the widest of them.
 const RiccatiKernels& riccati_kernels() noexcept;
 const QpKernels& qp_kernels() noexcept;
 const TranscriptionKernels& transcription_kernels() noexcept;

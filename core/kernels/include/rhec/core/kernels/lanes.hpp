@@ -2,17 +2,17 @@
 
 #include "rhec/core/base/padded.hpp"
 
-// Doubles that are computed with at once, in terms of the compiler's own vectors: as many as a register of the
-// instruction set has. Included only by the units that are compiled once for each instruction set, all of whose code is
-// local to them: no function of theirs may be merged with that of another set.
+// SIMD arithmetic on doubles with the compiler's vector types, as wide as a register of the instruction set. Included
+// only by units that are compiled once per instruction set. All of their code is local to the unit: none of its
+// functions may be merged with that of another set.
 
 namespace rhec::kernels {
 namespace {
 
 #define RHEC_ALWAYS_INLINE __attribute__((always_inline))
 
-/// A number that is known when it is compiled; lists of them. (Of the standard's templates the linker could keep the
-/// instance of another instruction set.)
+/// A compile-time number, and lists of them. (The standard's templates could be merged with the instance of another
+/// instruction set by the linker.)
 template <int number>
 struct Constant {
   constexpr operator int() const { return number; }
@@ -44,19 +44,19 @@ using LaneMask = long long __attribute__((vector_size(16)));
 constexpr LaneMask lane_numbers = {0, 1};
 #endif
 
-// In memory anywhere among doubles. (By memcpy the compiler would have to think that every store changes everything.)
+// Lanes anywhere in memory. (With memcpy the compiler would have to assume that every store changes everything.)
 using LanesInMemory [[gnu::aligned(sizeof(double))]] = Lanes;
 inline Lanes load(const double* from) { return *reinterpret_cast<const LanesInMemory*>(from); }
 inline void store(const Lanes& lanes, double* to) { *reinterpret_cast<LanesInMemory*>(to) = lanes; }
 inline Lanes all(double value) { return value - Lanes{}; }
 
-/// What is left of a row's part number `part` when only its first `count` entries are kept.
+/// The first `count` entries of a row, in its register number `part`; the others are zero.
 inline Lanes first_of(const Lanes& lanes, int part, int count) {
   const LaneMask keep = lane_numbers < static_cast<long long>(count - part * lane_count);
   return keep ? lanes : Lanes{};
 }
 
-/// The same of the entries from .. end - 1.
+/// The same for the entries from .. end - 1.
 inline Lanes between(const Lanes& lanes, int part, int from, int end) {
   const LaneMask is_left_out = lane_numbers < static_cast<long long>(from - part * lane_count);
   return is_left_out ? Lanes{} : first_of(lanes, part, end);
@@ -66,7 +66,7 @@ inline Lanes absolute(const Lanes& lanes) {
   constexpr long long but_sign = 0x7fff'ffff'ffff'ffff;
   return reinterpret_cast<Lanes>(reinterpret_cast<LaneMask>(lanes) & but_sign);
 }
-/// The larger of each two; the first where they cannot be compared.
+/// The larger of each pair; the first if they are not comparable (NaN).
 inline Lanes larger(const Lanes& a, const Lanes& b) { return b > a ? b : a; }
 inline Lanes smaller(const Lanes& a, const Lanes& b) { return b < a ? b : a; }
 
@@ -116,7 +116,7 @@ inline void add_sums_of(const Lanes* lanes, double* sums) {
 /// A row, or a part of one, in registers.
 template <int registers>
 struct Row {
-  /// Sums of many rows that are taken at once: two that do not wait for each other, where there is room for them.
+  /// Partial sums in a sum of many rows: two independent ones if there are registers for them.
   static constexpr int chains = registers == 1 ? 2 : 1;
   Lanes part[registers];
   static Row from(const double* memory) {
@@ -128,7 +128,7 @@ struct Row {
     for (int v = 0; v < registers; ++v) store(part[v], memory + v * lane_count);
   }
   double entry(int k) const { return part[k / lane_count][k % lane_count]; }
-  /// An entry in all lanes.
+  /// One entry, copied to all lanes.
   Lanes splat(int k) const { return all(entry(k)); }
   template <int number>
   Lanes splat(Constant<number> /*k*/) const {
@@ -149,7 +149,7 @@ struct Row {
   void add(const Row& other) {
     for (int v = 0; v < registers; ++v) part[v] += other.part[v];
   }
-  /// With another entry.
+  /// The row with one entry replaced.
   Row with(int k, double value) const {
     Row row = *this;
     const LaneMask is_it = lane_numbers == static_cast<long long>(k % lane_count);
@@ -157,7 +157,7 @@ struct Row {
     changed = is_it ? all(value) : changed;
     return row;
   }
-  /// The entries from .. end - 1, and zeros.
+  /// The entries from .. end - 1; the others are zero.
   Row between(int from, int end) const {
     Row row;
     for (int v = 0; v < registers; ++v) row.part[v] = kernels::between(part[v], v, from, end);
@@ -170,7 +170,7 @@ struct Row {
   }
 };
 
-/// As many rows as they have lanes, as a matrix; only where a row of eight is one register.
+/// Transposes as many rows as they have lanes; only if a row of eight is one register.
 inline void transpose([[maybe_unused]] Lanes* rows) {
 #if defined(__AVX512F__)
   Lanes pairs[8], quads[8];

@@ -2,14 +2,14 @@
 
 namespace rhec {
 
-// Views are made by naming their members, all at once: what is cleared first and filled then has to reach the cache
-// before it can be read, which takes longer than most kernels.
+// Initialise all members of a view at once, by designated initialisers: a view that is zeroed first and filled later
+// has to reach the cache before it can be read, which takes longer than most kernels.
 
-/// What the kernels over stage QPs and iterates work on: rows of `stride` entries, one a stage, 0 .. N.
+/// Arguments of the kernels on stage QPs and iterates: rows of `stride` entries, one per stage 0 .. N.
 struct QpView {
   int intervals = 0;
-  int first = 0, last = 0;                   ///< stages to be looked at
-  int states = 0, controls = 0, stride = 0;  ///< of the capacity
+  int first = 0, last = 0;                   ///< stages to visit
+  int states = 0, controls = 0, stride = 0;  ///< sizes of the capacity
   const int* state_counts = nullptr;
   const int* control_counts = nullptr;
   const int* identity_counts = nullptr;
@@ -23,14 +23,14 @@ struct KktParts {
   double stationarity, defect, bound_violation, complementarity, largest_term;
 };
 
-/// What a step that solves a QP without its inactive bounds does to them.
+/// How a step that was found without the inactive bounds meets them.
 struct StepParts {
-  bool is_finite;  ///< and no bound is not a number
-  bool violates;   ///< some bound, by more than the tolerance
+  bool is_finite;  ///< states, controls and costates; and no bound is NaN
+  bool violates;   ///< a bound is violated by more than the tolerance
   double largest_costate;
 };
 
-/// The largest of some violations, if it is above 0, and how many are.
+/// The largest violation, if above 0, and the number of violations above 0.
 struct ViolationParts {
   double largest;
   int count;
@@ -40,13 +40,13 @@ struct ViolationParts {
 struct QpKernels {
   KktParts (*kkt)(const QpView& view);
   StepParts (*check_step)(const QpView& view, double tolerance);
-  /// Marks with 1 the stages of which a multiplier is not zero or bounds coincide; true where a lower bound is above
-  /// its upper one by more than the tolerance, or one of them is not a number.
+  /// Marks with 1 the stages at which a multiplier is non-zero or two bounds coincide. Returns true if a lower bound
+  /// exceeds its upper bound by more than the tolerance, or a bound is NaN.
   bool (*mark_bounds)(const QpView& view, double tolerance, unsigned char* marks);
-  /// violations = max(least - values, values - most), of `count` entries, which are whole eights.
+  /// violations = max(least - values, values - most) for `count` entries, a multiple of eight.
   ViolationParts (*find_violations)(const double* values, const double* least, const double* most, long count,
                                     double* violations);
-  /// least = lower - tolerance (1 + |lower|) and most = upper + tolerance (1 + |upper|), of `count` entries.
+  /// least = lower - tolerance (1 + |lower|) and most = upper + tolerance (1 + |upper|) for `count` entries.
   void (*widen_bounds)(const double* lower, const double* upper, double tolerance, long count, double* least,
                        double* most);
   /// to += from.

@@ -2,83 +2,84 @@
 
 namespace rhec {
 
-// Views are made by naming their members, all at once: what is cleared first and filled then has to reach the cache
-// before it can be read, which takes longer than most kernels.
+// Initialise all members of a view at once, by designated initialisers: a view that is zeroed first and filled later
+// has to reach the cache before it can be read, which takes longer than most kernels.
 
-/// Where a model has written next states (to b) and its Jacobian's rows (to AB): what is left to fill.
+/// Dynamics of a QP: the model has written next states (to b) and the rows of its Jacobian (to AB); the rest is
+/// missing.
 struct DynamicsView {
   int first, last;             ///< intervals
   int states, stride;          ///< of the capacity
-  int vehicle_states, lifted;  ///< what a state is made of
-  const int* control_of;       ///< of each interval's lifted variables: the control that starts its block, or -1
-  const double* values;        ///< rows of the point
+  int vehicle_states, lifted;  ///< the parts of a stage state
+  const int* control_of;       ///< per interval and lifted variable: the control that starts its block, or -1
+  const double* values;        ///< rows of the iterate
   double *AB, *b;
-  bool has_lifted_rows;  ///< those of lifted variables are there already
-  bool any_start;        ///< a block starts somewhere
+  bool has_lifted_rows;  ///< the rows of lifted variables are already there
+  bool any_start;        ///< whether any block starts within the horizon
 };
 
-/// Where costs go: their matrices, their vectors, or both. What is not wanted is null.
+/// Where to write costs: matrices, vectors, or both. Null: not wanted.
 struct CostView {
   int intervals, states, controls, stride;
   const int* control_counts;
   double *H, *h;
-  bool adds_to_curvature;  ///< H holds the curvature of the intervals' dynamics, to which costs are added
+  bool adds_to_curvature;  ///< H already holds the curvature of the dynamics, to which costs are added
 };
 
-/// An estimator's measurements, NaN where missing, with weights 1 / variance. Rows of outputs are whole eights, those
-/// of inputs are a stage's, with inputs where its controls begin.
+/// An estimator's measurements, NaN where missing, with weights 1 / variance. Rows of outputs are padded to multiples
+/// of eight; rows of inputs are rows of a stage, with the inputs in the control columns.
 struct MeasurementView {
   int vehicle_states, output_count, input_count;
-  const double *outputs, *inputs;       ///< rows of all nodes and intervals
-  const double *predicted, *jacobians;  ///< of the range's nodes; Jacobians as rows of whole eights
+  const double *outputs, *inputs;       ///< rows for all nodes and intervals
+  const double *predicted, *jacobians;  ///< for the nodes of the range; rows of Jacobians are padded
   const double *output_weights, *input_weights;
-  const double *periods, *inverse_periods;  ///< a row each: of an angle a full turn and its inverse, else 0
-  const double* values;                     ///< rows of the point
+  const double *periods, *inverse_periods;  ///< one row each: 2 pi and its inverse for an angle, else 0
+  const double* values;                     ///< rows of the iterate
   double* room;                             ///< for two rows of outputs
-  /// Where H holds curvature already: what to add the squares to, and not to clear. Their pulls 2 weight (predicted -
-  /// measured) go to rows of outputs of the range's nodes. Null: it does not.
+  /// If H already holds curvature, the squares are added to it. Their gradients with respect to the outputs, 2 weight
+  /// (predicted - measured), then go to these rows of outputs, for the nodes of the range. Null: H is overwritten.
   double* pulls;
-  /// Of all stages: 1 where H is zero but for what measurements write to. Null: of none.
+  /// For all stages: 1 if H is zero except for the entries that measurements write. Null: for none.
   const unsigned char* is_clean;
 };
 
-/// A controller's references, a row [x; p; u] a stage. A column's reference may be anything where its weight is 0.
+/// A controller's references: one row [x; p; u] per stage. References of columns with weight 0 are arbitrary.
 struct TrackingView {
   const double *values, *references;
   const double *stage_weights, *terminal_weights, *periods, *inverse_periods;  ///< one row each
 };
 
-/// Rows of a point, their bounds and multipliers.
+/// Rows of an iterate, their bounds and multipliers.
 struct GuessView {
   int rows, stride;
-  int vehicle_states, states, used;  ///< columns: those of the vehicle, those of a state, those that are kept
+  int vehicle_states, states, used;  ///< columns: vehicle states, stage states, and all columns to keep
   const double *values, *multipliers, *lower, *upper;
 };
 
-/// Inner loops that turn a model, a point and data into the stages of a QP.
+/// Inner loops that write the stages of a QP from a model, an iterate and data.
 struct TranscriptionKernels {
-  /// Bounds of steps from a point: lower - point and upper - point.
+  /// Bounds of steps from an iterate: lower - point and upper - point.
   void (*write_bounds)(const double* lower, const double* upper, const double* point, double* step_lower,
                        double* step_upper, long count);
-  /// Marks rows of a and b, `count` of them and `stride` long: 2 where they are equal, 1 where their first `columns`
-  /// entries are, 0 otherwise. Rows of a go to `kept`, which may begin with, or before, those of b.
+  /// Compares `count` rows of a and b of length `stride`: marks 2 if they are equal, 1 if their first `columns` entries
+  /// are equal, otherwise 0. Copies the rows of a to `kept`, which may overlap b if it does not start behind it.
   void (*match)(const double* a, const double* b, double* kept, int count, int stride, int columns,
                 unsigned char* marks);
-  /// Copies rows: of controls what their bounds allow, of multipliers those whose bound there is; of lifted variables
-  /// no multiplier, and nothing of columns that are not used.
+  /// Copies rows. Controls are clipped to their bounds, and multipliers without a bound become zero, as do all
+  /// multipliers of lifted variables. Unused columns become zero.
   void (*adopt)(const GuessView& from, double* values, double* multipliers);
-  /// H += sum_j weights_j J_j J_j' over its first `columns` columns and h += sum_j pulls_j J_j (null: not), with the
-  /// `count` rows J_j of one stage; rows are as long as `columns` needs in multiples of eight.
+  /// H += sum_j weights_j J_j J_j' in its first `columns` columns and h += sum_j pulls_j J_j (null: not), with the
+  /// `count` rows J_j of one stage. Rows of J have length `columns`, padded to a multiple of eight.
   void (*add_products)(const double* J, const double* weights, const double* pulls, int count, int columns, int stride,
                        double* H, double* h);
-  /// weights (z - reference)^2 of stages first .. last; returns the sum where vectors are wanted. Differences of
-  /// entries whose turn is not 0 are taken on a circle of that length.
+  /// weights (z - reference)^2 of stages first .. last; returns their sum if vectors are wanted. Differences of entries
+  /// with a non-zero period are taken on the circle.
   double (*write_tracking)(const CostView& view, const TrackingView& tracked, int first, int last);
   /// Rows of lifted variables in AB, and b = F(s, w) - s_next.
   void (*complete_dynamics)(const DynamicsView& view);
-  /// Zeros to what is used of stages first .. last.
+  /// Sets the used entries of stages first .. last to zero.
   void (*clear_costs)(const CostView& view, int first, int last);
-  /// Squares of measured outputs and inputs, without the curvature of anything; returns their sum.
+  /// Squares of measured outputs and inputs, without second derivatives of the outputs; returns their sum.
   double (*write_measurements)(const CostView& view, const MeasurementView& measured, int first, int last);
 };
 

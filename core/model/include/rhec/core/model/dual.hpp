@@ -3,21 +3,21 @@
 #include <concepts>
 #include <utility>
 
-/// On functions and lambdas of which nothing may be left but their results.
+/// For functions and lambdas that must always be inlined.
 #define RHEC_INLINE __attribute__((always_inline))
 
 namespace rhec {
 
-/// Up to here lists of entries are written out when they are compiled; longer ones are loops.
+/// Lists of entries up to this length are unrolled at compile time; longer ones are loops.
 inline constexpr int longest_list = 24;
-/// The same of the entries of a Hessian: those of thirteen directions.
+/// The same limit for the entries of a Hessian: 91 entries, i.e. thirteen directions.
 inline constexpr int longest_triangle = 91;
 
-/// The length of an array for `size` entries, of which there may be none.
+/// Array length for `size` entries, of which there may be none.
 constexpr int room_for(int size) { return size > 0 ? size : 1; }
 
-/// function(0), ..., function(count - 1) one after the other, with indices that the compiler knows: no loop is left of
-/// it, so that what it knows of single entries (a derivative that is always 0 or 1) is not forgotten.
+/// Calls function(0), ..., function(count - 1) with compile-time indices. No loop remains, so the compiler keeps what
+/// it knows of single entries (e.g. that a derivative is always 0 or 1).
 template <int count, class Function>
 RHEC_INLINE constexpr void for_indices(const Function& function) {
   [&]<int... index>(std::integer_sequence<int, index...>) RHEC_INLINE {
@@ -26,7 +26,7 @@ RHEC_INLINE constexpr void for_indices(const Function& function) {
   (std::make_integer_sequence<int, count>());
 }
 
-/// The same, as a loop where there are many.
+/// The same, but a loop if `count` is large.
 template <int count, class Function>
 RHEC_INLINE constexpr void for_each_index(const Function& function) {
   if constexpr (count <= longest_list) {
@@ -46,12 +46,12 @@ struct Dual {
   T d[N];
 
   Dual() = default;
-  /// A constant is a number.
+  /// A constant: all derivatives are zero.
   template <std::convertible_to<T> Constant>
   Dual(const Constant& constant) : value(constant) {  // NOLINT(google-explicit-constructor)
     for_each_index<N>([&](auto j) { d[j] = T(0.0); });
   }
-  /// The independent variable number `direction`.
+  /// The independent variable along `direction`.
   template <int direction>
   static Dual variable(const T& value) {
     return variable(value, direction);
@@ -61,7 +61,7 @@ struct Dual {
     result.d[direction] = T(1.0);
     return result;
   }
-  /// g(a) from g, g' and g'' (which is not needed here) at a.value.
+  /// g(a) from g, g' and g'' (not needed here) at a.value.
   static Dual chain(const Dual& a, const T& g, const T& g1, const T& /*g2*/) {
     Dual result;
     result.value = g;
@@ -74,14 +74,14 @@ struct Dual {
     for_each_index<N>([&](auto j) { result.d[j] = a.d[j] * b.value + a.value * b.d[j]; });
     return result;
   }
-  /// What is linear acts alike on the value and on every derivative.
+  /// Linear operations act alike on the value and on every derivative.
   template <class Operation, class... Others>
   static Dual linear(Operation operation, const Others&... a) {
     Dual result;
     assign_linear(result, operation, a...);
     return result;
   }
-  /// The same into a place; it may be that of an operand.
+  /// The same, written to `out`, which may be one of the operands.
   template <class Operation, class... Others>
   static void assign_linear(Dual& out, Operation operation, const Others&... a) {
     out.value = operation(a.value...);
@@ -89,8 +89,8 @@ struct Dual {
   }
 };
 
-/// A number with its gradient along N directions and its Hessian along the first M of them, which is kept as its lower
-/// triangle by rows.
+/// A number with its gradient along N directions and its Hessian along the first M of them. The Hessian is stored as
+/// its lower triangle, row by row.
 template <class T, int N, int M = N>
 struct SecondOrder {
   using Value = T;
@@ -101,7 +101,7 @@ struct SecondOrder {
   T dd[room_for(hessian_size)];
 
   SecondOrder() = default;
-  /// Entry by entry, of which the compiler leaves out those that nobody asks for; a copy of the whole it would make.
+  /// Copies entry by entry, so that the compiler can omit unused entries; a default copy would copy all of them.
   SecondOrder(const SecondOrder& other) { assign_linear(*this, same, other); }
   SecondOrder& operator=(const SecondOrder& other) {  // NOLINT(bugprone-unhandled-self-assignment)
     assign_linear(*this, same, other);
@@ -142,7 +142,7 @@ struct SecondOrder {
     for_each_pair(fill);
     return result;
   }
-  /// function(k) for all entries of the triangle. In a loop the compiler would keep whole numbers in memory.
+  /// function(k) for all entries of the triangle. With a loop, the compiler would keep the whole number in memory.
   template <class Function>
   RHEC_INLINE static void for_each_entry(const Function& function) {
     if constexpr (hessian_size <= longest_triangle) {
@@ -167,7 +167,7 @@ struct SecondOrder {
     assign_linear(result, operation, a...);
     return result;
   }
-  /// The same into a place; it may be that of an operand.
+  /// The same, written to `out`, which may be one of the operands.
   template <class Operation, class... Others>
   static void assign_linear(SecondOrder& out, Operation operation, const Others&... a) {
     out.value = operation(a.value...);
@@ -185,7 +185,7 @@ concept Differentiable = requires(const D& a, const typename D::Value& t) {
   { D::chain(a, t, t, t) } -> std::same_as<D>;
   { D::product(a, a) } -> std::same_as<D>;
 };
-/// Of these, the ones that carry second derivatives.
+/// Those of them that carry second derivatives.
 template <class D>
 concept TwiceDifferentiable = Differentiable<D> && requires {
   D::hessian_size;

@@ -7,7 +7,7 @@
 
 // Arithmetic and elementary functions of every Differentiable number. Included by dual.hpp.
 //
-// A function is told by its value g and derivatives g', g'' at a point; the chain rule of the number does the rest.
+// A function is defined by its value g and derivatives g', g'' at a point; the number type applies the chain rule.
 // Constants may be anything that converts to the number's Value: `2 * x`, `1.0 / x`.
 
 namespace rhec {
@@ -39,7 +39,7 @@ D operator/(const D& a, const D& b) {
   return a * reciprocal(b);
 }
 
-// The same with a constant on one side.
+// The same with a constant as one operand.
 template <Differentiable D>
 D operator+(const D& a, const typename D::Value& b) {
   D sum = a;
@@ -94,7 +94,7 @@ D& operator/=(D& a, const Other& b) {
   return a = a / b;
 }
 
-/// Sine and cosine at once; a pack brings its own, which is found by its namespace.
+/// Sine and cosine at once; packs have their own, found by argument-dependent lookup.
 inline std::pair<double, double> sincos(double angle) { return {std::sin(angle), std::cos(angle)}; }
 
 template <Differentiable D>
@@ -168,7 +168,7 @@ template <Differentiable D>
 D atan2(const D& y, const D& x) {
   using T = typename D::Value;
   using std::atan2, std::sqrt;
-  // Turned back by its own angle, the vector is (length, 0); what is left of the angle has all derivatives and is zero.
+  // Rotated back by its own angle, the vector is (length, 0). The remaining angle is zero and has all derivatives.
   const T length = sqrt(x.value * x.value + y.value * y.value);
   const T c = x.value / length, s = y.value / length;
   D left = atan((y * c - x * s) / (x * c + y * s));

@@ -9,30 +9,30 @@
 
 namespace rhec {
 
-/// Kernels for instruction sets wider than the one that the program is compiled for; null where they were not built.
-/// `rhec_add_model(<name> ...)` in CMake defines `rhec::WideKernels <name>_wide_kernels()` for its model.
+/// Kernels for instruction sets wider than that of the program; null if they were not built. `rhec_add_model(<name>
+/// ...)` in CMake defines `rhec::WideKernels <name>_wide_kernels()` for its model.
 struct WideKernels {
   const ModelKernels* avx2 = nullptr;
   const ModelKernels* avx512 = nullptr;
 };
 
-/// How many variables of each kind a formula has.
+/// Numbers of variables of a formula.
 struct FormulaCounts {
   int states, inputs, parameters, outputs;
 };
-/// Throws Error where a description has others, or gives a role to a variable that is not there.
+/// Throws Error if a description has other numbers of variables, or gives a role to a variable that does not exist.
 RHEC_EXPORT void check_description(const ModelDescription& description, const FormulaCounts& counts);
 
-/// A number that no formula computes: what results hold before they are written.
+/// A value that no formula computes. It marks results that have not been written.
 RHEC_EXPORT double unwritten_result() noexcept;
-/// Throws Error where of the results of a function of a formula ("dynamics" or "outputs"), which all were unwritten and
-/// are followed by `result_guard` more, some still are, or one behind the last is not.
+/// Throws Error if a function of a formula ("dynamics" or "outputs") left a result unwritten or wrote beyond the last
+/// one. `results` was filled with unwritten values, plus `result_guard` more behind the last result.
 inline constexpr int result_guard = 8;
 RHEC_EXPORT void check_results(const ModelDescription& description, const char* function,
                                const std::vector<Variable>& variables, const std::vector<double>& results);
 
-/// Makes a Model out of one formula. All else (integration, first and second derivatives, evaluation of several stages
-/// at once) is derived. `Formula` is
+/// Makes a Model from one formula. Everything else (integration, first and second derivatives, evaluation of several
+/// stages at once) is derived. `Formula` is
 ///
 ///     struct Formula {
 ///       static constexpr int state_count, input_count, parameter_count, output_count;
@@ -41,13 +41,13 @@ RHEC_EXPORT void check_results(const ModelDescription& description, const char* 
 ///     };
 ///
 /// where Scalar behaves like a double: + - * /, sqrt exp log sin cos tan tanh asin acos atan atan2, the latter called
-/// without `std::` after a `using std::sin;`. It is no double: a formula does not compare, and decides nothing by
-/// values. With both functions `constexpr` the compiler finds out which derivatives are always zero, and leaves them
-/// out: a step takes less time.
+/// without `std::` after a `using std::sin;`. It is not a double: a formula must not compare values or branch on them.
+/// If both functions are `constexpr`, the compiler finds the derivatives that are always zero and omits them, which
+/// makes a step faster.
 template <class Formula>
 class FormulaModel : public Model {
  public:
-  /// Throws Error where the description has other numbers of variables than the formula.
+  /// Throws Error if the numbers of variables in the description differ from those of the formula.
   explicit FormulaModel(Formula formula, ModelDescription description, WideKernels wide = {})
       : formula_(std::move(formula)), description_(std::move(description)) {
     check_description(description_, {.states = Formula::state_count,
@@ -58,7 +58,7 @@ class FormulaModel : public Model {
     static constexpr ModelKernels generic = make_model_kernels<Formula, double>();
     add("generic", &generic);
 #if defined(__x86_64__)
-    // All that the kernels are compiled with (cmake/RhecModel.cmake), not just what names the instruction set.
+    // All instruction sets that the kernels use (cmake/RhecModel.cmake), not only the one in their name.
     const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
                             __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
@@ -111,7 +111,7 @@ class FormulaModel : public Model {
   }
 
  private:
-  /// Calls the formula once to see what it writes: a result that it forgets would be whatever was in memory.
+  /// Calls the formula once to check that it writes every result.
   void check_written() const {
     const auto room = [](int count) { return std::vector<double>(count + result_guard, unwritten_result()); };
     const std::vector<double> x(Formula::state_count, 0.1), u(Formula::input_count, 0.1);

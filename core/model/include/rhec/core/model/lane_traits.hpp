@@ -7,9 +7,9 @@
 namespace rhec {
 
 /// How many stages a number type carries at once, and how their rows of `size` doubles are loaded and stored: lane i of
-/// entry k is rows[i * step + k]. Of `count` rows that do not fill a pack the last one is repeated, so that no lane
-/// computes with rubbish. Of rows that are multiples of eight long `load_padded` reads, and `store_padded` writes as
-/// zeros, what is beyond `size` up to the next multiple of eight. A pack specialises this (pack.hpp).
+/// entry k is rows[i * step + k]. If `count` rows do not fill a pack, the last row is repeated, so that no lane
+/// computes with undefined values. For rows padded to multiples of eight, `load_padded` also reads the padding and
+/// `store_padded` sets it to zero. Packs specialise this (pack.hpp).
 template <class Lane>
 struct LaneTraits {
   static constexpr int width = 1;

@@ -12,36 +12,36 @@ namespace rhec {
 
 /// One component of a model's state, input, parameter or output.
 struct Variable {
-  std::string name;                                         ///< as it is spelt in configuration and in result files
+  std::string name;                                         ///< as spelt in configuration and in result files
   std::string unit;                                         ///< SI, e.g. "m", "rad/s"; "1" for a pure number
-  std::string meaning;                                      ///< one phrase for people
+  std::string meaning;                                      ///< short description for users
   double lower = -std::numeric_limits<double>::infinity();  ///< default bound
   double upper = std::numeric_limits<double>::infinity();   ///< default bound
   double scale = 1.0;     ///< a typical magnitude, for finite differences and random tests
-  bool is_angle = false;  ///< compared on the circle
-  double nominal = 1.0;   ///< of a parameter: its value where nothing slips
-  bool usual = true;      ///< of an output: measured unless the configuration chooses others
+  bool is_angle = false;  ///< differences are taken on the circle
+  double nominal = 1.0;   ///< of a parameter: its value without slip
+  bool usual = true;      ///< of an output: measured by default
 };
 
 /// The names of variables, in their order.
 RHEC_EXPORT std::vector<std::string> names_of(const std::vector<Variable>& variables);
-/// The values of parameters where nothing slips.
+/// The values of parameters without slip.
 RHEC_EXPORT std::vector<double> nominal_values(const std::vector<Variable>& parameters);
 
-/// Which variables say where the vehicle is and how fast it goes; -1 where the model has none. A vehicle that is
-/// shifted and turned as a whole moves as before: its dynamics know neither its position nor the sum of its headings.
+/// Which variables hold the vehicle's position and speed; -1 if the model has none. The dynamics depend neither on the
+/// position nor on a common rotation of all headings: a vehicle that is shifted and rotated as a whole moves as before.
 struct RHEC_EXPORT Roles {
-  int position_x = -1;                   ///< state: x of the point that shall follow the path [m]
+  int position_x = -1;                   ///< state: x of the point that follows the path [m]
   int position_y = -1;                   ///< state: y of that point [m]
   int heading = -1;                      ///< state: direction of travel at that point [rad]
-  int speed = -1;                        ///< input: speed of the wheels [m/s]
-  int speed_state = -1;                  ///< state: the same, of a vehicle whose input is an acceleration [m/s]
+  int speed = -1;                        ///< input: wheel speed [m/s]
+  int speed_state = -1;                  ///< state: wheel speed of a vehicle whose input is an acceleration [m/s]
   int speed_factor = -1;                 ///< parameter: ground speed / wheel speed [1]
-  std::vector<int> other_headings = {};  ///< states: of further bodies, e.g. of the tractor before its trailer [rad]
+  std::vector<int> other_headings = {};  ///< states: headings of further bodies, e.g. the tractor of a trailer [rad]
 
-  /// Puts the point that follows the path at a place, with all bodies in line.
+  /// Places the point that follows the path at (x, y) [m], with all bodies aligned in `direction` [rad].
   void place(double x, double y, double direction, double* state) const noexcept;
-  /// Turns all bodies by an angle [rad] about the point that follows the path.
+  /// Rotates all bodies by an angle [rad] about the point that follows the path.
   void turn(double angle, double* state) const noexcept;
 };
 
@@ -52,13 +52,14 @@ struct ModelDescription {
   Roles roles;
 };
 
-/// How a vehicle moves and what its sensors see:
+/// How a vehicle moves and what its sensors measure:
 ///
 ///     dx/dt = f(x, u, p),    y = h(x)
 ///
-/// with state x (n_x), input u (n_u), parameter p (n_p) and output y (n_y). Between two nodes the input is constant and
-/// x_{i+1} = F(x_i, u_i, p_i, dt_i) is a number of classical Runge-Kutta steps. All calls are const, thread-safe, do
-/// not allocate and do not throw; they cover a range of stages, so that an implementation may evaluate several at once.
+/// with state x (n_x), input u (n_u), parameter p (n_p) and output y (n_y). Between two nodes the input is constant,
+/// and x_{i+1} = F(x_i, u_i, p_i, dt_i) is computed by classical Runge-Kutta steps. All calls are const and
+/// thread-safe, and neither allocate nor throw. They take a range of stages, so that an implementation may evaluate
+/// several at once.
 class RHEC_EXPORT Model {
  public:
   virtual ~Model() = default;
@@ -70,7 +71,7 @@ class RHEC_EXPORT Model {
   int output_count() const noexcept { return static_cast<int>(description().outputs.size()); }
 
   /// One request to `integrate`. Row i of an array belongs to interval i of the range; rows are dense. A null result
-  /// pointer means 'not asked for'.
+  /// pointer means 'not requested'.
   ///
   /// With z = [x; u; p] (or [x; u; p; p_end] where `parameters_end` is given, see below):
   ///   next_states  count x n_x               F
@@ -106,27 +107,27 @@ class RHEC_EXPORT Model {
   };
   virtual void observe(const Nodes& request) const noexcept = 0;
 
-  /// The same over rows of stages, for solvers in a hurry. As they are, they gather, call the above and scatter; a
-  /// FormulaModel computes in place.
+  /// The same on the padded rows that solvers use (IntervalRows, NodeRows). By default these gather the rows, call the
+  /// functions above and scatter the results; FormulaModel computes in place.
   virtual void integrate_rows(const IntervalRows& request) const noexcept;
   virtual void observe_rows(const NodeRows& request) const noexcept;
-  /// How many doubles of scratch these two take for `count` rows.
+  /// Number of doubles of scratch that these two need for `count` rows.
   virtual std::size_t rows_scratch(int count) const noexcept;
 
-  /// dx/dt at one point, for integrators of one's own (the truth vehicle of a simulation).
+  /// dx/dt at one point, for other integrators (e.g. the true vehicle of a simulation).
   virtual void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept = 0;
 
-  /// Going straight ahead at a ground speed [m/s] where the vehicle slips like p, as the path's reference asks for:
-  /// writes all inputs (n_u), and of the state those entries that are speeds. As it is, the wheel speed (`roles.speed`
-  /// or `roles.speed_state`) becomes ground_speed / p[roles.speed_factor] and all other inputs 0; a model whose speed
-  /// is not one variable in m/s (the wheels of each side, say) says it itself.
+  /// Straight motion at a ground speed [m/s] with the slip parameters p, as needed for the path's reference: writes all
+  /// inputs (n_u) and those states that are speeds. By default the wheel speed (`roles.speed` or `roles.speed_state`)
+  /// becomes ground_speed / p[roles.speed_factor] and all other inputs 0. A model whose speed is not a single variable
+  /// in m/s (e.g. one wheel speed per side) overrides this.
   virtual void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept;
 
-  /// False where `hessians` cannot be asked for; such a model can be used with Gauss-Newton only.
+  /// False if `hessians` are not available; such a model can be used with Gauss-Newton only.
   virtual bool has_second_derivatives() const noexcept = 0;
 
-  /// The instruction sets that this machine can run of those that the model was built for, slowest first; the last one
-  /// is used. Tests walk through all of them by `use_instruction_set`, which answers false to an unknown name.
+  /// The instruction sets that the model was built for and that this machine can run, slowest first; the last one is
+  /// used. Tests select each of them by `use_instruction_set`, which returns false for an unknown name.
   virtual std::vector<std::string> instruction_sets() const { return {"generic"}; }
   virtual bool use_instruction_set(const std::string& name) { return name == "generic"; }
 };

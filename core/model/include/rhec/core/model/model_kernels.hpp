@@ -12,19 +12,19 @@ namespace rhec {
 struct ModelKernels {
   void (*integrate)(const void* formula, const Model::Intervals& request);
   void (*observe)(const void* formula, const Model::Nodes& request);
-  /// For one Runge-Kutta step an interval, without ramps and with Jacobians. Both are null for a wide model.
+  /// For one Runge-Kutta step per interval, without ramps and with Jacobians. Both are null for a wide model.
   void (*integrate_rows)(const void* formula, const IntervalRows& request);
   void (*observe_rows)(const void* formula, const NodeRows& request);
 };
 
 namespace kernels {
 
-/// The rows [first, first + count) of an array, of which a pack evaluates all at once.
+/// The rows [first, first + count) of an array, which a pack evaluates at once.
 struct Rows {
   int first, count;
 };
 
-/// The number under the derivatives.
+/// The value type of a number: double or a pack, without derivatives.
 template <class Scalar>
 struct LaneOf {
   using Type = Scalar;
@@ -100,7 +100,7 @@ inline void store_hessian(const Scalar* results, const double* multipliers, Rows
   store<n * n>(hessian, rows, out);
 }
 
-/// What was asked for of the results of `request`, an Intervals or Nodes whose values go to `out`.
+/// Stores the requested results of `request`, an Intervals or Nodes; values go to `out`.
 template <int size, class Scalar, class Request>
 inline void store_results(const Scalar* results, const Request& request, double* out, Rows rows) {
   if (out) store_values<size>(results, rows, out);
@@ -136,7 +136,7 @@ inline void observe_pack(const Formula& formula, const Model::Nodes& q, Rows row
   store_results<Formula::output_count>(y, q, q.outputs, rows);
 }
 
-/// Calls `evaluate` with the rows of one pack after another.
+/// Calls `evaluate` for the rows of one pack after another.
 template <class Lane, class Evaluate>
 inline void for_each_pack(int count, Evaluate evaluate) {
   constexpr int width = LaneTraits<Lane>::width;
@@ -144,7 +144,7 @@ inline void for_each_pack(int count, Evaluate evaluate) {
     evaluate(Rows{first, count - first < width ? count - first : width});
 }
 
-/// Only what is asked for is computed: the number type carries as many derivatives as the request needs.
+/// Computes only what is requested: the number type carries as many derivatives as the request needs.
 template <bool ramp, class Formula, class Lane>
 inline void integrate_range(const Formula& formula, const Model::Intervals& q) {
   constexpr int np = Formula::parameter_count;

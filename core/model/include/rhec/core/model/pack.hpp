@@ -1,10 +1,9 @@
 #pragma once
 
 // Packs of doubles for SIMD across stages. Included only by translation units that are compiled for one instruction set
-// (rhec_add_wide_kernels in CMake generates them), each of which defines RHEC_PACK_NAMESPACE as a name of its own.
-// xsimd has helpers that are neither templates nor tied to an instruction set; compiled twice, the linker would keep
-// one of them for all, and a machine without its instructions would stop there. So every such unit has xsimd under a
-// name of its own.
+// (rhec_add_wide_kernels in CMake generates them), each of which defines its own RHEC_PACK_NAMESPACE. xsimd has helpers
+// that are neither templates nor tied to an instruction set. Of several compiled copies the linker would keep one for
+// all units, and a machine without its instructions would crash. So each unit renames xsimd.
 
 #if defined(RHEC_PACK_NAMESPACE)
 #define xsimd RHEC_PACK_NAMESPACE
@@ -19,7 +18,7 @@
 namespace rhec {
 
 #if defined(__AVX2__)
-/// Four packs of four as a matrix, transposed.
+/// Transposes four packs of four, taken as a matrix.
 RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::fma3<xsimd::avx2>>* a) {
   const __m256d low01 = _mm256_unpacklo_pd(a[0], a[1]), high01 = _mm256_unpackhi_pd(a[0], a[1]);
   const __m256d low23 = _mm256_unpacklo_pd(a[2], a[3]), high23 = _mm256_unpackhi_pd(a[2], a[3]);
@@ -31,7 +30,7 @@ RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::fma3<xsimd::avx2>>
 #endif
 
 #if defined(__AVX512F__)
-/// Eight packs of eight as a matrix, transposed: pairs of columns, then quarters of the pack, then its halves.
+/// Transposes eight packs of eight, taken as a matrix: pairs of columns, then quarters of the pack, then its halves.
 RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::avx512dq>* a) {
   __m512d pairs[8], quads[8];
   for (int i = 0; i < 8; i += 2) {
@@ -50,7 +49,7 @@ RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::avx512dq>* a) {
   }
 }
 
-/// Four packs of eight, and four of zeros, as a matrix, transposed.
+/// Transposes four packs of eight and four of zeros, taken as a matrix.
 RHEC_INLINE inline void transpose_half(xsimd::batch<double, xsimd::avx512dq>* a) {
   // Rows 0, 2, 4, 6 and rows 1, 3, 5, 7, the first two columns and the others.
   const __m512d pairs[2] = {_mm512_unpacklo_pd(a[0], a[1]), _mm512_unpackhi_pd(a[0], a[1])};
@@ -130,7 +129,7 @@ struct LaneTraits<xsimd::batch<double, Arch>> {
       });
     });
   }
-  /// A block of `width` entries of all rows at a time; what is left one entry at a time.
+  /// Blocks of `width` entries of all rows first, then the remaining entries one by one.
   template <int size>
   static void store(const Lane* entries, int count, double* rows) {
     int k = 0;
@@ -148,7 +147,7 @@ struct LaneTraits<xsimd::batch<double, Arch>> {
   }
 };
 
-/// The widest pack of the instruction set that this unit is compiled for.
+/// The widest pack of the instruction set for which this unit is compiled.
 #if defined(__AVX512F__)
 using WidestPack = xsimd::batch<double, xsimd::avx512dq>;
 #elif defined(__AVX2__)

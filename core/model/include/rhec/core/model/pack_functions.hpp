@@ -1,8 +1,8 @@
 #pragma once
 
-// Sine, cosine and tangent of packs. xsimd's own take every argument, in code so long that a model's kernels would not
-// fit into the cache of instructions; here what is far away is left to the standard library, in a place of its own.
-// Included by pack.hpp, under the pack's namespace.
+// Sine, cosine and tangent of packs. xsimd's own accept every argument, with so much code that a model's kernels would
+// not fit into the instruction cache. Here large arguments are left to the standard library, out of line. Included by
+// pack.hpp, under the pack's namespace.
 
 #include <cmath>
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace rhec::pack_functions {
 
-/// Up to here the distance to the nearest multiple of pi/2 is found by two products.
+/// Up to this angle, two products give the distance to the nearest multiple of pi/2.
 inline constexpr double near = 1e9;
 
 template <class Pack>
@@ -36,11 +36,12 @@ template <class Pack>
 ///
 ///     sin r = r + r t P(t),    cos r = 1 - t/2 + t^2 Q(t)
 ///
-/// where P and Q are Chebyshev fits of degree 5 on [0, (pi/4)^2], made with 50 digits; they are off by 2e-17 and 2e-18.
+/// where P and Q are Chebyshev fits of degree 5 on [0, (pi/4)^2], computed with 50 digits; their errors are 2e-17 and
+/// 2e-18.
 template <class Pack>
 [[gnu::always_inline]] inline SineCosine<Pack> sine_cosine(const Pack& angle) {
   using Bits = xsimd::batch<std::int64_t, typename Pack::arch_type>;
-  constexpr double to_integer = 6755399441055744.0;  // 1.5 * 2^52: what is added to it is rounded to an integer
+  constexpr double to_integer = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer
   if (xsimd::any(xsimd::abs(angle) > Pack(near))) [[unlikely]]
     return of_far(angle);
   const Pack shifted = xsimd::fma(angle, Pack(0x1.45f306dc9c883p-1), Pack(to_integer)), n = shifted - Pack(to_integer);

@@ -7,9 +7,9 @@
 
 namespace rhec {
 
-/// Which derivatives of a number can be other than zero, as found out by computing with no values at all: bit j of
-/// `first` for d/da_j, bit j of `second[i]` for d2/(da_i da_j). A formula whose functions are constexpr is asked for it
-/// when it is compiled.
+/// Which derivatives of a number can be non-zero, found by computing with patterns instead of values: bit j of `first`
+/// for d/da_j, bit j of `second[i]` for d2/(da_i da_j). If a formula's functions are constexpr, its pattern is found at
+/// compile time.
 struct DerivativePattern {
   static constexpr int most_arguments = 64;
   std::uint64_t first = 0;
@@ -80,7 +80,7 @@ struct DerivativePattern {
   }
 };
 
-/// The patterns of dx/dt = f(x, p, u), by [x; p; u].
+/// The patterns of dx/dt = f(x, p, u) with respect to [x; p; u].
 template <class Formula>
 constexpr auto pattern_of_dynamics() {
   constexpr int nx = Formula::state_count, np = Formula::parameter_count, nu = Formula::input_count;
@@ -96,7 +96,7 @@ constexpr auto pattern_of_dynamics() {
   return rates;
 }
 
-/// The patterns of y = h(x), by x.
+/// The patterns of y = h(x) with respect to x.
 template <class Formula>
 constexpr auto pattern_of_outputs() {
   std::array<DerivativePattern, Formula::output_count> y{};
@@ -106,7 +106,7 @@ constexpr auto pattern_of_outputs() {
   return y;
 }
 
-/// Formulas that can be asked for their pattern when they are compiled.
+/// Formulas whose pattern is available at compile time.
 template <class Formula>
 concept HasPattern = requires {
   typename std::bool_constant<(pattern_of_dynamics<Formula>(), true)>;
@@ -116,15 +116,15 @@ concept HasOutputPattern = requires {
   typename std::bool_constant<(pattern_of_outputs<Formula>(), true)>;
 };
 
-/// Where the outputs bend: which second derivatives of any of them can be other than zero; of a formula that cannot
-/// tell, all.
+/// Curvature pattern of the outputs: which second derivatives of any output can be non-zero. All of them if the pattern
+/// is not available at compile time.
 template <class Formula>
 struct OutputPattern {
   static constexpr int nx = Formula::state_count;
   static_assert(nx <= DerivativePattern::most_arguments);
 
   std::array<std::uint64_t, nx> second{};
-  /// The states that some output is curved in: directions to differentiate along.
+  /// States in which some output is nonlinear: the directions of differentiation.
   std::array<int, nx> direction_of{};  ///< -1: none
   int curved = 0;
 
@@ -140,8 +140,8 @@ struct OutputPattern {
   constexpr bool bends(int i, int j) const { return (second[i] >> j & 1) != 0; }
 };
 
-/// What a Runge-Kutta step needs to know of f's derivatives by a = [x; p; u]; of a formula that cannot tell, nothing is
-/// left out.
+/// What a Runge-Kutta step needs to know about the derivatives of f with respect to a = [x; p; u]. Without a
+/// compile-time pattern, nothing is omitted.
 template <class Formula>
 struct DynamicsPattern {
   static constexpr int nx = Formula::state_count;
@@ -150,7 +150,7 @@ struct DynamicsPattern {
 
   std::array<std::uint64_t, nx> first{};          ///< of each state's rate
   std::array<std::uint64_t, arguments> second{};  ///< of any of them
-  /// The arguments that f depends on, those that it is curved in first: directions to differentiate along.
+  /// Arguments that f depends on, nonlinear ones first: the directions of differentiation.
   std::array<int, arguments> direction_of{};  ///< -1: none
   int directions = 0, curved = 0;
 

@@ -6,7 +6,7 @@
 namespace rhec {
 namespace kernels {
 
-/// Numbers entries[first], entries[first + 1], ... as the independent variables of these numbers.
+/// Makes entries[first], entries[first + 1], ... the independent variables with the same numbers.
 template <int size, int first, class Lane, class Scalar>
 RHEC_INLINE inline void set_variables(const Lane* entries, Scalar* out) {
   for_indices<size>([&](auto j) RHEC_INLINE {
@@ -41,7 +41,7 @@ inline void store_step(const Step& step, const IntervalRows& q, Rows rows) {
     });
 }
 
-/// One step over z = [x; p; u] from each of the rows, of which two packs are taken at once.
+/// One step over z = [x; p; u] from each of the rows, two packs at a time.
 template <bool with_hessian, class Lane, class Formula>
 inline void integrate_row_packs(const Formula& formula, const IntervalRows& q) {
   using Step = SensitiveStep<Formula, Lane, with_hessian>;
@@ -64,8 +64,8 @@ inline void integrate_row_packs(const Formula& formula, const IntervalRows& q) {
   }
 }
 
-/// Calls function(first, size) for each eight of `most` outputs, as constants, of which the first `count` are wanted:
-/// rows are as long as these take.
+/// Calls function(first, size), both compile-time constants, for each group of eight of `most` outputs that contains
+/// one of the first `count`: result rows are padded to these groups.
 template <int most, class Function>
 RHEC_INLINE inline void for_each_eight(int count, const Function& function) {
   for_indices<(most + 7) / 8>([&](auto eight) RHEC_INLINE {
@@ -104,7 +104,7 @@ template <class Scalar, class Formula>
   });
 }
 
-/// Adds to the Hessians what the outputs bend, entry by entry: most are zero.
+/// Adds the curvature of the outputs to the Hessians, entry by entry, since most are zero.
 template <class Lane, class Formula>
 [[gnu::flatten]] inline void bend_row_pack(const Formula& formula, const NodeRows& q, Rows rows) {
   constexpr int nx = Formula::state_count, ny = Formula::output_count, width = LaneTraits<Lane>::width;
@@ -171,7 +171,7 @@ void observe_rows(const void* formula, const NodeRows& q) {
 template <class Formula, class Lane>
 constexpr ModelKernels make_model_kernels() {
   ModelKernels table{&kernels::integrate<Formula, Lane>, &kernels::observe<Formula, Lane>, nullptr, nullptr};
-  // Written out for a wide model they would take too long to compile.
+  // Unrolled for a wide model, they would take too long to compile.
   constexpr int nz = Formula::state_count + Formula::parameter_count + Formula::input_count;
   if constexpr (nz <= longest_list && Formula::output_count <= longest_list) {
     table.integrate_rows = &kernels::integrate_rows<Formula, Lane>;

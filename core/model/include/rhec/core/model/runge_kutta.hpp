@@ -4,7 +4,7 @@
 
 namespace rhec::kernels {
 
-/// out = a + b * factor, without the copies that numbers with many derivatives would make on the way.
+/// out = a + b * factor, without the temporary copies of numbers with many derivatives.
 template <class Scalar, class Lane>
 inline void add_scaled(const Scalar& a, const Scalar& b, const Lane& factor, Scalar& out) {
   const auto sum = [&factor](const Lane& s, const Lane& t) { return s + t * factor; };
@@ -15,8 +15,8 @@ inline void add_scaled(const Scalar& a, const Scalar& b, const Lane& factor, Sca
   }
 }
 
-/// Turns x into x(t + duration) by `substeps` steps of the classical Runge-Kutta method for dx/dt = f(x, u, p), with p
-/// running linearly from `p` to `p_end` (null: constant). Scalar is a Lane, or a number over Lane with derivatives.
+/// Advances x by `duration` with `substeps` steps of the classical Runge-Kutta method for dx/dt = f(x, u, p); p runs
+/// linearly from `p` to `p_end` (null: constant). Scalar is a Lane, or a number over Lane with derivatives.
 template <class Formula, class Scalar, class Lane>
 inline void runge_kutta(const Formula& formula, Scalar* x, const Scalar* u, const Scalar* p, const Scalar* p_end,
                         const Lane& duration, int substeps) {

@@ -4,15 +4,15 @@
 
 namespace rhec::kernels {
 
-/// One step of the classical Runge-Kutta method with its derivatives by z = [x; p; u]. Derivatives are taken of f
-/// alone, along the directions that f depends on, and carried through the step by the chain rule. With the stages f_k =
-/// f(x_k, p, u), x_{k+1} = x + c_{k+1} h f_k:
+/// One step of the classical Runge-Kutta method with its sensitivities to z = [x; p; u]. Only f is differentiated,
+/// along the directions that it depends on; the chain rule carries the derivatives through the step. With the stages
+/// f_k = f(x_k, p, u), x_{k+1} = x + c_{k+1} h f_k:
 ///
 ///     dx_{k+1}/dz = dx/dz + c_{k+1} h (df_k/d(x, p, u)) S_k,      S_k = d(x_k, p, u)/dz
 ///
 /// In sum_r weights_r F_r the weight of f_k is  mu_4 = h/6 weights,  mu_k = b_k h weights + c_{k+1} h (df_{k+1}/dx)'
-/// mu_{k+1}, and the sum's Hessian is  sum_k S_k' (sum_r mu_{k,r} d2f_r/d(x, p, u)2) S_k. What the formula's pattern
-/// says to be zero is not computed.
+/// mu_{k+1}, and the Hessian of the sum is  sum_k S_k' (sum_r mu_{k,r} d2f_r/d(x, p, u)2) S_k. Entries that are zero by
+/// the formula's pattern are not computed.
 template <class Formula, class Lane, bool with_hessian>
 class SensitiveStep {
  public:
@@ -20,10 +20,10 @@ class SensitiveStep {
   static constexpr int nx = Pattern::nx, np = Pattern::np, nu = Pattern::nu, nz = Pattern::nz;
   static constexpr bool has_hessian = with_hessian;
 
-  Lane z[nz], h, weights[nx];  ///< to be set; without a Hessian the weights are not looked at
+  Lane z[nz], h, weights[nx];  ///< to be set; the weights are used for the Hessian only
   Lane next[nx], jacobian[nx][nz], hessian[with_hessian ? nz : 1][with_hessian ? nz : 1];
 
-  /// Steps from places that have nothing to do with each other; taken together, none waits for the others.
+  /// Takes independent steps together, so that the processor can overlap their instructions.
   static void take(const Formula& formula, int count, SensitiveStep* steps) {
     for_indices<4>([&](auto k) RHEC_INLINE {
       for (int i = 0; i < count; ++i) steps[i].template evaluate<k>(formula);
@@ -52,11 +52,11 @@ class SensitiveStep {
   static constexpr double reach[4] = {0.0, 0.5, 0.5, 1.0}, share[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   using Number = SecondOrder<Lane, Pattern::pattern.directions, with_hessian ? Pattern::pattern.curved : 0>;
 
-  /// Where derivatives of f_k are kept. Without a Hessian nobody asks for them once the next stage is through, and what
-  /// they add to the Jacobian is added at once: a step that stays small leaves the processor's cache to the rest.
+  /// Where the derivatives of f_k are stored. Without a Hessian they are not needed after the next stage, and their
+  /// part of the Jacobian is added at once: a small working set leaves the cache to other data.
   static constexpr int slot(int k) { return with_hessian ? k : k % 2; }
   static constexpr int slots = with_hessian ? 4 : 2;
-  /// Adds the share of what has been found of f_k.
+  /// Adds the contribution of one derivative of f_k.
   template <int k, int r, int j>
   RHEC_INLINE void add_share(const Lane& slope) {
     if constexpr (with_hessian || Pattern::is_argument(r)) slopes_[slot(k)][r][j] = slope;
@@ -68,7 +68,7 @@ class SensitiveStep {
     }
   }
 
-  /// d(argument a of f_k)/dz_j, where it can be other than zero.
+  /// d(argument a of f_k)/dz_j, where it can be non-zero.
   template <int k, int a, int j>
   RHEC_INLINE Lane sensitivity() const {
     if constexpr (a >= nx || k == 0) {
@@ -97,7 +97,7 @@ class SensitiveStep {
     });
     for_indices<np>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + j>(), p[j], z[nx + j]); });
     for_indices<nu>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + np + j>(), u[j], z[nx + np + j]); });
-    // Only what can be other than zero is kept, so that the compiler leaves out what only leads to the rest.
+    // Only entries that can be non-zero are kept, so that the compiler drops what only leads to the others.
     Number f[nx];
     formula.dynamics(static_cast<const Number*>(x), static_cast<const Number*>(u), static_cast<const Number*>(p), f);
     for_indices<nx>([&](auto r) RHEC_INLINE {

@@ -6,13 +6,14 @@
 
 namespace rhec {
 
-/// An OCP as a stage QP at an iterate. The OCP makes it (`Ocp::make_linearisation`); a solver holds it and asks for the
-/// QP at one iterate after the other. It owns the QP, its workspace, and whatever it remembers of earlier iterates.
+/// A linearisation cache: the stage QP of an OCP at an iterate. The OCP makes it (`Ocp::make_linearisation`); a solver
+/// holds it and asks for the QP at one iterate after the other. It owns the QP, its workspace, and what it keeps of
+/// earlier iterates.
 ///
-/// As it is, it evaluates everything anew. A problem whose horizon moves on from sample to sample derives its own,
-/// which evaluates only what has changed; the QP is the same, but for rounding.
+/// The base class evaluates everything anew. A problem whose horizon moves from sample to sample derives its own, which
+/// evaluates only what has changed; the QP is the same up to rounding.
 ///
-/// Refers to the OCP, which must outlive it. The constructor allocates, nothing else does. One caller at a time.
+/// The OCP must outlive it. The constructor allocates, nothing else does. One caller at a time.
 class RHEC_EXPORT Linearisation {
  public:
   explicit Linearisation(const Ocp& ocp);
@@ -23,23 +24,22 @@ class RHEC_EXPORT Linearisation {
   const Ocp& ocp() const noexcept { return ocp_; }
   const StageQp& qp() const noexcept { return qp_; }
 
-  /// The whole QP at an iterate. Returns the objective there.
+  /// Writes the whole QP at an iterate. Returns the objective there.
   virtual double linearise(const Iterate& iterate, Hessian hessian) noexcept;
 
-  /// What the KKT residual at a new iterate takes: all but H. `next` is the Hessian that `prepare` is going to be asked
-  /// for from there; one that remembers may do some of that work already. Returns the objective.
+  /// Writes what the KKT residual at a new iterate needs: all but H. `next` is the Hessian that `prepare` will ask for
+  /// at this iterate; a cache may do some of that work already. Returns the objective.
   virtual double linearise_for_residual(const Iterate& iterate, Hessian next) noexcept;
 
-  /// AB, b and H, the sizes and the bounds at an iterate, while the newest data are still to come; `refresh` does the
-  /// rest.
+  /// Writes AB, b, H, the sizes and the bounds at an iterate before the newest data are known; `refresh` completes it.
   virtual void prepare(const Iterate& iterate, Hessian hessian) noexcept;
-  /// What depends on data that may have come since (measurements, references, the initial state, bounds): h, the bounds
+  /// Writes what depends on data that may be new (measurements, references, the initial state, bounds): h, the bounds
   /// and the initial step.
   virtual void refresh(const Iterate& iterate) noexcept;
 
-  /// Whether the QP was made at this very iterate, for stages of today's sizes.
+  /// Whether the QP was made at exactly this iterate, with the present sizes of stages.
   virtual bool is_at(const Iterate& iterate) const noexcept;
-  /// Forgets all that is remembered.
+  /// Clears the cache.
   virtual void forget() noexcept;
 
  protected:
@@ -50,8 +50,8 @@ class RHEC_EXPORT Linearisation {
   void remember(const Iterate& iterate) noexcept;
 
   const Ocp& ocp_;
-  Iterate iterate_;        ///< that the QP was made at
-  bool is_known_ = false;  ///< whether it is
+  Iterate iterate_;        ///< at which the QP was made
+  bool is_known_ = false;  ///< whether `iterate_` is valid
 };
 
 }  // namespace rhec

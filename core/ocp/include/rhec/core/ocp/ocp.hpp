@@ -13,22 +13,23 @@ namespace rhec {
 
 class Linearisation;
 
-/// Which curvature a linearisation carries.
+/// The Hessian of a linearisation.
 enum class Hessian {
-  none,          ///< H is not wanted, and may be left as it is
-  gauss_newton,  ///< of the squared residuals only; positive semidefinite
+  none,          ///< H is not needed, and may be left as it is
+  gauss_newton,  ///< of the squared residuals only (Gauss-Newton); positive semidefinite
   exact          ///< of the Lagrangian, with the iterate's costates; may be indefinite
 };
 
-/// What is asked over a horizon, stage by stage, and nothing of who solves it:
+/// An optimisation problem over a horizon, stage by stage, independent of any solver (docs/method.md, sections 4 and
+/// 7):
 ///
 ///     minimise    sum_{i=0}^{N} l_i(s_i, w_i)
 ///     subject to  s_{i+1} = F_i(s_i, w_i),   bounds on every s_i and w_i,   s_0 given or free
 ///
-/// A stage state s_i holds the vehicle's state and the values of the lifted (blocked) variables; a stage
-/// control w_i holds the inputs and the values of the blocks that start there. So unblocked, blocked and full-horizon
-/// structures are all this one form. Evaluation is const, thread-safe and
-/// allocation-free; `scratch` is the caller's, of `scratch_size()` doubles.
+/// A stage state s_i holds the vehicle's state and the values of the lifted (blocked) variables; a stage control w_i
+/// holds the inputs and the values of the blocks that start there. So unblocked, blocked and full-horizon structures
+/// all have this form. Evaluation is const, thread-safe and allocation-free; the caller provides `scratch` of
+/// `scratch_size()` doubles.
 class RHEC_EXPORT Ocp {
  public:
   virtual ~Ocp() = default;
@@ -37,27 +38,27 @@ class RHEC_EXPORT Ocp {
   virtual int intervals() const noexcept = 0;
   virtual int state_count(int node) const noexcept = 0;
   virtual int control_count(int interval) const noexcept = 0;
-  /// The given initial stage state, or null where it is free.
+  /// The given initial stage state, or null if it is free.
   virtual const double* initial_state() const noexcept = 0;
   virtual const double* state_lower(int node) const noexcept = 0;
   virtual const double* state_upper(int node) const noexcept = 0;
   virtual const double* control_lower(int interval) const noexcept = 0;
   virtual const double* control_upper(int interval) const noexcept = 0;
   virtual bool has_second_derivatives() const noexcept = 0;
-  /// Whether the cost is a sum of squares whose residuals are small at the solution, so that full Gauss-Newton steps
-  /// converge to it. True of estimation; not of control, where a reference may be out of reach.
+  /// Whether the cost is a sum of squares with small residuals at the solution, so that full Gauss-Newton steps
+  /// converge. True for estimation, false for control, where a reference may be out of reach.
   virtual bool has_small_residuals() const noexcept { return false; }
-  /// The curvature that QPs of this problem should carry.
+  /// The Hessian that QPs of this problem should use.
   Hessian preferred_hessian() const noexcept {
     return has_second_derivatives() && !has_small_residuals() ? Hessian::exact : Hessian::gauss_newton;
   }
-  /// Whether the states of an iterate are best found by simulation with its controls, from the given initial state. Not
-  /// where data determine the states of every node, as in estimation.
+  /// Whether to find the states of an iterate by simulation with its controls from the given initial state. False if
+  /// data determine the states of every node, as in estimation.
   virtual bool can_roll_out() const noexcept { return initial_state() != nullptr; }
   virtual std::size_t scratch_size() const noexcept = 0;
 
-  /// Marks which derivatives of F_i can be other than zero, whatever the iterate: entry [c * state_count(i + 1) + r] of
-  /// `state_flags` for dF_r/ds_c, of `control_flags` for dF_r/dw_c. By default all can.
+  /// Marks which derivatives of F_i can be non-zero at any iterate: entry [c * state_count(i + 1) + r] of `state_flags`
+  /// for dF_r/ds_c, of `control_flags` for dF_r/dw_c. By default all can.
   virtual void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept;
 
   /// The objective at an iterate; `defects` (N rows of capacity().states, or null) gets F_i(s_i, w_i) - s_{i+1},
@@ -68,34 +69,34 @@ class RHEC_EXPORT Ocp {
     return evaluate_stages(iterate, defects, nullptr, scratch);
   }
 
-  /// Overwrites the state of node `interval` + 1 by simulation of one interval.
+  /// Overwrites the state of node `interval` + 1 by simulating one interval.
   virtual void simulate_interval(int interval, Iterate& iterate, std::span<double> scratch) const noexcept = 0;
   /// Overwrites the states of nodes 1 .. N by simulation from node 0 with the iterate's controls.
   void simulate(Iterate& iterate, std::span<double> scratch) const noexcept {
     for (int i = 0; i < intervals(); ++i) simulate_interval(i, iterate, scratch);
   }
 
-  /// Fills the stages of a range of the QP at an iterate: sizes, dynamics, costs and bounds. Returns the
-  /// objective's part of these stages.
+  /// Writes the stages of a range of the QP at an iterate: sizes, dynamics, costs and bounds. Returns the objective of
+  /// these stages.
   virtual double linearise(StageRange range, const Iterate& iterate, Hessian hessian, StageQp& qp,
                            std::span<double> scratch) const noexcept = 0;
 
-  /// Fills again what depends on data that may have come since `linearise` at the same iterate (measurements,
-  /// references, the initial state, bounds): h, the bounds and the initial step. F, b and H stay. As it is, b and F are
+  /// Writes again what depends on data that may be new since `linearise` at the same iterate (measurements, references,
+  /// the initial state, bounds): h, the bounds and the initial step. AB, b and H stay. By default b and AB are
   /// evaluated anew.
   virtual void refresh(const Iterate& iterate, StageQp& qp, std::span<double> scratch) const noexcept {
     linearise({0, intervals()}, iterate, Hessian::none, qp, scratch);
   }
 
-  /// What a solver linearises this problem with, sample after sample. Throws std::bad_alloc.
+  /// Makes the linearisation cache with which a solver linearises this problem. Throws std::bad_alloc.
   virtual std::unique_ptr<Linearisation> make_linearisation() const;
 };
 
 /// The whole horizon of an Ocp.
 inline StageRange all_stages(const Ocp& ocp) { return {0, ocp.intervals()}; }
 
-/// States from the controls by simulation; the first stage state is taken as it is. Controls are clipped to their
-/// bounds first, so that the result has no defect.
+/// Computes the states from the controls by simulation, from the iterate's first stage state. Controls are clipped to
+/// their bounds first. The result has no defects.
 RHEC_EXPORT void roll_out(const Ocp& ocp, Iterate& iterate, std::span<double> scratch) noexcept;
 
 }  // namespace rhec

@@ -8,8 +8,7 @@
 
 namespace rhec {
 
-/// A solver that hands every call on to another one. What watches or changes a solver's calls derives from it and
-/// overrides those that it is about, so that no call is forgotten.
+/// A solver that forwards every call to another one. Derive from it to observe or change some of a solver's calls.
 class RHEC_EXPORT SolverDecorator : public Solver {
  public:
   explicit SolverDecorator(std::shared_ptr<Solver> inner) : inner_(std::move(inner)) {}

@@ -7,16 +7,16 @@
 
 namespace rhec {
 
-/// An Ocp seen as one sparse NLP, for solvers that know no stages:
+/// An Ocp as one sparse NLP, for solvers without stage structure (docs/method.md, section 7):
 ///
 ///     minimise f(z)  subject to  c(z) = 0,  lower <= z <= upper
 ///
-/// z = [s_0; w_0; s_1; w_1; ...; s_N], without s_0 where it is given; rows of c are the defects F_i(s_i, w_i) -
-/// s_{i+1}, interval after interval. With L = f + multipliers' c + bound_multipliers' z the multipliers are the
-/// costates of nodes 1 .. N, and bound multipliers have the signs of Iterate's.
+/// z = [s_0; w_0; s_1; w_1; ...; s_N], without s_0 if it is given; rows of c are the defects F_i(s_i, w_i) - s_{i+1},
+/// interval after interval. With L = f + multipliers' c + bound_multipliers' z, the multipliers are the costates of
+/// nodes 1 .. N, and bound multipliers have the signs of those of an Iterate.
 ///
 /// Patterns hold for every iterate of one structure; values are scattered from the Ocp's own linearisation (StageQp),
-/// so nothing is evaluated twice. Matrices are in compressed columns with rows in order.
+/// so that nothing is evaluated twice. Matrices are stored by compressed columns with sorted rows.
 class RHEC_EXPORT SparseNlp {
  public:
   struct Pattern {
@@ -26,40 +26,40 @@ class RHEC_EXPORT SparseNlp {
     int entries() const noexcept { return starts.empty() ? 0 : starts.back(); }
   };
 
-  /// Takes over the Ocp's present structure. True where it differs from the one before, so that what was derived from
-  /// the patterns (orderings, symbolic factors) has to be made anew.
+  /// Takes over the Ocp's present structure. True if it has changed, so that whatever was derived from the patterns
+  /// (orderings, symbolic factors) must be renewed.
   bool take_structure(const Ocp& ocp);
-  /// Numbers that tell structures apart: equal signatures, equal patterns.
+  /// Identifies a structure: equal signatures mean equal patterns.
   const std::vector<std::int32_t>& signature() const noexcept { return signature_; }
 
   int variables() const noexcept { return hessian_.columns; }
   int constraints() const noexcept { return jacobian_.rows; }
   const Pattern& jacobian() const noexcept { return jacobian_; }
-  /// The lower triangle. The block of each stage [s_i; w_i] is full, and there is nothing outside of these blocks.
+  /// The lower triangle: a full block for each stage [s_i; w_i], and nothing outside of these blocks.
   const Pattern& hessian() const noexcept { return hessian_; }
-  /// Where in z the states of a node begin; -1: they are given.
+  /// Where in z the states of a node begin; -1 if they are given.
   int state_start(int node) const noexcept { return state_starts_[node]; }
 
-  // Between points and vectors. Multipliers and bound multipliers may be null.
+  // Conversion between iterates and vectors. Multipliers and bound multipliers may be null.
   void read(const Ocp& ocp, const Iterate& iterate, double* z, double* multipliers,
             double* bound_multipliers) const noexcept;
-  /// All stages, or those of a range: their states, controls and costates. A given s_0 is written too. costate_0 is
-  /// left as it is: it follows from the stationarity in s_0 (`set_costate_0`).
+  /// For all stages or those of a range: states, controls and costates. A given s_0 is also written. costate_0 is
+  /// unchanged: it follows from stationarity in s_0 (`set_costate_0`).
   void write(const Ocp& ocp, StageRange range, const double* z, const double* multipliers,
              const double* bound_multipliers, Iterate& iterate) const noexcept;
   void write(const Ocp& ocp, const double* z, const double* multipliers, const double* bound_multipliers,
              Iterate& iterate) const noexcept {
     write(ocp, all_stages(ocp), z, multipliers, bound_multipliers, iterate);
   }
-  /// The costate of a given initial state, from a linearisation at the iterate; zero where the initial state is free.
+  /// The costate of a given initial state, from a linearisation at the iterate; zero if the initial state is free.
   static void set_costate_0(const StageQp& linearisation, Iterate& iterate) noexcept;
 
-  /// Bounds of z; infinite where there is none.
+  /// Bounds of z; infinite if there is none.
   void bounds(const Ocp& ocp, double* lower, double* upper) const noexcept;
   /// c from the defects that Ocp::evaluate gives (rows of the capacity's states).
   void constraints(const Ocp& ocp, const double* defects, double* c) const noexcept;
 
-  // Values at the iterate of a linearisation, of all stages or of those of a range, to their places in the whole
+  // Values at the iterate of a linearisation, written for all stages or those of a range to their places in the whole
   // vectors. The Hessian is that of the Lagrangian if the linearisation was made with Hessian::exact and the iterate's
   // costates.
   void constraints(const StageQp& linearisation, StageRange range, double* c) const noexcept;
@@ -81,15 +81,15 @@ class RHEC_EXPORT SparseNlp {
 
  private:
   std::vector<std::int32_t> signature_, next_signature_;
-  std::vector<int> words_;                                 ///< where in the signature each interval begins
+  std::vector<int> words_;                                 ///< where each interval begins in the signature
   std::vector<std::uint8_t> state_flags_, control_flags_;  ///< of the interval being marked
   std::vector<int> state_starts_, control_starts_, constraint_starts_, state_counts_, control_counts_;
   Pattern jacobian_, hessian_;
-  /// Where the entries of each stage, which are one after the other, come from. Stages that are alike share a list.
+  /// Where the entries of each stage, which are contiguous, come from. Equal stages share a list.
   struct Sources {
-    std::vector<int> offsets;  ///< in the stage's F or H
-    std::vector<int> firsts;   ///< of each stage, in `offsets`
-    std::vector<int> starts;   ///< of each stage, among the entries; and where the last one's end
+    std::vector<int> offsets;  ///< in the stage's AB or H
+    std::vector<int> firsts;   ///< per stage, in `offsets`
+    std::vector<int> starts;   ///< per stage, the first of its entries; then the end of the last stage's
     void clear() noexcept;
     void end_stage();
     void repeat_stage();

@@ -4,7 +4,7 @@
 
 namespace rhec {
 
-/// Takes the times of a solver for its reports. Solvers do not read the clock for that themselves, since it costs a few
+/// Measures the times in a solver's reports. Solvers do not read the clock for this themselves, since it costs a few
 /// percent of a real-time step.
 class RHEC_EXPORT TimedSolver final : public SolverDecorator {
  public:
@@ -21,7 +21,7 @@ class RHEC_EXPORT TimedSolver final : public SolverDecorator {
  private:
   void write_times(Clock::time_point start, Report& report) noexcept;
 
-  double preparation_us_ = 0.0;  ///< since the last answer
+  double preparation_us_ = 0.0;  ///< since the last report
 };
 
 }  // namespace rhec

@@ -10,51 +10,53 @@
 
 namespace rhec {
 
-/// Solves a strictly convex StageQp with all its bounds, exactly, by a dual active-set method (Goldfarb & Idnani 1983,
-/// "A numerically stable dual method for solving strictly convex quadratic programs").
+/// Solves a strictly convex StageQp exactly with all its bounds, by a dual active-set method (Goldfarb & Idnani 1983;
+/// docs/method.md, section 7).
 ///
-/// What pulls the wrong way in the claimed active set is dropped, until all multipliers have their sign. From there the
-/// most violated bound is added, one at a time, by a step that keeps the signs: it drops the bound whose multiplier
-/// comes to zero first. The dual objective grows with each step, so that this ends.
+/// Bounds whose multipliers have the wrong sign are dropped from the claimed active set (warm start) until all signs
+/// are right. Then the most violated bound is added, one at a time, by a step that keeps the signs: it drops the bound
+/// whose multiplier reaches zero first. The dual objective grows with each step, so the method terminates.
 ///
-/// A change of the set costs no factorisation, in general. Claimed bounds of controls are held inside the Riccati
-/// factorisation, at no cost. Every other active bound is a multiplier in the gradient: with the sensitivities W of the
-/// minimiser to the gradients A of these bounds, the multipliers solve the small dense system S = -A'W, whose Cholesky
-/// factor grows and shrinks with the set. Only where a held bound is dropped is the QP factorised anew. Sensitivities
-/// come in batches, at once those of the bounds that may be next; where there is a claim, before the vectors are known.
+/// In general a change of the active set needs no factorisation. Claimed bounds of controls are held inside the Riccati
+/// factorisation, at no cost. Every other active bound adds its multiplier to the gradient: with the sensitivities W of
+/// the minimiser to the gradients A of these bounds, the multipliers solve the small dense system S = -A'W, whose
+/// Cholesky factor grows and shrinks with the set. Only dropping a held bound needs a new factorisation. Sensitivities
+/// are computed in batches, together with those of bounds that are likely to follow; for a claimed set already in
+/// `prepare`.
 ///
-/// A variable is known by its place in the rows of all stages, as those of an Iterate.
+/// A variable is identified by its place in the rows of all stages, as in an Iterate.
 class RHEC_EXPORT DualActiveSet {
  public:
   enum class Outcome {
     solved,
-    not_convex,   ///< without its state bounds the QP has no minimiser: it has to be convexified first
-    no_solution,  ///< the bounds contradict each other, as far as can be seen here
-    too_much,     ///< more changes than are provided for, or rounding: another method has to do it
+    not_convex,   ///< without state bounds the QP has no minimiser; it must be convexified first
+    no_solution,  ///< the bounds contradict each other, as far as this method can tell
+    too_much,     ///< too many changes of the active set, or rounding errors; use another method
     out_of_time
   };
-  /// At most so many active bounds beside the held ones, and so many changes of the set.
+  /// Largest number of active bounds besides the held ones, and of changes of the active set.
   static constexpr int max_columns = 32, max_changes = 96;
 
   DualActiveSet() = default;
   explicit DualActiveSet(const Capacity& capacity);
 
-  /// What needs the QP's matrices only: the factorisation with the claimed set (null: none), and sensitivities.
+  /// Work that needs only the QP's matrices: factorises with the claimed active set (null: none) and finds
+  /// sensitivities.
   void prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed) noexcept;
-  /// After `prepare`, with the QP's vectors as they are now. Where solved, the set goes to `active` and the
-  /// minimiser, its costates and multipliers to `step`. The deadline is looked at before every change of the set.
+  /// After `prepare`, with the QP's present vectors. If solved, writes the active set to `active` and the minimiser,
+  /// its costates and multipliers to `step`. Checks the deadline before every change of the active set.
   Outcome solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
                 Clock::time_point deadline) noexcept;
-  /// After `solve`: has the factorisation give its policy too (Riccati::feedback), which a solution may come without.
+  /// After `solve`: also computes the policy (Riccati::feedback), which `solve` may omit.
   void complete_policy(const StageQp& qp, Riccati& riccati) noexcept;
-  /// Since the last `prepare`.
+  /// Number since the last `prepare`.
   int factorisations() const noexcept { return factorisations_; }
 
  private:
   enum class Hold : std::uint8_t { free, held, column };
   enum class Found { nothing, values, step };
   static constexpr int none = -1, batch_size = Riccati::Sensitivities::size;
-  /// Room for all columns and for those that may be next.
+  /// Enough for all columns and for the bounds that are likely to follow.
   static constexpr int batch_count = max_columns / batch_size + 1;
   struct Batch {
     Riccati::Sensitivities sensitivities;
@@ -83,7 +85,7 @@ class RHEC_EXPORT DualActiveSet {
   void forget(int batch) noexcept;
   bool find_sensitivities_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept;
   bool find_sensitivities_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count) noexcept;
-  /// What the variable at one place answers to the gradient of another, which has sensitivities.
+  /// Sensitivity of the variable at one place to the gradient of another, which must have sensitivities.
   double sensitivity(int of, int at) const noexcept {
     const int number = number_[of];
     return batches_[number / batch_size]
@@ -119,26 +121,26 @@ class RHEC_EXPORT DualActiveSet {
   void write(ActiveSet& active, Iterate& step) const noexcept;
 
   int factorisations_ = 0, changes_ = 0;
-  int states_ = 0, stride_ = 0, places_ = 0;  ///< as many places as the QP has
+  int states_ = 0, stride_ = 0, places_ = 0;  ///< number of places that the QP uses
   bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
   double pull_tolerance_ = 0.0;
-  const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the program that is being solved
+  const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the QP that is being solved
   ActiveSet held_, claimed_;
-  // By place. The value of a held variable is its multiplier: that is what changes of it.
+  // By place. For a held variable, the value is its multiplier, since this is what changes.
   std::vector<double> value_, direction_, violation_;
-  /// The bounds with their tolerance; of variables that are not free there are none.
+  /// The bounds widened by their tolerance; infinite for variables that are not free.
   std::vector<double> least_, most_;
   std::vector<Hold> hold_;
   std::vector<std::int8_t> side_;  ///< of the active bound
-  std::vector<int> number_;        ///< among the sensitivities, or none
+  std::vector<int> number_;        ///< index among the sensitivities, or none
   std::vector<int> held_places_;
   std::vector<Batch> batches_;
-  std::vector<int> columns_;  ///< active bounds that are not held, in the order of the factor
+  std::vector<int> columns_;  ///< active bounds that are not held, in the order of the Cholesky factor
   std::vector<double> multipliers_, factor_;
-  /// Which multipliers the step was found with.
+  /// The multipliers with which the step was found.
   std::vector<int> base_places_;
   std::vector<double> base_multipliers_;
-  std::vector<double> h_;  ///< the QP's gradient with the multipliers of the columns
+  std::vector<double> h_;  ///< the QP's gradient plus the multipliers of the columns
   Iterate policy_step_;
 };
 

@@ -9,7 +9,7 @@
 
 namespace rhec {
 
-/// The sizes that memory is set aside for: the largest structure that a problem can take.
+/// The sizes for which memory is allocated: the largest structure of a problem.
 struct Capacity {
   int intervals = 0;  ///< N
   int states = 0;     ///< n_s, at any node
@@ -17,8 +17,8 @@ struct Capacity {
 
   bool operator==(const Capacity&) const = default;
 
-  /// The length of a row z = [s; w] of one stage in memory: as long as registers of eight are wide. The state is at its
-  /// beginning, the control at `states`, whatever a stage uses of both.
+  /// The length of a row z = [s; w] of one stage in memory, padded to a multiple of eight. The state begins at 0 and
+  /// the control at `states`, however many of them a stage uses.
   int row() const noexcept {
     const int used = states + controls;
     return used > 32 ? (used + 63) / 64 * 64 : padded(used);
@@ -31,13 +31,13 @@ struct StageRange {
   int last = 0;
 };
 
-/// A primal-dual iterate of an Ocp. Rows have the capacity's length, whatever a stage really uses. With the Lagrangian
+/// A primal-dual iterate of an Ocp. Rows have the capacity's length, whatever a stage uses. With the Lagrangian
 ///
 ///     L = sum_i l_i(s_i, w_i) + sum_i costate_{i+1}' (F_i(s_i, w_i) - s_{i+1}) + sum_i state_bound_i' s_i +
 ///     control_bound_i' w_i
 ///
-/// a bound multiplier is positive at an upper bound, negative at a lower one and zero between. costate_0 belongs to a
-/// given initial state; it is zero where the initial state is free.
+/// a bound multiplier is positive at an upper bound, negative at a lower one and zero between (docs/method.md, section
+/// 7). costate_0 belongs to a given initial state; it is zero if the initial state is free.
 class RHEC_EXPORT Iterate {
  public:
   Iterate() = default;
@@ -56,7 +56,7 @@ class RHEC_EXPORT Iterate {
   const double* state_bound(int node) const noexcept { return at(bounds_, node); }
   const double* control_bound(int interval) const noexcept { return at(bounds_, interval) + capacity_.states; }
 
-  /// Values and bound multipliers of a stage as one row [s; w], which begins at the state; rows follow each other.
+  /// Values and bound multipliers of a stage as one row [s; w]; rows are consecutive.
   double* row(int stage) noexcept { return at(values_, stage); }
   double* bound_row(int stage) noexcept { return at(bounds_, stage); }
   const double* row(int stage) const noexcept { return at(values_, stage); }

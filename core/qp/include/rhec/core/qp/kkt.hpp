@@ -4,16 +4,17 @@
 
 namespace rhec {
 
-/// How far a primal-dual iterate is from a first-order optimum: the one judge of every backend.
+/// How far a primal-dual iterate is from a first-order optimum: the same measure for every solver (docs/method.md,
+/// section 7).
 ///
 /// Stationarity and complementarity are relative to 1 + the largest term of the Lagrangian's gradient (objective,
-/// costates and bound multipliers each count), so that scaling the objective does not change the verdict. Defect and
-/// bound violation are absolute, in the units of their variables.
+/// costates and bound multipliers), so that scaling the objective changes little. Defect and bound violation are
+/// absolute, in the units of their variables.
 struct RHEC_EXPORT KktResidual {
   double stationarity = 0.0;
   double defect = 0.0;  ///< max |F_i(s_i, w_i) - s_{i+1}|, the given initial state included
   double bound_violation = 0.0;
-  double complementarity = 0.0;  ///< max |multiplier| x distance from the bound that it claims to be at
+  double complementarity = 0.0;  ///< max |multiplier| x distance from its bound
 
   double largest() const noexcept;
 };
@@ -21,20 +22,20 @@ struct RHEC_EXPORT KktResidual {
 /// The residual at the iterate that the QP was linearised at.
 RHEC_EXPORT KktResidual kkt_residual(const StageQp& linearisation, const Iterate& iterate) noexcept;
 
-/// What a residual is made of, for who goes through a long horizon piece by piece: largest absolute values.
+/// The terms of a residual as largest absolute values, to process a long horizon piece by piece.
 struct RHEC_EXPORT KktTerms {
   double stationarity = 0.0, defect = 0.0, bound_violation = 0.0, complementarity = 0.0;
   double largest_term = 0.0;  ///< of the Lagrangian's gradient
 
-  /// Those of the stages of a range, where the QP holds the linearisation at the iterate. Of the stage behind a
-  /// range that does not reach the end its sizes must be known.
+  /// Adds the stages of a range, for which the QP holds the linearisation at the iterate. If the range does not reach
+  /// the end, the sizes of the stage behind it must be set.
   void add(const StageQp& linearisation, const Iterate& iterate, StageRange range) noexcept;
   void add(const KktTerms& others) noexcept;
   KktResidual residual() const noexcept;
 };
 
-/// Costates that make the iterate stationary in all states, by one backward sweep; bound multipliers are taken as they
-/// are.
+/// Sets the costates that make the iterate stationary in all states, by one backward sweep; bound multipliers stay as
+/// they are.
 RHEC_EXPORT void set_costates(const StageQp& linearisation, Iterate& iterate) noexcept;
 
 }  // namespace rhec

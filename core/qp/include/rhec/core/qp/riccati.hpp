@@ -11,7 +11,7 @@ namespace rhec {
 struct RiccatiKernels;
 struct RiccatiView;
 
-/// Which bounds of a StageQp are held as equalities: -1 at the lower bound, +1 at the upper, 0 free.
+/// Which bounds of a StageQp are active, i.e. hold as equalities: -1 the lower bound, +1 the upper, 0 none.
 class RHEC_EXPORT ActiveSet {
  public:
   ActiveSet() = default;
@@ -21,15 +21,15 @@ class RHEC_EXPORT ActiveSet {
   std::int8_t* control(int interval) noexcept { return row(interval) + capacity_.states; }
   const std::int8_t* state(int node) const noexcept { return row(node); }
   const std::int8_t* control(int interval) const noexcept { return row(interval) + capacity_.states; }
-  /// A stage's states and controls as in a row of StageQp.
+  /// States and controls of a stage, in columns as in a row of StageQp.
   std::int8_t* row(int stage) noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
   const std::int8_t* row(int stage) const noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
   bool is_empty() const noexcept;
   void clear() noexcept;
-  /// function(stage, column, side) for every bound that is held, stage by stage; a column is that of a row.
+  /// Calls function(stage, column, side) for every active bound, stage by stage, with columns as in a row.
   template <class Function>
   void for_each(const Function& function) const {
-    // Rows are whole eights, of which most are free.
+    // Rows are padded to multiples of eight, and most entries are free.
     constexpr int eight = sizeof(std::uint64_t);
     for (int k = 0; k < static_cast<int>(sides_.size()); k += eight) {
       std::uint64_t any = 0;
@@ -46,19 +46,20 @@ class RHEC_EXPORT ActiveSet {
   std::vector<std::int8_t> sides_;
 };
 
-/// Solves a StageQp in which the bounds of an active set hold with equality and all others are ignored, by a backward
-/// Riccati recursion: with the value function V_{i+1}(s) = 1/2 s'Ps + p's subject to C s = d,
+/// Solves a StageQp in which the bounds of an active set hold as equalities and all others are ignored, by a backward
+/// Riccati recursion (docs/method.md, section 7): with the value function V_{i+1}(s) = 1/2 s'Ps + p's subject to C s =
+/// d,
 ///
 ///     G = R + B'PB,  L = S + B'PA,  g = r + B'(Pb + p)
 ///     w = -G^-1 (L s + g),   P_i = Q + A'PA - L'G^-1 L,   p_i = q + A'(Pb + p) - L'G^-1 g
 ///
-/// on the null space of the active rows. An active control is fixed; an active state bound C s_{i+1} = d becomes
-/// C B w = d - C b - C A s, solved for as many controls as it has pivots; what is left over passes on to node i. The
-/// cost is linear in the horizon. Where a reduced G is not positive definite it is convexified (its negative
-/// eigenvalues are reflected), which changes R on the free directions only; the reduced Hessian is then positive
-/// definite.
+/// on the null space of the active rows. An active bound of a control fixes it. An active state bound C s_{i+1} = d
+/// becomes C B w = d - C b - C A s, which is solved for as many controls as it has pivots; the remaining rows pass on
+/// to node i. The cost is linear in the horizon. If a reduced G is not positive definite it is convexified (its
+/// negative eigenvalues are reflected), which changes R in the free directions only; the reduced Hessian is then
+/// positive definite.
 ///
-/// `factor` needs the matrices and the active set, `solve` the vectors too, so that the former can be done in advance.
+/// `factor` needs the matrices and the active set, `solve` also the vectors, so that `factor` can run in advance.
 class RHEC_EXPORT Riccati {
  public:
   enum class Outcome {
@@ -68,73 +69,72 @@ class RHEC_EXPORT Riccati {
   Riccati() = default;
   explicit Riccati(const Capacity& capacity);
 
-  /// `diagonal`, if not null, is added to the diagonals of H (barrier terms): a row of the QP's stride a stage.
+  /// `diagonal`, if not null, is added to the diagonals of H (barrier terms): one row of the QP's stride per stage.
   void factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
   void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, nullptr); }
-  /// As much of it as `covariances` needs; a `solve` that follows factorises again.
+  /// Only what `covariances` needs; a `solve` that follows factorises again.
   void factor_for_covariances(const StageQp& qp, const ActiveSet& active) noexcept;
   bool was_convexified() const noexcept { return convexified_; }
-  /// After a `factor` without active bounds: puts what convexification changed into the QP's R, whose reduced
-  /// Hessian is positive definite from then on, whichever bounds become active.
+  /// After a `factor` without active bounds: writes the convexified R into the QP. Its reduced Hessian is then positive
+  /// definite for every active set.
   void write_convexified(StageQp& qp) noexcept;
 
-  /// The minimiser as a step, with costates and the multipliers of the active bounds, for vectors that may be newer
-  /// than `factor`; the gradients h may be replaced by rows of the caller (null: those of the QP).
+  /// The minimiser as a step, with costates and the multipliers of the active bounds. Vectors may have changed since
+  /// `factor`; `h` replaces the QP's gradients (null: it does not).
   Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* h) noexcept;
   Outcome solve(const StageQp& qp, const ActiveSet& active, Iterate& step) noexcept {
     return solve(qp, active, step, nullptr);
   }
 
-  /// What the minimiser answers to gradients of one entry each: with h = e_k and all else of the QP's vectors 0,
-  /// the values z of all stages, and in the places of active controls their multipliers. All in the time of one:
-  /// entry c of the row of stage i is at values[(i * stride + c) * size + (number of the gradient)].
+  /// Sensitivities of the minimiser to gradients of one entry each: with h = e_k and all other vectors of the QP zero,
+  /// the values z of all stages, and in place of fixed controls their multipliers. Interleaved: entry c of the row of
+  /// stage i is at values[(i * stride + c) * size + (number of the gradient)].
   struct Sensitivities {
     static constexpr int size = 8;
     AlignedDoubles values, costates;
-    std::vector<int> control_counts;  ///< of the program that they are for
+    std::vector<int> control_counts;  ///< of the QP that they belong to
     Sensitivities() = default;
     explicit Sensitivities(const Capacity& capacity);
   };
   struct Entry {
     int stage, place;
   };
-  /// Of at most Sensitivities::size gradients. False where the last factorisation holds state bounds or was
-  /// convexified: those have no sensitivities here.
+  /// For at most Sensitivities::size gradients. False if the last factorisation has active state bounds or was
+  /// convexified: sensitivities are not available then.
   bool find_sensitivities(const StageQp& qp, const ActiveSet& active, const Entry* gradients, int count,
                           Sensitivities& sensitivities) noexcept;
-  /// Adds the sensitivities, each by its weight (there are Sensitivities::size), to a minimiser that `solve` has found:
-  /// as if it had been asked with those gradients, but for `feedback`.
+  /// Adds the weighted sensitivities (Sensitivities::size weights) to a minimiser that `solve` has found: the result is
+  /// that of `solve` with these gradients, except for `feedback`.
   void combine(const StageQp& qp, const ActiveSet& active, const Sensitivities& sensitivities, const double* weights,
                Iterate& step) noexcept;
 
-  /// sums += the values of the sensitivities, each by its weight, over the first `places` entries of the rows of all
-  /// stages.
+  /// sums += weighted sum of the values of the sensitivities, over the first `places` entries of all rows.
   void add_values(const Sensitivities& sensitivities, const double* weights, int places, double* sums) const noexcept;
 
-  /// The control of stage i as the last `solve` would choose it for any stage-state step: w = T v(s) + Y s + y0.
+  /// The control of stage i by the policy of the last `solve` for any stage-state step: w = T v(s) + Y s + y0.
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
 
-  /// Marginal covariances of all states when the objective is twice a negative log-likelihood's quadratic, as RHE's is
-  /// (docs/method.md, section 2: no factor 1/2), from the last factorisation: node i's n_s x n_s block goes to
-  /// covariance + i * n_s^2, if not null; the last node's to `last`.
+  /// Marginal covariances of all states from the last factorisation, for an objective that is twice a negative
+  /// log-likelihood, as in RHE (docs/method.md, section 2: no factor 1/2). Node i's n_s x n_s block goes to covariance
+  /// + i * n_s^2, if not null; the last node's to `last`.
   void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
 
-  /// The largest number of controls, and of states, that one stage may have.
+  /// The largest number of controls, and of states, of one stage.
   static constexpr int max_width = 32;
-  /// A reduced Hessian with a pivot below this part of its diagonal entry is not positive definite enough.
+  /// A reduced Hessian with a pivot below this fraction of its diagonal entry counts as not positive definite.
   static constexpr double definite_tolerance = 1e-11;
 
  private:
-  /// How a special stage was reduced. Node 0 of a free initial state is a stage too, with s_0 in the place of w.
+  /// How a special stage was reduced. A free initial state is such a stage too, with s_0 in place of w.
   struct Reduction {
-    int free = 0;       ///< directions left to decide
-    int rows = 0;       ///< rows of C that were reduced here
-    int pivots = 0;     ///< of those, solved for a control
-    int left = 0;       ///< of those, passed on
-    bool plain = true;  ///< nothing is fixed and there are no rows: T is the identity
+    int free = 0;       ///< remaining free directions
+    int rows = 0;       ///< rows of C reduced here
+    int pivots = 0;     ///< rows solved for a control
+    int left = 0;       ///< rows passed on
+    bool plain = true;  ///< no fixed controls and no rows: T is the identity
     bool overflow = false;
   };
-  /// Pointers to what is kept of one special stage; see the members.
+  /// Pointers to the data of one special stage; see the members.
   struct Special {
     double *G, *L, *factor, *K, *T, *Y, *C, *eliminator;
     int *pivot_row, *pivot_column, *left_row;
@@ -166,7 +166,7 @@ class RHEC_EXPORT Riccati {
   Capacity capacity_;
   int ns_ = 0, nw_ = 0, stride_ = 0, width_ = 0, max_rows_ = 0;
   bool convexified_ = false, for_steps_ = true;
-  bool has_initial_inverse_ = false;  ///< of P at node 0; otherwise it was factorised as a special stage
+  bool has_initial_inverse_ = false;  ///< of P at node 0; otherwise node 0 was factorised as a special stage
   const RiccatiKernels* kernels_ = nullptr;
   AlignedDoubles P_, U_, V_, closed_, columns_, inverse_, drift_, g_, p_;  // see RiccatiView
   AlignedDoubles initial_inverse_;

@@ -1,11 +1,11 @@
 #pragma once
 
-// Products of the small column-major matrices of one stage. Written as plain loops over contiguous columns, which the
-// compiler turns into vector code; no temporaries, no allocation.
+// Products of the small column-major matrices of one stage: plain loops over contiguous columns, which the compiler
+// vectorises; no temporaries, no allocation.
 
 namespace rhec::small {
 
-/// The largest number of rows of what is factorised.
+/// The largest number of rows of a matrix to factorise.
 inline constexpr int longest = 32;
 
 /// C = A B;  A is m x k (leading dimension lda), B is k x n (ldb), C is m x n (ldc).
@@ -23,8 +23,8 @@ inline void multiply(const double* A, int lda, const double* B, int ldb, double*
   }
 }
 
-/// C += sign A' B;  A is k x m, B is k x n, and m is at most `longest`. Row by row of A, since k is mostly as short as
-/// the list of a stage's controls.
+/// C += sign A' B;  A is k x m, B is k x n, and m is at most `longest`. Works row by row of A, since k, the number of
+/// controls, is usually small.
 inline void add_transposed(const double* A, int lda, const double* B, int ldb, double* C, int ldc, int m, int k, int n,
                            double sign = 1.0) noexcept {
   double row[longest];
@@ -58,8 +58,8 @@ inline void add_transposed_product(const double* A, int lda, const double* x, do
   }
 }
 
-/// Cholesky factor of a symmetric matrix in its lower triangle, in place; false where a pivot is not above the part
-/// `relative` of its own diagonal entry, so that the scale of one variable does not decide about another.
+/// Cholesky factor of a symmetric matrix in its lower triangle, in place. False if a pivot is not above the fraction
+/// `relative` of its own diagonal entry; so the scale of one variable does not affect another.
 inline bool factor(double* G, int ld, int n, double relative) noexcept {
   double least[longest];
   for (int j = 0; j < n; ++j) least[j] = relative * G[j * ld + j];
@@ -76,7 +76,7 @@ inline bool factor(double* G, int ld, int n, double relative) noexcept {
   return true;
 }
 
-/// x := (G G')^-1 x with the factor's lower triangle.
+/// x := (G G')^-1 x with the factor G in the lower triangle.
 inline void solve(const double* G, int ld, int n, double* x) noexcept {
   double inverse[longest];
   for (int i = 0; i < n; ++i) inverse[i] = 1.0 / G[i * ld + i];

@@ -10,7 +10,7 @@
 
 namespace rhec {
 
-/// An Ocp linearised at an iterate, in the steps z_i = [ds_i; dw_i] from there:
+/// An Ocp linearised at an iterate (docs/method.md, section 7), in the steps z_i = [ds_i; dw_i] from there:
 ///
 ///     minimise    sum_{i=0}^{N} 1/2 z_i' H_i z_i + h_i' z_i                           (no dw at node N)
 ///     subject to  ds_{i+1} = AB_i z_i + b_i,   lower_i <= z_i <= upper_i
@@ -18,10 +18,9 @@ namespace rhec {
 ///
 /// with  AB = [A B],  H = [Q S'; S R],  h = [q; r].
 ///
-/// Sizes are per stage and at run time; storage never moves, but for `drop_first`. All rows have the length `stride` =
-/// capacity().row(): a stage's AB is n_s such rows (row r: what next state r depends on), its H is symmetric and as
-/// many rows (or columns) as z has entries, both halves filled. What a stage does not use of a row is zero, and free of
-/// bounds.
+/// Sizes are set per stage at run time; storage never moves, except in `drop_first`. All rows have the length `stride`
+/// = capacity().row(). A stage's AB has n_s rows (row r: derivatives of next state r). Its H is symmetric, with as many
+/// rows (or columns) as z has entries and both halves filled. Unused entries of a row are zero and have no bounds.
 class RHEC_EXPORT StageQp {
  public:
   using Rows =
@@ -33,12 +32,12 @@ class RHEC_EXPORT StageQp {
 
   StageQp() = default;
   explicit StageQp(const Capacity& capacity);
-  /// A window: of a program of the capacity so many stages at a time, for who goes through it piece by piece and wants
-  /// it to stay in the processor's cache. Other stages than those from `look_at` on must not be touched.
+  /// A window that stores only `stages` stages of a QP of this capacity at a time, to process a long horizon piece by
+  /// piece within the processor's cache. Only the stages from `look_at` on may be accessed.
   StageQp(const Capacity& capacity, int stages);
-  /// Stages `first`, first + 1, ... are looked at next, which hold nothing of use yet.
+  /// Moves the window to the stages `first`, first + 1, ...; their content is undefined.
   void look_at(int first) noexcept;
-  int window() const noexcept { return window_; }  ///< how many stages that are; 0: all are there
+  int window() const noexcept { return window_; }  ///< number of stages stored; 0: all
 
   const Capacity& capacity() const noexcept { return capacity_; }
   int stride() const noexcept { return stride_; }
@@ -46,14 +45,14 @@ class RHEC_EXPORT StageQp {
   int states(int node) const noexcept { return state_counts_[node]; }
   int controls(int interval) const noexcept { return interval < intervals_ ? control_counts_[interval] : 0; }
   const int* state_counts() const noexcept { return state_counts_.data(); }
-  const int* control_counts() const noexcept { return control_counts_.data(); }  ///< of intervals 0 .. N - 1
+  const int* control_counts() const noexcept { return control_counts_.data(); }  ///< for intervals 0 .. N - 1
   const int* identity_counts() const noexcept { return identity_counts_.data(); }
   void set_intervals(int intervals) noexcept {
     RHEC_ASSERT(intervals >= 0 && intervals <= capacity_.intervals, "at most the capacity");
     intervals_ = intervals;
   }
-  /// Clears what a stage that has become smaller does not use any more. The last `identities` states are those that the
-  /// interval hands on as they are: their rows of AB are, or will be, rows of the identity, and solvers may rely on it.
+  /// Clears entries that a smaller stage no longer uses. The last `identities` states are carried over unchanged by the
+  /// interval: their rows of AB are, or will be, rows of the identity, and solvers may rely on it.
   void set_sizes(int node, int states, int controls, int identities = 0) noexcept {
     RHEC_ASSERT(node >= 0 && node <= capacity_.intervals, "a node of the capacity");
     RHEC_ASSERT(states <= capacity_.states && controls <= capacity_.controls && identities <= states,
@@ -63,10 +62,10 @@ class RHEC_EXPORT StageQp {
     control_counts_[node] = controls;
     identity_counts_[node] = identities;
   }
-  /// Moves AB, b, H, h and sizes towards the front; behind them are zeros.
+  /// Moves AB, b, H, h and sizes towards the front by `stages`; zeros follow.
   void drop_first(int stages) noexcept;
   bool initial_state_is_given = false;
-  /// For who writes to AB: no state is handed on as it is any more.
+  /// For callers that write to AB: no row counts as a row of the identity any more.
   void drop_identity_rows() noexcept;
 
   // Raw access for kernels: pointers to stage i.
@@ -97,7 +96,8 @@ class RHEC_EXPORT StageQp {
   const double* control_upper(int i) const noexcept { return upper(i) + capacity_.states; }
   const double* initial_step() const noexcept { return initial_step_.data(); }
 
-  // The same as Eigen views of the stage's true size. S is n_w x n_s; who writes it writes its transpose too.
+  // The same as Eigen views of the stage's actual size. S is n_w x n_s; whoever writes it must also write its
+  // transpose.
   Rows A_of(int i) { return rows(AB(i), states(i + 1), states(i)); }
   Rows B_of(int i) { return rows(AB(i) + capacity_.states, states(i + 1), controls(i)); }
   Rows Q_of(int i) { return rows(H(i), states(i), states(i)); }
@@ -138,8 +138,8 @@ class RHEC_EXPORT StageQp {
   Capacity capacity_;
   int stride_ = 0, wide_ = 0, intervals_ = 0;
   int window_ = 0;
-  int first_ = 0;         ///< slot of stage 0 in AB, b, H and h: what moves towards the front is not copied
-  int first_bounds_ = 0;  ///< the same of the bounds
+  int first_ = 0;         ///< slot of stage 0 in AB, b, H and h, so that moving them copies nothing
+  int first_bounds_ = 0;  ///< the same for the bounds
   std::vector<int> state_counts_, control_counts_, identity_counts_;
   AlignedDoubles AB_, H_, h_, b_, lower_, upper_, initial_step_;
 };

@@ -9,56 +9,56 @@
 
 namespace rhec {
 
-/// Solves a StageQp with all its bounds, exactly.
+/// Solves a StageQp exactly with all its bounds (docs/method.md, section 7).
 ///
-/// It starts from the active set that the last sample's multipliers claim and corrects it by a dual active-set method
-/// (DualActiveSet); where a few bounds of states make up the claim, that is first tried as it is, inside one
-/// factorisation. Should the dual method have too much to do, the set is corrected by the primal-dual rule
-/// (Hintermueller, Ito & Kunisch 2002: what is violated is added, what pulls the wrong way is dropped) for a few rounds
-/// of factorisations; and should that not settle, a primal-dual interior-point method takes over, whose active set is
-/// then polished to the exact solution. The last also has the last word on whether there is a solution.
+/// The solver is warm-started with the active set of the last sample's multipliers and corrects it by a dual active-set
+/// method (DualActiveSet). If few bounds of states are in this set, it first tries the set as it is, inside one
+/// factorisation. If the dual method needs too many changes, the primal-dual rule (Hintermueller, Ito & Kunisch 2002:
+/// add violated bounds, drop those with the wrong sign) corrects the set for a few factorisations. If that does not
+/// settle, a primal-dual interior-point method takes over, and its active set is polished to the exact solution. The
+/// interior-point method also decides whether the QP is infeasible.
 class RHEC_EXPORT StageQpSolver {
  public:
   enum class Outcome {
-    active_set,      ///< exact, by active sets alone
+    active_set,      ///< exact, by active-set methods alone
     interior_point,  ///< the interior-point method was needed; exact after polishing, or to its tolerance
     infeasible,      ///< the bounds cannot be satisfied
-    out_of_time      ///< the deadline came first; `step` is of no use
+    out_of_time      ///< the deadline was reached; `step` is not usable
   };
-  /// When the interior-point method stops: complementarity relative to the gradient, and violation of the bounds.
+  /// Termination of the interior-point method: complementarity relative to the gradient, and violation of the bounds.
   struct Accuracy {
     double gap, infeasibility;
   };
   StageQpSolver() = default;
   explicit StageQpSolver(const Capacity& capacity);
 
-  /// The active set that an iterate's bound multipliers claim.
+  /// Takes the active set from an iterate's bound multipliers.
   void guess_from(const StageQp& qp, const Iterate& iterate) noexcept;
-  /// Factorises with the guess, so that `solve` needs no factorisation if the guess is right.
+  /// Factorises with this active set, so that `solve` needs no factorisation if the set is right.
   void prepare(const StageQp& qp) noexcept;
 
-  /// The minimiser goes to `step`: primal steps, new costates and bound multipliers. Where the reduced Hessian is not
-  /// positive definite it is that of a copy of the QP whose R is convexified (`was_convexified`).
-  /// The deadline is looked at between factorisations, of which the first is always made.
+  /// Writes the minimiser to `step`: primal steps, new costates and bound multipliers. If the reduced Hessian is not
+  /// positive definite, it solves a copy of the QP with convexified R (`was_convexified`). The deadline is checked
+  /// between factorisations; the first one is always made.
   Outcome solve(const StageQp& qp, Iterate& step, Clock::time_point deadline = Clock::time_point::max()) noexcept;
-  /// The robust path alone: convexify, interior point, polish.
+  /// Only the robust path: convexify, interior point, polish.
   Outcome solve_by_interior_point(const StageQp& qp, Iterate& step,
                                   Clock::time_point deadline = Clock::time_point::max()) noexcept;
 
-  /// The control of stage i that the last solution's policy chooses for a stage-state step. After `prepare_feedback`;
-  /// `qp` is the one that was solved, unchanged.
+  /// The control of stage i by the policy of the last solution for a stage-state step. After `prepare_feedback`, with
+  /// the same, unchanged `qp`.
   void prepare_feedback(const StageQp& qp) noexcept {
     if (is_dual_) dual_.complete_policy(solved(qp), riccati_);
   }
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept {
     riccati_.feedback(solved(qp), i, state_step, control_step);
   }
-  /// Covariances by the QP's Hessian without any bounds (Riccati::covariances), of all nodes or the last one;
-  /// false where it is not positive definite.
+  /// Covariances from the QP's Hessian without bounds (Riccati::covariances), of all nodes or of the last one; false if
+  /// it is not positive definite.
   bool covariances(const StageQp& qp, double* all, double* last) noexcept;
-  /// The QP that the last solution is of: the one that `solve` was given, or its convexified copy.
+  /// The QP that was solved last: the one given to `solve`, or its convexified copy.
   const StageQp& solved(const StageQp& qp) const noexcept { return is_convexified_ ? convexified_ : qp; }
-  /// True where the curvature had to be convexified since the last `guess_from`.
+  /// True if the Hessian has been convexified since the last `guess_from`.
   bool was_convexified() const noexcept { return was_convexified_ || riccati_.was_convexified(); }
   int factorisations() const noexcept { return factorisations_; }
   void reset() noexcept;
@@ -97,14 +97,14 @@ class RHEC_EXPORT StageQpSolver {
   DualActiveSet dual_;
   StageQp convexified_;
   bool factored_ = false;
-  bool is_convexified_ = false;   ///< the QP is not convex, and `convexified_` takes its place
+  bool is_convexified_ = false;   ///< the QP is not convex and `convexified_` replaces it
   bool was_convexified_ = false;  ///< since `guess_from`
-  bool prepared_ = false;         ///< for the active set as it was guessed
-  bool is_dual_ = false;          ///< the last solution is by `dual_`
+  bool prepared_ = false;         ///< for the active set of the warm start
+  bool is_dual_ = false;          ///< the last solution is from `dual_`
   bool out_of_time_ = false;
-  bool any_active_ = true;  ///< false: no bound is active, for certain
+  bool any_active_ = true;  ///< false: certainly no bound is active
   int factorisations_ = 0;
-  double gradient_scale_ = 1.0;      ///< of the last interior-point solution: what a slack of one weighs
+  double gradient_scale_ = 1.0;      ///< of the last interior-point solution: scale of a slack of one
   std::vector<std::uint8_t> marks_;  ///< stages at which a bound may be active
   std::vector<Bounded> bounded_;
   std::vector<double> diagonal_, h_;  ///< rows of the QP's stride: barrier terms
