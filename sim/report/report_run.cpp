@@ -316,7 +316,7 @@ class RunReport {
         {"rhe", status_of("estimator_status", counts.value("rhe", Json::object()), "estimator")},
         {"rhc", status_of("controller_status", counts.value("rhc", Json::object()), "controller")}};
     document_["fallbacks"] = {{"rhe", events("estimator_fallback")}, {"rhc", events("controller_fallback")}};
-    document_["relaxed"] = events("relaxed");
+    document_["relaxed"] = events(steps_.has("relaxed") ? "relaxed" : "softened");  // as earlier versions called it
   }
 
   void map() {
