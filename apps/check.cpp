@@ -13,9 +13,9 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/model_check.hpp"
-#include "rhec/sim/scenario.hpp"
-#include "rhec/sim/truth_estimator.hpp"
+#include "rhec/sim/check/model_check.hpp"
+#include "rhec/sim/loop/scenario.hpp"
+#include "rhec/sim/world/truth_estimator.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -16,9 +16,9 @@
 #include "rhec/core/config/option_values.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/comparison.hpp"
-#include "rhec/sim/output_folder.hpp"
-#include "rhec/sim/problem_file.hpp"
+#include "rhec/sim/comparison/comparison.hpp"
+#include "rhec/sim/files/json.hpp"
+#include "rhec/sim/files/output_folder.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <string_view>
 #include <vector>
 
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
+#include "rhec/sim/files/json.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -138,9 +138,9 @@ void print(const std::vector<PlaceFindings>& places, const std::string& name) {
   fmt::print("\n{}\n", summary);
 }
 
-nlohmann::ordered_json as_json(const Finding& finding) {
+sim::Json as_json(const Finding& finding) {
   const PluginRecord& plugin = finding.plugin;
-  nlohmann::ordered_json json{{"file", plugin.path.filename().string()}, {"verdict", verdict_of(finding)}};
+  sim::Json json{{"file", plugin.path.filename().string()}, {"verdict", verdict_of(finding)}};
   if (!plugin.name.empty()) {
     json["kind"] = std::string(word_of(plugin.kind));
     json["name"] = plugin.name;
@@ -160,9 +160,9 @@ nlohmann::ordered_json as_json(const Finding& finding) {
 }
 
 void print_json(const std::vector<PlaceFindings>& places) {
-  nlohmann::ordered_json json{{"places", nlohmann::ordered_json::array()}};
+  sim::Json json{{"places", sim::Json::array()}};
   for (const PlaceFindings& each : places) {
-    auto candidates = nlohmann::ordered_json::array();
+    auto candidates = sim::Json::array();
     for (const Finding& finding : each.findings) candidates.push_back(as_json(finding));
     json["places"].push_back({{"directory", each.place.directory.string()},
                               {"origin", origin_of(each.place)},
@@ -175,7 +175,7 @@ void print_json(const std::vector<PlaceFindings>& places) {
   json["not_used"] = counts.not_used;
   json["refused"] = counts.refused;
   json["failed"] = counts.failed;
-  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  fmt::print("{}\n", json.dump(2));
 }
 
 }  // namespace

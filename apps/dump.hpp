@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/sim/problem_dump.hpp"
+#include "rhec/sim/problems/problem_dump.hpp"
 
 namespace CLI {
 class App;

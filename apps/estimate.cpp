@@ -10,9 +10,9 @@
 #include "dump.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
-#include "rhec/sim/horizon_log.hpp"
-#include "rhec/sim/output_folder.hpp"
-#include "rhec/sim/recorded_log.hpp"
+#include "rhec/sim/files/output_folder.hpp"
+#include "rhec/sim/horizons/horizon_log.hpp"
+#include "rhec/sim/logs/recorded_log.hpp"
 
 namespace rhec::apps {
 namespace {

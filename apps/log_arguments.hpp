@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/sim/recorded_log.hpp"
+#include "rhec/sim/logs/recorded_log.hpp"
 
 namespace CLI {
 class App;

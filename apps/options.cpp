@@ -9,7 +9,8 @@
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
-#include "rhec/sim/scenario.hpp"
+#include "rhec/sim/logs/recorded_log.hpp"
+#include "rhec/sim/loop/scenario.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -79,7 +80,8 @@ solvers that are backed by another program, since not every installation has the
 )";
 
 int show(const OptionsArguments& arguments) {
-  const std::vector<OptionSection> sections = sim::scenario_sections();
+  std::vector<OptionSection> sections = sim::scenario_sections();
+  for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
   if (!arguments.section.empty()) {
     std::vector<std::string> known;
     for (const OptionSection& section : sections) {

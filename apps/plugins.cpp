@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <iterator>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -18,6 +17,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
 #include "rhec/core/model/model.hpp"
+#include "rhec/sim/files/json.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -110,17 +110,17 @@ void print_variables(const ModelDescription& about) {
   print_table(table, "");
 }
 
-nlohmann::ordered_json as_json(const Variable& variable) {
-  nlohmann::ordered_json all{{"name", variable.name}, {"unit", variable.unit}, {"meaning", variable.meaning}};
+sim::Json as_json(const Variable& variable) {
+  sim::Json all{{"name", variable.name}, {"unit", variable.unit}, {"meaning", variable.meaning}};
   all["lower"] = variable.lower;  // null where there is none
   all["upper"] = variable.upper;
   all["scale"] = variable.scale;
   return all;
 }
 
-void add_variables(const ModelDescription& about, nlohmann::ordered_json& all) {
+void add_variables(const ModelDescription& about, sim::Json& all) {
   for (const VariableKind& kind : variable_kinds) {
-    auto& list = all[kind.name] = nlohmann::ordered_json::array();
+    auto& list = all[kind.name] = sim::Json::array();
     for (const Variable& variable : about.*kind.variables) {
       list.push_back(as_json(variable));
       if (kind.variables == &ModelDescription::parameters) list.back()["nominal"] = variable.nominal;
@@ -153,8 +153,8 @@ void describe(const Host& host, const PluginRecord& plugin) {
   print_table(table, "");
 }
 
-nlohmann::ordered_json as_json(const Host& host, const PluginRecord& plugin) {
-  nlohmann::ordered_json all;
+sim::Json as_json(const Host& host, const PluginRecord& plugin) {
+  sim::Json all;
   if (!plugin.accepted()) return {{"path", plugin.path.string()}, {"refusal", plugin.explanation()}};
   all["kind"] = std::string(word_of(plugin.kind));
   all["name"] = plugin.name;
@@ -165,7 +165,7 @@ nlohmann::ordered_json as_json(const Host& host, const PluginRecord& plugin) {
   all["backend_version"] = plugin.backend_version;
   all["capabilities"] = plugin.capabilities;
   all["path"] = plugin.path.string();
-  all["options"] = nlohmann::ordered_json::array();
+  all["options"] = sim::Json::array();
   for (const OptionRow& option : host.options(plugin.kind, plugin.name))
     all["options"].push_back({{"name", option.name},
                               {"type", option.type},
@@ -195,9 +195,9 @@ int show(const PluginsArguments& arguments) {
   if (arguments.doctor) return examine_plugins(host, arguments.name, arguments.json);
   const std::vector<PluginRecord> wanted = arguments.name.empty() ? host.discover() : named(host, arguments.name);
   if (arguments.json) {
-    auto all = nlohmann::ordered_json::array();
+    auto all = sim::Json::array();
     for (const PluginRecord& plugin : wanted) all.push_back(as_json(host, plugin));
-    fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    fmt::print("{}\n", all.dump(2));
   } else if (arguments.name.empty()) {
     list(host);
   } else {

@@ -10,8 +10,8 @@
 #include "commands.hpp"
 #include "report/report_page.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/output_folder.hpp"
-#include "rhec/sim/report.hpp"
+#include "rhec/sim/files/output_folder.hpp"
+#include "rhec/sim/report/report.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -14,9 +14,10 @@
 #include "progress.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
-#include "rhec/sim/horizon_log.hpp"
-#include "rhec/sim/output_folder.hpp"
+#include "rhec/sim/files/output_folder.hpp"
+#include "rhec/sim/horizons/horizon_log.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
+#include "rhec/sim/loop/run_files.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -12,9 +12,9 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/horizon_log.hpp"
-#include "rhec/sim/output_folder.hpp"
-#include "rhec/sim/smoothing.hpp"
+#include "rhec/sim/files/output_folder.hpp"
+#include "rhec/sim/horizons/horizon_log.hpp"
+#include "rhec/sim/logs/smoothing.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -22,10 +22,10 @@
 #include "rhec/core/qp/kkt.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/csv.hpp"
-#include "rhec/sim/output_folder.hpp"
-#include "rhec/sim/problem_file.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/files/csv.hpp"
+#include "rhec/sim/files/output_folder.hpp"
+#include "rhec/sim/numbers/spread.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
 
 namespace rhec::apps {
 namespace {

@@ -21,9 +21,9 @@
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
-#include "rhec/sim/sweep.hpp"
-#include "rhec/sim/sweep_runner.hpp"
-#include "rhec/sim/sweep_store.hpp"
+#include "rhec/sim/store/sweep_store.hpp"
+#include "rhec/sim/study/sweep.hpp"
+#include "rhec/sim/study/sweep_runner.hpp"
 #include "sweep_ranks.hpp"
 
 namespace rhec::apps {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "rhec/plugins/host/host.hpp"
-#include "rhec/sim/sweep.hpp"
-#include "rhec/sim/sweep_runner.hpp"
+#include "rhec/sim/study/sweep.hpp"
+#include "rhec/sim/study/sweep_runner.hpp"
 
 namespace rhec::apps {
 

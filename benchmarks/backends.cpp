@@ -1,6 +1,6 @@
-// The solvers that are not for real time. Of ipopt, how much of a warm-started solve is ours: the evaluation of the
-// problem and all that the plugin does around it; sparse_sqp against ipopt on the same problems at the same accuracy,
-// warm-started along a sequence; and what sparse_sqp costs against the length of the horizon.
+// The solvers that are not for real time. For ipopt, the share of a warm-started solve spent in rhec: in evaluating the
+// problem and in the plugin. sparse_sqp against ipopt on the same problems at the same accuracy, warm-started along a
+// sequence. And the time of sparse_sqp against the length of the horizon.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 #include "solvers/ipopt/ipopt_solver.hpp"
 
@@ -23,14 +23,14 @@ namespace rhec::bench {
 namespace {
 
 constexpr double tolerance = 1e-8;
-constexpr int passes = 3;  // for the share of ipopt's time that is ours
+constexpr int passes = 3;  // for the share of ipopt's time spent in rhec
 Settings accuracy() { return parse_yaml(fmt::format("{{tolerance: {}}}", tolerance), "benchmark"); }
 
-/// Ipopt linked into this program, which tells how much of its solves was Ipopt's own.
+/// The ipopt plugin linked into this program, since only its class tells how much time a solve spent in Ipopt itself.
 class Observed final : public SolverDecorator {
  public:
   Observed() : Observed(std::make_shared<ipopt::IpoptSolver>(options())) {}
-  std::vector<double> our_shares;  ///< of each solve
+  std::vector<double> our_shares;  ///< of the time of each solve
 
   using Solver::solve;
   Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override {
@@ -52,7 +52,7 @@ class Observed final : public SolverDecorator {
   const ipopt::IpoptSolver* ipopt_;
 };
 
-/// Solves along a sequence; adds the times of all but the first sample.
+/// Solves along a sequence; collects the times of all samples but the first.
 struct Pass {
   std::vector<double> times, iterations;
   double worst_kkt = 0.0;
@@ -86,7 +86,8 @@ void compare(benchmark::State& state, const Host& host, const Sequence& sequence
     observed->our_shares.clear();
     loop.restart();
     for (std::size_t k = 0; k < sequence.samples.size(); ++k) loop.step();
-    our_shares.insert(our_shares.end(), observed->our_shares.begin() + 1, observed->our_shares.end());  // but the first
+    our_shares.insert(our_shares.end(), observed->our_shares.begin() + 1,
+                      observed->our_shares.end());  // without the first
   }
 
   auto& counters = state.counters;
@@ -100,7 +101,7 @@ void compare(benchmark::State& state, const Host& host, const Sequence& sequence
   counters["ipopt_our_share"] = sim::spread_of(our_shares).median;
 }
 
-/// The first problem of a sequence from a guess near by, with a solver that has forgotten all, to the tolerance.
+/// Solves the first problem of a sequence to the tolerance, from a nearby guess, with a solver that was reset.
 void solve_alone(benchmark::State& state, const Host& host, const Sequence& sequence) {
   RtiLoop loop(sequence, host.make_solver("sparse_sqp", accuracy()));
   std::vector<double> times;

@@ -1,6 +1,6 @@
-// Closed-loop runs over a grid: paths, speeds, block structures and seeds. Says how many runs a second there are, what
-// the whole grid takes, and what of a sample's time is the estimator's solver, the controller's, and each part of all
-// else.
+// Closed-loop runs over a grid of paths, speeds, block structures and seeds. Reports the runs per second, the time of
+// the whole grid, and the shares of a sample's time: the estimator's solver, the controller's solver, and the other
+// parts.
 //
 //     closed_loop_grid [--share 0.02] [--threads 2]
 #include <algorithm>
@@ -21,7 +21,8 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
+#include "rhec/sim/loop/run_files.hpp"
 #include "ticks.hpp"
 
 namespace rhec::bench {
@@ -30,7 +31,7 @@ namespace {
 using Steady = std::chrono::steady_clock;
 
 struct Run {
-  std::shared_ptr<const Settings> scenario;  // of a path, read once
+  std::shared_ptr<const Settings> scenario;  // of a path; read only once
   std::vector<std::string> assignments;
 };
 
@@ -55,7 +56,7 @@ std::vector<Run> whole_grid() {
   return grid;
 }
 
-// What a run's time goes to; LoopPart names those of a sample. The solvers report their own times.
+// The parts of a run's time; LoopPart names those of a sample. The solvers report their own times.
 enum Part {
   estimator_solver,
   controller_solver,
@@ -81,7 +82,7 @@ constexpr std::array part_names = {"estimator_solver",
                                    "summary"};
 static_assert(part_names.size() == part_count);
 
-/// Where the time goes once that has begun; what the solvers say that they took is taken off it afterwards.
+/// The part to which time counts once a LoopPart has begun; the solvers' reported times are subtracted afterwards.
 Part part_of(sim::LoopPart part) {
   switch (part) {
     case sim::LoopPart::simulate:
@@ -95,7 +96,7 @@ Part part_of(sim::LoopPart part) {
       return references;
     case sim::LoopPart::log_sample:
       return log;
-    case sim::LoopPart::end:  // what is left is to take it down
+    case sim::LoopPart::end:  // only the teardown is left
       break;
   }
   return setup;
@@ -104,7 +105,7 @@ Part part_of(sim::LoopPart part) {
 struct Totals {
   long runs = 0, completed = 0, samples = 0;
   std::array<double, part_count> us{};
-  double csv_us = 0.0;  // no part: a grid keeps the summaries
+  double csv_us = 0.0;  // not a part: a grid keeps only the summaries
   void add(const Totals& other) {
     runs += other.runs, completed += other.completed, samples += other.samples;
     for (int part = 0; part < part_count; ++part) us[part] += other.us[part];
@@ -112,7 +113,7 @@ struct Totals {
   }
 };
 
-/// Tells what a stretch of time after the other took.
+/// Measures consecutive laps.
 class Stopwatch {
  public:
   double lap_us() {
@@ -131,7 +132,7 @@ void drive(const Host& host, const Run& run, Totals& totals) {
   const sim::Scenario scenario(host, settings);
   totals.us[making] += watch.lap_us();
 
-  // Before the first part of the first sample the loop is set up.
+  // Before its first part the loop is being set up.
   Part current = setup;
   sim::LoopHooks hooks;
   hooks.begins = [&](sim::LoopPart next) {
@@ -157,13 +158,13 @@ void drive(const Host& host, const Run& run, Totals& totals) {
   totals.samples += result.steps;
 }
 
-/// Runs in an order that is random but always the same, so that a share of them is a fair sample.
+/// Runs in a random but reproducible order, so that a share of the grid is a fair sample.
 int run_share(double share, int thread_count) {
   std::vector<Run> grid = whole_grid();
   std::shuffle(grid.begin(), grid.end(), std::mt19937(1));  // NOLINT(cert-msc32-c,cert-msc51-cpp)
   const auto wanted = std::max<std::size_t>(1, static_cast<std::size_t>(share * static_cast<double>(grid.size())));
   const Host host;
-  Stopwatch().lap_us();  // the first one of all finds out how long a tick is
+  Stopwatch().lap_us();  // the first call calibrates the ticks
   std::atomic<std::size_t> next{0};
   std::mutex mutex;
   Totals totals;
@@ -185,7 +186,7 @@ int run_share(double share, int thread_count) {
   for (int t = 0; t < thread_count; ++t) threads.emplace_back(work);
   for (std::thread& thread : threads) thread.join();
   if (failure) std::rethrow_exception(failure);
-  // What writes the logs is no part of the grid; the threads share it.
+  // Writing the logs does not count; its time is spread over the threads.
   const double seconds =
       std::chrono::duration<double>(Steady::now() - start).count() - 1e-6 * totals.csv_us / thread_count;
 

@@ -1,5 +1,5 @@
-// Takes a number of steps over a recorded drive, for callgrind to count their instructions: what it is told to look at
-// is `counted_step` alone. scripts/measure/instructions runs it.
+// Takes a number of steps over a recorded drive, for callgrind to count their instructions, in `counted_step` only.
+// scripts/measure/instructions runs it.
 #include <cstdio>
 #include <exception>
 #include <string>

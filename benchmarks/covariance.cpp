@@ -1,5 +1,5 @@
-// An estimator in its loop: what of a call to `estimate` is the solver's step, what its covariance of the estimate, and
-// what all else; and what it costs to take a new node, the arrival cost's slide and the shift included.
+// An estimator in its loop: the shares of the solver's step, of the estimate's covariance and of the rest in a call of
+// `estimate`; and the time to take a new node, including the update of the arrival cost and the shift.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -11,19 +11,19 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/scenario.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/loop/scenario.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "ticks.hpp"
 
 namespace rhec::bench {
 namespace {
 
-/// Of the calls to an estimator's method and its solver [us].
+/// Times of the calls of an estimator's method and its solver [us].
 struct Times {
   std::vector<double> add_node, solve, covariance, rest_of_estimate;
 };
 
-/// Unlike the core's TimedSolver, on a clock for single microseconds, and of covariances too.
+/// Unlike the core's TimedSolver it has a clock that resolves microseconds, and times covariances too.
 class TickedSolver final : public SolverDecorator {
  public:
   TickedSolver(std::shared_ptr<Solver> solver, std::shared_ptr<Times> times)
@@ -88,7 +88,7 @@ class TimingHooks final : public RobotHooks {
   std::shared_ptr<Times> times_;
 };
 
-/// Estimates along a drive that winds about.
+/// Estimates along a winding drive.
 void run(benchmark::State& state, Robot robot) {
   constexpr int settling = 30, steps = 200;
   const auto times = std::make_shared<Times>();
@@ -115,7 +115,7 @@ void run(benchmark::State& state, Robot robot) {
     const auto forget_settling = [](std::vector<double>& of) {
       of.erase(of.end() - settling - steps, of.end() - steps);
     };
-    times->add_node.insert(times->add_node.end() - (settling + steps - 1), 0.0);  // the start is no call of it
+    times->add_node.insert(times->add_node.end() - (settling + steps - 1), 0.0);  // the first sample does not call it
     for (auto* of : {&times->add_node, &times->solve, &times->covariance, &times->rest_of_estimate})
       forget_settling(*of);
   }

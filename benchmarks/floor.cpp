@@ -1,5 +1,5 @@
-// The floor: a step written by hand for one vehicle, from the point at which gn_rti took one of a recorded sequence. It
-// must be the same step.
+// The floor: a hand-written step for one vehicle, from an iterate of a recorded sequence at which gn_rti took a step.
+// Both steps must agree.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
 namespace rhec::bench {
@@ -20,7 +20,7 @@ namespace {
 
 constexpr double same_step = 1e-9;
 
-/// A problem, the guess for it, and the point after gn_rti's step.
+/// A problem, its guess, and the iterate after gn_rti's step.
 struct Moment {
   const HorizonProblem* problem;
   Iterate guess, result;
@@ -39,8 +39,8 @@ bool is_bound_active(const Moment& moment) {
   return largest > 0.0;
 }
 
-/// The first step, from the middle of a sequence on, that no bound has a part in. The slip that a controller is given
-/// is put into its guess, since the floor takes it as given too.
+/// The first step after the middle of a sequence at which no bound is active. A controller's given slip is written to
+/// its guess, since the floor also takes it as given.
 Moment choose_moment(const Host& host, const Sequence& sequence) {
   RtiLoop loop(sequence, host.make_solver("gn_rti"));
   loop.keep_guess = true;
@@ -64,7 +64,7 @@ Moment choose_moment(const Host& host, const Sequence& sequence) {
 }
 
 floor::Vehicle vehicle_of(const HorizonProblem& problem) {
-  // As the scenarios and the reference problems have it; another one would not give the same step.
+  // The values of the scenarios and the reference problems; with others the steps would not agree.
   return {.wheelbase = 1.4, .gps_offset = 0.4, .step = problem.duration(0)};
 }
 
@@ -108,7 +108,7 @@ void fill(const Moment& moment, floor::Control& data) {
   std::copy_n(problem.initial_state(), 4, data.initial_state.at);
 }
 
-/// Throws Error where the floor's step is another one than gn_rti's.
+/// Throws Error if the floor's step differs from gn_rti's.
 void compare(const std::string& name, const Moment& moment, const floor::Workspace& work, int states) {
   double worst = 0.0;
   const auto look = [&](double ours, double theirs, double scale) {
@@ -160,7 +160,7 @@ void add(const Host& host, const Sequence& sequence, int states) {
   const Moment moment = choose_moment(host, sequence);
   fill(moment, *data);
   floor::prepare_constants(*data, *work);
-  for (int repeat = 0; repeat < 2; ++repeat) {  // once more, from what the first one left behind
+  for (int repeat = 0; repeat < 2; ++repeat) {  // again, with the workspace that the first step left
     floor::linearise<N>(*data, *work);
     floor::solve<N>(*data, *work);
     compare(sequence.name, moment, *work, states);

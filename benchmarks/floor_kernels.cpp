@@ -12,7 +12,7 @@ inline void write_dynamics(const Lanes (&rows_of)[3][8], Workspace& work, int fi
   for (int r = 0; r < 3; ++r) store_rows(rows_of[r], &work.dynamics[first][r], 8);
 }
 
-/// rows of the next states -> defects
+/// Subtracts the next node's states, which leaves the defects.
 template <int N>
 inline void subtract_next(const Row* point, Workspace& work) {
   const Eight states = {1, 1, 1, 1, 1, 1, 0, 0};

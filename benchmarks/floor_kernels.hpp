@@ -1,16 +1,16 @@
 #pragma once
 
-// A real-time iteration of bicycle_slip by hand: sizes known at compile time, derivatives written out, no inequalities.
-// What it leaves out makes it a floor: nothing that solves these problems and can do more is expected to be faster. The
-// linear algebra does not know which entries are zero. Nothing of rhec or Eigen is included here, since these files are
-// compiled for the very machine.
+// A hand-written real-time iteration of bicycle_slip: sizes known at compile time, derivatives written out, no
+// inequalities. That makes it a lower bound on the time: no more general solver of these problems is expected to be
+// faster. The linear algebra does not exploit zero entries. Nothing of rhec or Eigen is included here, since these
+// files are compiled for the instruction set of this machine.
 namespace rhec::bench::floor {
 
-/// Of a stage: x_pos, y_pos, beta, delta, kappa, mu, u1, u2.
+/// Values of a stage: x_pos, y_pos, beta, delta, kappa, mu, u1, u2.
 struct alignas(64) Row {
   double at[8];
 };
-inline constexpr int rows = 16 + 8;  ///< room for 16 nodes, and for whoever reads a register's width further
+inline constexpr int rows = 16 + 8;  ///< 16 nodes, padded for reads of a full register
 
 struct Vehicle {
   double wheelbase, gps_offset, step;
@@ -25,7 +25,7 @@ struct Estimation {
   Row arrival_mean, arrival_information[6];
 };
 
-/// Control with the exact Hessian of the Lagrangian. kappa and mu are given, and so no states.
+/// Control with the exact Hessian of the Lagrangian. kappa and mu are given, so they are not states.
 struct Control {
   Vehicle vehicle;
   Row point[rows];
@@ -35,7 +35,7 @@ struct Control {
   Row initial_state;
 };
 
-/// The quadratic program of the stages, and its solution.
+/// The stage QP and its solution.
 struct Workspace {
   Row dynamics[rows][8];  ///< [A B], a row for each state
   Row defect[rows];
@@ -44,7 +44,7 @@ struct Workspace {
   Row cost_to_go[rows][8], cost_to_go_gradient[rows];
   Row policy[rows][8], policy_offset[rows];  ///< columns of [A + B K; K]
   Row step[rows];                            ///< of states and inputs
-  Row costates[rows];                        ///< of the step's end
+  Row costates[rows];                        ///< after the step
 };
 
 void prepare_constants(const Estimation& problem, Workspace& work);

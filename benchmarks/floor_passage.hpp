@@ -4,7 +4,7 @@
 
 #include "floor_kernels.hpp"
 
-// Stages side by side, one in each lane of a register: what an interval does, with derivatives written out.
+// The dynamics of an interval with derivatives written out, for several stages at once, one in each lane of a register.
 namespace rhec::bench::floor {
 
 using Lanes = xsimd::batch<double>;
@@ -63,9 +63,9 @@ inline void store_rows(const Lanes (&columns)[8], Row* to, int stride) {
     for (int c = 0; c < 8; ++c) to[lane * stride].at[c] = side_by_side[c][lane];
 }
 
-/// beta' = v T(delta) at one of the three steering angles of a Runge-Kutta step, with its derivatives.
+/// beta' = v T(delta) at one of the three distinct steering angles of a Runge-Kutta step, with its derivatives.
 struct TurnRate {
-  Lanes rate, tangent, slope, bend;  ///< v T; T and its derivatives by mu delta
+  Lanes rate, tangent, slope, bend;  ///< v T; T and its derivatives with respect to mu delta
   Lanes steering;
 
   TurnRate(const Lanes& speed, const Lanes& mu, const Lanes& angle, double one_over_wheelbase) : steering(angle) {
@@ -77,10 +77,10 @@ struct TurnRate {
   }
 };
 
-/// A Runge-Kutta step of the bicycle: only its heading's and its steering's rates do not depend on where it is.
+/// A Runge-Kutta step of the bicycle. The rates of the heading and of the steering angle do not depend on the heading.
 struct Passage {
   Lanes x, y, beta, delta, kappa, mu, u1, u2, v;
-  TurnRate k1, k2, k4;  // the third is the second
+  TurnRate k1, k2, k4;  // the third equals the second
   Lanes sine[4], cosine[4];
   double h;
 
@@ -119,10 +119,10 @@ struct Passage {
     next[6] = next[7] = Lanes(0.0);
   }
 
-  /// Column of the first three rows for a variable that the speed and the turn rates depend on.
+  /// Column of the Jacobian's first three rows for a variable that affects the speed or the turn rates.
   void column(const Lanes& speed, const Lanes& a1, const Lanes& a2, const Lanes& a4, Lanes (&rows_of)[3][8],
               int at) const {
-    const Lanes o2 = h * a1, o3 = h * a2, o4 = h * a2;  // of twice the second and third angle, and of the fourth
+    const Lanes o2 = h * a1, o3 = h * a2, o4 = h * a2;  // of twice the second and third heading, and of the fourth
     rows_of[0][at] = h / 6.0 * (speed * cosine_sum() - v * (sine[1] * o2 + sine[2] * o3 + sine[3] * o4));
     rows_of[1][at] = h / 6.0 * (speed * sine_sum() + v * (cosine[1] * o2 + cosine[2] * o3 + cosine[3] * o4));
     rows_of[2][at] = h / 6.0 * (a1 + 4.0 * a2 + a4);
@@ -143,7 +143,7 @@ struct Passage {
     column(zero, k1.steering * s1, k2.steering * s2, k4.steering * s4, rows_of, 5);
   }
 
-  /// Second derivatives of costate' F by beta (b), delta (d), u1 (u) and u2 (w).
+  /// Second derivatives of costate' F with respect to beta (b), delta (d), u1 (u) and u2 (w).
   struct Curvature {
     Lanes bb, bd, bu, bw, dd, du, dw, uu, uw, ww;
   };
@@ -154,7 +154,7 @@ struct Passage {
       g[i] = weight[i] * (costate[0] * cosine[i] + costate[1] * sine[i]);
       slope[i] = weight[i] * (costate[1] * cosine[i] - costate[0] * sine[i]);
     }
-    // First and second derivatives of the turn rates by delta (d), u1 (u) and u2 (w).
+    // First and second derivatives of the turn rates with respect to delta (d), u1 (u) and u2 (w).
     struct Rate {
       Lanes d, u, w, dd, du, dw, uw, ww;
     };

@@ -3,7 +3,7 @@
 #include "floor_kernels.hpp"
 #include "floor_passage.hpp"
 
-// One stage at a time: a Riccati recursion for numbers of states and intervals known at compile time.
+// A Riccati recursion, stage by stage, for numbers of states and intervals known at compile time.
 namespace rhec::bench::floor {
 
 #if defined(__AVX512F__)
@@ -16,7 +16,7 @@ constexpr int part_size = 2;
 typedef double Part __attribute__((vector_size(8 * part_size), may_alias));
 constexpr int parts = 8 / part_size;
 
-/// Eight numbers in as many registers as the machine needs.
+/// Eight numbers in as many registers as that takes.
 struct Eight {
   Part part[parts] = {};
 
@@ -71,7 +71,7 @@ inline void transpose(Eight (&rows_of)[8]) {
 #endif
 }
 
-/// The backward sweep for `states` states and two inputs, in lanes 6 and 7.
+/// The backward sweep for `states` states, and two inputs in lanes 6 and 7.
 template <int N, int states>
 inline void backward(Workspace& work) {
   for (int r = 0; r < states; ++r) store(work.cost_to_go[N][r], load(work.hessian[N][r]));
@@ -106,7 +106,7 @@ inline void backward(Workspace& work) {
       store(work.cost_to_go[i][r], h + h6[r] * k6 + h7[r] * k7);
     }
     store(work.cost_to_go_gradient[i], gradient + o6 * h6 + o7 * h7);
-    // [A + B K, B; K, 1], whose columns carry a step on.
+    // [A + B K, B; K, 1], whose columns propagate a step.
     Eight closed[8];
     for (int r = 0; r < states; ++r) closed[r] = ab[r] + AB[r].at[6] * k6 + AB[r].at[7] * k7;
     closed[6] = k6 + unit6;
@@ -139,7 +139,7 @@ inline void forward(Workspace& work, Eight step) {
   }
 }
 
-/// -P^-1 p by elimination.
+/// The step of a free initial state, -P^-1 p, by elimination.
 inline Eight free_initial_step(const Workspace& work) {
   Eight row[6];
   double right[6], one_over[6], step[8] = {};

@@ -1,5 +1,5 @@
-// What a step of gn_rti costs against the length of the horizon, what a block structure that changes costs against one
-// that does not, and how much memory a solver sets aside. Every allocation of this program is counted.
+// The time of a gn_rti step against the length of the horizon, with a changing block structure against a constant one,
+// and the memory that the solver allocates. Every allocation of this program is counted.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -13,11 +13,11 @@
 #include "long_problems.hpp"
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
-// The C library's functions behind malloc and its like, which those of this program take the place of, in every library
-// that it loads.
+// The C library's functions behind malloc and the like. This program replaces malloc and the like, also for every
+// library that it loads.
 extern "C" {
 void* __libc_malloc(std::size_t size);                           // NOLINT(bugprone-reserved-identifier)
 void* __libc_calloc(std::size_t count, std::size_t size);        // NOLINT(bugprone-reserved-identifier)
@@ -57,8 +57,8 @@ constexpr int samples = 20;
 constexpr int block = 2;  // with size 5 and overlap 3, a block starts every 2 intervals
 constexpr int lengths[] = {15, 30, 60, 125, 250, 500, 1000};
 
-/// Steps of one sequence, from its second sample on: of each the least time over the passes, since in a long one there
-/// is always somebody who interrupts.
+/// Steps of one sequence, from its second sample on. Each step's time is its minimum over the passes, since long passes
+/// are always interrupted somewhere.
 class Steps {
  public:
   Steps(const Host& host, Sequence sequence) : sequence_(std::move(sequence)) {
@@ -106,7 +106,7 @@ void add_length(const Host& host, const std::string& kind, Sequence sequence) {
   add_benchmark("horizons/" + kind + "/" + std::to_string(steps->intervals()), run);
 }
 
-/// A structure that changes at every sample against one that does not, pass by pass in turn.
+/// A structure that changes at every sample against a constant one, in alternating passes.
 void add_changing_structure(const Host& host, int intervals) {
   const auto make = [&](Blocks blocks) {
     return std::make_shared<Steps>(host, long_estimation(host, intervals, samples, block, blocks));
@@ -129,7 +129,8 @@ void register_all() {
     add_length(host, "rhe", long_estimation(host, intervals, samples, block, Blocks::moving));
     add_length(host, "rhc", long_control(host, intervals, samples));
   }
-  for (const int intervals : {16, 250}) add_changing_structure(host, intervals);  // even: as many starts in both
+  for (const int intervals : {16, 250})
+    add_changing_structure(host, intervals);  // even: the same number of starts in both
 }
 
 }  // namespace

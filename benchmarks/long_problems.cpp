@@ -12,10 +12,10 @@ namespace rhec::bench {
 namespace {
 
 constexpr double step = 0.2;         // [s]
-constexpr double steering = 0.61;    // largest angle [rad]
-constexpr double kappa_walk = 0.05;  // from block to block
+constexpr double steering = 0.61;    // largest steering angle [rad]
+constexpr double kappa_walk = 0.05;  // standard deviation from block to block
 
-/// What really happened, by node and interval.
+/// The true states, inputs and parameters, by node and interval.
 struct DriveOfTruth {
   std::vector<std::array<double, 4>> states;
   std::vector<std::array<double, 2>> inputs, parameters;
@@ -47,7 +47,7 @@ std::shared_ptr<const Model> bicycle(const Host& host) {
   return host.make_model("bicycle_slip", parse_yaml("{outputs: [x_gps, y_gps, delta]}", "benchmark"));
 }
 
-/// The true drive from node `first` on as a point of a problem.
+/// Writes the true drive from node `first` on as an iterate of a problem.
 void write_truth(const DriveOfTruth& drive, int first, const HorizonProblem& problem, Iterate& point) {
   const int N = problem.intervals();
   point.clear_multipliers();

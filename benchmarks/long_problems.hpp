@@ -4,18 +4,18 @@
 
 namespace rhec::bench {
 
-/// How the blocks of a synthetic estimation lie.
+/// Where the blocks of a synthetic estimation start.
 enum class Blocks {
-  moving,  ///< their starts are fixed in time, so that they move through the window from sample to sample
-  fixed    ///< as many starts, at the same places of every window
+  moving,  ///< at fixed times, so the starts move through the window from sample to sample
+  fixed    ///< as many starts, at the same intervals of every window
 };
 
-/// Windows of any length over one long synthetic drive of bicycle_slip, winding about on ground whose slip varies, with
-/// noisy measurements; the guess is the true drive. Kappa starts a block every `block` intervals, linked to the one
-/// before; mu has one value.
+/// Estimation windows of any length over one long, winding synthetic drive of bicycle_slip on ground of varying slip,
+/// with noisy measurements; the guess is the true drive. A block of kappa starts every `block` intervals, linked to the
+/// block before; mu has one value.
 Sequence long_estimation(const Host& host, int intervals, int samples, int block, Blocks blocks);
 
-/// Windows of any length over that drive as a reference, from states that are a little off it.
+/// Control horizons of any length with that drive as the reference, from states slightly off it.
 Sequence long_control(const Host& host, int intervals, int samples);
 
 }  // namespace rhec::bench

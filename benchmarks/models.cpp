@@ -1,6 +1,6 @@
-// A step of gn_rti with every vehicle that ships, and with two from outside: the articulated loader of
-// plugins/template, built as its author would, and a vehicle of sizes that the core has no kernels for. Horizons are of
-// 15 intervals; each drives its own scenario, with one value of every parameter.
+// A step of gn_rti with every vehicle that ships and with two others: the articulated loader of plugins/template, built
+// as a plugin author would, and a vehicle with sizes for which the core has no kernels. Horizons have 15 intervals;
+// each vehicle drives its own scenario, with one value of every parameter.
 #include <benchmark/benchmark.h>
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
 namespace rhec::bench {

@@ -1,4 +1,4 @@
-// gn_rti and bicycle_slip as plugins against the same sources linked into this program, pass by pass in turn.
+// gn_rti and bicycle_slip as plugins against the same sources linked into this program, in alternating passes.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/chosen_outputs.hpp"
 #include "rhec/plugins/kit/manifest.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
-// The manifests of the sources that are linked in, whose symbol CMakeLists.txt renames.
+// The manifests of the linked-in sources; CMakeLists.txt renames their symbol.
 extern "C" {
 extern const rhec::Manifest linked_gn_rti;
 extern const rhec::Manifest linked_bicycle_slip;
@@ -33,13 +33,13 @@ std::shared_ptr<Interface> make(const Manifest& manifest, const Settings& settin
   return {static_cast<Interface*>(made), [&manifest](Interface* object) { manifest.destroy(object); }};
 }
 
-/// The host wraps a model whose outputs are chosen; so the same is done here.
+/// The host wraps the model to select its outputs, so the same is done here.
 std::shared_ptr<Model> make_linked_model(const Settings& settings) {
   const auto model = make<Model>(linked_bicycle_slip, settings);
   return with_outputs(model, usual_outputs(model->description()));
 }
 
-/// Both sides, and of each pass the time of a median step.
+/// One side of the comparison; a pass returns the median time of a step.
 struct Side {
   Sequence sequence;
   RtiLoop loop;
@@ -67,8 +67,8 @@ void add(const Host& host, const std::vector<sim::ProblemRecord>& records) {
   const auto run = [host, records](benchmark::State& state) {
     const Settings& options = records.front().model_options;
     std::vector<double> of_plugin, of_linked, ratios;
-    // Where things lie in memory makes a step some per cent faster or slower, for both sides by chance: so that they
-    // are made anew again and again, elsewhere.
+    // Memory layout makes a step a few per cent faster or slower by chance, so both sides are recreated again and again
+    // at other addresses.
     std::mt19937 random(1);  // NOLINT(cert-msc32-c,cert-msc51-cpp): the same places each time
     std::vector<std::vector<char>> spacers;
     const auto make_side = [&](bool is_plugin) {

@@ -34,7 +34,7 @@ int run_program(int count, char** words, const std::function<void()>& register_a
 }
 
 void add_benchmark(const std::string& name, const std::function<void(benchmark::State&)>& run, int iterations) {
-#ifndef __clang_analyzer__  // which takes Google Benchmark's list of benchmarks for a leak
+#ifndef __clang_analyzer__  // it reports Google Benchmark's list of benchmarks as a leak
   auto* made = benchmark::RegisterBenchmark(name.c_str(), run);
   made->UseRealTime()->Unit(benchmark::kMicrosecond);
   if (iterations > 0) made->Iterations(iterations);

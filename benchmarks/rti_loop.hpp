@@ -10,34 +10,34 @@
 
 namespace rhec::bench {
 
-/// Solves a sequence as a robot's loop would, one sample after the other from the solution before, with everything in
-/// place beforehand: nothing is parsed or allocated.
+/// Solves a sequence as a robot's control loop would, each sample from the solution of the one before. Everything is
+/// set up beforehand: nothing is parsed or allocated.
 class RtiLoop {
  public:
-  /// The sequence must outlive the loop. Throws Error where the solver cannot take it.
+  /// The sequence must outlive the loop. Throws Error if the solver cannot take it.
   RtiLoop(const Sequence& sequence, std::shared_ptr<Solver> solver);
 
-  /// Begins anew at the first sample, with a solver that has forgotten all.
+  /// Restarts at the first sample and resets the solver.
   void restart() noexcept;
-  /// The next sample: what is known of it is set, the guess moved on, the step prepared; then the newest data are set
-  /// and the step is taken and judged. The first one has no solution before it and is solved from its guess.
+  /// Solves the next sample: sets the known data, shifts the guess and prepares the step; then sets the newest data,
+  /// takes the step and assesses it. The first sample is solved from the sequence's guess, without preparation.
   const Report& step() noexcept;
 
   struct Times {
     Ticks::Count begin, prepared, answered, end;
     double total_us() const noexcept { return Ticks::microseconds(begin, end); }
-    /// From the newest data to the new point, which is not judged yet; where the loop looks inside.
+    /// From the newest data to the new iterate, before its assessment; only with `looks_inside`.
     double feedback_us() const noexcept { return Ticks::microseconds(prepared, answered); }
   };
   const Times& times() const noexcept { return times_; }
   const Report& report() const noexcept { return report_; }
   int sample() const noexcept { return next_ - 1; }
   const HorizonProblem& problem() const noexcept { return *problem_; }
-  const Iterate& guess() const noexcept { return guess_; }  ///< of the last step, where `keep_guess` asks for it
+  const Iterate& guess() const noexcept { return guess_; }  ///< of the last step, if `keep_guess` is set
   const Iterate& point() const noexcept { return point_; }
   Solver& solver() noexcept { return *solver_; }
   bool keep_guess = false;
-  /// At the clock within a step too: the processor has to finish all that it has begun first, which takes longer.
+  /// Also reads the clock within a step. That takes longer: the processor must complete all pending instructions first.
   bool looks_inside = false;
 
  private:
@@ -52,8 +52,9 @@ class RtiLoop {
   Report report_;
 };
 
-/// How far the objective of each sample's step lies above that of the optimum it is on the way to, relative to it. What
-/// a controller is judged by is what its inputs do, so its states are simulated; an estimator's are taken as they are.
+/// For each sample, how far the objective after the step lies above that of the optimum to which `converging` solves
+/// from there, relative to the latter. A controller's states are simulated with its inputs; an estimator's are taken as
+/// they are.
 std::vector<double> excess_objectives(const Sequence& sequence, const std::shared_ptr<Solver>& solver,
                                       const std::shared_ptr<Solver>& converging);
 

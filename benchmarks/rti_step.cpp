@@ -1,7 +1,7 @@
-// One real-time iteration of gn_rti, over sequences of problems in their order, each sample once a pass: data setting,
-// shift, preparation, and the step with its judgement. Times are of single samples: the median over the passes of each,
-// and of these the median, 99th percentile and largest over the sequence. Every other pass takes the time of whole
-// steps, the others that of the answer within.
+// One real-time iteration of gn_rti, over sequences of problems, each sample once per pass: setting the data, shift,
+// preparation, step and assessment. For each sample the median over the passes is taken; of these medians the median,
+// 99th percentile and maximum over the sequence are reported. Passes alternate between timing whole steps and timing
+// the feedback within them.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -10,13 +10,13 @@
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/spread.hpp"
+#include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"
 
 namespace rhec::bench {
 namespace {
 
-/// Over the passes, for each sample.
+/// The times of each sample over the passes.
 class PassTimes {
  public:
   explicit PassTimes(std::size_t samples) : of_sample_(samples) {}

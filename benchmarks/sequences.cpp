@@ -15,15 +15,15 @@
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/closed_loop.hpp"
-#include "rhec/sim/csv.hpp"
+#include "rhec/sim/files/csv.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
 
 namespace rhec::bench {
 namespace {
 
 using sim::ProblemRecord;
 
-/// Records by prefix, in the order in which the prefixes come.
+/// Groups records by prefix, in the order of the first record of each prefix.
 std::vector<std::vector<ProblemRecord>> by_prefix(std::vector<ProblemRecord> records) {
   std::vector<std::vector<ProblemRecord>> groups;
   std::map<std::string, std::size_t> place;
@@ -63,7 +63,7 @@ void set_known(const RheProblem& from, bool slides, RheProblem& to) noexcept {
   }
   set_blocks(from, to);
   to.finish();
-  // What the newest node will say stays open; that it will say something is known.
+  // The newest measurement is not known yet, only which of its outputs will be measured.
   for (int j = 0; j < ny; ++j)
     to.output(N)[j] = std::isnan(from.output(N)[j]) ? std::numeric_limits<double>::quiet_NaN() : to.output(N - 1)[j];
 }
@@ -107,7 +107,7 @@ void set_known(const Sequence::Sample& sample, HorizonProblem& to) noexcept {
     set_known(static_cast<const RheProblem&>(from), sample.slides, static_cast<RheProblem&>(to));
     return;
   }
-  // A controller that looks ahead keeps its references until it knows where the vehicle is.
+  // The controller keeps its references until the vehicle's position is known.
   auto& control = static_cast<RhcProblem&>(to);
   control.set_intervals(from.intervals());
   for (int i = 0; i < from.intervals(); ++i) control.set_duration(i, from.duration(i));
@@ -174,7 +174,8 @@ std::vector<std::vector<ProblemRecord>> record(const Host& host, const Drive& ho
     try {
       const std::string kind = problem.kind() == "rhe" ? "rhe" : "rhc";
       auto& kept = records[kind];
-      if (!kept.empty() && kept.back().step == step) kept.pop_back();  // of several solves the last one counts
+      if (!kept.empty() && kept.back().step == step)
+        kept.pop_back();  // of several solves in a step the last one counts
       const std::string id = how.name + "/" + kind + "/" + std::to_string(step);
       kept.push_back(sim::record_of(problem, &guess, id, model.name, model.options));
     } catch (const Error& mistake) {

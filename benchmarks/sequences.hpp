@@ -7,55 +7,56 @@
 
 #include "rhec/core/horizon/horizon_problem.hpp"
 #include "rhec/plugins/host/host.hpp"
-#include "rhec/sim/problem_file.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
 
 namespace rhec::bench {
 
-/// Problems that follow each other over time, all of one structure, and where the first solve begins.
+/// Problems of one structure that follow each other in time, and the guess for the first one.
 struct Sequence {
   std::string name;  ///< "gentle/rhe/fhb", "figure8/rhc"
   std::string kind;
   std::shared_ptr<const Model> model;
   struct Sample {
     std::unique_ptr<const HorizonProblem> problem;
-    int steps = 0;  ///< intervals that its window starts later than the one before
-    /// Its window is an estimator's of the same length an interval later, with the same data where both have any.
+    int steps = 0;  ///< intervals by which its window starts after the one before
+    /// An estimator's window of the same length, one interval later, with the same data where the windows overlap.
     bool slides = false;
   };
   std::vector<Sample> samples = {};
-  std::unique_ptr<HorizonProblem> workspace = {};  ///< with room for any of the samples
-  Iterate start = {};                              ///< guess for the first one
+  std::unique_ptr<HorizonProblem> workspace = {};  ///< large enough for any of the samples
+  Iterate start = {};                              ///< guess for the first sample
 };
 
-inline constexpr int longest_horizon = 10000;  ///< that a sequence may have
+inline constexpr int longest_horizon = 10000;  ///< longest that a sequence may have [intervals]
 
-/// The sequence of records of one prefix, in their order. Throws Error, also where inputs are blocked: a benchmark
+/// The sequence of the records of one prefix, in their order. Throws Error, also if inputs are blocked: a benchmark
 /// would not move their blocks.
 Sequence sequence_of(const std::vector<sim::ProblemRecord>& records, const std::shared_ptr<const Model>& model);
 
-/// The reference problems, a sequence for each prefix of their ids, in the order of the files. The folder is that of
-/// the environment variable RHEC_REFERENCE_PROBLEMS, or else one beside the source tree. Empty where it is not there.
+/// The reference problems, one sequence for each prefix of their ids, in the order of the files. Their folder is given
+/// by the environment variable RHEC_REFERENCE_PROBLEMS; the default is one beside the source tree. Empty if there is no
+/// such folder.
 std::vector<Sequence> reference_sequences(const Host& host);
 
-/// What a scenario of the source tree is driven with.
+/// A closed-loop run of a scenario of the source tree.
 struct Drive {
-  std::string name;                           ///< of the sequences, with /rhe or /rhc behind it
+  std::string name;                           ///< of the sequences, followed by /rhe or /rhc
   std::string scenario;                       ///< "figure8"
   std::vector<std::string> assignments = {};  ///< as after --set
 };
-/// The problems of a closed loop, estimator's and controller's, from when the estimator's window is full and its
-/// estimate has settled. Throws Error, also where the drive does not reach its end.
+/// The estimator's and the controller's problems of a closed-loop run, from the time when the estimator's window is
+/// full and its estimate has settled. Throws Error, also if the run does not complete.
 std::vector<std::vector<sim::ProblemRecord>> record(const Host& host, const Drive& how);
 std::vector<Sequence> drive(const Host& host, const Drive& how);
 
-/// Drives over varying ground, for every clone: full-horizon blocking, structured blocking of one and of both
-/// parameters on a path that is easy, and on one whose turns are as tight as the steering allows.
+/// Drives over varying ground that need no data outside the source tree: full-horizon blocking, and structured blocking
+/// of one and of both parameters, on an easy path and on one with turns as tight as the steering allows.
 const std::vector<Drive>& usual_drives();
 
-/// Copies the data of a sample into a problem of the same set-up, in place, as a loop would set them: all but what the
-/// newest measurement brings ...
+/// Copies a sample's data into a problem of the same set-up, in place, as a control loop would: all but what depends on
+/// the newest measurement ...
 void set_known(const Sequence::Sample& sample, HorizonProblem& to) noexcept;
-/// ... and that.
+/// ... and what does.
 void set_newest(const HorizonProblem& from, HorizonProblem& to, std::span<double> scratch) noexcept;
 
 }  // namespace rhec::bench

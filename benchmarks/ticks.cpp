@@ -5,7 +5,7 @@
 
 namespace rhec::bench {
 
-/// Against the steady clock, over 20 ms.
+/// Calibrated against the steady clock over 20 ms.
 double Ticks::microseconds_per_count() noexcept {
   static const double value = [] {
     using Steady = std::chrono::steady_clock;
@@ -20,7 +20,7 @@ double Ticks::microseconds_per_count() noexcept {
   return value;
 }
 
-/// The median of two readings with nothing between them.
+/// The median difference of two consecutive readings.
 Ticks::Count Ticks::overhead() noexcept {
   static const Count value = [] {
     std::array<Count, 1001> differences{};

@@ -8,8 +8,8 @@
 
 namespace rhec::bench {
 
-/// A clock for stretches of a microsecond: the processor's counter where there is one that runs evenly, so that reading
-/// it costs nanoseconds.
+/// A clock for intervals of about a microsecond: the processor's time-stamp counter on x86-64, which takes nanoseconds
+/// to read, and the steady clock elsewhere.
 class Ticks {
  public:
   using Count = std::int64_t;
@@ -18,14 +18,14 @@ class Ticks {
 #if defined(__x86_64__)
     unsigned processor = 0;
     const auto count = static_cast<Count>(__rdtscp(&processor));
-    _mm_lfence();  // nothing of what is timed begins before
+    _mm_lfence();  // no timed instruction starts before the counter is read
     return count;
 #else
     return std::chrono::steady_clock::now().time_since_epoch().count();
 #endif
   }
 
-  /// The time between two readings [us], without what the reading itself costs.
+  /// The time between two readings [us], minus the cost of a reading.
   static double microseconds(Count from, Count to) noexcept {
     return static_cast<double>(to - from - overhead()) * microseconds_per_count();
   }

@@ -1,5 +1,4 @@
-// A model for the benchmark of other vehicles: what a step costs where the sizes are none that kernels are compiled
-// for.
+// A model for the benchmark of other vehicles: it measures a step with sizes for which no kernels are compiled.
 #include "two_axle_steering.hpp"
 
 #include "rhec/core/model/formula_model.hpp"

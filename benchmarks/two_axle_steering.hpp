@@ -2,17 +2,17 @@
 
 #include <cmath>
 
-/// A vehicle that steers both axles, seen from its rear axle:
+/// A vehicle that steers both axles; its position is that of the rear axle:
 ///
 ///     x' = kappa v cos(theta + mu rear),   theta' = kappa v sin(mu (front - rear)) / (length cos(mu front))
 ///     y' = kappa v sin(theta + mu rear),   front' = front_rate,   rear' = rear_rate
 ///
-/// with the state [x, y, theta, front, rear], the input [v, front_rate, rear_rate] and the slip [kappa, mu]. Its third
-/// input makes it one of those that no kernel of the recursion is compiled for.
+/// with the state [x, y, theta, front, rear], the input [v, front_rate, rear_rate] and the slip [kappa, mu]. With three
+/// inputs, no kernel of the recursion is compiled for its sizes.
 struct TwoAxleSteering {
   static constexpr int state_count = 5, input_count = 3, parameter_count = 2, output_count = 4;
 
-  double length = 2.0;  ///< between the axles [m]
+  double length = 2.0;  ///< distance between the axles [m]
 
   template <class Scalar>
   constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

@@ -51,7 +51,7 @@ constinit const ModelKernels ${TABLE} = make_model_kernels<${ARG_FORMULA}, Wides
       # Not with sanitizers, whose checks in every line make that take minutes. Without signed zeros the sums of
       # derivatives lose their terms that are always zero.
       target_compile_options(${PREFIX}_${SET} PRIVATE
-        $<$<NOT:$<BOOL:${RHEC_SANITIZE}>>:-O3> ${RHEC_WIDE_FLAGS_${SET}} -fno-math-errno -fno-trapping-math
+        $<$<NOT:$<OR:$<BOOL:${RHEC_SANITIZE}>,$<BOOL:${RHEC_SANITIZE_THREADS}>>>:-O3> ${RHEC_WIDE_FLAGS_${SET}} -fno-math-errno -fno-trapping-math
         -fno-signed-zeros -ffp-contract=fast
         "$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized;-Wno-uninitialized>")  # in gcc's own intrinsics
       set_target_properties(${PREFIX}_${SET} PROPERTIES

@@ -19,20 +19,47 @@ if(RHEC_SANITIZE)
   target_compile_options(rhec_flags INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
   target_link_options(rhec_flags INTERFACE -fsanitize=address,undefined)
 endif()
+if(RHEC_SANITIZE_THREADS)
+  if(RHEC_SANITIZE)
+    message(FATAL_ERROR "RHEC_SANITIZE and RHEC_SANITIZE_THREADS are both ON; the compiler can do one of them at a time")
+  endif()
+  target_compile_options(rhec_flags INTERFACE -fsanitize=thread)
+  target_link_options(rhec_flags INTERFACE -fsanitize=thread)
+endif()
 
-# rhec_add_room(FLOOR ROOM [INTERNAL] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
-#   A room of a floor's library, in its own folder: the target `rhec_<FLOOR>_<ROOM>`. It sees the public headers of the rooms
-#   of the same floor that it comes AFTER, and of those that they come after, and no others. The headers in <folder>/include
-#   are installed, those of an INTERNAL room are not.
+# rhec_set_up_shared_library(NAME): what all shared libraries of ours have. The target is `rhec_<NAME>`, its alias and its
+# name in the package are `rhec::<NAME>`.
+function(rhec_set_up_shared_library NAME)
+  set(TARGET rhec_${NAME})
+  add_library(rhec::${NAME} ALIAS ${TARGET})
+  target_compile_features(${TARGET} PUBLIC cxx_std_20)
+  set_target_properties(${TARGET} PROPERTIES
+    LINKER_LANGUAGE CXX VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+    EXPORT_NAME ${NAME} INSTALL_RPATH "$ORIGIN")
+  install(TARGETS ${TARGET} EXPORT rhecTargets LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+endfunction()
+
+# rhec_add_room(FLOOR ROOM [INTERNAL] [SHARED] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
+#   A room of a floor, in its own folder: the target `rhec_<FLOOR>_<ROOM>`. It sees the public headers of the rooms of the same
+#   floor that it comes AFTER, and of those that they come after, and no others. The headers in <folder>/include are
+#   installed, those of an INTERNAL room are not. What is compiled is a part of the floor's library, or of a SHARED room a
+#   library of its own, `rhec::<FLOOR>_<ROOM>`, which is linked to those of the rooms before it that it needs.
 function(rhec_add_room FLOOR ROOM)
-  cmake_parse_arguments(PARSE_ARGV 2 ARG "INTERNAL" "" "AFTER;SOURCES;PUBLIC;PRIVATE")
+  cmake_parse_arguments(PARSE_ARGV 2 ARG "INTERNAL;SHARED" "" "AFTER;SOURCES;PUBLIC;PRIVATE")
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "rhec_add_room(${FLOOR} ${ROOM}): what is '${ARG_UNPARSED_ARGUMENTS}'?")
   endif()
   set(TARGET rhec_${FLOOR}_${ROOM})
   list(TRANSFORM ARG_AFTER PREPEND rhec_${FLOOR}_)
   set(HEADERS "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>")
-  if(ARG_SOURCES)
+  if(ARG_SHARED)
+    add_library(${TARGET} SHARED ${ARG_SOURCES})
+    target_include_directories(${TARGET} PUBLIC "${HEADERS}" "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
+    target_link_libraries(${TARGET} PUBLIC ${ARG_AFTER} ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} "$<BUILD_INTERFACE:rhec_flags>")
+    target_link_options(${TARGET} PRIVATE "LINKER:--as-needed")
+    rhec_set_up_shared_library(${FLOOR}_${ROOM})
+    set_property(GLOBAL APPEND PROPERTY RHEC_ROOMS_${FLOOR} rhec::${FLOOR}_${ROOM})
+  elseif(ARG_SOURCES)
     add_library(${TARGET} OBJECT ${ARG_SOURCES})
     target_include_directories(${TARGET} PUBLIC "${HEADERS}")
     target_link_libraries(${TARGET} PUBLIC ${ARG_AFTER} ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} rhec_flags)
@@ -68,15 +95,10 @@ function(rhec_add_library NAME)
     install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
   endif()
   add_library(rhec_${NAME} SHARED ${ARG_SOURCES} ${OBJECTS})
-  add_library(rhec::${NAME} ALIAS rhec_${NAME})
   target_include_directories(rhec_${NAME} PUBLIC
     "$<BUILD_INTERFACE:${HEADERS}>" "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
   target_link_libraries(rhec_${NAME} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} "$<BUILD_INTERFACE:rhec_flags>")
-  target_compile_features(rhec_${NAME} PUBLIC cxx_std_20)
-  set_target_properties(rhec_${NAME} PROPERTIES
-    LINKER_LANGUAGE CXX VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
-    EXPORT_NAME ${NAME} INSTALL_RPATH "$ORIGIN")
-  install(TARGETS rhec_${NAME} EXPORT rhecTargets LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+  rhec_set_up_shared_library(${NAME})
 endfunction()
 
 include("${CMAKE_CURRENT_LIST_DIR}/RhecPlugin.cmake")

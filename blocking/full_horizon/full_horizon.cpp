@@ -1,5 +1,5 @@
-// One value for the whole horizon (FHB). A strategy of its own rather than blocks of a large size: those would still
-// have a border somewhere, which would slide through the window once in a while.
+// One value for the whole horizon (FHB). A strategy of its own, since large blocks would still have a border that
+// slides through the window from time to time.
 #include <algorithm>
 
 #include "rhec/core/horizon/blocking.hpp"
@@ -16,7 +16,7 @@ class FullHorizon : public Blocking {
   std::int64_t starts(const Window& window, std::uint8_t* begins) const noexcept override {
     std::fill_n(begins, window.intervals, std::uint8_t{0});
     begins[0] = 1;
-    return 0;  // there is one block, and it began with the run
+    return 0;  // the only block began with the run
   }
   bool is_one_block() const noexcept override { return true; }
 };

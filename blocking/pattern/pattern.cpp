@@ -1,4 +1,4 @@
-// Blocks of given lengths: move blocking as it is usually written, e.g. [1, 1, 3, 5].
+// Blocks of given lengths, the usual form of move blocking, e.g. [1, 1, 3, 5].
 #include <algorithm>
 
 #include "rhec/core/horizon/linked_blocking.hpp"
@@ -37,7 +37,7 @@ class Pattern : public LinkedBlocking {
     std::fill_n(begins, window.intervals, std::uint8_t{0});
     begins[0] = 1;
     if (anchor_ == Anchor::horizon) {
-      // Not the last border: behind it, the last block goes on.
+      // Not the last border: the last block continues beyond it.
       for (auto border = borders_.begin(); border + 1 != borders_.end() && *border < window.intervals; ++border) {
         begins[*border] = 1;
       }

@@ -1,4 +1,4 @@
-// Structured blocking (SB) with an optional overlap (SB-O), Wallace et al.
+// Structured blocking (SB), optionally with overlap (SB-O): docs/method.md, section 4 [1].
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,8 +28,8 @@ struct StructuredOptions : BlockLink {
   }
 };
 
-/// A block starts at the intervals s with s mod S = 0 that have k - s >= o, k being the window's step; and at the
-/// window's first interval. With the anchor `horizon`, s is counted from there.
+/// A block starts at the window's first interval and at the intervals s with s mod S = 0 and k - s >= o, where k is the
+/// window's step. With the anchor `horizon`, s is counted from the window's first interval.
 class Structured : public LinkedBlocking {
  public:
   using Options = StructuredOptions;
@@ -38,14 +38,13 @@ class Structured : public LinkedBlocking {
   std::int64_t starts(const Window& window, std::uint8_t* begins) const noexcept override {
     const std::int64_t size = options_.size;
     const std::int64_t origin = options_.anchor == Anchor::time ? 0 : window.first;
-    const std::int64_t newest = window.step() - options_.overlap;  // no start later than this exists yet
+    const std::int64_t newest = window.step() - options_.overlap;  // no block starts later than this yet
     for (int i = 0; i < window.intervals; ++i) {
       const std::int64_t s = window.first + i;
       begins[i] = (s - origin) % size == 0 && s <= newest;
     }
     begins[0] = 1;
-    // A window at the start of the run can be shorter than the overlap; then there is one block, which began with the
-    // run.
+    // At the start of the run the window can be shorter than the overlap; then its only block began with the run.
     const std::int64_t last_possible = std::max(origin, std::min(window.first, newest));
     return last_possible - (last_possible - origin) % size;
   }

@@ -1,4 +1,4 @@
-// A value for every interval.
+// One value for every interval.
 #include <algorithm>
 
 #include "rhec/core/horizon/linked_blocking.hpp"

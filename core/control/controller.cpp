@@ -8,6 +8,7 @@
 
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 
 namespace rhec {
 namespace {
@@ -143,6 +144,18 @@ void Controller::start_cold() noexcept {
   roll_out(problem_, point_, scratch_);
 }
 
+/// Calls the solver and takes the command from its plan. False if there is no usable plan.
+bool Controller::find_plan(Clock::time_point deadline) noexcept {
+  command_.report = solver_->feedback(point_, deadline);
+  if (!is_usable(command_.report.status)) return false;
+  problem_.structure().inputs_on(point_, 0, command_.inputs.data());
+  // No solver should return such a command, and none must reach the robot.
+  const bool is_number =
+      std::all_of(command_.inputs.begin(), command_.inputs.end(), [](double value) { return std::isfinite(value); });
+  if (!is_number) command_.report.status = Status::bad_input;
+  return is_number;
+}
+
 const Controller::Command& Controller::control(const Estimate& estimate, Clock::time_point deadline) noexcept {
   finish();
   const Roles& roles = problem_.model().description().roles;
@@ -159,18 +172,22 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
     from_plan = shifter_.apply(1, problem_, point_);
     if (!from_plan) start_cold();
   }
-  command_.report = solver_->feedback(point_, deadline);
-  if (!is_usable(command_.report.status) && from_plan) {
+  bool is_found = find_plan(deadline);
+  if (!is_found && from_plan) {
     // The last plan may be a bad guess, e.g. after a jump of the estimate: try a simulation instead.
     start_cold();
-    command_.report = solver_->feedback(point_, deadline);
+    is_found = find_plan(deadline);
     command_.report.fallback_used = true;
   }
-  command_.fallback = !is_usable(command_.report.status);
+  command_.fallback = !is_found;
   fallbacks_ += command_.fallback;
   prepared_ = false;
-  has_plan_ = true;
-  problem_.structure().inputs_on(point_, 0, command_.inputs.data());
+  has_plan_ = is_found || from_plan;
+  if (!is_found) {
+    // Continue the last plan, which the shifter still has; without one, go straight ahead along the path.
+    if (!from_plan || !shifter_.apply(1, problem_, point_)) start_cold();
+    problem_.structure().inputs_on(point_, 0, command_.inputs.data());
+  }
   for (std::size_t j = 0; j < command_.inputs.size(); ++j)
     command_.inputs[j] = std::min(std::max(command_.inputs[j], problem_.input_lower(0, static_cast<int>(j))),
                                   problem_.input_upper(0, static_cast<int>(j)));
@@ -184,7 +201,9 @@ void Controller::finish() noexcept {
   if (is_finished_) return;
   is_finished_ = true;
   solver_->finish(point_, command_.report);
+  if (!has_plan_) return;
   shifter_.take(problem_, point_);
+  if (!command_.fallback) has_plan_ = is_finite(problem_, point_);
 }
 
 void Controller::prepare() noexcept {

@@ -1,4 +1,4 @@
-// A problem of one's own kind, solved by any of rhec's solvers: a robot drives into a parking place.
+// A user-defined kind of problem, solved by any of rhec's solvers: a robot drives into a parking place.
 #include <cstdio>
 
 #include "parking_problem.hpp"
@@ -15,7 +15,7 @@ int main(int count, char** words) try {
   const double slip[] = {0.9, 1.0};
   std::copy_n(slip, 2, problem.given_parameters());
 
-  // The first guess: slowly straight on.
+  // The initial guess: slowly straight ahead.
   rhec::Iterate iterate(problem.capacity());
   std::vector<double> inputs, parameters, scratch(problem.scratch_size());
   for (int i = 0; i < problem.intervals(); ++i) {

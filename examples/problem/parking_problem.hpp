@@ -7,12 +7,12 @@
 
 #include "rhec/core/horizon/horizon_problem.hpp"
 
-/// A kind of problem that rhec does not know: from a given state to a goal, with as little input as that takes.
+/// A kind of problem that rhec does not have: drive from a given state to a goal with little input.
 ///
 ///     minimise  sum_{i=0}^{N-1} || u_i ||^2_R  +  || x_N - goal ||^2_V
 ///     subject to the dynamics, the model's bounds on states and inputs, x_0 and the parameters given
 ///
-/// What it adds to HorizonProblem is the cost, and what is given. All solvers of rhec take it.
+/// It adds to HorizonProblem the cost and the given values. All solvers of rhec can solve it.
 class ParkingProblem final : public rhec::HorizonProblem {
  public:
   struct Setup {
@@ -76,10 +76,10 @@ class ParkingProblem final : public rhec::HorizonProblem {
     return total;
   }
 
-  bool has_late_bounds() const noexcept override { return true; }  // the initial state is one
+  bool has_late_bounds() const noexcept override { return true; }  // the initial state counts as one
   bool has_constant_cost_hessian() const noexcept override { return true; }
 
-  /// function(column of the row [s; w], weight, error) for each square of a stage.
+  /// Calls function(column in [s; w], weight, error) for each squared term of a stage.
   template <class Function>
   void for_each_term(int stage, const rhec::Iterate& iterate, const Function& function) const {
     if (stage == intervals()) {

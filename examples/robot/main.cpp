@@ -1,4 +1,4 @@
-// A robot in its loop. A toy takes the place of the vehicle: the model itself, on ground that slips.
+// A robot in its control loop. The model itself, on slipping ground, stands in for the vehicle.
 #include <cmath>
 #include <cstdio>
 
@@ -6,7 +6,7 @@
 
 int main(int count, char** words) try {
   if (count != 2) throw rhec::Error("expected one argument, a file such as robot.yaml");
-  const rhec::Host host;  // the plugins: those of RHEC_PLUGIN_PATH, then those that are installed
+  const rhec::Host host;  // finds plugins in RHEC_PLUGIN_PATH, then the installed ones
   const rhec::Robot robot = rhec::Robot::from_file(host, words[1]);
   const rhec::Model& model = *robot.model();
   std::vector<rhec::Waypoint> line;  // x, y [m], 2 m/s
@@ -30,8 +30,8 @@ int main(int count, char** words) try {
                      .durations = &step,
                      .next_states = next.data()});
     state.swap(next);
-    estimator->push_input(time, inputs.data());  // what holds from `time` on
-    estimator->prepare();                        // work that need not wait for the next sample
+    estimator->push_input(time, inputs.data());  // applied from `time` on
+    estimator->prepare();                        // work that does not need the next sample
     controller->prepare();
   }
   return controller->finished() ? 0 : 1;

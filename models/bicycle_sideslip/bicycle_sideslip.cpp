@@ -1,4 +1,4 @@
-// The bicycle with side-slip angles as a plugin: names, units and bounds of what is in its formula.
+// The bicycle with side-slip angles as a plugin: names, units and bounds of the variables in bicycle_sideslip.hpp.
 #include "bicycle_sideslip.hpp"
 
 #include <numbers>
@@ -13,7 +13,7 @@ WideKernels bicycle_sideslip_wide_kernels();  // defined by rhec_add_model
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kSteeringLimit = 35.0 * kDegree;  // [rad], and of the rate [rad/s]
+constexpr double kSteeringLimit = 35.0 * kDegree;  // of the angle [rad] and of its rate [rad/s]
 constexpr double kSideslipLimit = 15.0 * kDegree;  // [rad]
 constexpr const char* kSource =
     "Lenain, Thuilot, Cariou, Martinet, High accuracy path tracking for vehicles in presence of sliding: application "

@@ -9,15 +9,15 @@ namespace rhec {
 ///     x' = v cos(psi + beta_rear)      psi'   = v cos(beta_rear) (tan(delta + beta_front) - tan(beta_rear)) / L
 ///     y' = v sin(psi + beta_rear)      delta' = delta_rate
 ///
-/// with state [x, y, psi, delta], u = [v, delta_rate], p = [beta_front, beta_rear]: v is the speed of the rear axle's
-/// centre, and the axles' velocities point beta_rear and beta_front to the left of their wheels. The source writes the
-/// same in coordinates of the path that is followed. Outputs: an antenna with a lever arm (a_x, a_y), delta, psi.
+/// with state [x, y, psi, delta], u = [v, delta_rate], p = [beta_front, beta_rear]. v is the speed of the rear axle's
+/// centre; each axle's velocity points beta_front or beta_rear to the left of its wheels. The source gives the same
+/// model in path coordinates. Outputs: the position of an antenna with lever arm (a_x, a_y), delta, psi.
 struct BicycleSideslip {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 4;
 
   double wheelbase = 2.8;  ///< L [m]
-  double antenna_x = 0.0;  ///< a_x: how far the GPS antenna is before the rear axle [m]
-  double antenna_y = 0.0;  ///< a_y: how far it is to the left [m]
+  double antenna_x = 0.0;  ///< a_x: distance of the GPS antenna ahead of the rear axle [m]
+  double antenna_y = 0.0;  ///< a_y: its distance to the left [m]
 
   template <class Scalar>
   constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

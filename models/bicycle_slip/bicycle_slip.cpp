@@ -1,4 +1,4 @@
-// The bicycle with slip as a plugin: names, units and bounds of what is in its formula.
+// The bicycle with slip as a plugin: names, units and bounds of the variables in bicycle_slip.hpp.
 #include "bicycle_slip.hpp"
 
 #include <numbers>
@@ -12,7 +12,7 @@ WideKernels bicycle_slip_wide_kernels();  // defined by rhec_add_model
 
 namespace {
 
-constexpr double kSteeringLimit = 35.0 * std::numbers::pi / 180.0;  // [rad], and of the rate [rad/s]
+constexpr double kSteeringLimit = 35.0 * std::numbers::pi / 180.0;  // of the angle [rad] and of its rate [rad/s]
 constexpr const char* kSource =
     "Kraus et al., Moving horizon estimation and nonlinear model predictive control for autonomous agricultural "
     "vehicles, 2013; Wallace et al., Receding horizon estimation and control with structured noise blocking for mobile "

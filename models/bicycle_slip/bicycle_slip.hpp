@@ -15,7 +15,7 @@ struct BicycleSlip {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 4;
 
   double wheelbase = 1.4;   ///< l [m]
-  double gps_offset = 0.4;  ///< d: how far the GPS antenna is behind the rear axle [m]
+  double gps_offset = 0.4;  ///< d: distance of the GPS antenna behind the rear axle [m]
 
   template <class Scalar>
   constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

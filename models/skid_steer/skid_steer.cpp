@@ -1,4 +1,4 @@
-// The skid-steered vehicle as a plugin: names, units and bounds of what is in its formula.
+// The skid-steered vehicle as a plugin: names, units and bounds of the variables in skid_steer.hpp.
 #include "skid_steer.hpp"
 
 #include "rhec/core/model/formula_model.hpp"
@@ -73,7 +73,7 @@ class SkidSteerModel : public FormulaModel<SkidSteer> {
       : FormulaModel(static_cast<const SkidSteer&>(options), describe(), skid_steer_wide_kernels()),
         wheel_radius_(options.wheel_radius) {}
 
-  // No single input is the speed: each side has its own, and slips by its own share.
+  // No single input is the speed: each side has its own wheel speed and slip.
   void straight_motion(double ground_speed, const double* p, double*, double* inputs) const noexcept override {
     for (int side = 0; side < 2; ++side) inputs[side] = ground_speed / (wheel_radius_ * (1.0 - p[side]));
   }

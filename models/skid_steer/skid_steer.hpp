@@ -4,21 +4,21 @@
 
 namespace rhec {
 
-/// A skid-steered vehicle (Yi et al. 2009): the wheels of each side turn together, each side slips lengthwise by a
-/// ratio of its own, and to turn the vehicle has to slide sideways, about a centre of rotation s before its own centre:
+/// A skid-steered vehicle (Yi et al. 2009). The wheels of each side turn together, and each side has its own
+/// longitudinal slip ratio. To turn, the vehicle slides sideways; its centre of rotation is s ahead of its centre:
 ///
 ///     v_l  = r omega_l (1 - lambda_l)      v   = (v_l + v_r) / 2           x' = v cos(psi) + s psi' sin(psi)
 ///     v_r  = r omega_r (1 - lambda_r)      psi' = (v_r - v_l) / W          y' = v sin(psi) - s psi' cos(psi)
 ///
-/// with state [x, y, psi], u = [omega_l, omega_r], p = [lambda_l, lambda_r, s]. Outputs: an antenna with a lever arm
-/// (a_x, a_y) from the centre, and psi.
+/// with state [x, y, psi], u = [omega_l, omega_r], p = [lambda_l, lambda_r, s]. Outputs: the position of an antenna
+/// with lever arm (a_x, a_y) from the centre, and psi.
 struct SkidSteer {
   static constexpr int state_count = 3, input_count = 2, parameter_count = 3, output_count = 3;
 
   double wheel_radius = 0.14;  ///< r [m]
-  double track_width = 0.6;    ///< W: between the wheels of both sides [m]
-  double antenna_x = 0.0;      ///< a_x: how far the GPS antenna is before the centre [m]
-  double antenna_y = 0.0;      ///< a_y: how far it is to the left [m]
+  double track_width = 0.6;    ///< W: between the left and right wheels [m]
+  double antenna_x = 0.0;      ///< a_x: distance of the GPS antenna ahead of the centre [m]
+  double antenna_y = 0.0;      ///< a_y: its distance to the left [m]
 
   template <class Scalar>
   constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

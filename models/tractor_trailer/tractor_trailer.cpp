@@ -1,4 +1,4 @@
-// The tractor with a trailer as a plugin: names, units and bounds of what is in its formula.
+// The tractor with a trailer as a plugin: names, units and bounds of the variables in tractor_trailer.hpp.
 #include "tractor_trailer.hpp"
 
 #include <numbers>
@@ -12,7 +12,7 @@ WideKernels tractor_trailer_wide_kernels();  // defined by rhec_add_model
 
 namespace {
 
-constexpr double kSteeringLimit = 35.0 * std::numbers::pi / 180.0;  // [rad], and of the rate [rad/s]
+constexpr double kSteeringLimit = 35.0 * std::numbers::pi / 180.0;  // of the angle [rad] and of its rate [rad/s]
 constexpr const char* kSource =
     "Kayacan, Kayacan, Ramon, Saeys, Learning in centralized nonlinear model predictive control: application to an "
     "autonomous tractor-trailer system, IEEE Transactions on Control Systems Technology 23(1), 2015; the same, "

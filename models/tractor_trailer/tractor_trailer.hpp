@@ -5,32 +5,32 @@
 namespace rhec {
 
 /// A tractor with a passive trailer and three slip factors (Kayacan et al. 2014). The hitch is l behind the tractor's
-/// rear axle (ahead of it where l is negative); beta = psi_t - psi_i is the articulation:
+/// rear axle (ahead of it if l is negative); beta = psi_t - psi_i is the articulation angle:
 ///
 ///     psi_t' = mu v tan(kappa delta) / L_t
 ///     psi_i' = mu v / L_i (sin(eta beta) - l / L_t tan(kappa delta) cos(eta beta))
 ///     delta' = delta_rate
 ///
-/// The tractor's rear axle moves by mu v along psi_t. The position that is followed is that of the trailer's axle,
+/// The tractor's rear axle moves at mu v along psi_t. The position that follows the path is that of the trailer's axle,
 ///
 ///     x_i = x_t - l cos(psi_t) - L_i cos(psi_i),      y_i = y_t - l sin(psi_t) - L_i sin(psi_i)
 ///
-/// and since these are the states, their rates are the derivative of that geometry. Without slip the axle then rolls
-/// along psi_i exactly; with slip it drifts as the factors say. The published form moves it along psi_i at the
+/// x_i and y_i are states, and their rates are the derivative of that geometry. Without slip the axle then rolls
+/// exactly along psi_i; with slip it drifts according to the factors. The published model moves it along psi_i at the
 /// tractor's speed, which holds for small beta only.
 ///
-/// With state [x_i, y_i, psi_i, psi_t, delta], u = [v, delta_rate], p = [mu, kappa, eta]. Outputs: antennas on the
-/// trailer and on the tractor (each with a lever arm from its axle), delta, beta, and both headings.
+/// With state [x_i, y_i, psi_i, psi_t, delta], u = [v, delta_rate], p = [mu, kappa, eta]. Outputs: the positions of
+/// antennas on the trailer and on the tractor (each with a lever arm from its axle), delta, beta, and both headings.
 struct TractorTrailer {
   static constexpr int state_count = 5, input_count = 2, parameter_count = 3, output_count = 8;
 
   double wheelbase = 1.4;          ///< L_t [m]
-  double trailer_length = 1.3;     ///< L_i: from the hitch to the trailer's axle [m]
-  double hitch = 1.1;              ///< l: how far the hitch is behind the tractor's rear axle [m]
-  double tractor_antenna_x = 0.0;  ///< how far the antenna is before the tractor's rear axle [m]
-  double tractor_antenna_y = 0.0;  ///< how far it is to the left [m]
-  double trailer_antenna_x = 0.0;  ///< how far the antenna is before the trailer's axle [m]
-  double trailer_antenna_y = 0.0;  ///< how far it is to the left [m]
+  double trailer_length = 1.3;     ///< L_i: distance from the hitch to the trailer's axle [m]
+  double hitch = 1.1;              ///< l: distance of the hitch behind the tractor's rear axle [m]
+  double tractor_antenna_x = 0.0;  ///< distance of the antenna ahead of the tractor's rear axle [m]
+  double tractor_antenna_y = 0.0;  ///< its distance to the left [m]
+  double trailer_antenna_x = 0.0;  ///< distance of the antenna ahead of the trailer's axle [m]
+  double trailer_antenna_y = 0.0;  ///< its distance to the left [m]
 
   template <class Scalar>
   constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

@@ -1,4 +1,5 @@
-// The unicycle with traction coefficients as a plugin: names, units and bounds of what is in its formula.
+// The unicycle with traction coefficients as a plugin: names, units and bounds of the variables in
+// unicycle_traction.hpp.
 #include "unicycle_traction.hpp"
 
 #include "rhec/core/model/formula_model.hpp"

@@ -4,7 +4,7 @@
 
 namespace rhec {
 
-/// A tracked or differentially driven robot with traction coefficients (Kayacan et al. 2018):
+/// A tracked or differential-drive robot with traction coefficients (Kayacan et al. 2018):
 ///
 ///     x' = mu v cos(psi)      psi' = kappa omega
 ///     y' = mu v sin(psi)      h    = [x + a_x cos(psi) - a_y sin(psi), y + a_x sin(psi) + a_y cos(psi), psi]
@@ -13,8 +13,8 @@ namespace rhec {
 struct UnicycleTraction {
   static constexpr int state_count = 3, input_count = 2, parameter_count = 2, output_count = 3;
 
-  double antenna_x = 0.0;  ///< a_x: how far the GPS antenna is before the centre [m]
-  double antenna_y = 0.0;  ///< a_y: how far it is to the left [m]
+  double antenna_x = 0.0;  ///< a_x: distance of the GPS antenna ahead of the centre [m]
+  double antenna_y = 0.0;  ///< a_y: its distance to the left [m]
 
   template <class Scalar>
   constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

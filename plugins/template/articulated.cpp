@@ -1,5 +1,5 @@
-// A model: what the variables of the formula in articulated.hpp are called, their units, bounds and scales, the options
-// of the vehicle, and the line that makes a plugin of it. Try it with: rhec plugins articulated
+// A model: names, units, bounds and scales of the variables of the formula in articulated.hpp, the options of the
+// vehicle, and the line that makes it a plugin. Try it with: rhec plugins articulated
 #include "articulated.hpp"
 
 #include "rhec/core/model/formula_model.hpp"
@@ -11,8 +11,9 @@ WideKernels articulated_wide_kernels();  // rhec_add_model(articulated ...) in C
 
 namespace {
 
-// One entry for each number of the formula, in its order. `scale` is a typical magnitude; `lower` and `upper` are
-// bounds that a configuration can change; `is_angle`: compared on the circle. The names are keys of the configuration.
+// One entry for each variable of the formula, in the same order. `scale` is a typical magnitude; `lower` and `upper`
+// are bounds that a configuration can change; `is_angle`: differences are taken modulo 2 pi. The names are keys of the
+// configuration.
 rhec::ModelDescription describe() {
   rhec::ModelDescription model;
   model.name = "articulated";
@@ -33,12 +34,12 @@ rhec::ModelDescription describe() {
       {.name = "x_gps", .unit = "m", .meaning = "GPS antenna, x", .scale = 10.0},
       {.name = "y_gps", .unit = "m", .meaning = "GPS antenna, y", .scale = 10.0},
       {.name = "gamma", .unit = "rad", .meaning = "measured articulation angle", .scale = 0.3, .is_angle = true}};
-  // What a path follower needs to know: indices of states (the first three), of an input, and of a parameter.
+  // What a path follower needs: the indices of three states, of an input, and of a parameter.
   model.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0, .speed_factor = 0};
   return model;
 }
 
-// What differs from vehicle to vehicle is an option: `model: {name: articulated, front: 1.5}`.
+// Constants that differ from vehicle to vehicle are options: `model: {name: articulated, front: 1.5}`.
 struct ArticulatedOptions : Articulated {
   static const rhec::OptionTable<ArticulatedOptions>& table() {
     static const auto rows =

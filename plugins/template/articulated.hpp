@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-/// A vehicle that bends in its middle, as wheel loaders and some tractors do: front and rear unit, joined by a hinge.
+/// A centre-articulated vehicle, such as a wheel loader: a front and a rear unit joined by a hinge.
 ///
 ///     x'     = kappa v cos(theta)
 ///     y'     = kappa v sin(theta)
@@ -10,19 +10,19 @@
 ///     gamma' = w
 ///     h      = [x + antenna cos(theta), y + antenna sin(theta), gamma]
 ///
-/// with the state [x, y, theta, gamma] (middle of the front axle, heading of the front unit, articulation angle: that
-/// heading less the rear unit's), the input [v, w] (wheel speed, articulation rate) and the slip [kappa, mu, nu].
-/// Without slip all three are 1, and this is the model of Corke & Ridley, Steering kinematics for a center-articulated
-/// mobile robot, IEEE Transactions on Robotics and Automation 17(2), 2001.
+/// with the state [x, y, theta, gamma] (centre of the front axle, heading of the front unit, articulation angle: the
+/// front unit's heading minus the rear unit's), the input [v, w] (wheel speed, articulation rate) and the slip [kappa,
+/// mu, nu]. Without slip all three are 1, and this is the model of Corke & Ridley, Steering kinematics for a
+/// center-articulated mobile robot, IEEE Transactions on Robotics and Automation 17(2), 2001.
 ///
-/// For another vehicle: the four counts, the lengths, and the two functions. `Scalar` is a double and several other
-/// types that behave like one, by which derivatives are found; so no `if` on values, and no `std::` before sin.
+/// For another vehicle, change the four counts, the lengths, and the two functions. `Scalar` is double, or one of the
+/// types that compute derivatives and behave like double; so no `if` on values, and no `std::` before sin.
 struct Articulated {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 3, output_count = 3;
 
-  double front = 1.2;    ///< from the hinge to the front axle [m]
-  double rear = 1.2;     ///< from the hinge to the rear axle [m]
-  double antenna = 0.3;  ///< how far the GPS antenna is before the front axle [m]
+  double front = 1.2;    ///< distance from the hinge to the front axle [m]
+  double rear = 1.2;     ///< distance from the hinge to the rear axle [m]
+  double antenna = 0.3;  ///< distance of the GPS antenna ahead of the front axle [m]
 
   template <class Scalar>
   constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {

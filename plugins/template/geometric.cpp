@@ -1,9 +1,9 @@
-// A blocking: which consecutive intervals share one value of a parameter (estimation) or of an input (control). Here,
-// blocks that grow by a factor with their distance from now: fine where the newest data or the next input are, coarse
-// far away.
+// A blocking: which consecutive intervals share one value of a parameter (estimation) or of an input (control). Here
+// blocks grow by a factor with their distance from the current time: fine near the newest data or the next input,
+// coarse far away.
 //
-// To write one of your own: change the options, `starts`, and the two names in RHEC_PLUGIN. What `starts` has to do is
-// in rhec/core/horizon/blocking.hpp. Try it with: rhec plugins geometric
+// To write one of your own: change the options, `starts`, and the two names in RHEC_PLUGIN.
+// rhec/core/horizon/blocking.hpp says what `starts` has to do. Try it with: rhec plugins geometric
 #include <algorithm>
 
 #include "rhec/core/horizon/linked_blocking.hpp"
@@ -13,7 +13,7 @@ namespace {
 
 enum class Now { not_said, start, end };
 
-// BlockLink brings the options `transition` and `neighbour_sigma`, which every blocking of several blocks has.
+// BlockLink provides the options `transition` and `neighbour_sigma`, which every blocking with several blocks has.
 struct GeometricOptions : rhec::BlockLink {
   int first = 1;
   int factor = 2;
@@ -36,7 +36,7 @@ class Geometric : public rhec::LinkedBlocking {
  public:
   using Options = GeometricOptions;
   explicit Geometric(const Options& options) : LinkedBlocking(options), options_(options) {
-    // A mistake that a range cannot express is thrown here: say whose it is, which key, and what to write.
+    // Mistakes that the option's range cannot exclude are thrown here: name the plugin, the key, and what to write.
     if (options.now == Now::not_said)
       throw rhec::Error("blocking 'geometric': now: expected 'end' for an estimator or 'start' for a controller");
   }
@@ -53,11 +53,11 @@ class Geometric : public rhec::LinkedBlocking {
       }
       return window.first;
     }
-    // An estimator meets the same interval again at every step, so borders are counted from the start of the run: one
-    // stands at the multiples of the length that blocks of its age have. These lengths divide each other. So, as time
-    // goes on, neighbours merge to longer blocks, and no border comes back or moves.
+    // An estimator sees the same interval again at every step, so borders are counted from the start of the run: they
+    // stand at multiples of the block length for their age. Each length divides the next. So with time adjacent blocks
+    // merge into longer ones, and no border moves or reappears.
     for (int i = 1; i < window.intervals; ++i) begins[i] = (window.first + i) % length_at(window.intervals - i) == 0;
-    // The window's edge cuts the first block. What has left the window does not merge any more.
+    // The window's edge may cut the first block. Blocks outside the window no longer merge.
     return window.first - window.first % length_at(window.intervals);
   }
 
@@ -67,7 +67,7 @@ class Geometric : public rhec::LinkedBlocking {
   }
 
  private:
-  /// The length of blocks whose start lies so many intervals back: the longest that is no longer than that.
+  /// The length of blocks that start `age` intervals back: the longest length not above `age`.
   std::int64_t length_at(std::int64_t age) const noexcept {
     std::int64_t length = options_.first;
     while (length * options_.factor <= age) length *= options_.factor;

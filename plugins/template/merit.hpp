@@ -6,8 +6,8 @@
 
 #include "rhec/core/ocp/ocp.hpp"
 
-/// What plain_sqp minimises along a step: the objective, an augmented Lagrangian of the bounds (Nocedal & Wright,
-/// Numerical Optimization, 17.4) and a price on defects of the dynamics,
+/// The merit function of plain_sqp's line search: the objective, an augmented Lagrangian of the bounds (Nocedal &
+/// Wright, Numerical Optimization, 17.4) and an l1 penalty on the defects of the dynamics,
 ///
 ///     sum_i l_i  +  weight/2 sum_v (v + m/weight - nearest value within the bounds)^2  +  price sum |defects|
 ///
@@ -21,7 +21,7 @@ class Merit {
         defects_(static_cast<std::size_t>(ocp.capacity().intervals) * ocp.capacity().states) {}
 
   double weight = 1.0, price = 0.0;
-  rhec::Iterate multipliers;  ///< m, where an Iterate has its bound multipliers
+  rhec::Iterate multipliers;  ///< m, stored as bound multipliers
   std::vector<double> scratch;
 
   double operator()(const rhec::Ocp& ocp, rhec::Iterate& point) noexcept {
@@ -31,7 +31,7 @@ class Merit {
     return sum;
   }
 
-  /// The second term. Its derivatives become the point's bound multipliers: the next m.
+  /// The second term. Its derivatives are stored as the point's bound multipliers: the next m.
   double cost_of_bounds(const rhec::Ocp& ocp, rhec::Iterate& point) const noexcept {
     double sum = 0.0;
     const auto add = [&](const double* value, const double* lower, const double* upper, const double* multiplier,
@@ -44,7 +44,7 @@ class Merit {
       }
     };
     for (int i = 0; i <= ocp.intervals(); ++i) {
-      if (i == 0 && ocp.initial_state()) {  // a given state has no choice
+      if (i == 0 && ocp.initial_state()) {  // a given state is not a variable
         std::fill_n(point.state_bound(0), ocp.state_count(0), 0.0);
       } else {
         add(point.state(i), ocp.state_lower(i), ocp.state_upper(i), multipliers.state_bound(i), point.state_bound(i),

@@ -7,8 +7,8 @@
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/riccati.hpp"
 
-/// The method of plain_sqp: Newton's on the dynamics and on an augmented Lagrangian of the bounds, by the core's
-/// Riccati recursion, with a line search on Merit.
+/// The method of plain_sqp: Newton steps for the dynamics and an augmented Lagrangian of the bounds, computed by the
+/// core's Riccati recursion, with a line search on Merit.
 class Newton {
  public:
   using Iterate = rhec::Iterate;
@@ -26,10 +26,10 @@ class Newton {
   rhec::StageQp qp;
   Merit merit;
 
-  /// Improves `best`, which is finite at all times, and says why it stopped.
+  /// Improves `best`, which is always finite, and returns why it stopped.
   Status minimise(const Ocp& ocp, double tolerance, int max_iterations, rhec::Clock::time_point deadline,
                   rhec::Report& report) noexcept {
-    // Residuals are small in estimation, where Gauss-Newton's curvature serves; under slip they are large in control.
+    // Residuals are small in estimation, where the Gauss-Newton Hessian suffices; in control under slip they are large.
     const bool exact = ocp.preferred_hessian() == rhec::Hessian::exact;
     merit.price = 0.0;
     merit.multipliers = best;
@@ -49,7 +49,7 @@ class Newton {
       if (rhec::Clock::now() > deadline) return Status::deadline;
       const double outside = std::max(kkt.bound_violation, kkt.complementarity);
       if (std::max(kkt.stationarity, kkt.defect) <= std::max(0.1 * tolerance, 0.01 * outside)) {
-        // A minimum for these multipliers: better ones are known now, and bounds that hardly gain need more weight.
+        // Minimised for these multipliers: update them, and raise the weight if the violation has hardly decreased.
         const double heaviest = 1e5 * curvature;
         if (merit.weight >= heaviest && kkt.bound_violation > 0.5 * outside_before) return Status::infeasible;
         if (outside > 0.1 * outside_before) merit.weight = std::min(10.0 * merit.weight, heaviest);
@@ -59,7 +59,7 @@ class Newton {
       }
       ++report.factorisations;
       const double length = find_step(ocp, damping) ? take_step(ocp, kkt.largest()) : 0.0;
-      // Full steps need less damping; ones that had to be cut by much led along directions that hardly anything holds.
+      // Full steps need less damping; very short steps indicate directions that hardly anything determines.
       if (length == 1.0) damping = std::max(0.01 * damping, least_damping * curvature);
       if (length < 0.01) damping = std::max(10.0 * damping, 1e-9 * curvature);
       if (length == 0.0 && !(damping < curvature)) return Status::stalled;
@@ -76,7 +76,7 @@ class Newton {
     return largest;
   }
 
-  /// Newton's step from `best`. What nothing else holds in place is held by a little damping.
+  /// The Newton step from `best`. A little damping determines the directions that nothing else does.
   bool find_step(const Ocp& ocp, double damping) noexcept {
     for (int i = 0; i <= qp.intervals(); ++i) {
       const auto add_terms = [&](const double* gradient, const double* multiplier, double* sum, double* diagonal,
@@ -95,7 +95,7 @@ class Newton {
            is_finite(ocp, step_);
   }
 
-  /// Halves the step until it pays: by the merit, or near the solution, where that sees rounding alone, by the
+  /// Halves the step until it improves the merit or, near the solution, where merit differences are rounding, the
   /// residual.
   double take_step(const Ocp& ocp, double residual) noexcept {
     merit.price = std::max(merit.price, 1.5 * largest_costate(ocp, step_));
@@ -110,7 +110,7 @@ class Newton {
           trial_.control(i)[j] = best.control(i)[j] + length * step_.control(i)[j];
       }
       const double after = merit(ocp, trial_);
-      bool pays = after <= before + 1e-13 * (1.0 + std::abs(before));  // what is less is rounding
+      bool pays = after <= before + 1e-13 * (1.0 + std::abs(before));  // differences below this are rounding
       if (!pays && length == 1.0 && residual < 1e-3 && std::isfinite(after))
         pays = kkt_residual(ocp, trial_, qp, merit.scratch).largest() < 0.5 * residual;
       if (!pays) continue;
@@ -123,5 +123,5 @@ class Newton {
   rhec::Riccati riccati_;
   rhec::ActiveSet none_active_;
   Iterate step_, trial_;
-  Iterate terms_;  ///< gradients, and in the place of bound multipliers the diagonals that the Riccati recursion adds
+  Iterate terms_;  ///< gradients; its bound multipliers hold the diagonals that the Riccati recursion adds
 };

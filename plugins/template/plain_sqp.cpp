@@ -1,10 +1,10 @@
 // A solver: sequential quadratic programming with a line search; the method is in newton.hpp. To write one of your own,
-// replace that, and change the options and the names in RHEC_PLUGIN. What a solver owes its caller is in
-// rhec/core/ocp/solver.hpp.
+// replace newton.hpp, and change the options and the names in RHEC_PLUGIN. rhec/core/ocp/solver.hpp says what a solver
+// must do.
 //
-// What this one does not do: prepare before the newest data come, remember more from solve to solve than the point
-// does, give covariances, take stages wider than the Riccati recursion does, or solve everything: from far guesses over
-// long horizons, and where many bounds are active, it may end with iteration_limit or stalled, and says so.
+// This one does not prepare before the newest data arrive, keeps nothing but the iterate from one solve to the next,
+// computes no covariances, and takes no stages wider than the Riccati recursion does. With distant guesses on long
+// horizons, or with many active bounds, it may end with iteration_limit or stalled.
 #include "newton.hpp"
 #include "rhec/plugins/kit/sdk.hpp"
 
@@ -28,13 +28,13 @@ class PlainSqp : public rhec::Solver {
   using Options = PlainSqpOptions;
   explicit PlainSqp(const Options& options) : options_(options) {}
 
-  /// Solvers may refuse: empty, or the reason. Whoever asked tells it to the user.
+  /// Why this solver cannot take a problem; empty: it can. The caller shows the reason to the user.
   std::string why_not(const rhec::Ocp& ocp) const override {
     if (std::max(ocp.capacity().states, ocp.capacity().controls) <= rhec::Riccati::max_width) return {};
     return "a stage has more than " + std::to_string(rhec::Riccati::max_width) + " states or controls";
   }
 
-  /// The problem that is solved from here on; all memory is set aside for its capacity.
+  /// Takes on the problem to solve and allocates all memory for its capacity.
   void setup(const rhec::Ocp& ocp) override {
     if (const std::string reason = why_not(ocp); !reason.empty()) throw rhec::Error("solver 'plain_sqp': " + reason);
     ocp_ = &ocp;
@@ -46,13 +46,13 @@ class PlainSqp : public rhec::Solver {
 
   using Solver::solve;
   rhec::Report solve(rhec::Iterate& iterate, rhec::Clock::time_point deadline) noexcept override {
-    rhec::Report report;  // of status bad_input
+    rhec::Report report;  // its status is bad_input
     if (!ocp_ || !is_sound_start(*ocp_, iterate, newton_.merit.scratch)) return report;
     newton_.best = iterate;
     if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), newton_.best.state(0));
     report.status = newton_.minimise(*ocp_, options_.tolerance, options_.max_iterations, deadline, report);
     if (report.status != rhec::Status::infeasible) iterate = newton_.best;
-    assess(*ocp_, iterate, newton_.qp, newton_.merit.scratch, report);  // the core says what the iterate is worth
+    assess(*ocp_, iterate, newton_.qp, newton_.merit.scratch, report);  // the core computes objective and KKT residual
     return report;
   }
 

@@ -14,14 +14,14 @@ namespace {
 
 constexpr double sufficient_decrease = 1e-4;
 constexpr double shortest_step = 1e-6;
-// A KKT residual below which Newton's method is trusted more than the merit function.
+// Below this KKT residual Newton's method is trusted more than the merit function.
 constexpr double near_solution = 1e-3;
-// Differences of the merit below this part of it are rounding.
+// Relative differences of the merit below this are rounding.
 constexpr double merit_rounding = 1e-13;
-// A step that cannot even remove so much of the defects and violations shows a problem that has no solution nearby.
+// If no step can remove even this share of the defects and violations, there is no solution nearby.
 constexpr double least_asked_share = 0.1;
 
-/// Visits every pair of corresponding rows of two iterates: function(kind-agnostic destination, source, length).
+/// Visits corresponding rows of two iterates, of states and controls alike: function(destination, source, length).
 template <class Function>
 void for_each_primal_row(const Ocp& ocp, Iterate& to, const Iterate& from, const Function& function) {
   for (int i = 0; i <= ocp.intervals(); ++i) {
@@ -38,7 +38,7 @@ void for_each_dual_row(const Ocp& ocp, Iterate& to, const Iterate& from, const F
   }
 }
 
-/// Whether any costate is other than zero (which a number that is none is, too).
+/// Whether any costate is nonzero (NaN counts as nonzero).
 bool has_costates(const Ocp& ocp, const Iterate& iterate) noexcept {
   for (int i = 1; i <= ocp.intervals(); ++i)
     for (int j = 0; j < ocp.state_count(i); ++j)
@@ -72,7 +72,7 @@ std::string GnRti::why_not(const Ocp& ocp) const {
   if (ocp.has_second_derivatives()) return {};
   if (options_.hessian == Curvature::exact)
     return "the exact Hessian was asked for and the model has no second derivatives; set hessian: gauss_newton";
-  // A line search makes Gauss-Newton's step safe; a full one need not lead anywhere.
+  // A line search makes the Gauss-Newton step safe; a full step need not converge.
   if (options_.hessian == Curvature::automatic && options_.mode == Mode::rti && !ocp.has_small_residuals())
     return "the model has no second derivatives, and full Gauss-Newton steps need not converge in control; set mode: "
            "converge, or hessian: gauss_newton if residuals are small";
@@ -105,7 +105,7 @@ Hessian GnRti::hessian() const noexcept {
   return options_.hessian == Curvature::exact ? Hessian::exact : Hessian::gauss_newton;
 }
 
-/// Linearises at an iterate; one without costates gets those that fit it first, since the exact Hessian needs them.
+/// Linearises at an iterate. The exact Hessian needs costates; an iterate without any first gets those that fit it.
 void GnRti::linearise(Iterate& iterate) noexcept {
   if (hessian() == Hessian::exact && !has_costates(*ocp_, iterate)) {
     linearisation_->linearise(iterate, Hessian::gauss_newton);
@@ -140,15 +140,16 @@ void GnRti::add_step(const Iterate& from, double length, Iterate& to) const noex
   });
 }
 
-/// The step as a policy: controls go the given length towards the new ones and answer to where simulation really leads,
-/// so that the result has no defect. Far from the solution this carries much further than the linearised states do.
+/// Applies the step as a feedback policy in a simulation: controls move by the given step length and react to the
+/// deviation of the simulated from the linearised states, so the result has no defects. Far from the solution this
+/// makes much more progress than the linearised states do.
 void GnRti::roll_out_step(const Iterate& from, double length, Iterate& to) noexcept {
   add_step(from, length, to);
   qp_solver_.prepare_feedback(*qp_);
   double deviation[Riccati::max_width], policy[Riccati::max_width];
   for (int i = 0; i < ocp_->intervals(); ++i) {
     const int n = ocp_->state_count(i), m = ocp_->control_count(i);
-    // Of the policy's step, what it does at the linearised states is scaled; its answer to the deviation is not.
+    // The feedforward part of the policy is scaled by the step length; its feedback on the deviation is not.
     for (int j = 0; j < n; ++j)
       deviation[j] = step_.state(i)[j] + (to.state(i)[j] - from.state(i)[j] - length * step_.state(i)[j]);
     qp_solver_.feedback(*qp_, i, deviation, policy);
@@ -182,7 +183,7 @@ Report GnRti::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   use_exact_ = is_pending_ = false;
   if (ocp_ && iterate.capacity() == ocp_->capacity()) {
-    // A real-time iteration lives on the sample before; an iterate without costates has none.
+    // A real-time iteration continues from the previous sample; an iterate without costates has no previous sample.
     if (options_.mode == Mode::rti && has_costates(*ocp_, iterate)) {
       report = real_time(iterate, deadline);
     } else if (is_sound_start(*ocp_, iterate, scratch_)) {
@@ -212,13 +213,13 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
       report.status = outcome == StageQpSolver::Outcome::infeasible ? Status::infeasible : Status::deadline;
       break;
     }
-    // The active-set methods have checked their steps.
+    // The active-set methods have already checked that their steps are finite.
     if (outcome == StageQpSolver::Outcome::interior_point && !is_finite(*ocp_, step_)) {
       report.status = Status::stalled;
       break;
     }
-    // The step becomes the iterate that it leads to, and the iterate that it came from is kept in its place: of a
-    // horizon, the processor's cache holds only so many.
+    // The step is turned into the new iterate in place, and the swap keeps the old iterate where the step was: the
+    // processor's cache has room for only a few horizons.
     add_to_step(ocp_->intervals(), iterate, step_);
     const bool is_last = iteration + 1 == options_.iterations;
     if (!is_last && !assess_step(step_, report)) {
@@ -237,7 +238,7 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
   return report;
 }
 
-/// Linearises at a new iterate, as the next sample will want it; false where it is not finite.
+/// Linearises at a new iterate, as the next sample will need it; false if the result is not finite.
 bool GnRti::assess_step(const Iterate& iterate, Report& report) noexcept {
   const double objective = linearisation_->linearise_for_residual(iterate, hessian());
   const KktResidual kkt = kkt_residual(linearisation_->qp(), iterate);
@@ -252,12 +253,12 @@ void GnRti::settle(Iterate& iterate, Report& report) noexcept {
   if (!assess_step(iterate, report)) {
     --report.iterations;
     report.status = report.iterations > 0 ? Status::iteration_limit : Status::stalled;
-    std::swap(iterate, step_);  // the iterate before the last step
+    std::swap(iterate, step_);  // back to the iterate before the last step
     if (report.iterations == 0) give_up(iterate, report);
   }
 }
 
-/// Where the iterate was assessed, its linearisation is there already.
+/// If the iterate was assessed, its linearisation is already available.
 bool GnRti::covariances(const Iterate& iterate, StageRange nodes, std::span<double> blocks) noexcept {
   if (!ocp_ || is_prepared_ || is_pending_) return false;
   const int N = ocp_->intervals(), states = ocp_->capacity().states;
@@ -269,9 +270,9 @@ bool GnRti::covariances(const Iterate& iterate, StageRange nodes, std::span<doub
                                 is_last ? blocks.data() : nullptr);
 }
 
-/// The report on an iterate that no step has improved.
+/// Reports on an iterate that no step has improved.
 void GnRti::give_up(const Iterate& iterate, Report& report) noexcept {
-  // What is not finite is seen here first.
+  // The first check for numbers that are not finite on this path.
   if (is_sound_start(*ocp_, iterate, scratch_)) {
     report.objective = linearisation_->linearise(iterate, Hessian::none);
     report.kkt = kkt_residual(linearisation_->qp(), iterate);
@@ -280,8 +281,8 @@ void GnRti::give_up(const Iterate& iterate, Report& report) noexcept {
   }
 }
 
-/// Searches along the step from `best_` by the l1 merit; the accepted iterate goes to `trial_`. False where no length
-/// is acceptable.
+/// Line search along the step from `best_` on the l1 merit function; the accepted iterate goes to `trial_`. False if no
+/// step length is acceptable.
 bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
   defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(*ocp_, step_));
   bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(*ocp_, step_));
@@ -300,8 +301,8 @@ bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
         before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
     return std::isfinite(merit_after) && merit_after <= allowed;
   };
-  // Control follows the policy, from a given start; estimation, whose every node is measured, takes the linearised
-  // states, and the policy only where those lead nowhere.
+  // Control starts from a given state and follows the policy. Estimation has measurements at every node and takes the
+  // linearised states; it tries the policy only if they are not acceptable.
   const bool policy_first = ocp_->can_roll_out();
   for (double length = 1.0; length >= shortest_step; length *= 0.5) {
     if (policy_first) {
@@ -310,7 +311,7 @@ bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
       add_step(best_, length, trial_);
     }
     if (acceptable(length)) return true;
-    // Near the solution the merit may refuse a step that Newton's method is right about.
+    // Near the solution the merit function may reject a good Newton step.
     if (length == 1.0 && residual < near_solution && std::isfinite(merit_after)) {
       ocp_->linearise(all_stages(*ocp_), trial_, Hessian::gauss_newton, trial_qp_, scratch_);
       if (kkt_residual(trial_qp_, trial_).largest() < 0.5 * residual) return true;
@@ -329,8 +330,8 @@ StageQpSolver::Outcome GnRti::solve_qp(Report& report, Clock::time_point deadlin
   return outcome;
 }
 
-/// Powell's relaxation: of all defects and violated bounds, the step is asked to remove only a share of what it was
-/// asked before. Where that share is 0, the QP has a solution: no step.
+/// Powell's relaxation: scales the defects and violated bounds that the step must remove by `share`. At a share of 0
+/// the QP is feasible: the zero step satisfies it.
 void GnRti::relax_qp(double share) noexcept {
   relaxed_qp_ = qp_solver_.solved(*qp_);
   qp_ = &relaxed_qp_;
@@ -353,7 +354,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   defect_penalty_ = bound_penalty_ = 0.0;
   best_ = iterate;
-  // A given initial state is not for the line search to negotiate about.
+  // The line search does not vary a given initial state.
   if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
   report.status = Status::iteration_limit;
   double least_residual = std::numeric_limits<double>::infinity();
@@ -371,8 +372,8 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       report.status = Status::deadline;
       break;
     }
-    // Gauss-Newton that gains little, or goes round in circles, has met large residuals: from there the exact Hessian
-    // serves better.
+    // If Gauss-Newton makes little progress or cycles, the residuals are large: from here on the exact Hessian does
+    // better.
     if (options_.hessian == Curvature::automatic && !use_exact_ && ocp_->has_second_derivatives()) {
       slow = residual > 0.3 * least_residual ? slow + 1 : 0;
       if (slow >= 4) {
@@ -387,7 +388,8 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
     const auto try_step = [&] {
       qp_solver_.guess_from(*qp_, best_);
       auto outcome = solve_qp(report, deadline);
-      // Linearised equations can contradict bounds that the true ones do not: then less is asked of a single step.
+      // Linearised equations can contradict bounds even if the nonlinear ones do not: then a single step has to remove
+      // less.
       for (asked_share_ = 1.0; outcome == StageQpSolver::Outcome::infeasible && asked_share_ > least_asked_share;) {
         relax_qp(0.5);
         outcome = solve_qp(report, deadline);
@@ -398,8 +400,9 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       return search_along_step(residual, merit_after);
     };
     accepted = try_step();
-    // A curvature that had to be convexified is a poor guide: Gauss-Newton's step competes with its own. Near the
-    // solution merits differ by rounding only, and the exact curvature is what converges.
+    // Where the exact Hessian had to be convexified its step is unreliable, so the Gauss-Newton step is tried too and
+    // the better one is taken. Near the solution merits differ by rounding only, and it is the exact Hessian that
+    // converges.
     if (!late && hessian() == Hessian::exact &&
         (!accepted || (qp_solver_.was_convexified() && residual > near_solution))) {
       std::swap(trial_, other_trial_);

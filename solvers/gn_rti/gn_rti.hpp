@@ -11,8 +11,8 @@
 namespace rhec::gn_rti {
 
 enum class Mode {
-  rti,      ///< a fixed number of full steps a sample (Diehl 2002)
-  converge  ///< to the tolerance, globalised by a line search
+  rti,      ///< a fixed number of full steps per sample [9]
+  converge  ///< iterates to the tolerance, globalised by a line search
 };
 enum class Curvature {
   gauss_newton,
@@ -30,14 +30,15 @@ struct GnRtiOptions {
   static const OptionTable<GnRtiOptions>& table();
 };
 
-/// Sequential quadratic programming on the stages of an Ocp, with a Riccati recursion inside.
+/// Sequential quadratic programming on the stages of an Ocp; the QPs are solved by a Riccati recursion (docs/method.md,
+/// section 7 [9]).
 ///
-/// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers claim; `feedback`
-/// then needs only vectors, unless the newest data change the active set. `finish` linearises at the new iterate, of
-/// which the next guess is the same a stage later: `prepare` has one interval left to evaluate, or none. Estimation
-/// problems have small residuals and take Gauss-Newton's Hessian; control problems under slip have large ones, on which
-/// Gauss-Newton does not even converge locally, and take the exact one with the guess' costates, convexified inside the
-/// recursion.
+/// `prepare` linearises at the guess and factorises with the active set that the guess' multipliers imply; `feedback`
+/// then needs vector operations only, unless the newest data change the active set. `finish` linearises at the new
+/// iterate. The next guess is that iterate shifted by one stage, so `prepare` has at most one interval left to
+/// evaluate. Estimation problems have small residuals and use the Gauss-Newton Hessian. Control problems under slip
+/// have large residuals, on which Gauss-Newton does not even converge locally; they use the exact Hessian with the
+/// guess' costates, convexified inside the recursion.
 class GnRti final : public Solver {
  public:
   using Options = GnRtiOptions;
@@ -73,15 +74,15 @@ class GnRti final : public Solver {
   const Ocp* ocp_ = nullptr;
   std::unique_ptr<Linearisation> linearisation_;
   StageQp trial_qp_, relaxed_qp_;
-  const StageQp* qp_ = nullptr;  ///< that is solved: the linearisation's, or `relaxed_qp_`
+  const StageQp* qp_ = nullptr;  ///< the QP being solved: the linearisation's, or `relaxed_qp_`
   StageQpSolver qp_solver_;
   Iterate step_, trial_, best_, other_trial_;
   std::vector<double> scratch_, defects_;
   bool is_prepared_ = false;
-  bool is_pending_ = false;  ///< the last step was not assessed yet; `step_` is the iterate before it
+  bool is_pending_ = false;  ///< the last step is not assessed yet; `step_` holds the iterate before it
   bool use_exact_ = false;
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
-  double asked_share_ = 1.0;  ///< of the defects and violations that the step is asked to remove
+  double asked_share_ = 1.0;  ///< share of the defects and violations that the step must remove
 };
 
 }  // namespace rhec::gn_rti

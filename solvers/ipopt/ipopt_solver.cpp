@@ -14,36 +14,36 @@
 namespace rhec::ipopt {
 namespace {
 
-/// Ipopt's own tolerance, as a part of ours. It bounds how small the barrier may become, not when to stop.
+/// Ipopt's own tolerance, relative to ours. It limits how small the barrier parameter may become, not when to stop.
 constexpr double inner_tolerance = 1e-3;
 constexpr double smallest_inner_tolerance = 1e-14;
-/// What the barrier may still add to the objective, relative to it, for each unit of the tolerance.
+/// Relative contribution of the barrier to the objective that is negligible, as a multiple of the tolerance.
 constexpr double negligible_gap = 1.0;
 constexpr int most_spare_iterations = 6;
-/// A residual below which Newton's method finishes what is left.
+/// Below this residual another run polishes the best iterate.
 constexpr double near_solution = 1e-4;
 constexpr int most_polishes = 2;
-/// Iterations of a run after which another way of starting promises more. Interior points that take longer are most
-/// often those that wander with negative curvature.
+/// Iterations after which another kind of start is more promising. Runs that take longer are mostly those that wander
+/// in directions of negative curvature.
 constexpr int patience = 150;
-/// A violation of the dynamics that no rounding explains.
+/// A violation of the dynamics too large for rounding.
 constexpr double clear_violation = 1e-6;
-/// Where the barrier of a warm start begins, as a part of the guess' residual, and its limits.
+/// Initial barrier parameter of a warm start, relative to the guess' residual, and its limits.
 constexpr double warm_barrier_share = 1e-4;
 constexpr double smallest_warm_barrier = 1e-8;
 constexpr double largest_warm_barrier = 1e-2;
 constexpr double polish_barrier = 1e-10;
-/// Gradients that L-BFGS learns from. Ipopt's default of 6 takes half as many iterations again.
+/// Gradients that L-BFGS keeps. Ipopt's default of 6 takes 50% more iterations.
 constexpr int limited_memory_history = 50;
 
-/// Ipopt counts tags of its objects in a global variable and MUMPS has global state: whatever touches either, down to
-/// the last destructor, holds this.
+/// Ipopt counts the tags of its objects in a global variable and MUMPS has global state: all code that uses either,
+/// destructors included, holds this lock.
 std::timed_mutex& backend_lock() {
   static std::timed_mutex lock;
   return lock;
 }
 
-/// (x - 1)^2 with 0 <= x: a problem to find out whether Ipopt can start with the options that it was given.
+/// minimise (x - 1)^2 subject to 0 <= x: tests whether Ipopt can start with its options.
 class Trial final : public Ipopt::TNLP {
  public:
   bool get_nlp_info(Ipopt::Index& n, Ipopt::Index& m, Ipopt::Index& jacobian_entries, Ipopt::Index& hessian_entries,
@@ -89,7 +89,7 @@ class Trial final : public Ipopt::TNLP {
                          Ipopt::IpoptCalculatedQuantities*) override {}
 };
 
-/// Whether Ipopt can begin to solve anything with the options that it was given.
+/// Whether Ipopt can start with its options.
 bool starts(Ipopt::IpoptApplication& application) {
   const Ipopt::SmartPtr<Ipopt::TNLP> trial = new Trial;
   const auto outcome = application.OptimizeTNLP(trial);
@@ -116,7 +116,7 @@ const OptionTable<IpoptOptions>& IpoptOptions::table() {
 
 IpoptSolver::IpoptSolver(const Options& options) : options_(options) {
   const std::lock_guard hold(backend_lock());
-  // Without a console it prints nothing; never told to initialise itself, it does not look for a file of options.
+  // Created without a console it prints nothing; as Initialize() is never called it reads no options file.
   application_ = new Ipopt::IpoptApplication(false);
   native_ = set_native_options(options_.native, *application_);
   if (native_.empty() || starts(*application_)) return;
@@ -164,10 +164,10 @@ void IpoptSolver::set(const char* name, const char* value) {
   if (!native_.contains(name)) application_->Options()->SetStringValue(name, value);
 }
 
-/// How a run begins that follows one that was lost; the last, `adaptive`, is followed by none.
+/// The start of the run after one that failed; `adaptive` is the last.
 IpoptSolver::Start IpoptSolver::start_after(Start start, Ending ending) const noexcept {
   if (start == Start::warm) return Start::cold;
-  // Another curvature makes nothing feasible.
+  // Another Hessian does not make a problem feasible.
   const bool may_help = options_.hessian == Curvature::exact && ending != Ending::infeasible;
   return start == Start::cold && may_help ? Start::gauss_newton : Start::adaptive;
 }
@@ -180,7 +180,7 @@ int IpoptSolver::iterations_of(Start start) const noexcept {
 void IpoptSolver::set_run_options(Start start, double barrier) {
   const double tolerance = std::max(inner_tolerance * options_.tolerance, smallest_inner_tolerance);
   set("tol", tolerance);
-  // Of scaled and unscaled quantities alike; the core's residual is what stops a run.
+  // The same tolerance for scaled and unscaled quantities; it is the core's residual that stops a run.
   set("dual_inf_tol", tolerance);
   set("constr_viol_tol", tolerance);
   set("compl_inf_tol", tolerance);
@@ -193,13 +193,14 @@ void IpoptSolver::set_run_options(Start start, double barrier) {
   set("mu_strategy", start == Start::adaptive ? "adaptive" : "monotone");
   set("warm_start_init_point", barrier > 0.0 ? "yes" : "no");
   set("mu_init", barrier > 0.0 ? barrier : 0.1);
-  // The start is on the central path already and is left there.
+  // The start is on the central path already: Ipopt must not push it away from its bounds [16].
   for (const char* push : {"warm_start_bound_push", "warm_start_bound_frac", "warm_start_slack_bound_push",
                            "warm_start_slack_bound_frac", "warm_start_mult_bound_push"})
     set(push, 1e-16);
 }
 
-/// The best iterate is that of the least residual; among those within the tolerance, the last, whose barrier is least.
+/// Keeps the iterate of the smallest residual; of those within the tolerance the last one, whose barrier parameter is
+/// smallest.
 void IpoptSolver::keep_if_better(const PrimalDual& iterate) noexcept {
   seen_kkt_ = nlp_->residual_at(iterate);
   const double residual = seen_kkt_.largest();
@@ -250,10 +251,10 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   return best_kkt_.largest() <= near_solution ? Ending::near : Ending::lost;
 }
 
-/// True where the iterate is the best iterate, with the report of that.
+/// True if `iterate` was replaced by the best iterate; then `report` has its objective and KKT residual.
 bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
   nlp_->take(ocp);
-  // The guess is the first candidate, with the initial state that is given.
+  // The guess is the first candidate, with the given initial state.
   guess_ = iterate;
   if (ocp.initial_state()) std::copy_n(ocp.initial_state(), ocp.state_count(0), guess_.state(0));
   Report of_guess;
@@ -339,10 +340,10 @@ Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
       if (report.status == Status::bad_input) return report;
     }
   } catch (const std::exception&) {
-    // Memory that ran out: the iterate is the guess still.
+    // Out of memory: the iterate is still the guess.
     report.status = Status::stalled;
   } catch (...) {
-    // Ipopt's exceptions have no base class of the standard's.
+    // Ipopt's exceptions are not derived from std::exception.
     report.status = Status::stalled;
   }
   report.iterations = iterations_;

@@ -22,26 +22,25 @@ struct IpoptOptions {
   static const OptionTable<IpoptOptions>& table();
 };
 
-/// Multiple shooting: all states and controls are variables of one sparse NLP, solved by Ipopt's filter
-/// interior-point method.
+/// Multiple shooting: all states and controls are variables of one sparse NLP, solved by Ipopt's interior-point filter
+/// method [16] (docs/method.md, section 7).
 ///
-/// Ipopt runs until the core's own residual is within the tolerance and what the barrier adds to the objective is
-/// negligible; it never decides itself that it is done. A guess with multipliers is a warm start: its multipliers say
-/// which bounds are close, and its residual how small the barrier may begin.
+/// Ipopt runs until the core's KKT residual is within the tolerance and the barrier's contribution to the objective is
+/// negligible; Ipopt's own convergence test does not decide. A guess with multipliers is a warm start: its multipliers
+/// tell which bounds are close, and its residual how small the initial barrier parameter may be.
 ///
-/// A run that is lost, or has found nothing after so many iterations that it is likely to be, is followed by others
-/// from the guess, in this order: without the guess' multipliers, with Gauss-Newton's curvature in the place of the
-/// exact one, and with an adaptive barrier. All of them together make max_iterations at most, and the report says that
-/// there was a fallback.
+/// If a run fails, or has not converged after so many iterations that it probably will not, further runs start from the
+/// guess, in this order: without the guess' multipliers, with the Gauss-Newton instead of the exact Hessian, and with
+/// an adaptive barrier parameter. All runs together take at most max_iterations, and the report flags the fallback.
 ///
-/// Ipopt 3.11 counts with a global variable and MUMPS keeps global state, so solves wait for each other, process-wide;
-/// the time they wait counts for their deadline. Every solve builds Ipopt's algorithm anew, so nothing is remembered
-/// from one to the next but the guess.
+/// Ipopt 3.11 has a global counter and MUMPS keeps global state, so solves are serialised across the process; waiting
+/// counts towards the deadline. Every solve builds Ipopt's algorithm anew, so only the guess carries over from one
+/// solve to the next.
 class IpoptSolver final : public Solver, private Spectator {
  public:
   using Options = IpoptOptions;
   static const OptionTable<Options>& table() { return Options::table(); }
-  /// Throws Error where a native option is unknown or refused.
+  /// Throws Error if a native option is unknown or Ipopt refuses its value.
   explicit IpoptSolver(const Options& options);
   ~IpoptSolver() override;
   IpoptSolver(const IpoptSolver&) = delete;
@@ -54,7 +53,7 @@ class IpoptSolver final : public Solver, private Spectator {
   Report solve(Iterate& iterate, Clock::time_point deadline) noexcept override;
   void reset() noexcept override {}
 
-  /// Of the last solve, the time within Ipopt, without what its calls back took [us].
+  /// Time that the last solve spent in Ipopt, without its callbacks [us].
   double backend_us() const noexcept { return backend_us_; }
 
  private:
@@ -62,8 +61,8 @@ class IpoptSolver final : public Solver, private Spectator {
   enum class Start {
     warm,          ///< from the guess and its multipliers
     cold,          ///< from the guess alone
-    gauss_newton,  ///< the same with that curvature
-    adaptive,      ///< the same with the other strategy for the barrier
+    gauss_newton,  ///< the same with the Gauss-Newton Hessian
+    adaptive,      ///< the same with the adaptive barrier strategy
     polish         ///< from the best iterate so far, near the solution
   };
   enum class Ending { converged, out_of_time, out_of_iterations, infeasible, near, lost };
@@ -78,20 +77,20 @@ class IpoptSolver final : public Solver, private Spectator {
   void keep_if_better(const PrimalDual& iterate) noexcept;
   bool is_late() const noexcept { return deadline_ != Clock::time_point::max() && Clock::now() > deadline_; }
 
-  // Ours unless the user set the native option of that name.
+  // Set an option of Ipopt unless the user has set it in `native`.
   void set(const char* name, double value);
   void set(const char* name, int value);
   void set(const char* name, const char* value);
 
   Options options_;
   std::set<std::string> native_;
-  Ipopt::SmartPtr<Ipopt::IpoptApplication> application_;  ///< touched under the lock only
+  Ipopt::SmartPtr<Ipopt::IpoptApplication> application_;  ///< used under the lock only
   Ipopt::SmartPtr<OcpNlp> nlp_;
   const Ocp* ocp_ = nullptr;
   StageQp assessed_;
   std::vector<double> scratch_;
 
-  // Of the solve under way.
+  // Of the current solve.
   Clock::time_point deadline_;
   Iterate guess_, best_;
   KktResidual best_kkt_, seen_kkt_;

@@ -16,7 +16,7 @@ namespace {
 
 using std::literals::string_view_literals::operator""sv;
 
-/// Options of Ipopt that are not passed through, and what is said instead.
+/// Options of Ipopt that are not passed through, and the advice given instead.
 constexpr auto ours = std::to_array<std::pair<std::string_view, std::string_view>>(
     {{"tol"sv, "set the solver's option 'tolerance'"sv},
      {"max_iter"sv, "set the solver's option 'max_iterations'"sv},

@@ -9,8 +9,8 @@
 
 namespace rhec::ipopt {
 
-/// Sets every key of a map as an option of Ipopt's own, as the type that Ipopt registered for it, and returns the keys.
-/// Throws Error with the place and the key where Ipopt knows no such option or refuses the value, and where the option
+/// Sets every key of a map as one of Ipopt's own options, with the type that Ipopt registered for it, and returns the
+/// keys. Throws Error with the place and the key if Ipopt has no such option or refuses the value, or if the option
 /// would print, read a file, or contradict an option of this plugin.
 std::set<std::string> set_native_options(const Settings& native, Ipopt::IpoptApplication& application);
 

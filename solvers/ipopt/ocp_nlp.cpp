@@ -15,15 +15,15 @@
 namespace rhec::ipopt {
 namespace {
 
-/// What Ipopt takes for no bound, whatever its option for that says.
+/// A value that Ipopt takes for no bound, whatever its options say.
 constexpr double no_bound = 1e300;
-/// Weights of the objective below this are not divided by.
+/// Objective factors below this are not divided by.
 constexpr double smallest_divisor = 1e-3;
 
-/// Whether all of so many values are finite.
+/// Whether value(0) .. value(count - 1) are finite.
 template <class Value>
 bool all_finite(std::size_t count, const Value& value) {
-  double rests[4] = {};  // stay 0 as long as all is finite
+  double rests[4] = {};  // stay 0 while all values are finite
   std::size_t k = 0;
   for (; k + 4 <= count; k += 4)
     for (int j = 0; j < 4; ++j) rests[j] += 0.0 * value(k + j);
@@ -35,12 +35,12 @@ bool all_finite(std::span<const double> values) {
   return all_finite(values.size(), [&](std::size_t k) { return values[k]; });
 }
 
-/// Copies values times a factor; whether all of them are finite.
+/// Copies values times a factor; returns whether all of them are finite.
 bool copy_finite(std::span<const double> from, double factor, double* __restrict to) {
   return all_finite(from.size(), [&](std::size_t k) { return to[k] = factor * from[k]; });
 }
 
-/// To the bit.
+/// Bitwise equality.
 bool are_equal(std::span<const double> one, const double* other) {
   return std::memcmp(one.data(), other, one.size_bytes()) == 0;
 }
@@ -109,7 +109,7 @@ void OcpNlp::set_start(const Iterate& iterate, double barrier) noexcept {
   if (barrier <= 0.0) return;
   for (const int j : bounded_) {
     const bool has_lower = std::isfinite(lower_[j]), has_upper = std::isfinite(upper_[j]);
-    // A bound claimed as active stays close, the multiplier of one that is far is small: both on the central path.
+    // Active bounds stay close, and the multipliers of distant bounds are small: both are on the central path.
     const double room = upper_[j] - lower_[j];
     const auto distance = [&](double multiplier, double slack) {
       const double wanted = std::max(slack, barrier / std::max(multiplier, least_multiplier));
@@ -140,7 +140,7 @@ bool OcpNlp::evaluate_at(const double* z, unsigned visit) noexcept {
   if (evaluated_.is_at(z, visit)) return evaluated_.is_sound;
   evaluated_.move_to(z, visit);
   nlp_.write(*ocp_, z, nullptr, nullptr, trial_);
-  // Where all states are as many as there is room for, the defects are the constraints.
+  // If every node has as many states as the capacity allows, the defects are the constraints.
   const bool is_full = constraints() == ocp_->intervals() * ocp_->capacity().states;
   double* const defects = is_full ? constraints_.data() : defects_.data();
   objective_ = ocp_->evaluate(trial_, defects, scratch_);
@@ -152,7 +152,7 @@ bool OcpNlp::evaluate_at(const double* z, unsigned visit) noexcept {
 bool OcpNlp::linearise_at(const double* z, unsigned visit) {
   if (linearised_.is_at(z, visit)) return linearised_.is_sound;
   linearised_.move_to(z, visit);
-  // Ipopt asks for the Hessian later, and shows its iterate after that: with the multipliers that it has already.
+  // Ipopt requests the Hessian and reports the iterate only later, but it already has the multipliers: use them now.
   if (iterates_.data) {
     read_iterate();
     linearise_all(seen_, true);
@@ -162,7 +162,7 @@ bool OcpNlp::linearise_at(const double* z, unsigned visit) {
   return linearised_.is_sound;
 }
 
-/// Goes through the stages at an iterate, from one piece to the next, and lets `take` have each; returns the objective.
+/// Linearises at an iterate piece by piece and calls `take` after each piece; returns the objective.
 template <class Take>
 double OcpNlp::linearise(const double* z, const double* multipliers, const double* bound_multipliers, Hessian hessian,
                          const Take& take) noexcept {
@@ -170,7 +170,7 @@ double OcpNlp::linearise(const double* z, const double* multipliers, const doubl
   double objective = 0.0;
   is_judged_ = false;
   for (StageRange piece{0, 0}; piece.first <= N; piece.first = piece.last + 1) {
-    // With the stage behind them, which their equations lead to.
+    // Includes the stage after the piece, in which its dynamics end.
     const int behind = std::min(piece.first + pieces_.window() - 1, N);
     piece.last = behind < N ? behind - 1 : N;
     pieces_.look_at(piece.first);
@@ -182,7 +182,7 @@ double OcpNlp::linearise(const double* z, const double* multipliers, const doubl
   return objective;
 }
 
-/// All that is wanted at `linearised_`, which is the iterate's place unless Ipopt tries another.
+/// Computes all derivatives and the KKT residual at `linearised_`, the point of the iterate or a trial point of Ipopt.
 void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noexcept {
   const auto& [of_constraints, of_bounds] = iterate.multipliers;
   is_linear_exact_ = curvature_ == Curvature::exact && has_multipliers;
@@ -202,12 +202,12 @@ void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noex
   linear_iterate_ = &iterate;
   linear_tag_ = are_equal(linearised_.z, iterate.z.data()) ? iterate.tag : 0;
   linear_kkt_ = terms.residual();
-  // A number that is not finite, in the gradient or the Jacobian, makes the stationarity one too.
+  // If a number in the gradient or the Jacobian is not finite, the stationarity is not finite either.
   linearised_.is_sound = std::isfinite(linear_kkt_.stationarity);
   is_judged_ = true;
 }
 
-/// What makes a piece of the linearisation stationary where variables have one value only.
+/// Sets the bound multipliers of fixed variables of a piece such that stationarity holds.
 void OcpNlp::set_fixed_multipliers(StageRange piece) noexcept {
   const auto set = [&](int i, const double* lower, const double* upper, int first, int count) {
     for (int k = first; k < first + count; ++k) {
@@ -227,7 +227,7 @@ void OcpNlp::set_fixed_multipliers(StageRange piece) noexcept {
   }
 }
 
-/// At costates that are `factor` times the multipliers, or zero where there are none.
+/// The exact Hessian for costates `factor` times the multipliers, or zero if there are none.
 void OcpNlp::write_hessian(const double* z, const double* multipliers, double factor, double* values) noexcept {
   for (std::size_t row = 0; row < weighted_.size(); ++row)
     weighted_[row] = multipliers ? factor * multipliers[row] : 0.0;
@@ -235,7 +235,7 @@ void OcpNlp::write_hessian(const double* z, const double* multipliers, double fa
             [&](StageRange piece) { nlp_.hessian(pieces_, piece, values); });
 }
 
-/// Whether the linearisation is that of an iterate within its bounds.
+/// Whether the linearisation is that of this iterate, and the iterate is within its bounds.
 bool OcpNlp::has_judged(const PrimalDual& iterate) const noexcept {
   if (!is_judged_ || !linearised_.is_known || linear_kkt_.bound_violation > 0.0) return false;
   if (linear_tag_ != 0 && linear_tag_ == iterate.tag) return true;
@@ -364,7 +364,7 @@ bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_
     write_hessian(z, multipliers, 1.0 / objective_factor, values);
     for (double& value : all) value *= objective_factor;
   } else {
-    // The Ocp's Lagrangian always holds the whole objective: what is too much of it is taken away.
+    // The Ocp's Lagrangian always contains the objective with weight 1: subtract the excess.
     write_hessian(z, multipliers, 1.0, values);
     write_hessian(z, nullptr, 0.0, hessian_part_.data());
     for (Ipopt::Index entry = 0; entry < entries; ++entry)
@@ -386,14 +386,14 @@ void OcpNlp::finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double* 
   spectator_->see_last(seen_);
 }
 
-/// What was made of its multipliers has none any more.
+/// Invalidates `seen_` and what was computed with its multipliers.
 void OcpNlp::forget_seen() noexcept {
   seen_.tag = 0;
   if (linear_iterate_ == &seen_) is_judged_ = is_linear_exact_ = false;
 }
 
-/// Ipopt's present iterate to `seen_`. Ipopt 3.11 has it only in its own layout: scaled, and without variables that
-/// have one value only.
+/// Copies Ipopt's current iterate to `seen_`. Ipopt 3.11 gives it only in its own layout: scaled and without fixed
+/// variables.
 void OcpNlp::read_iterate() {
   const auto& [data, scaled, adapter] = iterates_;
   const Ipopt::SmartPtr<const Ipopt::IteratesVector> now = data->curr();

@@ -20,66 +20,66 @@ namespace rhec::ipopt {
 
 enum class Curvature { exact, gauss_newton, limited_memory };
 
-/// What belongs to constraints and bounds, with the signs of Iterate's.
+/// Multipliers of constraints and bounds, with the signs of Iterate's.
 struct Multipliers {
   std::vector<double> of_constraints, of_bounds;
 };
-/// An iterate of Ipopt in the problem's own units.
+/// An iterate of Ipopt, unscaled.
 struct PrimalDual {
   std::vector<double> z;
   Multipliers multipliers;
-  Ipopt::TaggedObject::Tag tag = 0;  ///< Ipopt's number for it; 0: it has none
+  Ipopt::TaggedObject::Tag tag = 0;  ///< Ipopt's identifier of the iterate; 0: none
 };
 
-/// Is shown the iterates of Ipopt.
+/// Observes Ipopt's iterates.
 class Spectator {
  public:
   virtual ~Spectator() = default;
-  /// Iteration `iteration` begins; false stops Ipopt. Null: an iterate of the restoration phase, which is no candidate
-  /// for a solution.
+  /// Called at the start of iteration `iteration`; returning false stops Ipopt. `iterate` is null in the restoration
+  /// phase, whose iterates are no candidates for the solution.
   virtual bool see(int iteration, const PrimalDual* iterate) noexcept = 0;
-  /// Where Ipopt ended.
+  /// Called with Ipopt's final iterate.
   virtual void see_last(const PrimalDual& iterate) noexcept = 0;
 };
 
-/// An Ocp as the sparse nonlinear program that Ipopt solves. Every iterate is evaluated once, whoever asks: objective
-/// and constraints together; then, in one passage through the stages, gradient, Jacobian, the Hessian for the iterate's
-/// multipliers and the KKT residual.
+/// An Ocp as the sparse NLP that Ipopt solves. Every iterate is evaluated only once: objective and constraints
+/// together, then, in one pass over the stages, the gradient, the Jacobian, the Hessian for the iterate's multipliers
+/// and the KKT residual.
 class OcpNlp final : public Ipopt::TNLP {
  public:
-  /// Of a long horizon, as many stages as a processor's cache has room for, the one behind a piece among them: pieces
-  /// are those of the core's `assess`, and so are their sums.
+  /// A long horizon is evaluated in pieces of so many stages, the stage after the piece included, which fit the
+  /// processor's cache. The core's `assess` uses the same pieces, so its sums are the same.
   static constexpr int window = 16;
 
   OcpNlp(const Ocp& ocp, Curvature curvature);
 
-  /// Takes over a problem of the capacity at construction, with its present structure and data.
+  /// Takes on a problem of the capacity given at construction, with its current structure and data.
   void take(const Ocp& ocp);
-  /// Forgets the problem that was taken, and all that was evaluated.
+  /// Forgets the problem and all evaluations.
   void release() noexcept { ocp_ = nullptr; }
 
   int variables() const noexcept { return nlp_.variables(); }
   int constraints() const noexcept { return nlp_.constraints(); }
   bool has_empty_bounds() const noexcept;
 
-  /// Where Ipopt starts. With a barrier parameter above zero the iterate's multipliers count too: each variable and the
-  /// multiplier of its bound are moved until their product is that parameter or more, as little as that takes.
+  /// Sets Ipopt's starting point. If `barrier` is above zero the iterate's multipliers are used too: the distance from
+  /// each bound and its multiplier are increased, as little as possible, until their product is at least `barrier`.
   void set_start(const Iterate& iterate, double barrier) noexcept;
-  /// From the next run on.
+  /// Takes effect with the next run.
   void set_curvature(Curvature curvature) noexcept;
-  /// For the length of a solve.
+  /// The spectator must outlive the solve.
   void set_spectator(Spectator* spectator) noexcept { spectator_ = spectator; }
 
-  /// Judges an iterate, with its states and controls clipped to their bounds. Multipliers of variables that have one
-  /// value only follow from stationarity: Ipopt does not see such variables.
+  /// The KKT residual of an iterate, with states and controls clipped to their bounds. Ipopt does not see fixed
+  /// variables: their multipliers are computed from stationarity.
   KktResidual residual_at(const PrimalDual& iterate) noexcept;
-  // Of the iterate whose residual was computed last:
-  /// Gives it away, once, and gets an iterate of the same capacity for it.
+  // For the iterate whose residual was computed last:
+  /// Swaps it with an iterate of the same capacity. Once only.
   void exchange_judged(Iterate& iterate) noexcept;
-  /// Sum of |bound multiplier| x distance from the bound: what the barrier still adds to the objective.
+  /// Sum of |bound multiplier| x distance from the bound: the barrier's remaining contribution to the objective.
   double complementarity_gap() const noexcept;
   double objective() const noexcept { return linear_objective_; }
-  /// The time that Ipopt's calls of this object have taken since it was made [us].
+  /// Time spent in Ipopt's calls of this object since construction [us].
   double microseconds() const noexcept { return microseconds_; }
 
   // Ipopt::TNLP. Arrays are Ipopt's.
@@ -108,7 +108,7 @@ class OcpNlp final : public Ipopt::TNLP {
                              const Ipopt::IpoptData* data, Ipopt::IpoptCalculatedQuantities* quantities) override;
 
  private:
-  /// Adds the time that it exists.
+  /// Adds its lifetime to a sum.
   class Timer {
    public:
     explicit Timer(double& microseconds) noexcept : microseconds_(&microseconds) {}
@@ -120,12 +120,12 @@ class OcpNlp final : public Ipopt::TNLP {
     double* microseconds_;
     Clock::time_point start_ = Clock::now();
   };
-  /// Where something was evaluated.
+  /// A point at which something was evaluated.
   struct Place {
     std::vector<double> z;
-    unsigned visit = 0;  ///< of Ipopt's, in which it was last asked for
+    unsigned visit = 0;  ///< the last of Ipopt's visits to this point
     bool is_known = false, is_sound = false;
-    /// Whether it is here, at `at`; what Ipopt says to be the same iterate need not be compared.
+    /// Whether it is the point `at`. If Ipopt says that the point is unchanged, nothing is compared.
     bool is_at(const double* at, unsigned now) noexcept;
     void move_to(const double* at, unsigned now) noexcept;
   };
@@ -149,14 +149,14 @@ class OcpNlp final : public Ipopt::TNLP {
   std::vector<double> lower_, upper_;
   std::vector<int> bounded_;  ///< variables that have a bound
   PrimalDual start_;
-  std::vector<double> start_lower_, start_upper_;  ///< multipliers of bounds as Ipopt has them, none of them negative
-  /// Where Ipopt has its iterates, from the first that it shows to its end.
+  std::vector<double> start_lower_, start_upper_;  ///< bound multipliers with Ipopt's signs: nonnegative
+  /// Ipopt's objects that hold its iterates; valid from the first iterate it reports to the end of the run.
   struct {
     const Ipopt::IpoptData* data = nullptr;
     Ipopt::OrigIpoptNLP* scaled = nullptr;
     Ipopt::TNLPAdapter* adapter = nullptr;
   } iterates_;
-  PrimalDual seen_;                              ///< one of them
+  PrimalDual seen_;                              ///< the last one read
   std::vector<double> seen_lower_, seen_upper_;  ///< always zero where there is no bound
 
   static constexpr unsigned elsewhere = 0;
@@ -169,15 +169,15 @@ class OcpNlp final : public Ipopt::TNLP {
   double objective_ = 0.0;
   // At `linearised_`.
   Place linearised_;
-  const PrimalDual* linear_iterate_ = nullptr;  ///< whose multipliers were taken
-  Ipopt::TaggedObject::Tag linear_tag_ = 0;     ///< its number, where it is at this place itself
-  StageQp pieces_;                              ///< of the passage under way; only the vectors are kept
-  Iterate linear_;  ///< the iterate; with its multipliers as long as its residual is computed
+  const PrimalDual* linear_iterate_ = nullptr;  ///< whose multipliers were used
+  Ipopt::TaggedObject::Tag linear_tag_ = 0;     ///< its tag, if it is at this point
+  StageQp pieces_;                              ///< window of the current pass; only the vectors are kept
+  Iterate linear_;  ///< the iterate; its multipliers are valid while its residual is computed
   std::vector<double> gradient_, jacobian_, hessian_;
   KktResidual linear_kkt_;
   double linear_objective_ = 0.0;
   bool is_judged_ = false;
-  bool is_linear_exact_ = false;  ///< the Hessian is that for these multipliers
+  bool is_linear_exact_ = false;  ///< the Hessian is exact, for these multipliers
 
   bool starts_with_multipliers_ = false, any_fixed_ = false;
   std::vector<double> weighted_, clipped_, hessian_part_;

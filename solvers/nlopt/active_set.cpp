@@ -14,11 +14,11 @@ using Matrix = Eigen::MatrixXd;
 using Eigen::Index;
 
 constexpr int most_rounds = 60;
-// Rounds after which bounds enter and leave one at a time, which cannot cycle as easily as all at once.
+// Rounds in which many bounds enter and leave at once. After these they change one at a time, which cycles less easily.
 constexpr int hasty_rounds = 12;
 constexpr double rank_tolerance = 1e-10;
 
-/// minimise |A z - b| with z >= 0.
+/// minimise |A z - b| subject to z >= 0.
 Vector nonnegative_least_squares(const Matrix& A, const Vector& b) {
   const Index count = A.cols();
   Vector z = Vector::Zero(count);
@@ -59,7 +59,7 @@ Vector nonnegative_least_squares(const Matrix& A, const Vector& b) {
       if (end == passive.end()) break;
       passive.erase(end, passive.end());
     }
-    // What entered was thrown out at once: rounding decides now.
+    // The entering variable left at once: only rounding is left.
     if (!is_passive[static_cast<std::size_t>(entering)]) break;
   }
   return z;
@@ -133,7 +133,8 @@ bool solve_active_set(const CondensedQp& qp, const Matrix& hessian, Vector& step
       if (side_of(k) != 0) held_rows.push_back(k);
     const auto f = static_cast<Index>(free_ones.size()), r = static_cast<Index>(held_rows.size());
 
-    // The held rows, on the free variables: R' y = right-hand side, in the basis [Y Z] of an orthogonal decomposition.
+    // The active rows, restricted to the free variables: R' y = right-hand side, in the basis [Y Z] of a QR
+    // decomposition.
     Matrix normals(f, r);
     Vector wanted(r);
     for (Index k = 0; k < r; ++k) {
@@ -198,7 +199,7 @@ bool solve_active_set(const CondensedQp& qp, const Matrix& hessian, Vector& step
     for (Index k = 0; k < n; ++k)
       if (side_of(k) != 0) found[k] = -left[k];
 
-    // Bounds that pull the wrong way leave, violated ones enter.
+    // Bounds with a multiplier of the wrong sign leave, violated bounds enter.
     const Vector rows = qp.jacobian * d;
     const double largest = found.size() > 0 ? found.cwiseAbs().maxCoeff() : 0.0;
     int changes = 0;
@@ -221,7 +222,7 @@ bool solve_active_set(const CondensedQp& qp, const Matrix& hessian, Vector& step
       if (side_of(k) != 0 && qp.lower[k] != qp.upper[k] && found[k] * side_of(k) < -1e-13 * (1.0 + largest)) {
         change(k, 0, std::abs(found[k]) / (1.0 + largest));
       } else if (value > qp.upper[k] + slack) {
-        if (side_of(k) == 1) return false;  // held, and yet violated: the held rows contradict each other
+        if (side_of(k) == 1) return false;  // active and yet violated: the active rows contradict each other
         change(k, 1, value - qp.upper[k]);
       } else if (value < qp.lower[k] - slack) {
         if (side_of(k) == -1) return false;

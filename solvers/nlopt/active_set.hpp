@@ -7,12 +7,12 @@
 
 namespace rhec::nlopt {
 
-/// A condensed problem at one iterate, in steps d from there:
+/// The QP of a condensed problem at one iterate, in the step d from there:
 ///
 ///     minimise g'd + 1/2 d'Hd  subject to  lower <= d <= upper,  row_lower <= J d <= row_upper
 ///
-/// Multipliers and active sets are counted through: first the bounds of d, then the rows. They are positive at upper
-/// bounds, negative at lower ones.
+/// Multipliers and active sets are indexed by bound: first the bounds of d, then the rows. Multipliers are positive at
+/// upper bounds and negative at lower bounds.
 struct CondensedQp {
   const Eigen::VectorXd& gradient;
   const Eigen::MatrixXd& jacobian;
@@ -21,13 +21,14 @@ struct CondensedQp {
   Eigen::Index bounds() const noexcept { return lower.size(); }
 };
 
-/// Multipliers that NLopt does not tell: those of bounds no further away than `distance` that leave the least gradient
-/// of the Lagrangian, each with the sign that its bound demands (Lawson and Hanson's nonnegative least squares).
-/// Gradients are compared divided by `scale`.
+/// Recovers the multipliers, which NLopt does not return: those of the bounds within `distance` that minimise the norm
+/// of the Lagrangian's gradient, each with the sign that its bound requires (Lawson and Hanson's nonnegative least
+/// squares). The gradient is divided by `scale`.
 Eigen::VectorXd recover_multipliers(const CondensedQp& qp, const Eigen::VectorXd& scale, double distance);
 
-/// The step to the minimiser by a primal-dual active-set method that begins with the bounds that have a multiplier.
-/// False, with nothing written, where the set does not settle or the curvature on it is not positive.
+/// Computes the minimising step by a primal-dual active-set method [6], which starts with the bounds that have a
+/// nonzero multiplier. Returns false and writes nothing if the active set does not settle or the reduced Hessian is not
+/// positive definite.
 bool solve_active_set(const CondensedQp& qp, const Eigen::MatrixXd& hessian, Eigen::VectorXd& step,
                       Eigen::VectorXd& multipliers);
 

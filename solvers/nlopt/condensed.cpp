@@ -112,7 +112,7 @@ void CondensedProblem::linearise() {
 }
 
 double CondensedProblem::reduced_gradient(const Entry& e) const noexcept {
-  // `adjoint_` has the costates of nodes 1 .. N; that of a free node 0 is this gradient.
+  // `adjoint_` has the costates of nodes 1 .. N; the costate of a free node 0 is this gradient.
   const int i = e.stage, N = ocp_->intervals();
   double sum = e.is_state ? qp_.q(0)[e.component] : qp_.r(i)[e.component];
   if (i < N) {
@@ -168,7 +168,7 @@ const CondensedProblem::Matrix& CondensedProblem::jacobian() {
 
 const CondensedProblem::Matrix& CondensedProblem::hessian(Hessian kind) {
   compute_sensitivities();
-  // First derivatives do not depend on the kind, so what was derived from them stays valid.
+  // First derivatives do not depend on the kind of Hessian, so what was derived from them stays valid.
   ocp_->linearise(all_stages(*ocp_), point_, kind, qp_, scratch_);
   const int N = ocp_->intervals(), n = variables();
   hessian_.setZero(n, n);
@@ -201,7 +201,7 @@ void CondensedProblem::set_multipliers(const Vector& multipliers) {
     (e.is_state ? point_.state_bound(e.stage) : point_.control_bound(e.stage))[e.component] = value;
   };
   for (int k = 0; k < rows(); ++k) put(rows_[static_cast<std::size_t>(k)], multipliers[variables() + k]);
-  // With the rows' multipliers in place, those of fixed variables are what stationarity leaves over.
+  // With the rows' multipliers set, those of fixed variables follow from stationarity.
   adjoint_.clear_multipliers();
   for (int k = 0; k < rows(); ++k) {
     const Entry& e = rows_[static_cast<std::size_t>(k)];

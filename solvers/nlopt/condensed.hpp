@@ -9,21 +9,21 @@
 
 namespace rhec::nlopt {
 
-/// An Ocp with its states eliminated by simulation:
+/// An Ocp with its states eliminated by simulation (single shooting; docs/method.md, section 7):
 ///
 ///     minimise f(x)  subject to  lower <= x <= upper,  row_lower <= c(x) <= row_upper
 ///
-/// x = [s_0 where it is free; w_0; ...; w_{N-1}] without what its bounds fix, c the bounded states of nodes 1 .. N. All
-/// that is asked at one x shares one simulation and one linearisation.
+/// x = [s_0 if it is free; w_0; ...; w_{N-1}] without fixed variables; c are the bounded states of nodes 1 .. N. All
+/// evaluations at one x share one simulation and one linearisation.
 class CondensedProblem {
  public:
   using Vector = Eigen::VectorXd;
   using Matrix = Eigen::MatrixXd;
 
   CondensedProblem() = default;
-  explicit CondensedProblem(const Ocp& ocp);  ///< for the capacity of this one
+  explicit CondensedProblem(const Ocp& ocp);  ///< for problems of this capacity
 
-  /// Takes over the Ocp's present structure and bounds; false where lower bounds are above upper ones. The Ocp must
+  /// Takes on the Ocp's current structure and bounds; false if a lower bound is above its upper bound. The Ocp must
   /// outlive the use of this object until the next call.
   bool take(const Ocp& ocp);
 
@@ -34,29 +34,30 @@ class CondensedProblem {
   const Vector& row_lower() const noexcept { return row_lower_; }
   const Vector& row_upper() const noexcept { return row_upper_; }
 
-  /// x of an iterate, within the bounds.
+  /// x of an iterate, clipped to the bounds.
   Vector read(const Iterate& iterate) const;
-  /// Simulates, unless x is where the last call led. False where that leads to numbers that are not finite.
+  /// Simulates, unless x is unchanged since the last call. False if a result is not finite.
   bool move_to(const Vector& x);
   const Vector& x() const noexcept { return x_; }
   double objective() const noexcept { return objective_; }
-  /// c at the present x.
+  /// One row of c at the current x.
   double row_value(int row) const noexcept {
     return point_.state(rows_[static_cast<std::size_t>(row)].stage)[rows_[static_cast<std::size_t>(row)].component];
   }
-  /// The largest violation of all bounds at the present x.
+  /// The largest violation of any bound at the current x.
   double violation() const noexcept;
 
-  // Derivatives at the present x, which must be finite; computed when first asked for.
+  // Derivatives at the current x, where `move_to` must have succeeded; computed on demand.
   const Vector& gradient();  ///< of f, by the adjoint sweep
   const Matrix& jacobian();  ///< of c, by forward sensitivities
-  /// Of the Lagrangian with the multipliers last set, or of Gauss-Newton; full and symmetric.
+  /// The Hessian of the Lagrangian with the multipliers last set, or its Gauss-Newton approximation; full and
+  /// symmetric.
   const Matrix& hessian(Hessian kind);
 
-  /// Multipliers of the bounds of x and then of the rows, positive at upper bounds, in units of the objective. Sets the
-  /// iterate's bound multipliers and costates, those of fixed variables too.
+  /// Takes the multipliers of the bounds of x, then of the rows, positive at upper bounds, in units of the objective.
+  /// Sets the iterate's bound multipliers and costates, those of fixed variables included.
   void set_multipliers(const Vector& multipliers);
-  /// The core's residual at the present x with the multipliers last set.
+  /// The core's KKT residual at the current x with the multipliers last set.
   KktResidual residual();
   const Iterate& iterate() const noexcept { return point_; }
 
@@ -76,13 +77,13 @@ class CondensedProblem {
   }
   void linearise();
   void compute_sensitivities();
-  /// The reduced gradient in one entry of s_0 or w, with the iterate's present costates.
+  /// The reduced gradient with respect to one entry of s_0 or w, with the current costates.
   double reduced_gradient(const Entry& entry) const noexcept;
 
   const Ocp* ocp_ = nullptr;
   std::vector<Entry> variables_, fixed_, rows_;
   std::vector<double> fixed_values_, lower_list_, upper_list_, row_lower_list_, row_upper_list_;
-  std::vector<int> control_columns_;  ///< of each control in x, or -1; rows of the capacity's controls
+  std::vector<int> control_columns_;  ///< index of each control in x, or -1; one row per interval
   std::vector<int> columns_before_;   ///< number of variables that node i depends on
   Vector lower_, upper_, row_lower_, row_upper_, x_, gradient_;
   Matrix jacobian_, hessian_;

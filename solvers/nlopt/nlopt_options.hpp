@@ -11,31 +11,31 @@
 
 namespace rhec::nlopt {
 
-/// What an algorithm of NLopt can take.
+/// What an algorithm of NLopt supports and requires.
 struct Traits {
-  bool gradients = false;        ///< asks for derivatives
-  bool inequalities = false;     ///< takes inequality constraints
-  bool equalities = false;       ///< takes equality constraints
-  bool bounds = true;            ///< takes bounds of variables
-  bool finite_bounds = false;    ///< needs all of them finite
-  bool local_optimiser = false;  ///< hands sub-problems to `local_algorithm`
-  bool from_start = true;        ///< begins at the start; a restart from its last iterate makes sense
+  bool gradients = false;        ///< uses derivatives
+  bool inequalities = false;     ///< supports inequality constraints
+  bool equalities = false;       ///< supports equality constraints
+  bool bounds = true;            ///< supports bounds of variables
+  bool finite_bounds = false;    ///< requires finite bounds on all variables
+  bool local_optimiser = false;  ///< solves subproblems with `local_algorithm`
+  bool from_start = true;        ///< starts at the given point, so a restart from its last iterate makes sense
   int fewest_variables = 1;
 };
 Traits traits_of(nlopt_algorithm algorithm);
-/// Without the prefix: "LD_SLSQP".
+/// Its name without the prefix, e.g. "LD_SLSQP".
 std::string name_of(nlopt_algorithm algorithm);
-/// The algorithms that this build of NLopt has, by name.
+/// The algorithms in this build of NLopt, by name.
 const std::vector<std::pair<std::string, nlopt_algorithm>>& algorithms();
-/// "LD_MMA, LD_SLSQP, ...": those that take constraints of the kinds asked for.
+/// The algorithms that support the given kinds of constraints: "LD_MMA, LD_SLSQP, ...".
 std::string names_of_those_with(bool inequalities, bool equalities);
 
-/// In which variables NLopt sees the problem.
+/// How the variables that NLopt sees are scaled.
 enum class Scaling {
-  automatic,  ///< full for LD_SLSQP, diagonal for all others
+  automatic,  ///< full for LD_SLSQP, diagonal for the others
   none,
   diagonal,  ///< divided by the square roots of the condensed Hessian's diagonal
-  full       ///< by its Cholesky factor; bounds of variables become general linear constraints
+  full       ///< by the Hessian's Cholesky factor; bounds of variables become general linear constraints
 };
 
 struct NloptOptions {
@@ -62,10 +62,10 @@ struct NloptOptions {
   static const OptionTable<NloptOptions>& table();
 };
 
-/// Whether derivatives are asked for; of AUGLAG and MLSL, whether their local algorithm does.
+/// Whether the algorithm uses derivatives; for AUGLAG and MLSL, whether their local algorithm does.
 bool uses_gradients(nlopt_algorithm algorithm, const NloptOptions& options);
 
-/// The native parameters as NLopt takes them. Throws Error where one is no number or would make NLopt print.
+/// The native parameters in NLopt's form. Throws Error if one is not a number or would make NLopt print.
 std::vector<std::pair<std::string, double>> native_parameters(const Settings& native);
 
 }  // namespace rhec::nlopt

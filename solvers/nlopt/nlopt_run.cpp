@@ -14,11 +14,12 @@ struct Destroy {
 };
 using Optimiser = std::unique_ptr<nlopt_opt_s, Destroy>;
 
-// What constraints say where the simulation has left the numbers: far outside, and finite, since NLopt computes on.
+// Value of the constraints where the simulation is not finite: far outside but finite, since NLopt computes with it.
 constexpr double far_outside = 1e10;
-// Asking for less than this of NLopt would be asking for rounding errors.
+// A smaller tolerance on violations would only demand rounding errors of NLopt.
 constexpr double least_allowed_violation = 1e-10;
-// How often a run may come back to one and the same iterate: more often than for its objective and its constraints.
+// How often a run may return to the same iterate. Evaluating the objective and the constraints there takes a few
+// returns.
 constexpr int most_returns = 100;
 
 }  // namespace
@@ -73,16 +74,16 @@ bool Run::go_to(const double* y, bool with_gradient) {
     return false;
   }
   Vector x = transformation_.x_of(Eigen::Map<const Vector>(y, problem_.variables()));
-  // Bounds that NLopt keeps, it keeps in y: what is outside in x is rounding.
+  // NLopt keeps bounds in y: a violation in x is rounding.
   if (!transformation_.is_full()) x = x.cwiseMax(problem_.lower()).cwiseMin(problem_.upper());
   return x.allFinite() && may_count(x, with_gradient) && problem_.move_to(x);
 }
 
-/// Counts a new iteration, or stops where that would be one too many.
+/// Counts a new iteration, or stops the run if the limit is reached.
 bool Run::may_count(const Vector& x, bool with_gradient) {
   if (with_gradient != uses_gradients_) return true;
   if (iterations_ > 0 && x == last_counted_) {
-    // LD_CCSAQ and LD_MMA try the iterate of their step again and again where rounding keeps it from being good enough.
+    // LD_CCSAQ and LD_MMA retry the same point again and again if rounding keeps it from being accepted.
     if (++returns_ <= most_returns) return true;
     stop(Outcome::ended);
     return false;
@@ -124,7 +125,7 @@ void Run::remember() {
     for (int k = 0; k < problem_.variables(); ++k)
       violation = std::max({violation, problem_.lower()[k] - problem_.x()[k], problem_.x()[k] - problem_.upper()[k]});
   }
-  // Among feasible points the objective counts, otherwise the violation.
+  // Feasible points are compared by objective, others by violation.
   violation = violation <= 2.0 * allowed_violation() ? 0.0 : violation;
   if (violation < best_violation_ || (violation == best_violation_ && value < best_value_)) {
     best_violation_ = violation;
@@ -180,7 +181,7 @@ void Run::evaluate(const std::vector<Constraint>& constraints, const double* y, 
   }
 }
 
-// NLopt is C: nothing may be thrown through it. What Eigen may throw is a failed allocation.
+// NLopt is C code: no exception may pass through it. Eigen may throw if an allocation fails.
 double Run::objective_of(unsigned, const double* y, double* gradient, void* data) noexcept {
   Run& run = *static_cast<Run*>(data);
   try {
@@ -209,7 +210,8 @@ void Run::equalities_of(unsigned, double* values, unsigned, const double* y, dou
   }
 }
 
-// Where a multiplier is large, a violation within the tolerance is worth a residual beyond it; so it shrinks as well.
+// With a large multiplier, a violation within the tolerance can cause a residual above it; so the allowed violation
+// shrinks with `strictness` too.
 double Run::allowed_violation() const noexcept {
   const double allowed = 0.5 * options_.tolerance;
   return std::max(limits_.strictness * allowed, std::min(allowed, least_allowed_violation));
@@ -288,9 +290,9 @@ Run::Outcome Run::optimise() {
   best_x_ = within(best_x_);
   if (was_stopped_) return outcome_;
   if (result == NLOPT_MAXTIME_REACHED) return Outcome::deadline;
-  // Rounding and incompatible linearised constraints are ends as good as any; the residual tells what they are worth.
+  // NLopt's other failures (rounding, incompatible linearised constraints) count as normal ends; the residual decides.
   if (result == NLOPT_INVALID_ARGS || result == NLOPT_OUT_OF_MEMORY) return Outcome::failed;
-  // NLopt's own choice counts where it is worth as much: it weighs violations by its merit function.
+  // NLopt's own result is preferred if it is as good: NLopt weighs violations by its merit function.
   const Vector x = within(transformation_.x_of(y));
   if (!traits_.from_start || !x.allFinite() || !problem_.move_to(x)) return Outcome::ended;
   if (problem_.violation() <= 2.0 * allowed &&

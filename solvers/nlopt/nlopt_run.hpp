@@ -8,14 +8,14 @@
 
 namespace rhec::nlopt {
 
-/// The variables that NLopt sees: x = centre + factor y, the factor a diagonal or a triangular matrix.
+/// The variables y that NLopt sees: x = centre + factor y, with a diagonal or triangular factor.
 struct Transformation {
   Eigen::VectorXd centre;
   Eigen::VectorXd diagonal;  ///< used if `full` is empty
   Eigen::MatrixXd full;      ///< upper triangular
   bool is_full() const noexcept { return full.size() > 0; }
   Eigen::VectorXd x_of(const Eigen::VectorXd& y) const;
-  /// factor' g, a gradient in y.
+  /// factor' g: the gradient with respect to y.
   Eigen::VectorXd pulled_back(const Eigen::VectorXd& g) const;
 };
 
@@ -24,33 +24,33 @@ class Run {
  public:
   enum class Goal {
     objective,
-    violation  ///< the sum of the squared violations of the rows, within the bounds of variables alone
+    violation  ///< the sum of squared violations of the rows, subject to the bounds of variables only
   };
   enum class Outcome {
-    ended,  ///< by NLopt's own criteria, or for rounding
+    ended,  ///< by NLopt's own criteria, or limited by rounding
     deadline,
     iteration_limit,
-    failed  ///< NLopt refused or gave up; `x` is still the best that was met
+    failed  ///< NLopt refused or gave up; `x` is still the best iterate found
   };
   struct Limits {
     Clock::time_point deadline;
-    long iterations = 0;      ///< as `iterations` counts them
-    long quota = 0;           ///< the same, after which this run has done enough; 0: none
+    long iterations = 0;      ///< limit, as counted by `iterations`
+    long quota = 0;           ///< iterations after which this run ends normally; 0: no quota
     double strictness = 1.0;  ///< factor on the tolerances
   };
   Run(CondensedProblem& problem, const NloptOptions& options, nlopt_algorithm algorithm, Goal goal,
       const Transformation& transformation, const Limits& limits);
 
   Outcome optimise();
-  /// The best iterate that was met: feasible and of the lowest objective, or the least infeasible.
+  /// The best iterate found: the feasible one of the lowest objective, or else the least infeasible one.
   const Eigen::VectorXd& x() const noexcept { return best_x_; }
   /// The last iterate that was counted as an iteration, feasible or not.
   const Eigen::VectorXd& last_x() const noexcept { return last_counted_; }
-  /// Points at which NLopt asked for derivatives or, where it never does, for values.
+  /// Number of points at which NLopt asked for derivatives, or for values if it never asks for derivatives.
   long iterations() const noexcept { return iterations_; }
 
  private:
-  /// A bound as NLopt's constraint value <= 0, or = 0.
+  /// A bound as a constraint of NLopt: value <= 0, or value = 0.
   struct Constraint {
     bool is_row = false;
     int index = 0;
@@ -82,7 +82,7 @@ class Run {
   Limits limits_;
   bool uses_gradients_;
   long iterations_ = 0;
-  int returns_ = 0;  ///< to the iterate that was counted last
+  int returns_ = 0;  ///< evaluations repeated at the iterate counted last
   nlopt_opt optimiser_ = nullptr;
   Outcome outcome_ = Outcome::ended;
   bool was_stopped_ = false;

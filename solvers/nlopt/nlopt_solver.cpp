@@ -17,24 +17,24 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-// A violation that is more than what a run leaves by its own tolerance.
+// A violation larger than the tolerance of a run can leave.
 constexpr double infeasible_beyond = 1e-6;
-// The KKT residual from which Newton steps are tried.
+// Below this KKT residual Newton steps are tried.
 constexpr double near_solution = 0.1;
 constexpr int most_newton_steps = 30;
-// An iteration of SLSQP takes far longer than scaling anew does where variables are many, and no longer where they are
-// few; the curvature of a new scaling is worth more than that of quasi-Newton updates.
+// A new scaling brings better curvature than quasi-Newton updates do. With many variables it takes far less time than
+// an iteration of SLSQP, so runs are short; with few it takes about as long.
 constexpr int many_variables = 100;
 constexpr long iterations_of_many_variables = 3;
 constexpr long iterations_of_few_variables = 15;
-// By how much the runs of a second attempt are longer. Where weights are very uneven, rounding decides how far a short
+// Factor by which the runs of a second attempt are longer. With very uneven weights, rounding decides how far a short
 // run gets.
 constexpr long longer_runs = 3;
-// Iterations after which an attempt with short runs is given up.
+// Iterations after which an attempt with short runs is abandoned.
 constexpr long patience = 300;
-// How near a bound is at which a multiplier may be: the smallest residual decides.
+// Distances within which a bound may have a multiplier: the one of the smallest residual is taken.
 constexpr double distances[] = {1e-9, 1e-6, 1e-4};
-// Curvature below this part of the largest is taken as if it were that.
+// Curvature is raised to at least this share of the largest.
 constexpr double least_curvature = 1e-10;
 
 /// Makes a symmetric matrix positive definite by reflecting its negative eigenvalues.
@@ -122,7 +122,7 @@ void NloptSolver::setup(const Ocp& ocp) {
 
 void NloptSolver::prepare(const Iterate&) noexcept {}
 
-// Nothing is learnt from one problem for the next.
+// Nothing carries over from one solve to the next.
 void NloptSolver::reset() noexcept {}
 
 Report NloptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
@@ -134,7 +134,7 @@ Report NloptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
     fallback_used_ = false;
     try {
       report = optimise(*ocp_, iterate, deadline);
-    } catch (const std::exception&) {  // memory ran out; `iterate` is written last
+    } catch (const std::exception&) {  // out of memory; `iterate` is unchanged, since it is written last
       report.status = Status::stalled;
       rhec::assess(*ocp_, iterate, qp_, scratch_, report);
     }
@@ -169,7 +169,7 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   return report;
 }
 
-/// The guess, simulated. Where that leaves the numbers, controls closer to zero are tried.
+/// Simulates the guess. If the result is not finite, controls closer to zero are tried.
 bool NloptSolver::find_start(const Ocp& ocp, const Iterate& iterate) {
   if (problem_.move_to(problem_.read(iterate))) return true;
   Iterate smaller = iterate;
@@ -255,7 +255,7 @@ Transformation NloptSolver::transformation_at(const Ocp& ocp, const Answer& answ
   problem_.move_to(answer.x);
   problem_.set_multipliers(answer.multipliers);
   Eigen::LLT<Matrix> factor;
-  // Far from a solution the exact curvature may be indefinite; Gauss-Newton's then leads better than a bent one.
+  // Far from a solution the exact Hessian may be indefinite; then Gauss-Newton does better than a convexified Hessian.
   const auto usable = [&](const Matrix& hessian) {
     ++factorisations_;
     factor.compute(hessian);
@@ -298,7 +298,7 @@ bool NloptSolver::polish(const Ocp& ocp, Answer& answer, Clock::time_point deadl
       const Vector x = within_bounds(answer.x + step);
       if (!problem_.move_to(x)) continue;
       Answer next = answer_with(multipliers);
-      // Newton's method also finds maxima; a step that raises the objective may only repair a violation.
+      // Newton's method also converges to maxima: a step may raise the merit only to repair a violation.
       const double rise = next.merit - answer.merit;
       const double allowed = 1e-7 * (1.0 + std::abs(answer.merit));
       if (!(next.kkt.largest() < 0.9 * answer.kkt.largest()) ||
@@ -331,10 +331,10 @@ Status NloptSolver::restore_feasibility(const Ocp& ocp, Answer& answer, Clock::t
   return Status::solved;
 }
 
-/// Attempts from the start that is given, with short runs and, where these got stuck, with longer ones: not where
-/// variables are many, since long runs take too long there and get no further.
+/// An attempt from the given start with short runs and, if that stalls, another one with longer runs. Not with many
+/// variables: there long runs take too long and get no further.
 Status NloptSolver::improve(const Ocp& ocp, Answer& answer, Clock::time_point deadline) {
-  // With the curvature known at the start, a fresh start soon serves better than quasi-Newton updates do.
+  // Since scaling uses the Hessian at the start, an early restart does better than more quasi-Newton updates.
   const long quota = scales_fully() && traits_.gradients ? iterations_per_run() : 0;
   const bool may_retry = quota > 0 && problem_.variables() > 0 && problem_.variables() <= many_variables;
   if (!may_retry) return attempt(ocp, answer, quota, deadline);
@@ -368,8 +368,9 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
     const Run::Outcome outcome = run.optimise();
     iterations_ += run.iterations();
     Answer next = assess(run.x());
-    // From far off, the rounding errors of a large step leave it slightly infeasible, and yet next to a solution. NLopt
-    // then ends for rounding, and with the start, which was feasible.
+    // From a distant start, rounding errors of a large step can leave it close to a solution but slightly infeasible.
+    // NLopt then stops because of rounding and returns the start, which was feasible; so the last iterate is assessed
+    // too.
     const double wanted = 0.1 * std::min(next.kkt.largest(), least_residual);
     if (run.last_x() != run.x() && problem_.move_to(within_bounds(run.last_x())) && problem_.violation() < wanted) {
       Answer last = assess(problem_.x());
@@ -377,7 +378,7 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
     }
     const bool stopped = outcome == Run::Outcome::deadline || outcome == Run::Outcome::iteration_limit;
     if (!stopped && options_.polish && next.kkt.largest() < near_solution) polish(ocp, next, deadline);
-    // Each time the least residual falls, so this cannot go round in circles with what is better otherwise.
+    // The least residual falls each time, so this cannot cycle with the other criteria.
     const bool is_nearer = next.kkt.largest() < 0.1 * least_residual;
     least_residual = std::min(least_residual, next.kkt.largest());
     const bool progress =
@@ -394,7 +395,7 @@ Status NloptSolver::attempt(const Ocp& ocp, Answer& answer, long quota, Clock::t
       restored = true;
       continue;
     }
-    // A run that ended early for its own criteria gets another chance, down to rounding.
+    // A run that ended early by its own criteria gets another chance, with tolerances down to rounding.
     idle = progress ? 0 : idle + 1;
     if (idle > 1) return Status::stalled;
     strictness = idle == 1 ? 0.0 : 0.01 * strictness;

@@ -9,19 +9,21 @@
 
 namespace rhec::nlopt {
 
-/// Single shooting on NLopt: the decisions are s_0 (where free) and all controls, states follow by simulation, and so
-/// the defect is zero up to rounding whatever NLopt does. Bounds of decisions are NLopt's bounds (or linear
-/// constraints, see the option `scaling`); bounds of later states are nonlinear constraints with exact Jacobians.
+/// Single shooting with NLopt (docs/method.md, section 7): the decision variables are s_0 (if free) and all controls.
+/// States follow by simulation, so the defects are always zero up to rounding. Bounds of decision variables are NLopt's
+/// bounds (or linear constraints, see the option `scaling`); bounds of later states are nonlinear constraints with
+/// exact Jacobians.
 ///
-/// NLopt tells neither multipliers nor how far it is from an optimum. So after each run multipliers are recovered from
-/// the bounds that are active, the core's residual is computed with them, and the run is repeated from its last iterate
-/// (scaled anew) until that residual is met. By default each run is also finished by Newton steps on the condensed
-/// problem with its active bounds (`polish`): quasi-Newton methods that compare objectives end where these differ by
-/// rounding only, which is about half of the digits. With few decisions, an attempt that gets stuck is followed by one
-/// from the guess with longer runs, within the same limit of iterations; the report says that there was a fallback.
+/// NLopt returns neither multipliers nor an optimality measure. So after each run the multipliers of the active bounds
+/// are recovered and the core's KKT residual is computed with them; runs are repeated from the last iterate, with new
+/// scaling, until that residual is within the tolerance. By default each run is followed by Newton steps on the
+/// condensed problem with its active bounds (`polish`): quasi-Newton methods that compare objectives stop where these
+/// differ by rounding only, which is at about half of the digits. With few decision variables, an attempt that stalls
+/// is followed by one from the guess with longer runs, within the same limit of iterations; the report flags the
+/// fallback.
 ///
-/// The condensed problem is dense: memory grows with the square of the number of decisions and an iteration of SLSQP
-/// with its cube. Evaluation and NLopt allocate while solving.
+/// The condensed problem is dense: memory grows with the square of the number of decision variables, the time of an
+/// SLSQP iteration with its cube. Evaluation and NLopt allocate while solving.
 class NloptSolver final : public Solver {
  public:
   using Options = NloptOptions;
@@ -36,12 +38,12 @@ class NloptSolver final : public Solver {
   void reset() noexcept override;
 
  private:
-  /// An iterate with what it is worth.
+  /// An iterate and its measures of quality.
   struct Answer {
     Eigen::VectorXd x, multipliers;
     double objective = 0.0, violation = 0.0;
     KktResidual kkt;
-    double merit = 0.0;  ///< the objective, and what the violations are worth by their multipliers
+    double merit = 0.0;  ///< objective + sum |multiplier| x violation
   };
   Report optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point deadline);
   Status improve(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
@@ -50,7 +52,7 @@ class NloptSolver final : public Solver {
   bool find_start(const Ocp& ocp, const Iterate& iterate);
   Eigen::VectorXd within_bounds(const Eigen::VectorXd& x) const;
   Answer assess(const Eigen::VectorXd& x);
-  /// What there is at the problem's present iterate with given multipliers.
+  /// The Answer at the problem's current iterate with given multipliers.
   Answer answer_with(const Eigen::VectorXd& multipliers);
   bool is_better(const Answer& one, const Answer& other) const noexcept;
   bool polish(const Ocp& ocp, Answer& answer, Clock::time_point deadline);
@@ -67,7 +69,7 @@ class NloptSolver final : public Solver {
   StageQp qp_;
   int factorisations_ = 0;
   long iterations_ = 0;
-  long limit_ = 0;  ///< of the iterations, for the attempt under way
+  long limit_ = 0;  ///< of the iterations, for the current attempt
   bool fallback_used_ = false;
 };
 

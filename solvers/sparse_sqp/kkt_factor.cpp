@@ -15,9 +15,10 @@ namespace rhec::sparse_sqp {
 namespace {
 
 constexpr int most_refinements = 6;
-// Below this relative residual refinement gains nothing more.
+// Below this relative residual further refinement gains nothing.
 constexpr double refined_enough = 2e-15;
-// Passes of equilibration, and a factor between a row's largest entry and one at which another pass gains nothing.
+// Limit of equilibration passes. If the largest entry of each row is within this factor of one, another pass gains
+// nothing.
 constexpr int most_scalings = 3;
 constexpr double scaled_enough = 8.0;
 
@@ -27,7 +28,7 @@ double largest_of(const std::vector<double>& numbers) noexcept {
   return largest;
 }
 
-/// The largest power of two that is not above a positive number.
+/// The largest power of two not above a positive number.
 double power_of_two(double value) noexcept {
   constexpr std::uint64_t exponent = 0x7ff0'0000'0000'0000;
   return std::bit_cast<double>(std::bit_cast<std::uint64_t>(value) & exponent);
@@ -49,22 +50,22 @@ struct KktFactor::Workspace {
   Workspace& operator=(const Workspace&) = delete;
 };
 
-/// K's ordering and the patterns of K and L for one structure, and where the numbers of H and J go.
+/// For one structure: the elimination order, the patterns of K and L, and where the values of H and J go in K.
 struct KktFactor::Symbolic {
   std::vector<std::int32_t> signature;  ///< of the structure
-  std::vector<int> place;               ///< of a variable or constraint in the order of elimination
+  std::vector<int> place;               ///< of a variable or constraint in the elimination order
   // K's upper triangle in that order, by columns with rows in order: the diagonal is the last entry of each.
   std::vector<int> starts, rows;
   std::vector<int> hessian_entries, jacobian_entries;
   // L without its diagonal, once by columns and once by rows, indices in order.
   std::vector<int> l_starts, l_rows, l_row_starts, l_columns;
 
-  /// An order of few fill-ins. Chains of stages have those whose neighbours are eliminated close to each other, so the
-  /// numbers of a long horizon are gone through as they lie in memory.
+  /// A fill-reducing order. For a chain of stages AMD finds one that eliminates neighbouring stages close to each
+  /// other, so a long horizon is traversed in the order in which it lies in memory.
   void choose_order(const SparseNlp& nlp, cholmod_common* common) {
     const int n = nlp.variables(), m = nlp.constraints(), size = n + m;
     const auto &H = nlp.hessian(), &J = nlp.jacobian();
-    // K's lower triangle as it comes, without the diagonal of the constraints.
+    // K's lower triangle in the original order, without the diagonal of the constraints.
     std::vector<int> column_starts(1, 0), row_indices;
     column_starts.reserve(static_cast<std::size_t>(size) + 1);
     row_indices.reserve(static_cast<std::size_t>(H.entries()) + J.entries());
@@ -91,13 +92,13 @@ struct KktFactor::Symbolic {
     for (int k = 0; k < size; ++k) place[order[k]] = k;
   }
 
-  /// The upper triangle of K with its rows and columns moved to `place`; remembers where each number went. The diagonal
-  /// is the last entry of each column.
+  /// The upper triangle of K, permuted by `place`, and where each value of H and J goes in it. The diagonal is the last
+  /// entry of each column.
   void make_matrix(const SparseNlp& nlp) {
     const int n = nlp.variables(), m = nlp.constraints();
     const auto &H = nlp.hessian(), &J = nlp.jacobian();
     const std::size_t size = static_cast<std::size_t>(n) + m;
-    // By rows first, and from those in their order into columns: then rows are in order within a column.
+    // Sorted by rows first, then distributed to columns: that leaves the rows of each column in order.
     std::vector<int> row_starts(size + 1, 0), next;
     const auto for_each_entry = [&](const auto& visit) {
       for (int c = 0; c < n; ++c)
@@ -138,7 +139,8 @@ struct KktFactor::Symbolic {
     jacobian_entries.assign(entry_of.begin() + H.entries(), entry_of.end() - m);
   }
 
-  /// The pattern of L. Row k has an entry wherever the elimination tree leads from an entry of K's column k up to k.
+  /// The pattern of L. Row k has an entry in every column on the paths in the elimination tree from the entries of K's
+  /// column k up to k.
   void analyse() {
     const int size = static_cast<int>(starts.size()) - 1;
     std::vector<int> parent(size, -1), reached_by(size, -1), ancestor(size, -1), counts(size, 0);
@@ -224,7 +226,7 @@ void KktFactor::take_structure(const SparseNlp& nlp) {
   l_values_.assign(symbolic_->l_rows.size(), 0.0);
 }
 
-/// Writes the numbers of K to their places.
+/// Writes the values of K to their places.
 void KktFactor::scatter() noexcept {
   const auto &H = nlp_->hessian(), &J = nlp_->jacobian();
   double* values = values_.data();
@@ -245,8 +247,8 @@ void KktFactor::scatter() noexcept {
     values[starts[symbolic_->place[n_ + r] + 1] - 1] = numbers_.dual ? -numbers_.dual[r] : 0.0;
 }
 
-/// Scales rows and columns towards a largest entry of one (Ruiz 2001), by powers of two: that changes no digit. It
-/// begins with the scales of the last matrix, which a solver's next one resembles.
+/// Scales rows and columns so that their largest entries are close to one (Ruiz 2001), by powers of two, which is
+/// exact. Starts with the scales of the last matrix: consecutive matrices of a solver are similar.
 void KktFactor::equilibrate() noexcept {
   const int *starts = symbolic_->starts.data(), *rows = symbolic_->rows.data();
   double* values = values_.data();
@@ -262,7 +264,7 @@ void KktFactor::equilibrate() noexcept {
       }
       norm_[c] = std::max(norm_[c], largest);
     }
-    double most = 1.0;  // that a row is off by
+    double most = 1.0;  // largest factor between a row's largest entry and one
     for (int k = 0; k < size; ++k) {
       const double norm = norm_[k] * scale_[k];
       if (!(norm > 0.0) || !std::isfinite(norm)) continue;
@@ -278,8 +280,8 @@ void KktFactor::equilibrate() noexcept {
   }
 }
 
-/// Row after row of L, each from the columns before it. False where a pivot is zero or no number, or where not as many
-/// are negative as there are constraints.
+/// Computes L row by row, each row from the columns before it. False if a pivot is zero or not finite, or if the number
+/// of negative pivots is not that of the constraints.
 bool KktFactor::eliminate() noexcept {
   const Symbolic& of = *symbolic_;
   const int *starts = of.starts.data(), *rows = of.rows.data(), *l_starts = of.l_starts.data(),
@@ -364,7 +366,7 @@ double KktFactor::solve(const double* rhs, double* x) {
     solve_with_factor(correction_.data());
     for (int k = 0; k < size; ++k) solution_[k] += correction_[k];
     const double remaining = find_residual(solution_.data()) / (size_of_rhs + largest_of(solution_));
-    if (!(remaining < best)) {  // also where it is not a number
+    if (!(remaining < best)) {  // also true for NaN
       for (int k = 0; k < size; ++k) solution_[k] -= correction_[k];
       break;
     }

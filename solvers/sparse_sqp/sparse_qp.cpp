@@ -11,21 +11,23 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int active_set_rounds = 10;
 constexpr int polishing_rounds = 6;
-// So many bounds let go in a round, and no fewer than half as many as in the one before, are no end in sight.
+// The active set is far from settled if a round releases this many bounds and more than half as many as the round
+// before.
 constexpr int many = 16;
-// Nor are so many rounds in a row that only let go some.
+// The same holds after this many consecutive rounds that release bounds and add none.
 constexpr int enough = 4;
 constexpr int most_interior_iterations = 80;
 constexpr int equation_refinements = 6;
-// Of the defects a step leaves no more than this part, or what rounding makes of them.
+// A step must reduce the defects to this share, or to rounding.
 constexpr double least_reduction = 1e-3, rounding_of_equations = 1e-12;
-// A bound counts as violated, or a multiplier as of the wrong sign, beyond this part of the sizes involved.
+// Relative tolerance beyond which a bound is violated or a multiplier has the wrong sign.
 constexpr double active_set_tolerance = 1e-11;
-// What refinement must reach for the solution of a system to be believed.
+// Relative residual below which the solution of a linear system is accepted, and below which it needs no smaller
+// regularisation.
 constexpr double believable = 1e-8;
 constexpr double accurate = 1e-11;
 constexpr double longest_step = 1e10;
-// Interior point: residuals relative to the QP's sizes.
+// Interior point: residuals relative to the magnitudes in the QP.
 constexpr double interior_tolerance = 1e-12;
 constexpr double good_enough_interior = 1e-6;
 constexpr double to_the_boundary = 0.995;
@@ -96,8 +98,8 @@ void SparseQp::guess_active(const Data& qp, const double* bound_multipliers) {
   }
 }
 
-/// Factors with `primal_`, `dual_` and the active set; false where the inertia is wrong. Of a semidefinite Hessian that
-/// can only be rounding, against which a larger regularisation helps; refinement takes care of the rest.
+/// Factorises with `primal_`, `dual_` and the active set; false if the inertia is wrong. With a semidefinite Hessian
+/// only rounding can cause that; then the regularisation is raised, and refinement removes its effect.
 bool SparseQp::factor_with(const Data& qp) {
   for (int k = 0; k < n_; ++k) fixed_[k] = active_[k] != 0;
   KktFactor::Numbers numbers;
@@ -116,8 +118,9 @@ bool SparseQp::factor_with(const Data& qp) {
   }
 }
 
-/// `solution_` = K^-1 `rhs_`; returns the remaining relative residual. Where refinement does not get far, as with
-/// weights of very different sizes, the regularisation was too large beside what it regularises: try smaller ones.
+/// `solution_` = K^-1 `rhs_`; returns the remaining relative residual. If refinement converges poorly, e.g. with
+/// weights of very different magnitudes, the regularisation is too large relative to the matrix: smaller ones are
+/// tried.
 double SparseQp::solve_system() {
   double residual = factor_.solve(rhs_.data(), solution_.data());
   while (residual > accurate && numbers_.regularisation > least_regularisation) {
@@ -140,9 +143,9 @@ double SparseQp::solve_system() {
   return residual;
 }
 
-/// Refines `d_` and `lambda_` until the equations are met: beside weights that are large, what the solution of the
-/// whole system leaves of them can be small and yet more than the next iterate should start from. False where they stay
-/// unmet: equations that contradict the active bounds give a solution that is only small beside huge multipliers.
+/// Refines `d_` and `lambda_` until the equations are satisfied. With large weights their residual can be small
+/// relative to the whole system and still too large for the next iterate. False if they cannot be satisfied: equations
+/// that contradict the active bounds yield huge multipliers, relative to which the residual looks small.
 bool SparseQp::meet_equations(const Data& qp) {
   const auto unmet = [&] {
     multiply_jacobian(qp, d_.data(), work_m_.data());
@@ -160,7 +163,7 @@ bool SparseQp::meet_equations(const Data& qp) {
     for (int r = 0; r < m_; ++r) lambda_[r] += solution_[n_ + r];
     const double last = std::exchange(remaining, unmet());
     if (remaining < 0.1 * last) continue;
-    // The regularisation holds back what the equations ask for.
+    // The regularisation prevents the equations from being satisfied: reduce it.
     if (numbers_.regularisation <= least_regularisation) break;
     const double before = std::exchange(numbers_.regularisation, 1e-2 * numbers_.regularisation);
     ++factorisations_;
@@ -174,16 +177,16 @@ bool SparseQp::meet_equations(const Data& qp) {
   return remaining <= believable * (1.0 + size);
 }
 
-/// Rounds of the primal-dual active set method from `active_`. Unless it is unknown or indefinite, what was found is in
-/// `d_`, `lambda_`, `mu_`.
+/// Rounds of the primal-dual active-set method from `active_`. If the outcome is optimal or feasible, the solution is
+/// in `d_`, `lambda_`, `mu_`.
 SparseQp::ActiveSet SparseQp::solve_active(const Data& qp, int rounds) {
   std::fill(primal_.begin(), primal_.end(), 0.0);
   std::fill(dual_.begin(), dual_.end(), 0.0);
-  int released_before = 0, peeled = 0;  // the latter: rounds in a row that only let go
+  int released_before = 0, peeled = 0;  // peeled: consecutive rounds that added no bound
   for (int round = 0; round < rounds; ++round) {
     if (!factor_with(qp)) return qp.is_convex ? ActiveSet::unknown : ActiveSet::indefinite;
     const auto value_at = [&](int k) { return active_[k] == 1 ? qp.upper[k] : qp.lower[k]; };
-    // What the fixed steps contribute to the rows of the others.
+    // Contribution of the fixed variables to the other rows.
     for (int k = 0; k < n_; ++k) d_[k] = active_[k] != 0 ? value_at(k) : 0.0;
     multiply_hessian(qp, d_.data(), mu_.data());
     multiply_jacobian(qp, d_.data(), work_m_.data());
@@ -214,7 +217,8 @@ SparseQp::ActiveSet SparseQp::solve_active(const Data& qp, int rounds) {
       settled = settled && next == active_[k];
       active_[k] = next;
     }
-    // Long stretches at a bound that should be shorter are peeled off from their ends, node by node.
+    // If the active set has a long run of nodes at a bound that should be shorter, each round releases only the nodes
+    // at the ends of the run.
     peeled = added == 0 ? peeled + 1 : 0;
     const bool is_peeling =
         (peeled >= enough && round == rounds - 1) || (peeled > 0 && released >= many && 2 * released > released_before);
@@ -225,7 +229,7 @@ SparseQp::ActiveSet SparseQp::solve_active(const Data& qp, int rounds) {
         d_[k] = std::clamp(d_[k], qp.lower[k], qp.upper[k]);
         if (active_[k] != 2) mu_[k] = active_[k] * std::max(0.0, mu_[k] * active_[k]);
       }
-      // A direction that nothing determines, neither cost nor equations nor bounds.
+      // A direction that neither cost nor equations nor bounds determine.
       if (!(max_abs(d_.data(), n_) <= longest_step)) return ActiveSet::unknown;
       return settled ? ActiveSet::optimal : ActiveSet::feasible;
     }
@@ -247,7 +251,7 @@ SparseQp::Outcome SparseQp::solve(const Data& qp, double* step, double* multipli
       outcome = Outcome::feasible;
       break;
     case ActiveSet::indefinite:
-      // Where a reduced Hessian is not positive definite, those with fewer bounds are not, either.
+      // If the reduced Hessian is not positive definite, it is not with fewer active bounds either.
       for (int k = 0; k < n_; ++k) bound_multipliers[k] = active_[k] == 2 ? 0.0 : active_[k];
       return Outcome::indefinite;
     case ActiveSet::unknown:
@@ -271,8 +275,8 @@ SparseQp::Outcome SparseQp::solve_relaxed(const Data& qp, double penalty, double
   return Outcome::relaxed;
 }
 
-/// Mehrotra's predictor-corrector. With a penalty the equations are J d + c = p - q with p, q > 0 and the cost
-/// penalty * sum(p + q); the multipliers of p and q are penalty - lambda and penalty + lambda.
+/// Mehrotra's predictor-corrector method [8]. With a penalty the equations are J d + c = p - q with p, q > 0 and the
+/// cost penalty * sum(p + q); the multipliers of p and q are penalty - lambda and penalty + lambda.
 SparseQp::Outcome SparseQp::interior_point(const Data& qp, double penalty, Clock::time_point deadline) {
   used_interior_point_ = true;
   for (int k = 0; k < n_; ++k) active_[k] = qp.lower[k] == qp.upper[k] ? 2 : 0;
@@ -323,7 +327,7 @@ SparseQp::Outcome SparseQp::interior_point(const Data& qp, double penalty, Clock
     }
     best_residual = std::min(best_residual, residual);
     const bool is_good_enough = best_residual < good_enough_interior;
-    // Beyond a certain accuracy the barrier's terms are too large for the numbers, and it gets worse again.
+    // Beyond a certain accuracy the barrier terms get too large for double precision, and the residual grows again.
     if (!std::isfinite(residual) || no_progress > (is_good_enough ? 2 : 15) || iteration == most_interior_iterations) {
       if (!is_good_enough) return Outcome::failed;
       std::swap(d_, best_d_);
@@ -342,7 +346,7 @@ SparseQp::Outcome SparseQp::interior_point(const Data& qp, double penalty, Clock
         dual_[pair.index] += pair.s / pair.z;
       }
     }
-    // Of bounds that hold back a negative curvature, the barrier has enough of a positive one.
+    // Where bounds limit a direction of negative curvature, the barrier terms make the matrix convex enough.
     if (!factor_with(qp)) return qp.is_convex ? Outcome::failed : Outcome::indefinite;
     double target = 0.0;
     if (!pairs_.empty()) {
@@ -358,7 +362,7 @@ SparseQp::Outcome SparseQp::interior_point(const Data& qp, double penalty, Clock
       target = ratio * ratio * ratio * mu;
     }
     interior_direction(target);
-    // With curvature in the cost one length for all keeps the residuals falling together.
+    // With a quadratic cost, one common step length reduces primal and dual residuals together.
     const double length = interior_length(to_the_boundary);
     for (int k = 0; k < n_; ++k) d_[k] += length * solution_[k];
     for (int r = 0; r < m_; ++r) lambda_[r] += length * solution_[n_ + r];
@@ -379,7 +383,7 @@ void SparseQp::start_interior(const Data& qp, double penalty, double multiplier)
       d_[k] = qp.lower[k];
       continue;
     }
-    // A start well inside, as near to no step as that allows.
+    // Starts well inside the bounds, as close to a zero step as that allows.
     const double margin = std::min(0.1, 0.25 * (qp.upper[k] - qp.lower[k]));
     d_[k] = std::min(std::max(0.0, qp.lower[k] + margin), qp.upper[k] - margin);
     if (std::isfinite(qp.lower[k])) pairs_.push_back({Pair::Kind::lower, k, d_[k] - qp.lower[k], multiplier});
@@ -395,8 +399,8 @@ void SparseQp::start_interior(const Data& qp, double penalty, double multiplier)
   }
 }
 
-/// Newton's direction towards s z = target (less the pair's second-order correction) for every pair; `solution_` gets
-/// those of d and lambda.
+/// Newton direction towards s z = target, less the pair's second-order correction, for every pair. `solution_` gets the
+/// directions of d and lambda.
 void SparseQp::interior_direction(double target) {
   for (int k = 0; k < n_; ++k) rhs_[k] = active_[k] == 2 ? 0.0 : -dual_residual_[k];
   for (int r = 0; r < m_; ++r) rhs_[n_ + r] = -primal_residual_[r];
@@ -430,7 +434,8 @@ void SparseQp::interior_direction(double target) {
   }
 }
 
-/// The longest step, up to one, that goes at most `share` of the way to where a slack or multiplier vanishes.
+/// Fraction-to-the-boundary rule: the longest step length, at most one, that goes at most `share` of the way to where a
+/// slack or multiplier vanishes.
 double SparseQp::interior_length(double share) const noexcept {
   double length = 1.0;
   for (const Pair& pair : pairs_) {
@@ -440,7 +445,7 @@ double SparseQp::interior_length(double share) const noexcept {
   return length;
 }
 
-/// Turns the interior solution into one with bounds that are active or not: exactly, where solving with them settles.
+/// Rounds the interior solution to an active set and polishes it; the result is exact if the active-set rounds settle.
 void SparseQp::finish_interior(const Data& qp, bool relaxed) {
   if (!relaxed) {
     const auto d = d_, lambda = lambda_;
@@ -456,7 +461,7 @@ void SparseQp::finish_interior(const Data& qp, bool relaxed) {
     if (!pair.is_bound() || pair.s > pair.z) continue;
     mu_[pair.index] = pair.kind == Pair::Kind::lower ? -pair.z : pair.z;
   }
-  // Of what is fixed, the interior point had no multiplier: it is what stationarity lacks.
+  // The interior-point method has no multipliers for fixed variables: they follow from stationarity.
   for (int k = 0; k < n_; ++k)
     if (qp.lower[k] == qp.upper[k]) mu_[k] = -dual_residual_[k];
 }

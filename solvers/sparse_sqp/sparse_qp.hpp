@@ -9,30 +9,29 @@
 
 namespace rhec::sparse_sqp {
 
-/// Solves the QPs of an SQP method,
+/// Solves the QPs of an SQP method (docs/method.md, section 7),
 ///
 ///     minimise 1/2 d'H d + g'd   subject to   J d + c = 0,   lower <= d <= upper,
 ///
-/// where lower <= 0 <= upper, so that only the equations can make it infeasible:
+/// where lower <= 0 <= upper, so the bounds alone are always feasible:
 ///
-/// 1. The active set that the caller guesses is tried and mended for some rounds (primal-dual active set method): near
-///    the solution of the nonlinear program that is one factorisation. Where all that is left is to let go many bounds,
-///    one after another, an NLP is better served by what there is, now, than by the best step much later.
-/// 2. Otherwise a primal-dual interior-point method (Mehrotra 1992) finds the active set, which is then polished to the
-///    exact solution.
-/// 3. Where no step satisfies the equations, they are relaxed: minimise also penalty * |J d + c|_1 (Fletcher's
-///    Sl1QP), whose slacks only change the lower right diagonal of the same matrix.
+/// 1. A primal-dual active-set method corrects the caller's guess of the active set for some rounds; near the solution
+///    of the nonlinear program that takes one factorisation. If all that remains is to release many bounds one after
+///    another, the feasible step found so far is returned: the NLP converges faster with it than by solving this QP.
+/// 2. Otherwise a primal-dual interior-point method [8] finds the active set, which is then polished to the exact
+///    solution.
+/// 3. If no step satisfies the equations, they are relaxed by an l1 penalty, penalty * |J d + c|_1 (Sl1QP [15]). Its
+///    slacks change only the lower right diagonal of the same matrix.
 ///
-/// An indefinite Hessian is fine as long as the reduced one is positive definite on the active set that was guessed.
+/// The Hessian may be indefinite as long as the reduced Hessian is positive definite on the active sets tried.
 class SparseQp {
  public:
   enum class Outcome {
     solved,
-    feasible,    ///< satisfies equations and bounds and is best but for bounds that should be let go: many, one after
-                 ///< another
+    feasible,    ///< satisfies equations and bounds; not optimal, since many active bounds still have to be released
     relaxed,     ///< solved with relaxed equations
-    indefinite,  ///< the Hessian is not positive definite where it would have to be: convexify it and ask again
-    failed,      ///< nothing came out that could be used
+    indefinite,  ///< the reduced Hessian is not positive definite: convexify and solve again
+    failed,      ///< no usable step was found
     deadline
   };
   struct Data {
@@ -43,27 +42,27 @@ class SparseQp {
   void take_structure(const SparseNlp& nlp);
   void forget() noexcept;
 
-  /// `step` (n), `multipliers` (m) and `bound_multipliers` (n, signs as Iterate's) are the guess for the active set and
-  /// get the solution.
+  /// On entry `bound_multipliers` is the guess of the active set; on exit `step` (n), `multipliers` (m) and
+  /// `bound_multipliers` (n, with the signs of Iterate's) are the solution.
   Outcome solve(const Data& qp, double* step, double* multipliers, double* bound_multipliers,
                 Clock::time_point deadline);
-  /// The same with equations relaxed from the start.
+  /// As `solve`, with the equations relaxed from the start.
   Outcome solve_relaxed(const Data& qp, double penalty, double* step, double* multipliers, double* bound_multipliers,
                         Clock::time_point deadline);
 
-  /// A step of least length, in the metric of the last QP's Hessian and on its active set, that takes J d + c to
-  /// zero for other constraint values: the second-order correction.
+  /// Second-order correction: the shortest step, in the metric of the last QP's Hessian and on its active set, that
+  /// satisfies J d + c = 0 for other constraint values c. False if the linear system cannot be solved accurately.
   bool correct(const Data& qp, const double* constraints, double* step);
 
-  int factorisations() const noexcept { return factorisations_; }  ///< so far
+  int factorisations() const noexcept { return factorisations_; }  ///< since construction
   bool used_interior_point() const noexcept { return used_interior_point_; }
-  /// Flags of the variables that the last factor had fixed.
+  /// Flags of the variables fixed in the last factorisation.
   std::span<const std::uint8_t> fixed() const noexcept { return fixed_; }
   KktFactor& factor() noexcept { return factor_; }
 
  private:
-  /// A slack and its multiplier in the interior point, s z -> 0: the distance of a step from a bound, or what a relaxed
-  /// equation exceeds or lacks.
+  /// A slack s and its multiplier z in the interior-point method, s z -> 0. The slack is the distance of the step from
+  /// a bound, or the positive or negative part of a relaxed equation's residual.
   struct Pair {
     enum class Kind : std::uint8_t { lower, upper, excess, lack };
     Kind kind;
@@ -91,15 +90,15 @@ class SparseQp {
   const SparseNlp* nlp_ = nullptr;
   int n_ = 0, m_ = 0, factorisations_ = 0;
   static constexpr double first_regularisation = 2e-12, largest_regularisation = 1e-5, least_regularisation = 1e-15;
-  double regularisation_ = first_regularisation;  ///< to begin with; smaller where that proved too large for refinement
-  KktFactor::Numbers numbers_;                    ///< of the present factor
+  double regularisation_ = first_regularisation;  ///< initial value; reduced if refinement fails
+  KktFactor::Numbers numbers_;                    ///< of the current factor
   bool used_interior_point_ = false;
-  bool factor_is_final_ = false;         ///< the factor is that of the solution's active set
+  bool factor_is_final_ = false;         ///< the factor belongs to the solution's active set
   std::vector<std::int8_t> active_;      ///< -1 at the lower bound, +1 at the upper, 2 fixed by both, 0 free
   std::vector<std::uint8_t> fixed_;      ///< flags of the active ones
   std::vector<double> d_, lambda_, mu_;  ///< the solution: step, multipliers, bound multipliers
   std::vector<Pair> pairs_, best_pairs_;
-  std::vector<double> best_d_, best_lambda_, best_dual_residual_;  ///< with `best_pairs_`: the interior point's best
+  std::vector<double> best_d_, best_lambda_, best_dual_residual_;  ///< with `best_pairs_`: the best interior iterate
   std::vector<double> primal_, dual_, rhs_, solution_, other_solution_, dual_residual_, primal_residual_, work_n_,
       work_m_;
 };

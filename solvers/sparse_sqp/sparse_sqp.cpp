@@ -18,21 +18,22 @@ namespace {
 
 constexpr double sufficient_decrease = 1e-4;
 constexpr double shortest_step = 1e-10, longest_step = 1e6;
-// A KKT residual below which Newton's method is trusted more than the merit function.
+// Below this KKT residual Newton's method is trusted more than the merit function.
 constexpr double near_solution = 1e-3;
-// A defect below which steps that gain little are due to the curvature, not to the distance.
+// Below this defect, slow progress is due to the curvature and not to the distance from the solution.
 constexpr double near_enough = 1e-1;
-// Differences of the merit below this part of it are rounding.
+// Relative differences of the merit below this are rounding.
 constexpr double merit_rounding = 1e-13;
-// What is left of |c|_1 by the linearised, relaxed equations: more than this part of it is no progress.
+// If the relaxed QP leaves more than this share of |c|_1, there is no progress.
 constexpr double stuck = 1.0 - 1e-6;
 constexpr double largest_penalty = 1e10;
-// What defects may make up of the objective of a solution.
+// Share of a solution's objective that the remaining defects may account for.
 constexpr double negligible_share = 1e-9;
 constexpr int corrections = 4;
 constexpr int convexifications = 6;
-// Lengths by stage: how often they are halved, how many stages to each side count as a stage's surroundings, what part
-// of all changes of the merit is a rise there, and by how much lengths of neighbouring stages may differ.
+// Step lengths by stage: how often they are halved, how many stages on each side form a stage's neighbourhood, which
+// share of the total change of the merit counts as a rise in it, and by how much the lengths of adjacent stages may
+// differ.
 constexpr int local_halvings = 10;
 constexpr int neighbourhood = 20;
 constexpr double least_rise = 1e-6;
@@ -51,7 +52,7 @@ bool is_step(SparseQp::Outcome outcome) {
          outcome == SparseQp::Outcome::relaxed;
 }
 
-/// Linearises a horizon piece by piece, each small enough for a processor's cache. Returns the objective.
+/// Linearises a horizon in chunks of stages that fit the processor's cache. Returns the objective.
 double linearise_stages(const Ocp& ocp, const Iterate& iterate, Hessian hessian, StageQp& qp,
                         std::span<double> scratch) {
   double objective = 0.0;
@@ -153,7 +154,7 @@ double SparseSqp::merit(const Ocp& ocp, const Iterate& iterate) noexcept {
   return objective + penalty_ * norm1(trial_constraints_);
 }
 
-/// `trial_` = `current_` and the step, in its lengths.
+/// `trial_` = `current_` + the step, scaled by the length of each stage.
 void SparseSqp::move(const Ocp& ocp) {
   for (std::size_t k = 0; k < z_.size(); ++k) {
     const double length = lengths_[stage_of_variable_[k]];
@@ -165,8 +166,8 @@ void SparseSqp::move(const Ocp& ocp) {
   nlp_.write(ocp, trial_z_.data(), trial_multipliers_.data(), trial_bound_multipliers_.data(), trial_);
 }
 
-/// Makes the QP's reduced Hessian positive definite on the active set that showed that it is not; in the last
-/// round, whatever is active.
+/// Makes the QP's reduced Hessian positive definite on the active set on which it was found not to be; in the last
+/// round, with no bound active.
 void SparseSqp::convexify(const Ocp& ocp, int round) {
   const bool for_all = round == convexifications;
   if (round == 1) linearise_stages(ocp, current_, Hessian::gauss_newton, other_stages_, scratch_);
@@ -175,7 +176,7 @@ void SparseSqp::convexify(const Ocp& ocp, int round) {
   hessian_is_convex_ = for_all;
 }
 
-/// Finds the step of the QP, with relaxed equations where there is no other.
+/// Solves the QP for the step, with relaxed equations if it is infeasible.
 SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::time_point deadline) {
   auto outcome = qp_.solve(qp_data(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
   for (int round = 1; outcome == SparseQp::Outcome::indefinite && round <= convexifications; ++round) {
@@ -192,7 +193,7 @@ SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::ti
   const double defect = norm1(constraints_);
   double penalty = std::max(penalty_, 1e2 * (1.0 + max_abs(gradient_)));
   outcome = solve_relaxed(penalty, deadline);
-  // A penalty is high enough when most of the defect goes, or when a higher one could not do much better.
+  // The penalty is high enough if the step removes most of the defect, or if a higher penalty would hardly remove more.
   while (outcome == SparseQp::Outcome::relaxed && predicted_defect_ > 0.1 * defect && penalty < largest_penalty) {
     penalty *= 100.0;
     const double last = predicted_defect_;
@@ -211,7 +212,7 @@ SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::ti
   return outcome;
 }
 
-/// The step with relaxed equations; `predicted_defect_` gets what it leaves of them.
+/// Solves the QP with relaxed equations; `predicted_defect_` gets their remaining residual.
 SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point deadline) {
   const auto outcome = qp_.solve_relaxed(qp_data(), penalty, step_.data(), step_multipliers_.data(),
                                          step_bound_multipliers_.data(), deadline);
@@ -224,17 +225,18 @@ SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point dea
   return outcome;
 }
 
-/// Searches along the step; the accepted iterate goes to `trial_`, its merit to `after`. False where no length will do.
+/// Line search along the step; the accepted iterate goes to `trial_`, its merit to `after`. False if no length is
+/// acceptable.
 bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
-  // A direction that nothing determines: no length of it is worth trying.
+  // Nothing determines a step this long: no step length is worth trying.
   if (!(max_abs(step_) <= longest_step * (1.0 + max_abs(z_)))) return false;
   const double defect = norm1(constraints_);
-  // Multipliers of relaxed equations are as large as the penalty that relaxed them, which was enough.
+  // Multipliers of relaxed equations reach the QP's penalty, which is large enough already.
   const double least_penalty = (predicted_defect_ > 0.0 ? 1.0 : 1.5) * max_abs(step_multipliers_);
   if (penalty_ < least_penalty) {
     penalty_ = least_penalty;
   } else if (penalty_ > 4.0 * least_penalty && penalty_cuts_left_ > 0 && predicted_defect_ == 0.0) {
-    // Multipliers of a far start can be huge; a penalty that remembers them makes every later step short.
+    // Multipliers can be huge far from the solution; a penalty that stayed that large would shorten every later step.
     penalty_ = 2.0 * least_penalty;
     --penalty_cuts_left_;
   }
@@ -246,14 +248,14 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     return std::isfinite(after) && after <= before + sufficient_decrease * length * std::min(slope, 0.0) +
                                                 merit_rounding * (1.0 + std::abs(before));
   };
-  // The merit refuses what the equations bend: correct that, with the same matrix.
+  // The merit rejects the step because of the equations' curvature: second-order corrections with the same matrix.
   const auto correct = [&](double length) {
     if (!std::isfinite(after) || predicted_defect_ > 0.0) return false;
     double remaining = norm1(trial_constraints_);
     for (int round = 0; round < corrections; ++round) {
       if (!qp_.correct(qp_data(), trial_constraints_.data(), correction_.data())) break;
-      // What is longer than the step itself corrects nothing, as where equations and active bounds depend on each
-      // other.
+      // A correction longer than the step itself is useless, e.g. if equations and active bounds are linearly
+      // dependent.
       if (!(max_abs(correction_) <= max_abs(step_))) break;
       for (std::size_t k = 0; k < z_.size(); ++k)
         trial_z_[k] = std::clamp(trial_z_[k] + correction_[k], lower_z_[k], upper_z_[k]);
@@ -265,12 +267,12 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     return false;
   };
   std::fill(lengths_.begin(), lengths_.end(), 1.0);
-  // Lengths of their own for the places that refuse the full step.
+  // First shorten the step only around the stages that reject the full step.
   for (int round = 0; round < local_halvings; ++round) {
     move(ocp);
     const double shortest = *std::min_element(lengths_.begin(), lengths_.end());
     if (acceptable(shortest)) return true;
-    // Near the solution the merit may refuse a step that Newton's method is right about.
+    // Near the solution the merit function may reject a good Newton step.
     if (round == 0 && residual < near_solution && std::isfinite(after)) {
       linearise_stages(ocp, trial_, Hessian::gauss_newton, other_stages_, scratch_);
       if (kkt_residual(other_stages_, trial_).largest() < 0.5 * residual) return true;
@@ -292,8 +294,8 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
   return false;
 }
 
-/// Halves the lengths around stages where the merit went up, with gradual passages to where it did not. False where it
-/// went up nowhere.
+/// Halves the step lengths around stages where the merit rose, with a gradual transition to the other stages. False if
+/// it rose nowhere.
 bool SparseSqp::shorten_locally() {
   const int stages = static_cast<int>(lengths_.size());
   double size = 0.0;
@@ -315,8 +317,8 @@ bool SparseSqp::shorten_locally() {
   return is_shorter;
 }
 
-/// What is left of the equations may be within the tolerance and yet, at the price of large multipliers, make up more
-/// of the objective than a solution should be off by: then one more step, which is kept where it leaves less.
+/// The remaining defects may be within the tolerance and yet, weighted with large multipliers, change the objective by
+/// more than is acceptable. Then one more step is taken, and kept if it reduces the defects.
 void SparseSqp::polish(const Ocp& ocp, Report& report, Clock::time_point deadline) {
   const double price = report.kkt.defect * max_abs(multipliers_);
   if (price <= negligible_share * std::abs(objective_)) return;
@@ -338,11 +340,12 @@ Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point dea
   double last_residual = std::numeric_limits<double>::infinity();
   int slow = 0;
   bool has_costates = max_abs(multipliers_) > 0.0;
-  // The first QP's active set is guessed from the iterate's multipliers, each later one's from the QP before.
+  // The active set of the first QP is guessed from the iterate's multipliers, that of each later QP from the previous
+  // QP.
   step_bound_multipliers_ = bound_multipliers_;
   for (;; ++report.iterations) {
     if (use_exact && !has_costates) {
-      // Exact curvature needs costates: those that fit the start.
+      // The exact Hessian needs costates: those that fit the start.
       linearise_stages(ocp, current_, Hessian::gauss_newton, stages_, scratch_);
       set_costates(stages_, current_);
       nlp_.read(ocp, current_, nullptr, multipliers_.data(), nullptr);
@@ -358,7 +361,7 @@ Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point dea
     }
     if (report.iterations == options_.max_iterations) return Status::iteration_limit;
     if (Clock::now() > deadline) return Status::deadline;
-    // Gauss-Newton whose full steps gain little has met large residuals: there the exact Hessian serves better.
+    // If Gauss-Newton makes little progress the residuals are large: there the exact Hessian does better.
     if (options_.hessian == Curvature::automatic && !use_exact && ocp.has_second_derivatives()) {
       slow = report.kkt.defect < near_enough && residual > 0.3 * last_residual ? slow + 1 : 0;
       if (slow >= 4) {
@@ -369,7 +372,7 @@ Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point dea
     last_residual = residual;
     auto outcome = find_step(ocp, report, deadline);
     if (use_exact && outcome == SparseQp::Outcome::relaxed) {
-      // With multipliers like that, the curvature of the equations would be all that counts.
+      // With the large multipliers of relaxed equations, their curvature would dominate the exact Hessian.
       linearise(ocp, Hessian::gauss_newton);
       outcome = find_step(ocp, report, deadline);
     }
@@ -415,7 +418,7 @@ Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
     nlp_.write(ocp, z_.data(), nullptr, nullptr, current_);
     report.status = converge(ocp, report, deadline);
   } catch (const std::bad_alloc&) {
-    reset();  // what was made for the structure may be incomplete
+    reset();  // the data of the structure may be incomplete
     report.status = Status::stalled;
   }
   report.factorisations = qp_.factorisations() - factorisations_before;
@@ -427,7 +430,7 @@ Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
 bool SparseSqp::covariances(const Iterate& iterate, StageRange nodes, std::span<double> blocks) noexcept {
   if (!ocp_ || !is_sound_start(*ocp_, iterate, scratch_)) return false;
   const Ocp& ocp = *ocp_;
-  // It has all or nothing.
+  // Computes the covariances of all nodes or none.
   const auto stride = static_cast<std::size_t>(ocp.capacity().states);
   if (nodes.first != 0 || nodes.last != ocp.intervals() ||
       blocks.size() < (static_cast<std::size_t>(ocp.intervals()) + 1) * stride * stride)

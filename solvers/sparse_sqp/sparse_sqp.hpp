@@ -22,14 +22,14 @@ struct SparseSqpOptions {
   static const OptionTable<SparseSqpOptions>& table();
 };
 
-/// Sequential quadratic programming on the sparse view of an Ocp, for horizons of thousands of intervals and for
-/// vehicles with many states: every step costs a number of operations that is linear in the horizon.
+/// Sequential quadratic programming on the sparse NLP of an Ocp (docs/method.md, section 7), for horizons of thousands
+/// of intervals and for vehicles with many states. The cost of a step is linear in the horizon.
 ///
-/// Bounds hold at every iterate. Steps are those of a sparse QP (SparseQp), accepted by the l1 merit
-/// f + penalty * |c|_1: taken with lengths that are shorter around stages where the merit would rise, with second-order
-/// corrections of what equations bend. Curvature that is not convex enough is given up at the stages that it fails at
-/// (convexify_by_stages). Where linearised equations contradict the bounds, they are relaxed (Fletcher's Sl1QP), and a
-/// iterate at which nothing reduces |c|_1 is reported as infeasible.
+/// Every iterate satisfies the bounds. Steps come from a sparse QP (SparseQp) and are accepted by the l1 merit function
+/// f + penalty * |c|_1. Step lengths are shorter around stages where the merit would rise, and second-order corrections
+/// account for the curvature of the equations. Where the exact Hessian is not convex enough, stages take the
+/// Gauss-Newton Hessian (convexify_by_stages). If linearised equations contradict the bounds, they are relaxed (Sl1QP
+/// [15]); an iterate at which no step reduces |c|_1 is reported as infeasible.
 class SparseSqp final : public Solver {
  public:
   using Options = SparseSqpOptions;
@@ -66,16 +66,16 @@ class SparseSqp final : public Solver {
   std::vector<double> scratch_, defects_;
   std::vector<double> hessian_, jacobian_, gradient_, constraints_, lower_, upper_;
   std::vector<double> z_, multipliers_, bound_multipliers_;               ///< of `current_`
-  std::vector<double> step_, step_multipliers_, step_bound_multipliers_;  ///< what the QP said
+  std::vector<double> step_, step_multipliers_, step_bound_multipliers_;  ///< solution of the QP
   std::vector<double> correction_, trial_z_, trial_multipliers_, trial_bound_multipliers_, trial_constraints_;
   std::vector<double> lower_z_, upper_z_;
   std::vector<double> relaxed_step_, relaxed_multipliers_, relaxed_bound_multipliers_;
   double objective_ = 0.0;  ///< at `current_`
   bool hessian_is_convex_ = false;
   std::vector<int> stage_of_variable_, stage_of_row_;  ///< a defect belongs to the stage that its interval starts at
-  std::vector<double> stage_merits_, merits_before_;   ///< of the iterate looked at last, and of `current_`
-  std::vector<double> merit_sums_;                     ///< of their differences, over the first stages
-  std::vector<double> lengths_;                        ///< of the step, by stage
+  std::vector<double> stage_merits_, merits_before_;   ///< of the last iterate evaluated, and of `current_`
+  std::vector<double> merit_sums_;                     ///< prefix sums of their differences
+  std::vector<double> lengths_;                        ///< step length of each stage
   double penalty_ = 0.0;
   int penalty_cuts_left_ = 0;
   double predicted_defect_ = 0.0;  ///< |J step + c|_1

@@ -12,11 +12,11 @@
 namespace rhec::sparse_sqp {
 namespace {
 
-// This part of the terms that a pivot is made of counts as zero, which a pivot may be in a Gauss-Newton QP.
+// A pivot below this share of its terms counts as zero. Zero is accepted: a pivot of a Gauss-Newton QP may be zero.
 constexpr double rounding = 1e-13;
-// Where stages have been recursed over this often on average, all of them take Gauss-Newton's.
+// Once the recursion has visited each stage this often on average, all stages take the Gauss-Newton Hessian.
 constexpr int most_work = 8;
-// What holds a state at a bound, beside the largest cost of a state.
+// Weight that holds a state at its bound, relative to the largest cost of a state.
 constexpr double stiff = 1e8;
 
 class Recursion {
@@ -59,7 +59,8 @@ class Recursion {
     std::copy_n(gauss_newton_.H(i), rows * qp_.stride(), qp_.H(i));
   }
 
-  /// From a stage whose successors' costs-to-go stand. Returns the stage whose pivot is not positive, or -1.
+  /// Recursion from stage `start`; the costs-to-go of later stages are known. Returns the stage whose pivot is not
+  /// positive definite, or -1.
   int recurse_from(int start) {
     for (int i = start; i >= 0; --i) {
       ++work_;
@@ -96,7 +97,7 @@ class Recursion {
     return factor_.info() == Eigen::Success;
   }
 
-  /// Adds to a cost-to-go what holds those of its states that are fixed.
+  /// Adds to a cost-to-go the weights that hold its fixed states.
   void hold(Eigen::MatrixXd& P, std::ptrdiff_t start) const {
     for (Eigen::Index j = 0; j < P.rows(); ++j)
       if (fixed_[start + j] != 0) P(j, j) += stiff * largest_cost_;
@@ -110,7 +111,7 @@ class Recursion {
   std::vector<std::ptrdiff_t> control_starts_;
   std::vector<int> free_;
   double largest_cost_ = 1.0;
-  std::int64_t work_ = 0;  ///< stages recursed over, again and again
+  std::int64_t work_ = 0;  ///< stages visited by the recursion, counted each time
   Eigen::LLT<Eigen::MatrixXd> factor_;
 };
 

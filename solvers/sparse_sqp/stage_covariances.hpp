@@ -6,19 +6,19 @@
 
 namespace rhec::sparse_sqp {
 
-/// Marginal covariances of all stage states when a QP's objective is twice a negative log-likelihood's quadratic
-/// and its bounds are ignored: column-major blocks of the capacity's n_s x n_s, one a node; zeros where a state is
-/// given. False, with nothing written, where the Hessian has no inverse.
+/// Marginal covariances of all stage states, with bounds ignored, if the QP's objective is the quadratic model of twice
+/// a negative log-likelihood. Column-major n_s x n_s blocks of the capacity's n_s, one per node; zeros at node 0 if the
+/// initial state is given. Returns false and writes nothing if the reduced Hessian is not positive definite.
 ///
-/// They come from a factor of their own, which eliminates stage after stage from the horizon's end (Riccati) and takes
-/// the dynamics as they are:
+/// They need their own factorisation, which eliminates stage by stage from the end of the horizon (Riccati recursion)
+/// without regularising the dynamics:
 ///
 ///     G = R + B'PB = LL',  W = L^-1 (S + B'PA),  P_i = Q + A'PA - W'W,  F = A - B L^-T W
 ///     C_0 = 2 P_0^-1,  C_{i+1} = F C_i F' + 2 (B L^-T)(B L^-T)'
 ///
-/// Every pivot is of the reduced Hessian, so variables without any cost of their own do no harm. In an order that is
-/// chosen for sparsity alone they would give pivots of the size of a regularisation, and covariances without a correct
-/// digit: refinement, which repairs single solutions, does not repair an inverse.
+/// Every pivot belongs to the reduced Hessian, so variables without a cost of their own do no harm. In an order chosen
+/// for sparsity alone, their pivots would be as small as the regularisation and the covariances would not have a single
+/// correct digit: refinement repairs individual solutions, not an inverse.
 bool stage_covariances(const StageQp& qp, std::span<double> blocks);
 
 }  // namespace rhec::sparse_sqp

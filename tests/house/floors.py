@@ -6,8 +6,9 @@
 
 A folder includes folders on lower floors, and itself; a plugin includes its own folder, core and plugins. Benchmarks look
 into plugins too, as "solvers/gn_rti/gn_rti.hpp". A room includes its own files and the public headers of the rooms that it
-comes after: `rhec_add_room(<floor> <room> AFTER <room> ...)` in its CMakeLists.txt says which. A folder of a floor that is a
-project of its own (the template of plugins) is no room: it includes what the floor has for others.
+comes after: `rhec_add_room(<floor> <room> AFTER <room> ...)` in its CMakeLists.txt says which. A SHARED room has a library
+of its own, which links to those rooms' libraries at most. A folder of a floor that is a project of its own (the template of
+plugins) is no room: it includes what the floor has for others.
 """
 import argparse
 import pathlib
@@ -31,7 +32,7 @@ MAY_USE = {
 }
 PLUGIN_FOLDERS = ("solvers", "models", "blocking")
 CORE_THIRD_PARTY = ("Eigen", "unsupported/Eigen", "fmt", "xsimd")
-CORE_LIBRARIES = ("libfmt", "libstdc++", "libm.", "libgcc_s", "libc.", "ld-linux", "libasan", "libubsan")
+CORE_LIBRARIES = ("libfmt", "libstdc++", "libm.", "libgcc_s", "libc.", "ld-linux", "libasan", "libubsan", "libtsan")
 STANDARD = set("""
 algorithm any array atomic barrier bit bitset charconv chrono codecvt compare complex concepts condition_variable
 coroutine deque exception execution filesystem format forward_list fstream functional future initializer_list iomanip
@@ -44,7 +45,7 @@ cstdlib cstring ctime cuchar cwchar cwctype
 """.split())
 ROOM = re.compile(r"^rhec_add_room\((\w+)\s+(\w+)([^)]*)\)", re.MULTILINE)
 PROJECT = re.compile(r"^project\(", re.MULTILINE)
-ROOM_KEYWORDS = ("INTERNAL", "AFTER", "SOURCES", "PUBLIC", "PRIVATE")
+ROOM_KEYWORDS = ("INTERNAL", "SHARED", "AFTER", "SOURCES", "PUBLIC", "PRIVATE")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
@@ -52,7 +53,7 @@ class Rooms:
     """The rooms of all floors: which rooms of its floor each may include, and which are not to be seen from other floors."""
 
     def __init__(self, root):
-        self.after, self.internal, self.projects, self.violations = {}, set(), set(), []
+        self.after, self.internal, self.shared, self.projects, self.violations = {}, set(), set(), set(), []
         for file in sorted(root.glob("*/*/CMakeLists.txt")):
             text = file.read_text(encoding="utf-8")
             if PROJECT.search(text):
@@ -74,6 +75,8 @@ class Rooms:
                 taker = word
                 if word == "INTERNAL":
                     self.internal.add((floor, room))
+                if word == "SHARED":
+                    self.shared.add((floor, room))
             elif taker == "AFTER":
                 self.after[floor, room].add(word)
         if file.parent.parts[-2:] != (floor, room):
@@ -182,10 +185,10 @@ def needed(library):
     return re.findall(r"\(NEEDED\).*\[(.*)\]", text)
 
 
-def link_violations(label, folder, needs, plugin_names):
-    """`needs` are the names that the library `label` of `folder` asks for."""
+def link_violations(label, folder, needs, plugin_names, rooms_before=()):
+    """`needs` are the names that the library `label` of `folder` asks for, or of a room of it that comes after others."""
     violations = []
-    allowed = [name for name in MAY_USE[folder] if name != folder]
+    allowed = [name for name in MAY_USE[folder] if name != folder] + [f"{folder}_{room}" for room in sorted(rooms_before)]
     for name in needs:
         ours = re.match(r"librhec_(\w+)\.so", name)
         bad = (
@@ -200,15 +203,18 @@ def link_violations(label, folder, needs, plugin_names):
     return violations
 
 
-def library_violations(lib, plugins):
-    violations, looked_at = [], 0
+def library_violations(root, lib, plugins):
+    violations, looked_at, rooms = [], 0, Rooms(root)
     modules = sorted(plugins.glob("*.so"))
     plugin_names = {module.name for module in modules}
-    for folder in ("core", "plugins", "sim"):
-        library = lib / f"librhec_{folder}.so"
+    libraries = {"core": ("core", ()), "plugins": ("plugins", ())}
+    for floor, room in sorted(rooms.shared):
+        libraries[f"{floor}_{room}"] = floor, rooms.reach(floor, room) - {room}
+    for name, (folder, rooms_before) in libraries.items():
+        library = lib / f"librhec_{name}.so"
         if library.exists():
             looked_at += 1
-            violations += link_violations(library, folder, needed(library), plugin_names)
+            violations += link_violations(library, folder, needed(library), plugin_names, rooms_before)
         else:
             violations.append(f"{library}: is not there; build first")
     if not modules:
@@ -225,7 +231,7 @@ def self_test():
         "core/low/up.cpp": '#include "rhec/plugins/host/host.hpp"',
         "core/low/angle.cpp": "#include <rhec/core/low/model.hpp>",
         "core/low/boost.cpp": "#include <boost/dll.hpp>",
-        "core/low/include/rhec/core/low/escapes.hpp": '#include "../../../../../../sim/src/own.hpp"',
+        "core/low/include/rhec/core/low/escapes.hpp": '#include "../../../../../../sim/world/own.hpp"',
         "core/low/higher.cpp": '#include "rhec/core/high/model.hpp"',
         "core/side/beside.cpp": '#include "rhec/core/high/model.hpp"',
         "core/high/no_room.cpp": '#include "rhec/core/model.hpp"',
@@ -234,12 +240,14 @@ def self_test():
         "core/round/CMakeLists.txt": "rhec_add_room(core round AFTER trip)",
         "core/trip/CMakeLists.txt": "rhec_add_room(core trip AFTER round)",
         "core/lost/CMakeLists.txt": "rhec_add_room(core lost AFTER nowhere)",
-        "plugins/host/up.cpp": '  #  include "rhec/sim/world.hpp"',
+        "plugins/host/up.cpp": '  #  include "rhec/sim/world/truth.hpp"',
         "plugins/host/internal.cpp": '#include "rhec/core/inner/lanes.hpp"',
         "plugins/template/peeks.cpp": '#include "../host/own.hpp"',
         "models/a/other.cpp": '#include "../b/b.hpp"',
-        "solvers/s/sim.cpp": '#include "rhec/sim/world.hpp"',
-        "sim/src/model.cpp": '#include "rhec/models/a.hpp"',
+        "solvers/s/sim.cpp": '#include "rhec/sim/world/truth.hpp"',
+        "sim/world/model.cpp": '#include "rhec/models/a.hpp"',
+        "sim/world/loop.cpp": '#include "rhec/sim/loop/run.hpp"',
+        "sim/loop/no_room.cpp": '#include "rhec/sim/world.hpp"',
         "benchmarks/app.cpp": '#include "rhec/apps/commands.hpp"',
         "benchmarks/up.cpp": '#include "../apps/main.cpp"',
         "benchmarks/gone.cpp": '#include "models/b/gone.hpp"',
@@ -252,7 +260,7 @@ def self_test():
         "core/high/good.cpp": '#include <vector>\n#include <Eigen/Core>\n#include <fmt/format.h>\n#include "rhec/core/low/model.hpp"',
         "core/high/inner.cpp": '#include "rhec/core/inner/lanes.hpp"\n#include "rhec/core/high/model.hpp"',
         "core/low/own_user.cpp": '#include "own.hpp"',
-        "core/low/own.hpp": "#pragma once\n// #include \"rhec/sim/world.hpp\"",
+        "core/low/own.hpp": "#pragma once\n// #include \"rhec/sim/world/truth.hpp\"",
         "plugins/kit/CMakeLists.txt": "rhec_add_room(plugins kit)",
         "plugins/host/CMakeLists.txt": "rhec_add_room(plugins host AFTER kit)",
         "plugins/host/own.hpp": "#pragma once",
@@ -261,9 +269,12 @@ def self_test():
         "plugins/host/good.cpp": '#include <boost/dll.hpp>\n#include "rhec/core/high/model.hpp"',
         "models/b/b.hpp": '#include "rhec/plugins/kit/sdk.hpp"',
         "models/b/b.cpp": '#include "b.hpp"',
-        "sim/src/own.hpp": '#include "rhec/plugins/host/host.hpp"\n#include "rhec/sim/world.hpp"',
-        "benchmarks/all.cpp": '#include <benchmark/benchmark.h>\n#include "models/b/b.hpp"\n#include "rhec/sim/world.hpp"',
-        "apps/main.cpp": '#include <CLI/CLI.hpp>\n#include "rhec/sim/world.hpp"',
+        "sim/world/CMakeLists.txt": "rhec_add_room(sim world SHARED SOURCES own.cpp)",
+        "sim/world/own.cpp": '#include "rhec/plugins/host/host.hpp"\n#include "rhec/sim/world/truth.hpp"',
+        "sim/loop/CMakeLists.txt": "rhec_add_room(sim loop SHARED AFTER world SOURCES run.cpp)",
+        "sim/loop/run.cpp": '#include "rhec/plugins/host/host.hpp"\n#include "rhec/sim/world/truth.hpp"',
+        "benchmarks/all.cpp": '#include <benchmark/benchmark.h>\n#include "models/b/b.hpp"\n#include "rhec/sim/world/truth.hpp"',
+        "apps/main.cpp": '#include <CLI/CLI.hpp>\n#include "rhec/sim/world/truth.hpp"',
     }
     failures = []
     with tempfile.TemporaryDirectory() as directory:
@@ -271,6 +282,8 @@ def self_test():
         for name, text in {**wrong, **right}.items():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_text(text + "\n")
+        if Rooms(root).shared != {("sim", "world"), ("sim", "loop")}:
+            failures.append(f"the rooms with libraries are {Rooms(root).shared}")
         told = {violation.split(":")[0].removeprefix(f"{root}/") for violation in include_violations(root)[0]}
         # A room that is declared wrongly is told by its name.
         failures += [f"not noticed: {name}" for name in wrong if name.removesuffix("/CMakeLists.txt") not in told]
@@ -279,16 +292,20 @@ def self_test():
         ("core", "librhec_plugins.so.0.1", True),
         ("core", "libboost_filesystem.so.1.74.0", True),
         ("core", "libfmt.so.9", False),
-        ("plugins", "librhec_sim.so.0.1", True),
+        ("plugins", "librhec_sim_files.so.0.1", True),
         ("plugins", "librhec_core.so.0.1", False),
         ("models", "other.so", True),
-        ("models", "librhec_sim.so.0.1", True),
+        ("models", "librhec_sim_files.so.0.1", True),
         ("models", "librhec_plugins.so.0.1", False),
         ("sim", "librhec_plugins.so.0.1", False),
+        ("sim", "librhec_sim_files.so.0.1", False),
+        ("sim", "librhec_sim_loop.so.0.1", True),
+        ("sim", "libsqlite3.so.0", False),
         ("sim", "other.so", True),
     ]
     for folder, name, bad in links:
-        if bool(link_violations("planted", folder, [name], {"other.so"})) != bad:
+        before = ("files", "world") if folder == "sim" else ()
+        if bool(link_violations("planted", folder, [name], {"other.so"}, before)) != bad:
             failures.append(f"{folder} linking to {name}: should be {'refused' if bad else 'accepted'}")
     house.tell("floors self-test", failures, len(wrong) + len(right) + len(links))
 
@@ -306,7 +323,7 @@ def main():
         parser.error("the source root is missing")
     violations, looked_at = include_violations(arguments.root.resolve())
     if arguments.lib and arguments.plugins:
-        more, libraries = library_violations(arguments.lib, arguments.plugins)
+        more, libraries = library_violations(arguments.root.resolve(), arguments.lib, arguments.plugins)
         violations, looked_at = violations + more, looked_at + libraries
     house.tell("floors", violations, looked_at)
 

@@ -26,7 +26,7 @@ cmake_minimum_required(VERSION 3.25)
 project(consumer LANGUAGES CXX)
 find_package(rhec REQUIRED)
 add_executable(consumer main.cpp)
-target_link_libraries(consumer PRIVATE rhec::core rhec::plugins rhec::sim)
+target_link_libraries(consumer PRIVATE rhec::core rhec::plugins @ROOMS@)
 rhec_add_plugin(outside SOURCES plugin.cpp)
 if(NOT IS_DIRECTORY "${rhec_PLUGIN_DIRECTORY}")
   message(FATAL_ERROR "no plugin directory ${rhec_PLUGIN_DIRECTORY}")
@@ -105,10 +105,12 @@ def check_plugins(prefix):
 def check_consumer(prefix, work, arguments):
     """A project of someone else finds the package, includes every public header, links, runs, and builds a plugin."""
     include = next(path.parent for path in prefix.glob("include/rhec"))
+    rooms = sorted({path.parts[-2] for path in include.glob("rhec/sim/*/*.hpp")})
+    expect(rooms, "no header of a room of sim was installed")
     headers = sorted(str(path.relative_to(include)) for path in include.rglob("*.hpp"))
     source = work / "consumer"
     source.mkdir()
-    (source / "CMakeLists.txt").write_text(CONSUMER_CMAKE)
+    (source / "CMakeLists.txt").write_text(CONSUMER_CMAKE.replace("@ROOMS@", " ".join(f"rhec::sim_{room}" for room in rooms)))
     (source / "main.cpp").write_text("".join(f'#include "{header}"\n' for header in headers) + CONSUMER_MAIN)
     (source / "plugin.cpp").write_text(PLUGIN)
     settings = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={arguments.cxxflags}", "-DCMAKE_BUILD_TYPE=Debug"]

@@ -73,7 +73,7 @@ def check(root):
 def self_test():
     wrong = {
         "core/src/a.cpp": "void f() { std::cout << 1; }",
-        "sim/src/b.cpp": 'void f() { printf("x"); }',
+        "sim/loop/b.cpp": 'void f() { printf("x"); }',
         "solvers/s/c.cpp": "void f() { std::exit(1); }",
         "models/m/d.cpp": 'void f() { fmt::print("x"); }',
         "core/include/rhec/core/e.hpp": "// no guard",

@@ -8,7 +8,7 @@
 
 #include "model_checks.hpp"
 #include "rhec/plugins/host/host.hpp"
-#include "rhec/sim/model_check.hpp"
+#include "rhec/sim/check/model_check.hpp"
 
 namespace {
 std::atomic<long> allocations{0};

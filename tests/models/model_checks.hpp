@@ -11,8 +11,8 @@
 
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/model/model.hpp"
-#include "rhec/sim/derivative_check.hpp"
-#include "rhec/sim/random.hpp"
+#include "rhec/sim/check/derivative_check.hpp"
+#include "rhec/sim/numbers/random.hpp"
 
 // What holds for every model beside what `rhec check` looks at: all instruction sets agree, all that is asked for is
 // written and nothing else.

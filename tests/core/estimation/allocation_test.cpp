@@ -15,8 +15,8 @@
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/paths.hpp"
-#include "rhec/sim/truth.hpp"
+#include "rhec/sim/world/paths.hpp"
+#include "rhec/sim/world/truth.hpp"
 
 namespace {
 std::atomic<long> allocations{0};

@@ -3,51 +3,14 @@
 #include <gtest/gtest.h>
 
 #include "rhec/core/qp/stage_qp_solver.hpp"
-#include "support/qp_conditions.hpp"
+#include "support/active_set_attempt.hpp"
 
-namespace rhec::gn_rti {
+namespace rhec {
 namespace {
 
-using rhec::testing::feasible_qp;
-using rhec::testing::kkt_violation;
-using rhec::testing::RandomQp;
+using namespace rhec::testing;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr Clock::time_point never = Clock::time_point::max();
-
-int count_active(const StageQp& qp, const ActiveSet& active) {
-  int count = 0;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    for (int j = 0; j < qp.states(i); ++j) count += active.state(i)[j] != 0;
-    for (int j = 0; j < qp.controls(i); ++j) count += active.control(i)[j] != 0;
-  }
-  return count;
-}
-
-double distance(const StageQp& qp, const Iterate& a, const Iterate& b) {
-  double largest = 0.0;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    for (int j = 0; j < qp.states(i); ++j) largest = std::max(largest, std::abs(a.state(i)[j] - b.state(i)[j]));
-    for (int j = 0; j < qp.controls(i); ++j) largest = std::max(largest, std::abs(a.control(i)[j] - b.control(i)[j]));
-  }
-  return largest;
-}
-
-/// Everything that a solution needs, for one program.
-struct Attempt {
-  Riccati riccati;
-  DualActiveSet method;
-  ActiveSet active;
-  Iterate step;
-  DualActiveSet::Outcome outcome;
-
-  Attempt(const StageQp& qp, const ActiveSet* claimed, Clock::time_point deadline = never)
-      : riccati(qp.capacity()), method(qp.capacity()), active(qp.capacity()), step(qp.capacity()) {
-    if (claimed) active = *claimed;
-    method.prepare(qp, riccati, claimed);
-    outcome = method.solve(qp, riccati, active, step, deadline);
-  }
-};
 
 TEST(DualActiveSet, AgreesWithTheInteriorPointMethodWhereManyBoundsAreActive) {
   RandomQp random(21);
@@ -111,19 +74,6 @@ TEST(DualActiveSet, ComesToTheSameSolutionFromAnyClaim) {
   EXPECT_GT(compared, 160);
 }
 
-TEST(DualActiveSet, AddsBoundsWithoutAnotherFactorisation) {
-  RandomQp random(23);
-  int with_bounds = 0;
-  for (int trial = 0; trial < 50; ++trial) {
-    const StageQp qp = feasible_qp(random, true, 0.5);
-    const Attempt attempt(qp, nullptr);
-    if (attempt.outcome != DualActiveSet::Outcome::solved) continue;
-    EXPECT_EQ(attempt.method.factorisations(), 1);
-    with_bounds += count_active(qp, attempt.active) > 0;
-  }
-  EXPECT_GT(with_bounds, 30);
-}
-
 TEST(DualActiveSet, GivesThePolicyOfItsSolution) {
   RandomQp random(24);
   int compared = 0;
@@ -159,74 +109,6 @@ TEST(DualActiveSet, SeesThatBoundsContradictEachOther) {
     seen += attempt.outcome == DualActiveSet::Outcome::no_solution;
   }
   EXPECT_GT(seen, 40);
-}
-
-/// s+ = s + w with cost (s - target)^2 / 2 + w^2 / 2 at every node.
-StageQp integrator(int intervals, double target) {
-  StageQp qp({intervals, 1, 1});
-  qp.set_intervals(intervals);
-  qp.initial_state_is_given = true;
-  qp.initial_step()[0] = 0.0;
-  for (int i = 0; i <= intervals; ++i) {
-    qp.set_sizes(i, 1, i < intervals ? 1 : 0);
-    qp.Q_of(i)(0, 0) = 1.0;
-    qp.q(i)[0] = -target;
-    if (i == intervals) break;
-    qp.R_of(i)(0, 0) = 1.0;
-    qp.AB(i)[0] = qp.AB(i)[1] = 1.0;
-  }
-  return qp;
-}
-
-TEST(DualActiveSet, SettlesWhereActiveBoundsDependOnEachOther) {
-  // The state is bounded where controls at their bounds bring it anyway: any of them may be called active.
-  StageQp qp = integrator(10, 20.0);
-  for (int i = 0; i < 10; ++i) {
-    qp.control_lower(i)[0] = -0.5;
-    qp.control_upper(i)[0] = 0.5;
-    qp.state_upper(i + 1)[0] = 0.5 * (i + 1);
-  }
-  ActiveSet all(qp.capacity());
-  for (int i = 0; i < 10; ++i) all.control(i)[0] = all.state(i + 1)[0] = 1;
-  for (const ActiveSet* claimed : {static_cast<const ActiveSet*>(nullptr), static_cast<const ActiveSet*>(&all)}) {
-    const Attempt attempt(qp, claimed);
-    ASSERT_EQ(attempt.outcome, DualActiveSet::Outcome::solved);
-    EXPECT_LT(kkt_violation(qp, attempt.step), 1e-9);
-    for (int i = 0; i <= 10; ++i) EXPECT_NEAR(attempt.step.state(i)[0], 0.5 * i, 1e-9);
-  }
-}
-
-TEST(DualActiveSet, KeepsBoundsThatCoincide) {
-  StageQp qp = integrator(8, -3.0);
-  qp.state_lower(4)[0] = qp.state_upper(4)[0] = 1.0;
-  qp.control_lower(6)[0] = qp.control_upper(6)[0] = 0.25;
-  ActiveSet claimed(qp.capacity());
-  claimed.state(4)[0] = claimed.control(6)[0] = 1;
-  const Attempt attempt(qp, &claimed);
-  ASSERT_EQ(attempt.outcome, DualActiveSet::Outcome::solved);
-  EXPECT_NEAR(attempt.step.state(4)[0], 1.0, 1e-12);
-  EXPECT_NEAR(attempt.step.control(6)[0], 0.25, 1e-12);
-  EXPECT_LT(attempt.step.state_bound(4)[0], 0.0) << "held up, although the upper side was claimed";
-  EXPECT_LT(kkt_violation(qp, attempt.step), 1e-9);
-}
-
-TEST(DualActiveSet, LeavesMoreBoundsThanItProvidesForToOthers) {
-  constexpr int intervals = 2 * DualActiveSet::max_columns;
-  StageQp qp = integrator(intervals, 1000.0);
-  for (int i = 0; i < intervals; ++i) qp.control_upper(i)[0] = 1.0 + 0.001 * i;
-  const Attempt attempt(qp, nullptr);
-  EXPECT_EQ(attempt.outcome, DualActiveSet::Outcome::too_much);
-  StageQpSolver solver(qp.capacity());
-  Iterate step(qp.capacity());
-  solver.guess_from(qp, step);
-  ASSERT_NE(solver.solve(qp, step), StageQpSolver::Outcome::infeasible);
-  EXPECT_LT(kkt_violation(qp, step), 1e-7);
-  // Claimed, they are held inside the factorisation, however many they are.
-  solver.guess_from(qp, step);
-  Iterate again(qp.capacity());
-  ASSERT_EQ(solver.solve(qp, again), StageQpSolver::Outcome::active_set);
-  EXPECT_EQ(solver.factorisations(), 1);
-  EXPECT_LT(distance(qp, step, again), 1e-9);
 }
 
 TEST(DualActiveSet, StopsAtTheDeadline) {
@@ -282,4 +164,4 @@ TEST(DualActiveSet, FollowsBoundsThatAreNoLongerThere) {
 }
 
 }  // namespace
-}  // namespace rhec::gn_rti
+}  // namespace rhec

@@ -1,5 +1,6 @@
-// How every solver that is found behaves: after failures, when reset, on threads, at deadlines, from good guesses,
-// while blocks move, and what its tolerance means.
+// How every solver that is found behaves: after failures, when reset, on threads, at deadlines, from good guesses, and
+// what its tolerance means.
+#include "behaviour.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -11,9 +12,6 @@
 #include <thread>
 #include <utility>
 
-#include "families.hpp"
-#include "found.hpp"
-#include "judge.hpp"
 #include "rhec/core/horizon/shift.hpp"
 #include "support/random_problem.hpp"
 
@@ -27,65 +25,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// What a call that has to return promptly may last, on a machine that is busy with other things.
 constexpr std::chrono::seconds promptly{10};
-
-struct Pair {
-  std::string solver, model;
-};
-
-std::ostream& operator<<(std::ostream& out, const Pair& of) { return out << of.solver << " on " << of.model; }
-
-std::vector<Pair> all_pairs() {
-  std::vector<Pair> pairs;
-  for (const std::string& solver : host().names(PluginKind::solver)) {
-    for (const std::string& model : host().names(PluginKind::model)) pairs.push_back({solver, model});
-    pairs.push_back({solver, "integrator"});
-  }
-  return pairs;
-}
-
-class Behaviour : public ::testing::TestWithParam<Pair> {
- protected:
-  std::shared_ptr<Solver> make(const Settings& options = {}) const { return make_solver(GetParam().solver, options); }
-
-  Problem problem(const std::string& name, unsigned seed = 1) const { return family(name).make(model_, seed); }
-
-  Judged solve(Solver& solver, const Problem& of) const {
-    return solve_and_judge(solver, *of.ocp, of.guess, tolerance_);
-  }
-
-  /// The same with a solver that was busy with another problem.
-  Judged set_up_and_solve(Solver& solver, const Problem& of) const {
-    solver.setup(*of.ocp);
-    return solve(solver, of);
-  }
-
-  /// What a new instance makes of a problem.
-  Judged by_new_instance(const Problem& of) const {
-    const auto solver = make();
-    solver->setup(*of.ocp);
-    return solve(*solver, of);
-  }
-
-  void expect_solved(const Judged& judged, const std::string& when) const {
-    EXPECT_EQ(judged.report.status, Status::solved) << when << ": " << name_of(judged.report.status);
-    EXPECT_LE(judged.kkt.largest(), tolerance_) << when;
-    for (const std::string& complaint : judged.complaints) ADD_FAILURE() << when << ": " << complaint;
-  }
-
-  /// Solved as a new instance solves it.
-  void expect_right(Solver& solver, const Problem& of, const std::string& when) const {
-    const Judged judged = set_up_and_solve(solver, of), fresh = by_new_instance(of);
-    expect_solved(judged, when);
-    EXPECT_NEAR(judged.objective, fresh.objective, 1e-7 * (1e-3 + std::abs(fresh.objective))) << when;
-  }
-
-  bool applies(const std::string& name) const {
-    return conformance::applies(family(name), GetParam().model, *model_) && make()->why_not(*problem(name).ocp).empty();
-  }
-
-  std::shared_ptr<const Model> model_ = make_model(GetParam().model);
-  double tolerance_ = tolerance_of(GetParam().solver);
-};
 
 // --- after a failure ------------------------------------------------------------------------------------------------
 
@@ -379,88 +318,6 @@ TEST_P(Behaviour, RecognisesItsOwnSolution) {
     expect_solved(warm, std::string(name) + " from its solution");
     EXPECT_LE(warm.report.iterations, 2) << name;
     EXPECT_NEAR(warm.objective, cold.objective, 1e-9 * (1e-3 + std::abs(cold.objective))) << name;
-  }
-}
-
-TEST_P(Behaviour, FollowsAHorizonThatMoves) {
-  constexpr int samples = 6, length = 12, period = 5;
-  RandomProblem random(model_, 77);
-  RandomProblem::RheSpec spec;
-  spec.intervals = length + samples;
-  const auto whole = random.rhe(spec);
-  spec.intervals = length;
-  RandomProblem again(model_, 77);
-  const auto window = again.rhe(spec);
-  window->arrival_mean = whole->arrival_mean;
-  const int np = model_->parameter_count();
-  // Borders of blocks stand still in time, and so move through the window.
-  const auto fill = [&](int first) {
-    for (int i = 0; i <= length; ++i) {
-      std::copy_n(whole->output(first + i), model_->output_count(), window->output(i));
-      if (i == length) break;
-      std::copy_n(whole->measured_input(first + i), model_->input_count(), window->measured_input(i));
-      window->set_duration(i, whole->duration(first + i));
-    }
-    for (int j = 0; j < np; ++j) {
-      std::array<std::uint8_t, length> begins{};
-      for (int i = 0; i < length; ++i) begins[i] = i == 0 || (first + i) % period == 0;
-      window->set_blocks(j, begins.data(), Transition::step);
-      for (int i = 1; i < length; ++i)
-        if (begins[i]) window->link(i, j, 0.01);
-    }
-    window->finish();
-  };
-  const auto solver = make();
-  solver->setup(*window);
-  GuessShifter shifter(*window);
-  Iterate guess;
-  for (int sample = 0; sample <= samples; ++sample) {
-    SCOPED_TRACE("sample " + std::to_string(sample));
-    fill(sample);
-    // A weak prior that need not move along: what is tested is the solver.
-    window->arrival_information.diagonal() *= 0.5;
-    Iterate cold = RandomProblem::cold_start(*window);
-    if (sample == 0) {
-      guess = cold;
-    } else {
-      ASSERT_TRUE(shifter.apply(1, *window, guess));
-    }
-    const auto fresh = make();
-    fresh->setup(*window);
-    const Judged expected = solve_and_judge(*fresh, *window, guess, tolerance_);
-    const Judged judged = solve_and_judge(*solver, *window, guess, tolerance_);
-    expect_solved(expected, "by a new instance");
-    expect_solved(judged, "by one that has a history");
-    EXPECT_NEAR(judged.objective, expected.objective, 1e-9 * (1e-3 + std::abs(expected.objective)));
-    EXPECT_LT(distance(scaled_primal(*window, judged.point), scaled_primal(*window, expected.point)), 1e-5);
-    shifter.take(*window, judged.point);
-    guess = judged.point;
-  }
-}
-
-TEST_P(Behaviour, KeepsUpWithBlocksThatMoveFromSampleToSample) {
-  if (model_->parameter_count() == 0) GTEST_SKIP() << "the model has no parameter";
-  const auto solver = make();
-  Problem of = problem("rhe_blocks");
-  auto& rhe = dynamic_cast<RheProblem&>(*of.ocp);
-  solver->setup(rhe);
-  for (int sample = 0; sample < 12; ++sample) {
-    SCOPED_TRACE("sample " + std::to_string(sample));
-    for (int j = 0; j < model_->parameter_count(); ++j) {
-      std::vector<std::uint8_t> begins(rhe.intervals(), 0);
-      // One parameter's blocks move, the others' grow.
-      for (int i = 0; i < rhe.intervals(); ++i)
-        begins[i] = i == 0 || (j == 0 ? (i + sample) % 4 == 0 : i % (1 + sample % 6) == 0);
-      rhe.set_blocks(j, begins.data(), sample % 5 == 4 ? Transition::ramp : Transition::step);
-      for (int i = 0; i < rhe.intervals(); ++i)
-        if (begins[i]) rhe.link(i, j, 0.01);
-    }
-    rhe.finish();
-    of.guess = RandomProblem::cold_start(rhe);
-    const Judged judged = solve(*solver, of), fresh = by_new_instance(of);
-    expect_solved(judged, "with a history");
-    EXPECT_NEAR(judged.objective, fresh.objective, 1e-8 * (1e-3 + std::abs(fresh.objective)));
-    EXPECT_LT(distance(scaled_primal(rhe, judged.point), scaled_primal(rhe, fresh.point)), 1e-5);
   }
 }
 

@@ -14,7 +14,7 @@
 #include "found.hpp"
 #include "judge.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/problem_file.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
 #include "verdicts.hpp"
 
 namespace rhec::conformance {

@@ -21,8 +21,10 @@ enum class ReferenceSpeed {
 /// Path-following controller: estimate in, input out (docs/method.md, section 3).
 ///
 /// At each call the closest point of the path is searched for ahead of the last one. The local reference is that point
-/// and the next N_c, each dt * u1ref metres further on. If the solver fails, the plan of the last sample is continued
-/// and the failure is counted. Allocates in its constructor only.
+/// and the next N_c, each dt * u1ref metres further on. If the solver fails, and fails again from a simulation, the
+/// plan of the last sample is continued and the failure is counted: its inputs are applied one after the other, and
+/// finally the last of them repeatedly. If there is no plan yet, the vehicle goes straight ahead. Allocates in its
+/// constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {
@@ -46,7 +48,7 @@ class RHEC_EXPORT Controller {
     std::vector<double> inputs;  ///< u_k, n_u: to be applied until the next call
     PathPoint reference;         ///< the closest point of the path
     Report report;               ///< objective and KKT residual may be missing before `finish`
-    bool fallback = false;       ///< the solver failed; the last plan is continued
+    bool fallback = false;       ///< the solver failed; the last plan is continued, if there is one
     bool softened = false;       ///< a state bound was out of reach from the estimate and was relaxed
   };
   /// The input for an estimate. Valid until the next call.
@@ -72,6 +74,7 @@ class RHEC_EXPORT Controller {
   void bound_speed(double most) noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
   void start_cold() noexcept;
+  bool find_plan(Clock::time_point deadline) noexcept;
 
   Setup setup_;
   Path path_;

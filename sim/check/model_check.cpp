@@ -1,0 +1,268 @@
+#include "rhec/sim/check/model_check.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "model_checks.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/sim/check/derivative_check.hpp"
+
+namespace rhec::sim {
+
+std::string_view word_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::pass:
+      return "pass";
+    case Verdict::skip:
+      return "skip";
+    case Verdict::warn:
+      return "warn";
+    case Verdict::fail:
+      return "fail";
+  }
+  return "";
+}
+
+int ModelCheck::count(Verdict verdict) const {
+  return static_cast<int>(std::count_if(findings.begin(), findings.end(),
+                                        [&](const Finding& finding) { return finding.verdict == verdict; }));
+}
+
+Verdict ModelCheck::verdict() const {
+  if (count(Verdict::fail) > 0) return Verdict::fail;
+  return count(Verdict::warn) > 0 ? Verdict::warn : Verdict::pass;
+}
+
+namespace {
+
+/// Puts the fastest instruction set back at the end, which models start with.
+class FastestAtTheEnd {
+ public:
+  explicit FastestAtTheEnd(Model& model) : model_(&model) {}
+  FastestAtTheEnd(const FastestAtTheEnd&) = delete;
+  FastestAtTheEnd& operator=(const FastestAtTheEnd&) = delete;
+  ~FastestAtTheEnd() {
+    const std::vector<std::string> sets = model_->instruction_sets();
+    if (!sets.empty()) model_->use_instruction_set(sets.back());
+  }
+
+ private:
+  Model* model_;
+};
+
+std::vector<double> sigmas_or_default(const std::vector<double>& given, const std::vector<Variable>& variables,
+                                      const char* kind) {
+  if (given.empty()) return default_sigmas(variables);
+  if (given.size() != variables.size())
+    throw Error(fmt::format("check of a model: {} standard deviations of {}s; it has {}", given.size(), kind,
+                            variables.size()));
+  for (std::size_t j = 0; j < given.size(); ++j)
+    if (!(given[j] > 0.0))
+      throw Error(fmt::format("check of a model: the standard deviation of {} '{}' is {}; expected more than 0", kind,
+                              variables[j].name, given[j]));
+  return given;
+}
+
+void require_fitting(const Model& model, const ModelDescription& within, const ModelCheckOptions& options) {
+  const ModelDescription& own = model.description();
+  if (names_of(own.states) != names_of(within.states) || names_of(own.inputs) != names_of(within.inputs) ||
+      names_of(own.parameters) != names_of(within.parameters) || names_of(own.outputs) != names_of(within.outputs))
+    throw Error(fmt::format("check of model '{}': the bounds to keep to are those of other variables", own.name));
+  if (!(options.interval > 0.0 && std::isfinite(options.interval)) || options.horizon < 1 || options.substeps < 1 ||
+      options.samples < 1)
+    throw Error("check of a model: interval, horizon, substeps and samples are to be greater than 0");
+  if (options.speed && !(*options.speed > 0.0 && std::isfinite(*options.speed)))
+    throw Error("check of a model: the speed is to be greater than 0");
+  if (!options.blockings.empty() && options.blockings.size() != within.parameters.size())
+    throw Error(fmt::format("check of a model: {} blockings for {} parameters", options.blockings.size(),
+                            within.parameters.size()));
+}
+
+/// The worst of several comparisons, with the circumstances in words.
+struct Worst {
+  WorstEntry entry;
+  std::string circumstances;
+  void take(const WorstEntry& other, const std::string& under) {
+    if (other.where.empty() || (!entry.where.empty() && other.error <= entry.error)) return;
+    entry = other;
+    circumstances = under;
+  }
+};
+
+constexpr int stages_of_a_range = 15;  // fills packs, and leaves one that is not full
+constexpr double derivative_tolerance = 1e-6, integration_tolerance = 1e-10;
+
+}  // namespace
+
+std::vector<Finding> check_derivatives(const CheckedModel& checked) {
+  FindingList findings("derivatives");
+  const FastestAtTheEnd restore(checked.model);
+  const StagePoints stages = random_stages(checked.about, stages_of_a_range, checked.options.seed);
+  Worst first, second, output_first, output_second, integration;
+  int compared = 0, skipped = 0;
+  const std::vector<std::string> sets = checked.model.instruction_sets();
+  for (const std::string& set : sets) {
+    if (!checked.model.use_instruction_set(set)) {
+      findings.fail(set, "instruction_sets() names it, use_instruction_set() refuses it",
+                    "let both know the same names");
+      continue;
+    }
+    for (const int substeps : {1, 3}) {
+      for (const bool ramp : {false, true}) {
+        const std::string under = fmt::format("instruction set {}, {} substep{}{}", set, substeps,
+                                              substeps > 1 ? "s" : "", ramp ? ", parameters on a ramp" : "");
+        const DerivativeErrors errors = derivative_errors(checked.model, checked.about, stages, ramp, substeps);
+        first.take(errors.first, under);
+        second.take(errors.second, under);
+        output_first.take(errors.output_first, fmt::format("instruction set {}", set));
+        output_second.take(errors.output_second, fmt::format("instruction set {}", set));
+        integration.take(integration_error(checked.model, checked.about, stages, ramp, substeps), under);
+        compared += errors.compared;
+        skipped += errors.skipped;
+      }
+    }
+  }
+  const auto judge = [&](const Worst& worst, double tolerance, const char* what, const char* against,
+                         const char* advice) {
+    if (!(worst.entry.error > tolerance)) return;
+    findings.fail(worst.entry.where,
+                  fmt::format("{}: {:.6g} by the model, {:.6g} by {}; relative error {:.2g} ({})", what,
+                              worst.entry.given, worst.entry.expected, against, worst.entry.error, worst.circumstances),
+                  advice,
+                  {{"error", worst.entry.error}, {"given", worst.entry.given}, {"expected", worst.entry.expected}});
+  };
+  constexpr const char *differences = "differences", *steps = "Runge-Kutta steps of rates()";
+  judge(integration, integration_tolerance, "values of F", steps, "let integrate() and rates() be of one formula");
+  judge(first, derivative_tolerance, "first derivative of F", differences, "mend `jacobians` of integrate()");
+  judge(second, derivative_tolerance, "second derivative of F", differences, "mend `hessians` of integrate()");
+  judge(output_first, derivative_tolerance, "first derivative of h", differences, "mend `jacobians` of observe()");
+  judge(output_second, derivative_tolerance, "second derivative of h", differences, "mend `hessians` of observe()");
+  if (compared == 0 && findings.empty() && skipped > 0)
+    findings.skip("no derivative is finite at random points inside the bounds; see 'numbers'");
+  if (findings.empty()) {
+    const double worst_first = std::max(first.entry.error, output_first.entry.error),
+                 worst_second = std::max(second.entry.error, output_second.entry.error);
+    findings.pass(
+        fmt::format("{} entries on {}: largest relative error beyond rounding {:.1g} of first{} derivatives{}",
+                    compared, fmt::join(sets, ", "), worst_first,
+                    checked.model.has_second_derivatives() ? fmt::format(", {:.1g} of second", worst_second) : "",
+                    checked.model.has_second_derivatives() ? "" : "; no second ones: for Gauss-Newton only"),
+        {{"first", worst_first}, {"second", worst_second}, {"compared", compared}, {"skipped", skipped}});
+  }
+  return findings.take();
+}
+
+std::vector<Finding> measure_times(const CheckedModel& checked, std::vector<EvaluationTimes>& times) {
+  using Clock = std::chrono::steady_clock;
+  constexpr int range = 16, calls = 300;
+  FindingList findings("time");
+  const FastestAtTheEnd restore(checked.model);
+  Model& model = checked.model;
+  const int nx = model.state_count(), nz = nx + model.input_count() + model.parameter_count(),
+            ny = model.output_count();
+  const StagePoints stages = random_stages(checked.about, range, checked.options.seed);
+  std::vector<double> next(range * nx), jacobians(range * nx * nz), hessians(range * nz * nz), outputs(range * ny),
+      output_jacobians(range * ny * nx);
+  const std::vector<double> multipliers(range * nx, 1.0);
+  const auto spread = [&](const auto& call) {
+    std::vector<double> nanoseconds;
+    call();
+    for (int i = 0; i < calls; ++i) {
+      const auto start = Clock::now();
+      call();
+      nanoseconds.push_back(std::chrono::duration<double, std::nano>(Clock::now() - start).count() / range);
+    }
+    return spread_of(nanoseconds);
+  };
+  for (const std::string& set : model.instruction_sets()) {
+    if (!model.use_instruction_set(set)) continue;
+    Model::Intervals request{.count = range,
+                             .states = stages.states.data(),
+                             .inputs = stages.inputs.data(),
+                             .parameters = stages.parameters.data(),
+                             .durations = stages.durations.data(),
+                             .substeps = checked.options.substeps,
+                             .next_states = next.data()};
+    EvaluationTimes found;
+    found.instruction_set = set;
+    found.values = spread([&] { model.integrate(request); });
+    request.jacobians = jacobians.data();
+    found.jacobians = spread([&] { model.integrate(request); });
+    if (model.has_second_derivatives()) {
+      request.multipliers = multipliers.data();
+      request.hessians = hessians.data();
+      found.hessians = spread([&] { model.integrate(request); });
+    }
+    found.outputs = spread([&] {
+      model.observe({.count = range,
+                     .states = stages.states.data(),
+                     .outputs = outputs.data(),
+                     .jacobians = output_jacobians.data()});
+    });
+    times.push_back(std::move(found));
+  }
+  if (times.empty()) {
+    findings.skip("the model names no instruction set");
+    return findings.take();
+  }
+  const EvaluationTimes& used = times.back();
+  findings.pass(fmt::format("{:.0f} ns a stage with Jacobian on {} ({:.0f} ns without, {})", used.jacobians.median,
+                            used.instruction_set, used.values.median,
+                            model.has_second_derivatives() ? fmt::format("{:.0f} ns with Hessian", used.hessians.median)
+                                                           : "no second derivatives"));
+  return findings.take();
+}
+
+ModelCheck check_model(Model& model, const ModelDescription& within, const ModelCheckOptions& options) {
+  require_fitting(model, within, options);
+  ModelCheck check;
+  check.model = within.name;
+  check.seed = options.seed;
+  check.parameters = names_of(within.parameters);
+  check.states = names_of(within.states);
+  const auto add = [&](std::vector<Finding> found) {
+    for (Finding& finding : found) check.findings.push_back(std::move(finding));
+  };
+  bool can_go_on = true;
+  add(check_description(within, can_go_on));
+  if (!can_go_on) {
+    for (const char* skipped :
+         {"symmetry", "straight_motion", "derivatives", "numbers", "scaling", "observability", "time"}) {
+      FindingList findings(skipped);
+      findings.skip("the description has to be mended first");
+      add(findings.take());
+    }
+    return check;
+  }
+  const CheckedModel checked{model, within, options, sigmas_or_default(options.output_sigmas, within.outputs, "output"),
+                             sigmas_or_default(options.input_sigmas, within.inputs, "input")};
+  add(check_symmetry(checked));
+  add(check_straight_motion(checked));
+  add(check_derivatives(checked));
+  add(check_numbers(checked));
+  add(check_drives(checked, check.drives));
+  add(measure_times(checked, check.times));
+  return check;
+}
+
+ModelCheck check_model(Model& model, const ModelCheckOptions& options) {
+  return check_model(model, model.description(), options);
+}
+
+ModelCheck check_model(const Host& host, const Robot& robot, ModelCheckOptions options) {
+  options.interval = robot.step();
+  options.horizon = robot.estimator_options().horizon;
+  options.substeps = robot.estimator_options().substeps;
+  options.output_sigmas = robot.output_sigmas();
+  options.input_sigmas = robot.input_sigmas();
+  options.blockings = robot.make_blockings();
+  // The robot's own is shared, and may not be given another instruction set.
+  const PluginChoice choice = robot.model_choice();
+  const std::shared_ptr<Model> model = host.make_model(choice.name, choice.options);
+  return check_model(*model, robot.bounded_description(), options);
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,286 @@
+// Where inside the bounds a model's numbers are not finite, or grow without bound.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "model_checks.hpp"
+#include "rhec/sim/check/derivative_check.hpp"
+#include "rhec/sim/numbers/random.hpp"
+
+namespace rhec::sim {
+namespace {
+
+constexpr double reach = 3.0;    // of variables without bounds, in scales
+constexpr double steep = 1e3;    // a derivative so many times the usual one is looked at more closely,
+constexpr double steeper = 1e2;  // and has no bound where it grows by this much more in its neighbourhood
+constexpr int looked_into = 32;  // bad samples whose variables are drawn anew one by one,
+constexpr int redraws = 24;      // so often
+constexpr double narrow = 0.8;   // of its range: a variable says where the bad samples are if they are within this
+
+/// What is looked at of one sample.
+struct Look {
+  // Not finite: of F, and of h.
+  bool values = false, first = false, second = false;
+  bool outputs = false, output_first = false, output_second = false;
+  double slope = 0.0;  ///< largest entry of F's Jacobian, in scales
+
+  bool bad_step() const { return values || first || second; }
+  bool bad_output() const { return outputs || output_first || output_second; }
+};
+
+struct Dimension {
+  std::string name;
+  double lower, upper, scale;
+};
+
+class Explorer {
+ public:
+  explicit Explorer(const CheckedModel& checked)
+      : model_(checked.model),
+        options_(checked.options),
+        nx_(checked.model.state_count()),
+        nu_(checked.model.input_count()),
+        np_(checked.model.parameter_count()),
+        ny_(checked.model.output_count()),
+        nz_(nx_ + nu_ + np_),
+        random_(checked.options.seed, "numbers of a model"),
+        step_multipliers_(nx_, 1.0),
+        output_multipliers_(ny_, 1.0) {
+    for (const auto* variables : {&checked.about.states, &checked.about.inputs, &checked.about.parameters})
+      for (const Variable& variable : *variables) {
+        const auto [lower, upper] = range_of(variable, reach);
+        dimensions_.push_back({variable.name, lower, upper, variable.scale});
+      }
+  }
+
+  using Point = std::vector<double>;
+  const std::vector<Dimension>& dimensions() const { return dimensions_; }
+
+  Look look(const Point& z) {
+    constexpr double unwritten = std::numeric_limits<double>::quiet_NaN();
+    const bool second = model_.has_second_derivatives();
+    for (auto* array : {&next_, &jacobian_, &hessian_, &outputs_, &output_jacobian_, &output_hessian_}) array->clear();
+    next_.resize(nx_, unwritten);
+    jacobian_.resize(nx_ * nz_, unwritten);
+    hessian_.resize(second ? nz_ * nz_ : 0, unwritten);
+    outputs_.resize(ny_, unwritten);
+    output_jacobian_.resize(ny_ * nx_, unwritten);
+    output_hessian_.resize(second ? nx_ * nx_ : 0, unwritten);
+    Model::Intervals step{.count = 1,
+                          .states = z.data(),
+                          .inputs = z.data() + nx_,
+                          .parameters = z.data() + nx_ + nu_,
+                          .durations = &options_.interval,
+                          .substeps = options_.substeps,
+                          .next_states = next_.data(),
+                          .jacobians = jacobian_.data()};
+    Model::Nodes node{.count = 1, .states = z.data(), .outputs = outputs_.data(), .jacobians = output_jacobian_.data()};
+    if (second) {
+      step.multipliers = step_multipliers_.data();
+      step.hessians = hessian_.data();
+      node.multipliers = output_multipliers_.data();
+      node.hessians = output_hessian_.data();
+    }
+    model_.integrate(step);
+    model_.observe(node);
+    const auto bad = [](const std::vector<double>& array) {
+      return std::any_of(array.begin(), array.end(), [](double value) { return !std::isfinite(value); });
+    };
+    Look found{bad(next_), bad(jacobian_), bad(hessian_), bad(outputs_), bad(output_jacobian_), bad(output_hessian_)};
+    for (int j = 0; j < nz_; ++j)
+      for (int r = 0; r < nx_; ++r)
+        found.slope =
+            std::max(found.slope, std::abs(jacobian_[j * nx_ + r]) * dimensions_[j].scale / dimensions_[r].scale);
+    return found;
+  }
+
+  double draw(int j) { return random_.uniform(dimensions_[j].lower, dimensions_[j].upper); }
+
+  /// Half of all samples are anywhere; the others lie on bounds and zeros in some or all of their variables.
+  Point sample(int index) {
+    Point z(nz_);
+    const double share = index % 2 == 0 ? 0.0 : random_.uniform();
+    const bool at_zero = index == 0;
+    for (int j = 0; j < nz_; ++j) {
+      const Dimension& d = dimensions_[j];
+      const double choice = random_.uniform();
+      z[j] = draw(j);
+      if (at_zero || choice < share / 3.0) {
+        z[j] = std::clamp(0.0, d.lower, d.upper);
+      } else if (choice < share) {
+        z[j] = choice < share * 2.0 / 3.0 ? d.lower : d.upper;
+      }
+    }
+    return z;
+  }
+
+  /// The same point with one variable drawn anew.
+  Point redrawn(Point z, int j) {
+    z[j] = draw(j);
+    return z;
+  }
+
+  /// Whether the slope of `at` grows on, the closer one looks.
+  bool grows_on(Point at, double slope) {
+    const double start = slope;
+    for (int trial = 0; trial < 2000 && std::isfinite(slope) && slope < steeper * start; ++trial) {
+      Point near = at;
+      const int j = static_cast<int>(random_.uniform() * nz_);
+      const double width = (dimensions_[j].upper - dimensions_[j].lower) * std::pow(10.0, -8.0 * random_.uniform());
+      near[j] = std::clamp(near[j] + width * random_.uniform(-1.0, 1.0), dimensions_[j].lower, dimensions_[j].upper);
+      const double found = look(near).slope;
+      if (!(found > slope)) continue;
+      slope = found;
+      at = near;
+    }
+    return slope >= steeper * start;
+  }
+
+  std::string text_of(const Point& z) const {
+    std::string text;
+    for (int j = 0; j < nz_; ++j) text += fmt::format("{}{} {:.4g}", j > 0 ? ", " : "", dimensions_[j].name, z[j]);
+    return text;
+  }
+
+ private:
+  const Model& model_;
+  const ModelCheckOptions& options_;
+  int nx_, nu_, np_, ny_, nz_;
+  RandomStream random_;
+  std::vector<double> step_multipliers_, output_multipliers_;
+  std::vector<Dimension> dimensions_;
+  std::vector<double> next_, jacobian_, hessian_, outputs_, output_jacobian_, output_hessian_;
+};
+
+/// Sorted values in clusters, as "in [-1.6, -1.5] or [1.5, 1.6]"; empty where they are nearly everywhere.
+std::string intervals_of(std::vector<double> values, const Dimension& d) {
+  if (values.empty() || !(d.upper > d.lower)) return {};
+  std::sort(values.begin(), values.end());
+  const double width = d.upper - d.lower;
+  std::vector<std::array<double, 2>> clusters = {{values[0], values[0]}};
+  for (const double value : values) {
+    if (value - clusters.back()[1] > 0.1 * width) clusters.push_back({value, value});
+    clusters.back()[1] = value;
+  }
+  double covered = 0.0;
+  for (const auto& [low, high] : clusters) covered += high - low;
+  if (covered > narrow * width) return {};
+  std::string text = fmt::format("{} ", d.name);
+  for (std::size_t k = 0; k < clusters.size(); ++k) {
+    const auto [low, high] = clusters[k];
+    text += k > 0 ? " or " : "";
+    text += high - low > 1e-9 * width ? fmt::format("in [{:.4g}, {:.4g}]", low, high) : fmt::format("at {:.4g}", low);
+  }
+  return text;
+}
+
+/// Which variables decide whether a sample is bad, and in which part of their ranges it is; "" where none does.
+/// A variable decides where drawing it anew, and nothing else, often mends a bad sample.
+template <class IsBad>
+std::string region_of(Explorer& explorer, const std::vector<Explorer::Point>& bad, const IsBad& is_bad) {
+  std::string text;
+  const std::size_t step = std::max<std::size_t>(1, bad.size() / looked_into);
+  for (std::size_t j = 0; j < explorer.dimensions().size(); ++j) {
+    int mended = 0, drawn = 0;
+    std::vector<double> values;
+    values.reserve(bad.size());
+    for (const auto& point : bad) values.push_back(point[j]);
+    for (std::size_t k = 0; k < bad.size(); k += step) {
+      for (int i = 0; i < redraws; ++i) {
+        const auto other = explorer.redrawn(bad[k], static_cast<int>(j));
+        ++drawn;
+        if (is_bad(explorer.look(other)))
+          values.push_back(other[j]);
+        else
+          ++mended;
+      }
+    }
+    if (mended < 0.2 * drawn) continue;
+    const std::string part = intervals_of(std::move(values), explorer.dimensions()[j]);
+    if (!part.empty()) text += (text.empty() ? "" : "; ") + part;
+  }
+  return text;
+}
+
+struct Tally {
+  std::vector<Explorer::Point> points;
+  int values = 0, first = 0, second = 0;  ///< samples of which these are not finite
+};
+
+template <class IsBad>
+void judge(Explorer& explorer, const Tally& bad, int samples, const char* what, FindingList& findings,
+           const IsBad& is_bad) {
+  if (bad.points.empty()) return;
+  const std::string region = region_of(explorer, bad.points, is_bad);
+  findings.fail(
+      region.empty() ? "anywhere" : region,
+      fmt::format(
+          "{} of {} samples give {} or derivatives that are not finite (values {}, first derivatives {}, second "
+          "{}), e.g. at {}",
+          bad.points.size(), samples, what, bad.values, bad.first, bad.second, explorer.text_of(bad.points.front())),
+      "narrow the bounds to where the formula holds, or write it so that it holds there; and write all that is asked "
+      "for",
+      {{"samples", samples},
+       {"bad", static_cast<double>(bad.points.size())},
+       {"values", bad.values},
+       {"first", bad.first},
+       {"second", bad.second}});
+}
+
+}  // namespace
+
+std::vector<Finding> check_numbers(const CheckedModel& checked) {
+  FindingList findings("numbers");
+  Explorer explorer(checked);
+  const int samples = checked.options.samples;
+  Tally step, output;
+  std::vector<std::pair<double, Explorer::Point>> slopes;
+  for (int i = 0; i < samples; ++i) {
+    Explorer::Point z = explorer.sample(i);
+    const Look look = explorer.look(z);
+    if (look.bad_output()) {
+      output.points.push_back(z);
+      output.values += look.outputs;
+      output.first += look.output_first;
+      output.second += look.output_second;
+    }
+    if (look.bad_step()) {
+      step.points.push_back(std::move(z));
+      step.values += look.values;
+      step.first += look.first;
+      step.second += look.second;
+    } else {
+      slopes.emplace_back(look.slope, std::move(z));
+    }
+  }
+  judge(explorer, step, samples, "next states", findings, [](const Look& look) { return look.bad_step(); });
+  judge(explorer, output, samples, "outputs", findings, [](const Look& look) { return look.bad_output(); });
+
+  if (!slopes.empty()) {
+    std::sort(slopes.begin(), slopes.end());
+    const double limit = steep * std::max(1.0, slopes[slopes.size() / 2].first);
+    std::vector<Explorer::Point> points;
+    for (auto& [slope, point] : slopes)
+      if (slope > limit) points.push_back(std::move(point));
+    // From the least steep of them: on the pole itself rounding ends the growth.
+    if (!points.empty() && explorer.grows_on(points.front(), explorer.look(points.front()).slope)) {
+      const std::string region = region_of(explorer, points, [&](const Look& look) { return !(look.slope <= limit); });
+      findings.warn(region.empty() ? "anywhere" : region,
+                    fmt::format("{} of {} samples are near a pole: derivatives of next states grow without bound, e.g. "
+                                "at {}",
+                                points.size(), samples, explorer.text_of(points.front())),
+                    "give bounds that keep away from it", {{"samples", samples}, {"steep", points.size()}});
+    }
+  }
+  if (findings.empty())
+    findings.pass(fmt::format("{} samples inside the bounds (without bounds: within {:g} scales, of angles pi), their "
+                              "edges and zeros: all finite",
+                              samples, reach),
+                  {{"samples", samples}});
+  return findings.take();
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rhec/core/base/export.hpp"
+#include "rhec/sim/figures/svg.hpp"
+
+namespace rhec::sim {
+
+/// Who speaks in a curve; it sets colour and stroke.
+enum class CurveRole { estimate, truth, reference, other };
+
+/// One curve over time. Values that are NaN interrupt it.
+struct Curve {
+  std::string label;
+  std::vector<double> times;   ///< [s]
+  std::vector<double> values;  ///< one per time
+  std::vector<double> sigmas;  ///< standard deviations, drawn as a band of 2 sigma; empty: no band
+  CurveRole role = CurveRole::estimate;
+};
+
+/// A diagram of curves over time.
+struct Panel {
+  std::string title;  ///< e.g. "Longitudinal slip kappa"
+  std::string unit;   ///< e.g. "m"; "1" and empty are not shown
+  std::vector<Curve> curves;
+  double lower = std::numeric_limits<double>::quiet_NaN();  ///< of the axis; NaN: as the values need
+  double upper = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Values over the plane, drawn beneath the map.
+struct BaseMap {
+  std::string title;                                ///< of the colour bar, e.g. "true kappa"
+  std::function<double(double x, double y)> value;  ///< at a position [m]; NaN is left blank
+  double lower = 0.0, upper = 1.0;                  ///< values at the ends of the colour bar
+};
+
+/// What a run looked like: the map on the left, diagrams over time on the right.
+struct RunPicture {
+  std::string title;
+  std::string subtitle;
+  std::vector<Point> path;       ///< asked for [m]
+  std::vector<Point> driven;     ///< true track [m]; may be empty
+  std::vector<Point> estimated;  ///< estimated track [m]; may be empty
+  std::vector<Point> fixes;      ///< measured positions [m]; may be empty
+  std::optional<BaseMap> base;
+  std::vector<Panel> panels;
+};
+
+/// The picture as an SVG document. Curves are thinned as `thin_curve` and `thin_track` say, so that long runs stay
+/// small. Throws Error for a curve whose times, values and sigmas differ in number.
+RHEC_EXPORT std::string draw_run(const RunPicture& picture);
+
+}  // namespace rhec::sim

@@ -1,0 +1,252 @@
+#include "rhec/sim/loop/closed_loop.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include <Eigen/Cholesky>
+
+#include "rhec/core/base/angle.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/sim/world/truth_estimator.hpp"
+
+namespace rhec::sim {
+namespace {
+
+// A vehicle this far off its path is lost [m].
+constexpr double lost = 50.0;
+
+/// error' covariance^-1 error
+class Nees {
+ public:
+  explicit Nees(int size) : error(size), factor_(size, size), solved_(size) {}
+
+  Eigen::VectorXd error;
+
+  double with(const Eigen::MatrixXd& covariance) {
+    // L D L' row by row, and z = L^-1 error beside it: the sum of z_i^2 / d_i.
+    double sum = 0.0;
+    for (Eigen::Index i = 0; i < error.size(); ++i) {
+      double pivot = covariance(i, i), z = error[i];
+      for (Eigen::Index j = 0; j < i; ++j) {
+        double value = covariance(i, j);  // of L D
+        for (Eigen::Index k = 0; k < j; ++k) value -= factor_(k, i) * factor_(j, k);
+        factor_(j, i) = value;
+        const double entry = value / factor_(j, j);  // of L
+        factor_(i, j) = entry;
+        pivot -= entry * value;
+        z -= entry * solved_[j];
+      }
+      if (!(pivot > least_pivot * covariance(i, i))) return with_singular(covariance);
+      factor_(i, i) = pivot;
+      solved_[i] = z;
+      sum += z * z / pivot;
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr double least_pivot = 1e-14;  // of a diagonal entry: below it pivots are rounding
+
+  double with_singular(const Eigen::MatrixXd& covariance) const {
+    const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
+    if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
+    return error.dot(factor.solve(error));
+  }
+
+  Eigen::MatrixXd factor_;  // L below the diagonal, D on it, L D above
+  Eigen::VectorXd solved_;
+};
+
+/// Sums of absolute and squared errors.
+class Errors {
+ public:
+  explicit Errors(const ModelDescription& about) : about_(about), parameters_(about.parameters.size()) {}
+  void add(const Sample& sample) {
+    ++count_;
+    const Roles& roles = about_.roles;
+    for (std::size_t j = 0; j < parameters_.size(); ++j)
+      parameters_[j].add(sample.parameters[j] - sample.true_parameters[j]);
+    position_.add(std::hypot(sample.state[roles.position_x] - sample.true_state[roles.position_x],
+                             sample.state[roles.position_y] - sample.true_state[roles.position_y]));
+    if (roles.heading >= 0)
+      heading_.add(angle_difference(sample.state[roles.heading], sample.true_state[roles.heading]));
+    tracking_.add(sample.tracking);
+  }
+  ErrorSummary absolute() const {
+    return make([this](const Sum& sum) { return sum.absolute / static_cast<double>(count_); });
+  }
+  ErrorSummary root_mean_square() const {
+    return make([this](const Sum& sum) { return std::sqrt(sum.squared / static_cast<double>(count_)); });
+  }
+
+ private:
+  struct Sum {
+    double absolute = 0.0, squared = 0.0;
+    void add(double error) {
+      absolute += std::abs(error);
+      squared += error * error;
+    }
+  };
+  template <class Function>
+  ErrorSummary make(const Function& value_of) const {
+    ErrorSummary summary;
+    for (std::size_t j = 0; j < parameters_.size(); ++j)
+      summary.parameters[about_.parameters[j].name] = value_of(parameters_[j]);
+    summary.position = value_of(position_);
+    summary.heading = value_of(heading_);
+    summary.tracking = value_of(tracking_);
+    return summary;
+  }
+  const ModelDescription& about_;
+  std::vector<Sum> parameters_;
+  Sum position_, heading_, tracking_;
+  std::int64_t count_ = 0;
+};
+
+Spread spread_of_times(std::vector<double> times) {
+  return times.empty() ? Spread{0.0, 0.0, 0.0} : spread_of(std::move(times));
+}
+
+}  // namespace
+
+RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
+  std::int64_t k = 0;
+  Robot robot = with_hooks(scenario.robot(), hooks, [&k] { return k; });
+  const Model& model = *robot.model();
+  const Roles& roles = model.description().roles;
+  const int nx = model.state_count(), np = model.parameter_count();
+  const auto seed = static_cast<std::uint64_t>(scenario.options().seed);
+  TruthVehicle truth(model, scenario.terrain(), scenario.initial_state(), scenario.vehicle());
+  robot.use_estimators(scenario_estimators(&truth));
+  Sensors sensors(model, {robot.output_sigmas(), robot.input_sigmas()}, seed);
+  const auto estimator = robot.make_estimator(scenario.initial_state());
+  const auto controller = robot.make_controller(scenario.path());
+  PathFollower true_follower(scenario.path());
+
+  const double step = robot.step();
+  // Three times as long as the path should take, which a vehicle that lags behind its literal reference still keeps.
+  const auto limit =
+      static_cast<std::int64_t>(3.0 * scenario.path().length() / (scenario.options().speed * step)) + 100;
+  std::vector<double> outputs(model.output_count()), measured(model.input_count());
+  Nees nees(nx + np);
+  RunLog log;
+  log.samples.reserve(static_cast<std::size_t>(limit));
+  const auto begin = [&hooks](LoopPart part) {
+    if (hooks.begins) hooks.begins(part);
+  };
+  begin(LoopPart::simulate);
+  for (;; ++k) {
+    const double time = static_cast<double>(k) * step;
+    sensors.observe(truth.state().data(), outputs.data());
+    begin(LoopPart::estimate);
+    estimator->push_measurement(time, outputs.data());
+    const Estimate& estimate = estimator->estimate(time);
+    begin(LoopPart::control);
+    const Controller::Command& command = controller->control(estimate);
+    begin(LoopPart::log_sample);
+    true_follower.advance(truth.state()[roles.position_x], truth.state()[roles.position_y]);
+
+    Sample sample;
+    sample.step = k;
+    sample.time = time;
+    sample.true_state = truth.state();
+    sample.true_parameters = truth.parameters();
+    sample.state = estimate.state;
+    sample.parameters = estimate.parameters;
+    sample.nees = std::numeric_limits<double>::quiet_NaN();
+    if (estimate.covariance.size() > 0) {
+      sample.sigma = estimate.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+      nees.error << sample.state - sample.true_state, sample.parameters - sample.true_parameters;
+      for (int j = 0; j < nx; ++j)
+        if (model.description().states[j].is_angle)
+          nees.error[j] = angle_difference(sample.state[j], sample.true_state[j]);
+      sample.nees = nees.with(estimate.covariance);
+    }
+    sample.inputs = command.inputs;
+    sample.reference = command.reference;
+    sample.tracking = true_follower.lateral();
+    sample.estimator_status = estimate.report.status;
+    sample.controller_status = command.report.status;
+    sample.estimator_fallback = estimate.fallback;
+    sample.controller_fallback = command.fallback;
+    sample.softened = command.softened;
+    sample.estimator_us = estimate.report.preparation_us + estimate.report.feedback_us;
+    sample.estimator_feedback_us = estimate.report.feedback_us;
+    sample.controller_us = command.report.preparation_us + command.report.feedback_us;
+    log.samples.push_back(std::move(sample));
+    if (hooks.sampled) hooks.sampled({k, time, estimator.get(), &estimate, controller.get(), &command});
+    if (hooks.progress) hooks.progress(std::min(1.0, true_follower.arc_length() / scenario.path().length()));
+
+    if (controller->finished() || true_follower.finished()) {
+      log.completed = true;
+      log.ended = "the end of the path was reached";
+      break;
+    }
+    if (!truth.state().allFinite() || !(std::abs(true_follower.lateral()) < lost)) {
+      log.ended = "the vehicle left its path and was lost";
+      break;
+    }
+    if (k >= limit) {
+      log.ended = "the vehicle took more than three times as long as it should have";
+      break;
+    }
+    begin(LoopPart::simulate);
+    truth.advance(command.inputs.data(), step);
+    sensors.measure_inputs(command.inputs.data(), measured.data());
+    begin(LoopPart::prepare_control);
+    controller->prepare();
+    begin(LoopPart::prepare_estimate);
+    estimator->push_input(time, measured.data());
+    estimator->prepare();
+    begin(LoopPart::simulate);
+  }
+  controller->finish();
+  begin(LoopPart::end);
+  return log;
+}
+
+RunSummary summarise(const RunLog& log, const Scenario& scenario) {
+  const ModelDescription& about = scenario.robot().model()->description();
+  RunSummary summary;
+  summary.steps = static_cast<std::int64_t>(log.samples.size());
+  summary.completed = log.completed;
+  summary.ended = log.ended;
+  Errors all(about), after_start(about);
+  std::vector<double> estimator_us, controller_us;
+  std::map<Status, std::int64_t> estimator_statuses, controller_statuses;
+  double nees = 0.0;
+  std::int64_t with_nees = 0;
+  const bool solves_estimation = scenario.robot().estimator_options().name == "rhe";
+  for (const Sample& sample : log.samples) {
+    all.add(sample);
+    if (sample.step >= scenario.robot().estimator_options().horizon) after_start.add(sample);
+    if (std::isfinite(sample.nees)) {
+      nees += sample.nees;
+      ++with_nees;
+    }
+    if (solves_estimation) {
+      estimator_us.push_back(sample.estimator_us);
+      ++estimator_statuses[sample.estimator_status];
+      summary.fallbacks += sample.estimator_fallback;
+      ++summary.solves;
+    }
+    controller_us.push_back(sample.controller_us);
+    ++controller_statuses[sample.controller_status];
+    summary.fallbacks += sample.controller_fallback;
+    ++summary.solves;
+  }
+  for (const auto& [status, count] : estimator_statuses) summary.estimator_statuses[name_of(status)] = count;
+  for (const auto& [status, count] : controller_statuses) summary.controller_statuses[name_of(status)] = count;
+  summary.mae = all.absolute();
+  summary.rmse = all.root_mean_square();
+  summary.mae_after_start = after_start.absolute();
+  summary.nees = with_nees > 0 ? nees / static_cast<double>(with_nees) : std::numeric_limits<double>::quiet_NaN();
+  summary.estimator_us = spread_of_times(std::move(estimator_us));
+  summary.controller_us = spread_of_times(std::move(controller_us));
+  return summary;
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "rhec/sim/files/json.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
+
+namespace rhec::sim {
+
+/// The files of a run: steps.csv, summary.json, run.svg (the same bytes for the same scenario and seed, but for the
+/// solve times in the summary), and times.csv.
+RHEC_EXPORT std::string steps_csv(const RunLog& log, const Scenario& scenario);
+RHEC_EXPORT std::string times_csv(const RunLog& log);
+RHEC_EXPORT Json json_of(const RunSummary& summary);
+RHEC_EXPORT std::string summary_json(const RunSummary& summary);
+RHEC_EXPORT std::string run_svg(const RunLog& log, const Scenario& scenario);
+
+}  // namespace rhec::sim

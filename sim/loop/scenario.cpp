@@ -1,0 +1,244 @@
+#include "rhec/sim/loop/scenario.hpp"
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <tuple>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/plugins/robot/by_name.hpp"
+#include "rhec/sim/world/paths.hpp"
+#include "rhec/sim/world/truth_estimator.hpp"
+
+namespace rhec::sim {
+namespace {
+
+struct PathOptions {
+  enum class Name { figure8, zigzag, file };
+  Name name = Name::figure8;
+  int laps = 2, legs = 6;
+  double radius = 21.9, leg_length = 68.0, turn_radius = 9.0, spacing = 0.1;
+  std::string file;
+};
+
+struct TerrainOptions {
+  enum class Name { gaussian, constant, patches, raster };
+  Name name = Name::gaussian;
+  double correlation_length = 10.0, period = 500.0, patch_size = 10.0;
+  double lower = 0.5, upper = 1.0;
+  Settings ranges, values;
+  std::vector<std::string> files;
+  RasterField::Interpolation interpolation = RasterField::Interpolation::bilinear;
+};
+
+const OptionTable<PathOptions>& path_table() {
+  using P = PathOptions;
+  static const auto rows =
+      OptionTable<P>()
+          .choice("name", &P::name,
+                  {{"figure8", P::Name::figure8}, {"zigzag", P::Name::zigzag}, {"file", P::Name::file}}, "which path")
+          .integer("laps", &P::laps, "of figure8", between(1, 1000))
+          .number("radius", &P::radius, "of the circles of figure8 [m]", greater_than(0.0))
+          .integer("legs", &P::legs, "of zigzag", between(1, 1000))
+          .number("leg_length", &P::leg_length, "of zigzag [m]", greater_than(0.0))
+          .number("turn_radius", &P::turn_radius, "of the half circles of zigzag [m]", greater_than(0.0))
+          .number("spacing", &P::spacing, "largest distance between waypoints [m]", greater_than(0.0))
+          .text("file", &P::file, "of waypoints x, y (, speed), for path.name: file");
+  return rows;
+}
+
+/// The values of constant terrain.
+const NumbersByName& values_by_name() {
+  static const NumbersByName map(
+      "terrain values", {any()},
+      {{"PARAMETER",
+        &ModelDescription::parameters,
+        {"", [](const ModelDescription&, const Variable& parameter, std::size_t) { return parameter.nominal; }},
+        "of constant; where nothing slips (1, or 0 of an angle)"}});
+  return map;
+}
+
+const OptionTable<TerrainOptions>& terrain_table() {
+  using T = TerrainOptions;
+  static const auto rows =
+      OptionTable<T>()
+          .choice("name", &T::name,
+                  {{"gaussian", T::Name::gaussian},
+                   {"constant", T::Name::constant},
+                   {"patches", T::Name::patches},
+                   {"raster", T::Name::raster}},
+                  "how the true parameters vary over the ground")
+          .number("correlation_length", &T::correlation_length, "L of the gaussian field [m]", greater_than(0.0))
+          .number("period", &T::period, "after which the gaussian field repeats itself [m]", greater_than(0.0))
+          .number("patch_size", &T::patch_size, "of patches [m]", greater_than(0.0))
+          .number("lower", &T::lower, "least value of gaussian and patches, of ratios (1 where nothing slips)")
+          .number("upper", &T::upper, "largest value of gaussian and patches, of ratios")
+          .map("ranges", &T::ranges,
+               {{"PARAMETER", "[lower, upper]", "", "", "of gaussian and patches, in place of lower and upper"}})
+          .map("values", &T::values, values_by_name().rows())
+          .names("files", &T::files, "of raster: one a parameter")
+          .choice(
+              "interpolation", &T::interpolation,
+              {{"bilinear", RasterField::Interpolation::bilinear}, {"nearest", RasterField::Interpolation::nearest}},
+              "of raster");
+  return rows;
+}
+
+const OptionTable<TruthOptions>& vehicle_table() {
+  static const auto rows =
+      OptionTable<TruthOptions>()
+          .number("step", &TruthOptions::step,
+                  "integration step of the truth; on smooth ground it may take longer ones [s]", between(1e-6, 1.0))
+          .flag("mechanical_stops", &TruthOptions::mechanical_stops, "bounded states cannot leave their bounds");
+  return rows;
+}
+
+/// A file that a scenario names is meant beside it; one that the command line names, where the user stands.
+std::filesystem::path file_at(const Settings& named) {
+  const std::filesystem::path given(named.as_text());
+  const bool in_a_file = named.origin().line > 0;
+  const std::filesystem::path folder = in_a_file ? std::filesystem::path(named.origin().file).parent_path() : "";
+  if (std::filesystem::exists(folder / given)) return folder / given;
+  throw named.error(
+      fmt::format("found '{}', expected a file; there is no {}", given.string(), (folder / given).string()));
+}
+
+/// The key of a section; the section itself where it does not have it.
+const Settings& key_or_section(const Settings& section, std::string_view key) {
+  const Settings* found = section.find(key);
+  return found ? *found : section;
+}
+
+// A path or a run beyond this is a slip of a unit, and would not fit into memory.
+constexpr double most_waypoints = 2e6, most_samples = 1e6;
+
+void require_few_waypoints(const Settings& section, double length, double spacing) {
+  if (length / spacing <= most_waypoints) return;
+  throw key_or_section(section, "spacing")
+      .error(fmt::format("a path of {:.4g} m has a waypoint every {} m, more than {:g} of them; make it shorter or the "
+                         "spacing larger",
+                         length, spacing, most_waypoints));
+}
+
+std::vector<Waypoint> make_waypoints(const ScenarioOptions& options) {
+  const PathOptions path = path_table().parse(options.path, "path");
+  switch (path.name) {
+    case PathOptions::Name::figure8:
+      require_few_waypoints(options.path, path.laps * 4.0 * std::numbers::pi * path.radius, path.spacing);
+      return figure_eight({options.speed, path.laps, path.radius, path.spacing});
+    case PathOptions::Name::zigzag:
+      require_few_waypoints(options.path, path.legs * (path.leg_length + std::numbers::pi * path.turn_radius),
+                            path.spacing);
+      return zig_zag({options.speed, path.legs, path.leg_length, path.turn_radius, path.spacing});
+    case PathOptions::Name::file:
+      if (path.file.empty())
+        throw key_or_section(options.path, "name")
+            .error("found 'file', but no path.file; expected there a CSV file of waypoints x, y (, speed)");
+      return load_waypoints(file_at(*options.path.find("file")), {options.speed});
+  }
+  return {};
+}
+
+std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDescription& about,
+                                   const Settings& section) {
+  check_keys(terrain.ranges, names_of(about.parameters), "terrain ranges");
+  std::vector<SlipRange> ranges(about.parameters.size(), SlipRange{terrain.lower, terrain.upper});
+  const bool varies = terrain.name == TerrainOptions::Name::gaussian || terrain.name == TerrainOptions::Name::patches;
+  for (std::size_t j = 0; j < ranges.size(); ++j) {
+    const Variable& parameter = about.parameters[j];
+    const Settings* pair = terrain.ranges.find(parameter.name);
+    if (!pair && parameter.nominal != 1.0) {
+      // No ratio: a share of what it may be. Angles of 0.5 to 1 rad would be another vehicle's.
+      ranges[j] = {0.5 * (parameter.nominal + parameter.lower), 0.5 * (parameter.nominal + parameter.upper)};
+      if (varies && !(std::isfinite(ranges[j].lower) && std::isfinite(ranges[j].upper)))
+        throw key_or_section(section, "ranges")
+            .error(fmt::format("how far '{}' varies is not known, since the model gives it no bounds; expected [lower, "
+                               "upper] under ranges.{}",
+                               parameter.name, parameter.name));
+    }
+    if (pair) std::tie(ranges[j].lower, ranges[j].upper) = BoundsValue{}.read(*pair, {});
+    if (pair && !(std::isfinite(ranges[j].lower) && std::isfinite(ranges[j].upper)))
+      throw pair->mismatch("two finite numbers [lower, upper]");
+  }
+  return ranges;
+}
+
+std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, const ModelDescription& about) {
+  const TerrainOptions terrain = terrain_table().parse(options.terrain, "terrain");
+  if (!(terrain.lower <= terrain.upper))
+    throw key_or_section(options.terrain, "lower")
+        .error(fmt::format("lower is {} and upper is {}; expected lower <= upper", terrain.lower, terrain.upper));
+  const std::vector<double> constant = values_by_name().read(terrain.values, about);
+  const std::vector<SlipRange> ranges = slip_ranges(terrain, about, options.terrain);
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+  switch (terrain.name) {
+    case TerrainOptions::Name::gaussian:
+      return gaussian_random_field({seed, ranges, terrain.correlation_length, terrain.period});
+    case TerrainOptions::Name::patches:
+      return patch_field({seed, ranges, terrain.patch_size});
+    case TerrainOptions::Name::constant:
+      return constant_field(constant);
+    case TerrainOptions::Name::raster: {
+      if (terrain.files.size() != about.parameters.size())
+        throw key_or_section(options.terrain, "files")
+            .error(fmt::format("{} raster files given; expected {}, one a parameter of the model", terrain.files.size(),
+                               about.parameters.size()));
+      RasterField raster;
+      if (terrain.files.empty())
+        throw options.terrain.error("the model has no parameters; a raster has nothing to say");
+      for (const Settings& file : options.terrain.find("files")->items()) raster.files.push_back(file_at(file));
+      raster.interpolation = terrain.interpolation;
+      return raster_field(raster);
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+const OptionTable<ScenarioOptions>& ScenarioOptions::table() {
+  static const auto rows = [] {
+    OptionTable<ScenarioOptions> table;
+    table.text("name", &ScenarioOptions::name, "of the run, for titles")
+        .number("speed", &ScenarioOptions::speed, "reference ground speed [m/s]", between(0.01, 100.0))
+        .integer("seed", &ScenarioOptions::seed, "of terrain and noise", between(0, 2147483647))
+        .subtree("path", &ScenarioOptions::path, "name: figure8 | zigzag | file, and its options")
+        .subtree("terrain", &ScenarioOptions::terrain, "name: gaussian | constant | patches | raster, and its options")
+        .subtree("vehicle", &ScenarioOptions::vehicle, "the true vehicle: step, mechanical_stops");
+    RobotOptions::add_to(table);
+    return table;
+  }();
+  return rows;
+}
+
+std::vector<OptionSection> scenario_sections() {
+  std::vector<OptionSection> sections = {
+      {"", "A scenario: a robot, and the world that it drives in.", ScenarioOptions::table().schema()},
+      {"path", "What the robot shall follow.", path_table().schema()},
+      {"terrain", "The ground: the true parameters of the model as a function of position.", terrain_table().schema()},
+      {"vehicle", "The vehicle as it really moves.", vehicle_table().schema()},
+  };
+  for (OptionSection& section : robot_sections(scenario_estimators())) sections.push_back(std::move(section));
+  return sections;
+}
+
+Scenario::Scenario(const Host& host, const Settings& settings)
+    : options_(ScenarioOptions::table().parse(settings, "scenario")),
+      robot_(host, options_, scenario_estimators()),
+      path_(make_waypoints(options_)),
+      terrain_(make_terrain(options_, robot_.model()->description())) {
+  vehicle_ = vehicle_table().parse(options_.vehicle, "vehicle");
+  const double samples = path_.length() / (options_.speed * options_.step);
+  if (!(samples >= 1.0 && samples <= most_samples))
+    throw key_or_section(settings, "step")
+        .error(fmt::format("a path of {:.4g} m at {} m/s has {:.4g} steps of {} s; expected between 1 and {:g}",
+                           path_.length(), options_.speed, samples, options_.step, most_samples));
+  const PathPoint start = path_.point_at(0.0);
+  initial_state_ = Eigen::VectorXd::Zero(robot_.model()->state_count());
+  robot_.model()->description().roles.place(start.x, start.y, start.heading, initial_state_.data());
+}
+
+}  // namespace rhec::sim

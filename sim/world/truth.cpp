@@ -1,0 +1,184 @@
+#include "rhec/sim/world/truth.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "rhec/core/base/error.hpp"
+
+namespace rhec::sim {
+namespace {
+
+// Steps that are made as one where that does not show.
+constexpr int longest = 5;
+// What shows, in typical magnitudes of a state.
+constexpr double seen = 1e-8;
+
+}  // namespace
+
+TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eigen::VectorXd& initial_state,
+                           const TruthOptions& options)
+    : model_(&model), field_(&field), options_(options), state_(initial_state) {
+  const ModelDescription& description = model.description();
+  const int n_x = model.state_count(), n_p = model.parameter_count();
+  if (description.roles.position_x < 0 || description.roles.position_y < 0) {
+    throw Error(
+        fmt::format("truth vehicle: model '{}' does not say which states are its position, by which slip is looked "
+                    "up; set position_x and position_y among its roles",
+                    description.name));
+  }
+  if (field.channels() != n_p) {
+    throw Error(
+        fmt::format("truth vehicle: the slip field has {} channel(s), but model '{}' has {} parameter(s); give one "
+                    "channel per parameter",
+                    field.channels(), description.name, n_p));
+  }
+  if (initial_state.size() != n_x) {
+    throw Error(fmt::format("truth vehicle: the initial state has {} value(s), but model '{}' has {} state(s)",
+                            initial_state.size(), description.name, n_x));
+  }
+  if (!(std::isfinite(options.step) && options.step > 0.0)) {
+    throw Error(fmt::format("truth vehicle: step is {}; expected a time greater than 0 s", options.step));
+  }
+  lower_.resize(n_x);
+  upper_.resize(n_x);
+  scales_.resize(n_x);
+  for (int i = 0; i < n_x; ++i) {
+    const Variable& variable = description.states[i];
+    lower_[i] = variable.lower;
+    upper_[i] = variable.upper;
+    scales_[i] = variable.scale;
+    const bool inside = !options.mechanical_stops || (state_[i] >= lower_[i] && state_[i] <= upper_[i]);
+    if (!std::isfinite(state_[i]) || !inside) {
+      throw Error(fmt::format("truth vehicle: the initial {} is {} {}; expected a value in [{}, {}]", variable.name,
+                              state_[i], variable.unit, lower_[i], upper_[i]));
+    }
+  }
+  for (Eigen::VectorXd* vector : {&stage_state_, &rates_, &stage_rates_, &end_rates_, &sum_rates_})
+    vector->setZero(n_x);
+  for (Eigen::VectorXd* vector :
+       {&parameters_, &mean_parameters_, &stage_parameters_, &step_parameters_, &sum_parameters_}) {
+    vector->setZero(n_p);
+  }
+  position_x_ = description.roles.position_x;
+  position_y_ = description.roles.position_y;
+  look_up(state_.data(), parameters_.data());
+  mean_parameters_ = parameters_;
+}
+
+void TruthVehicle::look_up(const double* state, double* parameters) const noexcept {
+  field_->sample(state[position_x_], state[position_y_], parameters);
+}
+
+/// True where it had to move the state.
+bool TruthVehicle::stop(double* state) const noexcept {
+  if (!options_.mechanical_stops) return false;
+  bool stopped = false;
+  for (Eigen::Index j = 0; j < lower_.size(); ++j) {
+    const double inside = std::min(std::max(state[j], lower_[j]), upper_[j]);
+    stopped = stopped || inside != state[j];
+    state[j] = inside;
+  }
+  return stopped;
+}
+
+/// From the state, whose slip and rates are known, to the next one, with its slip and rates. A step that `must_fit` is
+/// not made where its error might be seen: then the answer is false.
+bool TruthVehicle::step(const double* inputs, double duration, bool must_fit) noexcept {
+  constexpr double reach[] = {0.0, 0.5, 0.5, 1.0};
+  constexpr double weight[] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  const Eigen::Index n_x = state_.size(), n_p = parameters_.size();
+  const double* const state = state_.data();
+  double *stage_state = stage_state_.data(), *stage_parameters = stage_parameters_.data(), *rates = stage_rates_.data();
+  double *sum_rates = sum_rates_.data(), *sum_parameters = step_parameters_.data();
+  bool stopped = false;
+  stage_rates_ = rates_;
+  stage_parameters_ = parameters_;
+  for (int stage = 0; stage < 4; ++stage) {
+    if (stage > 0) {
+      for (Eigen::Index j = 0; j < n_x; ++j) stage_state[j] = state[j] + reach[stage] * duration * rates[j];
+      stopped = stop(stage_state) || stopped;
+      look_up(stage_state, stage_parameters);
+      model_->rates(stage_state, inputs, stage_parameters, rates);
+    }
+    for (Eigen::Index j = 0; j < n_x; ++j) sum_rates[j] = (stage > 0 ? sum_rates[j] : 0.0) + weight[stage] * rates[j];
+    for (Eigen::Index j = 0; j < n_p; ++j)
+      sum_parameters[j] = (stage > 0 ? sum_parameters[j] : 0.0) + weight[stage] * duration * stage_parameters[j];
+  }
+  for (Eigen::Index j = 0; j < n_x; ++j) stage_state[j] = state[j] + duration * sum_rates[j];
+  stopped = stop(stage_state) || stopped;
+  look_up(stage_state, stage_parameters);
+  double* const end_rates = end_rates_.data();
+  model_->rates(stage_state, inputs, stage_parameters, end_rates);
+  if (must_fit) {
+    if (stopped) return false;
+    // With the rates at the end in place of those of the last stage the step is one of third order (Hairer, Norsett &
+    // Wanner 1993, II.4): how far the two are apart bounds its error with a wide margin.
+    for (Eigen::Index j = 0; j < n_x; ++j)
+      if (!(std::abs(duration / 6.0 * (rates[j] - end_rates[j])) <= seen * scales_[j])) return false;
+  }
+  state_.swap(stage_state_);
+  parameters_.swap(stage_parameters_);
+  rates_.swap(end_rates_);
+  sum_parameters_ += step_parameters_;
+  return true;
+}
+
+void TruthVehicle::advance(const double* inputs, double duration) noexcept {
+  if (!(duration > 0.0)) return;
+  // A duration that is a whole number of steps but for rounding takes that number.
+  const int steps = std::max(1, static_cast<int>(std::ceil(duration / options_.step - 1e-9)));
+  sum_parameters_.setZero();
+  model_->rates(state_.data(), inputs, parameters_.data(), rates_.data());
+  int most = field_->is_smooth() ? longest : 1;
+  for (int done = 0; done < steps;) {
+    int at_once = std::min(most, steps - done);
+    while (!step(inputs, duration * at_once / steps, at_once > 1)) at_once = most = at_once / 2;
+    done += at_once;
+  }
+  time_ += duration;
+  mean_parameters_ = sum_parameters_ / duration;
+}
+
+namespace {
+
+void check_sigmas(const char* kind, const std::vector<double>& sigmas, const std::vector<Variable>& variables) {
+  if (!sigmas.empty() && sigmas.size() != variables.size()) {
+    throw Error(fmt::format("sensors: {} standard deviation(s) for {} {}(s); give one each, or none at all",
+                            sigmas.size(), variables.size(), kind));
+  }
+  for (std::size_t i = 0; i < sigmas.size(); ++i) {
+    if (!(std::isfinite(sigmas[i]) && sigmas[i] >= 0.0)) {
+      throw Error(fmt::format("sensors: the standard deviation of {} '{}' is {}; expected 0 or more", kind,
+                              variables[i].name, sigmas[i]));
+    }
+  }
+}
+
+}  // namespace
+
+Sensors::Sensors(const Model& model, const SensorNoise& noise, std::uint64_t seed) : model_(&model) {
+  const ModelDescription& description = model.description();
+  const auto fill = [&](std::vector<Channel>& channels, const char* kind, const std::vector<double>& sigmas,
+                        const std::vector<Variable>& variables) {
+    check_sigmas(kind, sigmas, variables);
+    for (std::size_t i = 0; i < variables.size(); ++i) {
+      channels.push_back({sigmas.empty() ? 0.0 : sigmas[i],
+                          RandomStream(seed, fmt::format("noise of {} {}", kind, variables[i].name))});
+    }
+  };
+  fill(outputs_, "output", noise.outputs, description.outputs);
+  fill(inputs_, "input", noise.inputs, description.inputs);
+}
+
+void Sensors::observe(const double* state, double* outputs) noexcept {
+  model_->observe({.count = 1, .states = state, .outputs = outputs});
+  for (Channel& channel : outputs_) *outputs++ += channel.sigma * channel.random.normal();
+}
+
+void Sensors::measure_inputs(const double* inputs, double* measured) noexcept {
+  for (Channel& channel : inputs_) *measured++ = *inputs++ + channel.sigma * channel.random.normal();
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,47 @@
+#include "rhec/sim/world/truth_estimator.hpp"
+
+#include <memory>
+#include <utility>
+
+namespace rhec::sim {
+namespace {
+
+/// Looks at the vehicle itself, and at no measurement. Of what is known there is no covariance.
+class TruthEstimation final : public EstimationMethod {
+ public:
+  TruthEstimation(std::shared_ptr<const Model> model, const TruthVehicle& vehicle)
+      : model_(std::move(model)), vehicle_(vehicle) {}
+  const Model& model() const noexcept override { return *model_; }
+  int substeps() const noexcept override { return 1; }
+  void start(const double*) noexcept override {}
+  void add_node(double, const double*, const double*) noexcept override {}
+  bool amend(int, const double*) noexcept override { return true; }
+  void estimate(Estimate& result, Clock::time_point) noexcept override {
+    result.state = vehicle_.state();
+    result.parameters = vehicle_.parameters();
+    result.covariance.resize(0, 0);
+    result.report = {};
+    result.report.status = Status::solved;
+    result.fallback = false;
+  }
+  void reset() noexcept override {}
+
+ private:
+  std::shared_ptr<const Model> model_;
+  const TruthVehicle& vehicle_;
+};
+
+}  // namespace
+
+EstimatorMakers scenario_estimators(const TruthVehicle* vehicle) {
+  EstimatorMakers makers;
+  makers.add({"truth", "what the simulation knows",
+              [vehicle](const EstimatorParts& parts) -> std::unique_ptr<EstimationMethod> {
+                if (!vehicle)
+                  throw parts.section.error("name: 'truth' is known to a simulation only; choose rhe or ekf");
+                return std::make_unique<TruthEstimation>(parts.context->model, *vehicle);
+              }});
+  return makers;
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,130 @@
+#include "rhec/core/estimation/kalman_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "support/cart.hpp"
+#include "support/linear_case.hpp"
+
+namespace rhec {
+namespace {
+
+using namespace testing;
+
+/// The variances that a linear case's noise has.
+KalmanFilter::Noise variances_of(const Model& model) {
+  const testing::Noise noise = noise_of(model);
+  const double infinity = std::numeric_limits<double>::infinity();
+  KalmanFilter::Noise variances;
+  for (const double sigma : noise.outputs) variances.output_variances.push_back(sigma * sigma);
+  for (const double sigma : noise.inputs) variances.input_variances.push_back(sigma * sigma);
+  variances.parameter_lower.assign(model.parameter_count(), -infinity);
+  variances.parameter_upper.assign(model.parameter_count(), infinity);
+  return variances;
+}
+
+KalmanFilter filter_for(const std::shared_ptr<const Model>& model) {
+  KalmanFilter filter(model, variances_of(*model), 1);
+  filter.mean = initial_mean(*model);
+  filter.covariance = initial_covariance(*model);
+  return filter;
+}
+
+double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
+
+TEST(KalmanFilter, IsTheTextbooksOnALinearModel) {
+  for (const bool ramps : {false, true}) {
+    const auto model = linear_model<Hovercraft>();
+    const auto samples = simulate(*model, 40, false, 3);
+    ReferenceFilter reference(*model, noise_of(*model), {{.variance = 0.02, .ramp = ramps}, {.variance = 0.01}});
+    KalmanFilter filter = filter_for(model);
+    const double zeros[2] = {0.0, 0.0};
+    for (int k = 0; k <= 40; ++k) {
+      if (k > 0) {
+        reference.predict(k - 1, samples[k]);
+        const bool jumps = k > 1;
+        const double ramp[2] = {ramps && jumps ? 0.02 : 0.0, 0.0};
+        if (jumps && !ramps) filter.add_parameter_variance(0, 0.02);
+        if (jumps) filter.add_parameter_variance(1, 0.01);
+        filter.predict(samples[k].inputs.data(), zeros, samples[k].duration, ramp);
+      }
+      reference.update(samples[k]);
+      filter.update(samples[k].outputs.data(), nullptr);
+      EXPECT_LT(largest(filter.mean - reference.mean.cast<double>()), 1e-9) << k;
+      EXPECT_LT(largest(filter.covariance - reference.covariance.cast<double>()), 1e-9) << k;
+      EXPECT_EQ(largest(filter.covariance - filter.covariance.transpose()), 0.0) << k;
+    }
+  }
+}
+
+TEST(KalmanFilter, TakesRobustWeightsAsPartsOfTheInformation) {
+  const auto model = linear_model<Trolley>();
+  const double y[] = {0.7, -0.2}, weights[] = {0.25, 1.0};
+  KalmanFilter weighted = filter_for(model);
+  weighted.update(y, weights);
+  KalmanFilter::Noise noise = variances_of(*model);
+  noise.output_variances[0] *= 4.0;
+  KalmanFilter wide(model, noise, 1);
+  wide.mean = initial_mean(*model);
+  wide.covariance = initial_covariance(*model);
+  wide.update(y, nullptr);
+  EXPECT_LT(largest(weighted.mean - wide.mean), 1e-12);
+  EXPECT_LT(largest(weighted.covariance - wide.covariance), 1e-12);
+}
+
+TEST(KalmanFilter, PassesOverWhatIsNoNumber) {
+  const auto model = linear_model<Trolley>();
+  KalmanFilter filter = filter_for(model);
+  const Eigen::VectorXd mean = filter.mean;
+  const Eigen::MatrixXd covariance = filter.covariance;
+  const double nothing[] = {nan, nan};
+  filter.update(nothing, nullptr);
+  EXPECT_EQ(filter.mean, mean);
+  EXPECT_EQ(filter.covariance, covariance);
+  const double infinite[] = {HUGE_VAL, 1.0};
+  filter.update(infinite, nullptr);
+  EXPECT_TRUE(filter.mean.allFinite() && filter.covariance.allFinite());
+}
+
+TEST(KalmanFilter, GuessesAnInputThatIsMissingAndTrustsItLittle) {
+  const auto model = linear_model<Trolley>();
+  const double missing = nan, measured = 0.5, guess = 0.5;
+  KalmanFilter without = filter_for(model), with = without;
+  without.predict(&missing, &guess, 0.2);
+  with.predict(&measured, &guess, 0.2);
+  EXPECT_LT(largest(without.mean - with.mean), 1e-12);
+  EXPECT_GT(without.covariance(1, 1), with.covariance(1, 1) + 100.0);
+}
+
+TEST(KalmanFilter, RestartsAParameterAsIfNothingWereKnownOfIt) {
+  const auto model = linear_model<Boat>();
+  KalmanFilter filter = filter_for(model);
+  const Eigen::VectorXd mean = filter.mean;
+  const Eigen::MatrixXd covariance = filter.covariance;
+  filter.restart_parameter(0, 9.0);
+  EXPECT_EQ(filter.mean, mean);
+  EXPECT_EQ(filter.covariance(3, 3), 9.0);
+  for (int j = 0; j < 3; ++j) EXPECT_EQ(filter.covariance(3, j), 0.0);
+  EXPECT_EQ(largest(filter.covariance.topLeftCorner(3, 3) - covariance.topLeftCorner(3, 3)), 0.0);
+}
+
+TEST(KalmanFilter, KeepsItsParametersWithinTheirBounds) {
+  KalmanFilter filter(cart(), {{0.01, 0.01}, {0.01}, {0.0, 0.2}, {0.5, 2.0}}, 2);
+  filter.mean = Eigen::Vector4d(0.0, 3.0, 0.3, 1.0);
+  filter.covariance = Eigen::Vector4d(0.1, 0.1, 1.0, 1.0).asDiagonal();
+  // It gains speed against all drag that there can be.
+  for (int k = 1; k <= 10; ++k) {
+    const double u = 0.0, y[] = {0.65 * k, std::pow(3.0 + 0.1 * k, 2)};
+    filter.predict(&u, &u, 0.2);
+    filter.update(y, nullptr);
+    EXPECT_GE(filter.mean[2], 0.0) << k;
+    EXPECT_LE(filter.mean[2], 0.5) << k;
+  }
+  EXPECT_EQ(filter.mean[2], 0.0);
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""The tests have the shape of the sources: mirror.py <source root> | --self-test
+
+The test of <floor>/<room>/<name>.cpp is tests/<floor>/<room>/<name>_test.cpp; a plugin's folder is a room. What outgrows one
+file goes on in <name>_<subject>_test.cpp beside it. Headers without a source may have tests too, and a command of apps/ may
+be tested from outside, by tests/cli/<name>.py. What is tested in another place is listed here with the reason, and nothing
+else is: an entry that is no longer needed is a violation, too.
+"""
+import argparse
+import pathlib
+import sys
+import tempfile
+
+import house
+
+# The floors whose sources and tests must mirror each other.
+FLOORS = ("core", "solvers", "models", "blocking")
+# Folders of tests that are about more than one source: whole suites, and programs in other languages.
+SUITES = {
+    "cli": "the commands of apps/, from outside: apps/check.cpp is tested by tests/cli/check.py",
+    "closed_loop": "estimator and controller together",
+    "house": "the house itself",
+    "performance": "counts of instructions",
+    "reference": "recorded solutions",
+    "report": "the page of reports, in a browser",
+    "reproduction": "scripts/reproduce",
+    "solvers/conformance": "every solver on every problem",
+    "support": "what tests share",
+    "threads": "what is promised to programs with several threads",
+}
+# Sources without a test of their own -> why, and what tests them.
+UNTESTED = {}
+# Tests that mirror no source -> what they are about.
+ALONE = {
+    "tests/blocking/geometric_test.cpp": "plugins/template/geometric.cpp, a blocking from outside",
+    "tests/core/estimation/allocation_test.cpp": "all methods of estimation, which must not allocate",
+    "tests/core/horizon/own_problem_test.cpp": "a kind of problem from outside, examples/problem",
+    "tests/models/derivatives_test.cpp": "every model that is found",
+}
+
+
+def of_suite(test, root):
+    path = test.relative_to(root / "tests")
+    return any(path.is_relative_to(suite) for suite in SUITES)
+
+
+def tests_of(source, root):
+    """Where the test of a source may be; the first one is the usual place."""
+    name = source.relative_to(root)
+    places = [root / "tests" / name.parent / f"{name.stem}_test.cpp"]
+    if name.parts[0] == "apps":
+        places.append(root / "tests" / "cli" / f"{name.stem}.py")
+    return places
+
+
+def mirrored(test, root):
+    """Whether a test names a source, or a header, of the folder that it mirrors."""
+    folder = root / test.relative_to(root / "tests").parent
+    words = test.name.removesuffix("_test.cpp").split("_")
+    names = ["_".join(words[:count]) for count in range(len(words), 0, -1)]
+    for name in names:
+        if (folder / f"{name}.cpp").is_file() or any(folder.rglob(f"{name}.hpp")):
+            return True
+    return False
+
+
+def violations_of(root, floors=FLOORS, untested=None, alone=None):
+    untested, alone = UNTESTED if untested is None else untested, ALONE if alone is None else alone
+    found, looked_at = [], 0
+    for source in house.files(root, floors, {".cpp"}):
+        looked_at += 1
+        name = source.relative_to(root)
+        places = [place.relative_to(root) for place in tests_of(source, root)]
+        there = [place for place in places if (root / place).is_file()]
+        if there and name.as_posix() in untested:
+            found.append(f"{name}: has a test, {there[0]}; take it off the list in mirror.py")
+        elif not there and name.as_posix() not in untested:
+            found.append(f"{name}: has no test; expected {' or '.join(map(str, places))}")
+    for test in house.files(root, [f"tests/{floor}" for floor in floors], {".cpp"}):
+        if not test.name.endswith("_test.cpp") or of_suite(test, root):
+            continue
+        looked_at += 1
+        name = test.relative_to(root).as_posix()
+        if mirrored(test, root):
+            if name in alone:
+                found.append(f"{name}: mirrors a source; take it off the list in mirror.py")
+        elif name not in alone:
+            found.append(f"{name}: mirrors no source of {test.relative_to(root / 'tests').parent}/; move it, or say in mirror.py what "
+                         "it is about")
+    for name in sorted([*untested, *alone]):
+        if not (root / name).is_file():
+            found.append(f"tests/house/mirror.py: lists {name}, which is not there")
+    return found, looked_at
+
+
+def self_test():
+    """Plants sources and tests in a small tree; what is wrong must be told, and nothing else."""
+    right = [
+        "core/low/angle.cpp", "tests/core/low/angle_test.cpp",
+        "core/low/include/rhec/core/low/dual.hpp", "tests/core/low/dual_test.cpp",
+        "tests/core/low/angle_large_numbers_test.cpp",
+        "core/low/long_name.cpp", "tests/core/low/long_name_test.cpp",
+        "core/low/special.cpp",
+        "models/cart/cart.cpp", "tests/models/cart/cart_test.cpp",
+        "tests/models/every_test.cpp", "tests/models/helper.cpp",
+        "sim/src/later.cpp",
+        "apps/check.cpp", "tests/cli/check.py",
+        "solvers/fast/fast.cpp", "tests/solvers/fast/fast_test.cpp", "tests/solvers/conformance/all_test.cpp",
+    ]
+    wrong = [
+        "core/low/untested.cpp",
+        "core/low/moved.cpp", "tests/core/moved_test.cpp",
+        "tests/core/low/gone_test.cpp",
+        "models/cart/other.cpp",
+        "apps/untested.cpp",
+        "core/low/tested_after_all.cpp",
+        "tests/solvers/listed_test.cpp",
+    ]
+    more = ["tests/core/low/tested_after_all_test.cpp"]
+    untested = {"core/low/special.cpp": "planted", "core/low/tested_after_all.cpp": "planted"}
+    alone = {"tests/models/every_test.cpp": "planted", "tests/core/low/never_written_test.cpp": "planted"}
+    failures = []
+    with tempfile.TemporaryDirectory() as directory:
+        root = pathlib.Path(directory)
+        for name in right + wrong + more:
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text("\n")
+        found, _ = violations_of(root, (*FLOORS, "apps"), untested, alone)
+        told = {violation.split(":")[0] for violation in found}
+        failures += [f"not noticed: {name}" for name in wrong if name not in told]
+        failures += [f"wrongly blamed: {name}" for name in right + more if name in told]
+        if not any("never_written_test.cpp" in violation for violation in found):
+            failures.append("not noticed: an entry of the list that names no file")
+    house.tell("mirror self-test", failures, len(right) + len(wrong) + len(more) + 1)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("root", nargs="?", type=pathlib.Path)
+    parser.add_argument("--self-test", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.self_test:
+        self_test()
+    if not arguments.root:
+        parser.error("the source root is missing")
+    house.tell("mirror", *violations_of(arguments.root.resolve()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,230 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+#include "rhec/sim/logs/recorded_log.hpp"
+
+namespace rhec::sim {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+constexpr const char* scenario_text = R"(
+name: circle
+step: 0.2
+model: {name: bicycle_slip, wheelbase: 2.0, gps_offset: 0}
+log: {wheel_offset: 0.5}
+noise:
+  outputs: {x_gps: 0.1, y_gps: 0.1, delta: 0.02}
+  inputs: {u1: 0.1, u2: 0.05}
+bounds: {kappa: [0.3, 1.3], mu: [0.3, 1.3], u2: [null, null]}
+estimator:
+  horizon: 10
+  heading_starts: 12
+  forgetting: {kappa: 0.02, mu: 0.02}
+  initial:
+    parameters: {kappa: 1, mu: 1}
+    sigma: {x_pos: 100, y_pos: 100, beta: 3.14, delta: 0.1, kappa: 0.3, mu: 0.3}
+variants:
+  rhe: {}
+  robust: {estimator: {robust: {outputs: [x_gps, y_gps], delta: 3}}}
+  ekf: {estimator: {name: ekf}}
+)";
+
+LogScenario scenario_of(const std::string& text = scenario_text, const std::vector<std::string>& chosen = {}) {
+  return {Host(), parse_yaml(text, "circle.yaml"), chosen};
+}
+
+/// A drive that stands for 2 s, heading along `heading`, and then goes round a circle, as files.
+class RecordedLogTest : public testing::Test {
+ protected:
+  static constexpr double wheelbase = 2.0, kappa = 0.8, speed = 3.0, steering = 0.2, heading = 2.5;
+
+  void SetUp() override {
+    root_ = fs::path(testing::TempDir()) /
+            ("rhec_log_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(root_);
+    fs::create_directories(root_);
+    double x = 5.0, y = -3.0, angle = heading;
+    const double wheel = 1.0 - std::tan(steering) * 0.5 / wheelbase;
+    for (int i = 0; i <= 1600; ++i) {
+      const double time = 0.025 * i, v = time < 2.0 ? 0.0 : speed;
+      // Two rows with one stamp, as of a clock too coarse.
+      rows_ += fmt::format("{:.3f},{:.9f},{:.9f}\n", 0.05 * (i / 2), v * wheel, steering);
+      if (i % 8 == 0) fixes_ += fmt::format("{:.3f},{:.9f},{:.9f}\n", time, x, y);
+      const double rate = kappa * v / wheelbase * std::tan(steering), middle = angle + 0.5 * 0.025 * rate;
+      x += 0.025 * kappa * v * std::cos(middle);
+      y += 0.025 * kappa * v * std::sin(middle);
+      angle += 0.025 * rate;
+    }
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  fs::path put(const std::string& name, const std::string& content) const {
+    std::ofstream(root_ / name) << content;
+    return root_ / name;
+  }
+  RecordedLog log(const LogScenario& scenario) const { return log(scenario, rows_, fixes_); }
+  RecordedLog log(const LogScenario& scenario, const std::string& rows, const std::string& fixes) const {
+    return read_recorded_log(put("drs.txt", rows), put("gps.txt", fixes), scenario);
+  }
+  std::string message_for(const std::string& rows, const std::string& fixes) const {
+    return message_of([&] { log(scenario_of(), rows, fixes); });
+  }
+
+  fs::path root_;
+  std::string rows_, fixes_;
+};
+
+TEST_F(RecordedLogTest, FindsTheHeadingAndTheSlipAndPredictsWhatIsWithheld) {
+  const LogScenario scenario = scenario_of();
+  const RecordedLog drive = log(scenario);
+  for (const LogVariant& variant : scenario.variants()) {
+    const Replay result = replay(variant.robot, drive, scenario.log(), {5, 4});
+    const HeldOutSummary summary = summarise(result, drive);
+    EXPECT_EQ(summary.all.count, 40) << variant.name;
+    EXPECT_EQ(result.counts.fallbacks, 0) << variant.name;
+    EXPECT_LT(summary.all.median, 0.1) << variant.name;
+    const LoggedEstimate& last = result.estimates.back();
+    EXPECT_NEAR(
+        std::remainder(last.values[2] - (heading + kappa * speed / wheelbase * std::tan(steering) * (last.time - 2.0)),
+                       2.0 * M_PI),
+        0.0, 0.1)
+        << variant.name;
+    EXPECT_NEAR(last.values[4], kappa, 0.05) << variant.name;
+  }
+}
+
+TEST_F(RecordedLogTest, AWithheldFixLeavesNoTrace) {
+  const LogScenario scenario = scenario_of();
+  const HoldOut hold_out{5, 4};
+  const RecordedLog drive = log(scenario);
+  RecordedLog bent = drive;
+  for (std::size_t i = 0; i < bent.fixes.size(); ++i)
+    if (hold_out.holds(i)) bent.fixes[i].x += 100.0;
+  RecordedLog without = drive;
+  without.fixes.clear();
+  for (std::size_t i = 0; i < drive.fixes.size(); ++i)
+    if (!hold_out.holds(i)) without.fixes.push_back(drive.fixes[i]);
+  for (const LogVariant& variant : scenario.variants()) {
+    const auto nodes = [&](const RecordedLog& which, const HoldOut& held) {
+      std::vector<std::vector<double>> rows;
+      for (const LoggedEstimate& entry : replay(variant.robot, which, scenario.log(), held).estimates) {
+        if (entry.held_out) continue;
+        rows.push_back({entry.time});
+        rows.back().insert(rows.back().end(), entry.values.begin(), entry.values.end());
+      }
+      return rows;
+    };
+    const auto expected = nodes(drive, hold_out);
+    EXPECT_EQ(expected, nodes(bent, hold_out)) << variant.name;
+    EXPECT_EQ(expected, nodes(without, {})) << variant.name;
+  }
+}
+
+TEST_F(RecordedLogTest, NodesAreNeverFurtherApartThanTheStep) {
+  const LogScenario scenario = scenario_of(scenario_text, {"ekf"});
+  RecordedLog drive = log(scenario);
+  drive.fixes.erase(drive.fixes.begin() + 80, drive.fixes.begin() + 120);  // 8 s without fixes
+  const Replay result = replay(scenario.variants().front().robot, drive, scenario.log(), {5, 4});
+  double last = result.estimates.front().time;
+  for (const LoggedEstimate& entry : result.estimates) {
+    if (entry.held_out) continue;
+    EXPECT_LE(entry.time - last, 0.2 + 1e-6) << entry.time;
+    last = entry.time;
+  }
+  EXPECT_LT(summarise(result, drive).all.rmse_capped, 0.5);
+}
+
+TEST_F(RecordedLogTest, MasksAndCountsWhatIsMissing) {
+  const LogScenario scenario = scenario_of();
+  const auto replaced = [](std::string text, const std::string& start, int column) {
+    const std::size_t row = text.find("\n" + start) + 1;
+    std::size_t begin = row;
+    for (int i = 0; i < column; ++i) begin = text.find(',', begin) + 1;
+    return text.replace(begin, text.find_first_of(",\n", begin) - begin, "nan");
+  };
+  std::string rows = replaced(replaced(rows_, "10.050,", 1), "20.100,", 2);
+  const RecordedLog drive = log(scenario, rows, replaced(fixes_, "12.000,", 1));
+  EXPECT_EQ(drive.missing_speeds, 1);
+  EXPECT_EQ(drive.missing_steerings, 1);
+  EXPECT_EQ(drive.missing_coordinates, 1);
+  for (const LogVariant& variant : scenario.variants()) {
+    const Replay result = replay(variant.robot, drive, scenario.log(), {5, 4});
+    for (const LoggedEstimate& entry : result.estimates) ASSERT_TRUE(entry.values.allFinite()) << variant.name;
+    EXPECT_LT(summarise(result, drive).all.median, 0.1) << variant.name;
+  }
+}
+
+TEST_F(RecordedLogTest, AWithheldFixWithoutAnEstimateCountsWithTheCap) {
+  const LogScenario scenario = scenario_of(scenario_text, {"ekf"});
+  std::string rows = rows_.substr(rows_.find("\n1.500,") + 1);
+  const RecordedLog drive = log(scenario, rows, fixes_);
+  const Replay result = replay(scenario.variants().front().robot, drive, scenario.log(), {5, 4});
+  EXPECT_EQ(result.unpredicted, 1);
+  EXPECT_EQ(summarise(result, drive).all.count, 40);
+}
+
+TEST_F(RecordedLogTest, TellsFixesThatAgreeWithTheirNeighbours) {
+  const std::string rows = "0,0,0\n1,0,0\n";
+  const RecordedLog drive = log(
+      scenario_of(), rows, "0,0,0\n0.2,0.1,0\n0.4,9,0\n0.6,0.3,0\n0.8,0.4,0\n1.0,0.5,0\n2.5,1,0\n2.7,1,0\n2.9,1,nan\n");
+  std::vector<bool> agrees;
+  for (const Fix& fix : drive.fixes) agrees.push_back(fix.agrees);
+  // The ends have one neighbour; 9 jumps, and so both beside it stand off; 2.5 s is too far from 1.0 s.
+  EXPECT_EQ(agrees, (std::vector<bool>{false, false, false, false, true, false, false, false, false}));
+}
+
+TEST_F(RecordedLogTest, NamesFileLineAndWhatIsWrong) {
+  EXPECT_THAT(message_for("0,1,0\n1,1\n", fixes_), AllOf(HasSubstr("drs.txt:2: "), HasSubstr("3 are expected")));
+  EXPECT_THAT(message_for("0,1,0\n1,fast,0\n", fixes_), AllOf(HasSubstr("drs.txt:2: "), HasSubstr("'fast'")));
+  EXPECT_THAT(message_for("0,1,0\n2,1,0\n1,1,0\n", fixes_), HasSubstr("drs.txt:3: time runs backwards"));
+  EXPECT_THAT(message_for(rows_, "0,1,0\n2,1,0\n1,1,0\n"), HasSubstr("gps.txt:3: time runs backwards"));
+  EXPECT_THAT(message_for(rows_, "nan,1,0\n"), HasSubstr("gps.txt:1: the time is missing"));
+  EXPECT_THAT(message_for(rows_, "0,1,0\n1e9,1,0\n"), HasSubstr("gps.txt:2: time leaps"));
+  EXPECT_THAT(message_for(rows_, "100,1,0\n101,1,0\n"), HasSubstr("expected logs of one drive"));
+  EXPECT_THAT(message_for("0,1,80\n", fixes_), AllOf(HasSubstr("drs.txt:1: "), HasSubstr("expected")));
+  EXPECT_THAT(message_of([&] { read_recorded_log(root_ / "none.txt", root_ / "none.txt", scenario_of()); }),
+              HasSubstr("none.txt: cannot be read"));
+}
+
+TEST(LogScenario, RefusesWhatDoesNotFit) {
+  const auto message = [](const std::string& from, const std::string& to) {
+    std::string text = scenario_text;
+    text.replace(text.find(from), from.size(), to);
+    return message_of([&] { scenario_of(text); });
+  };
+  EXPECT_THAT(message("wheel_offset", "wheel_ofset"), AllOf(HasSubstr("circle.yaml:5"), HasSubstr("wheel_offset")));
+  EXPECT_THAT(message("{wheel_offset: 0.5}", "{steering: gamma}"),
+              AllOf(HasSubstr("circle.yaml:5"), HasSubstr("gamma")));
+  EXPECT_THAT(message("wheelbase: 2.0, ", ""), HasSubstr("needs model.wheelbase"));
+  EXPECT_THAT(message("rhe: {}", "rhe: {estimator: {horizont: 3}}"),
+              AllOf(HasSubstr("horizont"), HasSubstr("horizon")));
+  EXPECT_THAT(message("rhe: {}", "rhe: {log: {}}"), HasSubstr("shared by all variants"));
+  EXPECT_THAT(message_of([] { scenario_of(scenario_text, {"best"}); }),
+              AllOf(HasSubstr("'best'"), HasSubstr("rhe, robust, ekf")));
+}
+
+}  // namespace
+}  // namespace rhec::sim

@@ -1,0 +1,78 @@
+#pragma once
+
+// Every solver on every model, for tests of how solvers behave.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "families.hpp"
+#include "found.hpp"
+#include "judge.hpp"
+
+namespace rhec::conformance {
+
+struct Pair {
+  std::string solver, model;
+};
+
+inline std::ostream& operator<<(std::ostream& out, const Pair& of) { return out << of.solver << " on " << of.model; }
+
+inline std::vector<Pair> all_pairs() {
+  std::vector<Pair> pairs;
+  for (const std::string& solver : host().names(PluginKind::solver)) {
+    for (const std::string& model : host().names(PluginKind::model)) pairs.push_back({solver, model});
+    pairs.push_back({solver, "integrator"});
+  }
+  return pairs;
+}
+
+class Behaviour : public ::testing::TestWithParam<Pair> {
+ protected:
+  std::shared_ptr<Solver> make(const Settings& options = {}) const { return make_solver(GetParam().solver, options); }
+
+  Problem problem(const std::string& name, unsigned seed = 1) const { return family(name).make(model_, seed); }
+
+  Judged solve(Solver& solver, const Problem& of) const {
+    return solve_and_judge(solver, *of.ocp, of.guess, tolerance_);
+  }
+
+  /// The same with a solver that was busy with another problem.
+  Judged set_up_and_solve(Solver& solver, const Problem& of) const {
+    solver.setup(*of.ocp);
+    return solve(solver, of);
+  }
+
+  /// What a new instance makes of a problem.
+  Judged by_new_instance(const Problem& of) const {
+    const auto solver = make();
+    solver->setup(*of.ocp);
+    return solve(*solver, of);
+  }
+
+  void expect_solved(const Judged& judged, const std::string& when) const {
+    EXPECT_EQ(judged.report.status, Status::solved) << when << ": " << name_of(judged.report.status);
+    EXPECT_LE(judged.kkt.largest(), tolerance_) << when;
+    for (const std::string& complaint : judged.complaints) ADD_FAILURE() << when << ": " << complaint;
+  }
+
+  /// Solved as a new instance solves it.
+  void expect_right(Solver& solver, const Problem& of, const std::string& when) const {
+    const Judged judged = set_up_and_solve(solver, of), fresh = by_new_instance(of);
+    expect_solved(judged, when);
+    EXPECT_NEAR(judged.objective, fresh.objective, 1e-7 * (1e-3 + std::abs(fresh.objective))) << when;
+  }
+
+  bool applies(const std::string& name) const {
+    return conformance::applies(family(name), GetParam().model, *model_) && make()->why_not(*problem(name).ocp).empty();
+  }
+
+  std::shared_ptr<const Model> model_ = make_model(GetParam().model);
+  double tolerance_ = tolerance_of(GetParam().solver);
+};
+
+}  // namespace rhec::conformance

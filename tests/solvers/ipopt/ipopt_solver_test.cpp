@@ -1,0 +1,197 @@
+// What the solver ipopt promises beyond the conformance of every solver.
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <thread>
+
+#include "problems.hpp"
+
+namespace rhec::ipopt {
+namespace {
+
+using namespace testing;
+
+TEST(Ipopt, AWarmStartTakesFewerIterationsThanAColdOne) {
+  int warm_iterations = 0, cold_iterations = 0;
+  for (unsigned seed = 20; seed < 30; ++seed) {
+    RandomProblem random(bicycle(), seed);
+    RandomProblem::RhcSpec spec;
+    spec.off = 0.2;
+    const auto problem = random.rhc(spec);
+    const auto warm = ipopt_with("{}"), cold = ipopt_with("{warm_start: false}");
+    warm->setup(*problem);
+    cold->setup(*problem);
+    Iterate solution = RandomProblem::cold_start(*problem);
+    ASSERT_EQ(warm->solve(solution).status, Status::solved);
+    problem->given_state()[0] += 0.02;
+    problem->given_state()[2] -= 0.01;
+    std::vector<double> scratch(problem->scratch_size());
+    problem->finish(scratch);
+    Iterate from_warm = solution, from_cold = solution;
+    const Report a = warm->solve(from_warm), b = cold->solve(from_cold);
+    EXPECT_EQ(a.status, Status::solved);
+    EXPECT_EQ(b.status, Status::solved);
+    warm_iterations += a.iterations;
+    cold_iterations += b.iterations;
+  }
+  EXPECT_LT(warm_iterations, 0.8 * cold_iterations);
+}
+
+TEST(Ipopt, TheUnitsOfTheObjectiveMatterToNothing) {
+  RandomProblem random(bicycle(), 5);
+  const auto rhe = random.rhe(blocks_of(4));
+  RandomProblem::RhcSpec spec;
+  spec.off = 0.3;
+  const auto rhc = random.rhc(spec);
+  for (const HorizonProblem* problem :
+       {static_cast<HorizonProblem*>(rhe.get()), static_cast<HorizonProblem*>(rhc.get())}) {
+    std::vector<double> scratch(problem->scratch_size());
+    const Iterate start = RandomProblem::cold_start(*problem);
+    const auto solver = ipopt_with("{}");
+    solver->setup(*problem);
+    Iterate expected = start;
+    ASSERT_EQ(solver->solve(expected).status, Status::solved);
+    const double optimum = problem->evaluate(expected, nullptr, scratch);
+    for (const double factor : {1e-4, 1e-2, 1e2, 1e4}) {
+      const Scaled scaled(*problem, factor);
+      Iterate point = start;
+      solver->setup(scaled);
+      const Report report = solver->solve(point);
+      EXPECT_EQ(report.status, Status::solved) << factor;
+      EXPECT_LE(report.kkt.defect, 1e-8) << factor;
+      EXPECT_NEAR(problem->evaluate(point, nullptr, scratch), optimum, 1e-7 * optimum) << factor;
+    }
+  }
+}
+
+TEST(Ipopt, TwoThreadsGetTheBitsThatEachGetsAlone) {
+  RandomProblem random(bicycle(), 6);
+  const auto rhe = random.rhe(blocks_of(2));
+  const auto rhc = random.rhc({});
+  const HorizonProblem* problems[] = {rhe.get(), rhc.get()};
+  const auto solve = [](const HorizonProblem& problem) {
+    const auto solver = ipopt_with("{}");
+    solver->setup(problem);
+    Iterate point = RandomProblem::cold_start(problem);
+    EXPECT_EQ(solver->solve(point).status, Status::solved);
+    return point;
+  };
+  const Iterate alone[] = {solve(*rhe), solve(*rhc)};
+  std::atomic<int> wrong{0};
+  const auto work = [&](int which) {
+    const HorizonProblem& problem = *problems[which];
+    for (int repeat = 0; repeat < 10; ++repeat) {
+      const Iterate point = solve(problem);
+      for (int i = 0; i <= problem.intervals(); ++i) {
+        const std::size_t bytes = sizeof(double) * problem.state_count(i);
+        wrong += std::memcmp(point.state(i), alone[which].state(i), bytes) != 0;
+        wrong += std::memcmp(point.costate(i), alone[which].costate(i), bytes) != 0;
+      }
+    }
+  };
+  std::thread one(work, 0), other(work, 1);
+  one.join();
+  other.join();
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(Ipopt, ADeadlineGivesTheBestIterateSoFar) {
+  RandomProblem random(bicycle(), 7);
+  const auto problem = random.rhe(blocks_of(10, 300));
+  const auto solver = ipopt_with("{}");
+  solver->setup(*problem);
+  const Iterate start = RandomProblem::cold_start(*problem);
+  std::vector<double> scratch(problem->scratch_size());
+  StageQp qp(problem->capacity());
+  const double before = kkt_residual(*problem, start, qp, scratch).largest();
+  bool improved = false;
+  for (const int milliseconds : {-1000, 1, 5, 10, 20, 40, 200, 1000}) {
+    Iterate point = start;
+    const Report report = solver->solve(point, Clock::now() + std::chrono::milliseconds(milliseconds));
+    EXPECT_TRUE(report.status == Status::deadline || (report.status == Status::solved && milliseconds > 0));
+    EXPECT_TRUE(point.is_finite());
+    EXPECT_EQ(report.kkt.largest(), kkt_residual(*problem, point, qp, scratch).largest());
+    EXPECT_LE(report.kkt.largest(), before);
+    improved |= report.kkt.largest() < before;
+  }
+  EXPECT_TRUE(improved) << "no deadline left time for an iteration";
+}
+
+TEST(Ipopt, WaitingForAnotherSolveCountsForTheDeadline) {
+  RandomProblem random(bicycle(), 8);
+  const auto longer = random.rhe(blocks_of(10, 300));
+  std::atomic<bool> stop{false}, started{false};
+  std::thread other([&] {
+    const auto solver = ipopt_with("{}");
+    solver->setup(*longer);
+    while (!stop) {
+      started = true;
+      Iterate point = RandomProblem::cold_start(*longer);
+      solver->solve(point);
+    }
+  });
+  const auto solver = ipopt_with("{}");
+  solver->setup(*longer);
+  while (!started) std::this_thread::yield();
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    Iterate point = RandomProblem::cold_start(*longer);
+    EXPECT_EQ(solver->solve(point, Clock::now() + std::chrono::milliseconds(1)).status, Status::deadline);
+    EXPECT_TRUE(point.is_finite());
+  }
+  stop = true;
+  other.join();
+}
+
+TEST(Ipopt, PrintsNothingAndReadsNoFile) {
+  const auto here = std::filesystem::current_path();
+  const auto folder = std::filesystem::temp_directory_path() / ("rhec_ipopt_test_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  std::filesystem::current_path(folder);
+  std::ofstream("ipopt.opt") << "print_level 8\nmax_iter 1\noutput_file told.txt\n";
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  RandomProblem random(bicycle(), 9);
+  const auto possible = random.rhc({});
+  RandomProblem::RhcSpec far;
+  far.off = 3.0;
+  const auto difficult = random.rhc(far);
+  for (const char* options : {"{}", "{hessian: limited_memory}", "{max_iterations: 2}", "{native: {mu_init: 1.0}}"}) {
+    for (const auto* problem : {possible.get(), difficult.get()}) {
+      const auto solver = ipopt_with(options);
+      solver->setup(*problem);
+      Iterate point = RandomProblem::cold_start(*problem);
+      const Report report = solver->solve(point);
+      if (problem == possible.get() && std::string(options) == "{}") {
+        EXPECT_EQ(report.status, Status::solved);
+      }
+    }
+  }
+  EXPECT_NE(error_of("{native: {mu_strategy: never}}"), "");
+  std::fflush(nullptr);
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  int files = 0;
+  for ([[maybe_unused]] const auto& file : std::filesystem::directory_iterator(folder)) ++files;
+  EXPECT_EQ(files, 1) << "besides ipopt.opt";
+  std::filesystem::current_path(here);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Ipopt, AnotherCapacityThanAtSetupIsBadInput) {
+  RandomProblem random(bicycle(), 10);
+  const auto small = random.rhe(blocks_of(3, 5)), large = random.rhe(blocks_of(3, 6));
+  const auto solver = ipopt_with("{}");
+  solver->setup(*small);
+  Iterate point = RandomProblem::cold_start(*large);
+  EXPECT_EQ(solver->solve(point).status, Status::bad_input);
+}
+
+}  // namespace
+}  // namespace rhec::ipopt

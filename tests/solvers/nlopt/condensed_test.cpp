@@ -1,0 +1,104 @@
+#include "solvers/nlopt/condensed.hpp"
+
+#include <gtest/gtest.h>
+
+#include "problems.hpp"
+
+namespace rhec::nlopt {
+namespace {
+
+using namespace testing;
+using Vector = Eigen::VectorXd;
+using Matrix = Eigen::MatrixXd;
+
+void check_derivatives(const Ocp& ocp, const Iterate& start) {
+  CondensedProblem problem(ocp);
+  ASSERT_TRUE(problem.take(ocp));
+  const Vector x = problem.read(start);
+  ASSERT_TRUE(problem.move_to(x));
+  const Vector gradient = problem.gradient();
+  const Matrix jacobian = problem.jacobian();
+  Vector multipliers = Vector::Zero(problem.variables() + problem.rows());
+  for (Eigen::Index k = 0; k < problem.rows(); ++k) multipliers[problem.variables() + k] = 0.1 * std::sin(1.0 + k);
+  problem.set_multipliers(multipliers);
+  const Matrix hessian = problem.hessian(Hessian::exact);
+  const auto lagrangian_gradient = [&] {
+    return Vector(problem.gradient() + problem.jacobian().transpose() * multipliers.tail(problem.rows()));
+  };
+  const double step = 1e-5;
+  for (Eigen::Index k = 0; k < problem.variables(); ++k) {
+    Vector values[2], gradients[2];
+    double objectives[2];
+    for (const int side : {0, 1}) {
+      Vector moved = x;
+      moved[k] += side == 0 ? -step : step;
+      ASSERT_TRUE(problem.move_to(moved));
+      objectives[side] = problem.objective();
+      values[side].resize(problem.rows());
+      for (int row = 0; row < problem.rows(); ++row) values[side][row] = problem.row_value(row);
+      gradients[side] = lagrangian_gradient();
+    }
+    const double scale = 1.0 + gradient.cwiseAbs().maxCoeff();
+    EXPECT_NEAR((objectives[1] - objectives[0]) / (2.0 * step), gradient[k], 1e-6 * scale) << k;
+    const Vector column = (values[1] - values[0]) / (2.0 * step);
+    if (problem.rows() > 0) {
+      EXPECT_LT((column - jacobian.col(k)).cwiseAbs().maxCoeff(), 1e-8) << k;
+    }
+    const Vector curvature = (gradients[1] - gradients[0]) / (2.0 * step);
+    EXPECT_LT((curvature - hessian.col(k)).cwiseAbs().maxCoeff(), 1e-6 * (1.0 + hessian.cwiseAbs().maxCoeff())) << k;
+  }
+}
+
+TEST(CondensedProblem, HasTheDerivativesThatDifferencesSay) {
+  for (const int block : {0, 1, 3}) {
+    RandomProblem random(bicycle(), 30U + static_cast<unsigned>(block));
+    RandomProblem::RheSpec spec;
+    spec.intervals = 7;
+    spec.block = block;
+    const auto rhe = random.rhe(spec);
+    check_derivatives(*rhe, RandomProblem::cold_start(*rhe));
+  }
+  RandomProblem random(bicycle(), 34);
+  RandomProblem::RhcSpec spec;
+  spec.intervals = 8;
+  spec.blocked_inputs = {1};
+  const auto rhc = random.rhc(spec);
+  check_derivatives(*rhc, RandomProblem::cold_start(*rhc));
+}
+
+TEST(CondensedProblem, SharesOneSimulationAndOneLinearisationAtAPoint) {
+  RandomProblem random(bicycle(), 35);
+  const auto ocp = random.rhc({});
+  CondensedProblem problem(*ocp);
+  ASSERT_TRUE(problem.take(*ocp));
+  const Vector x = problem.read(RandomProblem::cold_start(*ocp));
+  problem.move_to(x);
+  problem.gradient();
+  problem.move_to(x);
+  problem.jacobian();
+  problem.gradient();
+  EXPECT_EQ(problem.simulations(), 1);
+  EXPECT_EQ(problem.linearisations(), 1);
+  problem.move_to(x + Vector::Constant(x.size(), 1e-3));
+  problem.gradient();
+  EXPECT_EQ(problem.simulations(), 2);
+  EXPECT_EQ(problem.linearisations(), 2);
+}
+
+TEST(CondensedProblem, LeavesOutWhatItsBoundsFix) {
+  RandomProblem random(bicycle(), 36);
+  const auto ocp = random.rhc({});
+  CondensedProblem problem(*ocp);
+  ASSERT_TRUE(problem.take(*ocp));
+  const int before = problem.variables();
+  ocp->input_lower(3, 0) = ocp->input_upper(3, 0) = 0.7;
+  std::vector<double> scratch(ocp->scratch_size());
+  ocp->finish(scratch);
+  ASSERT_TRUE(problem.take(*ocp));
+  EXPECT_EQ(problem.variables(), before - 1);
+  problem.move_to(problem.read(RandomProblem::cold_start(*ocp)));
+  EXPECT_EQ(problem.point().control(3)[0], 0.7);
+}
+
+}  // namespace
+}  // namespace rhec::nlopt

@@ -1,0 +1,47 @@
+#include "solvers/sparse_sqp/stage_covariances.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "programs.hpp"
+
+namespace rhec::sparse_sqp {
+namespace {
+
+using namespace testing;
+
+TEST(StageCovariances, AreThoseOfTheDenseInverse) {
+  RandomQp random(5);
+  for (int trial = 0; trial < 40; ++trial) {
+    const Program program(random_stages(random));
+    const int stride = program.qp.capacity().states, N = program.qp.intervals();
+    std::vector<double> blocks(static_cast<std::size_t>(N + 1) * stride * stride, -7.0);
+    ASSERT_TRUE(stage_covariances(program.qp, blocks)) << trial;
+    const Eigen::MatrixXd K = dense_kkt(program, Eigen::VectorXd::Zero(program.n), Eigen::VectorXd::Zero(program.m),
+                                        std::vector<std::uint8_t>(program.n, 0)),
+                          inverse = K.fullPivLu().inverse();
+    for (int i = 0; i <= N; ++i) {
+      const int start = program.nlp.state_start(i);
+      for (int c = 0; c < stride; ++c)
+        for (int r = 0; r < stride; ++r) {
+          const double expected = start < 0 ? 0.0 : 2.0 * inverse(start + r, start + c);
+          ASSERT_NEAR(blocks[(i * stride + c) * stride + r], expected, 1e-9 * (1.0 + std::abs(expected)))
+              << trial << ", node " << i;
+        }
+    }
+  }
+}
+
+TEST(StageCovariances, ThereAreNoneWithoutAnInverse) {
+  RandomQp random(5);
+  StageQp qp = random.make(4, 2, 1, false);
+  for (int i = 0; i <= 4; ++i) qp.Q_of(i)(0, 0) -= 10.0;
+  std::vector<double> blocks(20, -7.0);
+  EXPECT_FALSE(stage_covariances(qp, blocks));
+  EXPECT_THAT(blocks, ::testing::Each(-7.0));
+}
+
+}  // namespace
+}  // namespace rhec::sparse_sqp
