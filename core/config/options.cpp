@@ -78,6 +78,13 @@ void check_keys(const Settings& from, const std::vector<std::string>& known, std
   }
 }
 
+void check_old_names(const Settings& from, const std::vector<std::pair<std::string, std::string>>& renamed,
+                     std::string_view owner) {
+  for (const auto& [old_name, new_name] : renamed)
+    if (const Settings* value = from.find(old_name))
+      throw value->error(fmt::format("'{}' of {} is called '{}' now; rename the key", old_name, owner, new_name));
+}
+
 void check_new_name(const std::string& name, const std::vector<std::string>& known) {
   if (std::find(known.begin(), known.end(), name) == known.end()) return;
   throw Error(fmt::format("an option table has the name '{}' twice; give each option a name of its own", name));

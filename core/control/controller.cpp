@@ -164,7 +164,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   std::copy_n(estimate.state.data(), nx, problem_.given_state());
   std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
   set_reference(follower_.arc_length(), estimate.parameters.data());
-  command_.softened = problem_.finish(scratch_) > 0;
+  command_.relaxed = problem_.finish(scratch_) > 0;
   bool from_plan = has_plan_;
   if (!has_plan_) {
     start_cold();

@@ -157,7 +157,7 @@ void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, cons
   }
   for (int j = 0; j < np; ++j) {
     const Border& border = borders[j];
-    filter_.add_parameter_variance(j, walks_[j].forgetting * walks_[j].forgetting);
+    filter_.add_parameter_variance(j, walks_[j].process_noise * walks_[j].process_noise);
     if (!border.reached) continue;
     if (border.neighbour_sigma) {
       filter_.add_parameter_variance(j, *border.neighbour_sigma * *border.neighbour_sigma * border.steps);

@@ -31,7 +31,7 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
   for (const double sigma : context.noise.input_sigmas) setup.noise.input_variances.push_back(sigma * sigma);
   setup.noise.parameter_lower = lower_bounds_of(context.about.parameters);
   setup.noise.parameter_upper = upper_bounds_of(context.about.parameters);
-  for (const ParameterWalk& walk : parts.walks) setup.walk.push_back(walk.forgetting);
+  for (const ParameterWalk& walk : parts.walks) setup.walk.push_back(walk.process_noise);
   setup.initial_mean = parts.initial_mean;
   setup.initial_covariance = parts.initial_covariance;
   setup.substeps = parts.substeps;

@@ -31,10 +31,10 @@ struct ArrivalOptions {
   }
 };
 
-const NumbersByName& forgetting_by_name() {
+const NumbersByName& process_noise_by_name() {
   static const NumbersByName map(
-      "forgetting", {at_least(0.0)},
-      {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.forgetting),
+      "process_noise", {at_least(0.0)},
+      {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.process_noise),
         "standard deviation per square root of a step, added at each slide"}});
   return map;
 }
@@ -121,12 +121,13 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
       .integer("heading_starts", &E::heading_starts,
                "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
       .map("arrival", &E::arrival, ArrivalOptions::table().schema())
-      .map("forgetting", &E::forgetting, forgetting_by_name().rows())
+      .map("process_noise", &E::process_noise, process_noise_by_name().rows())
       .map("restart_sigma", &E::restart_sigma, restart_sigma_by_name().rows())
       .map("block_sigma", &E::block_sigma, block_sigma_by_name().rows())
       .map("initial", &E::initial, InitialOptions::table().schema())
       .map("robust", &E::robust, robust_rows("[]"))
-      .map("solver", &E::solver, {default_solver.row()});
+      .map("solver", &E::solver, {default_solver.row()})
+      .renamed("forgetting", "process_noise");
 }
 
 EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, BlockingSection blocking,
@@ -147,11 +148,11 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
              .make_solver = {}} {
   const ModelDescription& about = parts_.context->about;
   parts_.robust = robust_losses(options_.robust, about, "estimator");
-  const auto forgetting = forgetting_by_name().read(options_.forgetting, about);
+  const auto process_noise = process_noise_by_name().read(options_.process_noise, about);
   const auto restart = restart_sigma_by_name().read(options_.restart_sigma, about);
   const auto alone = block_sigma_by_name().read(options_.block_sigma, about);
   for (std::size_t j = 0; j < about.parameters.size(); ++j)
-    parts_.walks.push_back({forgetting[j], restart[j], alone[j]});
+    parts_.walks.push_back({process_noise[j], restart[j], alone[j]});
 
   const InitialOptions initial = InitialOptions::table().parse(options_.initial, "estimator: initial");
   has_initial_state_ = options_.initial.find("state") != nullptr;

@@ -299,8 +299,8 @@ struct HorizonLog::Parts {
     line.word(name_of(command.report.status));
     line.key("fallback");
     line.flag(command.fallback);
-    line.key("softened");
-    line.flag(command.softened);
+    line.key("relaxed");
+    line.flag(command.relaxed);
     line.close('}');
   }
 };

@@ -172,7 +172,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.controller_status = command.report.status;
     sample.estimator_fallback = estimate.fallback;
     sample.controller_fallback = command.fallback;
-    sample.softened = command.softened;
+    sample.relaxed = command.relaxed;
     sample.estimator_us = estimate.report.preparation_us + estimate.report.feedback_us;
     sample.estimator_feedback_us = estimate.report.feedback_us;
     sample.controller_us = command.report.preparation_us + command.report.feedback_us;

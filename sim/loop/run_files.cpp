@@ -77,7 +77,7 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
   head("", about.inputs);
   text +=
       ",reference_x,reference_y,reference_heading,tracking,nees,estimator_status,controller_status,estimator_fallback,"
-      "controller_fallback,softened\n";
+      "controller_fallback,relaxed\n";
   const std::size_t sigmas = about.states.size() + about.parameters.size();
   for (const Sample& sample : log.samples) {
     fmt::format_to(std::back_inserter(text), "{}", sample.step);
@@ -103,7 +103,7 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
     }
     fmt::format_to(std::back_inserter(text), ",{},{},{:d},{:d},{:d}\n", name_of(sample.estimator_status),
                    name_of(sample.controller_status), sample.estimator_fallback, sample.controller_fallback,
-                   sample.softened);
+                   sample.relaxed);
   }
   return text;
 }

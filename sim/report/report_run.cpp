@@ -316,7 +316,7 @@ class RunReport {
         {"rhe", status_of("estimator_status", counts.value("rhe", Json::object()), "estimator")},
         {"rhc", status_of("controller_status", counts.value("rhc", Json::object()), "controller")}};
     document_["fallbacks"] = {{"rhe", events("estimator_fallback")}, {"rhc", events("controller_fallback")}};
-    document_["softened"] = events("softened");
+    document_["relaxed"] = events("relaxed");
   }
 
   void map() {

@@ -24,7 +24,7 @@ bounds: {kappa: [0.3, 1.3], mu: [0.3, 1.3], u2: [null, null]}
 estimator:
   horizon: 10
   heading_starts: 12
-  forgetting: {kappa: 0.02, mu: 0.02}
+  process_noise: {kappa: 0.02, mu: 0.02}
   initial:
     parameters: {kappa: 1, mu: 1}
     sigma: {x_pos: 100, y_pos: 100, beta: 3.14, delta: 0.1, kappa: 0.3, mu: 0.3}

@@ -179,7 +179,7 @@ struct Change {
   int size = 1;           ///< blocks start at multiples of it; 0: never
   double variance = 0.0;  ///< a step
   bool ramp = false;
-  double forgetting = 0.0;  ///< variance added at every interval but the first, wherever blocks start
+  double process_noise = 0.0;  ///< variance added at every interval but the first, wherever blocks start
 };
 
 /// The textbook's filter on z = [x; p], in long double so that it is the more exact of the two.
@@ -222,7 +222,7 @@ class ReferenceFilter {
     }
     for (int j = 0; j < np; ++j) {
       const Change& change = changes_[j];
-      if (interval > 0) covariance(nx + j, nx + j) += change.forgetting;
+      if (interval > 0) covariance(nx + j, nx + j) += change.process_noise;
       if (change.size == 0 || interval == 0 || interval % change.size != 0) continue;
       const Real variance = Real(change.variance) * change.size;
       if (change.ramp) {
@@ -302,7 +302,7 @@ inline RecedingHorizonEstimation::Setup linear_setup(const Model& model, int hor
   setup.problem.parameter_upper.assign(model.parameter_count(), infinity);
   setup.arrival = arrival;
   setup.blockings = std::move(blockings);
-  setup.walks.assign(model.parameter_count(), {.forgetting = 0.0, .restart_sigma = 1.0});
+  setup.walks.assign(model.parameter_count(), {.process_noise = 0.0, .restart_sigma = 1.0});
   setup.initial_mean = initial_mean(model);
   setup.initial_covariance = initial_covariance(model);
   return setup;

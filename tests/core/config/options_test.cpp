@@ -51,7 +51,8 @@ struct Options {
             .integers("starts", &Options::starts, "of the blocks")
             .names("outputs", &Options::outputs, "measured")
             .subtree("native", &Options::native, "of the backend")
-            .group("search", &Options::search, Search::table());
+            .group("search", &Options::search, Search::table())
+            .renamed("precision", "tolerance");
     return options;
   }
 };
@@ -73,6 +74,11 @@ std::string message(const std::string& key, const std::string& text) {
   Settings root;
   root.set(key, line(3, text));
   return message(root);
+}
+
+TEST(Options, AnOldNameIsRefusedWithTheNewOne) {
+  EXPECT_EQ(message("precision", "1e-3"),
+            "field.yaml:3: precision: 'precision' of solver 'toy' is called 'tolerance' now; rename the key");
 }
 
 TEST(Options, NothingWrittenGivesTheDefaults) {

@@ -367,12 +367,12 @@ TEST_P(PassedDeadline, AtTheFirstSampleLetsTheVehicleGoStraightAhead) {
 TEST(ControllerBounds, OutOfTheEstimatesReachAreMovedAndSaidSo) {
   Drive drive;
   drive.go_well(3, false);
-  EXPECT_FALSE(drive.ask().softened);
+  EXPECT_FALSE(drive.ask().relaxed);
   // The estimate has the wheels steered further than they can be, by what takes two samples at the largest rate.
   drive.now.state[3] = steering_limit * (1.0 + 0.2 * 1.5);
   for (int k = 0; k < 2; ++k) {
     const auto& command = drive.ask();
-    EXPECT_EQ(command.softened, k == 0) << k;
+    EXPECT_EQ(command.relaxed, k == 0) << k;
     EXPECT_FALSE(command.fallback) << k;
     EXPECT_EQ(command.report.status, Status::solved) << k;
     EXPECT_NEAR(command.inputs[1], -steering_limit, 1e-5) << "back as fast as the rate's bound allows";
@@ -380,7 +380,7 @@ TEST(ControllerBounds, OutOfTheEstimatesReachAreMovedAndSaidSo) {
   }
   EXPECT_LT(drive.now.state[3], steering_limit);
   const auto& inside = drive.ask();
-  EXPECT_FALSE(inside.softened);
+  EXPECT_FALSE(inside.relaxed);
   EXPECT_FALSE(inside.fallback);
   EXPECT_EQ(drive.controller->problem().state_upper(1)[3], steering_limit) << "the bound is where it was";
   EXPECT_EQ(drive.controller->fallbacks(), 0);
@@ -394,7 +394,7 @@ TEST(ControllerBounds, HoldForTheInputsOfAPlanThatGoesOn) {
   drive.fail(Fault::infeasible, 2);
   const auto& command = drive.ask();
   EXPECT_TRUE(command.fallback);
-  EXPECT_TRUE(command.softened);
+  EXPECT_TRUE(command.relaxed);
   for (int j = 0; j < 2; ++j) {
     EXPECT_GE(command.inputs[j], drive.controller->problem().input_lower(0, j));
     EXPECT_LE(command.inputs[j], drive.controller->problem().input_upper(0, j));

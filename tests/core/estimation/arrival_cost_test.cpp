@@ -38,8 +38,8 @@ struct OneInterval {
     problem.simulate(solution, scratch);
   }
 
-  ArrivalCost arrival(ArrivalKind kind, double forgetting = 0.0, double restart = 1.0) const {
-    ArrivalCost cost(kind, problem, std::vector<ParameterWalk>(model->parameter_count(), {forgetting, restart}));
+  ArrivalCost arrival(ArrivalKind kind, double process_noise = 0.0, double restart = 1.0) const {
+    ArrivalCost cost(kind, problem, std::vector<ParameterWalk>(model->parameter_count(), {process_noise, restart}));
     cost.reset(initial_mean(*model), initial_covariance(*model));
     return cost;
   }
@@ -121,7 +121,7 @@ TEST(ArrivalCost, FilteringAndSmoothingAgreeInTheEstimatorWithForgetting) {
   for (const ArrivalKind kind : recursive) {
     RecedingHorizonEstimation::Setup setup =
         linear_setup(*model, 8, kind, {blocking("full_horizon"), blocking("structured", "{size: 3, overlap: 4}")});
-    for (ParameterWalk& walk : setup.walks) walk = {.forgetting = 0.1, .restart_sigma = 0.7};
+    for (ParameterWalk& walk : setup.walks) walk = {.process_noise = 0.1, .restart_sigma = 0.7};
     methods.push_back(std::make_unique<RecedingHorizonEstimation>(model, gn_rti(), setup));
   }
   Estimate estimates[2] = {empty_estimate(*model), empty_estimate(*model)};

@@ -53,8 +53,8 @@ class BlockStructure : public ::testing::Test {
   }
 
   std::unique_ptr<RheProblem> problem = cart_estimation(8);
-  std::vector<ParameterWalk> walks = {{.forgetting = 0.0, .restart_sigma = 1.0, .block_sigma = 0.5},
-                                      {.forgetting = 0.0, .restart_sigma = 1.0, .block_sigma = 0.7}};
+  std::vector<ParameterWalk> walks = {{.process_noise = 0.0, .restart_sigma = 1.0, .block_sigma = 0.5},
+                                      {.process_noise = 0.0, .restart_sigma = 1.0, .block_sigma = 0.7}};
   std::vector<std::int64_t> first_starts = {0, 0};
   std::vector<std::uint8_t> begins = std::vector<std::uint8_t>(8);
 };

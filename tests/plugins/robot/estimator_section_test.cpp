@@ -48,7 +48,7 @@ TEST(EstimatorSection, HasTheDocumentedDefaults) {
   EXPECT_EQ(shown("substeps"), std::to_string(parts.substeps));
   EXPECT_EQ(shown("heading_starts"), std::to_string(parts.heading_starts));
   EXPECT_EQ(shown("arrival.name"), "ekf");
-  EXPECT_EQ(shown("forgetting.PARAMETER"), NumberValue{}.print(parts.walks[1].forgetting));
+  EXPECT_EQ(shown("process_noise.PARAMETER"), NumberValue{}.print(parts.walks[1].process_noise));
   EXPECT_EQ(shown("restart_sigma.PARAMETER"), NumberValue{}.print(parts.walks[1].restart_sigma));
   EXPECT_EQ(shown("block_sigma.PARAMETER"), NumberValue{}.print(parts.walks[1].block_sigma));
   EXPECT_EQ(shown("initial.sigma.STATE"), "0.1 x its typical magnitude");
@@ -58,7 +58,7 @@ TEST(EstimatorSection, HasTheDocumentedDefaults) {
 
 TEST(EstimatorSection, ReadsNumbersByName) {
   const EstimatorParts parts = estimator(R"(
-forgetting: {mu: 0.5}
+process_noise: {mu: 0.5}
 restart_sigma: {kappa: 2}
 block_sigma: {kappa: .inf}
 initial: {state: {beta: 1}, parameters: {mu: 0.25}, sigma: {delta: 4, kappa: 8}}
@@ -66,8 +66,8 @@ arrival: {name: smoothing}
 robust: {outputs: [y_gps]}
 horizon: 7)")
                                    .parts();
-  EXPECT_EQ(parts.walks[0].forgetting, ParameterWalk{}.forgetting);
-  EXPECT_EQ(parts.walks[1].forgetting, 0.5);
+  EXPECT_EQ(parts.walks[0].process_noise, ParameterWalk{}.process_noise);
+  EXPECT_EQ(parts.walks[1].process_noise, 0.5);
   EXPECT_EQ(parts.walks[0].restart_sigma, 2.0);
   EXPECT_EQ(parts.walks[1].restart_sigma, ParameterWalk{}.restart_sigma);
   EXPECT_EQ(parts.walks[0].block_sigma, std::numeric_limits<double>::infinity());
@@ -100,7 +100,8 @@ TEST(EstimatorSection, RefusesUnknownNamesWithTheNearest) {
       {"horzion: 3", "horzion: estimator has no option 'horzion'; did you mean 'horizon'?"},
       {"name: ekv", "name: found 'ekv', expected one of rhe, ekf"},
       {"arrival: {name: ekv}", "did you mean 'ekf'?"},
-      {"forgetting: {kapa: 1}", "forgetting.kapa: forgetting has no option 'kapa'; did you mean 'kappa'?"},
+      {"process_noise: {kapa: 1}", "process_noise.kapa: process_noise has no option 'kapa'; did you mean 'kappa'?"},
+      {"forgetting: {kappa: 1}", "'forgetting' of estimator is called 'process_noise' now; rename the key"},
       {"restart_sigma: {kapa: 1}", "did you mean 'kappa'?"},
       {"block_sigma: {kapa: 1}", "did you mean 'kappa'?"},
       {"initial: {stat: {}}", "initial.stat: estimator: initial has no option 'stat'; did you mean 'state'?"},
@@ -119,7 +120,7 @@ TEST(EstimatorSection, RefusesWrongNumbersWhateverTheEstimator) {
       {"horizon: 0", "between 1 and 100000"},
       {"substeps: 0", "between 1 and 1000"},
       {"heading_starts: 65", "between 1 and 64"},
-      {"forgetting: {kappa: -1}", "at least 0"},
+      {"process_noise: {kappa: -1}", "at least 0"},
       {"restart_sigma: {kappa: .inf}", "a finite number"},
       {"block_sigma: {kappa: 0}", "greater than 0"},
       {"initial: {sigma: {beta: 0}}", "greater than 0"},

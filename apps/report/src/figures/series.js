@@ -194,9 +194,9 @@ function atBounds(values, lower, upper) {
 
 const problems = {rhe: "estimator", rhc: "controller"};
 
-/// Which statuses solvers reported, when; fallbacks and softened bounds as marks, all of them.
+/// Which statuses solvers reported, when; fallbacks and relaxed bounds as marks, all of them.
 export function statusFigure(document, source = document, prefix = "") {
-  const statuses = source.statuses || {}, fallbacks = source.fallbacks || {}, softened = source.softened || [];
+  const statuses = source.statuses || {}, fallbacks = source.fallbacks || {}, relaxed = source.relaxed || [];
   const lanes = Object.keys(problems).filter((problem) => statuses[problem]);
   if (lanes.length === 0) return null;
   const names = [];
@@ -207,15 +207,15 @@ export function statusFigure(document, source = document, prefix = "") {
   return {
     name: `${prefix}statuses`, title: "Statuses of the solves, fallbacks",
     caption: `${fallen === 0 ? "No solve fell back" : `${fallen} solves fell back (crosses)`}` +
-             `${softened.length ? `; a bound of a state was softened in ${softened.length} samples (triangles)` : ""}.`,
+             `${relaxed.length ? `; a bound of a state was relaxed in ${relaxed.length} samples (triangles)` : ""}.`,
     about: ["statuses"], time: () => [0, end], frames: 1, height: () => 96 + 44 * lanes.length,
-    option: (look, {width, height, view}) => statusOption(look, width, height, view, {lanes, names, statuses, fallbacks, softened, end}),
+    option: (look, {width, height, view}) => statusOption(look, width, height, view, {lanes, names, statuses, fallbacks, relaxed, end}),
     table: () => ({columns: ["solves of", "status", "how many", "share"],
       rows: lanes.reduce((rows, problem) => rows.concat(Object.keys(statuses[problem].counts).map((name) => {
         const all = Object.keys(statuses[problem].counts).reduce((sum, key) => sum + statuses[problem].counts[key], 0);
         return [problems[problem], name, statuses[problem].counts[name], percent(statuses[problem].counts[name] / all)];
       })).concat([[problems[problem], "fallback", (fallbacks[problem] || []).length, ""]]), [])
-        .concat(source.softened ? [["controller", "bound softened", softened.length, ""]] : [])}),
+        .concat(source.relaxed ? [["controller", "bound relaxed", relaxed.length, ""]] : [])}),
   };
 }
 
@@ -233,7 +233,7 @@ function statusColour(look, names, index) {
   return fine[names[index]] || others[rank % others.length];
 }
 
-function statusOption(look, width, height, view, {lanes, names, statuses, fallbacks, softened, end}) {
+function statusOption(look, width, height, view, {lanes, names, statuses, fallbacks, relaxed, end}) {
   const option = base(look), top = 40;
   const frame = addFrame(option, look, {
     top, height: height - top - BOTTOM, width, left: 84, x: {...timeAxis([0, end], view), splitLine: {show: false}},
@@ -258,8 +258,8 @@ function statusOption(look, width, height, view, {lanes, names, statuses, fallba
   });
   const marks = lanes.reduce((all, problem, lane) => all.concat((fallbacks[problem] || []).map(([, time]) => [time, lane])), []);
   if (marks.length) addDots(option, frame, "fallback", marks, look.alarm, {symbol: "path://M0,2L2,0L5,3L8,0L10,2L7,5L10,8L8,10L5,7L2,10L0,8L3,5Z", symbolSize: 9, symbolOffset: [0, -16], clip: false});
-  if (softened.length) addDots(option, frame, "softened", softened.map(([, time]) => [time, lanes.length - 1]), look.reference, {symbol: "triangle", symbolSize: 7, symbolOffset: [0, 15], clip: false});
-  addLegend(option, look, names.concat(marks.length ? ["fallback"] : [], softened.length ? ["softened"] : []));
+  if (relaxed.length) addDots(option, frame, "relaxed", relaxed.map(([, time]) => [time, lanes.length - 1]), look.reference, {symbol: "triangle", symbolSize: 7, symbolOffset: [0, 15], clip: false});
+  addLegend(option, look, names.concat(marks.length ? ["fallback"] : [], relaxed.length ? ["relaxed"] : []));
   option.tooltip = {show: false};
   return option;
 }

@@ -359,7 +359,7 @@ export function windowWords(document, horizon) {
   } else {
     sentences.push("This estimator has no horizon.");
   }
-  if (rhc) sentences.push(`The control horizon has ${rhc.input[0].length} intervals.${rhc.fallback ? " The solve fell back: the last plan goes on." : ""}${rhc.softened ? " A bound of a state was softened." : ""}`);
+  if (rhc) sentences.push(`The control horizon has ${rhc.input[0].length} intervals.${rhc.fallback ? " The solve fell back: the last plan goes on." : ""}${rhc.relaxed ? " A bound of a state was relaxed." : ""}`);
   return sentences.join(" ");
 }
 

@@ -56,6 +56,9 @@ RHEC_EXPORT Error wrong_option(const Settings& at, const std::string& type, cons
 /// Throws Error unless `from` is a map (or null) whose keys are all in `known` or `skip`.
 RHEC_EXPORT void check_keys(const Settings& from, const std::vector<std::string>& known, std::string_view owner,
                             std::initializer_list<std::string_view> skip = {});
+/// Throws Error if `from` has a key that is called otherwise now. `renamed` has old and new names.
+RHEC_EXPORT void check_old_names(const Settings& from, const std::vector<std::pair<std::string, std::string>>& renamed,
+                                 std::string_view owner);
 /// Throws Error if a table gets the same name twice.
 RHEC_EXPORT void check_new_name(const std::string& name, const std::vector<std::string>& known);
 

@@ -94,6 +94,12 @@ class OptionTable {
                   }});
   }
 
+  /// An option that had another name once. The old name is refused with an error that gives the new one.
+  OptionTable& renamed(std::string old_name, std::string new_name) {
+    renamed_.emplace_back(std::move(old_name), std::move(new_name));
+    return *this;
+  }
+
   /// The options in `from` (a map, or null for all defaults). `context` names their owner, e.g. "blocking
   /// 'structured'"; keys in `skip` (e.g. the "name" that selects the plugin) are ignored. Throws Error with the place,
   /// the key path, what was found and what was expected; for an unknown key it suggests the nearest known one.
@@ -106,6 +112,7 @@ class OptionTable {
   /// The same, starting from the values in `into`.
   void parse_into(T& into, const Settings& from, std::string_view context,
                   std::initializer_list<std::string_view> skip = {}) const {
+    check_old_names(from, renamed_, context);
     check_keys(from, names_, context, skip);
     for (const Entry& option : entries_) {
       if (const Settings* value = from.find(option.name)) option.read(into, *value, context);
@@ -150,6 +157,7 @@ class OptionTable {
   }
 
   std::vector<std::string> names_;
+  std::vector<std::pair<std::string, std::string>> renamed_;  ///< old and new names
   std::vector<Entry> entries_;
 };
 

@@ -22,9 +22,8 @@ enum class ReferenceSpeed {
 ///
 /// At each call the closest point of the path is searched for ahead of the last one. The local reference is that point
 /// and the next N_c, each dt * u1ref metres further on. If the solver fails, and fails again from a simulation, the
-/// plan of the last sample is continued and the failure is counted: its inputs are applied one after the other, and
-/// finally the last of them repeatedly. If there is no plan yet, the vehicle goes straight ahead. Allocates in its
-/// constructor only.
+/// plan of the last sample is continued and the failure is counted: its inputs one after the other, then the last of
+/// them. Without a plan the vehicle goes straight ahead. Allocates in its constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {
@@ -49,7 +48,7 @@ class RHEC_EXPORT Controller {
     PathPoint reference;         ///< the closest point of the path
     Report report;               ///< objective and KKT residual may be missing before `finish`
     bool fallback = false;       ///< the solver failed; the last plan is continued, if there is one
-    bool softened = false;       ///< a state bound was out of reach from the estimate and was relaxed
+    bool relaxed = false;        ///< a state bound was out of reach from the estimate and was relaxed
   };
   /// The input for an estimate. Valid until the next call.
   const Command& control(const Estimate& estimate, Clock::time_point deadline = Clock::time_point::max()) noexcept;

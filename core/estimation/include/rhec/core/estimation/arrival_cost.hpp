@@ -20,8 +20,8 @@ enum class ArrivalKind {
 
 /// How a parameter may change outside the horizon and from block to block.
 struct ParameterWalk {
-  double forgetting = 0.03;    ///< process noise: standard deviation per square root of a step, added at each slide
-  double restart_sigma = 1.0;  ///< standard deviation with which an unlinked block starts
+  double process_noise = 0.03;  ///< standard deviation per square root of a step, added at each slide
+  double restart_sigma = 1.0;   ///< standard deviation with which an unlinked block starts
   /// Standard deviation between an unlinked block inside the horizon and the previous block; infinite: none.
   double block_sigma = 0.25;
 };

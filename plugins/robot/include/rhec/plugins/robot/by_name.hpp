@@ -37,8 +37,8 @@ RHEC_EXPORT DefaultByName<double> constant_default(double number);
 /// A share of the variable's typical magnitude.
 RHEC_EXPORT DefaultByName<double> scaled_default(double share);
 
-/// A map of a configuration from names of a model's variables to values of one kind, e.g. `forgetting: {kappa: 0.03}`:
-/// what may be named, what holds for those that are not, and how both are documented.
+/// A map of a configuration from names of a model's variables to values of one kind, e.g. `process_noise: {kappa:
+/// 0.03}`: what may be named, what holds for those that are not, and how both are documented.
 template <class Value>
 class ByName {
  public:

@@ -23,7 +23,7 @@ struct Sample {
   PathPoint reference;
   double tracking = 0.0;  ///< signed distance of the true position from the path [m]
   Status estimator_status = Status::solved, controller_status = Status::solved;
-  bool estimator_fallback = false, controller_fallback = false, softened = false;
+  bool estimator_fallback = false, controller_fallback = false, relaxed = false;
   double estimator_us = 0.0, controller_us = 0.0;  ///< preparation and feedback of the solvers [us]
   double estimator_feedback_us = 0.0;              ///< of it, what came after the measurement [us]
 };
