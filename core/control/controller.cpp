@@ -144,12 +144,12 @@ void Controller::start_cold() noexcept {
   roll_out(problem_, point_, scratch_);
 }
 
-/// Asks the solver, and takes the command from its answer. False where it has none that may be used.
+/// Calls the solver and takes the command from its plan. False if there is no usable plan.
 bool Controller::find_plan(Clock::time_point deadline) noexcept {
   command_.report = solver_->feedback(point_, deadline);
   if (!is_usable(command_.report.status)) return false;
   problem_.structure().inputs_on(point_, 0, command_.inputs.data());
-  // No solver should answer so; a robot must not be told so.
+  // No solver should return such a command, and none must reach the robot.
   const bool is_number =
       std::all_of(command_.inputs.begin(), command_.inputs.end(), [](double value) { return std::isfinite(value); });
   if (!is_number) command_.report.status = Status::bad_input;
@@ -184,7 +184,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   prepared_ = false;
   has_plan_ = is_found || from_plan;
   if (!is_found) {
-    // The last plan, which the shifter still has, goes on; where there is none, straight ahead along the path.
+    // Continue the last plan, which the shifter still has; without one, go straight ahead along the path.
     if (!from_plan || !shifter_.apply(1, problem_, point_)) start_cold();
     problem_.structure().inputs_on(point_, 0, command_.inputs.data());
   }

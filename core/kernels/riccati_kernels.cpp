@@ -303,7 +303,7 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
   };
   R costate = p;
   costate.add(R::from(at.drift));
-  R gradient;  // with respect to the state (closed loop only) and the controls
+  R gradient;  // with respect to the state (closed-loop in the first case) and the controls
   if (Stage::is_compact && !view.fixes[i]) {
     const R h = R::from(at.h);
     R sums[2] = {h, costate.between(stage.moved, stage.next_states)};

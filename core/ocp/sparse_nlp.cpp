@@ -33,8 +33,7 @@ bool SparseNlp::take_structure(const Ocp& ocp) {
       // Eight bytes with any bits set, to eight bits.
       std::uint64_t eight = 0;
       std::memcpy(&eight, flags + first, std::min(count - first, 8));
-      for (const int half : {4, 2, 1})
-        eight |= eight >> half;  // the lowest bit of each byte is not affected by the byte above
+      for (const int half : {4, 2, 1}) eight |= eight >> half;  // lowest bits get only those of their byte
       eight &= 0x0101'0101'0101'0101U;
       next_signature_.push_back(static_cast<std::int32_t>((eight * 0x0102'0408'1020'4080U) >> 56));
     }

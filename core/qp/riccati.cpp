@@ -294,7 +294,7 @@ void Riccati::feedback(const StageQp& qp, int i, const double* s, double* w) noe
 
 void Riccati::covariances(const StageQp& qp, double* covariance, double* last) noexcept {
   const int N = qp.intervals(), n0 = qp.states(0), width = ns_ + nw_;
-  // Of z = [s; w] at a stage, and of the next state.
+  // Covariance of z = [s; w] at a stage, and of the next state.
   double* now = work_.data();
   double* half = now + static_cast<std::ptrdiff_t>(width) * stride_;
   const Special initial = special(N);

@@ -48,7 +48,7 @@ class OptionTable {
                       std::vector<std::pair<std::string, std::type_identity_t<Enum>>> choices, std::string meaning) {
     return leaf(std::move(name), member, ChoiceValue<Enum>{std::move(choices)}, std::move(meaning));
   }
-  /// `none` or an empty value means 'no number'.
+  /// `none` or an empty value means 'no value'.
   OptionTable& optional_number(std::string name, std::optional<double> T::*member, std::string meaning,
                                Range range = any()) {
     return leaf(std::move(name), member, OptionalValue<NumberValue>{{range}}, std::move(meaning));

@@ -61,7 +61,7 @@ class RHEC_EXPORT Settings {
   const std::string& path() const noexcept { return path_; }  ///< "estimator.noise[2]"; empty at the root
 
   /// Scalar values; empty if the text cannot be read as such. Numbers must be complete, in C notation; infinity is
-  /// written `.inf` or `inf`; NaN is not a number.
+  /// written `.inf` or `inf`; NaN is rejected.
   std::optional<double> number() const noexcept;
   std::optional<int> integer() const noexcept;
   std::optional<bool> flag() const noexcept;  ///< `true` or `false`

@@ -7,8 +7,8 @@
 
 namespace rhec {
 
-/// How the value of a block is related to that of the previous block: options common to all strategies with more than
-/// one block. A strategy's options derive from it and add it to their table:
+/// How the value of a block is related to that of the previous block (docs/method.md, section 4): options common to all
+/// strategies with more than one block. A strategy's options derive from it and add it to their table:
 ///
 ///     struct MyOptions : BlockLink {
 ///       int size = 5;

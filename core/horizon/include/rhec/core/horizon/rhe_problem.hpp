@@ -16,8 +16,8 @@ namespace rhec {
 class OutputCache;
 struct CostView;
 
-/// Pseudo-Huber loss on a group of outputs: with s the weighted squared residual of the group, 2 delta^2 (sqrt(1 + s /
-/// delta^2) - 1) replaces s. It is smooth, so that its exact Hessian exists.
+/// Pseudo-Huber loss on a group of outputs (docs/method.md, section 2): with s the weighted squared residual of the
+/// group, 2 delta^2 (sqrt(1 + s / delta^2) - 1) replaces s. It is smooth, so that its exact Hessian exists.
 struct RobustLoss {
   std::vector<int> outputs;  ///< these share one loss, e.g. the two coordinates of a position fix
   double delta = 3.0;        ///< in standard deviations: transition from quadratic to linear
@@ -26,7 +26,7 @@ struct RobustLoss {
 /// Receding horizon estimation over N intervals (docs/method.md, section 2; Wallace et al., eq. 2):
 ///
 ///     minimise  || [chi_0; rho_first] - [xbar; pbar] ||^2_P            arrival cost
-///             + sum over nodes      || h(chi_i) - y_i ||^2_Ry          what is missing (NaN) is left out
+///             + sum over nodes      || h(chi_i) - y_i ||^2_Ry          missing outputs (NaN) are skipped
 ///             + sum over intervals  || nu_i - u_meas_i ||^2_Ru
 ///             + sum over block starts (rho_b - rho_a)^2 / variance     where neighbouring blocks are linked
 ///     subject to the dynamics, bounds on states at every node, on inputs, and on every parameter block.
@@ -77,8 +77,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   /// until they are overwritten.
   void drop_first_interval() noexcept;
 
-  /// Weights in (0, 1] that the robust losses give to the outputs at an iterate: derivative of the loss with respect to
-  /// s.
+  /// Weights in (0, 1] that the robust losses give to the outputs at an iterate: d loss / d s.
   void robust_weights(const Iterate& iterate, int node, double* weights, std::span<double> scratch) const noexcept;
 
   std::string_view kind() const noexcept override { return "rhe"; }

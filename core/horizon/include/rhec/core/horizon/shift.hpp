@@ -6,7 +6,8 @@
 
 namespace rhec {
 
-/// The initial guess for a horizon: the solution of an earlier one, shifted by the steps between them.
+/// The initial guess for a horizon: the solution of an earlier one, shifted by the steps between them (real-time
+/// iteration, docs/method.md, section 7).
 ///
 /// `take` keeps a solution in terms of the vehicle: states and costates per node; inputs, parameters and their bound
 /// multipliers per interval. The problem may then be filled for the next sample, with other block starts or a longer

@@ -34,8 +34,7 @@ struct RiccatiView {
   std::uint8_t* fixes = nullptr;  ///< per stage: whether any of its controls is fixed
   double* drift = nullptr;        ///< one row per stage: P_{i+1} b_i
   double* g = nullptr;  ///< one row per stage: gradient with respect to z before elimination, if a control is fixed
-  double* p =
-      nullptr;  ///< one row per node: gradient of the value function; in its control columns the controls at s = 0
+  double* p = nullptr;  ///< one row per node: gradient of the value function; beside it, controls at s = 0
 
   double *values = nullptr, *costates = nullptr, *bounds = nullptr;  ///< rows of the step, an Iterate
 };

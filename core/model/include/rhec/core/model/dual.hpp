@@ -13,7 +13,7 @@ inline constexpr int longest_list = 24;
 /// The same limit for the entries of a Hessian: 91 entries, i.e. thirteen directions.
 inline constexpr int longest_triangle = 91;
 
-/// Array length for `size` entries, of which there may be none.
+/// Array length for `size` entries; at least 1, since `size` may be 0.
 constexpr int room_for(int size) { return size > 0 ? size : 1; }
 
 /// Calls function(0), ..., function(count - 1) with compile-time indices. No loop remains, so the compiler keeps what

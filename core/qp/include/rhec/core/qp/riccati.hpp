@@ -47,8 +47,8 @@ class RHEC_EXPORT ActiveSet {
 };
 
 /// Solves a StageQp in which the bounds of an active set hold as equalities and all others are ignored, by a backward
-/// Riccati recursion (docs/method.md, section 7): with the value function V_{i+1}(s) = 1/2 s'Ps + p's subject to C s =
-/// d,
+/// Riccati recursion (docs/method.md, section 7): with the value function
+/// V_{i+1}(s) = 1/2 s'Ps + p's subject to C s = d,
 ///
 ///     G = R + B'PB,  L = S + B'PA,  g = r + B'(Pb + p)
 ///     w = -G^-1 (L s + g),   P_i = Q + A'PA - L'G^-1 L,   p_i = q + A'(Pb + p) - L'G^-1 g
@@ -115,8 +115,8 @@ class RHEC_EXPORT Riccati {
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
 
   /// Marginal covariances of all states from the last factorisation, for an objective that is twice a negative
-  /// log-likelihood, as in RHE (docs/method.md, section 2: no factor 1/2). Node i's n_s x n_s block goes to covariance
-  /// + i * n_s^2, if not null; the last node's to `last`.
+  /// log-likelihood, as in RHE (docs/method.md, section 2: no factor 1/2). The n_s x n_s block of node i goes to
+  /// covariance + i * n_s^2, if not null; the last node's to `last`.
   void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
 
   /// The largest number of controls, and of states, of one stage.

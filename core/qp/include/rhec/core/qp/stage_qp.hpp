@@ -18,8 +18,8 @@ namespace rhec {
 ///
 /// with  AB = [A B],  H = [Q S'; S R],  h = [q; r].
 ///
-/// Sizes are set per stage at run time; storage never moves, except in `drop_first`. All rows have the length `stride`
-/// = capacity().row(). A stage's AB has n_s rows (row r: derivatives of next state r). Its H is symmetric, with as many
+/// Sizes are set per stage at run time; storage never moves, except in `drop_first`. All rows have length `stride`
+/// (capacity().row()). A stage's AB has n_s rows (row r: derivatives of next state r). Its H is symmetric, with as many
 /// rows (or columns) as z has entries and both halves filled. Unused entries of a row are zero and have no bounds.
 class RHEC_EXPORT StageQp {
  public:
