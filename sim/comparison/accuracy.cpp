@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "judge.hpp"
+#include "assessment.hpp"
 #include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
@@ -26,14 +26,14 @@ bool has_option(const Host& host, const std::string& solver, std::string_view na
 /// The 99th percentile of the KKT residual over all problems that are taken.
 double p99_of(const Host& host, const Backend& backend, const Settings& options, const std::vector<Recorded>& records) {
   Bench bench(host, backend, options);
-  Judge judge;
+  Assessor assessor;
   Iterate point;
   std::vector<double> residuals;
   for (const Recorded& record : records) {
     if (!bench.why_not(record).empty()) continue;
     Answer answer = bench.solve(record, point);
-    judge.begin(*record.problem);
-    const double kkt = judge.kkt_of(point, answer);
+    assessor.begin(*record.problem);
+    const double kkt = assessor.kkt_of(point, answer);
     residuals.push_back(std::isfinite(kkt) ? kkt : infinity);
   }
   return residuals.empty() ? 0.0 : spread_of(std::move(residuals)).p99;

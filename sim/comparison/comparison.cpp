@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 
 #include "accuracy.hpp"
+#include "assessment.hpp"
 #include "bench.hpp"
-#include "judge.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/sim/problems/problem_format.hpp"
@@ -111,13 +111,13 @@ SameProblems solve_same_problems(Task& task, std::string_view kind, const std::v
   const std::size_t count = backends.size();
   std::vector<Bench> benches;
   for (std::size_t b = 0; b < count; ++b) benches.emplace_back(task.host, backends[b], options[b]);
-  Judge judge;
+  Assessor assessor;
   std::vector<Iterate> points(count + 1);  // the reference's is the last
   std::vector<Answer> answers(count + 1);
   std::vector<std::uint8_t> has_point(count + 1);
   for (std::size_t p = 0; p < records.size(); ++p) {
     const Recorded& record = records[p];
-    judge.begin(*record.problem);
+    assessor.begin(*record.problem);
     std::fill(has_point.begin(), has_point.end(), 0);
     std::vector<std::uint8_t> taken(count);
     // Who is first changes from problem to problem, so that nobody always comes after the same load.
@@ -128,7 +128,7 @@ SameProblems solve_same_problems(Task& task, std::string_view kind, const std::v
         if (mine.refused++ == 0) mine.refusal = reason;
         continue;
       }
-      judge.warm_up(record.guess);
+      assessor.warm_up(record.guess);
       answers[b] = benches[b].solve(record, points[b]);
       taken[b] = 1;
       has_point[b] = answers[b].usable;
@@ -140,17 +140,17 @@ SameProblems solve_same_problems(Task& task, std::string_view kind, const std::v
     std::size_t most_accurate = count + 1;
     for (std::size_t b = 0; b <= count; ++b) {
       if (b < count && !taken[b]) continue;
-      answers[b].kkt = judge.kkt_of(points[b], answers[b]);
+      answers[b].kkt = assessor.kkt_of(points[b], answers[b]);
       if (has_point[b] && (most_accurate > count || answers[b].kkt < answers[most_accurate].kkt)) most_accurate = b;
     }
     std::size_t best = count + 1;
-    std::vector<Judge::Verdict> verdicts(count + 1);
+    std::vector<Assessor::Verdict> verdicts(count + 1);
     if (most_accurate <= count) {
       const Iterate prices = points[most_accurate];
       for (std::size_t b = 0; b <= count; ++b) {
         if (!has_point[b]) continue;
-        judge.make_judged(points[b]);
-        verdicts[b] = judge.verdict_on(points[b], prices);
+        assessor.make_assessed(points[b]);
+        verdicts[b] = assessor.verdict_on(points[b], prices);
         if (verdicts[b].is_feasible() && (best > count || verdicts[b].charged < verdicts[best].charged)) best = b;
       }
     }
@@ -163,7 +163,7 @@ SameProblems solve_same_problems(Task& task, std::string_view kind, const std::v
         answer.violation = verdicts[b].violation;
         if (best <= count) {
           answer.gap = (verdicts[b].charged - verdicts[best].charged) / std::max(1.0, std::abs(verdicts[best].charged));
-          answer.distance = judge.distance(points[b], points[best]);
+          answer.distance = assessor.distance(points[b], points[best]);
         }
       } else {
         answer.objective = std::numeric_limits<double>::quiet_NaN();

@@ -135,7 +135,7 @@ TEST(Comparison, ADefectCannotFlatter) {
       EXPECT_LE(good.answers[p].gap, 1e-12) << same.problems[p].step;
     }
     EXPECT_GT(with_defect, same.problems.size() / 2);
-    // An estimate's objective as it was returned lies below the optimum; a plan is judged by what its inputs do.
+    // An estimate's objective as it was returned lies below the optimum; a plan is assessed by what its inputs do.
     if (same.kind == "rhe") {
       EXPECT_GT(below, same.problems.size() / 2);
     } else {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "assessment.hpp"
 #include "families.hpp"
 #include "found.hpp"
-#include "judge.hpp"
 
 namespace rhec::conformance {
 
@@ -37,34 +37,34 @@ class Behaviour : public ::testing::TestWithParam<Pair> {
 
   Problem problem(const std::string& name, unsigned seed = 1) const { return family(name).make(model_, seed); }
 
-  Judged solve(Solver& solver, const Problem& of) const {
-    return solve_and_judge(solver, *of.ocp, of.guess, tolerance_);
+  Assessment solve(Solver& solver, const Problem& of) const {
+    return solve_and_assess(solver, *of.ocp, of.guess, tolerance_);
   }
 
   /// The same with a solver that was busy with another problem.
-  Judged set_up_and_solve(Solver& solver, const Problem& of) const {
+  Assessment set_up_and_solve(Solver& solver, const Problem& of) const {
     solver.setup(*of.ocp);
     return solve(solver, of);
   }
 
   /// What a new instance makes of a problem.
-  Judged by_new_instance(const Problem& of) const {
+  Assessment by_new_instance(const Problem& of) const {
     const auto solver = make();
     solver->setup(*of.ocp);
     return solve(*solver, of);
   }
 
-  void expect_solved(const Judged& judged, const std::string& when) const {
-    EXPECT_EQ(judged.report.status, Status::solved) << when << ": " << name_of(judged.report.status);
-    EXPECT_LE(judged.kkt.largest(), tolerance_) << when;
-    for (const std::string& complaint : judged.complaints) ADD_FAILURE() << when << ": " << complaint;
+  void expect_solved(const Assessment& assessed, const std::string& when) const {
+    EXPECT_EQ(assessed.report.status, Status::solved) << when << ": " << name_of(assessed.report.status);
+    EXPECT_LE(assessed.kkt.largest(), tolerance_) << when;
+    for (const std::string& complaint : assessed.complaints) ADD_FAILURE() << when << ": " << complaint;
   }
 
   /// Solved as a new instance solves it.
   void expect_right(Solver& solver, const Problem& of, const std::string& when) const {
-    const Judged judged = set_up_and_solve(solver, of), fresh = by_new_instance(of);
-    expect_solved(judged, when);
-    EXPECT_NEAR(judged.objective, fresh.objective, 1e-7 * (1e-3 + std::abs(fresh.objective))) << when;
+    const Assessment assessed = set_up_and_solve(solver, of), fresh = by_new_instance(of);
+    expect_solved(assessed, when);
+    EXPECT_NEAR(assessed.objective, fresh.objective, 1e-7 * (1e-3 + std::abs(fresh.objective))) << when;
   }
 
   bool applies(const std::string& name) const {

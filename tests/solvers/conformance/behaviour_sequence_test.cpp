@@ -60,14 +60,14 @@ TEST_P(BehaviourInSequence, FollowsAHorizonThatMoves) {
     }
     const auto fresh = make();
     fresh->setup(*window);
-    const Judged expected = solve_and_judge(*fresh, *window, guess, tolerance_);
-    const Judged judged = solve_and_judge(*solver, *window, guess, tolerance_);
+    const Assessment expected = solve_and_assess(*fresh, *window, guess, tolerance_);
+    const Assessment assessed = solve_and_assess(*solver, *window, guess, tolerance_);
     expect_solved(expected, "by a new instance");
-    expect_solved(judged, "by one that has a history");
-    EXPECT_NEAR(judged.objective, expected.objective, 1e-9 * (1e-3 + std::abs(expected.objective)));
-    EXPECT_LT(distance(scaled_primal(*window, judged.point), scaled_primal(*window, expected.point)), 1e-5);
-    shifter.take(*window, judged.point);
-    guess = judged.point;
+    expect_solved(assessed, "by one that has a history");
+    EXPECT_NEAR(assessed.objective, expected.objective, 1e-9 * (1e-3 + std::abs(expected.objective)));
+    EXPECT_LT(distance(scaled_primal(*window, assessed.point), scaled_primal(*window, expected.point)), 1e-5);
+    shifter.take(*window, assessed.point);
+    guess = assessed.point;
   }
 }
 
@@ -90,10 +90,10 @@ TEST_P(BehaviourInSequence, KeepsUpWithBlocksThatMoveFromSampleToSample) {
     }
     rhe.finish();
     of.guess = RandomProblem::cold_start(rhe);
-    const Judged judged = solve(*solver, of), fresh = by_new_instance(of);
-    expect_solved(judged, "with a history");
-    EXPECT_NEAR(judged.objective, fresh.objective, 1e-8 * (1e-3 + std::abs(fresh.objective)));
-    EXPECT_LT(distance(scaled_primal(rhe, judged.point), scaled_primal(rhe, fresh.point)), 1e-5);
+    const Assessment assessed = solve(*solver, of), fresh = by_new_instance(of);
+    expect_solved(assessed, "with a history");
+    EXPECT_NEAR(assessed.objective, fresh.objective, 1e-8 * (1e-3 + std::abs(fresh.objective)));
+    EXPECT_LT(distance(scaled_primal(rhe, assessed.point), scaled_primal(rhe, fresh.point)), 1e-5);
   }
 }
 

@@ -129,9 +129,9 @@ TEST_P(Behaviour, IsRightAfterAnInfeasibleProblem) {
   const Problem impossible = problem("rhc_infeasible"), possible = problem("rhc_inputs_at_bounds");
   const auto solver = make();
   for (int repeat = 0; repeat < 2; ++repeat) {
-    const Judged judged = set_up_and_solve(*solver, impossible);
-    EXPECT_EQ(judged.report.status, Status::infeasible) << name_of(judged.report.status);
-    EXPECT_TRUE(same_bits(*impossible.ocp, judged.point, impossible.guess));
+    const Assessment assessed = set_up_and_solve(*solver, impossible);
+    EXPECT_EQ(assessed.report.status, Status::infeasible) << name_of(assessed.report.status);
+    EXPECT_TRUE(same_bits(*impossible.ocp, assessed.point, impossible.guess));
     expect_right(*solver, possible, "after an infeasible problem");
   }
 }
@@ -147,13 +147,13 @@ TEST_P(SolverAlone, SaysInfeasibleOfAVehicleThatCannotStayWhereItMust) {
   const double tolerance = tolerance_of(GetParam());
   const auto solver = make_solver(GetParam());
   solver->setup(*impossible.ocp);
-  const Judged refused = solve_and_judge(*solver, *impossible.ocp, impossible.guess, tolerance);
+  const Assessment refused = solve_and_assess(*solver, *impossible.ocp, impossible.guess, tolerance);
   EXPECT_EQ(refused.report.status, Status::infeasible) << name_of(refused.report.status);
   EXPECT_TRUE(same_bits(*impossible.ocp, refused.point, impossible.guess));
   solver->setup(*possible.ocp);
-  const Judged judged = solve_and_judge(*solver, *possible.ocp, possible.guess, tolerance);
-  EXPECT_EQ(judged.report.status, Status::solved) << name_of(judged.report.status);
-  for (const std::string& complaint : judged.complaints) ADD_FAILURE() << complaint;
+  const Assessment assessed = solve_and_assess(*solver, *possible.ocp, possible.guess, tolerance);
+  EXPECT_EQ(assessed.report.status, Status::solved) << name_of(assessed.report.status);
+  for (const std::string& complaint : assessed.complaints) ADD_FAILURE() << complaint;
 }
 
 // --- instances ------------------------------------------------------------------------------------------------------
@@ -272,11 +272,11 @@ TEST_P(Behaviour, StopsAtADeadlineThatHasPassed) {
     const auto solver = make();
     solver->setup(*of.ocp);
     const auto start = Clock::now();
-    const Judged judged =
-        solve_and_judge(*solver, *of.ocp, of.guess, tolerance_, Clock::now() - std::chrono::seconds(1));
+    const Assessment assessed =
+        solve_and_assess(*solver, *of.ocp, of.guess, tolerance_, Clock::now() - std::chrono::seconds(1));
     EXPECT_LT(Clock::now() - start, promptly) << name;
-    EXPECT_EQ(judged.report.status, Status::deadline) << name << ": " << name_of(judged.report.status);
-    for (const std::string& complaint : judged.complaints) ADD_FAILURE() << name << ": " << complaint;
+    EXPECT_EQ(assessed.report.status, Status::deadline) << name << ": " << name_of(assessed.report.status);
+    for (const std::string& complaint : assessed.complaints) ADD_FAILURE() << name << ": " << complaint;
     expect_right(*solver, of, "after a deadline");
   }
 }
@@ -292,14 +292,14 @@ TEST_P(Behaviour, ReturnsTheBestPointAtADeadlineAhead) {
       const std::string when = fmt::format("{}, {} us", name, microseconds);
       const auto start = Clock::now();
       solver->reset();
-      Judged judged = solve_and_judge(*solver, *of.ocp, of.guess, tolerance_,
-                                      Clock::now() + std::chrono::microseconds(microseconds));
+      Assessment assessed = solve_and_assess(*solver, *of.ocp, of.guess, tolerance_,
+                                             Clock::now() + std::chrono::microseconds(microseconds));
       EXPECT_LT(Clock::now() - start, promptly) << when;
-      const Status status = judged.report.status;
+      const Status status = assessed.report.status;
       EXPECT_TRUE(status == Status::deadline || status == Status::solved) << when << ": " << name_of(status);
       // Methods differ in what they trade on the way; none may return a point that has run away.
-      EXPECT_LE(judged.kkt.largest(), 10.0 * (1.0 + before)) << when;
-      for (const std::string& complaint : judged.complaints) ADD_FAILURE() << when << ": " << complaint;
+      EXPECT_LE(assessed.kkt.largest(), 10.0 * (1.0 + before)) << when;
+      for (const std::string& complaint : assessed.complaints) ADD_FAILURE() << when << ": " << complaint;
     }
   }
 }
@@ -311,10 +311,10 @@ TEST_P(Behaviour, RecognisesItsOwnSolution) {
                            "rhc_inputs_at_bounds", "rhc_states_at_bounds", "rhc_blocked_input"}) {
     if (!applies(name)) continue;
     Problem of = problem(name);
-    const Judged cold = by_new_instance(of);
+    const Assessment cold = by_new_instance(of);
     expect_solved(cold, name);
     of.guess = cold.point;
-    const Judged warm = by_new_instance(of);
+    const Assessment warm = by_new_instance(of);
     expect_solved(warm, std::string(name) + " from its solution");
     EXPECT_LE(warm.report.iterations, 2) << name;
     EXPECT_NEAR(warm.objective, cold.objective, 1e-9 * (1e-3 + std::abs(cold.objective))) << name;
@@ -335,10 +335,10 @@ TEST_P(Behaviour, MeansTheCoresResidualByItsTolerance) {
       options.set("tolerance", Settings::scalar(fmt::format("{}", tolerance)));
       const auto solver = make(options);
       solver->setup(*of.ocp);
-      const Judged judged = solve_and_judge(*solver, *of.ocp, of.guess, tolerance);
-      EXPECT_EQ(judged.report.status, Status::solved) << when << ": " << name_of(judged.report.status);
-      EXPECT_LE(judged.kkt.largest(), tolerance) << when;
-      for (const std::string& complaint : judged.complaints) ADD_FAILURE() << when << ": " << complaint;
+      const Assessment assessed = solve_and_assess(*solver, *of.ocp, of.guess, tolerance);
+      EXPECT_EQ(assessed.report.status, Status::solved) << when << ": " << name_of(assessed.report.status);
+      EXPECT_LE(assessed.kkt.largest(), tolerance) << when;
+      for (const std::string& complaint : assessed.complaints) ADD_FAILURE() << when << ": " << complaint;
     }
   }
 }
@@ -351,13 +351,14 @@ TEST_P(Behaviour, SaysWhenItStoppedAtItsLimitOfIterations) {
     options.set("max_iterations", Settings::scalar("1"));
     const auto solver = make(options);
     solver->setup(*of.ocp);
-    const Judged judged = solve_and_judge(*solver, *of.ocp, of.guess, tolerance_);
+    const Assessment assessed = solve_and_assess(*solver, *of.ocp, of.guess, tolerance_);
     // A problem that is linear may be solved by one step.
     const bool linear = GetParam().model == "integrator";
-    EXPECT_TRUE(judged.report.status == Status::iteration_limit || (linear && judged.report.status == Status::solved))
-        << name << ": " << name_of(judged.report.status);
-    EXPECT_LE(judged.report.iterations, 1) << name;
-    for (const std::string& complaint : judged.complaints) ADD_FAILURE() << name << ": " << complaint;
+    EXPECT_TRUE(assessed.report.status == Status::iteration_limit ||
+                (linear && assessed.report.status == Status::solved))
+        << name << ": " << name_of(assessed.report.status);
+    EXPECT_LE(assessed.report.iterations, 1) << name;
+    for (const std::string& complaint : assessed.complaints) ADD_FAILURE() << name << ": " << complaint;
   }
 }
 

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <ostream>
 
+#include "assessment.hpp"
 #include "families.hpp"
 #include "found.hpp"
-#include "judge.hpp"
 #include "refusals.hpp"
 #include "verdicts.hpp"
 
@@ -80,26 +80,26 @@ TEST_P(EverySolver, IsRight) {
       continue;
     }
     solver->setup(*problem.ocp);
-    const Judged judged = solve_and_judge(*solver, *problem.ocp, problem.guess, tolerance);
-    verdict.status = name_of(judged.report.status);
-    verdict.iterations = judged.report.iterations;
-    verdict.residual = judged.kkt.largest();
-    verdict.objective = judged.objective;
-    verdict.corrected = judged.corrected_objective;
-    verdict.milliseconds = judged.milliseconds;
+    const Assessment assessed = solve_and_assess(*solver, *problem.ocp, problem.guess, tolerance);
+    verdict.status = name_of(assessed.report.status);
+    verdict.iterations = assessed.report.iterations;
+    verdict.residual = assessed.kkt.largest();
+    verdict.objective = assessed.objective;
+    verdict.corrected = assessed.corrected_objective;
+    verdict.milliseconds = assessed.milliseconds;
     const Status expected = from.answer == Family::Answer::solved ? Status::solved : Status::infeasible;
-    if (judged.report.status != expected) {
+    if (assessed.report.status != expected) {
       verdict.reason = fmt::format(
           "it says {} (residual: stationarity {:.0e}, defect {:.0e}, bounds {:.0e}, "
           "complementarity {:.0e}) after {} iterations",
-          verdict.status, judged.kkt.stationarity, judged.kkt.defect, judged.kkt.bound_violation,
-          judged.kkt.complementarity, verdict.iterations);
+          verdict.status, assessed.kkt.stationarity, assessed.kkt.defect, assessed.kkt.bound_violation,
+          assessed.kkt.complementarity, verdict.iterations);
     }
-    for (const std::string& complaint : judged.complaints)
+    for (const std::string& complaint : assessed.complaints)
       verdict.reason += (verdict.reason.empty() ? "" : ", ") + complaint;
     verdict.outcome = !verdict.reason.empty() ? "failed" : expected == Status::solved ? "solved" : "infeasible";
     EXPECT_EQ(verdict.reason, "");
-    verdict.solution = scaled_primal(*problem.ocp, judged.point);
+    verdict.solution = scaled_primal(*problem.ocp, assessed.point);
     verdicts.push_back(std::move(verdict));
   }
   keep_verdicts(verdicts);

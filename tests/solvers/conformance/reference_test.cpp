@@ -11,8 +11,8 @@
 #include <ostream>
 #include <sstream>
 
+#include "assessment.hpp"
 #include "found.hpp"
-#include "judge.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/problems/problem_file.hpp"
 #include "verdicts.hpp"
@@ -85,23 +85,23 @@ TEST_P(Reference, IsMetOrBettered) {
       continue;
     }
     solver->setup(*problem);
-    const Judged judged = solve_and_judge(*solver, *problem, guess, tolerance);
-    verdict.status = name_of(judged.report.status);
-    verdict.iterations = judged.report.iterations;
-    verdict.residual = judged.kkt.largest();
-    verdict.objective = judged.objective;
-    verdict.corrected = judged.corrected_objective;
-    verdict.milliseconds = judged.milliseconds;
-    if (judged.report.status != Status::solved) verdict.reason = "it says " + verdict.status;
-    for (const std::string& complaint : judged.complaints)
+    const Assessment assessed = solve_and_assess(*solver, *problem, guess, tolerance);
+    verdict.status = name_of(assessed.report.status);
+    verdict.iterations = assessed.report.iterations;
+    verdict.residual = assessed.kkt.largest();
+    verdict.objective = assessed.objective;
+    verdict.corrected = assessed.corrected_objective;
+    verdict.milliseconds = assessed.milliseconds;
+    if (assessed.report.status != Status::solved) verdict.reason = "it says " + verdict.status;
+    for (const std::string& complaint : assessed.complaints)
       verdict.reason += (verdict.reason.empty() ? "" : ", ") + complaint;
-    const double gap = (judged.objective - verdict.reference) / std::abs(verdict.reference);
+    const double gap = (assessed.objective - verdict.reference) / std::abs(verdict.reference);
     if (!verdict.several_optima && gap > objective_tolerance)
       verdict.reason +=
           fmt::format("{}its objective is {:.1e} above the reference", verdict.reason.empty() ? "" : ", ", gap);
     verdict.outcome = verdict.reason.empty() ? "solved" : "failed";
     EXPECT_EQ(verdict.reason, "");
-    verdict.solution = scaled_primal(*problem, judged.point);
+    verdict.solution = scaled_primal(*problem, assessed.point);
     verdicts.push_back(std::move(verdict));
   }
   keep_verdicts(verdicts);

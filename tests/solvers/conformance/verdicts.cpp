@@ -15,7 +15,7 @@
 #include <tuple>
 #include <utility>
 
-#include "judge.hpp"
+#include "assessment.hpp"
 
 namespace rhec::conformance {
 namespace {

@@ -20,7 +20,7 @@ struct Verdict {
   int iterations = 0;
   double residual = std::numeric_limits<double>::quiet_NaN();  ///< KKT, by the core
   double objective = std::numeric_limits<double>::quiet_NaN();
-  double corrected = std::numeric_limits<double>::quiet_NaN();  ///< Judged::corrected_objective
+  double corrected = std::numeric_limits<double>::quiet_NaN();  ///< Assessment::corrected_objective
   double milliseconds = 0.0;
   double reference = std::numeric_limits<double>::quiet_NaN();  ///< objective that another program found
   std::vector<double> solution;                                 ///< scaled_primal

@@ -40,8 +40,8 @@ std::shared_ptr<Solver> plugin(const std::string& options = "{}") {
   return host().make_solver("sparse_sqp", parse_yaml(options, "test"));
 }
 
-/// Solves with a solver that is set up for the problem, and holds the report against the core's own judgement.
-Report solve_and_judge(Solver& solver, const HorizonProblem& problem, Iterate& point, double tolerance = 1e-8) {
+/// Solves with a solver that is set up for the problem, and holds the report against the core's own assessment.
+Report solve_and_assess(Solver& solver, const HorizonProblem& problem, Iterate& point, double tolerance = 1e-8) {
   const Report report = solver.solve(point);
   StageQp qp(problem.capacity());
   std::vector<double> scratch(problem.scratch_size());
@@ -94,7 +94,7 @@ TEST(SparseSqp, CovariancesAreThoseOfTheRecursion) {
     const auto solver = plugin();
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    ASSERT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved) << seed;
+    ASSERT_EQ(solve_and_assess(*solver, *problem, point).status, Status::solved) << seed;
     const double now = covariance_deviation(*solver, *problem, point);
     EXPECT_LT(now, 1e-6) << "seed " << seed;
     worst = std::max(worst, now);
@@ -108,7 +108,7 @@ TEST(SparseSqp, CovariancesOfAGivenStateAreZero) {
   const auto solver = plugin();
   solver->setup(*problem);
   Iterate point = RandomProblem::cold_start(*problem);
-  ASSERT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved);
+  ASSERT_EQ(solve_and_assess(*solver, *problem, point).status, Status::solved);
   const int ns = problem->capacity().states;
   std::vector<double> blocks(static_cast<std::size_t>(problem->intervals() + 1) * ns * ns, -1.0);
   ASSERT_TRUE(solver->covariances(point, all_stages(*problem), blocks));
@@ -225,7 +225,7 @@ TEST(SparseSqp, TakesAModelWiderThanTheDenseSolver) {
       ASSERT_EQ(solver->why_not(*problem), "");
       solver->setup(*problem);
       Iterate point = RandomProblem::cold_start(*problem);
-      EXPECT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved);
+      EXPECT_EQ(solve_and_assess(*solver, *problem, point).status, Status::solved);
     }
   }
 }
@@ -272,7 +272,7 @@ TEST(SparseSqp, SolvesTenThousandIntervals) {
   LongCase now = long_case(10000);
   const auto solver = plugin();
   solver->setup(*now.problem);
-  const Report report = solve_and_judge(*solver, *now.problem, now.guess);
+  const Report report = solve_and_assess(*solver, *now.problem, now.guess);
   EXPECT_EQ(report.status, Status::solved) << name_of(report.status) << ' ' << report.kkt.largest();
   EXPECT_LT(covariance_deviation(*solver, *now.problem, now.guess), 1e-6);
 }
@@ -295,7 +295,7 @@ TEST(SparseSqp, EveryHessianLeadsToTheSameOptimum) {
       const auto solver = plugin("{hessian: " + name + "}");
       solver->setup(*problem);
       Iterate point = RandomProblem::cold_start(*problem);
-      const Report report = solve_and_judge(*solver, *problem, point);
+      const Report report = solve_and_assess(*solver, *problem, point);
       EXPECT_EQ(report.status, Status::solved) << name;
       objectives.push_back(report.objective);
     }
@@ -313,7 +313,7 @@ TEST(SparseSqp, RefusesAHessianThatTheModelHasNot) {
   const auto solver = plugin();
   solver->setup(*rhe);
   Iterate point = RandomProblem::cold_start(*rhe);
-  EXPECT_EQ(solve_and_judge(*solver, *rhe, point).status, Status::solved);
+  EXPECT_EQ(solve_and_assess(*solver, *rhe, point).status, Status::solved);
 }
 
 std::vector<double> numbers_of(const HorizonProblem& problem, const Iterate& point) {
@@ -346,7 +346,7 @@ TEST(SparseSqp, IsRightAgainAfterFailures) {
   solver->setup(*good);
   const Iterate start = RandomProblem::cold_start(*good);
   Iterate first = start;
-  ASSERT_EQ(solve_and_judge(*solver, *good, first).status, Status::solved);
+  ASSERT_EQ(solve_and_assess(*solver, *good, first).status, Status::solved);
   const std::vector<double> expected = numbers_of(*good, first);
 
   const auto bad = random.rhe(spec);
@@ -357,7 +357,7 @@ TEST(SparseSqp, IsRightAgainAfterFailures) {
   EXPECT_EQ(numbers_of(*bad, point), numbers_of(*bad, bad_start)) << "the point was not left as it was";
   point = start;
   solver->setup(*good);
-  EXPECT_EQ(solve_and_judge(*solver, *good, point).status, Status::solved);
+  EXPECT_EQ(solve_and_assess(*solver, *good, point).status, Status::solved);
   EXPECT_EQ(numbers_of(*good, point), expected);
 
   point = start;
@@ -398,7 +398,7 @@ TEST(SparseSqp, TakesHorizonsOfNoneAndOfOneInterval) {
       const auto solver = plugin();
       solver->setup(*problem);
       Iterate point = RandomProblem::cold_start(*problem);
-      EXPECT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved) << intervals << ' ' << seed;
+      EXPECT_EQ(solve_and_assess(*solver, *problem, point).status, Status::solved) << intervals << ' ' << seed;
       EXPECT_LT(covariance_deviation(*solver, *problem, point), 1e-8) << intervals << ' ' << seed;
     }
   }
@@ -416,17 +416,17 @@ TEST(SparseSqp, StructuresThatChangeFromSolveToSolve) {
     const auto problem = random.rhe(spec);
     solver->setup(*problem);
     Iterate point = RandomProblem::cold_start(*problem);
-    EXPECT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved) << k;
+    EXPECT_EQ(solve_and_assess(*solver, *problem, point).status, Status::solved) << k;
     // Blocks that end, and then all as before.
     const RheProblem before = *problem;
     std::vector<std::uint8_t> begins(problem->intervals(), 0);
     for (int j = 0; j < 2; ++j) problem->set_blocks(j, begins.data(), Transition::step);
     problem->finish();
     point = RandomProblem::cold_start(*problem);
-    EXPECT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved) << k;
+    EXPECT_EQ(solve_and_assess(*solver, *problem, point).status, Status::solved) << k;
     problem->take_data(before);
     point = RandomProblem::cold_start(*problem);
-    EXPECT_EQ(solve_and_judge(*solver, *problem, point).status, Status::solved) << k;
+    EXPECT_EQ(solve_and_assess(*solver, *problem, point).status, Status::solved) << k;
   }
 }
 

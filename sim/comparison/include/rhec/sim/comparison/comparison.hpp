@@ -33,19 +33,19 @@ struct ComparisonOptions {
   std::function<void(double share)> progress;
 };
 
-/// What a backend made of one problem, as the core judges it. An estimate is judged as it was returned; a plan after
-/// its states have been simulated with its inputs, so that no defect flatters it.
+/// What a backend made of one problem, as the core assesses it. An estimate is assessed as it was returned; a plan
+/// after its states have been simulated with its inputs, so that no defect flatters it.
 struct Answer {
   Status status = Status::bad_input;
   bool usable = false;  ///< by its status, and all numbers are finite
   int iterations = 0;
   double kkt = 0.0;        ///< the largest part of the KKT residual of the point as it was returned
   double defect = 0.0;     ///< max |F_i(s_i, w_i) - s_{i+1}| of the point as it was returned
-  double violation = 0.0;  ///< max of what bounds are violated by, of the judged point
-  double objective = 0.0;  ///< of the judged point
-  /// Objective of the judged point, its defects and violations charged at the multipliers of the answer with the least
-  /// KKT residual, less that of the best answer, relative to max(1, |the best|). The best is the least such sum of a
-  /// point with defects and violations of at most 1e-6, of all backends and the reference. NaN where none is.
+  double violation = 0.0;  ///< max of what bounds are violated by, of the assessed point
+  double objective = 0.0;  ///< of the assessed point
+  /// Objective of the assessed point, its defects and violations charged at the multipliers of the answer with the
+  /// least KKT residual, less that of the best answer, relative to max(1, |the best|). The best is the least such sum
+  /// of a point with defects and violations of at most 1e-6, of all backends and the reference. NaN where none is.
   double gap = std::numeric_limits<double>::quiet_NaN();
   /// Of states, inputs and parameters, the largest difference from the best answer in units of the model's scales.
   double distance = std::numeric_limits<double>::quiet_NaN();

@@ -1,4 +1,4 @@
-#include "judge.hpp"
+#include "assessment.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,28 +17,28 @@ double violation_of(double value, double lower, double upper) { return std::max(
 
 }  // namespace
 
-void Judge::begin(const HorizonProblem& problem) {
+void Assessor::begin(const HorizonProblem& problem) {
   problem_ = &problem;
   if (qp_.capacity() != problem.capacity()) qp_ = StageQp(problem.capacity());
   scratch_.resize(problem.scratch_size());
   defects_.resize(static_cast<std::size_t>(problem.capacity().intervals) * problem.capacity().states);
 }
 
-double Judge::kkt_of(const Iterate& point, Answer& answer) {
+double Assessor::kkt_of(const Iterate& point, Answer& answer) {
   const KktResidual kkt = kkt_residual(*problem_, point, qp_, scratch_);
   answer.defect = kkt.defect;
   return kkt.largest();
 }
 
-void Judge::make_judged(Iterate& point) {
+void Assessor::make_assessed(Iterate& point) {
   if (problem_->can_roll_out()) roll_out(*problem_, point, scratch_);
 }
 
-bool Judge::Verdict::is_feasible() const { return defect <= feasible && violation <= feasible; }
+bool Assessor::Verdict::is_feasible() const { return defect <= feasible && violation <= feasible; }
 
-Judge::Verdict Judge::verdict_on(const Iterate& judged, const Iterate& prices) {
+Assessor::Verdict Assessor::verdict_on(const Iterate& assessed, const Iterate& prices) {
   Verdict verdict;
-  verdict.objective = problem_->evaluate(judged, defects_.data(), scratch_);
+  verdict.objective = problem_->evaluate(assessed, defects_.data(), scratch_);
   double charge = 0.0;
   const int N = problem_->intervals(), width = problem_->capacity().states;
   const auto charge_bounds = [&](const double* values, const double* lower, const double* upper, const double* price,
@@ -52,10 +52,10 @@ Judge::Verdict Judge::verdict_on(const Iterate& judged, const Iterate& prices) {
   for (int i = 0; i <= N; ++i) {
     const bool is_given = i == 0 && problem_->initial_state();
     if (!is_given)
-      charge_bounds(judged.state(i), problem_->state_lower(i), problem_->state_upper(i), prices.state_bound(i),
+      charge_bounds(assessed.state(i), problem_->state_lower(i), problem_->state_upper(i), prices.state_bound(i),
                     problem_->state_count(i));
     if (i == N) break;
-    charge_bounds(judged.control(i), problem_->control_lower(i), problem_->control_upper(i), prices.control_bound(i),
+    charge_bounds(assessed.control(i), problem_->control_lower(i), problem_->control_upper(i), prices.control_bound(i),
                   problem_->control_count(i));
     const double* defect = defects_.data() + static_cast<std::ptrdiff_t>(i) * width;
     for (int j = 0; j < problem_->state_count(i + 1); ++j) {
@@ -67,7 +67,7 @@ Judge::Verdict Judge::verdict_on(const Iterate& judged, const Iterate& prices) {
   return verdict;
 }
 
-double Judge::distance(const Iterate& a, const Iterate& b) {
+double Assessor::distance(const Iterate& a, const Iterate& b) {
   const ModelDescription& about = problem_->model().description();
   double largest = 0.0;
   const auto compare = [&](const std::vector<Variable>& variables, const double* one, const double* other) {

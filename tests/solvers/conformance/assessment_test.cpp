@@ -1,4 +1,4 @@
-// The judge itself: it must see through a solver whose report or point is wrong.
+// The assessment itself: it must see through a solver whose report or point is wrong.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <limits>
 #include <utility>
 
+#include "assessment.hpp"
 #include "families.hpp"
 #include "found.hpp"
-#include "judge.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
 
 namespace rhec::conformance {
@@ -46,15 +46,15 @@ std::vector<std::string> complaints_about(const std::string& family_name, Lie li
   const Problem problem = family(family_name).make(make_model(host().names(PluginKind::model).front()), 1);
   Liar solver(std::move(lie));
   solver.setup(*problem.ocp);
-  return solve_and_judge(solver, *problem.ocp, problem.guess, 1e-8).complaints;
+  return solve_and_assess(solver, *problem.ocp, problem.guess, 1e-8).complaints;
 }
 
-TEST(Judge, HasNothingToSayAboutAnHonestSolver) {
+TEST(Assessment, HasNothingToSayAboutAnHonestSolver) {
   for (const char* name : {"rhe_all_at_bounds", "rhc_inputs_at_bounds", "rhe_infeasible"})
     EXPECT_THAT(complaints_about(name, [](const Ocp&, Iterate&, Report&) {}), IsEmpty()) << name;
 }
 
-TEST(Judge, SeesAStatusThatIsNotTrue) {
+TEST(Assessment, SeesAStatusThatIsNotTrue) {
   EXPECT_THAT(complaints_about("rhe_blocks", [](const Ocp&, Iterate& point, Report&) { point.control(3)[0] += 1e-3; }),
               Contains(HasSubstr("it says solved with a KKT residual")));
   EXPECT_THAT(
@@ -64,7 +64,7 @@ TEST(Judge, SeesAStatusThatIsNotTrue) {
               Contains("it says infeasible and has changed the point"));
 }
 
-TEST(Judge, SeesAReportThatIsNotThePoints) {
+TEST(Assessment, SeesAReportThatIsNotThePoints) {
   EXPECT_THAT(complaints_about("rhc_near", [](const Ocp&, Iterate&, Report& report) { report.objective += 1e-6; }),
               Contains(HasSubstr("it reports an objective")));
   EXPECT_THAT(complaints_about("rhc_near", [](const Ocp&, Iterate&, Report& report) { report.kkt.defect = 1e-3; }),
@@ -76,7 +76,7 @@ TEST(Judge, SeesAReportThatIsNotThePoints) {
 }
 
 // These are seen without the core's residual.
-TEST(Judge, SeesASolutionThatIsNone) {
+TEST(Assessment, SeesASolutionThatIsNone) {
   const auto all_costates = [](const Ocp& ocp, Iterate& point, double factor) {
     for (int i = 0; i <= ocp.intervals(); ++i)
       for (int j = 0; j < ocp.state_count(i); ++j) point.costate(i)[j] *= factor;

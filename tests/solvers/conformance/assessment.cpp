@@ -1,4 +1,4 @@
-#include "judge.hpp"
+#include "assessment.hpp"
 
 #include <fmt/format.h>
 
@@ -101,9 +101,9 @@ double slope_of_lagrangian(const HorizonProblem& problem, const Iterate& point, 
 }
 
 /// Defects, bounds and signs of multipliers, and the Lagrangian's slope, of a point that is said to be a solution.
-void check_solution(const HorizonProblem& problem, const Judged& judged, double tolerance,
+void check_solution(const HorizonProblem& problem, const Assessment& assessed, double tolerance,
                     std::vector<std::string>& complaints) {
-  const Iterate& point = judged.point;
+  const Iterate& point = assessed.point;
   std::vector<double> scratch(problem.scratch_size());
   double defect = 0.0, violation = 0.0, at_no_bound = 0.0;
   Iterate simulated = point;
@@ -134,7 +134,7 @@ void check_solution(const HorizonProblem& problem, const Judged& judged, double 
   const double slack = tolerance + 1e-11;
   if (!(defect <= slack)) complaints.push_back(fmt::format("its defect is {:.1e}", defect));
   if (!(violation <= slack)) complaints.push_back(fmt::format("it violates a bound by {:.1e}", violation));
-  const double scale = 1.0 + largest_multiplier(problem, point) + std::abs(judged.objective);
+  const double scale = 1.0 + largest_multiplier(problem, point) + std::abs(assessed.objective);
   if (!(at_no_bound <= 10.0 * slack * scale))
     complaints.push_back(fmt::format("a multiplier is not at its bound: {:.1e}", at_no_bound));
   // What differences can tell: a wrong sign or a missing multiplier, not the last digits.
@@ -151,25 +151,25 @@ KktResidual residual_at(const HorizonProblem& problem, const Iterate& point) {
   return kkt_residual(problem, point, qp, scratch);
 }
 
-Judged solve_and_judge(Solver& solver, const HorizonProblem& problem, const Iterate& guess, double tolerance,
-                       Clock::time_point deadline) {
-  Judged judged;
-  judged.point = guess;
+Assessment solve_and_assess(Solver& solver, const HorizonProblem& problem, const Iterate& guess, double tolerance,
+                            Clock::time_point deadline) {
+  Assessment assessed;
+  assessed.point = guess;
   const auto start = Clock::now();
-  solver.prepare(judged.point);
-  judged.report = solver.solve(judged.point, deadline);
-  judged.milliseconds = 1e-3 * microseconds_since(start);
-  const Report& report = judged.report;
-  std::vector<std::string>& complaints = judged.complaints;
+  solver.prepare(assessed.point);
+  assessed.report = solver.solve(assessed.point, deadline);
+  assessed.milliseconds = 1e-3 * microseconds_since(start);
+  const Report& report = assessed.report;
+  std::vector<std::string>& complaints = assessed.complaints;
   std::vector<double> scratch(problem.scratch_size());
-  if (!is_finite(problem, judged.point)) {
+  if (!is_finite(problem, assessed.point)) {
     complaints.emplace_back("the point is not finite");
-    return judged;
+    return assessed;
   }
-  judged.kkt = residual_at(problem, judged.point);
-  judged.objective = problem.evaluate(judged.point, nullptr, scratch);
-  judged.corrected_objective = corrected_objective(problem, judged.point, scratch);
-  const double residual = judged.kkt.largest();
+  assessed.kkt = residual_at(problem, assessed.point);
+  assessed.objective = problem.evaluate(assessed.point, nullptr, scratch);
+  assessed.corrected_objective = corrected_objective(problem, assessed.point, scratch);
+  const double residual = assessed.kkt.largest();
   const std::string status = name_of(report.status);
   const bool solved = report.status == Status::solved;
   if (solved && !(residual <= tolerance))
@@ -178,18 +178,18 @@ Judged solve_and_judge(Solver& solver, const HorizonProblem& problem, const Iter
       report.status == Status::iteration_limit || report.status == Status::stalled || report.status == Status::deadline;
   if (gave_up && residual <= tolerance)
     complaints.push_back(fmt::format("it says {} of a point with a KKT residual of {:.1e}", status, residual));
-  if (report.status == Status::infeasible && !same_bits(problem, judged.point, guess))
+  if (report.status == Status::infeasible && !same_bits(problem, assessed.point, guess))
     complaints.emplace_back("it says infeasible and has changed the point");
   if (is_usable(report.status)) {
-    if (!(std::abs(report.objective - judged.objective) <= 1e-11 * (1.0 + std::abs(judged.objective))))
+    if (!(std::abs(report.objective - assessed.objective) <= 1e-11 * (1.0 + std::abs(assessed.objective))))
       complaints.push_back(fmt::format("it reports an objective of {:.12g}; the point's is {:.12g}", report.objective,
-                                       judged.objective));
+                                       assessed.objective));
     if (!(std::abs(report.kkt.largest() - residual) <= 1e-12 + 1e-3 * residual))
       complaints.push_back(
           fmt::format("it reports a KKT residual of {:.1e}; the point's is {:.1e}", report.kkt.largest(), residual));
   }
-  if (solved) check_solution(problem, judged, tolerance, complaints);
-  return judged;
+  if (solved) check_solution(problem, assessed, tolerance, complaints);
+  return assessed;
 }
 
 bool same_bits(const HorizonProblem& problem, const Iterate& a, const Iterate& b) {

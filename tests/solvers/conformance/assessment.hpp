@@ -1,6 +1,6 @@
 #pragma once
 
-// What a solver did, judged by the core and by an evaluation that shares as little as possible with it.
+// What a solver did, assessed by the core and by an evaluation that shares as little as possible with it.
 
 #include <string>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace rhec::conformance {
 
-struct Judged {
+struct Assessment {
   Report report;
   double milliseconds = 0.0;
   Iterate point;
@@ -23,8 +23,8 @@ struct Judged {
 };
 
 /// Prepares and solves from a guess. `tolerance` is the solver's.
-Judged solve_and_judge(Solver& solver, const HorizonProblem& problem, const Iterate& guess, double tolerance,
-                       Clock::time_point deadline = Clock::time_point::max());
+Assessment solve_and_assess(Solver& solver, const HorizonProblem& problem, const Iterate& guess, double tolerance,
+                            Clock::time_point deadline = Clock::time_point::max());
 
 /// The KKT residual of a point.
 KktResidual residual_at(const HorizonProblem& problem, const Iterate& point);

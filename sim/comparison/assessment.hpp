@@ -8,8 +8,8 @@
 
 namespace rhec::sim {
 
-/// Judges the answers to one problem after the other.
-class Judge {
+/// Assesses the answers to one problem after the other.
+class Assessor {
  public:
   void begin(const HorizonProblem& problem);
   /// For a time that does not depend on who is asked first: brings the problem and its model into the caches.
@@ -17,14 +17,14 @@ class Judge {
   /// The largest part of the residual; the defect goes into the answer.
   double kkt_of(const Iterate& point, Answer& answer);
   /// The point that counts: an estimate as it is, a plan by what its inputs do.
-  void make_judged(Iterate& point);
+  void make_assessed(Iterate& point);
 
   struct Verdict {
     double objective = 0.0, charged = 0.0, defect = 0.0, violation = 0.0;
     bool is_feasible() const;
   };
   /// Defects and violations cost what the multipliers of `prices` say.
-  Verdict verdict_on(const Iterate& judged, const Iterate& prices);
+  Verdict verdict_on(const Iterate& assessed, const Iterate& prices);
 
   /// The largest difference, in units of the model's scales.
   double distance(const Iterate& a, const Iterate& b);
