@@ -2,19 +2,21 @@
 """The tests have the shape of the sources: mirror.py <source root> | --self-test
 
 The test of <floor>/<room>/<name>.cpp is tests/<floor>/<room>/<name>_test.cpp; a plugin's folder is a room. What outgrows one
-file goes on in <name>_<subject>_test.cpp beside it. Headers without a source may have tests too, and a command of apps/ may
-be tested from outside, by tests/cli/<name>.py. What is tested in another place is listed here with the reason, and nothing
-else is: an entry that is no longer needed is a violation, too.
+file goes on in <name>_<subject>_test.cpp beside it. Headers without a source may have tests too. What is in apps/ may be
+tested from outside, by tests/cli/<name>.py or tests/report/<name>.py. A folder whose CMakeLists.txt has a project() is a
+project of its own and is left out. What is tested in another place is listed here with the test that does it, and nothing
+else is: an entry that is no longer needed, or names a test that is not there, is a violation, too.
 """
 import argparse
 import pathlib
+import re
 import sys
 import tempfile
 
 import house
 
 # The floors whose sources and tests must mirror each other.
-FLOORS = ("core", "solvers", "models", "blocking")
+FLOORS = ("core", "plugins", "solvers", "models", "blocking", "sim", "apps")
 # Folders of tests that are about more than one source: whole suites, and programs in other languages.
 SUITES = {
     "cli": "the commands of apps/, from outside: apps/check.cpp is tested by tests/cli/check.py",
@@ -28,14 +30,17 @@ SUITES = {
     "support": "what tests share",
     "threads": "what is promised to programs with several threads",
 }
-# Sources without a test of their own -> why, and what tests them.
-UNTESTED = {}
+# Sources without a test of their own -> the file that tests them, and what it does with them.
+UNTESTED = {
+    "TODO": "",
+}
 # Tests that mirror no source -> what they are about.
 ALONE = {
     "tests/blocking/geometric_test.cpp": "plugins/template/geometric.cpp, a blocking from outside",
     "tests/core/estimation/allocation_test.cpp": "all methods of estimation, which must not allocate",
     "tests/core/horizon/own_problem_test.cpp": "a kind of problem from outside, examples/problem",
     "tests/models/derivatives_test.cpp": "every model that is found",
+    "tests/sim/world/allocation_test.cpp": "paths, ground and the true vehicle, which must not allocate",
 }
 
 
@@ -44,12 +49,18 @@ def of_suite(test, root):
     return any(path.is_relative_to(suite) for suite in SUITES)
 
 
+def of_another_project(path, root):
+    """Whether a folder above it, but for the root, is a project of its own."""
+    lists = [folder / "CMakeLists.txt" for folder in path.parents if folder != root and folder.is_relative_to(root)]
+    return any(file.is_file() and re.search(r"^project\(", file.read_text(), re.MULTILINE) for file in lists)
+
+
 def tests_of(source, root):
     """Where the test of a source may be; the first one is the usual place."""
     name = source.relative_to(root)
     places = [root / "tests" / name.parent / f"{name.stem}_test.cpp"]
     if name.parts[0] == "apps":
-        places.append(root / "tests" / "cli" / f"{name.stem}.py")
+        places += [root / "tests" / suite / f"{name.stem}.py" for suite in ("cli", "report")]
     return places
 
 
@@ -68,6 +79,8 @@ def violations_of(root, floors=FLOORS, untested=None, alone=None):
     untested, alone = UNTESTED if untested is None else untested, ALONE if alone is None else alone
     found, looked_at = [], 0
     for source in house.files(root, floors, {".cpp"}):
+        if of_another_project(source, root):
+            continue
         looked_at += 1
         name = source.relative_to(root)
         places = [place.relative_to(root) for place in tests_of(source, root)]
@@ -90,6 +103,10 @@ def violations_of(root, floors=FLOORS, untested=None, alone=None):
     for name in sorted([*untested, *alone]):
         if not (root / name).is_file():
             found.append(f"tests/house/mirror.py: lists {name}, which is not there")
+    for name, reason in sorted(untested.items()):
+        test = reason.split(":")[0]
+        if not test.startswith("tests/") or not (root / test).is_file():
+            found.append(f"tests/house/mirror.py: says that {name} is tested by '{test}', which is no file of tests/")
     return found, looked_at
 
 
@@ -103,8 +120,12 @@ def self_test():
         "core/low/special.cpp",
         "models/cart/cart.cpp", "tests/models/cart/cart_test.cpp",
         "tests/models/every_test.cpp", "tests/models/helper.cpp",
-        "sim/src/later.cpp",
         "apps/check.cpp", "tests/cli/check.py",
+        "apps/report/page.cpp", "tests/report/page.py",
+        "apps/run.cpp", "tests/cli/runs.py",
+        "plugins/host/host.cpp", "tests/plugins/host/host_test.cpp",
+        "plugins/template/CMakeLists.txt", "plugins/template/own.cpp", "plugins/template/deep/own.cpp",
+        "sim/CMakeLists.txt", "sim/loop/loop.cpp", "tests/sim/loop/loop_test.cpp",
         "solvers/fast/fast.cpp", "tests/solvers/fast/fast_test.cpp", "tests/solvers/conformance/all_test.cpp",
     ]
     wrong = [
@@ -113,25 +134,35 @@ def self_test():
         "tests/core/low/gone_test.cpp",
         "models/cart/other.cpp",
         "apps/untested.cpp",
+        "sim/loop/untested.cpp",
+        "plugins/untested.cpp",
         "core/low/tested_after_all.cpp",
         "tests/solvers/listed_test.cpp",
     ]
-    more = ["tests/core/low/tested_after_all_test.cpp"]
-    untested = {"core/low/special.cpp": "planted", "core/low/tested_after_all.cpp": "planted"}
+    texts = {"plugins/template/CMakeLists.txt": "cmake_minimum_required(VERSION 3.22)\nproject(mine)\n",
+             "sim/CMakeLists.txt": "# No project(): a part of ours.\nadd_subdirectory(loop)\n"}
+    more = ["tests/core/low/tested_after_all_test.cpp", "sim/loop/by_nobody.cpp", "sim/loop/by_words.cpp"]
+    by_another = "tests/models/every_test.cpp: planted"
+    untested = {"core/low/special.cpp": by_another, "core/low/tested_after_all.cpp": by_another,
+                "apps/run.cpp": "tests/cli/runs.py", "sim/loop/by_nobody.cpp": "tests/cli/gone.py: planted",
+                "sim/loop/by_words.cpp": "looked at by eye"}
     alone = {"tests/models/every_test.cpp": "planted", "tests/core/low/never_written_test.cpp": "planted"}
     failures = []
     with tempfile.TemporaryDirectory() as directory:
         root = pathlib.Path(directory)
         for name in right + wrong + more:
             (root / name).parent.mkdir(parents=True, exist_ok=True)
-            (root / name).write_text("\n")
-        found, _ = violations_of(root, (*FLOORS, "apps"), untested, alone)
+            (root / name).write_text(texts.get(name, "\n"))
+        found, _ = violations_of(root, FLOORS, untested, alone)
         told = {violation.split(":")[0] for violation in found}
         failures += [f"not noticed: {name}" for name in wrong if name not in told]
         failures += [f"wrongly blamed: {name}" for name in right + more if name in told]
         if not any("never_written_test.cpp" in violation for violation in found):
             failures.append("not noticed: an entry of the list that names no file")
-    house.tell("mirror self-test", failures, len(right) + len(wrong) + len(more) + 1)
+        for name in ("by_nobody.cpp is tested by 'tests/cli/gone.py'", "by_words.cpp is tested by 'looked at by eye'"):
+            if not any(name in violation for violation in found):
+                failures.append(f"not noticed: {name}")
+    house.tell("mirror self-test", failures, len(right) + len(wrong) + len(more) + 3)
 
 
 def main():

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+#include "rhec/sim/study/sweep.hpp"
+
+// Sweeps as texts, for tests that are told the folder of scenarios as SCENARIOS.
+namespace rhec::sim {
+
+inline const Host& host() {
+  static const Host found;
+  return found;
+}
+
+/// Of a text that stands for a file beside the scenarios.
+inline Sweep sweep_of(const std::string& text) { return Sweep(parse_yaml(text, std::string(SCENARIOS) + "/sweep.yaml")); }
+inline Sweep grid_of(const std::string& grid) { return sweep_of("scenario: figure8.yaml\ngrid:\n" + grid); }
+
+/// What the error says, without the folder; empty where there is none.
+inline std::string error_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& mistake) {
+    std::string text = mistake.what();
+    const std::string folder = std::string(SCENARIOS) + "/";
+    for (std::size_t at = text.find(folder); at != std::string::npos; at = text.find(folder))
+      text.erase(at, folder.size());
+    return text;
+  }
+  return {};
+}
+inline std::string mistake_in(const std::string& text) {
+  return error_of([&] {
+    const Sweep sweep = sweep_of(text);
+    sweep.check_values(host());
+    sweep.identities();
+  });
+}
+inline std::string mistake_in_grid(const std::string& grid) { return mistake_in("scenario: figure8.yaml\ngrid:\n" + grid); }
+
+}  // namespace rhec::sim
