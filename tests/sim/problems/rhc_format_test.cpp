@@ -1,0 +1,70 @@
+// Control problems: how a line is read, and what problem is made of it.
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "rhec/core/horizon/rhc_problem.hpp"
+#include "sim/support/problem_lines.hpp"
+
+namespace rhec::sim {
+namespace {
+
+using ::testing::ElementsAre;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+TEST(RhcFormat, BuildsAControlProblem) {
+  const ProblemRecord record = read_problem(rhc_line, "set.jsonl", 3);
+  const auto problem = build(record, cart());
+  const auto& rhc = dynamic_cast<const RhcProblem&>(*problem);
+  EXPECT_EQ(record.first_interval(), 8);
+  EXPECT_THAT(rhc.setup().blocked_inputs, ElementsAre(1));
+  EXPECT_EQ(rhc.control_count(0), 2);
+  EXPECT_EQ(rhc.control_count(1), 1);
+  EXPECT_EQ(rhc.initial_state()[2], 0.5) << "the parameter";
+  EXPECT_EQ(rhc.state_reference(2)[0], 3.0);
+  Iterate guess(rhc.capacity());
+  cold_start(record, rhc, guess);
+  EXPECT_EQ(guess.control(0)[0], 4.0);
+  EXPECT_EQ(guess.control(1)[0], 4.5) << "clipped";
+  std::vector<double> scratch(rhc.scratch_size());
+  // Node 0: 0; node 1: off by 0.8; the end: off by 1.575. Inputs: off by 0 and by 0.5.
+  EXPECT_NEAR(rhc.evaluate(guess, nullptr, scratch), 0.8 * 0.8 + 10 * 1.575 * 1.575 + 5 * 0.5 * 0.5, 1e-12);
+}
+
+TEST(RhcFormat, BuildsBoundsThatDifferFromIntervalToInterval) {
+  const auto control = build(read_problem(rhc_line_2, "set.jsonl", 3), cart());
+  EXPECT_EQ(control->control_lower(0)[0], 0.0);
+  EXPECT_EQ(control->control_lower(1)[0], -infinity);
+  EXPECT_EQ(control->control_upper(1)[0], 4.5);
+  EXPECT_EQ(control->control_upper(1)[1], 1.0);
+}
+
+TEST(RhcFormat, RefillsInPlaceWhatFits) {
+  const auto control = build(read_problem(rhc_line, "set.jsonl", 3), cart());
+  ASSERT_TRUE(refill(read_problem(replaced(rhc_line, "[0, 4.5]", "[0, 4.25]"), "set.jsonl", 4), *control));
+  EXPECT_EQ(control->control_upper(1)[0], 4.25) << "bounds of inputs move with the reference speed";
+  EXPECT_FALSE(refill(read_problem(replaced(rhc_line, "{\"push\": [0]}", "{}"), "set.jsonl", 4), *control));
+}
+
+TEST(RhcFormat, NamesThePlaceAndTheRemedy) {
+  const Mistake mistakes[] = {
+      {rhc_line, "\"initial_state\": [1, 0.5]", "\"initial_state\": [1]", "initial_state", "expected 2, for pos, lean"},
+      {rhc_line, "[1, 2, 3]", "[1, 2]", "reference.pos", "2 numbers, expected 3, one for each node"},
+      {rhc_line, "[4, 5]", "[4, 5, 6]", "reference.speed", "3 numbers, expected 2, one for each interval"},
+      {rhc_line, ", \"speed\": [4, 5]", "", "reference.speed", "missing, but the variable has a weight"},
+      {rhc_line, "\"terminal\": {\"pos\"", "\"terminal\": {\"speed\"", "weights.terminal.speed", "no such variable"},
+      {rhc_line, "\"stage\": {\"pos\": 1", "\"stage\": {\"pos\": null", "weights.stage.pos", "expected a number"},
+      {rhc_line, "\"speed\": [0, 4.5]", "\"grip\": [0, 1]", "bounds.grip", "no such variable here"},
+      {rhc_line, "\"parameters\": [0.5],", "", "parameters", "missing"},
+      {rhc_line_2, "[[0, null], 4.5]", "[[0], 4.5]", "bounds.speed[0]", "1 numbers, expected 2: one for each interval"},
+      {rhc_line_2, "[[0, null], 4.5]", "[[0, 5], 4.5]", "bounds.speed", "on interval 1, expected lower <= upper"},
+      {rhc_line_2, "\"push\": [-1, 1]", "\"lean\": [[-1, 1], 2]", "bounds.lean", "lists of bounds are for inputs"},
+      {rhc_line, "\"speed\": [0, 4.5]", "\"speed\": [[0, 0], 4.5]", "bounds.speed[0]", "expected a number"},
+  };
+  expect_told(mistakes);
+}
+
+}  // namespace
+}  // namespace rhec::sim
