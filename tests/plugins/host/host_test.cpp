@@ -1,71 +1,27 @@
 #include "rhec/plugins/host/host.hpp"
-#include "rhec/plugins/kit/manifest.hpp"
 
-#include <elf.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
 
 #include <array>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <system_error>
 #include <thread>
-#include <tuple>
 
+#include "plugins/host/fixtures.hpp"
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/model/model.hpp"
-#include "rhec/plugins/kit/fingerprint.hpp"
 
 namespace rhec {
 namespace {
 
-namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
-
-fs::path fixture(const std::string& name) { return fs::path(FIXTURES) / name; }
-
-template <class Call>
-std::string message(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-/// What the host says of the files in its first place.
-std::vector<PluginRecord> records_in(const fs::path& directory) {
-  const Host host({directory});
-  std::vector<PluginRecord> records;
-  for (const PluginRecord& record : host.discover()) {
-    if (record.path.parent_path() == fs::canonical(directory)) records.push_back(record);
-  }
-  return records;
-}
-
-std::string refusal_of(const std::string& name) {
-  const auto records = records_in(fixture(name));
-  return records.size() == 1 ? records[0].refusal : "not one file";
-}
-
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = testing::TempDir() + "rhec_host_XXXXXX";
-    path_ = mkdtemp(pattern.data());
-  }
-  ~TemporaryFolder() { fs::remove_all(path_); }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 /// Sets a variable of the environment, and puts back what was there.
 class Environment {
@@ -86,18 +42,6 @@ class Environment {
   const char* name_;
   std::optional<std::string> before_;
 };
-
-TEST(Host, AGoodPluginIsToldAsItsManifestSays) {
-  const auto records = records_in(fixture("good"));
-  ASSERT_EQ(records.size(), 1u);
-  EXPECT_TRUE(records[0].accepted()) << records[0].refusal;
-  EXPECT_EQ(records[0].kind, PluginKind::blocking);
-  EXPECT_EQ(records[0].name, "toy");
-  EXPECT_EQ(records[0].version, "1.0");
-  EXPECT_EQ(records[0].licence, "MIT");
-  EXPECT_EQ(records[0].backend_version, "7");
-  EXPECT_EQ(records[0].path.filename(), "toy.so");
-}
 
 TEST(Host, AGoodPluginWorks) {
   const Host host({fixture("good")});
@@ -239,150 +183,6 @@ TEST(Host, SeveralThreadsMayAsk) {
   for (auto& each : made) threads.emplace_back([&] { each = host.make_blocking("toy"); });
   for (std::thread& thread : threads) thread.join();
   for (const auto& each : made) EXPECT_NE(each, nullptr);
-}
-
-TEST(BadPlugin, ALibraryWithoutAManifestIsNotEvenLoaded) {
-  EXPECT_THAT(refusal_of("no_manifest"), HasSubstr("exports no data symbol rhec_plugin_manifest"));
-  EXPECT_EQ(getenv("RHEC_TEST_NO_MANIFEST_RAN"), nullptr) << "its constructors ran";
-}
-
-TEST(BadPlugin, ManifestsOfAnotherTimeAreRefused) {
-  EXPECT_THAT(refusal_of("wrong_magic"), HasSubstr("does not start like one of rhec"));
-  EXPECT_THAT(refusal_of("old_abi"), HasSubstr("has ABI 0, this rhec reads 1: the plugin is older"));
-  EXPECT_THAT(refusal_of("new_abi"), HasSubstr("has ABI 99, this rhec reads 1: the plugin is newer"));
-  EXPECT_THAT(refusal_of("ends_after_head"), HasSubstr("has 16 bytes, expected"));
-  EXPECT_THAT(refusal_of("ends_before_head"), HasSubstr("has 4 bytes, expected 16 at least"));
-  EXPECT_THAT(refusal_of("other_revision"),
-              HasSubstr("blocking 'wrong' implements revision 77 of the interfaces, this rhec has " +
-                        std::to_string(kInterfaceRevision)));
-}
-
-TEST(BadPlugin, AnotherAlignmentOfEigenIsToldWithThePluginAndBothValues) {
-  const std::string own =
-      std::string(RHEC_BUILD_FINGERPRINT).substr(std::string(RHEC_BUILD_FINGERPRINT).rfind(", ") + 2);
-  for (const auto& [name, plugin, values] :
-       {std::tuple("other_alignment", "blocking 'toy' 3.0", "alignment 32 (static "),
-        std::tuple("other_static_alignment", "blocking 'toy' 4.0", "(static 0)")}) {
-    const auto records = records_in(fixture(name));
-    ASSERT_EQ(records.size(), 1u) << name;
-    EXPECT_THAT(records[0].refusal, AllOf(HasSubstr(plugin), HasSubstr(values), HasSubstr("rhec with " + own)));
-    EXPECT_THAT(records[0].refusal, Not(HasSubstr("gcc"))) << "what is alike is not told";
-    EXPECT_THAT(records[0].remedy, HasSubstr("-march"));
-    EXPECT_EQ(records[0].name, "toy");
-  }
-}
-
-TEST(BadPlugin, AnotherBuildIsRefusedWithBothFingerprints) {
-  EXPECT_THAT(refusal_of("other_fingerprint"),
-              AllOf(HasSubstr("rhec 0.0.1, gcc 4, somewhere else"), HasSubstr(RHEC_BUILD_FINGERPRINT)));
-}
-
-TEST(BadPlugin, IncompleteManifestsAreRefused) {
-  EXPECT_THAT(refusal_of("unknown_kind"), HasSubstr("kind 9"));
-  EXPECT_THAT(refusal_of("null_text"), HasSubstr("null text"));
-  EXPECT_THAT(refusal_of("null_factory"), HasSubstr("schema, create or destroy is null"));
-}
-
-TEST(BadPlugin, AMissingDependencyIsNamed) {
-  const auto records = records_in(fixture("missing_dependency"));
-  ASSERT_EQ(records.size(), 1u);
-  EXPECT_THAT(records[0].refusal,
-              AllOf(HasSubstr("needs the library librhec_test_gone.so, which the loader cannot open"),
-                    HasSubstr("librhec_test_gone.so: cannot open shared object file")));
-  EXPECT_THAT(records[0].remedy, HasSubstr("install the package that provides librhec_test_gone.so"));
-}
-
-TEST(BadPlugin, AMissingSymbolIsNamed) {
-  const auto records = records_in(fixture("undefined_symbol"));
-  ASSERT_EQ(records.size(), 1u);
-  EXPECT_THAT(records[0].refusal,
-              HasSubstr("undefined symbol: no library that it is linked to defines rhec_test_gone"));
-  EXPECT_EQ(records[0].remedy, "link it to the library that does");
-}
-
-TEST(BadPlugin, ASymbolOfAnotherRhecIsToldWithHowThisOneWasBuilt) {
-  const auto records = records_in(fixture("other_strings"));
-  ASSERT_EQ(records.size(), 1u);
-  EXPECT_THAT(records[0].refusal, HasSubstr("defines rhec::"));
-  EXPECT_THAT(records[0].remedy, AllOf(HasSubstr("build it again"), HasSubstr(RHEC_BUILD_FINGERPRINT)));
-}
-
-TEST(BadPlugin, FilesThatAreNoLibraryAreRefused) {
-  TemporaryFolder folder;
-  std::ofstream(folder.path() / "a_empty.so").close();
-  std::ofstream(folder.path() / "b_text.so") << "GROUP ( libm.so.6 )\n";
-  fs::copy_file("/proc/self/exe", folder.path() / "c_program.so");
-  fs::create_symlink("nowhere", folder.path() / "d_dangling.so");
-  fs::create_directory(folder.path() / "e_folder.so");
-  ASSERT_EQ(mkfifo((folder.path() / "f_pipe.so").c_str(), 0600), 0);
-  fs::create_symlink("g_loop.so", folder.path() / "g_loop.so");
-  std::ofstream(folder.path() / "h_notes.txt") << "not looked at";
-  const auto records = records_in(folder.path());
-  ASSERT_EQ(records.size(), 7u);
-  EXPECT_THAT(records[0].refusal, HasSubstr("empty"));
-  EXPECT_THAT(records[1].refusal, HasSubstr("not an ELF file"));
-  EXPECT_THAT(records[2].refusal, HasSubstr("a program, not a shared library"));
-  EXPECT_THAT(records[3].refusal, HasSubstr("a symbolic link to nowhere, where nothing is"));
-  EXPECT_THAT(records[4].refusal, HasSubstr("a directory, not a library"));
-  EXPECT_THAT(records[5].refusal, HasSubstr("a pipe"));
-  EXPECT_THAT(records[6].refusal, HasSubstr("cannot be looked at"));
-  for (const PluginRecord& record : records) EXPECT_NE(record.remedy, "") << record.path;
-}
-
-/// A copy of the good plugin with other bytes in the head of the file.
-std::string refusal_with_bytes(std::streamoff offset, const std::string& bytes) {
-  TemporaryFolder folder;
-  const fs::path copy = folder.path() / "toy.so";
-  fs::copy_file(fixture("good") / "toy.so", copy);
-  std::fstream(copy, std::ios::in | std::ios::out | std::ios::binary).seekp(offset) << bytes;
-  const auto records = records_in(folder.path());
-  return records.size() == 1 ? records[0].refusal : "not one file";
-}
-
-TEST(BadPlugin, ALibraryForAnotherMachineIsToldWithBoth) {
-  const std::string other = refusal_with_bytes(offsetof(Elf64_Ehdr, e_machine), {'\x16', '\x00'});  // of S/390
-  EXPECT_THAT(other, AllOf(HasSubstr("for another kind of machine (ELF machine 22, "), HasSubstr("expected ")));
-  EXPECT_THAT(refusal_with_bytes(EI_CLASS, {sizeof(void*) == 8 ? ELFCLASS32 : ELFCLASS64}),
-              HasSubstr(sizeof(void*) == 8 ? ", 32 bits" : ", 64 bits"));
-}
-
-TEST(BadPlugin, OtherElfFilesAreToldByTheirType) {
-  const auto offset = static_cast<std::streamoff>(offsetof(Elf64_Ehdr, e_type));
-  EXPECT_THAT(refusal_with_bytes(offset, {ET_EXEC, 0}), HasSubstr("a program, not a shared library"));
-  EXPECT_THAT(refusal_with_bytes(offset, {ET_REL, 0}), HasSubstr("an object file that is not linked yet"));
-  EXPECT_THAT(refusal_with_bytes(offset, {ET_CORE, 0}), HasSubstr("an ELF file of another type"));
-}
-
-TEST(BadPlugin, ATruncatedCopyIsRefusedWhereverItEnds) {
-  TemporaryFolder folder;
-  const fs::path good = fixture("good") / "toy.so", copy = folder.path() / "toy.so";
-  const auto size = fs::file_size(good);
-  Elf64_Ehdr header;
-  ASSERT_TRUE(std::ifstream(good, std::ios::binary).read(reinterpret_cast<char*>(&header), sizeof header));
-  const auto within_sections = header.e_shoff + header.e_shentsize / 2;
-  ASSERT_LT(within_sections, size);
-  for (const std::uintmax_t kept : {std::uintmax_t{2}, std::uintmax_t{20}, std::uintmax_t{64}, std::uintmax_t{300},
-                                    size / 4, size / 2, std::uintmax_t{within_sections}, size - 1}) {
-    fs::copy_file(good, copy, fs::copy_options::overwrite_existing);
-    fs::resize_file(copy, kept);
-    const auto records = records_in(folder.path());
-    ASSERT_EQ(records.size(), 1u);
-    const auto expected = kept < sizeof header ? sizeof header : size;
-    EXPECT_EQ(records[0].refusal, "the file is truncated: it has " + std::to_string(kept) + " bytes, expected " +
-                                      std::to_string(expected) + " at least");
-  }
-}
-
-TEST(BadPlugin, BytesThatAreWrongDoNotHarmTheReader) {
-  TemporaryFolder folder;
-  const fs::path good = fixture("no_manifest") / "bad.so", copy = folder.path() / "bad.so";
-  for (int offset = 16; offset < 64; ++offset) {  // all of the header behind its first mark
-    fs::copy_file(good, copy, fs::copy_options::overwrite_existing);
-    std::fstream file(copy, std::ios::in | std::ios::out | std::ios::binary);
-    file.seekp(offset).put('\xff');
-    file.close();
-    for (const auto& record : records_in(folder.path())) EXPECT_FALSE(record.accepted()) << offset;
-  }
 }
 
 TEST(BadPlugin, FailuresOfAFactoryBecomeWords) {

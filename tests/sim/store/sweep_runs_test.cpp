@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +18,6 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::Pair;
 
 class SweepRunsTest : public FolderTest {
@@ -121,7 +122,7 @@ TEST_F(SweepRunsTest, WhatWasNotCompletedHasNoValues) {
 
 TEST_F(SweepRunsTest, RefusesWhatIsNoSweep) {
   const auto message = [&] { return message_of([&] { read_sweep_runs(path()); }); };
-  EXPECT_THAT(message(), HasSubstr("runs.sqlite: "));
+  EXPECT_THAT(message(), HasSubstr("runs.sqlite: cannot be opened"));
   put("runs.sqlite", std::string(5000, 'x'));
   EXPECT_THAT(message(), HasSubstr("is no SQLite database"));
   std::filesystem::remove(path());

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/plugins/host/host.hpp"
+
+// The plugins that tests of the host are made with, and what it says of them.
+namespace rhec {
+
+namespace fs = std::filesystem;
+
+inline fs::path fixture(const std::string& name) { return fs::path(FIXTURES) / name; }
+
+template <class Call>
+std::string message(Call call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// What the host says of the files in its first place.
+inline std::vector<PluginRecord> records_in(const fs::path& directory) {
+  const Host host({directory});
+  std::vector<PluginRecord> records;
+  for (const PluginRecord& record : host.discover()) {
+    if (record.path.parent_path() == fs::canonical(directory)) records.push_back(record);
+  }
+  return records;
+}
+
+inline std::string refusal_of(const std::string& name) {
+  const auto records = records_in(fixture(name));
+  return records.size() == 1 ? records[0].refusal : "not one file";
+}
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = testing::TempDir() + "rhec_host_XXXXXX";
+    path_ = mkdtemp(pattern.data());
+  }
+  ~TemporaryFolder() { fs::remove_all(path_); }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+}  // namespace rhec
