@@ -1,7 +1,6 @@
 // Models with one fault each: every check finds its own fault, and nothing else.
 #include <gmock/gmock.h>
 
-#include <functional>
 #include <set>
 #include <string>
 
@@ -26,25 +25,6 @@ struct Tank {
   void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
   }
-};
-
-/// Passes on all that it is asked to another model, then spoils some of it.
-class Spoilt : public FormulaModel<Unicycle> {
- public:
-  Spoilt() : FormulaModel({}, unicycle_description()) {}
-  std::function<void(const Intervals&, int)> spoil_step = [](const Intervals&, int) {};
-  std::function<void(const Nodes&)> spoil_node = [](const Nodes&) {};
-  bool second = true;
-
-  void integrate(const Intervals& request) const noexcept override {
-    FormulaModel::integrate(request);
-    spoil_step(request, 6 + (request.parameters_end ? 4 : 2));
-  }
-  void observe(const Nodes& request) const noexcept override {
-    FormulaModel::observe(request);
-    spoil_node(request);
-  }
-  bool has_second_derivatives() const noexcept override { return second; }
 };
 
 TEST(ModelCheck, FindsNothingWrongWithAGoodModel) {

@@ -61,6 +61,25 @@ class Described : public FormulaModel<Formula> {
   ModelDescription about_;
 };
 
+/// Passes on all that it is asked to another model, then spoils some of it.
+class Spoilt : public FormulaModel<Unicycle> {
+ public:
+  Spoilt() : FormulaModel({}, unicycle_description()) {}
+  std::function<void(const Intervals&, int)> spoil_step = [](const Intervals&, int) {};
+  std::function<void(const Nodes&)> spoil_node = [](const Nodes&) {};
+  bool second = true;
+
+  void integrate(const Intervals& request) const noexcept override {
+    FormulaModel::integrate(request);
+    spoil_step(request, 6 + (request.parameters_end ? 4 : 2));
+  }
+  void observe(const Nodes& request) const noexcept override {
+    FormulaModel::observe(request);
+    spoil_node(request);
+  }
+  bool has_second_derivatives() const noexcept override { return second; }
+};
+
 template <class Formula = Unicycle>
 ModelCheck check(const std::function<void(ModelDescription&)>& spoil = {}, const ModelCheckOptions& options = {}) {
   ModelDescription about = unicycle_description();
