@@ -85,7 +85,9 @@ TEST_F(SmoothingTest, WithoutAFixNothingCanBeEstimated) {
   drive.fixes.resize(5);
   drive.fixes.erase(drive.fixes.begin(), drive.fixes.begin() + 4);
   const LogVariant& variant = scenario_.variants().front();
-  EXPECT_THAT(message_of([&] { smooth(variant.name, variant.robot, drive, scenario_.log(), {1, 0}); }),
+  EXPECT_THAT(message_of([&] {
+                smooth(variant.name, variant.robot, drive, scenario_.log(), {1, 0});
+              }),
               HasSubstr("the log has no fix that is not withheld"));
 }
 

@@ -103,7 +103,9 @@ TEST(ModelNames, TellWhatTheModelDoesNotHave) {
   const ModelNames names(record, *model);
   const std::map<std::string, double> good = {{"speed", 1.0}, {"pos", 1.0}}, bad = {{"psh", 1.0}};
   EXPECT_EQ(message_of([&] { names.check("weights", good, {&about.states, &about.inputs}); }), "no error");
-  EXPECT_EQ(message_of([&] { names.check("weights", bad, {&about.states, &about.inputs}); }),
+  EXPECT_EQ(message_of([&] {
+              names.check("weights", bad, {&about.states, &about.inputs});
+            }),
             "set.jsonl:3: weights.psh: model 'cart' has no such variable here; did you mean 'push'?");
   EXPECT_EQ(message_of([&] { names.check_count("inputs[0]", 3, about.inputs); }),
             "set.jsonl:3: inputs[0]: 3 numbers, expected 2, for speed, push of model 'cart'");

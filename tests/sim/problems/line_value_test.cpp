@@ -78,9 +78,13 @@ TEST(LineValue, KeysAreToldWithTheMapsThatTheyAreIn) {
   const LineValue horizon = line["horizon"];
   EXPECT_EQ(message_of([&] { horizon["dt"].number(); }), "set.jsonl:7: horizon.dt: found \"x\", expected a number");
   EXPECT_THAT(message_of([&] { horizon["intervals"]; }), HasSubstr("set.jsonl:7: horizon.intervals: missing"));
-  EXPECT_EQ(message_of([&] { horizon.allow({"dt", "step", "guess"}); }),
+  EXPECT_EQ(message_of([&] {
+              horizon.allow({"dt", "step", "guess"});
+            }),
             "set.jsonl:7: horizon.steps: unknown key; did you mean 'step'?");
-  EXPECT_EQ(message_of([&] { horizon.allow({"dt", "steps"}, {"guess"}, 1); }),
+  EXPECT_EQ(message_of([&] {
+              horizon.allow({"dt", "steps"}, {"guess"}, 1);
+            }),
             "set.jsonl:7: horizon.guess: is a key of version 2; add \"version\": 2 to the line");
   EXPECT_NO_THROW(horizon.allow({"dt", "steps"}, {"guess"}, 2));
   EXPECT_EQ(at_key("set.jsonl:7", "", "no map"), "set.jsonl:7: no map");

@@ -73,9 +73,8 @@ TEST(BlockingMaps, ThereIsOneForEachOfTheOtherSettings) {
 
 TEST(BlockingMaps, WhatIsOnNoMapIsTold) {
   std::vector<RunGroup> groups = blockings();
-  groups.push_back(group_of({{"speed", "4"},
-                             {"blocking.kappa.name", "\"unblocked\""},
-                             {"blocking.kappa.neighbour_sigma", "0.04"}}));
+  groups.push_back(
+      group_of({{"speed", "4"}, {"blocking.kappa.name", "\"unblocked\""}, {"blocking.kappa.neighbour_sigma", "0.04"}}));
   Json notes = Json::array();
   const SweepMaps maps = blocking_maps(groups, SweepSettings(groups), notes);
   EXPECT_THAT(maps.others, ElementsAre(&groups.back())) << "the plain one is what maps are held against";

@@ -52,7 +52,7 @@ TEST_F(SqliteDatabaseTest, KeepsValuesOfEveryKind) {
 TEST_F(SqliteDatabaseTest, ATransactionIsUndoneUnlessItIsCommitted) {
   SqliteDatabase database(path());
   database.execute("CREATE TABLE t (a)");
-  { 
+  {
     const SqliteTransaction given_up(database);
     database.execute("INSERT INTO t VALUES (1)");
     EXPECT_EQ(database.number("SELECT count(*) FROM t"), 1);

@@ -90,9 +90,9 @@ TEST_F(SweepRunsTest, MeasuresAreThoseOfTheSummary) {
   other.nees = std::nan("");
   write({row_of(R"({"seed":1})", 1), other});
   const SweepRuns runs = read_sweep_runs(path());
-  EXPECT_THAT(runs.measures, testing::UnorderedElementsAre("mae.kappa", "mae.position", "mae.mu", "rhe.median",
-                                                           "rhe.p99", "rhc.median", "rhc.p99", "mae_after_start.kappa",
-                                                           "nees"));
+  EXPECT_THAT(runs.measures,
+              testing::UnorderedElementsAre("mae.kappa", "mae.position", "mae.mu", "rhe.median", "rhe.p99",
+                                            "rhc.median", "rhc.p99", "mae_after_start.kappa", "nees"));
   ASSERT_EQ(runs.groups.size(), 1U);
   const RunGroup& group = runs.groups.front();
   EXPECT_EQ(measure(runs, group, 1, "mae.kappa"), 0.5);

@@ -22,7 +22,8 @@ inline Settings short_scenario() {
   return settings;
 }
 
-inline Backend backend(const std::string& label, const std::string& solver, const std::vector<std::string>& assignments = {}) {
+inline Backend backend(const std::string& label, const std::string& solver,
+                       const std::vector<std::string>& assignments = {}) {
   Backend result{label, solver, Settings::map()};
   for (const std::string& assignment : assignments) apply_assignment(result.options, assignment);
   return result;

@@ -16,7 +16,9 @@ inline const Host& host() {
 }
 
 /// Of a text that stands for a file beside the scenarios.
-inline Sweep sweep_of(const std::string& text) { return Sweep(parse_yaml(text, std::string(SCENARIOS) + "/sweep.yaml")); }
+inline Sweep sweep_of(const std::string& text) {
+  return Sweep(parse_yaml(text, std::string(SCENARIOS) + "/sweep.yaml"));
+}
 inline Sweep grid_of(const std::string& grid) { return sweep_of("scenario: figure8.yaml\ngrid:\n" + grid); }
 
 /// What the error says, without the folder; empty where there is none.
@@ -39,6 +41,8 @@ inline std::string mistake_in(const std::string& text) {
     sweep.identities();
   });
 }
-inline std::string mistake_in_grid(const std::string& grid) { return mistake_in("scenario: figure8.yaml\ngrid:\n" + grid); }
+inline std::string mistake_in_grid(const std::string& grid) {
+  return mistake_in("scenario: figure8.yaml\ngrid:\n" + grid);
+}
 
 }  // namespace rhec::sim
