@@ -1,0 +1,123 @@
+#include "rhec/sim/loop/scenario.hpp"
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "sim/support/figure8.hpp"
+#include "sim/support/folder_test.hpp"
+#include "sim/support/message_of.hpp"
+
+namespace rhec::sim {
+namespace {
+
+using testing::AllOf;
+using testing::Contains;
+using testing::Ge;
+using testing::HasSubstr;
+using testing::Le;
+
+/// The ground's kappa and mu at a place.
+std::array<double, 2> slip_at(const Scenario& scenario, double x, double y) {
+  std::array<double, 2> values{};
+  scenario.terrain().sample(x, y, values.data());
+  return values;
+}
+
+TEST(Scenario, TheVehicleStartsOnThePathAndFacesAlongIt) {
+  const Scenario scenario = figure8_with({"path.radius=12"});
+  const PathPoint start = scenario.path().point_at(0.0);
+  const Eigen::VectorXd& state = scenario.initial_state();
+  ASSERT_EQ(state.size(), 4);
+  EXPECT_EQ(state[0], start.x);
+  EXPECT_EQ(state[1], start.y);
+  EXPECT_EQ(state[2], start.heading);
+  EXPECT_EQ(state[3], 0.0);
+  EXPECT_NEAR(scenario.path().length(), 2 * 4.0 * M_PI * 12.0, 1.0) << "two laps of two circles";
+  EXPECT_EQ(start.speed, 8.0);
+}
+
+TEST(Scenario, TheGroundIsAsItIsNamed) {
+  const Scenario constant = figure8_with({"terrain={name: constant, values: {kappa: 0.75}}"});
+  EXPECT_EQ(slip_at(constant, 3.0, -7.0), (std::array{0.75, 1.0})) << "mu is where nothing slips";
+  const Scenario patches = figure8_with({"terrain={name: patches, lower: 0.6, ranges: {mu: [0.9, 0.95]}}"});
+  for (double x = -50.0; x < 50.0; x += 1.0) {
+    const auto [kappa, mu] = slip_at(patches, x, 0.0);
+    EXPECT_THAT(kappa, AllOf(Ge(0.6), Le(1.0)));
+    EXPECT_THAT(mu, AllOf(Ge(0.9), Le(0.95)));
+  }
+  const std::vector<std::string> same = {"seed=3"}, other = {"seed=4"};
+  EXPECT_EQ(slip_at(figure8_with(same), 1.0, 2.0), slip_at(figure8_with(same), 1.0, 2.0));
+  EXPECT_NE(slip_at(figure8_with(same), 1.0, 2.0), slip_at(figure8_with(other), 1.0, 2.0));
+}
+
+TEST(Scenario, TheVehicleIsTheTruth) {
+  const Scenario scenario = figure8_with({"vehicle={step: 0.005, mechanical_stops: false}"});
+  EXPECT_EQ(scenario.vehicle().step, 0.005);
+  EXPECT_FALSE(scenario.vehicle().mechanical_stops);
+}
+
+class ScenarioFileTest : public FolderTest {};
+
+TEST_F(ScenarioFileTest, FilesAreMeantBesideTheScenarioThatNamesThem) {
+  put("path.csv", "x,y\n0,0\n10,0\n10,20\n");
+  put("kappa.csv", "origin_x,origin_y,cell_size\n0,0,1\n0.5\n");
+  put("mu.csv", "origin_x,origin_y,cell_size\n0,0,1\n0.75\n");
+  const auto yaml = put("mine.yaml",
+                        "model: bicycle_slip\npath: {name: file, file: path.csv}\n"
+                        "terrain: {name: raster, files: [kappa.csv, mu.csv]}\n");
+  const Scenario scenario(Host(), load_yaml(yaml.string()));
+  EXPECT_DOUBLE_EQ(scenario.path().length(), 30.0);
+  EXPECT_EQ(slip_at(scenario, 5.0, 5.0), (std::array{0.5, 0.75}));
+  put("mine.yaml", "model: bicycle_slip\npath:\n  name: file\n  file: none.csv\n");
+  EXPECT_THAT(message_of([&] { Scenario(Host(), load_yaml(yaml.string())); }),
+              AllOf(HasSubstr("mine.yaml:4: "), HasSubstr("found 'none.csv', expected a file"),
+                    HasSubstr(file("none.csv").string())));
+}
+
+TEST(Scenario, MistakesAreToldWithTheirKey) {
+  const struct {
+    std::vector<std::string> assignments;
+    std::string key, what;
+  } cases[] = {
+      {{"path.name=file"}, "path.name", "no path.file"},
+      {{"path.spacing=1e-6"}, "path.spacing", "more than 2e+06 of them"},
+      {{"path={name: zigzag, spacing: 1e-6}"}, "path.spacing", "more than 2e+06 of them"},
+      {{"path.laps=1", "path.radius=0.05", "speed=100"}, "step", "expected between 1 and 1e+06"},
+      {{"terrain={name: gaussian, lower: 1, upper: 0.5}"}, "terrain.lower", "expected lower <= upper"},
+      {{"terrain={name: raster, files: [a.csv]}"}, "terrain.files", "1 raster files given; expected 2"},
+      {{"terrain={name: raster, files: [none.csv, none.csv]}"}, "terrain.files", "there is no none.csv"},
+      {{"terrain.ranges.kapa=[0, 1]"}, "terrain", "did you mean 'kappa'"},
+      {{"terrain.ranges.kappa=[0, .inf]"}, "terrain.ranges.kappa", "two finite numbers"},
+      {{"terrain={name: constant, values: {kapa: 1}}"}, "terrain", "did you mean 'kappa'"},
+      {{"terrain={name: swamp}"}, "terrain.name", "gaussian"},
+      {{"path={name: figure9}"}, "path.name", "did you mean 'figure8'"},
+      {{"vehicle.stp=1"}, "vehicle", "did you mean 'step'"},
+      {{"spede=4"}, "spede", "did you mean 'speed'"},
+  };
+  for (const auto& each : cases)
+    EXPECT_THAT(message_of([&] { figure8_with(each.assignments); }), AllOf(HasSubstr(each.key), HasSubstr(each.what)))
+        << each.assignments.front();
+}
+
+TEST(ScenarioSections, AreThoseOfTheWorldBeforeThoseOfTheRobot) {
+  const std::vector<OptionSection> sections = scenario_sections();
+  ASSERT_GE(sections.size(), 5U);
+  std::vector<std::string> names;
+  for (const OptionSection& section : sections) {
+    names.push_back(section.name);
+    EXPECT_FALSE(section.meaning.empty()) << section.name;
+  }
+  EXPECT_THAT(std::vector<std::string>(names.begin(), names.begin() + 4),
+              testing::ElementsAre("", "path", "terrain", "vehicle"));
+  EXPECT_THAT(names, Contains("estimator"));
+  std::vector<std::string> keys;
+  for (const OptionRow& row : sections.front().rows) keys.push_back(row.name);
+  for (const char* key : {"speed", "seed", "path", "terrain", "vehicle", "estimator"}) EXPECT_THAT(keys, Contains(key));
+}
+
+}  // namespace
+}  // namespace rhec::sim
