@@ -105,6 +105,8 @@ def main():
                            ("smoother.blocking.kapa={name: unblocked}", "kappa"), ("smoother.deadline=0", "deadline")):
             done = smooth("--variant", "rhe", "--set", key)
             expect(done.returncode == 1 and words in done.stderr, f"{key}: {done.returncode} {done.stderr}")
+        done = smooth("--hold-out", "5", "--hold-out-phase", "5")
+        expect(done.returncode == 1 and "expected a number below it" in done.stderr, f"phase: {done.returncode} {done.stderr}")
     for complaint in complaints:
         print("FAILED:", complaint)
     return 1 if complaints else 0

@@ -1,0 +1,33 @@
+// What `rhec report` says where rhec was built without its page.
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "apps/report/report_page.hpp"
+#include "rhec/core/base/error.hpp"
+
+namespace rhec::apps {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+template <class Call>
+std::string message_of(const Call& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(NoReportPage, SaysHowToBuildRhecWithIt) {
+  EXPECT_FALSE(has_report_page());
+  const auto remedy = AllOf(HasSubstr("built without the report's page"), HasSubstr("-DRHEC_REPORT=ON"));
+  EXPECT_THAT(message_of([] { report_page("{}"); }), remedy);
+  EXPECT_THAT(message_of([] { report_figures("{}"); }), remedy);
+}
+
+}  // namespace
+}  // namespace rhec::apps
