@@ -14,7 +14,7 @@ import tempfile
 import house
 
 # The floors whose sources and tests must mirror each other.
-FLOORS = ("core", "solvers", "models", "blocking")
+FLOORS = ("core", "plugins", "solvers", "models", "blocking", "sim", "apps")
 # Folders of tests that are about more than one source: whole suites, and programs in other languages.
 SUITES = {
     "cli": "the commands of apps/, from outside: apps/check.cpp is tested by tests/cli/check.py",
