@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "parking_problem.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host/host.hpp"
 
 int main(int count, char** words) try {

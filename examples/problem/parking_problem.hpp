@@ -22,7 +22,9 @@ class ParkingProblem final : public rhec::HorizonProblem {
     std::vector<double> goal_weights;   ///< n_x, diagonal of V
   };
   ParkingProblem(std::shared_ptr<const rhec::Model> model, Setup setup)
-      : HorizonProblem(std::move(model), {.structure = {.max_intervals = setup.intervals}, .substeps = 1}),
+      : HorizonProblem(
+            std::move(model),
+            {.structure = {.max_intervals = setup.intervals, .blocked_inputs = {}, .one_block = {}}, .substeps = 1}),
         goal(nx(), 0.0),
         setup_(std::move(setup)),
         given_(capacity().states, 0.0) {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "rhec/core/base/angle.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/kkt.hpp"
 
 namespace rhec::sim {

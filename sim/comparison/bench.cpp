@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/sim/problems/problem_format.hpp"
 
 namespace rhec::sim {

@@ -10,7 +10,7 @@
 
 #include "format_parts.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/core/ocp/point.hpp"
+#include "rhec/core/ocp/iterate_checks.hpp"
 
 namespace rhec::sim {
 namespace {

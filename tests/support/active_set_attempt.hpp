@@ -31,7 +31,7 @@ inline double distance(const StageQp& qp, const Iterate& a, const Iterate& b) {
   return largest;
 }
 
-/// Everything that a solution needs, for one program.
+/// Everything that a solution needs, for one QP.
 struct Attempt {
   Riccati riccati;
   DualActiveSet method;

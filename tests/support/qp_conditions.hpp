@@ -9,7 +9,7 @@
 
 namespace rhec::testing {
 
-/// Largest violation of the KKT conditions of the program by a step with its multipliers.
+/// Largest violation of the KKT conditions of the QP by a step with its multipliers.
 inline double kkt_violation(const StageQp& qp, const Iterate& step) {
   double worst = 0.0;
   const int N = qp.intervals();
@@ -40,7 +40,7 @@ inline double kkt_violation(const StageQp& qp, const Iterate& step) {
   return worst;
 }
 
-/// A random strictly convex program with bounds on all controls, the tighter the smaller `tightness`, and on the
+/// A random strictly convex QP with bounds on all controls, the tighter the smaller `tightness`, and on the
 /// states.
 inline StageQp bounded_qp(RandomQp& random, bool given, double tightness) {
   StageQp qp = random.make(random.integer(2, 15), random.integer(1, 5), random.integer(1, 4), given);
@@ -59,7 +59,7 @@ inline StageQp bounded_qp(RandomQp& random, bool given, double tightness) {
   return qp;
 }
 
-/// A random program whose bounds leave room around some trajectory, so that it has a solution; the less room, the more
+/// A random QP whose bounds leave room around some trajectory, so that it has a solution; the less room, the more
 /// of them are active there.
 inline StageQp feasible_qp(RandomQp& random, bool given, double room) {
   StageQp qp = random.make(random.integer(2, 15), random.integer(1, 5), random.integer(1, 4), given);

@@ -73,7 +73,7 @@ class RandomQp {
   std::mt19937 random_;
 };
 
-/// The same program as one dense system: variables [s_0; w_0; s_1; ...], equality rows for dynamics and active bounds.
+/// The same QP as one dense system: variables [s_0; w_0; s_1; ...], equality rows for dynamics and active bounds.
 struct DenseQp {
   Eigen::MatrixXd H, E;
   Eigen::VectorXd g, e;
@@ -141,7 +141,7 @@ struct DenseQp {
     }
   }
 
-  /// [z; multipliers] of the equality-constrained program.
+  /// [z; multipliers] of the equality-constrained QP.
   Eigen::VectorXd solve() const {
     const auto n = H.rows(), m = E.rows();
     Eigen::MatrixXd kkt = Eigen::MatrixXd::Zero(n + m, n + m);

@@ -7,11 +7,16 @@
 #include <numbers>
 #include <ostream>
 #include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/control/controller.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
+#include "rhec/plugins/robot/hooks.hpp"
 #include "rhec/plugins/robot/robot.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
@@ -88,6 +93,19 @@ Path winding() {
   return Path(waypoints);
 }
 
+/// Puts an unreliable solver round each that a robot makes, and says where the last one is.
+class UnreliableSolver final : public RobotHooks {
+ public:
+  explicit UnreliableSolver(std::shared_ptr<Unreliable>& made) : made_(made) {}
+  std::shared_ptr<Solver> wrap_solver(std::string_view, std::shared_ptr<Solver> solver) const override {
+    made_ = std::make_shared<Unreliable>(std::move(solver));
+    return made_;
+  }
+
+ private:
+  std::shared_ptr<Unreliable>& made_;
+};
+
 /// A bicycle that follows a path from beside it, its controller, and another one that is told the same and never fails.
 class Drive {
  public:
@@ -100,10 +118,7 @@ class Drive {
                                "robot.yaml"),
                     "robot"));
     sound = robot.make_controller(winding());
-    robot.wrap_solvers([this](std::string_view, std::shared_ptr<Solver> inner) -> std::shared_ptr<Solver> {
-      solver = std::make_shared<Unreliable>(std::move(inner));
-      return solver;
-    });
+    robot.add_hooks(std::make_shared<UnreliableSolver>(solver));
     controller = robot.make_controller(winding());
     now.state = Eigen::VectorXd::Zero(4);
     now.state << 0.0, 0.8, 0.3, 0.0;

@@ -33,7 +33,7 @@ class CountingModel final : public testing::OtherModel {
   mutable std::atomic<int> intervals{0}, nodes{0};
 };
 
-/// All that a stage of a program is made of.
+/// All that a stage of a QP is made of.
 void expect_same(const StageQp& found, const StageQp& expected, const std::string& where) {
   ASSERT_EQ(found.intervals(), expected.intervals()) << where;
   ASSERT_EQ(found.initial_state_is_given, expected.initial_state_is_given) << where;
@@ -76,7 +76,7 @@ class Journey {
     point_ = RandomProblem::cold_start(problem);
     assess();
   }
-  /// The window is another one, of the same problem and program. Before, that held the exact Hessian for a while.
+  /// The window is another one, of the same problem and QP. Before, that held the exact Hessian for a while.
   void begin_again(const std::function<void()>& set_window) {
     if (problem_->has_second_derivatives()) remembering_->linearise(point_, Hessian::exact);
     set_window();
@@ -222,7 +222,7 @@ TEST_P(LinearisationCacheTest, AControllersQpMovesWithItsPlan) {
     for (int sample = 0; sample < 8; ++sample) {
       const int steps = sample == 5 ? 2 : 1;
       ASSERT_TRUE(journey.move(steps));
-      // Of the exact Hessian's program, the interval that comes next is known beforehand.
+      // Of the exact Hessian's QP, the interval that comes next is known beforehand.
       const int unknown = hessian == Hessian::exact ? steps - 1 : steps;
       journey.compare("sample " + std::to_string(sample), unknown, 0);
       if (HasFatalFailure()) return;

@@ -7,6 +7,7 @@
 #include "examples/problem/parking_problem.hpp"
 #include "rhec/core/horizon/shift.hpp"
 #include "rhec/core/ocp/linearisation.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 

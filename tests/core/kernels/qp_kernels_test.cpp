@@ -1,4 +1,4 @@
-// The loops over quadratic programs: every instruction set that this machine can run against the narrowest.
+// The loops over QPs: every instruction set that this machine can run against the narrowest.
 #include "rhec/core/kernels/qp_kernels.hpp"
 
 #include <gtest/gtest.h>
@@ -16,14 +16,14 @@ using testing::RandomQp;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Random rows of an iterate and a program, where some bounds are infinite.
-struct RandomProgram {
+/// Random rows of an iterate and a QP, where some bounds are infinite.
+struct RandomRows {
   StageQp qp;
   Iterate point;
   QpView view;
 
   /// Of sizes that kernels are compiled for, or of any.
-  explicit RandomProgram(RandomQp& random, bool is_usual = false)
+  explicit RandomRows(RandomQp& random, bool is_usual = false)
       : qp(random.make(random.integer(1, 9), is_usual ? random.integer(5, 8) : random.integer(1, 11),
                        is_usual ? 2 : random.integer(1, 9), random.integer(0, 1) == 0)),
         point(qp.capacity()) {
@@ -52,25 +52,25 @@ struct RandomProgram {
 TEST(QpKernels, AgreeOnRandomRows) {
   RandomQp random(9);
   for (int trial = 0; trial < 150; ++trial) {
-    RandomProgram program(random, trial % 3 == 0);
-    if (trial % 10 == 3) program.qp.state_lower(1)[0] = std::nan("");
-    if (trial % 10 == 5) program.point.state(1)[0] = infinity;
-    std::vector<unsigned char> marks(program.qp.intervals() + 1), same_marks(marks.size());
+    RandomRows rows(random, trial % 3 == 0);
+    if (trial % 10 == 3) rows.qp.state_lower(1)[0] = std::nan("");
+    if (trial % 10 == 5) rows.point.state(1)[0] = infinity;
+    std::vector<unsigned char> marks(rows.qp.intervals() + 1), same_marks(marks.size());
     const QpKernels& generic = *runnable_kernels().front().qp;
-    const KktParts kkt = generic.kkt(program.view);
-    const StepParts check = generic.check_step(program.view, 1e-10);
-    const bool crosses = generic.mark_bounds(program.view, 1e-10, marks.data());
+    const KktParts kkt = generic.kkt(rows.view);
+    const StepParts check = generic.check_step(rows.view, 1e-10);
+    const bool crosses = generic.mark_bounds(rows.view, 1e-10, marks.data());
     if (trial % 10 == 5) {
       EXPECT_FALSE(check.is_finite);
     }
     for (const KernelSet& set : runnable_kernels()) {
-      const KktParts same = set.qp->kkt(program.view);
+      const KktParts same = set.qp->kkt(rows.view);
       EXPECT_NEAR(same.stationarity, kkt.stationarity, 1e-12) << set.instruction_set;
       EXPECT_EQ(same.defect, kkt.defect);
       EXPECT_EQ(same.bound_violation, kkt.bound_violation);
       EXPECT_EQ(same.complementarity, kkt.complementarity);
       EXPECT_EQ(same.largest_term, kkt.largest_term);
-      const StepParts same_check = set.qp->check_step(program.view, 1e-10);
+      const StepParts same_check = set.qp->check_step(rows.view, 1e-10);
       EXPECT_EQ(same_check.is_finite, check.is_finite) << set.instruction_set << ", " << trial;
       if (check.is_finite) {
         EXPECT_EQ(same_check.violates, check.violates);
@@ -78,20 +78,20 @@ TEST(QpKernels, AgreeOnRandomRows) {
       if (check.is_finite) {
         EXPECT_EQ(same_check.largest_costate, check.largest_costate);
       }
-      EXPECT_EQ(set.qp->mark_bounds(program.view, 1e-10, same_marks.data()), crosses) << set.instruction_set;
+      EXPECT_EQ(set.qp->mark_bounds(rows.view, 1e-10, same_marks.data()), crosses) << set.instruction_set;
       EXPECT_EQ(same_marks, marks) << set.instruction_set;
     }
   }
 }
 
-AlignedDoubles numbers(RandomQp& random, std::size_t count) {
+AlignedDoubles numbers(RandomRows& random, std::size_t count) {
   AlignedDoubles v(count);
   for (double& entry : v) entry = random.uniform(-2.0, 2.0);
   return v;
 }
 
 TEST(QpKernels, ComputeWhatTheySay) {
-  RandomQp random(14);
+  RandomRows random(14);
   for (int trial = 0; trial < 40; ++trial) {
     const int width = padded(random.integer(1, 20));
     const AlignedDoubles a = numbers(random, width), b = numbers(random, width), h = numbers(random, width);

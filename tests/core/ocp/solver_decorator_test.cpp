@@ -39,14 +39,14 @@ class Witness final : public Solver {
 
   std::vector<std::string> calls;
   const Ocp* problem = nullptr;
-  const Iterate* iterate = nullptr;
-  Clock::time_point deadline;
+  const Iterate* last_iterate = nullptr;
+  Clock::time_point last_deadline;
 
  private:
   void take(const char* call, const Iterate& asked, Clock::time_point until = {}) {
     calls.emplace_back(call);
-    iterate = &asked;
-    deadline = until;
+    last_iterate = &asked;
+    last_deadline = until;
   }
   static Report report(int iterations) {
     Report made;
@@ -87,16 +87,16 @@ TEST(SolverDecorator, HandsOnEveryCallAndItsAnswer) {
   Iterate iterate(Capacity{1, 1, 1});
   const Iterate other(Capacity{1, 1, 1});
   decorator.prepare(other);
-  EXPECT_EQ(witness->iterate, &other);
+  EXPECT_EQ(witness->last_iterate, &other);
   const auto deadline = Clock::now();
   EXPECT_EQ(decorator.solve(iterate, deadline).iterations, 1);
-  EXPECT_EQ(witness->iterate, &iterate);
-  EXPECT_EQ(witness->deadline, deadline);
+  EXPECT_EQ(witness->last_iterate, &iterate);
+  EXPECT_EQ(witness->last_deadline, deadline);
   EXPECT_EQ(decorator.solve(iterate).iterations, 1);
-  EXPECT_EQ(witness->deadline, Clock::time_point::max());
+  EXPECT_EQ(witness->last_deadline, Clock::time_point::max());
   Report report = decorator.feedback(iterate, deadline);
   EXPECT_EQ(report.iterations, 2);
-  EXPECT_EQ(witness->deadline, deadline);
+  EXPECT_EQ(witness->last_deadline, deadline);
   decorator.finish(iterate, report);
   EXPECT_EQ(report.iterations, 3);
   double block = 0.0;

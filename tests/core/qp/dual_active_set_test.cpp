@@ -135,7 +135,7 @@ TEST(DualActiveSet, LeavesWhatIsNotConvexToConvexification) {
     solver.guess_from(qp, step);
     ASSERT_NE(solver.solve(qp, step), StageQpSolver::Outcome::infeasible) << "trial " << trial;
     ASSERT_TRUE(solver.was_convexified());
-    // The multipliers belong to the program as it was bent; the bounds are those that were given.
+    // The multipliers belong to the QP as it was bent; the bounds are those that were given.
     for (int i = 0; i <= qp.intervals(); ++i) {
       for (int j = 0; i > 0 && j < qp.states(i); ++j) {
         ASSERT_GT(step.state(i)[j], qp.state_lower(i)[j] - 1e-8);

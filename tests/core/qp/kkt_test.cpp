@@ -11,7 +11,7 @@ namespace {
 
 using testing::RandomQp;
 
-/// A program without defects, linearised at a point that is stationary.
+/// A QP without defects, linearised at a point that is stationary.
 struct Stationary {
   explicit Stationary(bool given, unsigned seed) : qp(RandomQp(seed).make(5, 3, 2, given)), point(qp.capacity()) {
     for (int i = 0; i <= 5; ++i) {

@@ -15,7 +15,7 @@ using rhec::testing::feasible_qp;
 using rhec::testing::kkt_violation;
 using rhec::testing::RandomQp;
 
-TEST(StageQpSolver, SolvesRandomProgramsToTheirKktConditions) {
+TEST(StageQpSolver, SolvesRandomQpsToTheirKktConditions) {
   RandomQp random(11);
   int exact = 0, interior = 0;
   for (int trial = 0; trial < 500; ++trial) {
@@ -133,7 +133,7 @@ TEST(StageQpSolver, SaysSoWhenTheBoundsCannotBeSatisfied) {
     Iterate step(qp.capacity());
     solver.guess_from(qp, step);
     EXPECT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::infeasible) << "trial " << trial;
-    // And the next program is solved as if nothing had happened.
+    // And the next QP is solved as if nothing had happened.
     StageQp good = bounded_qp(random, true, 1.0);
     StageQpSolver fresh(good.capacity());
     Iterate answer(good.capacity());

@@ -12,7 +12,7 @@ namespace {
 
 using testing::RandomQp;
 
-/// All that a program holds of one stage and that moves.
+/// All that a QP holds of one stage and that moves.
 std::vector<double> contents(const StageQp& qp, int i) {
   const Capacity& capacity = qp.capacity();
   std::vector<double> all;

@@ -47,8 +47,8 @@ TEST(TruthEstimator, IsNotMadeWithoutAVehicle) {
   const auto error = [](const auto& act) -> std::string {
     try {
       act();
-    } catch (const Error& error) {
-      return error.what();
+    } catch (const Error& thrown) {
+      return thrown.what();
     }
     return "(no error)";
   };

@@ -13,9 +13,9 @@ namespace {
 using namespace testing;
 using Vector = std::vector<double>;
 
-/// The program at a point near a problem's cold start, with multipliers of the size of its gradient.
-struct Program {
-  Program(const Ocp& ocp, const Iterate& start, RandomProblem& random, Curvature curvature)
+/// The NLP at a point near a problem's cold start, with multipliers of the size of its gradient.
+struct TestNlp {
+  TestNlp(const Ocp& ocp, const Iterate& start, RandomProblem& random, Curvature curvature)
       : nlp(new OcpNlp(ocp, curvature)) {
     nlp->take(ocp);
     nlp->get_nlp_info(n, m, jacobian_entries, hessian_entries, style);
@@ -64,26 +64,26 @@ struct Program {
 };
 
 void check_derivatives(const HorizonProblem& problem, RandomProblem& random) {
-  Program program(problem, RandomProblem::cold_start(problem), random, Curvature::exact);
+  TestNlp test(problem, RandomProblem::cold_start(problem), random, Curvature::exact);
   constexpr double step = 1e-6;
   // 1e-4: where the weight is too small to be divided by.
   for (const double factor : {0.0, 1e-4, 1.0, 2.0}) {
-    const Vector gradient = program.gradient(program.z, factor);
-    const auto hessian = program.hessian(factor);
+    const Vector gradient = test.gradient(test.z, factor);
+    const auto hessian = test.hessian(factor);
     double scale = 1.0, curvature = 1.0;
-    for (int c = 0; c < program.n; ++c) {
+    for (int c = 0; c < test.n; ++c) {
       scale = std::max(scale, std::abs(gradient[c]));
       for (const double value : hessian[c]) curvature = std::max(curvature, std::abs(value));
     }
-    for (int c = 0; c < program.n; ++c) {
-      Vector before = program.z, after = program.z;
+    for (int c = 0; c < test.n; ++c) {
+      Vector before = test.z, after = test.z;
       before[c] -= step;
       after[c] += step;
-      EXPECT_NEAR(gradient[c], (program.lagrangian(after, factor) - program.lagrangian(before, factor)) / (2.0 * step),
+      EXPECT_NEAR(gradient[c], (test.lagrangian(after, factor) - test.lagrangian(before, factor)) / (2.0 * step),
                   1e-5 * scale)
           << "weight " << factor << ", variable " << c;
-      const Vector low = program.gradient(before, factor), high = program.gradient(after, factor);
-      for (int r = 0; r < program.n; ++r)
+      const Vector low = test.gradient(before, factor), high = test.gradient(after, factor);
+      for (int r = 0; r < test.n; ++r)
         EXPECT_NEAR(hessian[c][r], (high[r] - low[r]) / (2.0 * step), 1e-6 * curvature)
             << "weight " << factor << ", " << r << ", " << c;
     }
@@ -103,11 +103,11 @@ TEST(IpoptProgram, DerivativesAreThoseOfItsFunctionsWithAnyWeightOfTheObjective)
 TEST(IpoptProgram, GaussNewtonCurvatureIsOfTheObjectiveAlone) {
   RandomProblem random(bicycle(), 2);
   const auto problem = random.rhe(blocks_of(3, 5));
-  Program program(*problem, RandomProblem::cold_start(*problem), random, Curvature::gauss_newton);
-  const auto none = program.hessian(0.0), once = program.hessian(1.0), twice = program.hessian(2.0);
+  TestNlp test(*problem, RandomProblem::cold_start(*problem), random, Curvature::gauss_newton);
+  const auto none = test.hessian(0.0), once = test.hessian(1.0), twice = test.hessian(2.0);
   double largest = 0.0;
-  for (int c = 0; c < program.n; ++c) {
-    for (int r = 0; r < program.n; ++r) {
+  for (int c = 0; c < test.n; ++c) {
+    for (int r = 0; r < test.n; ++r) {
       EXPECT_EQ(none[c][r], 0.0);
       EXPECT_EQ(twice[c][r], 2.0 * once[c][r]);
       largest = std::max(largest, once[c][r]);
@@ -121,17 +121,17 @@ TEST(IpoptProgram, EvaluatesEveryPointOnce) {
   RandomProblem random(bicycle(), 3);
   const auto problem = random.rhe(blocks_of(3));
   const Scaled counted(*problem, 1.0);
-  Program program(counted, RandomProblem::cold_start(*problem), random, Curvature::exact);
+  TestNlp test(counted, RandomProblem::cold_start(*problem), random, Curvature::exact);
   counted.evaluations = counted.linearisations = 0;
   for (int repeat = 0; repeat < 2; ++repeat) {
-    program.lagrangian(program.z, 1.0);
-    program.gradient(program.z, 1.0);
+    test.lagrangian(test.z, 1.0);
+    test.gradient(test.z, 1.0);
   }
   EXPECT_EQ(counted.evaluations, 1);
   EXPECT_EQ(counted.linearisations, 1);
-  program.z[0] += 0.1;
-  program.gradient(program.z, 1.0);
-  program.lagrangian(program.z, 1.0);
+  test.z[0] += 0.1;
+  test.gradient(test.z, 1.0);
+  test.lagrangian(test.z, 1.0);
   EXPECT_EQ(counted.evaluations, 2);
   EXPECT_EQ(counted.linearisations, 2);
 }

@@ -97,7 +97,7 @@ TEST(CondensedProblem, LeavesOutWhatItsBoundsFix) {
   ASSERT_TRUE(problem.take(*ocp));
   EXPECT_EQ(problem.variables(), before - 1);
   problem.move_to(problem.read(RandomProblem::cold_start(*ocp)));
-  EXPECT_EQ(problem.point().control(3)[0], 0.7);
+  EXPECT_EQ(problem.iterate().control(3)[0], 0.7);
 }
 
 }  // namespace

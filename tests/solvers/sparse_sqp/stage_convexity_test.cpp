@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "programs.hpp"
+#include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
 namespace {
@@ -24,7 +24,7 @@ TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
       exact.Q_of(i).diagonal().array() -= shift;
       exact.R_of(i).diagonal().array() -= shift;
     }
-    const Program before(exact);
+    const TestQp before(exact);
     std::vector<std::uint8_t> fixed(before.n, 0);
     // Controls, or states in place of them: of a node as many as there are controls that lead to it.
     std::ptrdiff_t variable = exact.initial_state_is_given ? 0 : exact.states(0);
@@ -44,7 +44,7 @@ TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
       ++untouched;
     } else {
       EXPECT_GT(taken, 0) << trial;
-      EXPECT_GT(least_reduced_eigenvalue(Program(convex), fixed), 0.0) << trial;
+      EXPECT_GT(least_reduced_eigenvalue(TestQp(convex), fixed), 0.0) << trial;
       ++bent;
       stages_seen += N + 1;
       stages_taken += taken;

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "programs.hpp"
+#include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
 namespace {
@@ -15,15 +15,15 @@ using namespace testing;
 TEST(StageCovariances, AreThoseOfTheDenseInverse) {
   RandomQp random(5);
   for (int trial = 0; trial < 40; ++trial) {
-    const Program program(random_stages(random));
-    const int stride = program.qp.capacity().states, N = program.qp.intervals();
+    const TestQp test(random_stages(random));
+    const int stride = test.qp.capacity().states, N = test.qp.intervals();
     std::vector<double> blocks(static_cast<std::size_t>(N + 1) * stride * stride, -7.0);
-    ASSERT_TRUE(stage_covariances(program.qp, blocks)) << trial;
-    const Eigen::MatrixXd K = dense_kkt(program, Eigen::VectorXd::Zero(program.n), Eigen::VectorXd::Zero(program.m),
-                                        std::vector<std::uint8_t>(program.n, 0)),
+    ASSERT_TRUE(stage_covariances(test.qp, blocks)) << trial;
+    const Eigen::MatrixXd K = dense_kkt(test, Eigen::VectorXd::Zero(test.n), Eigen::VectorXd::Zero(test.m),
+                                        std::vector<std::uint8_t>(test.n, 0)),
                           inverse = K.fullPivLu().inverse();
     for (int i = 0; i <= N; ++i) {
-      const int start = program.nlp.state_start(i);
+      const int start = test.nlp.state_start(i);
       for (int c = 0; c < stride; ++c)
         for (int r = 0; r < stride; ++r) {
           const double expected = start < 0 ? 0.0 : 2.0 * inverse(start + r, start + c);

@@ -123,7 +123,8 @@ class RHEC_EXPORT StageQp {
     return v.data() + static_cast<std::ptrdiff_t>(i) * rows * stride_;
   }
   bool is_held(const AlignedDoubles& v, int i, int rows) const noexcept {
-    return i >= 0 && (static_cast<std::ptrdiff_t>(i) + 1) * rows * stride_ <= std::ssize(v);
+    // Kernels take the address that stage 0 would have, whether a window holds it or not.
+    return window_ > 0 || (i >= 0 && (static_cast<std::ptrdiff_t>(i) + 1) * rows * stride_ <= std::ssize(v));
   }
   double* control_rows(int i) noexcept { return H(i) + static_cast<std::ptrdiff_t>(capacity_.states) * stride_; }
   const double* control_rows(int i) const noexcept {

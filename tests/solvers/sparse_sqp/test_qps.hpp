@@ -1,6 +1,6 @@
 #pragma once
 
-// Stage programs as sparse ones and as dense matrices.
+// Stage QPs as sparse ones and as dense matrices.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using rhec::testing::RandomQp;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// The sizes of a stage program as an Ocp, for the patterns that the sparse view makes of them. It has no numbers.
+/// The sizes of a stage QP as an Ocp, for the patterns that the sparse view makes of them. It has no numbers.
 class Shape final : public Ocp {
  public:
   explicit Shape(const StageQp& qp) : qp_(qp), origin_(qp.capacity().states, 0.0) {}
@@ -50,9 +50,9 @@ class Shape final : public Ocp {
   std::vector<double> origin_;
 };
 
-/// A stage program as a sparse one, and as dense matrices.
-struct Program {
-  explicit Program(const StageQp& stages) : qp(stages), shape(qp) {
+/// A stage QP as a sparse one, and as dense matrices.
+struct TestQp {
+  explicit TestQp(const StageQp& stages) : qp(stages), shape(qp) {
     nlp.take_structure(shape);
     n = nlp.variables();
     m = nlp.constraints();
@@ -111,14 +111,14 @@ inline StageQp random_stages(RandomQp& random) {
 }
 
 /// The whole matrix K, dense.
-inline Eigen::MatrixXd dense_kkt(const Program& program, const Eigen::VectorXd& primal, const Eigen::VectorXd& dual,
+inline Eigen::MatrixXd dense_kkt(const TestQp& test, const Eigen::VectorXd& primal, const Eigen::VectorXd& dual,
                                  const std::vector<std::uint8_t>& fixed) {
-  const int n = program.n, m = program.m;
+  const int n = test.n, m = test.m;
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(n + m, n + m);
-  K.topLeftCorner(n, n) = program.H;
+  K.topLeftCorner(n, n) = test.H;
   K.topLeftCorner(n, n).diagonal() += primal;
-  K.bottomLeftCorner(m, n) = program.J;
-  K.topRightCorner(n, m) = program.J.transpose();
+  K.bottomLeftCorner(m, n) = test.J;
+  K.topRightCorner(n, m) = test.J.transpose();
   K.bottomRightCorner(m, m).diagonal() = -dual;
   for (int k = 0; k < n; ++k) {
     if (!fixed[k]) continue;
@@ -130,11 +130,11 @@ inline Eigen::MatrixXd dense_kkt(const Program& program, const Eigen::VectorXd& 
 }
 
 /// The least eigenvalue of the reduced Hessian where some variables do not move.
-inline double least_reduced_eigenvalue(const Program& program, const std::vector<std::uint8_t>& fixed) {
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(program.m + std::count(fixed.begin(), fixed.end(), 1), program.n);
-  rows.topRows(program.m) = program.J;
-  Eigen::Index row = program.m;
-  for (int k = 0; k < program.n; ++k)
+inline double least_reduced_eigenvalue(const TestQp& test, const std::vector<std::uint8_t>& fixed) {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(test.m + std::count(fixed.begin(), fixed.end(), 1), test.n);
+  rows.topRows(test.m) = test.J;
+  Eigen::Index row = test.m;
+  for (int k = 0; k < test.n; ++k)
     if (fixed[k] != 0) rows(row++, k) = 1.0;
   const Eigen::FullPivLU<Eigen::MatrixXd> lu(rows);
   EXPECT_EQ(lu.rank(), rows.rows()) << "what is fixed contradicts the equations";
@@ -142,7 +142,7 @@ inline double least_reduced_eigenvalue(const Program& program, const std::vector
   const Eigen::MatrixXd Z = lu.kernel();
   const Eigen::MatrixXd Q =
       Eigen::HouseholderQR<Eigen::MatrixXd>(Z).householderQ() * Eigen::MatrixXd::Identity(Z.rows(), Z.cols());
-  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Q.transpose() * program.H * Q).eigenvalues()[0];
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Q.transpose() * test.H * Q).eigenvalues()[0];
 }
 
 }  // namespace rhec::sparse_sqp::testing
