@@ -15,16 +15,23 @@ using testing::Pair;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
+Variable variable(const char* unit, double scale, double lower = -infinity, double upper = infinity) {
+  Variable made;
+  made.name = "a";
+  made.unit = unit;
+  made.scale = scale;
+  made.lower = lower;
+  made.upper = upper;
+  return made;
+}
+
 TEST(RangeOf, IsThatOfTheBoundsOrOfScales) {
-  EXPECT_THAT(range_of({.name = "a", .unit = "m", .lower = -1.0, .upper = 3.0}, 10.0), Pair(-1.0, 3.0));
-  EXPECT_THAT(range_of({.name = "a", .unit = "m", .scale = 2.0}, 10.0), Pair(-20.0, 20.0));
-  EXPECT_THAT(range_of({.name = "a", .unit = "rad", .scale = 0.1}, 1.0), Pair(-std::numbers::pi, std::numbers::pi));
-  EXPECT_THAT(range_of({.name = "a", .unit = "m", .lower = -1.0, .upper = infinity, .scale = 2.0}, 10.0),
-              Pair(-1.0, 20.0));
-  EXPECT_THAT(range_of({.name = "a", .unit = "m", .lower = 5.0, .upper = infinity, .scale = 2.0}, 10.0),
-              Pair(5.0, 25.0));
-  EXPECT_THAT(range_of({.name = "a", .unit = "m", .lower = -infinity, .upper = -5.0, .scale = 2.0}, 10.0),
-              Pair(-25.0, -5.0));
+  EXPECT_THAT(range_of(variable("m", 1.0, -1.0, 3.0), 10.0), Pair(-1.0, 3.0));
+  EXPECT_THAT(range_of(variable("m", 2.0), 10.0), Pair(-20.0, 20.0));
+  EXPECT_THAT(range_of(variable("rad", 0.1), 1.0), Pair(-std::numbers::pi, std::numbers::pi));
+  EXPECT_THAT(range_of(variable("m", 2.0, -1.0), 10.0), Pair(-1.0, 20.0));
+  EXPECT_THAT(range_of(variable("m", 2.0, 5.0), 10.0), Pair(5.0, 25.0));
+  EXPECT_THAT(range_of(variable("m", 2.0, -infinity, -5.0), 10.0), Pair(-25.0, -5.0));
 }
 
 TEST(RandomStages, KeepAwayFromBoundsAndStandStillNowAndThen) {

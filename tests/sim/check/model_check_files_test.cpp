@@ -18,13 +18,15 @@ ModelCheck made_up() {
   check.seed = 7;
   check.parameters = {"grip", "drag"};
   check.states = {"pos", "lean"};
-  check.findings = {{.check = "description", .verdict = Verdict::pass, .found = "nothing"},
-                    {.check = "derivatives",
-                     .verdict = Verdict::warn,
-                     .where = "d next pos / d lean",
-                     .found = "0.5 and not 0.25",
-                     .advice = "mend it",
-                     .numbers = {{"given", 0.5}, {"expected", infinity}}}};
+  Finding good, bad;
+  good.check = "description";
+  bad.check = "derivatives";
+  bad.verdict = Verdict::warn;
+  bad.where = "d next pos / d lean";
+  bad.found = "0.5 and not 0.25";
+  bad.advice = "mend it";
+  bad.numbers = {{"given", 0.5}, {"expected", infinity}};
+  check.findings = {good, bad};
   DriveInformation drive;
   drive.name = "turn";
   drive.unknowns = 4;
@@ -34,7 +36,9 @@ ModelCheck made_up() {
   drive.state_determined = {true, false};
   drive.undetermined = {"0.71 lean - 0.71 drag"};
   check.drives = {drive};
-  check.times = {{.instruction_set = "generic", .values = {1.0, 2.0, 3.0}}};
+  check.times.emplace_back();
+  check.times.front().instruction_set = "generic";
+  check.times.front().values = {1.0, 2.0, 3.0};
   return check;
 }
 

@@ -1,7 +1,7 @@
 // The files of a replay, of estimates that are made up here.
 #include <gmock/gmock.h>
 
-#include <cmath>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -23,7 +23,7 @@ constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 RecordedLog two_fixes() {
   RecordedLog log;
   log.rows.resize(5);
-  log.fixes = {{.time = 1.0, .x = 10.0, .y = 20.0}, {.time = 2.0, .x = 11.0, .y = missing, .line = 2, .agrees = true}};
+  log.fixes = {{1.0, 10.0, 20.0, 1, false}, {2.0, 11.0, missing, 2, true}};
   log.missing_coordinates = 1;
   log.missing_speeds = 3;
   return log;

@@ -28,7 +28,7 @@ Sample sample_at(std::int64_t step) {
   sample.parameters = Eigen::Vector2d(0.75, 0.875);
   sample.nees = missing;
   sample.inputs = {4.0, -0.5};
-  sample.reference = {.x = 1.0, .y = 2.25, .heading = 0.5};
+  sample.reference = {1.0, 2.25, 0.5, 8.0};
   sample.tracking = -0.25;
   sample.controller_status = Status::iteration_limit;
   sample.controller_fallback = true;

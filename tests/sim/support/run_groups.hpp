@@ -12,7 +12,7 @@ namespace rhec::sim {
 inline RunGroup group_of(std::map<std::string, std::string> keys, int runs = 1) {
   RunGroup group;
   group.keys = std::move(keys);
-  for (int seed = 1; seed <= runs; ++seed) group.outcomes.push_back({.seed = std::int64_t{seed}, .values = {}});
+  for (int seed = 1; seed <= runs; ++seed) group.outcomes.push_back({seed, {}});
   return group;
 }
 
