@@ -127,7 +127,9 @@ TEST_F(AssessorTest, DistanceIsInScalesAndAcrossWholeTurns) {
 }
 
 TEST_F(AssessorTest, OfAWindowWithoutIntervalsParametersCount) {
-  const auto problem = random_.rhe({.intervals = 0});
+  RandomProblem::RheSpec spec;
+  spec.intervals = 0;
+  const auto problem = random_.rhe(spec);
   assessor_.begin(*problem);
   const Iterate one(problem->capacity());
   Iterate other = one;

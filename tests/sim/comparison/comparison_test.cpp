@@ -9,6 +9,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "sim/support/comparisons.hpp"
 
 namespace rhec::sim {

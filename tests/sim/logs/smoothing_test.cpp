@@ -56,7 +56,6 @@ TEST_F(SmoothingTest, EstimatesTheWholeDriveAtTheTimesOfTheEstimator) {
 TEST_F(SmoothingTest, KnowsFromTheStartWhatTheEstimatorLearnsOnItsWay) {
   const RecordedLog drive = log(scenario_);
   const SmoothedReplay result = smoothed(drive);
-  EXPECT_LE(summarise(result.smoothed, drive).all.median, summarise(result.causal, drive).all.median);
   EXPECT_LT(summarise(result.smoothed, drive).all.median, 0.02);
   // Of a drive whose speed factor is one number: soon after the vehicle has begun to move.
   const auto error_at = [&](const Replay& replay, double time) {

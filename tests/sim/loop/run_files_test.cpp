@@ -102,7 +102,9 @@ TEST(RunSummaryJson, HasWhatTheRunCameTo) {
 }
 
 TEST(RunSvg, HasATitleAndAPanelForEachParameterAndTheTracking) {
-  const std::string svg = run_svg(two_samples(), figure8_with({"name=my run", "seed=7"}));
+  RunLog log = two_samples();
+  log.samples[0].sigma = log.samples[1].sigma;
+  const std::string svg = run_svg(log, figure8_with({"name=my run", "seed=7"}));
   for (const char* words : {"my run", "8 m/s, seed 7; the end of the path was reached", "true kappa",
                             "Distance from the path", "estimated"})
     EXPECT_THAT(svg, HasSubstr(words));

@@ -116,7 +116,7 @@ TEST_F(SweepRunsTest, WhatWasNotCompletedHasNoValues) {
   const SweepRuns runs = read_sweep_runs(path());
   for (const RunGroup& group : runs.groups)
     for (const SeedOutcome& outcome : group.outcomes) EXPECT_EQ(outcome.values.empty(), outcome.seed != 1);
-  EXPECT_THAT(runs.statuses, ElementsAre(Pair("completed", 1), Pair("not_completed", 1), Pair("refused", 1)));
+  EXPECT_THAT(runs.statuses, ElementsAre(Pair("completed", 1), Pair("not completed", 1), Pair("refused", 1)));
   EXPECT_THAT(runs.programs, ElementsAre("one", "two"));
 }
 
