@@ -37,7 +37,7 @@ UNTESTED = {
     "apps/main.cpp": "tests/cli/bad_input.py: commands, usage and exit codes",
     "apps/options.cpp": "tests/cli/configuration.py: docs/configuration.md is what it prints",
     "apps/plugins.cpp": "tests/cli/runs.py: the list, and one plugin's options; tests/cli/doctor.py has --doctor",
-    "apps/report/embedded.cpp": "tests/report/report.py: the page is looked at in a browser; without it there is none",
+    "apps/report/embedded.cpp": "tests/report/report.py: the page, which it holds, is looked at in a browser",
     "apps/report/report_page.cpp": "tests/cli/report.py: the document is read from the page",
     "apps/report/svg_engine.cpp": "tests/report/figures.py: each figure of each kind of report",
     "apps/run.cpp": "tests/cli/runs.py: every choice of a scenario, and what a run leaves behind",

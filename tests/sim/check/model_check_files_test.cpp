@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 
 #include <limits>
-#include <string>
 
 #include "rhec/sim/check/model_check.hpp"
 #include "rhec/sim/files/json.hpp"

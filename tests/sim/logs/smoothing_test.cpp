@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <string>
-#include <vector>
 
 #include "sim/support/message_of.hpp"
 #include "sim/support/recorded_drive.hpp"

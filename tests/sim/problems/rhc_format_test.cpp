@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 
 #include <limits>
-#include <string>
 #include <vector>
 
 #include "rhec/core/horizon/rhc_problem.hpp"

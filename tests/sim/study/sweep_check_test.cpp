@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 
 #include <set>
-#include <string>
 #include <vector>
 
 #include "sim/support/sweeps.hpp"

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <limits>
 #include <string>
-#include <vector>
 
 #include "sim/support/message_of.hpp"
 
