@@ -85,6 +85,26 @@ TEST_F(DrivesTest, ATurnGoesOnAndASlalomGoesToBothSides) {
   }
 }
 
+/// What the unicycle's yaw rate follows is its own rate, as of a steering angle.
+struct Steered : Unicycle {
+  template <class Scalar>
+  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    Unicycle::dynamics(x, u, p, dxdt);
+    dxdt[3] = u[1];
+  }
+};
+
+TEST_F(DrivesTest, AnInputThatWouldDriveAStateTooFarIsLeftOut) {
+  FormulaModel<Steered> model({}, unicycle_description());
+  const ModelCheckOptions options;
+  const CheckedModel checked{model, model.description(), options, {0.1, 0.1}, {0.1, 0.1}};
+  for (const Drive& drive : Drives(checked).all()) {
+    if (drive.name != "turn" && drive.name != "slalom") continue;
+    EXPECT_LE(drive.states.row(3).cwiseAbs().maxCoeff(), 0.4 + 1e-9) << drive.name << ": the inner half of its bounds";
+    EXPECT_GT(drive.states.row(3).cwiseAbs().maxCoeff(), 0.2) << drive.name;
+  }
+}
+
 TEST_F(DrivesTest, SensitivitiesAreThoseOfTheIntervals) {
   const Drive& drive = named("turn");
   constexpr double step = 1e-6, interval = 0.2;

@@ -31,13 +31,20 @@ TEST(Spread, AQuantileIsOneOfTheValues) {
   EXPECT_EQ(one.max, -7.0);
 }
 
+TEST(Spread, WhatIsMissingDoesNotCount) {
+  constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+  const Spread spread = spread_of({missing, 1.0, missing, 3.0, 2.0, missing, missing});
+  EXPECT_EQ(spread.median, 2.0);
+  EXPECT_EQ(spread.p99, 3.0);
+  EXPECT_EQ(spread.max, 3.0);
+  EXPECT_TRUE(std::isnan(spread_of({missing, missing}).max)) << "none of them is a number";
+}
+
 TEST(Spread, WhatIsInfiniteCounts) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   const Spread spread = spread_of({infinity, 1.0, 2.0});
   EXPECT_EQ(spread.median, 2.0);
   EXPECT_EQ(spread.max, infinity);
-  const double missing = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(std::isnan(spread_of({missing, missing}).max)) << "none of them is a number";
 }
 
 }  // namespace
