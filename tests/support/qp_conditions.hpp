@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "support/random_qp.hpp"
 
 namespace rhec::testing {
@@ -16,14 +17,14 @@ inline double kkt_violation(const StageQp& qp, const Iterate& step) {
   for (int i = 0; i <= N; ++i) {
     const Eigen::Map<const Eigen::VectorXd> s(step.state(i), qp.states(i)),
         w(step.control(i < N ? i : 0), qp.controls(i));
-    Eigen::VectorXd by_state = qp.Q_of(i) * s + qp.q_of(i);
+    Eigen::VectorXd by_state = Q_of(qp, i) * s + q_of(qp, i);
     Eigen::VectorXd by_control = Eigen::VectorXd::Zero(qp.controls(i));
     if (i < N) {
       const Eigen::Map<const Eigen::VectorXd> costate(step.costate(i + 1), qp.states(i + 1));
-      by_state += qp.S_of(i).transpose() * w + qp.A_of(i).transpose() * costate;
-      by_control = qp.R_of(i) * w + qp.S_of(i) * s + qp.r_of(i) + qp.B_of(i).transpose() * costate;
+      by_state += S_of(qp, i).transpose() * w + A_of(qp, i).transpose() * costate;
+      by_control = R_of(qp, i) * w + S_of(qp, i) * s + r_of(qp, i) + B_of(qp, i).transpose() * costate;
       const Eigen::Map<const Eigen::VectorXd> next(step.state(i + 1), qp.states(i + 1));
-      worst = std::max(worst, (qp.A_of(i) * s + qp.B_of(i) * w + qp.b_of(i) - next).lpNorm<Eigen::Infinity>());
+      worst = std::max(worst, (A_of(qp, i) * s + B_of(qp, i) * w + b_of(qp, i) - next).lpNorm<Eigen::Infinity>());
     }
     const auto check = [&](double gradient, double multiplier, double value, double lower, double upper) {
       worst = std::max({worst, std::abs(gradient + multiplier), lower - value, value - upper});
@@ -77,7 +78,7 @@ inline StageQp feasible_qp(RandomQp& random, bool given, double room) {
       w[j] = random.uniform(-1.0, 1.0);
       bound(w[j], qp.control_lower(i)[j], qp.control_upper(i)[j]);
     }
-    s = qp.A_of(i) * s + qp.B_of(i) * w + qp.b_of(i);
+    s = A_of(qp, i) * s + B_of(qp, i) * w + b_of(qp, i);
   }
   return qp;
 }

@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 
 #include "rhec/core/qp/riccati.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 
 namespace rhec::testing {
 
@@ -29,10 +30,10 @@ class RandomQp {
       const int n = states + m;
       Eigen::MatrixXd root = Eigen::MatrixXd::NullaryExpr(n, n, [&] { return uniform(-1.0, 1.0); });
       const Eigen::MatrixXd H = root * root.transpose() + 0.1 * Eigen::MatrixXd::Identity(n, n);
-      qp.Q_of(i) = H.topLeftCorner(states, states);
-      qp.S_of(i) = H.bottomLeftCorner(m, states);
-      qp.S_transposed_of(i) = H.topRightCorner(states, m);
-      qp.R_of(i) = H.bottomRightCorner(m, m);
+      Q_of(qp, i) = H.topLeftCorner(states, states);
+      S_of(qp, i) = H.bottomLeftCorner(m, states);
+      S_transposed_of(qp, i) = H.topRightCorner(states, m);
+      R_of(qp, i) = H.bottomRightCorner(m, m);
       for (int c = 0; c < states; ++c) {
         qp.q(i)[c] = uniform(-1.0, 1.0);
         qp.state_lower(i)[c] = -infinity;
@@ -95,19 +96,19 @@ struct DenseQp {
     std::vector<double> right;
     for (int i = 0; i <= N; ++i) {
       const int n = qp.states(i), m = qp.controls(i), x = state_at[i], w = control_at[i];
-      H.block(x, x, n, n) = qp.Q_of(i);
-      g.segment(x, n) = qp.q_of(i);
+      H.block(x, x, n, n) = Q_of(qp, i);
+      g.segment(x, n) = q_of(qp, i);
       if (m > 0) {
-        H.block(w, x, m, n) = qp.S_of(i);
-        H.block(x, w, n, m) = qp.S_of(i).transpose();
-        H.block(w, w, m, m) = qp.R_of(i);
-        g.segment(w, m) = qp.r_of(i);
+        H.block(w, x, m, n) = S_of(qp, i);
+        H.block(x, w, n, m) = S_of(qp, i).transpose();
+        H.block(w, w, m, m) = R_of(qp, i);
+        g.segment(w, m) = r_of(qp, i);
       }
       if (i == N) break;
       for (int k = 0; k < qp.states(i + 1); ++k) {
         Eigen::VectorXd row = Eigen::VectorXd::Zero(size);
-        row.segment(x, n) = qp.A_of(i).row(k);
-        if (m > 0) row.segment(w, m) = qp.B_of(i).row(k);
+        row.segment(x, n) = A_of(qp, i).row(k);
+        if (m > 0) row.segment(w, m) = B_of(qp, i).row(k);
         row[state_at[i + 1] + k] = -1.0;
         rows.push_back(row);
         right.push_back(-qp.b(i)[k]);
