@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "rhec/core/qp/riccati.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "support/dense_solution.hpp"
 
 namespace rhec {
@@ -84,7 +85,7 @@ TEST(SpecialStages, ConvexifiesWhatIsNotPositiveDefiniteAndCanWriteItBack) {
   for (int trial = 0; trial < 50; ++trial) {
     StageQp qp = random.make(5, 3, 2, true);
     for (int i = 0; i < 5; ++i)
-      for (int j = 0; j < qp.controls(i); ++j) qp.R_of(i)(j, j) -= 4.0;
+      for (int j = 0; j < qp.controls(i); ++j) R_of(qp, i)(j, j) -= 4.0;
     Riccati riccati(qp.capacity());
     const ActiveSet none(qp.capacity());
     Iterate step(qp.capacity()), again(qp.capacity());
