@@ -2,6 +2,8 @@
 #include "rhec/core/kernels/riccati_kernels.hpp"
 
 #include <gtest/gtest.h>
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 #include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/qp/stage_qp_views.hpp"

@@ -1,5 +1,6 @@
 // The stages of the recursion that core/qp/special_stages.cpp takes: controls that have to keep bounds of the next
 // state, a free initial state that is held at bounds, and reduced Hessians that are not positive definite.
+#include <Eigen/SVD>
 #include <array>
 #include <cmath>
 #include <vector>
