@@ -8,6 +8,7 @@
 #include "rhec/core/kernels/riccati_kernels.hpp"
 #include "rhec/core/qp/riccati.hpp"
 #include "rhec/core/qp/small_matrix.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "tolerances.hpp"
 
 namespace rhec {
@@ -173,7 +174,7 @@ void Riccati::write_convexified(StageQp& qp) noexcept {
     if (is_special_[i] == 0) continue;
     const Special v = special(i);
     const int m = qp.controls(i);
-    auto R = qp.R_of(i);
+    auto R = R_of(qp, i);
     for (int c = 0; c < m; ++c) {
       for (int r = c; r < m; ++r) {
         double now = 0.0;

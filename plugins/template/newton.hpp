@@ -6,6 +6,7 @@
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/riccati.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 
 /// The method of plain_sqp: Newton steps for the dynamics and an augmented Lagrangian of the bounds, computed by the
 /// core's Riccati recursion, with a line search on Merit.
@@ -70,8 +71,8 @@ class Newton {
   double largest_curvature() const {
     double largest = 1.0;
     for (int i = 0; i <= qp.intervals(); ++i) {
-      for (int j = 0; j < qp.states(i); ++j) largest = std::max(largest, qp.Q_of(i)(j, j));
-      for (int j = 0; j < qp.controls(i); ++j) largest = std::max(largest, qp.R_of(i)(j, j));
+      for (int j = 0; j < qp.states(i); ++j) largest = std::max(largest, Q_of(qp, i)(j, j));
+      for (int j = 0; j < qp.controls(i); ++j) largest = std::max(largest, R_of(qp, i)(j, j));
     }
     return largest;
   }

@@ -5,6 +5,7 @@
 
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/kkt.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 
 namespace rhec::nlopt {
 
@@ -146,10 +147,10 @@ void CondensedProblem::compute_sensitivities() {
   for (int i = 0; i < N; ++i) {
     Matrix& next = sensitivities_[static_cast<std::size_t>(i) + 1];
     next.setZero(qp_.states(i + 1), columns(i + 1));
-    next.leftCols(columns(i)).noalias() = qp_.A_of(i) * sensitivities_[static_cast<std::size_t>(i)];
+    next.leftCols(columns(i)).noalias() = A_of(qp_, i) * sensitivities_[static_cast<std::size_t>(i)];
     for (int j = 0; j < qp_.controls(i); ++j) {
       const int column = column_of(i, j);
-      if (column >= 0) next.col(column) = qp_.B_of(i).col(j);
+      if (column >= 0) next.col(column) = B_of(qp_, i).col(j);
     }
   }
   jacobian_.setZero(rows(), variables());
@@ -176,10 +177,10 @@ const CondensedProblem::Matrix& CondensedProblem::hessian(Hessian kind) {
   for (int i = 0; i <= N; ++i) {
     const Matrix& G = sensitivities_[static_cast<std::size_t>(i)];
     const Eigen::Index columns = G.cols();
-    product.noalias() = qp_.Q_of(i) * G;
+    product.noalias() = Q_of(qp_, i) * G;
     hessian_.topLeftCorner(columns, columns).noalias() += G.transpose() * product;
     if (i == N) break;
-    product.noalias() = qp_.S_of(i) * G;
+    product.noalias() = S_of(qp_, i) * G;
     for (int j = 0; j < qp_.controls(i); ++j) {
       const int row = column_of(i, j);
       if (row < 0) continue;
@@ -187,7 +188,7 @@ const CondensedProblem::Matrix& CondensedProblem::hessian(Hessian kind) {
       hessian_.col(row).head(columns) += product.row(j).transpose();
       for (int k = 0; k < qp_.controls(i); ++k) {
         const int column = column_of(i, k);
-        if (column >= 0) hessian_(row, column) += qp_.R_of(i)(j, k);
+        if (column >= 0) hessian_(row, column) += R_of(qp_, i)(j, k);
       }
     }
   }

@@ -8,6 +8,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include "rhec/core/qp/stage_qp_views.hpp"
 
 namespace rhec::sparse_sqp {
 namespace {
@@ -33,7 +34,7 @@ class Recursion {
       variable += qp.controls(i) + qp.states(i + 1);
     }
     for (int i = 0; i <= qp.intervals(); ++i)
-      for (int j = 0; j < qp.states(i); ++j) largest_cost_ = std::max(largest_cost_, std::abs(qp.Q_of(i)(j, j)));
+      for (int j = 0; j < qp.states(i); ++j) largest_cost_ = std::max(largest_cost_, std::abs(Q_of(qp, i)(j, j)));
   }
 
   int run() {
@@ -64,19 +65,19 @@ class Recursion {
   int recurse_from(int start) {
     for (int i = start; i >= 0; --i) {
       ++work_;
-      Eigen::MatrixXd next = qp_.Q_of(i);
+      Eigen::MatrixXd next = Q_of(qp_, i);
       if (i < qp_.intervals()) {
         const Eigen::MatrixXd& P = costs_to_go_[i + 1];
-        const Eigen::MatrixXd A = qp_.A_of(i), PA = P * A;
+        const Eigen::MatrixXd A = A_of(qp_, i), PA = P * A;
         next.noalias() += A.transpose() * PA;
         free_.clear();
         for (int j = 0; j < qp_.controls(i); ++j)
           if (fixed_.empty() || fixed_[control_starts_[i] + j] == 0) free_.push_back(j);
         if (!free_.empty()) {
-          const Eigen::MatrixXd B = qp_.B_of(i)(Eigen::all, free_), BPB = B.transpose() * P * B;
-          const Eigen::MatrixXd R = qp_.R_of(i)(free_, free_);
+          const Eigen::MatrixXd B = B_of(qp_, i)(Eigen::all, free_), BPB = B.transpose() * P * B;
+          const Eigen::MatrixXd R = R_of(qp_, i)(free_, free_);
           if (!factor(R + BPB, R.diagonal().cwiseAbs() + BPB.diagonal().cwiseAbs())) return i;
-          Eigen::MatrixXd W = qp_.S_of(i)(free_, Eigen::all);
+          Eigen::MatrixXd W = S_of(qp_, i)(free_, Eigen::all);
           W.noalias() += B.transpose() * PA;
           factor_.matrixL().solveInPlace(W);
           next.noalias() -= W.transpose() * W;
@@ -87,7 +88,7 @@ class Recursion {
     }
     if (qp_.initial_state_is_given || qp_.states(0) == 0) return -1;
     const Eigen::MatrixXd& P = costs_to_go_[0];
-    return factor(P, P.diagonal().cwiseAbs() + qp_.Q_of(0).diagonal().cwiseAbs()) ? -1 : 0;
+    return factor(P, P.diagonal().cwiseAbs() + Q_of(qp_, 0).diagonal().cwiseAbs()) ? -1 : 0;
   }
 
   bool factor(const Eigen::MatrixXd& pivot, const Eigen::VectorXd& sizes) {

@@ -6,25 +6,26 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include "rhec/core/qp/stage_qp_views.hpp"
 
 namespace rhec::sparse_sqp {
 
 bool stage_covariances(const StageQp& qp, std::span<double> blocks) {
   const int N = qp.intervals();
   std::vector<Eigen::MatrixXd> closed(N), spread(N);  // F and B L^-T of each stage
-  Eigen::MatrixXd P = qp.Q_of(N);
+  Eigen::MatrixXd P = Q_of(qp, N);
   Eigen::LLT<Eigen::MatrixXd> factor;
   for (int i = N - 1; i >= 0; --i) {
-    const Eigen::MatrixXd A = qp.A_of(i), PA = P * A;
+    const Eigen::MatrixXd A = A_of(qp, i), PA = P * A;
     closed[i] = A;
-    spread[i] = qp.B_of(i);
-    Eigen::MatrixXd next = qp.Q_of(i);
+    spread[i] = B_of(qp, i);
+    Eigen::MatrixXd next = Q_of(qp, i);
     next.noalias() += A.transpose() * PA;
     if (qp.controls(i) > 0) {
-      const Eigen::MatrixXd B = qp.B_of(i);
-      factor.compute(qp.R_of(i) + B.transpose() * P * B);
+      const Eigen::MatrixXd B = B_of(qp, i);
+      factor.compute(R_of(qp, i) + B.transpose() * P * B);
       if (factor.info() != Eigen::Success) return false;
-      const Eigen::MatrixXd W = factor.matrixL().solve(qp.S_of(i) + B.transpose() * PA);
+      const Eigen::MatrixXd W = factor.matrixL().solve(S_of(qp, i) + B.transpose() * PA);
       spread[i] = factor.matrixL().solve(B.transpose()).transpose();
       closed[i].noalias() -= spread[i] * W;
       next.noalias() -= W.transpose() * W;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "rhec/core/qp/dual_active_set.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "support/qp_conditions.hpp"
 
 namespace rhec::testing {
@@ -55,10 +56,10 @@ inline StageQp integrator(int intervals, double target) {
   qp.initial_step()[0] = 0.0;
   for (int i = 0; i <= intervals; ++i) {
     qp.set_sizes(i, 1, i < intervals ? 1 : 0);
-    qp.Q_of(i)(0, 0) = 1.0;
+    Q_of(qp, i)(0, 0) = 1.0;
     qp.q(i)[0] = -target;
     if (i == intervals) break;
-    qp.R_of(i)(0, 0) = 1.0;
+    R_of(qp, i)(0, 0) = 1.0;
     qp.AB(i)[0] = qp.AB(i)[1] = 1.0;
   }
   return qp;

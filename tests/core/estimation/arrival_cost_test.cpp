@@ -2,6 +2,7 @@
 #include "rhec/core/estimation/arrival_cost.hpp"
 
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include <cmath>
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "support/random_problem.hpp"
 
@@ -43,12 +44,12 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
   ASSERT_NEAR(objective, std::accumulate(costs.begin(), costs.end(), 0.0), 1e-12 * (1.0 + std::abs(objective)));
 
   const auto gradient = [&](const StageQp& of, int i, Eigen::VectorXd& by_state, Eigen::VectorXd& by_control) {
-    by_state = of.q_of(i);
-    by_control = of.r_of(i);
+    by_state = q_of(of, i);
+    by_control = r_of(of, i);
     if (i < N) {
       const Eigen::Map<const Eigen::VectorXd> costate(point.costate(i + 1), ns);
-      by_state += of.A_of(i).transpose() * costate;
-      by_control += of.B_of(i).transpose() * costate;
+      by_state += A_of(of, i).transpose() * costate;
+      by_control += B_of(of, i).transpose() * costate;
     }
     if (i > 0) by_state -= Eigen::Map<const Eigen::VectorXd>(point.costate(i), ns);
   };
@@ -69,7 +70,7 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
       ASSERT_NEAR((f_up - f_down) / (2.0 * h), slope, tolerance * (1.0 + std::abs(slope))) << "gradient at stage " << i;
       if (i < N) {
         for (int r = 0; r < ns; ++r) {
-          const double entry = is_state ? qp.A_of(i)(r, j) : qp.B_of(i)(r, j);
+          const double entry = is_state ? A_of(qp, i)(r, j) : B_of(qp, i)(r, j);
           ASSERT_NEAR((plus[i * ns + r] - minus[i * ns + r]) / (2.0 * h), entry, 1e-6 * (1.0 + std::abs(entry)))
               << "dynamics at stage " << i << ", " << (is_state ? "state " : "control ") << j;
         }
@@ -81,12 +82,12 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
       ocp.linearise(all_stages(ocp), down, Hessian::gauss_newton, moved, scratch);
       gradient(moved, i, s_down, w_down);
       for (int r = 0; r < ocp.state_count(i); ++r) {
-        const double entry = is_state ? exact.Q_of(i)(r, j) : exact.S_of(i)(j, r);
+        const double entry = is_state ? Q_of(exact, i)(r, j) : S_of(exact, i)(j, r);
         ASSERT_NEAR((s_up[r] - s_down[r]) / (2.0 * h), entry, tolerance * (1.0 + std::abs(entry)))
             << "Q, S at stage " << i;
       }
       for (int r = 0; r < controls; ++r) {
-        const double entry = is_state ? exact.S_of(i)(r, j) : exact.R_of(i)(r, j);
+        const double entry = is_state ? S_of(exact, i)(r, j) : R_of(exact, i)(r, j);
         ASSERT_NEAR((w_up[r] - w_down[r]) / (2.0 * h), entry, tolerance * (1.0 + std::abs(entry)))
             << "S, R at stage " << i;
       }
@@ -152,10 +153,10 @@ TEST_P(OcpTest, ARangeOfStagesIsWhatTheWholeHorizonGives) {
   problem->linearise({4, 9}, point, Hessian::exact, parts, scratch);
   for (int i = 0; i <= 9; ++i) {
     // Lanes of a pack are evaluated alike wherever they stand.
-    EXPECT_TRUE(whole.Q_of(i).isApprox(parts.Q_of(i), 1e-13)) << i;
-    EXPECT_TRUE(whole.q_of(i).isApprox(parts.q_of(i), 1e-13)) << i;
+    EXPECT_TRUE(Q_of(whole, i).isApprox(Q_of(parts, i), 1e-13)) << i;
+    EXPECT_TRUE(q_of(whole, i).isApprox(q_of(parts, i), 1e-13)) << i;
     if (i < 9) {
-      EXPECT_TRUE(whole.A_of(i).isApprox(parts.A_of(i), 1e-13)) << i;
+      EXPECT_TRUE(A_of(whole, i).isApprox(A_of(parts, i), 1e-13)) << i;
     }
   }
 }
@@ -171,8 +172,8 @@ TEST_P(OcpTest, NewDataChangeTheVectorsAndNotTheMatrices) {
   problem->refresh(point, early, scratch);
   problem->linearise(all_stages(*problem), point, Hessian::gauss_newton, late, scratch);
   for (int i = 0; i <= problem->intervals(); ++i) {
-    EXPECT_TRUE(early.q_of(i).isApprox(late.q_of(i), 1e-13));
-    EXPECT_TRUE(early.Q_of(i).isApprox(late.Q_of(i), 1e-13));
+    EXPECT_TRUE(q_of(early, i).isApprox(q_of(late, i), 1e-13));
+    EXPECT_TRUE(Q_of(early, i).isApprox(Q_of(late, i), 1e-13));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rhec/core/ocp/linearisation.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "support/cart.hpp"
 #include "support/other_model.hpp"
 
@@ -57,7 +58,7 @@ class RheLinearisationTest : public ::testing::Test {
     for (int i = 0; i <= intervals; ++i) {
       for (int j = 0; j < qp.states(i); ++j) EXPECT_NEAR(qp.q(i)[j], expected.q(i)[j], 1e-13) << i;
       for (int j = 0; j < qp.controls(i); ++j) EXPECT_NEAR(qp.r(i)[j], expected.r(i)[j], 1e-13) << i;
-      EXPECT_LT((qp.Q_of(i) - expected.Q_of(i)).cwiseAbs().maxCoeff(), 1e-13) << i;
+      EXPECT_LT((Q_of(qp, i) - Q_of(expected, i)).cwiseAbs().maxCoeff(), 1e-13) << i;
     }
   }
   /// The window slides: a node leaves at the front, and one comes in behind.

@@ -16,6 +16,7 @@
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/core/qp/kkt.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -327,7 +328,7 @@ TEST(Shift, CostatesOfCarriedParametersFitTheNewStructure) {
     for (int i = 0; i < problem.intervals(); ++i) {
       for (int j = 0; j < problem.control_count(i); ++j) {
         double sum = qp.r(i)[j];
-        for (int r = 0; r < 4; ++r) sum += qp.B_of(i)(r, j) * point.costate(i + 1)[r];
+        for (int r = 0; r < 4; ++r) sum += B_of(qp, i)(r, j) * point.costate(i + 1)[r];
         point.control_bound(i)[j] = -sum;
       }
     }
@@ -353,7 +354,7 @@ TEST(Shift, CostatesOfCarriedParametersFitTheNewStructure) {
   std::vector<double> scratch(problem.scratch_size());
   problem.linearise(all_stages(problem), old, Hessian::gauss_newton, qp, scratch);
   double expected = qp.q(2)[2] + old.costate(3)[2];
-  for (int r = 0; r < 2; ++r) expected += qp.A_of(2)(r, 2) * old.costate(3)[r];
+  for (int r = 0; r < 2; ++r) expected += A_of(qp, 2)(r, 2) * old.costate(3)[r];
   EXPECT_NEAR(guess.costate(2)[2], expected, 1e-9 * (1.0 + std::abs(expected)));
 }
 

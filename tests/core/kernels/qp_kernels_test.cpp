@@ -84,14 +84,14 @@ TEST(QpKernels, AgreeOnRandomRows) {
   }
 }
 
-AlignedDoubles numbers(RandomRows& random, std::size_t count) {
+AlignedDoubles numbers(RandomQp& random, std::size_t count) {
   AlignedDoubles v(count);
   for (double& entry : v) entry = random.uniform(-2.0, 2.0);
   return v;
 }
 
 TEST(QpKernels, ComputeWhatTheySay) {
-  RandomRows random(14);
+  RandomQp random(14);
   for (int trial = 0; trial < 40; ++trial) {
     const int width = padded(random.integer(1, 20));
     const AlignedDoubles a = numbers(random, width), b = numbers(random, width), h = numbers(random, width);

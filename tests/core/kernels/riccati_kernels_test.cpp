@@ -2,8 +2,11 @@
 #include "rhec/core/kernels/riccati_kernels.hpp"
 
 #include <gtest/gtest.h>
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 #include "rhec/core/kernels/kernel_sets.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "support/random_qp.hpp"
 
 namespace rhec {
@@ -172,7 +175,7 @@ TEST(RiccatiKernels, OfTheRecursionStopWhereTheReducedHessianIsNotDefinite) {
     for (int i = 0; i < qp.intervals(); ++i)
       if (qp.controls(i) > 0) bent = i;
     if (bent < 0) continue;
-    qp.R_of(bent)(0, 0) = -1e4;
+    R_of(qp, bent)(0, 0) = -1e4;
     const ActiveSet none(qp.capacity());
     for (const KernelSet& set : runnable_kernels()) {
       Recursion recursion(qp, none);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "support/random_problem.hpp"
 
@@ -146,13 +147,13 @@ TEST(SparseNlp, ASmallerPatternThanAllOnesIsStillEnough) {
     for (int c = 0; c < ns; ++c)
       for (int r = 0; r < ns; ++r)
         if (!A[c * ns + r]) {
-          EXPECT_EQ(qp.A_of(i)(r, c), 0.0) << i << " A " << r << "," << c;
+          EXPECT_EQ(A_of(qp, i)(r, c), 0.0) << i << " A " << r << "," << c;
           ++zeros;
         }
     for (int c = 0; c < problem->control_count(i); ++c)
       for (int r = 0; r < ns; ++r)
         if (!B[c * ns + r]) {
-          EXPECT_EQ(qp.B_of(i)(r, c), 0.0) << i << " B " << r << "," << c;
+          EXPECT_EQ(B_of(qp, i)(r, c), 0.0) << i << " B " << r << "," << c;
           ++zeros;
         }
   }
@@ -193,7 +194,7 @@ TEST(SparseNlp, PointsGoThereAndBack) {
   set_costates(view.qp, swept);
   for (int j = 0; j < problem->state_count(0); ++j) {
     double expected = view.qp.q(0)[j];
-    for (int r = 0; r < problem->state_count(1); ++r) expected += view.qp.A_of(0)(r, j) * back.costate(1)[r];
+    for (int r = 0; r < problem->state_count(1); ++r) expected += A_of(view.qp, 0)(r, j) * back.costate(1)[r];
     EXPECT_NEAR(back.costate(0)[j], expected, 1e-12 * (1.0 + std::abs(expected)));
   }
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "rhec/core/qp/stage_qp_solver.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "support/active_set_attempt.hpp"
 
 namespace rhec {
@@ -128,7 +129,7 @@ TEST(DualActiveSet, LeavesWhatIsNotConvexToConvexification) {
   for (int trial = 0; trial < 100; ++trial) {
     StageQp qp = feasible_qp(random, true, 0.5);
     for (int i = 0; i < qp.intervals(); ++i)
-      for (int j = 0; j < qp.controls(i); ++j) qp.R_of(i)(j, j) -= random.uniform(0.0, 2.0);
+      for (int j = 0; j < qp.controls(i); ++j) R_of(qp, i)(j, j) -= random.uniform(0.0, 2.0);
     if (Attempt(qp, nullptr).outcome != DualActiveSet::Outcome::not_convex) continue;
     StageQpSolver solver(qp.capacity());
     Iterate step(qp.capacity());

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "rhec/core/qp/riccati.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "support/dense_solution.hpp"
 
 namespace rhec {
@@ -51,8 +52,8 @@ TEST(FreeInitialState, MayHaveAPriorOfVeryDifferentScales) {
   RandomQp random(33);
   for (int trial = 0; trial < 20; ++trial) {
     StageQp qp = random.make(4, 3, 2, false);
-    qp.Q_of(0)(0, 0) += 1e8;
-    qp.Q_of(0)(2, 2) += 1e4;
+    Q_of(qp, 0)(0, 0) += 1e8;
+    Q_of(qp, 0)(2, 2) += 1e4;
     expect_solved(qp, ActiveSet(qp.capacity()), 1e-6);
   }
 }
@@ -62,7 +63,7 @@ TEST(FreeInitialState, IsConvexifiedWhereItHasNoMinimum) {
   int convexified = 0;
   for (int trial = 0; trial < 20; ++trial) {
     StageQp qp = random.make(3, 3, 2, false);
-    qp.Q_of(0)(1, 1) -= 20.0;
+    Q_of(qp, 0)(1, 1) -= 20.0;
     Riccati riccati(qp.capacity());
     const ActiveSet none(qp.capacity());
     Iterate step(qp.capacity());

@@ -1,4 +1,5 @@
 #include "rhec/core/qp/kkt.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 
 #include <gtest/gtest.h>
 
@@ -23,12 +24,12 @@ struct Stationary {
     // Controls at which nothing pulls.
     for (int i = 0; i < 5; ++i)
       for (int j = 0; j < qp.controls(i); ++j)
-        for (int r = 0; r < 3; ++r) qp.r(i)[j] -= qp.B_of(i)(r, j) * point.costate(i + 1)[r];
+        for (int r = 0; r < 3; ++r) qp.r(i)[j] -= B_of(qp, i)(r, j) * point.costate(i + 1)[r];
     // And a free initial state that is at its optimum.
     if (!given)
       for (int j = 0; j < 3; ++j) {
         double pull = 0.0;
-        for (int r = 0; r < 3; ++r) pull += qp.A_of(0)(r, j) * point.costate(1)[r];
+        for (int r = 0; r < 3; ++r) pull += A_of(qp, 0)(r, j) * point.costate(1)[r];
         qp.q(0)[j] = -pull;
       }
   }

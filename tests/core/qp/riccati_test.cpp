@@ -1,5 +1,6 @@
 #include "rhec/core/qp/riccati.hpp"
 
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <vector>

@@ -1,5 +1,6 @@
 // The stages of the recursion that core/qp/special_stages.cpp takes: controls that have to keep bounds of the next
 // state, a free initial state that is held at bounds, and reduced Hessians that are not positive definite.
+#include <Eigen/SVD>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -7,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "rhec/core/qp/riccati.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "support/dense_solution.hpp"
 
 namespace rhec {
@@ -84,7 +86,7 @@ TEST(SpecialStages, ConvexifiesWhatIsNotPositiveDefiniteAndCanWriteItBack) {
   for (int trial = 0; trial < 50; ++trial) {
     StageQp qp = random.make(5, 3, 2, true);
     for (int i = 0; i < 5; ++i)
-      for (int j = 0; j < qp.controls(i); ++j) qp.R_of(i)(j, j) -= 4.0;
+      for (int j = 0; j < qp.controls(i); ++j) R_of(qp, i)(j, j) -= 4.0;
     Riccati riccati(qp.capacity());
     const ActiveSet none(qp.capacity());
     Iterate step(qp.capacity()), again(qp.capacity());

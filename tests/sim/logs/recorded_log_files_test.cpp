@@ -1,6 +1,8 @@
 // The files of a replay, of estimates that are made up here.
 #include <gmock/gmock.h>
 
+#include <Eigen/Core>
+
 #include <limits>
 #include <sstream>
 #include <string>

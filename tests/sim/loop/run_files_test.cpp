@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/Core>
+
 #include <limits>
 #include <sstream>
 #include <string>

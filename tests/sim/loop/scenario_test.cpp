@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/Core>
+
 #include <array>
 #include <cmath>
 #include <string>

@@ -6,6 +6,7 @@
 
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/kkt.hpp"
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "rhec/plugins/kit/sdk.hpp"
 
 namespace {
@@ -67,7 +68,7 @@ class ToySolver : public rhec::Solver {
     for (int i = ocp.initial_state() ? 1 : 0; i <= ocp.intervals(); ++i) {
       const int n = ocp.state_count(i);
       const Eigen::Map<const Eigen::VectorXd> q(qp_.q(i), n);
-      const Eigen::MatrixXd symmetric = qp_.Q_of(i);
+      const Eigen::MatrixXd symmetric = Q_of(qp_, i);
       const Eigen::VectorXd step = symmetric.completeOrthogonalDecomposition().solve(-q);
       for (int j = 0; j < n; ++j)
         point.state(i)[j] = std::clamp(point.state(i)[j] + step[j], ocp.state_lower(i)[j], ocp.state_upper(i)[j]);

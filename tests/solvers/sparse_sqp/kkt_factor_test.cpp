@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
@@ -105,10 +106,10 @@ std::vector<std::unique_ptr<TestQp>> structures(int count) {
     StageQp qp = random.make(8, 2, 1, false);
     for (int i = 0; i < 8; ++i) {  // the number in binary: which intervals have a control
       qp.set_sizes(i, 2, (k >> i) & 1);
-      qp.R_of(i).setOnes();
-      qp.S_of(i).setConstant(0.1);
-      qp.S_transposed_of(i).setConstant(0.1);
-      qp.Q_of(i).diagonal().array() += 1.0;
+      R_of(qp, i).setOnes();
+      S_of(qp, i).setConstant(0.1);
+      S_transposed_of(qp, i).setConstant(0.1);
+      Q_of(qp, i).diagonal().array() += 1.0;
     }
     all.push_back(std::make_unique<TestQp>(qp));
   }

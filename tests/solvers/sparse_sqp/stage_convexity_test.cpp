@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
@@ -21,8 +22,8 @@ TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
     const int from = random.integer(0, N), to = std::min(N, from + random.integer(0, 1));
     const double shift = random.uniform(0.0, 3.0);
     for (int i = from; i <= to; ++i) {
-      exact.Q_of(i).diagonal().array() -= shift;
-      exact.R_of(i).diagonal().array() -= shift;
+      Q_of(exact, i).diagonal().array() -= shift;
+      R_of(exact, i).diagonal().array() -= shift;
     }
     const TestQp before(exact);
     std::vector<std::uint8_t> fixed(before.n, 0);
@@ -51,11 +52,11 @@ TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
     }
     int differ = 0;
     for (int i = 0; i <= N; ++i) {
-      const bool is_exact = exact.Q_of(i) == convex.Q_of(i) &&
-                            (i == N || (exact.S_of(i) == convex.S_of(i) && exact.R_of(i) == convex.R_of(i)));
+      const bool is_exact = Q_of(exact, i) == Q_of(convex, i) &&
+                            (i == N || (S_of(exact, i) == S_of(convex, i) && R_of(exact, i) == R_of(convex, i)));
       const bool is_gauss_newton =
-          gauss_newton.Q_of(i) == convex.Q_of(i) &&
-          (i == N || (gauss_newton.S_of(i) == convex.S_of(i) && gauss_newton.R_of(i) == convex.R_of(i)));
+          Q_of(gauss_newton, i) == Q_of(convex, i) &&
+          (i == N || (S_of(gauss_newton, i) == S_of(convex, i) && R_of(gauss_newton, i) == R_of(convex, i)));
       EXPECT_TRUE(is_exact || is_gauss_newton) << trial << ", stage " << i;
       differ += is_exact ? 0 : 1;
     }

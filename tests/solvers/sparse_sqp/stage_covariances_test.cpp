@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "rhec/core/qp/stage_qp_views.hpp"
 #include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
@@ -37,7 +38,7 @@ TEST(StageCovariances, AreThoseOfTheDenseInverse) {
 TEST(StageCovariances, ThereAreNoneWithoutAnInverse) {
   RandomQp random(5);
   StageQp qp = random.make(4, 2, 1, false);
-  for (int i = 0; i <= 4; ++i) qp.Q_of(i)(0, 0) -= 10.0;
+  for (int i = 0; i <= 4; ++i) Q_of(qp, i)(0, 0) -= 10.0;
   std::vector<double> blocks(20, -7.0);
   EXPECT_FALSE(stage_covariances(qp, blocks));
   EXPECT_THAT(blocks, ::testing::Each(-7.0));

@@ -73,12 +73,14 @@ class FormulaModel : public Model {
   const ModelDescription& description() const noexcept override { return description_; }
   void integrate(const Intervals& request) const noexcept override {
     RHEC_ASSERT(request.count >= 0 && request.substeps >= 1, "whole intervals and Runge-Kutta steps");
-    RHEC_ASSERT(request.states && request.inputs && request.parameters && request.durations, "where to integrate");
+    RHEC_ASSERT(request.count == 0 || (request.states && request.durations), "where to integrate");
+    RHEC_ASSERT(request.count == 0 || Formula::input_count == 0 || request.inputs, "the inputs");
+    RHEC_ASSERT(request.count == 0 || Formula::parameter_count == 0 || request.parameters, "the parameters");
     RHEC_ASSERT(!request.hessians || request.multipliers, "second derivatives are weighted by multipliers");
     kernels_->integrate(&formula_, request);
   }
   void observe(const Nodes& request) const noexcept override {
-    RHEC_ASSERT(request.count >= 0 && request.states, "where to observe");
+    RHEC_ASSERT(request.count == 0 || (request.count > 0 && request.states), "where to observe");
     RHEC_ASSERT(!request.hessians || request.multipliers, "second derivatives are weighted by multipliers");
     kernels_->observe(&formula_, request);
   }

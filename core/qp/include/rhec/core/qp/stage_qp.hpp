@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/qp/iterate.hpp"
 
@@ -23,13 +21,6 @@ namespace rhec {
 /// rows (or columns) as z has entries and both halves filled. Unused entries of a row are zero and have no bounds.
 class RHEC_EXPORT StageQp {
  public:
-  using Rows =
-      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0, Eigen::OuterStride<>>;
-  using ConstRows =
-      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>, 0, Eigen::OuterStride<>>;
-  using Vector = Eigen::Map<Eigen::VectorXd>;
-  using ConstVector = Eigen::Map<const Eigen::VectorXd>;
-
   StageQp() = default;
   explicit StageQp(const Capacity& capacity);
   /// A window that stores only `stages` stages of a QP of this capacity at a time, to process a long horizon piece by
@@ -96,23 +87,6 @@ class RHEC_EXPORT StageQp {
   const double* control_upper(int i) const noexcept { return upper(i) + capacity_.states; }
   const double* initial_step() const noexcept { return initial_step_.data(); }
 
-  // The same as Eigen views of the stage's actual size. S is n_w x n_s; whoever writes it must also write its
-  // transpose.
-  Rows A_of(int i) { return rows(AB(i), states(i + 1), states(i)); }
-  Rows B_of(int i) { return rows(AB(i) + capacity_.states, states(i + 1), controls(i)); }
-  Rows Q_of(int i) { return rows(H(i), states(i), states(i)); }
-  Rows S_of(int i) { return rows(control_rows(i), controls(i), states(i)); }
-  Rows S_transposed_of(int i) { return rows(H(i) + capacity_.states, states(i), controls(i)); }
-  Rows R_of(int i) { return rows(control_rows(i) + capacity_.states, controls(i), controls(i)); }
-  ConstRows A_of(int i) const { return rows(AB(i), states(i + 1), states(i)); }
-  ConstRows B_of(int i) const { return rows(AB(i) + capacity_.states, states(i + 1), controls(i)); }
-  ConstRows Q_of(int i) const { return rows(H(i), states(i), states(i)); }
-  ConstRows S_of(int i) const { return rows(control_rows(i), controls(i), states(i)); }
-  ConstRows R_of(int i) const { return rows(control_rows(i) + capacity_.states, controls(i), controls(i)); }
-  ConstVector b_of(int i) const { return {b(i), states(i + 1)}; }
-  ConstVector q_of(int i) const { return {q(i), states(i)}; }
-  ConstVector r_of(int i) const { return {r(i), controls(i)}; }
-
  private:
   double* at(AlignedDoubles& v, int i, int rows) const noexcept {
     RHEC_ASSERT(is_held(v, i, rows), "a stage that is held");
@@ -125,14 +99,6 @@ class RHEC_EXPORT StageQp {
   bool is_held(const AlignedDoubles& v, int i, int rows) const noexcept {
     // Kernels take the address that stage 0 would have, whether a window holds it or not.
     return window_ > 0 || (i >= 0 && (static_cast<std::ptrdiff_t>(i) + 1) * rows * stride_ <= std::ssize(v));
-  }
-  double* control_rows(int i) noexcept { return H(i) + static_cast<std::ptrdiff_t>(capacity_.states) * stride_; }
-  const double* control_rows(int i) const noexcept {
-    return H(i) + static_cast<std::ptrdiff_t>(capacity_.states) * stride_;
-  }
-  Rows rows(double* first, int count, int length) { return {first, count, length, Eigen::OuterStride<>(stride_)}; }
-  ConstRows rows(const double* first, int count, int length) const {
-    return {first, count, length, Eigen::OuterStride<>(stride_)};
   }
   void clear(int i) noexcept;
 

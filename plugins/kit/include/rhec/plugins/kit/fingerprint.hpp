@@ -1,6 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
+// Of Eigen the macros alone, as Eigen/Core includes them: the whole of it would take most of a plugin's time to
+// compile.
+#include <Eigen/src/Core/util/Macros.h>
+//
+#include <Eigen/src/Core/util/ConfigureVectorization.h>
+
 #include <string>  // defines the macros of the standard library
 
 /// What two libraries must have in common before they may hand each other C++ objects, as one constant text. It is put
