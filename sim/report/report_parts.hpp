@@ -43,7 +43,7 @@ std::string thinning_words(const Thinned& thinned, std::size_t total, const char
 // Limits on what a page shows of a long run.
 constexpr std::size_t most_rows = 3000;                ///< samples of a curve
 constexpr std::size_t most_values = 60000;             ///< rows of all curves together
-constexpr std::size_t most_track_points = 24000;       ///< of all tracks together; readers zoom into them
+constexpr std::size_t most_track_points = 24000;       ///< of all tracks together; more, since details matter
 constexpr std::size_t most_horizon_bytes = 1'700'000;  ///< as in the file
 constexpr std::size_t most_status_changes = 3000;
 

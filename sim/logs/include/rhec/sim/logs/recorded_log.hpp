@@ -107,7 +107,7 @@ struct Replay {
   std::string name;  ///< of the variant, for files and figures
   std::vector<LoggedEstimate> estimates;
   Estimator::Counts counts;
-  std::int64_t unpredicted = 0;  ///< withheld fixes before there was an estimate
+  std::int64_t unpredicted = 0;  ///< withheld fixes before the first estimate
   std::vector<double> solve_us;  ///< preparation and feedback of each solve [us]
   double seconds = 0.0;          ///< of the whole replay
 };

@@ -65,7 +65,7 @@ class RHEC_EXPORT ProblemFormat {
 RHEC_EXPORT const ProblemFormat* find_problem_format(std::string_view kind) noexcept;
 /// The same, but throws Error listing the known kinds if there is none.
 RHEC_EXPORT const ProblemFormat& problem_format(std::string_view kind);
-/// The kinds that have a format.
+/// All kinds with a format.
 RHEC_EXPORT std::vector<std::string> problem_kinds();
 
 }  // namespace rhec::sim

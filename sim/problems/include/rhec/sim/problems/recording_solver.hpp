@@ -36,7 +36,7 @@ class RHEC_EXPORT RecordingSolver final : public SolverDecorator {
   const HorizonProblem* problem_ = nullptr;  ///< null for problems of other classes, which are not reported
   Iterate guess_;
   std::int64_t asked_at_ = 0;  ///< step of the solve under way
-  bool is_pending_ = false;    ///< a `feedback` is not finished
+  bool is_pending_ = false;    ///< a `feedback` awaits `finish`
 };
 
 /// The parts of a closed-loop sample, and the loop's end.
@@ -57,7 +57,7 @@ struct LoopSample {
   const Estimator* estimator = nullptr;          ///< never null
   const Estimate* estimate = nullptr;            ///< never null
   const Controller* controller = nullptr;        ///< null in the replay of a log
-  const Controller::Command* command = nullptr;  ///< the same
+  const Controller::Command* command = nullptr;  ///< null in the replay of a log
 };
 
 /// Callbacks for a loop (closed loop or log replay).

@@ -21,8 +21,7 @@ RHEC_EXPORT std::vector<Waypoint> figure_eight(const FigureEight& options = {});
 /// Straight legs alternating along +x and -x, joined by half circles, as in field work between headlands: from (0, -20)
 /// facing +x, each leg offset by 2 * radius along +y from the previous one. The first half circle turns left.
 ///
-///     length = legs * leg_length + (legs - 1) * pi * radius          (549.4 m by default; the paper's is 'about 550
-///     m')
+///     length = legs * leg_length + (legs - 1) * pi * radius          (549.4 m by default; about 550 m in the paper)
 ///
 /// A half circle of 9 m requires a steering angle of 8.8 deg from a bicycle with a wheelbase of 1.4 m (17.6 deg at a
 /// side slip of 0.5).

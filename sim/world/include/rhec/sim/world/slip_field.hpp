@@ -38,8 +38,7 @@ RHEC_EXPORT std::unique_ptr<const SlipField> constant_field(std::vector<double> 
 ///
 ///     E[g(a) g(b)] = exp(-|a - b|^2 / (2 L^2)),      value = lower + (upper - lower) * Phi(g),
 ///
-/// where L is the correlation length and Phi the normal distribution function. Values are thus uniform in [lower,
-/// upper].
+/// where L is the correlation length and Phi the normal distribution function. Values are uniform in [lower, upper].
 ///
 /// g is white noise on a square lattice, smoothed by the kernel exp(-d^2 / L^2), whose convolution with itself is the
 /// required correlation. Values are therefore exactly normal, not only in the limit of many terms as with random
