@@ -54,8 +54,8 @@ class Drives {
   void find_blocks();
   /// Inputs for driving straight ahead or standing still; writes the speeds among the states to `state`.
   Vector base_inputs(Course course, Vector& state) const;
-  /// Deviation of the inputs from the straight drive: half of the room to their bounds, or half a scale. If all inputs
-  /// produce speed (left and right wheels), every other one is raised or lowered by a fraction of it.
+  /// Deviation of the inputs from the straight drive: half the room to a bound or half a scale, whichever is smaller.
+  /// If all inputs produce speed (left and right wheels), every other one is raised or lowered by a fraction of it.
   Vector excitation(const Vector& base) const;
   /// How far states are outside the inner half of their bounds (or beyond their scale if unbounded), in scales.
   double excess(const Vector& x) const;

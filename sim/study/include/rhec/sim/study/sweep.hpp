@@ -21,7 +21,7 @@ class RHEC_EXPORT Sweep {
  public:
   /// Reads a file and the scenarios that it names. Throws Error, naming file, line and key, for any error of form: an
   /// unknown key, a grid without runs, a range that does not reach its end, groups of unequal length, a key that
-  /// overrides another, more than 10^15 runs.
+  /// overrides an earlier one, more than 10^15 runs.
   static Sweep from_file(const std::filesystem::path& file);
   /// From settings whose origin is a file; scenarios are looked up relative to that file.
   explicit Sweep(const Settings& description);
