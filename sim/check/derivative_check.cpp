@@ -13,15 +13,15 @@ namespace rhec::sim {
 namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
-constexpr double margin = 0.02;       // of a variable's range, which the points of a difference stay inside of
-constexpr double most_scales = 10.0;  // wider bounds than that are no typical values
-constexpr double distances[] = {2e-2, 2e-3, 2e-4, 2e-5, 2e-6};  // of the points of a difference, in scales
+constexpr double margin = 0.02;       // of a variable's range; difference points stay inside it
+constexpr double most_scales = 10.0;  // wider bounds do not count as typical values
+constexpr double distances[] = {2e-2, 2e-3, 2e-4, 2e-5, 2e-6};  // spacing of difference points, in scales
 
 /// One entry of z = [x; u; p; p_end].
 struct Entry {
   std::string name;
   double scale = 1.0;
-  double step = 1.0;  ///< what `distances` are parts of
+  double step = 1.0;  ///< unit of `distances`
 };
 
 std::pair<double, double> typical_range(const Variable& variable) {
@@ -116,13 +116,13 @@ class Evaluation {
   int substeps_, nx_ = 0, ny_ = 0, nz_ = 0;
 };
 
-/// What a column of given derivatives is compared with.
+/// Reference for a column of given derivatives.
 struct Differences {
-  std::vector<double> slope;   ///< of the distance that agrees best; NaN where none is finite
-  std::vector<double> excess;  ///< by how much that is away from `given`, beyond what rounding explains
+  std::vector<double> slope;   ///< for the distance that agrees best; NaN if none is finite
+  std::vector<double> excess;  ///< its deviation from `given` beyond rounding error
 };
 
-/// The derivative by `entry` of what `evaluate` gives of the stages (`size` values each), as five points of a line say.
+/// Five-point difference with respect to `entry` of the results of `evaluate` at the stages (`size` values each).
 template <class Evaluate>
 Differences differences(const StagePoints& stages, const ModelDescription& about, int entry, double step, int size,
                         const std::vector<double>& given, const Evaluate& evaluate) {
@@ -146,7 +146,7 @@ Differences differences(const StagePoints& stages, const ModelDescription& about
     for (std::size_t k = 0; k < count; ++k) {
       const double rounding = 8.0 * std::numeric_limits<double>::epsilon() * largest[k] / h;
       const double excess = std::max(0.0, std::abs(given[k] - slope[k]) - rounding);
-      if (!(excess < best.excess[k])) continue;  // NaN is not
+      if (!(excess < best.excess[k])) continue;  // also skips NaN
       best.excess[k] = excess;
       best.slope[k] = slope[k];
     }
@@ -154,7 +154,7 @@ Differences differences(const StagePoints& stages, const ModelDescription& about
   return best;
 }
 
-/// Keeps the worst of what it is shown, once all is known that errors are relative to.
+/// Collects entries and finds the worst in `finish`, once the magnitudes that errors are relative to are known.
 class Worst {
  public:
   explicit Worst(int results) : largest_(results, 0.0) {}
@@ -192,7 +192,7 @@ class Worst {
 
 struct Results {
   const std::vector<Variable>* variables;
-  const char* prefix;  ///< before a result's name
+  const char* prefix;  ///< prefix of a result's name
 };
 
 /// First derivatives: `jacobians` against differences of `values`.
@@ -219,7 +219,7 @@ void first_derivatives(const StagePoints& stages, const ModelDescription& about,
   worst.finish(into, all);
 }
 
-/// Second derivatives of each result by itself, and that multipliers sum them up.
+/// Checks the second derivatives of each result separately, and their sum weighted with multipliers.
 template <class Jacobians, class Hessians>
 void second_derivatives(const StagePoints& stages, const ModelDescription& about, const std::vector<Entry>& entries,
                         const Results& results, const Jacobians& jacobians, const Hessians& hessians, WorstEntry& into,

@@ -1,4 +1,4 @@
-// What the measurements along a drive tell of its unknowns: the first state, and the parameters block by block.
+// Information in the measurements along a drive about its unknowns: the initial state and each block of parameters.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,8 +14,8 @@ namespace rhec::sim {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double least_sigma = 1e-9;        // of noise, in scales, lest one measurement hides all others
-constexpr double largest_null_part = 1e-6;  // of a unit vector, in what is not determined
+constexpr double least_sigma = 1e-9;        // of noise, in scales, so that one measurement does not dominate all others
+constexpr double largest_null_part = 1e-6;  // of a unit vector, in the undetermined subspace
 
 }  // namespace
 
@@ -25,7 +25,7 @@ void Drives::add_parameters(const Drive& drive, int interval, Eigen::Ref<Matrix>
   for (int j = 0; j < np_; ++j) {
     const int now = nx_ + blocks_.unknown[j][interval];
     const auto at_start = jacobian.col(nx_ + nu_ + j);
-    // On a ramp the interval starts with the value of the block before.
+    // On a ramp the interval starts with the previous block's value.
     by_unknowns.col(blocks_.ramp[j][interval] ? now - 1 : now) += at_start;
     if (with_end) by_unknowns.col(now) += jacobian.col(nx_ + nu_ + np_ + j);
   }
@@ -40,7 +40,7 @@ std::string Drives::name_of_unknown(int unknown) const {
 }
 
 std::vector<std::string> Drives::combinations(Matrix null_space) const {
-  std::vector<std::pair<int, std::string>> texts;  // with the first unknown, to sort by
+  std::vector<std::pair<int, std::string>> texts;  // with the first unknown as sort key
   for (Eigen::Index c = 0; c < null_space.cols(); ++c) {
     Eigen::Index pivot = 0;
     Matrix rest = null_space.rightCols(null_space.cols() - c).cwiseAbs();
@@ -92,8 +92,8 @@ DriveInformation Drives::information(const Drive& drive) const {
   if (!drive.unusable.empty()) return found;
 
   // Unknowns in scales, inputs in standard deviations, rows in standard deviations: [inputs, unknowns] of the outputs,
-  // and below it the identity of the measured inputs. Its triangular factor has in its last corner the square root of
-  // the information once the inputs are eliminated (the Schur complement), without a product being formed.
+  // and below it the identity of the measured inputs. The last corner of its triangular factor is the square root of
+  // the information after eliminating the inputs (the Schur complement), computed without forming a product.
   const auto noise = [](double sigma, double scale) {
     return std::clamp(sigma, least_sigma * scale, scale / least_sigma);
   };

@@ -1,4 +1,4 @@
-// The drives that a model is tried on.
+// The drives used to check a model.
 #include "drives.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace rhec::sim {
 namespace {
 
-constexpr double heading = 0.5;  // of the drives [rad]; along no axis
+constexpr double heading = 0.5;  // of the drives [rad]; not along an axis
 
 bool is_role(const Roles& roles, int state) {
   const auto& others = roles.other_headings;
@@ -119,7 +119,7 @@ Eigen::VectorXd Drives::moved(const Vector& x, const Vector& u) const {
 Eigen::VectorXd Drives::inputs_at(Course course, int k, const Vector& x, const Vector& base,
                                   const Vector& change) const {
   if (course == Course::straight || course == Course::standing) return base;
-  // Left and right once within the horizon, twice as far as in the turn that goes on.
+  // The slalom goes left and right once over the horizon, with twice the amplitude of the steady turn.
   const double phase = course == Course::turn ? 1.0 : 2.0 * std::cos(2.0 * std::numbers::pi * (k + 0.5) / intervals_);
   Vector inputs = base;
   for (int j = 0; j < nu_; ++j) {
@@ -143,7 +143,7 @@ Drive Drives::drive(const CourseName& named) {
     return made;
   }
   const Vector change = excitation(base);
-  // A turn is steady once it has gone on for a while.
+  // A turn becomes steady after a while.
   if (named.course == Course::turn)
     for (int k = 0; k < intervals_; ++k) x = moved(x, inputs_at(named.course, k, x, base, change));
   made.states.resize(nx_, intervals_ + 1);

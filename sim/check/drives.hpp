@@ -9,23 +9,23 @@
 
 namespace rhec::sim {
 
-/// A drive over one horizon with the sensitivities of its intervals.
+/// A drive over one horizon, with the sensitivities of each interval.
 struct Drive {
   std::string name, meaning, unusable;
-  Eigen::MatrixXd states, inputs;                 ///< columns: nodes, intervals
+  Eigen::MatrixXd states, inputs;                 ///< one column per node, one per interval
   std::vector<Eigen::MatrixXd> jacobians;         ///< by interval, dF/d[x; u; p] or dF/d[x; u; p; p_end]
   std::vector<Eigen::MatrixXd> output_jacobians;  ///< by node
-  Eigen::MatrixXd outputs;                        ///< columns: nodes
+  Eigen::MatrixXd outputs;                        ///< one column per node
 };
 
-/// Which unknown stands for a parameter on each interval.
+/// The unknown that represents a parameter on each interval.
 struct DriveBlocks {
-  std::vector<std::vector<int>> unknown;  ///< by parameter and interval, counted from 0
-  std::vector<std::vector<bool>> ramp;    ///< the interval on which it runs to that value
+  std::vector<std::vector<int>> unknown;  ///< by parameter and interval, zero-based
+  std::vector<std::vector<bool>> ramp;    ///< true: the parameter ramps to that value over the interval
   std::vector<int> parameter_of;          ///< by unknown
 };
 
-/// Typical drives of a model (straight ahead, a turn, a slalom, standing still), and what measurements along them tell.
+/// Typical drives of a model (straight ahead, turn, slalom, standstill) and the information in their measurements.
 class Drives {
  public:
   explicit Drives(const CheckedModel& checked);
@@ -52,24 +52,24 @@ class Drives {
   };
 
   void find_blocks();
-  /// The inputs of going straight on or standing; the speeds among the states go to `state`.
+  /// Inputs for driving straight ahead or standing still; writes the speeds among the states to `state`.
   Vector base_inputs(Course course, Vector& state) const;
-  /// How far the inputs leave those of the straight drive: half of what there is room for, or of a scale. Of inputs
-  /// that all make speed (the wheels of two sides), every other one by a part of it up or down.
+  /// Deviation of the inputs from the straight drive: half the room to a bound or half a scale, whichever is smaller.
+  /// If all inputs produce speed (left and right wheels), every other one is raised or lowered by a fraction of it.
   Vector excitation(const Vector& base) const;
-  /// By how much states leave the inner half of their bounds (their scale, where they have none), in scales.
+  /// How far states are outside the inner half of their bounds (or beyond their scale if unbounded), in scales.
   double excess(const Vector& x) const;
   Vector moved(const Vector& x, const Vector& u) const;
-  /// The inputs of interval k. What would drive a state too far (a steering angle, by its rate) is left out.
+  /// The inputs of interval k. Omits excitation that would drive a state too far (a steering angle, through its rate).
   Vector inputs_at(Course course, int k, const Vector& x, const Vector& base, const Vector& change) const;
   Drive drive(const CourseName& named);
   Matrix jacobian(const Vector& x, const Vector& u, int interval) const;
   void observe(Drive& made) const;
 
-  /// Adds to `by_unknowns` (n_x rows) what an interval's parameters do to its end.
+  /// Adds the sensitivity of an interval's end state to its parameters to `by_unknowns` (n_x rows).
   void add_parameters(const Drive& drive, int interval, Eigen::Ref<Matrix> by_unknowns) const;
   std::string name_of_unknown(int unknown) const;
-  /// Columns that span what is not determined, as short sums: each is made to have an unknown of its own.
+  /// The undetermined subspace as short linear combinations, each reduced so that it has an unknown of its own.
   std::vector<std::string> combinations(Matrix null_space) const;
 
   const CheckedModel& checked_;

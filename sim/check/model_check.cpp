@@ -38,7 +38,7 @@ Verdict ModelCheck::verdict() const {
 
 namespace {
 
-/// Puts the fastest instruction set back at the end, which models start with.
+/// Restores the fastest instruction set, the default of models, at the end.
 class FastestAtTheEnd {
  public:
   explicit FastestAtTheEnd(Model& model) : model_(&model) {}
@@ -81,7 +81,7 @@ void require_fitting(const Model& model, const ModelDescription& within, const M
                             within.parameters.size()));
 }
 
-/// The worst of several comparisons, with the circumstances in words.
+/// The worst of several comparisons, with a description of the circumstances.
 struct Worst {
   WorstEntry entry;
   std::string circumstances;
@@ -92,7 +92,7 @@ struct Worst {
   }
 };
 
-constexpr int stages_of_a_range = 15;  // fills packs, and leaves one that is not full
+constexpr int stages_of_a_range = 15;  // fills SIMD packs and leaves one partly filled
 constexpr double derivative_tolerance = 1e-6, integration_tolerance = 1e-10;
 
 }  // namespace
@@ -259,7 +259,7 @@ ModelCheck check_model(const Host& host, const Robot& robot, ModelCheckOptions o
   options.output_sigmas = robot.output_sigmas();
   options.input_sigmas = robot.input_sigmas();
   options.blockings = robot.make_blockings();
-  // The robot's own is shared, and may not be given another instruction set.
+  // The robot's own model is shared; its instruction set must not change.
   const PluginChoice choice = robot.model_choice();
   const std::shared_ptr<Model> model = host.make_model(choice.name, choice.options);
   return check_model(*model, robot.bounded_description(), options);

@@ -1,4 +1,4 @@
-// What a model says of itself, and whether it moves as its roles say.
+// Checks a model's description, and whether the model moves according to its roles.
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -14,14 +14,14 @@
 namespace rhec::sim {
 namespace {
 
-constexpr double far_off = 100.0;  // a scale that is wrong by this factor misleads finite differences and solvers
+constexpr double far_off = 100.0;  // a scale wrong by this factor misleads finite differences and solvers
 
 struct Kind {
   const char* word;
   const std::vector<Variable>& variables;
 };
 
-/// A role: what it means, of which variables, and what such a variable is like.
+/// A role: its meaning, its group of variables, and the expected properties of such a variable.
 struct Role {
   const char* name;
   int index;
@@ -89,7 +89,7 @@ class Description {
                      "make the scale a typical magnitude inside the bounds");
   }
 
-  /// Bounds are given by the names of states, inputs and parameters alike; what is measured has names of its own.
+  /// Bounds are set by name for states, inputs and parameters alike; outputs have a separate name space.
   void check_names() {
     std::map<std::string, const char*> owners, outputs;
     for (const Kind& kind : kinds_) {
@@ -290,7 +290,7 @@ std::vector<Finding> check_straight_motion(const CheckedModel& checked) {
     return Motion{std::cos(direction) * vx + std::sin(direction) * vy,
                   std::cos(direction) * vy - std::sin(direction) * vx};
   };
-  constexpr double direction = 0.7;  // nothing special
+  constexpr double direction = 0.7;  // arbitrary
   constexpr const char* advice =
       "override Model::straight_motion, or mend roles.speed, speed_factor and nominal values";
   const Motion nominal = motion(nominal_values(about.parameters), direction);

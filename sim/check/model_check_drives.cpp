@@ -1,4 +1,4 @@
-// What typical drives say: magnitudes against scales, and which states and parameters the measurements tell.
+// Checks on typical drives: magnitudes against scales, and observability of states and parameters.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,10 +16,10 @@ namespace {
 using Matrix = Eigen::MatrixXd;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double far_off = 100.0;        // between a magnitude and its scale
+constexpr double far_off = 100.0;        // ratio of a magnitude to its scale
 constexpr double ill_conditioned = 1e6;  // of the scaled Jacobian of F
 
-/// The largest magnitude that something had on a drive, and on which one.
+/// The largest magnitude over all drives, and the drive where it occurred.
 struct Magnitude {
   double value = 0.0;
   std::string drive;
@@ -52,7 +52,7 @@ class ScaleCheck {
     }
     double widest = 1.0;
     for (const Seen& seen : seen_) {
-      if (seen.magnitude.value == 0.0) continue;  // it rests at zero on every drive, which says nothing
+      if (seen.magnitude.value == 0.0) continue;  // zero on every drive: no information
       const double ratio = seen.magnitude.value / seen.scale;
       widest = std::max({widest, ratio, 1.0 / ratio});
       if (ratio < far_off && ratio > 1.0 / far_off) continue;
@@ -99,7 +99,7 @@ class ScaleCheck {
     }
   }
 
-  /// What a parameter that is off by its scale does to the state over the horizon, in scales of the state.
+  /// Effect of a parameter error of one scale on the state over the horizon, in scales of the state.
   void take_sensitivities(const Drive& drive) {
     const int nx = static_cast<int>(about_.states.size()), nu = static_cast<int>(about_.inputs.size()),
               np = static_cast<int>(about_.parameters.size());

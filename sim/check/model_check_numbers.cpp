@@ -1,4 +1,4 @@
-// Where inside the bounds a model's numbers are not finite, or grow without bound.
+// Finds where within the bounds a model's values are not finite or grow without bound.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,15 +14,15 @@ namespace rhec::sim {
 namespace {
 
 constexpr double reach = 3.0;    // of variables without bounds, in scales
-constexpr double steep = 1e3;    // a derivative so many times the usual one is looked at more closely,
-constexpr double steeper = 1e2;  // and has no bound where it grows by this much more in its neighbourhood
-constexpr int looked_into = 32;  // bad samples whose variables are drawn anew one by one,
-constexpr int redraws = 24;      // so often
-constexpr double narrow = 0.8;   // of its range: a variable says where the bad samples are if they are within this
+constexpr double steep = 1e3;    // a derivative this many times the usual one is examined further;
+constexpr double steeper = 1e2;  // it counts as unbounded if it grows by this factor in its neighbourhood
+constexpr int looked_into = 32;  // bad samples whose variables are redrawn one by one,
+constexpr int redraws = 24;      // this many times each
+constexpr double narrow = 0.8;   // of its range: a variable locates the bad samples if they lie within this fraction
 
-/// What is looked at of one sample.
+/// Results for one sample.
 struct Look {
-  // Not finite: of F, and of h.
+  // Counts of non-finite entries of F and of h.
   bool values = false, first = false, second = false;
   bool outputs = false, output_first = false, output_second = false;
   double slope = 0.0;  ///< largest entry of F's Jacobian, in scales
@@ -99,7 +99,7 @@ class Explorer {
 
   double draw(int j) { return random_.uniform(dimensions_[j].lower, dimensions_[j].upper); }
 
-  /// Half of all samples are anywhere; the others lie on bounds and zeros in some or all of their variables.
+  /// Half of the samples are uniform; the others have some or all variables at a bound or at zero.
   Point sample(int index) {
     Point z(nz_);
     const double share = index % 2 == 0 ? 0.0 : random_.uniform();
@@ -117,13 +117,13 @@ class Explorer {
     return z;
   }
 
-  /// The same point with one variable drawn anew.
+  /// The same point with one variable redrawn.
   Point redrawn(Point z, int j) {
     z[j] = draw(j);
     return z;
   }
 
-  /// Whether the slope of `at` grows on, the closer one looks.
+  /// Whether the slope keeps growing closer to `at`.
   bool grows_on(Point at, double slope) {
     const double start = slope;
     for (int trial = 0; trial < 2000 && std::isfinite(slope) && slope < steeper * start; ++trial) {
@@ -155,7 +155,7 @@ class Explorer {
   std::vector<double> next_, jacobian_, hessian_, outputs_, output_jacobian_, output_hessian_;
 };
 
-/// Sorted values in clusters, as "in [-1.6, -1.5] or [1.5, 1.6]"; empty where they are nearly everywhere.
+/// Sorted values in clusters, as "in [-1.6, -1.5] or [1.5, 1.6]"; empty if they are nearly everywhere.
 std::string intervals_of(std::vector<double> values, const Dimension& d) {
   if (values.empty() || !(d.upper > d.lower)) return {};
   std::sort(values.begin(), values.end());
@@ -177,8 +177,8 @@ std::string intervals_of(std::vector<double> values, const Dimension& d) {
   return text;
 }
 
-/// Which variables decide whether a sample is bad, and in which part of their ranges it is; "" where none does.
-/// A variable decides where drawing it anew, and nothing else, often mends a bad sample.
+/// The variables that decide whether a sample is bad, and the ranges where it is; "" if there are none. A variable
+/// decides if redrawing it alone often fixes a bad sample.
 template <class IsBad>
 std::string region_of(Explorer& explorer, const std::vector<Explorer::Point>& bad, const IsBad& is_bad) {
   std::string text;
@@ -207,7 +207,7 @@ std::string region_of(Explorer& explorer, const std::vector<Explorer::Point>& ba
 
 struct Tally {
   std::vector<Explorer::Point> points;
-  int values = 0, first = 0, second = 0;  ///< samples of which these are not finite
+  int values = 0, first = 0, second = 0;  ///< numbers of samples where these are not finite
 };
 
 template <class IsBad>
@@ -265,7 +265,7 @@ std::vector<Finding> check_numbers(const CheckedModel& checked) {
     std::vector<Explorer::Point> points;
     for (auto& [slope, point] : slopes)
       if (slope > limit) points.push_back(std::move(point));
-    // From the least steep of them: on the pole itself rounding ends the growth.
+    // Start from the least steep one: at the pole itself, rounding limits the growth.
     if (!points.empty() && explorer.grows_on(points.front(), explorer.look(points.front()).slope)) {
       const std::string region = region_of(explorer, points, [&](const Look& look) { return !(look.slope <= limit); });
       findings.warn(region.empty() ? "anywhere" : region,

@@ -6,13 +6,13 @@
 
 #include "rhec/sim/check/model_check.hpp"
 
-// The checks that `check_model` is made of. Each answers at least one finding.
+// The individual checks of `check_model`. Each returns at least one finding.
 namespace rhec::sim {
 
-/// What every check is given.
+/// Input of every check.
 struct CheckedModel {
   Model& model;
-  const ModelDescription& about;  ///< with the bounds to keep to
+  const ModelDescription& about;  ///< with the bounds to respect
   const ModelCheckOptions& options;
   std::vector<double> output_sigmas, input_sigmas;
 };
@@ -45,19 +45,19 @@ class FindingList {
   std::vector<Finding> all_;
 };
 
-/// `can_go_on`: whether there is enough to try the model with.
+/// `can_go_on`: whether the description suffices to evaluate the model.
 std::vector<Finding> check_description(const ModelDescription& about, bool& can_go_on);
 std::vector<Finding> check_symmetry(const CheckedModel& checked);
 std::vector<Finding> check_straight_motion(const CheckedModel& checked);
 std::vector<Finding> check_derivatives(const CheckedModel& checked);
 std::vector<Finding> check_numbers(const CheckedModel& checked);
-/// Checks "scaling" and "observability", which look at the same drives.
+/// Checks "scaling" and "observability", which use the same drives.
 std::vector<Finding> check_drives(const CheckedModel& checked, std::vector<DriveInformation>& drives);
 std::vector<Finding> measure_times(const CheckedModel& checked, std::vector<EvaluationTimes>& times);
 
-/// The state at the origin with all bodies in line along `direction`, all else 0 or as near to it as bounds let.
+/// The state at the origin with all bodies in line along `direction`, all else 0 or as close to 0 as bounds allow.
 std::vector<double> state_in_line(const CheckedModel& checked, double direction);
-/// The ground speed at which the largest input has its typical magnitude; none where no input makes speed [m/s].
+/// The ground speed at which the largest input has its typical magnitude; none if no input produces speed [m/s].
 std::optional<double> typical_speed(const CheckedModel& checked);
 
 }  // namespace rhec::sim

@@ -15,7 +15,7 @@ namespace rhec::sim {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// Tolerances that are tried: 10^-2 ... 10^-12.
+// Tolerances tried: 10^-2 ... 10^-12.
 constexpr int loosest_exponent = -2, tightest_exponent = -12;
 
 bool has_option(const Host& host, const std::string& solver, std::string_view name) {
@@ -23,7 +23,7 @@ bool has_option(const Host& host, const std::string& solver, std::string_view na
   return std::any_of(rows.begin(), rows.end(), [&](const OptionRow& row) { return row.name == name; });
 }
 
-/// The 99th percentile of the KKT residual over all problems that are taken.
+/// The 99th percentile of the KKT residual over all accepted problems.
 double p99_of(const Host& host, const Backend& backend, const Settings& options, const std::vector<Recorded>& records) {
   Bench bench(host, backend, options);
   Assessor assessor;
@@ -51,7 +51,7 @@ Settings tighten(const Host& host, const Backend& backend, double accuracy, cons
       host.make_solver(backend.solver, converging);
       options = converging;
     } catch (const Error&) {
-      // Its `mode` means something else.
+      // This solver's `mode` has another meaning.
     }
   }
   double least = infinity;
@@ -69,7 +69,7 @@ Settings tighten(const Host& host, const Backend& backend, double accuracy, cons
     try {
       host.make_solver(backend.solver, tightened);
     } catch (const Error&) {
-      continue;  // a value that this plugin does not allow; all options were fine before
+      continue;  // this plugin does not allow the value; all other options were valid
     }
     const double residual = p99_of(host, backend, tightened, records);
     if (!result.tolerance || residual < least) {

@@ -6,8 +6,8 @@
 
 namespace rhec::sim {
 
-/// Tightens a backend's option `tolerance` until the residual is small enough at the 99th percentile of the problems;
-/// returns the options to go on with, and puts into `result` what came of it.
+/// Tightens a backend's option `tolerance` until the 99th percentile of the KKT residual is small enough; returns the
+/// options to use and stores the outcome in `result`.
 Settings tighten(const Host& host, const Backend& backend, double accuracy, const std::vector<Recorded>& records,
                  BackendAnswers& result);
 

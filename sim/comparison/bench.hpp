@@ -9,7 +9,7 @@
 
 namespace rhec::sim {
 
-/// A problem of the reference's run, the guess that its solver was given, and its answer.
+/// A problem from the reference's run, with its solver's initial guess and solution.
 struct Recorded {
   SameProblems::Place place;
   std::unique_ptr<const HorizonProblem> problem;
@@ -17,14 +17,14 @@ struct Recorded {
   bool reference_is_usable = false;
 };
 
-/// Solves problems of a kind in their order, with one instance a seed.
+/// Solves problems of one kind in order, with one solver instance per seed.
 class Bench {
  public:
   Bench(const Host& host, const Backend& backend, Settings options);
 
-  /// Empty: it takes the problem, and is ready for it.
+  /// Empty: the solver accepts the problem and is set up for it.
   std::string why_not(const Recorded& record);
-  /// Puts the answer into `point`.
+  /// Writes the solution to `point`.
   Answer solve(const Recorded& record, Iterate& point);
 
  private:
@@ -34,7 +34,7 @@ class Bench {
   const Backend* backend_;
   Settings options_;
   std::shared_ptr<Solver> solver_;
-  std::unique_ptr<HorizonProblem> problem_;  ///< that the solver is set up for
+  std::unique_ptr<HorizonProblem> problem_;  ///< the problem that the solver is set up for
   bool ready_ = false;
   std::int64_t seed_ = 0;
 };

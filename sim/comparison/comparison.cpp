@@ -19,10 +19,10 @@
 namespace rhec::sim {
 namespace {
 
-// Problems of each kind that are left if the caller does not say how many: enough for a 99th percentile.
+// Default number of problems of each kind: enough for a 99th percentile.
 constexpr std::int64_t wanted_problems = 400;
 
-/// The recorded problems by kind of problem, in the order in which a loop first poses them: estimation, then control.
+/// The recorded problems by kind, in the order in which a loop first solves them: estimation, then control.
 using Records = std::vector<std::pair<std::string, std::vector<Recorded>>>;
 
 std::vector<Recorded>& of_kind(Records& records, std::string_view kind) {
@@ -46,13 +46,13 @@ Scenario scenario_with(const Host& host, Settings settings, std::int64_t seed, c
   return {host, settings};
 }
 
-/// What every part of a comparison needs.
+/// Shared by all parts of a comparison.
 struct Task {
   const Host& host;
   const Settings& scenario;
   const ComparisonOptions& options;
   std::vector<std::int64_t> seeds;
-  double work = 1.0, done = 0.0;  // in about equal pieces
+  double work = 1.0, done = 0.0;  // in units of about equal effort
 
   void show(double share_of_piece) const {
     if (options.progress) options.progress(std::min(1.0, (done + share_of_piece) / work));
@@ -65,7 +65,7 @@ struct Task {
 
 // ---- the problems
 
-/// Drives a seed with the reference and adds the problems of every n-th step.
+/// Runs the reference with one seed and adds the problems of every n-th step.
 RunSummary record(const Task& task, std::int64_t seed, int every, Records& records) {
   const Backend& reference = task.options.reference;
   const Scenario scenario =
@@ -93,7 +93,8 @@ RunSummary record(const Task& task, std::int64_t seed, int every, Records& recor
   return summarise(log, scenario);
 }
 
-/// The least n for which every n-th step leaves the wanted number of problems, if all seeds are as this one.
+/// The smallest n for which every n-th step gives at most the wanted number of problems, if all seeds are like this
+/// one.
 int thinning_for(const Records& first_seed, std::size_t seeds) {
   std::int64_t most = 0;
   for (const auto& [kind, records] : first_seed) most = std::max<std::int64_t>(most, records.size());
@@ -102,7 +103,7 @@ int thinning_for(const Records& first_seed, std::size_t seeds) {
 
 // ---- the two parts
 
-/// Options that each backend was left with, by kind.
+/// Final options of each backend, by kind.
 using Tuned = std::map<std::string, std::vector<Settings>>;
 
 SameProblems solve_same_problems(Task& task, std::string_view kind, const std::vector<Recorded>& records,
@@ -112,7 +113,7 @@ SameProblems solve_same_problems(Task& task, std::string_view kind, const std::v
   std::vector<Bench> benches;
   for (std::size_t b = 0; b < count; ++b) benches.emplace_back(task.host, backends[b], options[b]);
   Assessor assessor;
-  std::vector<Iterate> points(count + 1);  // the reference's is the last
+  std::vector<Iterate> points(count + 1);  // the reference's comes last
   std::vector<Answer> answers(count + 1);
   std::vector<std::uint8_t> has_point(count + 1);
   for (std::size_t p = 0; p < records.size(); ++p) {
@@ -120,7 +121,7 @@ SameProblems solve_same_problems(Task& task, std::string_view kind, const std::v
     assessor.begin(*record.problem);
     std::fill(has_point.begin(), has_point.end(), 0);
     std::vector<std::uint8_t> taken(count);
-    // Who is first changes from problem to problem, so that nobody always comes after the same load.
+    // The first backend rotates from problem to problem, so that none always runs after the same load.
     for (std::size_t turn = 0; turn < count; ++turn) {
       const std::size_t b = (p + turn) % count;
       BackendAnswers& mine = result.backends[b];
@@ -264,11 +265,11 @@ Comparison compare(const Host& host, const Settings& scenario, const ComparisonO
     if (task.seeds.back() > std::numeric_limits<int>::max())
       throw Error(fmt::format("compare: seed {} is too large; the scenario's seed and --seeds must give seeds up to {}",
                               task.seeds.back(), std::numeric_limits<int>::max()));
-    host.make_solver(reference.solver, reference.options);  // a mistake in it is told before anything runs
+    host.make_solver(reference.solver, reference.options);  // reports invalid options before anything runs
     for (const Backend& backend : options.backends) host.make_solver(backend.solver, backend.options);
   }
   const auto seeds = static_cast<double>(task.seeds.size()), count = static_cast<double>(options.backends.size());
-  // Drives; then of each kind tightening and solving; then drives again.
+  // Reference runs; then tightening and solving for each kind; then closed-loop runs.
   task.work = seeds + 2.0 * ((options.accuracy ? count : 0.0) + 1.0) + (options.closed_loop ? count * seeds : 0.0);
 
   Records records;

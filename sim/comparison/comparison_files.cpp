@@ -42,7 +42,7 @@ Json json_of(const SameProblems& same, const BackendAnswers& backend, const std:
   json["violation"] = json_of(spread_of(answers, &Answer::violation));
   json["gap"] = json_of(spread_of(answers, &Answer::gap));
   json["distance"] = json_of(spread_of(answers, &Answer::distance));
-  // Where to look first.
+  // The problem to examine first.
   const auto worst = std::max_element(answers.begin(), answers.end(), [](const Answer& a, const Answer& b) {
     return std::isnan(b.gap) ? false : std::isnan(a.gap) || a.gap < b.gap;
   });
@@ -95,14 +95,14 @@ constexpr const char* colours[] = {"#d1341f", "#2563c4", "#1b8a5a", "#8a3fb0",
 constexpr const char* dashes[] = {"", "7 3", "2 3"};
 constexpr const char* grey_text = R"(font-size="11" fill="#5f6368")";
 
-/// Colours first; where they are used up, dashes tell apart.
+/// Distinguished by colours first, then by dashes.
 std::string style_of(std::size_t backend) {
   const std::string dash = dashes[backend / std::size(colours) % std::size(dashes)];
   return fmt::format("stroke=\"{}\" stroke-width=\"1.8\"{}", colours[backend % std::size(colours)],
                      dash.empty() ? "" : fmt::format(" stroke-dasharray=\"{}\"", dash));
 }
 
-/// A time as people say it, to three digits.
+/// A time with its unit, to three digits.
 std::string time_text(double us) {
   const double scale = us < 1e3 ? 1.0 : us < 1e6 ? 1e3 : 1e6;
   const double value = us / scale;

@@ -41,7 +41,7 @@ struct Interval {
   double width() const { return upper - lower; }
   double middle() const { return 0.5 * (lower + upper); }
   Interval padded(double share) const { return {lower - share * width(), upper + share * width()}; }
-  // An interval that can be an axis, whatever went in.
+  // A valid axis interval for any input.
   Interval usable() const {
     if (empty()) return {0.0, 1.0};
     if (width() > 1e-9 * std::max(std::abs(lower), std::abs(upper))) return *this;
@@ -50,7 +50,7 @@ struct Interval {
   }
 };
 
-// A rectangle of the drawing, and the data that it shows.
+// A rectangle of the drawing and the data range that it shows.
 struct Frame {
   Point corner;
   double width, height;
@@ -65,11 +65,11 @@ struct Frame {
 
 struct LegendEntry {
   std::string label;
-  std::string style;  // of a short line
+  std::string style;  // of a short line sample
   bool is_dot = false;
 };
 
-// Good enough to keep things apart: the drawing cannot ask for the font.
+// An estimate that avoids overlaps; font metrics are not available.
 double text_width(std::string_view text, double font_size) {
   const auto letters = std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
   return 0.57 * font_size * static_cast<double>(letters);
@@ -96,7 +96,7 @@ void draw_legend(Svg& svg, const std::vector<LegendEntry>& legend, Point at) {
   }
 }
 
-// Heading on the left, legend on the right of one line, or on a line of its own where both do not fit.
+// Heading on the left and legend on the right of one line; the legend gets its own line if both do not fit.
 bool fits(const std::string& title, const std::vector<LegendEntry>& legend, double width) {
   return text_width(title, 12.5) + 16.0 + width_of(legend) <= width;
 }
@@ -155,7 +155,7 @@ void draw_base(Svg& svg, const Frame& frame, const BaseMap& base) {
     const double share = (base.value(x, y) - base.lower) / (base.upper - base.lower);
     return std::isnan(share) ? -1 : static_cast<int>(std::clamp(share * palette_levels, 0.0, palette_levels - 1.0));
   };
-  // One shape per colour, made of runs of equal cells in cell units, keeps the file small.
+  // One shape per colour, composed of runs of equal cells in cell units, keeps the file small.
   std::vector<std::string> shapes(palette_levels);
   for (int row = 0; row < rows; ++row) {
     int run_start = 0, run_level = level_at(row, 0);
@@ -186,7 +186,7 @@ void draw_colour_bar(Svg& svg, const Frame& frame, const BaseMap& base) {
       {frame.right() + gutter, frame.corner.y}, bar_width, frame.height, {0.0, 1.0}, {base.lower, base.upper}};
   for (int level = 0; level < levels; ++level) {
     const double top = bar.bottom() - (level + 1) * bar.height / levels;
-    // Half a pixel more closes the seams between neighbours.
+    // An extra half pixel closes the seams between neighbours.
     svg.rectangle({bar.corner.x, top}, bar.width, bar.height / levels + (level > 0 ? 0.5 : 0.0),
                   fmt::format("fill=\"{}\"", hex(slip_palette((level + 0.5) / levels))));
   }
@@ -231,7 +231,7 @@ void draw_map(Svg& svg, const RunPicture& picture, Point corner, double height) 
       frame.y.include(point.y);
     }
   }
-  // A metre has the same length along both axes; the shorter one shows more land.
+  // Equal scale on both axes; the shorter one shows a wider surrounding area.
   frame.x = frame.x.usable();
   frame.y = frame.y.usable();
   const double metres = 1.1 * std::max(frame.x.width() / frame.width, frame.y.width() / frame.height);  // per pixel
@@ -308,7 +308,7 @@ Interval value_range(const Panel& panel) {
     for (double value : curve.values) lines.include(value);
   }
   lines = lines.usable();
-  // A band may widen the axis somewhat; what goes beyond (as at the start of a run) is cut off.
+  // A band may widen the axis somewhat; anything beyond (as at the start of a run) is clipped.
   const Interval most = lines.padded(0.25);
   Interval range = lines;
   for (const Curve& curve : panel.curves) {
@@ -324,7 +324,7 @@ Interval value_range(const Panel& panel) {
 }
 
 void draw_band(Svg& svg, const Frame& frame, const Curve& curve, std::string_view style) {
-  // Infinite coordinates are no drawing; a band that leaves the panel needs to go only a little farther.
+  // Avoid infinite coordinates: a band that leaves the panel is drawn only slightly beyond it.
   const Interval most = frame.y.padded(0.2);
   std::vector<double> sides[2];
   for (std::size_t i = 0; i < curve.values.size(); ++i) {
@@ -337,7 +337,7 @@ void draw_band(Svg& svg, const Frame& frame, const Curve& curve, std::string_vie
   while (begin < curve.values.size()) {
     std::size_t end = begin;
     while (end < curve.values.size() && !std::isnan(sides[0][end])) ++end;
-    const std::size_t share = 2000 * (end - begin) / curve.values.size() + 8;  // of the points that a side may have
+    const std::size_t share = 2000 * (end - begin) / curve.values.size() + 8;  // maximum number of points per side
     std::vector<Point> outline;
     for (int side = 0; side < 2; ++side) {
       std::vector<std::size_t> kept = thin_curve(std::span(sides[side]).subspan(begin, end - begin), share);

@@ -10,7 +10,7 @@
 namespace rhec::sim {
 namespace {
 
-// Hundredths of a pixel are finer than anything that is seen.
+// Hundredths of a pixel are finer than the eye can see.
 std::string number(double value) {
   std::string text = fmt::format("{:.2f}", value);
   while (text.back() == '0') text.pop_back();
@@ -187,14 +187,14 @@ std::vector<std::size_t> thin_curve(std::span<const double> values, std::size_t 
 }
 
 std::vector<Point> thin_track(std::span<const Point> track, double tolerance, std::size_t most) {
-  constexpr double farthest = 1e9;  // a track in more pieces than `most` cannot be thinned so far
+  constexpr double farthest = 1e9;  // a track with more than `most` pieces cannot be thinned to `most` points
   while (true) {
     std::vector<Point> kept;
     bool last_is_kept = true;
     for (Point point : track) {
       last_is_kept = kept.empty() || !is_finite(point) || !is_finite(kept.back()) ||
                      std::hypot(point.x - kept.back().x, point.y - kept.back().y) >= tolerance;
-      // One gap is as good as many.
+      // Merge consecutive gaps.
       if (last_is_kept && (is_finite(point) || (!kept.empty() && is_finite(kept.back())))) kept.push_back(point);
     }
     if (!last_is_kept) kept.push_back(track.back());

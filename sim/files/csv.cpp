@@ -31,10 +31,10 @@ bool means_missing(std::string_view field) {
   return field.size() == 3 && same(field[0], 'n') && same(field[1], 'a') && same(field[2], 'n');
 }
 
-// A finite number, a NaN where the value is missing, or nothing.
+// A finite number, NaN for a missing value, or nothing.
 std::optional<double> number_in(std::string_view field) {
   if (means_missing(field)) return std::numeric_limits<double>::quiet_NaN();
-  // from_chars knows no plus sign.
+  // from_chars does not accept a plus sign.
   if (field.front() == '+' && field.size() > 1 && field[1] != '-') field.remove_prefix(1);
   double value = 0.0;
   const auto [end, failure] = std::from_chars(field.data(), field.data() + field.size(), value);
@@ -54,7 +54,7 @@ int for_each_field(std::string_view line, Visit visit) {
   }
 }
 
-// Enough of a field for a message, whatever the file is.
+// A field, shortened for messages.
 std::string quoted(std::string_view field) {
   constexpr std::size_t most = 40;
   std::string text;
@@ -62,7 +62,7 @@ std::string quoted(std::string_view field) {
   return fmt::format("'{}{}'", text, field.size() > most ? "..." : "");
 }
 
-// Cuts the first line off the text.
+// Removes the first line from the text and returns it.
 std::string_view take_line(std::string_view& text) {
   const std::size_t end = text.find('\n');
   const std::string_view line = text.substr(0, end);
@@ -113,7 +113,7 @@ CsvTable parse_csv(std::string_view text, const std::string& name, const CsvOpti
     text = rest;
   }
   table.first_row_line = line_number + 1;
-  // A guess from the first line saves most of the growing.
+  // Estimating the size from the first line avoids most reallocations.
   const std::size_t first_length = std::min(text.find('\n'), text.size()) + 1;
   const auto first_fields = static_cast<std::size_t>(
       std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(first_length - 1), ','));

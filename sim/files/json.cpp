@@ -1,4 +1,4 @@
-// The one unit that knows the library which reads and writes JSON.
+// The only translation unit that uses the JSON library.
 #include "rhec/sim/files/json.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 using Foreign = nlohmann::ordered_json;
 
-/// Makes a value of what the parser tells, one thing after the other.
+/// Builds a value from the parser's events.
 class Builder {
  public:
   explicit Builder(Json::RepeatedKeys repeated) : repeated_(repeated) {}
@@ -22,7 +22,7 @@ class Builder {
   bool number_unsigned(std::uint64_t value) { return put(Json(value)); }
   bool number_float(double value, const std::string&) { return put(Json(value)); }
   bool string(std::string& value) { return put(Json(std::move(value))); }
-  bool binary(const Foreign::binary_t&) { return false; }  // is in no text
+  bool binary(const Foreign::binary_t&) { return false; }  // does not occur in text
   bool start_array(std::size_t) { return open(Json::array()); }
   bool start_object(std::size_t) { return open(Json::object()); }
   bool end_array() { return close(); }
@@ -53,7 +53,7 @@ class Builder {
     place_for(std::move(value));
     return true;
   }
-  // An array or object does not grow while one within it is open, so that the pointers stay good.
+  // An array or object does not grow while a nested one is open, so the pointers stay valid.
   bool open(Json empty) {
     open_.push_back(&place_for(std::move(empty)));
     return true;

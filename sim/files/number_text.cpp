@@ -10,7 +10,7 @@ namespace rhec::sim {
 namespace {
 
 constexpr std::array<double, 13> powers = {1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12};
-// Above it a number times its power of ten is no longer a whole number of its own.
+// Above this limit, the scaled number is no longer a unique integer.
 constexpr double largest_exact = 9e15;
 
 }  // namespace

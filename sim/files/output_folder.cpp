@@ -30,11 +30,11 @@ OutputFolder::OutputFolder(const fs::path& folder) {
     throw Error(fmt::format("{}: is a file; results go to a folder: choose another name or move the file away",
                             folder_.string()));
   }
-  // Aside within the folder where there is one, since only it is known to be writable and on the right disk.
+  // The temporary folder is inside an existing folder, since only that is known to be writable and on the right disk.
   const fs::path parent = fs::is_directory(status) ? folder_ : folder_.parent_path();
   fs::create_directories(parent, failure);
   if (failure) refuse(parent, "cannot be created", failure);
-  // Creating a folder tells whether it is new, so the first name that nobody else has is ours.
+  // create_directory reports whether the folder is new, so the first unused name is ours.
   for (int attempt = 0;; ++attempt) {
     aside_ = parent / fmt::format(".{}.partial-{}", folder_.filename().string(), attempt);
     if (fs::create_directory(aside_, failure)) return;
@@ -85,7 +85,7 @@ void OutputFolder::commit() {
   if (!fs::exists(folder_, failure)) {
     fs::rename(aside_, folder_, failure);
     if (!failure) return;
-    // Somebody else created it meanwhile: go on file by file.
+    // Another process created it meanwhile: continue file by file.
     fs::create_directories(folder_, failure);
   }
   for (const fs::path& name : names_) {

@@ -12,13 +12,13 @@ namespace rhec::sim {
 namespace {
 
 constexpr int version = 1;
-// Cells of the map of slip: as many as a picture shows.
+// Number of cells of the slip map: as many as a figure shows.
 constexpr double most_cells = 6000.0;
-// The map reaches this far beyond path and track [m].
+// Margin of the map around path and track [m].
 constexpr double map_margin = 5.0;
 constexpr double most_path_points = 2000.0, least_path_step = 0.5;
 
-/// No bound is null, as in a configuration.
+/// Null means unbounded, as in a configuration.
 Json bound(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json json_of(const std::vector<Variable>& variables) {
@@ -35,8 +35,7 @@ Json json_of(const std::vector<Variable>& variables) {
   return list;
 }
 
-/// The outputs that are the coordinates of a position: that move as one coordinate of the vehicle does, and not as the
-/// other.
+/// The outputs that are position coordinates, i.e. that depend on one coordinate of the vehicle but not on the other.
 Json position_outputs(const Model& model) {
   const Roles& roles = model.description().roles;
   const int nx = model.state_count(), ny = model.output_count();
@@ -102,7 +101,7 @@ Json settings_of(const Robot& robot, bool has_controller) {
 
 Json json_or_null(const Settings& settings) { return settings.is_null() ? Json(nullptr) : sim::json_of(settings); }
 
-/// `"key":` and what `write` appends.
+/// Appends `"key":` and the output of `write`.
 template <class Function>
 void append_member(std::string& text, const char* key, const Function& write) {
   if (text.back() != '{') text += ',';
@@ -141,7 +140,7 @@ std::vector<PathPoint> points_of(const Path& path) {
   return points;
 }
 
-/// How the ground slips over the part of it that the run saw: the middles of square cells, row by row from the bottom.
+/// Slip of the ground in the area of the run, at the centres of square cells, row by row from the bottom.
 void append_slip(const RunLog& log, const Scenario& scenario, const std::vector<PathPoint>& path, std::string& text) {
   const ModelDescription& about = scenario.robot().model()->description();
   Box box;
@@ -169,7 +168,7 @@ void append_slip(const RunLog& log, const Scenario& scenario, const std::vector<
     for (const auto& [key, value] : {std::pair{"x0", x0}, std::pair{"y0", y0}, std::pair{"dx", dx}, std::pair{"dy", dy},
                                      std::pair{"nx", double(nx)}, std::pair{"ny", double(ny)}})
       append_member(text, key, [&, value = value] { append_number(value, 6, text); });
-    // A thousandth of the typical magnitude is seen; more would only make the file longer.
+    // Resolves a thousandth of the typical magnitude; more would only enlarge the file.
     const int decimals = std::max(0, decimals_for(about.parameters[j].scale) - 1);
     append_member(text, "values",
                   [&] { append_column(text, nx * ny, decimals, [&](int i) { return values[i * np + j]; }); });

@@ -11,16 +11,16 @@
 namespace rhec::sim {
 namespace {
 
-// A window is looked at as if it reached this much farther, to see where blocks will start [intervals].
+// How far beyond a window's end to predict where blocks will start [intervals].
 constexpr int outlook = 256;
-// Intervals of all windows and plans that are kept together, so that long horizons make no long files.
+// Limit on the total intervals of all recorded windows and plans, so that long horizons do not produce large files.
 constexpr std::int64_t most_intervals = 40000;
 
-/// What a block structure looks like in one window.
+/// The block structure in one window.
 struct BlocksInView {
   std::vector<std::int64_t> starts, suppressed;
-  std::int64_t first_start = 0;  ///< where the first block really began
-  std::int64_t next_start = -1;  ///< where the block after the last will begin; -1: none will
+  std::int64_t first_start = 0;  ///< where the first block actually began
+  std::int64_t next_start = -1;  ///< where the block after the last will begin; -1: nowhere
 };
 
 class Line {
@@ -99,7 +99,7 @@ struct HorizonLog::Parts {
   int horizon = 0;
   std::string records;
 
-  // What was measured, node by node.
+  // Measurements by node.
   std::vector<double> times, outputs, inputs;
   struct Change {
     std::int64_t node;
@@ -108,7 +108,7 @@ struct HorizonLog::Parts {
   };
   std::vector<Change> statuses;
 
-  // Workspace for the covariances of all nodes, made when the first window is seen.
+  // Workspace for the covariances of all nodes, allocated with the first window.
   StageQp qp;
   Riccati riccati;
   ActiveSet no_bounds;
@@ -130,7 +130,7 @@ struct HorizonLog::Parts {
       times.push_back(at);
       outputs.insert(outputs.end(), problem.output(place), problem.output(place) + ny);
       if (node == 0) continue;
-      if (place == 0) {  // the interval before it has left the window unseen
+      if (place == 0) {  // the preceding interval left the window unrecorded
         inputs.insert(inputs.end(), static_cast<std::size_t>(nu), std::numeric_limits<double>::quiet_NaN());
       } else {
         inputs.insert(inputs.end(), problem.measured_input(place - 1), problem.measured_input(place - 1) + nu);
@@ -147,8 +147,8 @@ struct HorizonLog::Parts {
     for (int i = 0; i < N; ++i)
       if (i == 0 || problem.structure().starts_block(i, parameter)) view.starts.push_back(window.first + i);
     if (blocking.is_one_block()) return view;
-    // Starts that a later look at the same intervals finds beside those of now are there already, but for an overlap
-    // that holds them back. Of a blocking whose borders move with the window nothing of the kind can be said.
+    // Starts that a longer window adds on the same intervals are suppressed now by the overlap. This holds only if the
+    // block borders do not move with the window.
     std::fill(begins.begin(), begins.end(), std::uint8_t{0});
     blocking.starts({window.first, farther}, begins.data());
     const bool borders_stay = std::all_of(view.starts.begin(), view.starts.end(), [&](std::int64_t start) {
@@ -163,7 +163,7 @@ struct HorizonLog::Parts {
     return view;
   }
 
-  /// Numbers that are not finite where a window is not determined.
+  /// Non-finite numbers if a window is not observable.
   void find_covariances(const RecedingHorizonEstimation& method) {
     const RheProblem& problem = method.problem();
     const Capacity capacity = problem.capacity();

@@ -17,14 +17,14 @@ namespace rhec::sim {
 namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-// Stamps are decimal: two that differ by less are the same [s].
+// Stamps are decimal: a smaller difference means equal stamps [s].
 constexpr double same_time = 1e-6;
-// A log that is silent for longer is two logs, or has a broken stamp [s].
+// A longer gap means two concatenated logs or a corrupt stamp [s].
 constexpr double longest_silence = 3600.0;
-// Rows of one stamp are not spread over more than this, since nobody knows when the silence after them began [s].
+// Rows with equal stamps are spread over at most this time, since the start of a subsequent gap is unknown [s].
 constexpr double longest_spread = 0.1;
 
-/// Puts the keys of a variant over the scenario: maps are merged, all else is replaced.
+/// Overrides the scenario with a variant's keys: maps are merged, all else is replaced.
 void put_over(Settings& base, const Settings& variant, const std::string& prefix) {
   for (const auto& [key, value] : variant.members()) {
     std::string path = prefix;
@@ -56,7 +56,7 @@ void check_names(const LogOptions& log, const ModelDescription& about, const Set
   index_of(log.steering_rate, about.inputs, section, "input");
 }
 
-/// Where the columns of a log go in the model's outputs and inputs.
+/// Maps the columns of a log to the model's outputs and inputs.
 struct Places {
   int x, y, steering, speed, steering_rate;
   Places(const LogOptions& log, const ModelDescription& about)
@@ -67,7 +67,7 @@ struct Places {
         steering_rate(index_of(log.steering_rate, about.inputs, {}, "input")) {}
 };
 
-/// Rows of one stamp were recorded one after the other by a clock too coarse to tell.
+/// Rows with equal stamps were recorded in sequence by a coarse clock.
 void spread_rows(std::vector<DeadReckoning>& rows) {
   for (std::size_t first = 0; first < rows.size();) {
     std::size_t next = first + 1;
@@ -118,7 +118,7 @@ class Driver {
         outputs_(robot.model()->description().outputs.size(), missing),
         inputs_(robot.model()->description().inputs.size(), missing) {}
 
-  Driver(const Driver&) = delete;  // the estimator's solver asks this one for the step
+  Driver(const Driver&) = delete;  // the estimator's solver queries this object for the step
   Driver& operator=(const Driver&) = delete;
 
   Replay run() {
@@ -145,8 +145,7 @@ class Driver {
       const DeadReckoning& row = log_.rows[known_];
       double rate = missing;
       if (known_ > 0) {
-        // Now that the row has come, what went on since the one before is known, and takes the place of what was
-        // assumed.
+        // The new row determines the inputs since the previous row; they replace the assumed ones.
         const DeadReckoning& before = log_.rows[known_ - 1];
         const double duration = row.time - before.time;
         if (duration > 0.0) {
@@ -155,7 +154,7 @@ class Driver {
         }
       }
       push_input(row.time, row.speed, rate);
-      // A node between fixes waits half a step, lest a fix fall right after it.
+      // A node between fixes waits half a step, in case a fix follows immediately.
       while (started_ && row.stamp >= newest_ + 1.5 * step_) add_node(newest_ + step_);
     }
   }
@@ -166,7 +165,7 @@ class Driver {
     estimator_->push_input(time, inputs_.data());
   }
 
-  /// From the rows that are known: between two, interpolated; after the last, held.
+  /// From the known rows: interpolated between two, held after the last.
   double steering_at(double time) const {
     std::size_t after = known_;
     while (after > 0 && log_.rows[after - 1].time > time) --after;
@@ -186,7 +185,7 @@ class Driver {
   }
 
   void take_fix(const Fix& fix, std::int64_t index) {
-    if (known_ == 0) return;  // before the first row of dead reckoning nobody knows how it moved
+    if (known_ == 0) return;  // the motion before the first row of dead reckoning is unknown
     if (started_) {
       const double from = newest_;
       const int parts = static_cast<int>(std::ceil((fix.time - from) / step_ - 1e-6));
@@ -247,7 +246,7 @@ class Driver {
   double step_;
   std::unique_ptr<Estimator> estimator_;
   std::vector<double> outputs_, inputs_;
-  std::size_t known_ = 0;  ///< rows that have come so far
+  std::size_t known_ = 0;  ///< rows received so far
   double newest_ = 0.0;    ///< time of the newest node
   bool started_ = false;
   Replay result_;
@@ -320,7 +319,7 @@ LogScenario::LogScenario(const Host& host, const Settings& settings, const std::
     wheelbase_ = wheelbase ? wheelbase->as_number() : 0.0;
     if (log_.wheel_offset != 0.0 && !(wheelbase_ > 0.0))
       throw base.log.error("wheel_offset: needs model.wheelbase, the distance of the axles; give both or neither");
-    variants_.back().robot.make_estimator();  // what is wrong shows before anything runs
+    variants_.back().robot.make_estimator();  // reports errors before anything runs
   };
   if (base.variants.is_null()) {
     add(base.name, settings);
@@ -365,7 +364,7 @@ RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const
     DeadReckoning row{rows.at(i, 0), rows.at(i, 0), rows.at(i, 1), rows.at(i, 2) - options.steering_bias};
     if (!std::isnan(row.steering)) steering = row.steering;
     if (options.wheel_offset != 0.0) {
-      // In a bend a wheel beside the middle runs on a circle of another radius.
+      // In a bend an off-centre wheel runs on a circle of a different radius.
       const double factor = 1.0 - std::tan(steering) * options.wheel_offset / scenario.wheelbase();
       if (!(factor > 0.1))
         throw Error(

@@ -13,7 +13,7 @@ namespace {
 
 Json json_of(const PredictionErrors& errors) {
   Json json = {{"count", errors.count}};
-  // Nothing to speak of is null rather than a perfect zero.
+  // Without errors to summarise the result is null, not zero.
   json["median_m"] = errors.count > 0 ? Json(errors.median) : Json();
   json["rmse_capped_m"] = errors.count > 0 ? Json(errors.rmse_capped) : Json();
   return json;
@@ -85,7 +85,7 @@ std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& 
       {"missing_coordinates", log.missing_coordinates},
       {"consistent", std::count_if(log.fixes.begin(), log.fixes.end(), [](const Fix& f) { return f.agrees; })}};
   json["hold_out"] = {{"every", hold_out.every}, {"phase", hold_out.phase}, {"error_cap_m", error_cap}};
-  // That of the first one, which the scenario is about; the others are beside it below.
+  // Result of the first variant, the scenario's main one; all variants follow below.
   json["variant"] = replays.front().name;
   json["held_out"] = json_of(summarise(replays.front(), log));
   Json& variants = json["variants"];

@@ -14,14 +14,14 @@ namespace {
 
 using Seconds = std::chrono::duration<double>;
 
-/// The node of a run at a time from its first one: the last that is not later, but for rounding.
+/// The node at a time since the first node: the last one that is not later, up to rounding.
 std::ptrdiff_t node_at(const SmoothedRun& run, double time) {
-  constexpr double rounding = 1e-6;  // the timeline takes stamps so near for one node [s]
+  constexpr double rounding = 1e-6;  // the timeline merges stamps this close into one node [s]
   const auto after = std::upper_bound(run.times.begin(), run.times.end(), time + rounding);
   return std::max<std::ptrdiff_t>(0, after - run.times.begin() - 1);
 }
 
-/// Keeps what an estimator is given and answers.
+/// Records an estimator's data and estimates.
 class NodeHooks final : public RobotHooks {
  public:
   explicit NodeHooks(std::shared_ptr<NodeLog> nodes) : nodes_(std::move(nodes)) {}
@@ -47,7 +47,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
 
   const auto start = Clock::now();
   const double most_seconds = robot.smoother_options().deadline;
-  // Longer than this is no limit, and would not fit into the clock.
+  // A longer time is no limit, and would overflow the clock's type.
   constexpr double no_limit = 1e9;
   const Clock::time_point deadline = most_seconds < no_limit
                                          ? start + std::chrono::duration_cast<Clock::duration>(Seconds(most_seconds))
@@ -87,7 +87,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
     const std::ptrdiff_t node = node_at(run, time);
     state_at(run, model, robot.estimator_options().substeps, causal.held_out ? time : run.times[node],
              entry.values.data());
-    // At a node the parameters are those that led to it; between nodes, those of the interval that it is in.
+    // At a node, the parameters are those of the preceding interval; between nodes, those of the current interval.
     const std::ptrdiff_t interval =
         std::clamp<std::ptrdiff_t>(causal.held_out ? node : node - 1, 0, run.intervals() - 1);
     std::copy_n(run.parameters.data() + interval * np, np, entry.values.data() + nx);

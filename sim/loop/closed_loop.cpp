@@ -15,7 +15,7 @@
 namespace rhec::sim {
 namespace {
 
-// A vehicle this far off its path is lost [m].
+// A vehicle farther than this from its path is lost [m].
 constexpr double lost = 50.0;
 
 /// error' covariance^-1 error
@@ -26,7 +26,7 @@ class Nees {
   Eigen::VectorXd error;
 
   double with(const Eigen::MatrixXd& covariance) {
-    // L D L' row by row, and z = L^-1 error beside it: the sum of z_i^2 / d_i.
+    // Factorises L D L' row by row along with z = L^-1 error; the result is the sum of z_i^2 / d_i.
     double sum = 0.0;
     for (Eigen::Index i = 0; i < error.size(); ++i) {
       double pivot = covariance(i, i), z = error[i];
@@ -48,7 +48,7 @@ class Nees {
   }
 
  private:
-  static constexpr double least_pivot = 1e-14;  // of a diagonal entry: below it pivots are rounding
+  static constexpr double least_pivot = 1e-14;  // of a diagonal entry: smaller pivots are rounding errors
 
   double with_singular(const Eigen::MatrixXd& covariance) const {
     const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
@@ -127,7 +127,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   PathFollower true_follower(scenario.path());
 
   const double step = robot.step();
-  // Three times as long as the path should take, which a vehicle that lags behind its literal reference still keeps.
+  // Three times the path's nominal duration, enough for a vehicle that lags behind its literal reference.
   const auto limit =
       static_cast<std::int64_t>(3.0 * scenario.path().length() / (scenario.options().speed * step)) + 100;
   std::vector<double> outputs(model.output_count()), measured(model.input_count());

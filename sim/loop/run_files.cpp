@@ -27,7 +27,7 @@ Json json_of(const ErrorSummary& errors) {
 
 Json json_of(const Spread& times) { return {{"median", times.median}, {"p99", times.p99}, {"max", times.max}}; }
 
-/// The least and the largest value of a parameter that the vehicle met, a little apart where it met one alone.
+/// The smallest and largest true value of a parameter during the run, slightly apart if it was constant.
 std::pair<double, double> true_range(const RunLog& log, Eigen::Index parameter) {
   double lower = std::numeric_limits<double>::infinity(), upper = -lower;
   for (const Sample& sample : log.samples) {
@@ -40,7 +40,7 @@ std::pair<double, double> true_range(const RunLog& log, Eigen::Index parameter) 
   return {middle - 0.5 * least_width, middle + 0.5 * least_width};
 }
 
-/// A comma, and the number like "{:.10g}", in half of its time.
+/// A comma and the number like "{:.10g}", in half the time.
 void append_number(double value, std::string& text) {
   std::array<char, 32> digits;
   const auto [end, error] = std::to_chars(digits.begin(), digits.end(), value, std::chars_format::general, 10);
@@ -124,7 +124,7 @@ Json json_of(const RunSummary& summary) {
   json["mae"] = json_of(summary.mae);
   json["rmse"] = json_of(summary.rmse);
   json["mae_after_start"] = json_of(summary.mae_after_start);
-  json["nees"] = summary.nees;  // null where it is not known
+  json["nees"] = summary.nees;  // null if unknown
   json["solve_time_us"] = {{"rhe", json_of(summary.estimator_us)}, {"rhc", json_of(summary.controller_us)}};
   json["statuses"] = {{"rhe", summary.estimator_statuses}, {"rhc", summary.controller_statuses}};
   json["solves"] = summary.solves;
@@ -174,7 +174,7 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
     for (const Sample& sample : log.samples)
       if (sample.sigma.size() > 0) estimate.sigmas.push_back(sample.sigma[states + index]);
     panel.curves.push_back(std::move(estimate));
-    // As far as the ground and nearly all estimates go: the first few, which know nothing yet, would dwarf the rest.
+    // The range of the ground truth and nearly all estimates; the first, uninformed ones would dwarf the rest.
     auto [lower, upper] = true_range(log, index);
     std::vector<double> estimates;
     for (const Sample& sample : log.samples)

@@ -96,7 +96,7 @@ const OptionTable<TruthOptions>& vehicle_table() {
   return rows;
 }
 
-/// A file that a scenario names is meant beside it; one that the command line names, where the user stands.
+/// A file named in a scenario is relative to the scenario; one named on the command line, to the working directory.
 std::filesystem::path file_at(const Settings& named) {
   const std::filesystem::path given(named.as_text());
   const bool in_a_file = named.origin().line > 0;
@@ -106,13 +106,13 @@ std::filesystem::path file_at(const Settings& named) {
       fmt::format("found '{}', expected a file; there is no {}", given.string(), (folder / given).string()));
 }
 
-/// The key of a section; the section itself where it does not have it.
+/// The key of a section; the section itself if it lacks the key.
 const Settings& key_or_section(const Settings& section, std::string_view key) {
   const Settings* found = section.find(key);
   return found ? *found : section;
 }
 
-// A path or a run beyond this is a slip of a unit, and would not fit into memory.
+// A path or run beyond this indicates a wrong unit and would not fit into memory.
 constexpr double most_waypoints = 2e6, most_samples = 1e6;
 
 void require_few_waypoints(const Settings& section, double length, double spacing) {
@@ -151,7 +151,7 @@ std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDes
     const Variable& parameter = about.parameters[j];
     const Settings* pair = terrain.ranges.find(parameter.name);
     if (!pair && parameter.nominal != 1.0) {
-      // No ratio: a share of what it may be. Angles of 0.5 to 1 rad would be another vehicle's.
+      // The parameter is not a ratio: use part of its range. For angles, 0.5 to 1 rad would be unrealistic.
       ranges[j] = {0.5 * (parameter.nominal + parameter.lower), 0.5 * (parameter.nominal + parameter.upper)};
       if (varies && !(std::isfinite(ranges[j].lower) && std::isfinite(ranges[j].upper)))
         throw key_or_section(section, "ranges")

@@ -9,7 +9,7 @@ namespace rhec::sim {
 RandomStream::RandomStream(std::uint64_t seed, std::string_view name) noexcept {
   std::uint64_t hash = 0xCBF29CE484222325u;  // FNV-1a
   for (char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x00000100000001B3u;
-  // Scattering the seed before the name comes in keeps (seed, name) pairs apart that differ in a few bits only.
+  // Scattering the seed before mixing in the name separates (seed, name) pairs that differ in only a few bits.
   std::uint64_t word = scatter(seed) ^ hash;
   for (std::uint64_t& part : state_) part = word = scatter(word);
 }

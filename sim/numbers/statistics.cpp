@@ -9,8 +9,8 @@ namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
-/// P(0 < T < t): with t = sqrt(n) tan(a) it is a multiple of the integral of cos(a)^(n-1), which Simpson's rule finds
-/// to rounding.
+/// P(0 < T < t): with t = sqrt(n) tan(a) it is a multiple of the integral of cos(a)^(n-1), which Simpson's rule
+/// evaluates to rounding precision.
 double share_up_to(double t, double n) {
   constexpr int parts = 400;
   const double end = std::atan(t / std::sqrt(n)), h = end / parts;

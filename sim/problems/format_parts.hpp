@@ -15,7 +15,7 @@
 #include "rhec/core/model/model.hpp"
 #include "rhec/sim/problems/problem_format.hpp"
 
-// What the formats of problems have in common.
+// Common parts of the problem formats.
 namespace rhec::sim {
 
 const ProblemFormat& rhe_format() noexcept;
@@ -23,7 +23,7 @@ const ProblemFormat& rhc_format() noexcept;
 
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 
-/// The problem as the class that its kind stands for.
+/// The problem, cast to the class of its kind.
 template <class Problem>
 const Problem& as_kind(const HorizonProblem& problem) {
   if (const auto* found = dynamic_cast<const Problem*>(&problem)) return *found;
@@ -62,23 +62,23 @@ void keep_bounds(ProblemRecord& record, const std::vector<Variable>& variables, 
 
 // ---- from a record to a problem
 
-/// Whether a record's estimation has one value of a parameter.
+/// Whether a parameter has a single value over the record's estimation horizon.
 bool is_one_block(const ProblemRecord& record, const Model& model, int parameter);
-/// Whether a block starts on each interval, of a channel that has blocks.
+/// For each interval, whether a block of the channel starts there; the channel must have blocks.
 std::vector<std::uint8_t> begins_of(const ProblemRecord& record, const std::string& channel);
-/// Throws Error unless the guess has the problem's shape.
+/// Throws Error unless the guess matches the problem's dimensions.
 void check_guess(const ProblemRecord& record, const HorizonProblem& problem);
 
-/// From names to the model's order.
+/// Maps names to the model's order.
 class ModelNames {
  public:
   ModelNames(const ProblemRecord& record, const Model& model) : record_(record), about_(model.description()) {}
 
   Error error(std::string_view key, std::string_view what) const { return Error(at_key(record_.where, key, what)); }
 
-  /// -1: there is none of this name.
+  /// -1 if there is no such name.
   static int index_of(const std::vector<Variable>& variables, const std::string& name);
-  /// Throws Error unless every key of a map is the name of a variable of the given groups.
+  /// Throws Error unless every key of a map names a variable of the given groups.
   template <class Map>
   void check(std::string_view key, const Map& map, std::initializer_list<const std::vector<Variable>*> groups) const {
     for (const auto& [name, value] : map) check_name(key, name, groups);
@@ -86,7 +86,7 @@ class ModelNames {
   void check_count(std::string_view key, std::size_t count, const std::vector<Variable>& variables) const;
   void fill_bounds(const std::vector<Variable>& variables, std::vector<double>& lower,
                    std::vector<double>& upper) const;
-  /// 0 where there is no value.
+  /// Missing values are 0.
   static std::vector<double> in_order(const std::map<std::string, double>& by_name,
                                       const std::vector<Variable>& variables);
 

@@ -10,14 +10,13 @@
 
 namespace rhec::sim {
 
-/// What is wrong at a key of a line, or with the line where there is no key.
+/// Message about a key of a line, or about the line if there is no key.
 std::string at_key(const std::string& where, std::string_view key, std::string_view what);
 
-/// "did you mean 'x'?", or the names there are.
+/// "did you mean 'x'?", or a list of the known names.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& known);
 
-/// A value of a line that knows its key. What asks for a value of another kind than it is throws Error, naming file,
-/// line and key.
+/// A value of a line, with its key. Accessors throw Error, naming file, line and key, if the value has another kind.
 class LineValue {
  public:
   using Rows = std::vector<std::vector<double>>;
@@ -42,15 +41,15 @@ class LineValue {
   std::vector<double> numbers() const;
   /// Rows of any width.
   Rows ragged(std::size_t count, std::string_view what) const;
-  /// Rows of one width each, null for missing where that is allowed.
+  /// Rows of equal width; null for missing values if that is allowed.
   Rows rows(std::size_t count, std::string_view what, bool may_miss) const;
 
   const Json& map() const;
   LineValue operator[](const std::string& key) const;
   bool has(const std::string& key) const { return map().contains(key); }
-  /// Throws Error for another key than these.
+  /// Throws Error for any other key.
   void allow(const std::vector<std::string>& known) const;
-  /// The same, with the keys that came with version 2.
+  /// The same, with the keys added in version 2.
   void allow(std::vector<std::string> known, const std::vector<std::string>& since_2, int version) const;
   template <class Each>
   void for_each(const Each& each) const {

@@ -10,7 +10,7 @@
 namespace rhec::sim {
 namespace {
 
-/// As one word of a shell.
+/// Quotes text as one shell word.
 std::string quoted(const std::string& text) {
   if (text.find_first_of(" \t'\"\\$`!*?[]{}()<>|&;#~") == std::string::npos) return text;
   std::string word = "'";

@@ -1,4 +1,4 @@
-// From the lines of a file to records, and back; and the lines of solutions.
+// Reads and writes records as lines of a file, and writes solution lines.
 #include "rhec/sim/problems/problem_file.hpp"
 
 #include <fmt/format.h>
@@ -36,7 +36,7 @@ void read_version(const LineValue& line, ProblemRecord& record) {
 
 void read_horizon(const LineValue& horizon, const ProblemFormat& format, ProblemRecord& record) {
   horizon.allow({"intervals", "dt", "integrator", "substeps"});
-  // Before an estimator's second node its window has no interval yet.
+  // Before an estimator's second node its window has no intervals.
   const bool may_be_empty = record.version >= 2 && format.traits().may_be_empty;
   record.intervals = horizon["intervals"].integer(may_be_empty ? 0 : 1);
   const auto N = static_cast<std::size_t>(record.intervals);
@@ -128,7 +128,7 @@ Json bounds_of(const ProblemRecord& record) {
   return all;
 }
 
-/// True where a stage has a value at a bound.
+/// Whether any stage has a value at a bound.
 bool at_bound(const double* values, const double* lower, const double* upper, int count) {
   for (int j = 0; j < count; ++j) {
     const double hair = 1e-7 * (1.0 + std::abs(values[j]));
@@ -149,7 +149,7 @@ bool any_bound_active(const HorizonProblem& problem, const Iterate& point) {
 
 void append_number(std::string& text, double value) {
   if (value == 0.0 && std::signbit(value)) {
-    text += "-0.0";  // as an integer it would lose its sign in reading
+    text += "-0.0";  // "-0" would be read as an integer and lose its sign
   } else if (std::isfinite(value)) {
     fmt::format_to(std::back_inserter(text), "{:.17g}", value);
   } else {

@@ -1,4 +1,4 @@
-// From a problem to its record, and from a record to its problem.
+// Converts problems to records and back.
 #include "rhec/sim/problems/problem_record.hpp"
 
 #include <algorithm>

@@ -8,7 +8,7 @@
 namespace rhec::sim {
 namespace {
 
-/// Takes the times of solvers, and records them where somebody wants to be told.
+/// Times solvers, and records their solves if there is a callback.
 class SolverHooks final : public RobotHooks {
  public:
   SolverHooks(RecordingSolver::Callback solved, std::function<std::int64_t()> step)
@@ -36,7 +36,7 @@ void RecordingSolver::setup(const Ocp& ocp) {
   is_pending_ = false;
 }
 
-/// False where nobody is to be told: an iterate of another capacity is refused by the solver, and could not be kept
+/// False if there is nothing to report: the solver refuses an iterate of another capacity, which could not be copied
 /// without allocation.
 bool RecordingSolver::keep_guess(const Iterate& guess) noexcept {
   is_pending_ = false;
@@ -56,7 +56,7 @@ Report RecordingSolver::solve(Iterate& iterate, Clock::time_point deadline) noex
 Report RecordingSolver::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
   const bool is_told = keep_guess(iterate);
   const Report report = inner().feedback(iterate, deadline);
-  // Who got no usable iterate will not finish it.
+  // Without a usable iterate, the caller does not call `finish`.
   is_pending_ = is_told && is_usable(report.status);
   if (is_told && !is_pending_) callback_(asked_at_, *problem_, guess_, iterate, report);
   return report;

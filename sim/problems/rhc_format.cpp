@@ -1,4 +1,4 @@
-// Control: how an RhcProblem is written, read, built and copied.
+// Control: writes, reads, builds and copies an RhcProblem.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -90,7 +90,7 @@ void fill(const ProblemRecord& record, RhcProblem& problem) {
   problem.finish(scratch);
 }
 
-// What of a set-up cannot change afterwards.
+// Fixed properties of a set-up.
 bool fits(const RhcProblem::Setup& wanted, const RhcProblem::Setup& there) {
   return wanted.max_intervals <= there.max_intervals && wanted.substeps == there.substeps &&
          wanted.state_weights == there.state_weights && wanted.input_weights == there.input_weights &&

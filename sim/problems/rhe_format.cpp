@@ -1,4 +1,4 @@
-// Estimation: how an RheProblem is written, read, built and copied.
+// Estimation: writes, reads, builds and copies an RheProblem.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 namespace rhec::sim {
 namespace {
 
-// What rounding may do to an information matrix, as a share of the terms' own magnitudes.
+// Rounding tolerance of an information matrix, relative to the magnitudes of its terms.
 constexpr double rounding_of_information = 1e-8;
 
 void read_transitions(const LineValue& map, ProblemRecord& record) {
@@ -54,8 +54,8 @@ void read_robust(const LineValue& list, ProblemRecord& record) {
   }
 }
 
-/// Throws unless an information matrix is symmetric and positive semidefinite, up to rounding. Each entry is judged by
-/// the magnitudes of its row and column, since the variables' units may be orders of magnitude apart.
+/// Throws unless an information matrix is symmetric and positive semidefinite, up to rounding. Tolerances are relative
+/// to the magnitudes of an entry's row and column, since the variables' units may differ by orders of magnitude.
 void check_information(const LineValue& information, const ProblemRecord::Rows& rows) {
   const auto n = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd scaled(n, n);
@@ -181,7 +181,7 @@ bool same_losses(const std::vector<RobustLoss>& a, const std::vector<RobustLoss>
   });
 }
 
-// What of a set-up cannot change afterwards.
+// Fixed properties of a set-up.
 bool fits(const RheProblem::Setup& wanted, const RheProblem::Setup& there) {
   return wanted.max_intervals <= there.max_intervals && wanted.substeps == there.substeps &&
          wanted.output_weights == there.output_weights && wanted.input_weights == there.input_weights &&
@@ -284,7 +284,7 @@ class RheFormat final : public ProblemFormat {
       for (int i = 0; i < record.intervals; ++i) {
         if (!problem.structure().starts_block(i, j)) continue;
         starts.push_back(i);
-        // The problem keeps the reciprocal, and the reciprocal of a reciprocal's reciprocal is itself to the bit.
+        // The problem stores the reciprocal. Taking the reciprocal three times gives the same bits as taking it once.
         variances.push_back(problem.link_variance(i, j));
       }
       if (std::any_of(variances.begin(), variances.end(), [](double variance) { return std::isfinite(variance); }))

@@ -26,7 +26,7 @@ constexpr const char* what_there_is =
                   (folder / file).string(), beside, maker));
 }
 
-/// What OutputFolder leaves where a program was killed.
+/// Remains of an OutputFolder whose program was killed.
 std::string unfinished_in(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
     if (const std::string name = entry.path().filename().string();
@@ -44,7 +44,7 @@ Json folder_report(const fs::path& folder) {
     throw Error(
         fmt::format("{}: there is no run in this folder{}; {}", folder.string(), unfinished_in(folder), what_there_is));
   }
-  // A folder may have held a run and an estimation, one after the other; the summary is that of the last.
+  // A folder may have held a run and then an estimation, or vice versa; the summary is that of the last one.
   const Json summary = read_json(folder / "summary.json", run_maker);
   if (summary.is_object() && summary.contains("variants")) {
     if (!has("estimates.csv")) missing(folder, "estimates.csv", "summary.json", log_maker);

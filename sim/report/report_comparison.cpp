@@ -15,7 +15,7 @@ constexpr const char* maker = "rhec compare";
                           file.string(), what, maker));
 }
 
-/// A member of this kind, or an Error that names its place.
+/// A member of this kind; otherwise throws an Error with its location.
 const Json& required(const Json& json, const std::string& key, Json::Kind kind, const std::filesystem::path& file,
                      const std::string& place) {
   const std::string path = place.empty() ? key : place + "." + key;

@@ -164,7 +164,7 @@ Thinned thin(const std::vector<const std::vector<double>*>& columns, std::size_t
     for (std::size_t row = 0; row < count; ++row) thinned.rows.push_back(row);
     return thinned;
   }
-  // Two rows of each column in each stretch, and the two ends.
+  // Two rows per column and stretch, plus the two ends.
   const std::size_t stretches = std::max<std::size_t>(1, (most - 2) / (2 * columns.size()));
   thinned.stretch = (count + stretches - 1) / stretches;
   std::vector<std::size_t> rows = {0, count - 1};

@@ -28,7 +28,7 @@ bool fell_back(const Json& record) {
   return of("rhe") || of("rhc");
 }
 
-/// Entries first .. last of each of a list of columns; null beyond their ends.
+/// Entries first .. last of each column; null beyond the ends.
 Json cut(const Json& columns, std::int64_t first, std::int64_t last) {
   Json parts = Json::array();
   for (const Json& column : columns) {
@@ -40,7 +40,8 @@ Json cut(const Json& columns, std::int64_t first, std::int64_t last) {
   return parts;
 }
 
-/// The window with what is kept but once in the file: times and measurements of its nodes, and the truth.
+/// The window, completed by data stored only once in the file: times and measurements of its nodes, and the ground
+/// truth.
 void complete_window(Json& window, const Json& nodes, const std::vector<std::vector<double>>& truth) {
   const auto first = window.at("first").get<std::int64_t>();
   const std::int64_t last = first + window.at("intervals").get<std::int64_t>();
@@ -110,7 +111,7 @@ Json horizons_of(const HorizonFile::Variant& variant, std::size_t samples, std::
   if (variant.records.empty()) return nullptr;
   const std::size_t stride = std::max<std::size_t>(1, (variant.bytes + most_bytes - 1) / most_bytes);
   const auto in_file = static_cast<std::size_t>(variant.nodes.value("every", std::int64_t{1}));
-  // Where nearly all fell back, not all of them can stay either.
+  // If nearly all fell back, not all of these can be kept either.
   const auto failures = static_cast<std::size_t>(
       std::count_if(variant.records.begin(), variant.records.end(), [](const Json& r) { return fell_back(r); }));
   const bool all_failures_fit = failures * variant.bytes <= most_bytes * variant.records.size();

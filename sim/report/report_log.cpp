@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* maker = log_maker;
-// A silence of fixes longer than this is a gap [s].
+// A longer time without fixes is a gap [s].
 constexpr double least_gap = 2.0;
 
 /// The rows of one variant in estimates.csv.
@@ -131,7 +131,7 @@ class LogReport {
     document_["summary"] = summary_;
   }
 
-  /// What was measured of them on each interval, at its beginning; the same for all variants that keep windows.
+  /// Their measured values on each interval, at its start; the same for all variants with recorded windows.
   void inputs() {
     Json& list = document_["inputs"] = Json::array();
     if (!horizons_) return;
@@ -155,7 +155,7 @@ class LogReport {
     }
   }
 
-  /// The rows of a variant that are estimates at nodes, or those of fixes.
+  /// A variant's rows with estimates at nodes, or those with fixes.
   template <class Function>
   std::vector<std::int64_t> rows_of(const Range& range, const Function& is_wanted) const {
     std::vector<std::int64_t> rows;
@@ -340,7 +340,7 @@ class LogReport {
   std::optional<HorizonFile> horizons_;
   std::optional<ResultTable> times_;
   std::vector<std::string> names_;  ///< of states and parameters
-  std::size_t states_ = 0;          ///< of them, how many are states
+  std::size_t states_ = 0;          ///< number of states among them
   std::size_t most_ = most_rows;
   Json document_, notes_;
   std::string words_;

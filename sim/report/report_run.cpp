@@ -44,7 +44,7 @@ Names names_of(const ResultTable& steps, const Json& summary, const fs::path& fo
   return names;
 }
 
-/// What is said of variables where nobody knows more than their names.
+/// Default description of variables if only their names are known.
 Json bare(const std::vector<std::string>& names) {
   Json list = Json::array();
   for (const std::string& name : names)
@@ -101,7 +101,7 @@ class RunReport {
   }
 
  private:
-  /// A folder that an older program has written to since has windows of another run.
+  /// An older program may have written to the folder since; its windows are then from another run.
   void require_same_run() const {
     const Json& head = horizons_->head;
     bool same = head.value("samples", std::size_t{0}) == time_.size();
@@ -130,7 +130,7 @@ class RunReport {
       const std::size_t first = steps_.column(names_.inputs.front());
       for (std::size_t j = 0; j < names_.inputs.size(); ++j) {
         const Json& planned = plan.at("input").at(j);
-        // What is applied can differ from the plan where that could not be used.
+        // The applied input can differ from the plan if the plan was unusable.
         if (plan.at("fallback").get<bool>() || planned.empty()) continue;
         if (!is_close(planned.front(), steps_.number(row, first + j))) return false;
       }
@@ -161,7 +161,7 @@ class RunReport {
       model["inputs"] = bare(names_.inputs);
       model["parameters"] = bare(names_.parameters);
       model["outputs"] = Json::array();
-      // The vehicle's position and heading come first in all models of rhec, but nobody says so here.
+      // The vehicle's position and heading come first in all models of rhec, but the files do not state this.
       model["roles"] = {{"position_x", -1}, {"position_y", -1}, {"heading", -1}, {"speed", -1}, {"speed_factor", -1}};
       model["position_outputs"] = nullptr;
       document_["settings"] = nullptr;
@@ -184,7 +184,7 @@ class RunReport {
     return nullptr;
   }
 
-  /// The time column of some rows: that of all samples, or one of their own under this name.
+  /// The time column of the given rows: that of all samples, or a separate one with this name.
   Json time_key(const std::string& name, const Thinned& thinned) {
     if (thinned.stretch == 1) return "all";
     document_["times"][name] = column_of(time_, thinned.rows);
@@ -213,7 +213,7 @@ class RunReport {
     }
   }
 
-  /// Of the input, as the controller had it at each sample that was kept: one number where it is always the same.
+  /// Bounds of the input in the controller at each recorded sample; a single number if constant.
   Json bounds_of(std::size_t input, const char* side, const std::vector<std::size_t>& rows) const {
     if (!horizons_) return nullptr;
     std::vector<std::pair<std::size_t, Json>> found;
@@ -316,7 +316,7 @@ class RunReport {
         {"rhe", status_of("estimator_status", counts.value("rhe", Json::object()), "estimator")},
         {"rhc", status_of("controller_status", counts.value("rhc", Json::object()), "controller")}};
     document_["fallbacks"] = {{"rhe", events("estimator_fallback")}, {"rhc", events("controller_fallback")}};
-    document_["relaxed"] = events(steps_.has("relaxed") ? "relaxed" : "softened");  // as earlier versions called it
+    document_["relaxed"] = events(steps_.has("relaxed") ? "relaxed" : "softened");  // name in earlier versions
   }
 
   void map() {
@@ -393,7 +393,7 @@ class RunReport {
   std::vector<bool> is_angle_;
   std::size_t most_ = most_rows;
   Json document_, notes_;
-  std::string words_;  ///< how curves were thinned
+  std::string words_;  ///< describes how curves were thinned
 };
 
 }  // namespace

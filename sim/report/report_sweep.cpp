@@ -14,7 +14,7 @@
 namespace rhec::sim {
 namespace {
 
-// What a page has room for.
+// Limits of a page.
 constexpr std::size_t most_bytes = 3'200'000;
 constexpr std::size_t most_others = 200;
 constexpr int digits = 5;
@@ -34,9 +34,9 @@ class SweepReport {
   }
 
  private:
-  // ---- what there is room for
+  // ---- selection of what fits on a page
 
-  /// Those with most runs first; among them those whose setting most runs of the sweep have.
+  /// Maps with most runs first; ties are broken by how many runs of the sweep have their setting.
   void sort_maps() {
     std::map<std::pair<std::size_t, std::string>, std::int64_t> counts;
     for (const SweepMap& map : made_.maps)
@@ -54,7 +54,7 @@ class SweepReport {
     made_.maps = std::move(sorted);
   }
 
-  /// The places of measures that fit, most important first.
+  /// Indices of the measures that fit, most important first.
   void choose_measures() {
     sort_maps();
     std::vector<std::size_t> order(runs_.measures.size());
@@ -78,7 +78,7 @@ class SweepReport {
     if (!left_out.empty())
       add_note(notes_, "runs",
                fmt::format("Left out, since the page would become too large: {}.", fmt::join(left_out, ", ")));
-    // A sweep over very many settings: those with most runs.
+    // If a sweep has very many settings, those with most runs.
     used = 0;
     for (const SweepMap& map : made_.maps) {
       for (const std::size_t measure : measures_) used += bytes_of(map, has_pairs(runs_.measures[measure]));
@@ -203,7 +203,7 @@ class SweepReport {
     std::string fixed;
     for (std::size_t i = 0; i < made_.choice_keys.size(); ++i) {
       const VariedKey& choice = made_.choice_keys[i];
-      // Only what maps really have; the other runs are in the table.
+      // Only values that occur in maps; the other runs are in the table.
       std::vector<std::string> values;
       for (const std::string& value : choice.values)
         if (std::any_of(made_.maps.begin(), made_.maps.end(),
@@ -250,7 +250,7 @@ class SweepReport {
     return moments;
   }
 
-  /// Of the seeds that were completed in both.
+  /// Over the seeds completed in both.
   static Moments differences_of(const RunGroup& group, const RunGroup& reference, std::size_t measure) {
     std::map<std::int64_t, double> known;
     for (const SeedOutcome& outcome : reference.outcomes)
@@ -331,7 +331,7 @@ class SweepReport {
     return json;
   }
 
-  /// A row of nothing but nulls is as good as an empty one, and large maps have many.
+  /// Replaces all-null rows by empty ones; large maps have many.
   static Json without_empty_rows(Json rows) {
     for (Json& row : rows)
       if (std::all_of(row.begin(), row.end(), [](const Json& value) { return value.is_null(); })) row = Json::array();
@@ -376,7 +376,7 @@ class SweepReport {
     for (const VariedKey& key : settings_.varied()) keys.push_back(key.key);
     for (const std::string& key : settings_.varies())
       if (key.starts_with("blocking.")) keys.push_back(key);
-    // Those that differ among the rows.
+    // Keys that differ among the rows.
     std::erase_if(keys, [&](const std::string& key) {
       return std::all_of(made_.others.begin(), made_.others.end(), [&](const RunGroup* group) {
         return value_of(*group, key) == value_of(*made_.others.front(), key);
@@ -405,8 +405,8 @@ class SweepReport {
   SweepRuns runs_;
   SweepSettings settings_;
   SweepMaps made_;
-  std::vector<std::vector<std::string>> shown_values_;  ///< of each choice key
-  std::vector<std::size_t> shown_choices_;              ///< of them, those that maps differ in
+  std::vector<std::vector<std::string>> shown_values_;  ///< per choice key
+  std::vector<std::size_t> shown_choices_;              ///< indices of those in which maps differ
   std::vector<std::size_t> measures_;
   Json document_, notes_;
 };

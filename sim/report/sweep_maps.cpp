@@ -12,7 +12,7 @@
 namespace rhec::sim {
 namespace {
 
-constexpr std::size_t most_choices = 60;  ///< maps of a sweep over any keys, before some of them are averaged over
+constexpr std::size_t most_choices = 60;  ///< maps of a sweep; beyond that, keys are averaged over
 
 }  // namespace
 
@@ -27,7 +27,7 @@ SweepMaps blocking_maps(const std::vector<RunGroup>& groups, const SweepSettings
   SweepMaps made;
   made.axes = {SweepAxis{"size", "block length S", {}}, SweepAxis{"overlap", "overlap o", {}}};
   for (const VariedKey& key : settings.varied()) made.choice_keys.push_back(key);
-  // Where a parameter has one block, or one for every interval, by all else that varies.
+  // Groups where a parameter has one block, or one per interval, by all other varying keys.
   std::map<std::string, const RunGroup*> full, unblocked;
   const auto others_are = [&](const RunGroup& group, const std::vector<std::string>& blocked, const char* name) {
     return std::all_of(blocked.begin(), blocked.end(), [&](const std::string& parameter) {
@@ -53,7 +53,7 @@ SweepMaps blocking_maps(const std::vector<RunGroup>& groups, const SweepSettings
   for (const RunGroup& group : groups)
     for (const std::vector<std::string>& way : ways) {
       if (others_are(group, way, "\"full_horizon\"")) full[key_of(group, way)] = &group;
-      // Of several kinds without blocks, the plain one.
+      // Prefer the plain one of several unblocked variants.
       if (others_are(group, way, "\"unblocked\"") && !has_options(group, way)) unblocked[key_of(group, way)] = &group;
     }
   std::map<std::string, SweepMap> maps;
@@ -101,7 +101,7 @@ SweepMaps general_maps(const std::vector<RunGroup>& groups, const SweepSettings&
     add_note(notes, "runs", "No key varies but the seed, so that there is one setting alone.");
     keys.push_back({"name", {"name"}, settings.sorted_values("name")});
   }
-  // Numbers make axes, those with most values first; where there are none, names do.
+  // Numeric keys become axes, those with most values first; without any, text keys do.
   std::stable_sort(keys.begin(), keys.end(), [](const VariedKey& a, const VariedKey& b) {
     return std::tuple(!a.is_numeric(), -std::ssize(a.values)) < std::tuple(!b.is_numeric(), -std::ssize(b.values));
   });

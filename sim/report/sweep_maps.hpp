@@ -14,7 +14,7 @@ namespace rhec::sim {
 /// The values of one axis, choice or setting, as JSON texts.
 using Setting = std::vector<std::string>;
 
-/// The outcomes that are one cell of a map: of one group, or of several that are averaged over.
+/// The groups of one cell of a map: one group, or several that are averaged.
 using Cell = std::vector<const RunGroup*>;
 
 struct SweepMap {
@@ -30,10 +30,10 @@ struct SweepAxis {
   std::vector<std::string> values;
 };
 
-/// The groups of a sweep, laid out.
+/// The groups of a sweep, arranged in maps.
 struct SweepMaps {
   std::vector<SweepAxis> axes;
-  std::vector<VariedKey> choice_keys;  ///< what the settings of maps are values of
+  std::vector<VariedKey> choice_keys;  ///< the keys whose values are the maps' settings
   std::vector<SweepMap> maps;
   std::vector<const RunGroup*> others;  ///< groups on no map
 };

@@ -50,7 +50,7 @@ void SweepSettings::find_varied_keys() {
   std::map<std::string, std::size_t> present;
   for (const RunGroup& group : groups_)
     for (const auto& [key, value] : group.keys) ++present[key];
-  // Keys that divide the groups alike are one.
+  // Keys that partition the groups identically are merged.
   std::map<std::vector<std::size_t>, std::size_t> known;
   for (auto& [key, of_key] : values) {
     if (present[key] < groups_.size()) of_key.insert(no_value);
@@ -66,7 +66,7 @@ void SweepSettings::find_varied_keys() {
     varied_[entry->second].all.push_back(key);
   }
   for (VariedKey& key : varied_) {
-    // A name says more than what goes with it.
+    // A name is more descriptive than the keys that vary with it.
     for (const std::string& other : key.all)
       if (other.ends_with(".name") && !key.key.ends_with(".name")) key.key = other;
     key.values = sorted_values(key.key);
@@ -81,7 +81,7 @@ std::vector<std::string> SweepSettings::sorted_values(const std::string& key) co
   for (const auto& [value, count] : counts) values.push_back(value);
   const bool numbers =
       std::all_of(values.begin(), values.end(), [](const std::string& v) { return number_in(v) || v == no_value; });
-  // What has most runs is what the others are variations of.
+  // The value with most runs is the baseline that the others vary.
   std::sort(values.begin(), values.end(), [&](const std::string& a, const std::string& b) {
     if (numbers || counts[a] == counts[b]) return comes_before(a, b);
     return counts[a] > counts[b];

@@ -1,4 +1,4 @@
-// The one unit that knows OpenSSL.
+// The only translation unit that uses OpenSSL.
 #include "rhec/sim/store/run_identity.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// The one unit that knows SQLite.
+// The only translation unit that uses SQLite.
 #include "sqlite_database.hpp"
 
 #include <fmt/format.h>
@@ -12,7 +12,7 @@
 namespace rhec::sim {
 namespace {
 
-/// What is wrong and what to do about it.
+/// The error and what to do about it.
 std::string_view explained(int code) {
   switch (code & 0xff) {
     case SQLITE_BUSY:
@@ -43,7 +43,7 @@ SqliteDatabase::SqliteDatabase(std::filesystem::path file, Access access) : file
   sqlite3* opened = nullptr;
   const int flags = access == Access::read ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
   const int code = sqlite3_open_v2(file_.c_str(), &opened, flags, nullptr);
-  database_.reset(opened);  // there is one in case of an error, too, which has its words
+  database_.reset(opened);  // set even after an error, since it holds the error message
   require(code);
   sqlite3_extended_result_codes(opened, 1);
   if (access == Access::write && sqlite3_db_readonly(opened, "main") == 1) require(SQLITE_READONLY);
@@ -123,7 +123,7 @@ SqliteTransaction::~SqliteTransaction() {
   if (committed_) return;
   try {
     database_.execute("ROLLBACK");
-  } catch (const Error&) {  // after some errors SQLite has done that already; the error that led here is what counts
+  } catch (const Error&) {  // SQLite rolls back by itself after some errors; the original error is the relevant one
     return;
   }
 }

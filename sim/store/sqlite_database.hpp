@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-// Of SQLite, which the .cpp alone includes.
+// From SQLite, whose header only the .cpp includes.
 struct sqlite3;
 struct sqlite3_stmt;
 
@@ -15,27 +15,27 @@ namespace rhec::sim {
 
 class SqliteStatement;
 
-/// An open SQLite file. Errors are rhec::Error, with the file's name, SQLite's words and what to do.
+/// An open SQLite file. Errors are rhec::Error with the file's name, SQLite's message and what to do.
 class SqliteDatabase {
  public:
   enum class Access {
-    write,  ///< opens the file, or makes an empty one
-    read    ///< of a file that is there, which stays as it is
+    write,  ///< opens the file, or creates an empty one
+    read    ///< opens an existing file without changing it
   };
   explicit SqliteDatabase(std::filesystem::path file, Access access = Access::write);
 
   const std::filesystem::path& file() const noexcept { return file_; }
-  /// How long to wait for others that use the file [ms].
+  /// Sets how long to wait for others that use the file [ms].
   void set_patience(int milliseconds);
-  /// Statements without results, with semicolons between them.
+  /// Executes statements without results, separated by semicolons.
   void execute(const std::string& statements);
   SqliteStatement prepare(std::string_view statement);
-  /// The one number that a query gives.
+  /// The single number that a query returns.
   std::int64_t number(std::string_view query);
 
-  /// Throws Error unless `code` says that all is well.
+  /// Throws Error unless `code` reports success.
   void require(int code) const;
-  /// Throws Error where the file is shorter than its pages: SQLite itself does not miss a part of the last one.
+  /// Throws Error if the file is shorter than its pages: SQLite itself does not notice a truncated last page.
   void require_whole();
 
  private:
@@ -46,8 +46,8 @@ class SqliteDatabase {
   std::unique_ptr<sqlite3, Close> database_;
 };
 
-/// A prepared statement of a database, which must outlive it. Places and columns are counted as SQLite does: places
-/// from 1, columns from 0.
+/// A prepared statement of a database, which must outlive it. Indices are those of SQLite: places from 1, columns from
+/// 0.
 class SqliteStatement {
  public:
   SqliteStatement(SqliteDatabase& database, sqlite3_stmt* statement) : database_(&database), statement_(statement) {}
@@ -58,9 +58,9 @@ class SqliteStatement {
   void bind(int place, std::string_view text);
   void bind_null(int place);
 
-  /// Goes on to the next row; false where there is none.
+  /// Advances to the next row; false if there is none.
   bool step();
-  /// Makes it ready to be stepped anew.
+  /// Resets the statement, so that it can be stepped again.
   void reset() noexcept;
 
   bool is_null(int column) const;
@@ -76,10 +76,10 @@ class SqliteStatement {
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
 };
 
-/// A transaction that is undone unless it is committed.
+/// A transaction that is rolled back unless it is committed.
 class SqliteTransaction {
  public:
-  /// Begins it, with the right to write.
+  /// Begins a write transaction.
   explicit SqliteTransaction(SqliteDatabase& database) : database_(database) { database_.execute("BEGIN IMMEDIATE"); }
   ~SqliteTransaction();
   SqliteTransaction(const SqliteTransaction&) = delete;

@@ -16,10 +16,10 @@
 namespace rhec::sim {
 namespace {
 
-constexpr int patience = 60000;  // of a sweep that is writing [ms]
+constexpr int patience = 60000;  // for a sweep that is writing [ms]
 
-/// A configuration without its own key `seed`, which is what runs are paired by. The text is canonical: no blanks, keys
-/// in their order, none of them twice.
+/// A configuration without its top-level key `seed`, by which runs are paired. The text is canonical: no blanks, keys
+/// sorted and unique.
 std::string without_seed(const std::string& text) {
   constexpr std::string_view key = "\"seed\":";
   int depth = 0;

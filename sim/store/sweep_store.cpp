@@ -51,13 +51,13 @@ constexpr const char* columns =
 
 constexpr int start_patience = 1000, write_patience = 60000;  // [ms]
 
-/// A lock that goes with the process, however that ends. It is a file of its own beside the database, which SQLite
-/// locks and unlocks in its own way.
+/// A lock that ends with the process, however it ends. It is a separate file next to the database, since SQLite locks
+/// the database itself.
 class LockFile {
  public:
   explicit LockFile(const fs::path& database) : path_(database) {
     path_ += ".lock";
-    // Who finishes takes the file away, so a lock counts only if the file is still the one of that name.
+    // The owner deletes the file when done, so a lock is valid only if the path still refers to the locked file.
     do {
       close_file();
       descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
@@ -117,7 +117,7 @@ fs::path checked(const fs::path& file) {
   return file;
 }
 
-/// Makes the tables of an empty file; throws where it is not ours.
+/// Creates the tables in an empty file; throws if the file is not ours.
 void prepare_schema(SqliteDatabase& database) {
   SqliteTransaction all_or_nothing(database);
   const std::int64_t application = database.number("PRAGMA application_id"),
@@ -166,8 +166,8 @@ struct SweepStore::Parts {
       : program_name(std::move(program)), lock(checked(file)), database(file) {
     database.set_patience(start_patience);
     prepare_schema(database);
-    // A journal beside the file rather than a log that readers share memory for: that also works where a cluster's
-    // hosts share a disk. Each transaction is on the disk when it ends.
+    // A rollback journal instead of a write-ahead log, which needs shared memory: this also works on a disk shared by a
+    // cluster's hosts. Each transaction is on disk when it ends.
     database.execute("PRAGMA journal_mode = TRUNCATE; PRAGMA synchronous = FULL");
     database.require_whole();
     database.set_patience(write_patience);
@@ -179,7 +179,7 @@ struct SweepStore::Parts {
   }
 
   std::string program_name;
-  LockFile lock;  // before the database, and let go after it
+  LockFile lock;  // locked before opening the database, released after closing it
   SqliteDatabase database;
   std::optional<SqliteStatement> insert, find;
 };

@@ -37,7 +37,7 @@ constexpr const char* forms_of_values =
     "a list of values, or a range {from, to, step} or {from, to, count}; a key within a section has dots, e.g. "
     "estimator.horizon";
 
-/// A finite number with all the digits that it is written with.
+/// A finite number with all digits of its text.
 long double precise_number(const Settings& from) {
   const std::optional<double> value = from.number();
   if (!value || !std::isfinite(*value)) throw from.mismatch("a finite number");
@@ -53,7 +53,7 @@ bool is_within(const std::string& inner, const std::string& outer) {
   return inner.size() > outer.size() && inner.starts_with(outer) && inner[outer.size()] == '.';
 }
 
-/// Throws unless `key`, which is set after `others`, leaves what they say as it is.
+/// Throws if `key`, which is set after `others`, overrides one of them.
 void require_independent(const std::string& key, const std::vector<std::string>& others, const Settings& at) {
   for (const std::string& other : others) {
     if (other == key) throw at.error(fmt::format("'{}' is given values twice in one block; keep one of them", key));
@@ -121,7 +121,7 @@ void Sweep::read_scenarios(const Values& values) {
   }
 }
 
-// ---- the form of a grid
+// ---- parsing a grid
 
 std::int64_t Sweep::range_count(const Settings& from) {
   const Settings *step = from.find("step"), *count = from.find("count");
@@ -222,7 +222,7 @@ void Sweep::read_block(const Settings& from) {
       read_scenarios(axis.values[k]);
       names_scenario = true;
     }
-  // Without any scenario the keys set must make one; that is found out when values are checked.
+  // Without a scenario the keys must define one; checking the values verifies this.
   if (!names_scenario) base_of(scenario_);
   count_ += block.count;
   if (static_cast<double>(count_) > most_runs)
@@ -234,7 +234,7 @@ void Sweep::read_block(const Settings& from) {
 
 Settings Sweep::Values::at(std::int64_t index) const {
   if (!listed.empty()) return listed[static_cast<std::size_t>(index)];
-  // More digits than a double has, so that what comes out is the double that one would have typed: 0.3, not 0.1 + 0.2.
+  // Extended precision, so that the result is the double one would have typed: 0.3, not 0.1 + 0.2.
   const long double share = count > 1 ? static_cast<long double>(index) / static_cast<long double>(count - 1) : 0.0L;
   const long double value = index == count - 1 ? to : from + (to - from) * share;
   return Settings::scalar(fmt::format("{}", static_cast<double>(value)), origin);

@@ -1,4 +1,4 @@
-// What can be said of a sweep before it starts: which runs it has, and whether their values are any good.
+// Checks of a sweep before it starts: its runs and whether their values are valid.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace rhec::sim {
 namespace {
 
-/// What a run makes before its first sample; throws Error for what is wrong with its settings.
+/// Constructs what a run needs before its first sample; throws Error for invalid settings.
 void make_parts(const Host& host, const Settings& settings) {
   const Scenario scenario(host, settings);
   Robot robot = scenario.robot();
@@ -50,7 +50,7 @@ void Sweep::check_values(const Host& host) const {
 }
 
 void Sweep::check_values(const Host& host, const Block& block) const {
-  // Of a range its ends will do: what is valid lies between two bounds, or is whole.
+  // The ends of a range suffice: valid values lie between two bounds or are integers.
   constexpr std::int64_t ends = 8, most_mates = 12;
   const std::size_t axes = block.axes.size();
   std::vector<Indices> tried(axes);
@@ -68,7 +68,7 @@ void Sweep::check_values(const Host& host, const Block& block) const {
     longest = std::max<std::int64_t>(longest, std::ssize(tried[a]));
   }
 
-  // Tries the combination at these places of `tried`; returns what is wrong with it.
+  // Tries the combination at these indices of `tried`; returns its error.
   const auto why_not = [&](const Indices& places) -> std::string {
     Indices indices(axes);
     for (std::size_t a = 0; a < axes; ++a) indices[a] = tried[a][static_cast<std::size_t>(places[a])];
@@ -97,7 +97,7 @@ void Sweep::check_values(const Host& host, const Block& block) const {
         Indices places = places_at(turn);
         places[a] = i;
         const std::string found = why_not(places);
-        // The one that speaks of this value's line is the one to tell.
+        // Prefer the error that refers to this value's line.
         if (reason.empty() || (found.starts_with(value.where() + ":") && !reason.starts_with(value.where() + ":")))
           reason = found;
       }

@@ -48,7 +48,7 @@ SweepRow make_run(const Host& host, const Sweep& sweep, std::int64_t run) {
   } catch (const Error& mistake) {
     row.status = RunStatus::refused;
     row.reason = mistake.what();
-  } catch (const std::bad_alloc&) {  // says nothing of the run
+  } catch (const std::bad_alloc&) {  // not the run's fault
     throw;
   } catch (const std::exception& failure) {
     row.status = RunStatus::failed;
@@ -88,7 +88,7 @@ void ThreadWorkers::work() {
     std::exception_ptr failure;
     try {
       row = make_run(host_, sweep_, run);
-    } catch (...) {  // is thrown again by take()
+    } catch (...) {  // rethrown by take()
       failure = std::current_exception();
     }
     lock.lock();
@@ -100,7 +100,7 @@ void ThreadWorkers::work() {
 
 std::int64_t ThreadWorkers::room() {
   const std::lock_guard lock(mutex_);
-  // One more for each: whoever finishes while rows are written goes on at once.
+  // One extra run per thread: a thread that finishes while rows are written continues at once.
   return 2 * std::ssize(threads_) - std::ssize(waiting_);
 }
 
@@ -128,12 +128,12 @@ std::int64_t ThreadWorkers::withdraw() {
 
 SweepProgress run_sweep(const Sweep& sweep, SweepStore& store, SweepWorkers& workers, const SweepHooks& hooks) {
   constexpr std::chrono::milliseconds patience(100);
-  constexpr int most_looked_up = 1000;  // at once, so that the progress is told meanwhile
+  constexpr int most_looked_up = 1000;  // at once, so that progress is still reported
   const Steady::time_point start = Steady::now();
   SweepProgress progress;
   progress.total = sweep.count();
   std::int64_t next = 0, under_way = 0;
-  // Returns whether there is more to look up before anybody has to wait.
+  // Returns whether more runs can be looked up without waiting.
   const auto give = [&] {
     std::int64_t room = workers.room();
     for (int looked_up = 0; room > 0 && next < progress.total && looked_up < most_looked_up; ++looked_up, ++next) {

@@ -6,17 +6,18 @@
 
 namespace rhec::sim {
 
-/// Lattice points that a value of the field is smoothed from, along each axis.
+/// Number of lattice points per axis that contribute to a field value.
 constexpr int lattice_taps = 12;
 
-/// Sum of column_weights[c] * row_weights[r] * corner[r * stride + c] over `lattice_taps` rows and columns. All of them
-/// add in the same order and give the same bits.
+/// Sum of column_weights[c] * row_weights[r] * corner[r * stride + c] over `lattice_taps` rows and columns. All
+/// variants add in the same order and give the same bits.
 using LatticeSum = double (*)(const double* corner, std::ptrdiff_t stride, const double* row_weights,
                               const double* column_weights);
 
 namespace lattice_sums {
 
-// Four neighbours at once; left to itself the compiler takes them one by one. Where registers hold two, it takes two.
+// Four neighbours at once; the compiler does not vectorise this on its own. With two-lane registers it processes two at
+// a time.
 using Four [[gnu::vector_size(4 * sizeof(double))]] = double;
 
 [[gnu::always_inline]] inline double add_up(const double* corner, std::ptrdiff_t stride, const double* row_weights,
@@ -55,7 +56,7 @@ inline double plain(const double* corner, std::ptrdiff_t stride, const double* r
 
 }  // namespace lattice_sums
 
-/// Those that this machine can run, the fastest last.
+/// Variants that this machine can run, fastest last.
 inline std::vector<LatticeSum> available_lattice_sums() {
   std::vector<LatticeSum> sums = {lattice_sums::plain};
 #if defined(__x86_64__)

@@ -21,7 +21,7 @@ void require_at_least(const char* path, const char* key, int value, int least) {
   if (value < least) throw Error(fmt::format("{}: {} is {}; expected {} or more", path, key, value, least));
 }
 
-// Lays waypoints along straights and arcs from a pose onwards.
+// Generates waypoints along straights and arcs from a start pose.
 class Pen {
  public:
   Pen(double x, double y, double spacing, double speed) : x_(x), y_(y), spacing_(spacing), speed_(speed) {

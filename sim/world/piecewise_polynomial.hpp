@@ -9,21 +9,21 @@
 
 namespace rhec::sim {
 
-/// A smooth function of one variable as a table of polynomials, one for each of so many equal pieces of an interval.
-/// With pieces short enough it differs from the function by rounding only, at the price of a dozen multiplications.
-/// Only for arguments of that interval.
+/// A smooth function of one variable as a table of polynomials on equal pieces of an interval. With sufficiently short
+/// pieces it differs from the function only by rounding, at the cost of a dozen multiplications. Arguments must lie in
+/// that interval.
 class PiecewisePolynomial {
  public:
   template <class Function>
   PiecewisePolynomial(double lower, double upper, int pieces, const Function& function)
       : lower_(lower), upper_(upper), pieces_per_unit_(pieces / (upper - lower)), last_(pieces - 1), table_(pieces) {
-    // Through the middle of a piece, exactly, and its other Chebyshev nodes: differences from the middle are small, and
-    // so is their rounding.
+    // Interpolates exactly at the middle of a piece and at its other Chebyshev nodes: differences from the middle are
+    // small, and so is their rounding error.
     constexpr int unknowns = degree;
     Eigen::Matrix<double, unknowns, unknowns> powers;
     Eigen::Matrix<double, unknowns, 1> nodes, differences;
     for (int k = 0; k < unknowns; ++k) {
-      const int number = k < unknowns / 2 ? k : k + 1;  // of degree + 1 nodes, without the one in the middle
+      const int number = k < unknowns / 2 ? k : k + 1;  // among degree + 1 nodes, skipping the middle one
       nodes[k] = 0.5 * std::cos(std::numbers::pi * (number + 0.5) / (degree + 1));
       for (int power = 1; power <= degree; ++power) powers(k, power - 1) = std::pow(nodes[k], power);
     }
@@ -51,7 +51,7 @@ class PiecewisePolynomial {
   double lower_, upper_, pieces_per_unit_;
   int last_;
   std::vector<std::array<double, degree + 2>>
-      table_;  // coefficients of powers of the place in a piece, and one to align
+      table_;  // coefficients of powers of the position in a piece, plus one for alignment
 };
 
 }  // namespace rhec::sim

@@ -46,12 +46,12 @@ class Gaussian final : public SlipField {
                       "length of {} m; choose a shorter period or a longer correlation length",
                       options.period, wanted, wanted, options.correlation_length));
     }
-    // With fewer points than the kernel has, the field would be correlated with its own repetition.
+    // With fewer points than the kernel, the field would be correlated with its periodic repetition.
     side_ = std::max<std::ptrdiff_t>(static_cast<int>(wanted), 2 * taps);
-    // The lattice goes on for as many lines as a kernel reaches, so that no kernel is broken at its end.
+    // The lattice is padded by the kernel's width, so that no kernel wraps around.
     stride_ = side_ + taps - 1;
     noise_.resize(ranges_.size() * stride_ * stride_);
-    // Each channel has its own stream: a channel more leaves the others as they were. Scaling the noise by the kernel's
+    // Each channel has its own stream: adding a channel does not change the others. Scaling the noise by the kernel's
     // norm, the square root of sum exp(-2 d^2 / L^2) = pi L^2 / (2 spacing^2), gives unit variance.
     const double scale = lattice_step * std::sqrt(2.0 / std::numbers::pi);
     for (std::size_t channel = 0; channel < ranges_.size(); ++channel) {
@@ -71,15 +71,15 @@ class Gaussian final : public SlipField {
 
  private:
   static constexpr double lattice_step = 0.7;  // in correlation lengths
-  static constexpr int taps = lattice_taps;    // beyond them the kernel is below 1e-7
+  static constexpr int taps = lattice_taps;    // beyond these the kernel is below 1e-7
   static constexpr int offset(int tap) { return tap - (taps / 2 - 1); }
-  static constexpr double farthest = 8.5;  // standard deviations: what is normal and lies beyond is less than rounding
+  static constexpr double farthest = 8.5;  // standard deviations; the probability beyond is below rounding
 
   using Taps = std::array<double, taps>;
-  // Two neighbours at once, as every machine can; left to itself the compiler takes them one by one.
+  // Two neighbours at once, which every machine supports; the compiler does not vectorise this on its own.
   using Pair [[gnu::vector_size(2 * sizeof(double))]] = double;
 
-  // What would be exponential and error functions at every look-up.
+  // Tables that replace exponential and error functions at every look-up.
   struct Tables {
     PiecewisePolynomial share_below{-farthest, farthest, 544,
                                     [](double g) { return 0.5 * std::erfc(-g / std::numbers::sqrt2); }};
@@ -92,7 +92,7 @@ class Gaussian final : public SlipField {
     return tables;
   }
 
-  // The lattice lines that a coordinate sees, and how much of each.
+  // The lattice lines that contribute to a coordinate, and their weights.
   struct Axis {
     Taps weights;
     std::ptrdiff_t first;
@@ -100,7 +100,7 @@ class Gaussian final : public SlipField {
 
   Axis look_at(double coordinate) const noexcept {
     const double whole = std::floor(coordinate), fraction = coordinate - whole;
-    // exp(-a^2 (f - m)^2) = exp(-a^2 f^2) * exp(2 a^2 f)^m * exp(-a^2 m^2) spares an exponential per tap.
+    // exp(-a^2 (f - m)^2) = exp(-a^2 f^2) * exp(2 a^2 f)^m * exp(-a^2 m^2) avoids an exponential per tap.
     const double ratio = tables_->ratio(fraction), square = ratio * ratio;
     Axis axis;
     Pair factor = tables_->first_weight(fraction) * Pair{1.0, ratio};
@@ -131,7 +131,7 @@ class Gaussian final : public SlipField {
   std::vector<SlipRange> ranges_;
   double spacing_;
   std::ptrdiff_t side_ = 0, stride_ = 0;
-  std::vector<double> noise_;  // channel by channel, row by row
+  std::vector<double> noise_;  // by channel, then by row
   Taps fixed_weights_;
 };
 
@@ -166,7 +166,7 @@ class Patches final : public SlipField {
   }
 
  private:
-  // A random number for each square, from its place alone, so that the plane needs no table.
+  // A random number for each square, computed from its position alone, so that the plane needs no table.
   std::uint64_t number_of(double column, double row) const noexcept {
     const auto bits = [](double v) { return static_cast<std::uint64_t>(static_cast<std::int64_t>(v)); };
     return scatter(scatter(seed_ ^ bits(column)) + bits(row));

@@ -27,7 +27,7 @@ class Constant final : public SlipField {
 struct Grid {
   double origin_x, origin_y, cell_size;
   std::int64_t columns, rows;
-  std::vector<double> values;  // row after row
+  std::vector<double> values;  // row by row
 
   double at(std::int64_t row, std::int64_t column) const {
     return values[static_cast<std::size_t>(row * columns + column)];
@@ -59,7 +59,7 @@ struct Grid {
 };
 
 Grid load_grid(const std::filesystem::path& file) {
-  // The head and the values differ in the number of columns, so they are two tables in one file.
+  // The header and the values have different numbers of columns, so they are parsed as two tables.
   const std::string text = read_text(file);
   const std::string name = file.string();
   std::size_t head_end = text.find('\n');

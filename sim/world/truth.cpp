@@ -10,9 +10,9 @@
 namespace rhec::sim {
 namespace {
 
-// Steps that are made as one where that does not show.
+// Maximum number of steps merged into one.
 constexpr int longest = 5;
-// What shows, in typical magnitudes of a state.
+// Error tolerance of merged steps, in typical magnitudes of a state.
 constexpr double seen = 1e-8;
 
 }  // namespace
@@ -71,7 +71,7 @@ void TruthVehicle::look_up(const double* state, double* parameters) const noexce
   field_->sample(state[position_x_], state[position_y_], parameters);
 }
 
-/// True where it had to move the state.
+/// True if it had to move the state.
 bool TruthVehicle::stop(double* state) const noexcept {
   if (!options_.mechanical_stops) return false;
   bool stopped = false;
@@ -83,8 +83,8 @@ bool TruthVehicle::stop(double* state) const noexcept {
   return stopped;
 }
 
-/// From the state, whose slip and rates are known, to the next one, with its slip and rates. A step that `must_fit` is
-/// not made where its error might be seen: then the answer is false.
+/// Steps from the state, whose slip and rates are known, to the next one with its slip and rates. With `must_fit`, does
+/// not step and returns false if the error estimate exceeds the tolerance.
 bool TruthVehicle::step(const double* inputs, double duration, bool must_fit) noexcept {
   constexpr double reach[] = {0.0, 0.5, 0.5, 1.0};
   constexpr double weight[] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
@@ -113,8 +113,8 @@ bool TruthVehicle::step(const double* inputs, double duration, bool must_fit) no
   model_->rates(stage_state, inputs, stage_parameters, end_rates);
   if (must_fit) {
     if (stopped) return false;
-    // With the rates at the end in place of those of the last stage the step is one of third order (Hairer, Norsett &
-    // Wanner 1993, II.4): how far the two are apart bounds its error with a wide margin.
+    // With the rates at the end instead of those of the last stage, the step is of third order (Hairer, Norsett &
+    // Wanner 1993, II.4): the difference of the two bounds the error with a wide margin.
     for (Eigen::Index j = 0; j < n_x; ++j)
       if (!(std::abs(duration / 6.0 * (rates[j] - end_rates[j])) <= seen * scales_[j])) return false;
   }
@@ -127,7 +127,7 @@ bool TruthVehicle::step(const double* inputs, double duration, bool must_fit) no
 
 void TruthVehicle::advance(const double* inputs, double duration) noexcept {
   if (!(duration > 0.0)) return;
-  // A duration that is a whole number of steps but for rounding takes that number.
+  // A duration that is a whole number of steps up to rounding takes that number.
   const int steps = std::max(1, static_cast<int>(std::ceil(duration / options_.step - 1e-9)));
   sum_parameters_.setZero();
   model_->rates(state_.data(), inputs, parameters_.data(), rates_.data());

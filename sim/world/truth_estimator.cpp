@@ -6,7 +6,7 @@
 namespace rhec::sim {
 namespace {
 
-/// Looks at the vehicle itself, and at no measurement. Of what is known there is no covariance.
+/// Reads the vehicle's true state and no measurements. There is no covariance.
 class TruthEstimation final : public EstimationMethod {
  public:
   TruthEstimation(std::shared_ptr<const Model> model, const TruthVehicle& vehicle)

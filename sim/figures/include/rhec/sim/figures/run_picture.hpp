@@ -11,10 +11,10 @@
 
 namespace rhec::sim {
 
-/// Who speaks in a curve; it sets colour and stroke.
+/// What a curve shows; sets its colour and stroke.
 enum class CurveRole { estimate, truth, reference, other };
 
-/// One curve over time. Values that are NaN interrupt it.
+/// One curve over time. NaNs interrupt it.
 struct Curve {
   std::string label;
   std::vector<double> times;   ///< [s]
@@ -28,14 +28,14 @@ struct Panel {
   std::string title;  ///< e.g. "Longitudinal slip kappa"
   std::string unit;   ///< e.g. "m"; "1" and empty are not shown
   std::vector<Curve> curves;
-  double lower = std::numeric_limits<double>::quiet_NaN();  ///< of the axis; NaN: as the values need
+  double lower = std::numeric_limits<double>::quiet_NaN();  ///< axis limit; NaN: chosen from the values
   double upper = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Values over the plane, drawn beneath the map.
 struct BaseMap {
   std::string title;                                ///< of the colour bar, e.g. "true kappa"
-  std::function<double(double x, double y)> value;  ///< at a position [m]; NaN is left blank
+  std::function<double(double x, double y)> value;  ///< at a position [m]; NaN leaves a gap
   double lower = 0.0, upper = 1.0;                  ///< values at the ends of the colour bar
 };
 
@@ -43,7 +43,7 @@ struct BaseMap {
 struct RunPicture {
   std::string title;
   std::string subtitle;
-  std::vector<Point> path;       ///< asked for [m]
+  std::vector<Point> path;       ///< reference path [m]
   std::vector<Point> driven;     ///< true track [m]; may be empty
   std::vector<Point> estimated;  ///< estimated track [m]; may be empty
   std::vector<Point> fixes;      ///< measured positions [m]; may be empty
@@ -51,7 +51,7 @@ struct RunPicture {
   std::vector<Panel> panels;
 };
 
-/// The picture as an SVG document. Curves are thinned as `thin_curve` and `thin_track` say, so that long runs stay
+/// The picture as an SVG document. `thin_curve` and `thin_track` thin the curves, so that files of long runs stay
 /// small. Throws Error for a curve whose times, values and sigmas differ in number.
 RHEC_EXPORT std::string draw_run(const RunPicture& picture);
 

@@ -20,8 +20,8 @@ struct Colour {
 };
 /// As '#rrggbb'.
 RHEC_EXPORT std::string hex(Colour colour);
-/// A palette for values in [0, 1] whose lightness grows evenly, from a deep blue-green (0) to a pale sand (1), so that
-/// its order is seen by everybody and dark lines stand out on it. Interpolated in OKLCh (Ottosson 2020).
+/// A palette for values in [0, 1] with uniformly increasing lightness, from deep blue-green (0) to pale sand (1):
+/// everybody can see its order, and dark lines stand out on it. Interpolated in OKLCh (Ottosson 2020).
 RHEC_EXPORT Colour slip_palette(double value);
 
 /// Collects the elements of an SVG document. Styles are SVG attributes, e.g. `fill="none" stroke="#333"`.
@@ -36,13 +36,13 @@ class RHEC_EXPORT Svg {
   void polygon(std::span<const Point> points, std::string_view style);
   /// A round dot of the stroke's width at each point.
   void dots(std::span<const Point> points, std::string_view style);
-  /// Text of any characters; `style` may set font-size, text-anchor, fill, transform.
+  /// Escapes the text; `style` may set font-size, text-anchor, fill, transform.
   void text(Point at, std::string_view text, std::string_view style = {});
-  /// What is drawn until `end_group` is cut off at this rectangle.
+  /// Clips what is drawn before `end_group` to this rectangle.
   void begin_clip(Point corner, double width, double height);
   void begin_group(std::string_view attributes);
   void end_group();
-  /// A ready element.
+  /// Appends a complete element as is.
   void raw(std::string_view element) { body_ += element; }
 
   /// The whole document.
@@ -63,13 +63,12 @@ struct Ticks {
 RHEC_EXPORT Ticks nice_ticks(double lower, double upper, int wanted);
 
 /// Thins a curve to about `most` points, without hiding a peak: the indices of the first, last, lowest and highest
-/// value of each of `most` / 4 equal stretches, in order. Curves that are short enough keep every point. NaNs are kept
-/// where they interrupt the curve.
+/// value of each of `most` / 4 equal stretches, in order. Short curves keep every point. NaNs that interrupt the curve
+/// are kept.
 RHEC_EXPORT std::vector<std::size_t> thin_curve(std::span<const double> values, std::size_t most = 2000);
 
-/// Thins a track to `most` points (not counting gaps): leaves out those nearer than a tolerance to the last one kept,
-/// which begins at `tolerance` and is doubled until few enough are left. So no point is drawn farther off than the
-/// tolerance.
+/// Thins a track to `most` points (not counting gaps): drops points closer than a tolerance to the last one kept. The
+/// tolerance starts at `tolerance` and doubles until few enough points remain; it bounds the error of the drawn track.
 RHEC_EXPORT std::vector<Point> thin_track(std::span<const Point> track, double tolerance, std::size_t most = 2000);
 
 }  // namespace rhec::sim

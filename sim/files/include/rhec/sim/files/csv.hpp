@@ -18,8 +18,8 @@ enum class CsvHeader {
 
 struct CsvOptions {
   CsvHeader header = CsvHeader::none;
-  int columns = 0;              ///< the number of columns that every line must have; 0: that of the first line
-  std::int64_t first_line = 1;  ///< the line of the file at which the text given to `parse_csv` begins
+  int columns = 0;              ///< required number of columns; 0: that of the first line
+  std::int64_t first_line = 1;  ///< line of the file at which the text given to `parse_csv` starts
 };
 
 /// Numbers in rows and columns. A missing value is a NaN.
@@ -28,7 +28,7 @@ struct CsvTable {
   std::vector<std::string> header;    ///< names of the columns; empty without a header
   std::vector<double> values;         ///< row after row
   std::vector<std::int64_t> missing;  ///< number of missing values, one count per column
-  std::int64_t first_row_line = 1;    ///< the line of the file, counted from 1, that row 0 stands on
+  std::int64_t first_row_line = 1;    ///< line number of row 0 in the file, from 1
 
   int columns() const noexcept { return static_cast<int>(missing.size()); }
   std::int64_t rows() const noexcept { return missing.empty() ? 0 : std::ssize(values) / std::ssize(missing); }
@@ -38,11 +38,11 @@ struct CsvTable {
 };
 
 /// Reads numbers separated by commas. An empty field or the word nan means 'missing'; blanks around a field, a sign
-/// '+', Windows line ends and a byte-order mark are accepted; anything else is refused: a line with more or fewer
+/// '+', Windows line ends and a byte-order mark are accepted; anything else is an error: a line with more or fewer
 /// fields than the first one, a blank line within the data, a field that is not a finite number. Throws Error naming
 /// file, line and what was found there.
 RHEC_EXPORT CsvTable read_csv(const std::filesystem::path& file, const CsvOptions& options = {});
-/// The same from memory; `name` stands for the file in messages.
+/// Parses text in memory; messages use `name` as the file name.
 RHEC_EXPORT CsvTable parse_csv(std::string_view text, const std::string& name, const CsvOptions& options = {});
 
 /// A whole file as text. Throws Error naming the file and the reason.

@@ -20,8 +20,7 @@
 
 namespace rhec::sim {
 
-/// A value of JSON: null, a truth value, a number, a text, an array of values or an object, whose members keep the
-/// order in which they were written.
+/// A JSON value: null, boolean, number, string, array or object. Objects keep the order of their members.
 class RHEC_EXPORT Json {
  public:
   enum class Kind : std::uint8_t { null, boolean, integer, number, text, array, object };
@@ -49,7 +48,8 @@ class RHEC_EXPORT Json {
   Json(const std::map<std::string, T>& members) : Json(object()) {
     for (const auto& [key, value] : members) (*this)[key] = Json(value);
   }
-  /// An object, where every value is an array of two that begins with a text: {{"x", 1}, {"y", 2}}. Else an array.
+  /// An object if every value is a two-element array that starts with a string: {{"x", 1}, {"y", 2}}. Otherwise an
+  /// array.
   Json(std::initializer_list<Json> values);
   Json(const Json& other);
   Json(Json&& other) noexcept;
@@ -59,13 +59,13 @@ class RHEC_EXPORT Json {
   static Json array();
   static Json object();
 
-  /// Throws JsonParseError. Of a key that is repeated the last value counts, unless that is refused.
+  /// Throws JsonParseError. The last value of a repeated key wins, unless repeated keys are refused.
   enum class RepeatedKeys { last_counts, refused };
   static Json parse(std::string_view text, RepeatedKeys repeated = RepeatedKeys::last_counts);
-  /// None where the text is no JSON.
+  /// Empty if the text is not valid JSON.
   static std::optional<Json> parse_if_valid(std::string_view text);
-  /// The text: on one line, or with so many blanks of indentation. What is no UTF-8 is written as the sign for an
-  /// unknown character, a number that is not finite as null. Numbers read again are the same bits.
+  /// Serialises on one line, or with `indent` spaces per level. Invalid UTF-8 becomes the replacement character, a
+  /// non-finite number null. Numbers round-trip to the same bits.
   std::string dump(int indent = -1) const;
 
   Kind kind() const noexcept { return static_cast<Kind>(value_.index()); }
@@ -79,9 +79,9 @@ class RHEC_EXPORT Json {
   bool is_array() const noexcept { return kind() == Kind::array; }
   bool is_object() const noexcept { return kind() == Kind::object; }
 
-  // Of a value of another kind these throw JsonError.
+  // These throw JsonError for a value of another kind.
   bool as_flag() const;
-  std::int64_t as_integer() const;  ///< a number with decimals is cut off
+  std::int64_t as_integer() const;  ///< truncates decimals
   double as_number() const;
   const std::string& as_text() const;
   template <class T>
@@ -103,7 +103,7 @@ class RHEC_EXPORT Json {
     }
   }
 
-  // An array, or an object. Null is an empty one of either; of other values these throw JsonError.
+  // For arrays and objects. Null counts as empty; for other values these throw JsonError.
   std::size_t size() const;
   bool empty() const { return size() == 0; }
   void reserve(std::size_t count);
@@ -130,13 +130,13 @@ class RHEC_EXPORT Json {
   }
 
   const std::vector<Member>& items() const;
-  const Json* find(std::string_view key) const;  ///< null: there is none
+  const Json* find(std::string_view key) const;  ///< null if there is none
   bool contains(std::string_view key) const { return find(key) != nullptr; }
   const Json& at(std::string_view key) const;
   const Json& operator[](std::string_view key) const { return at(key); }
-  /// Makes the member, where there is none.
+  /// Creates the member if there is none.
   Json& operator[](std::string_view key);
-  /// The member, or this where there is none.
+  /// The member, or the given value if there is none.
   template <class T>
   T value(std::string_view key, const T& otherwise) const {
     const Json* found = find(key);
@@ -144,7 +144,7 @@ class RHEC_EXPORT Json {
   }
   std::string value(std::string_view key, const char* otherwise) const { return value(key, std::string(otherwise)); }
   void erase(std::string_view key);
-  /// Takes over all members of another object.
+  /// Copies all members of another object.
   void update(const Json& other);
 
   /// Numbers are compared by value, members in their order.
@@ -181,12 +181,12 @@ class RHEC_EXPORT Json {
   Value value_;
 };
 
-/// Settings as JSON; what reads as a number or a truth value becomes one.
+/// Settings as JSON; text that reads as a number or boolean becomes one.
 RHEC_EXPORT Json json_of(const Settings& settings);
-/// The same as a text, which is YAML too.
+/// The same as text, which is also valid YAML.
 RHEC_EXPORT std::string json_text(const Settings& settings);
 
-/// Appends a text in quotes, as JSON has it.
+/// Appends a quoted JSON string.
 RHEC_EXPORT void append_quoted(std::string_view value, std::string& text);
 
 }  // namespace rhec::sim

@@ -8,26 +8,26 @@
 
 namespace rhec::sim {
 
-/// A value of JSON is of another kind than was asked for, or has no such member.
+/// A JSON value has the wrong kind or lacks a member.
 class RHEC_EXPORT JsonError : public std::runtime_error {
  public:
   explicit JsonError(const std::string& what) : std::runtime_error(what) {}
   ~JsonError() override;
 };
 
-/// A text is no JSON.
+/// A text is not valid JSON.
 class RHEC_EXPORT JsonParseError final : public JsonError {
  public:
   enum class Cause {
     syntax,
-    large_number,  ///< one that no double can hold
-    repeated_key   ///< where these are refused
+    large_number,  ///< beyond the range of double
+    repeated_key   ///< if repeated keys are refused
   };
   JsonParseError(Cause cause, std::size_t byte, std::string key);
   ~JsonParseError() override;
   Cause cause;
-  std::size_t byte;  ///< how many had been read by then
-  std::string key;   ///< that is repeated
+  std::size_t byte;  ///< bytes read so far
+  std::string key;   ///< the repeated key
 };
 
 }  // namespace rhec::sim

@@ -6,11 +6,11 @@
 
 namespace rhec::sim {
 
-/// Decimals that a variable of a typical magnitude is written with: a hundred-thousandth of it is seen.
+/// Decimals for writing a variable of typical magnitude `scale`: enough to resolve 1e-5 of it.
 RHEC_EXPORT int decimals_for(double scale) noexcept;
 
-/// Appends a number as JSON has it, with so many decimals at most and no needless zeros; null where it is not finite.
-/// Several times as fast as a general format, since windows have hundreds of numbers each.
+/// Appends a JSON number with at most `decimals` decimals and no trailing zeros; null if it is not finite. Several
+/// times faster than general formatting, since each window has hundreds of numbers.
 RHEC_EXPORT void append_number(double value, int decimals, std::string& text);
 
 }  // namespace rhec::sim

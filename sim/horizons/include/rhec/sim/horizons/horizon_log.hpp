@@ -14,24 +14,24 @@
 
 namespace rhec::sim {
 
-/// Keeps what the windows of a loop's estimator and the plans of its controller looked like, for `rhec report`: of
-/// every n-th sample and of each whose solver's result could not be used. What was measured at a node is kept once.
+/// Records the estimator's windows and the controller's plans of a loop for `rhec report`: for every n-th sample, and
+/// for each sample whose solver result was unusable. Measurements at a node are stored once.
 ///
-/// It looks on only: the loop's results are the same bits with it and without it.
+/// It only observes: the loop's results are bit-identical with and without it.
 class RHEC_EXPORT HorizonLog {
  public:
-  /// Of a loop that drives this robot, about so many samples long; at most about `most` of them are kept.
+  /// For a loop with this robot of about `samples` samples; keeps at most about `most` of them.
   HorizonLog(const Robot& robot, std::int64_t samples, std::int64_t most = 1000);
   ~HorizonLog();
   HorizonLog(HorizonLog&&) noexcept;
 
-  /// What to hang into the loop as LoopHooks::sampled; this object must outlive it.
+  /// Callback for LoopHooks::sampled; this object must outlive the loop.
   void take(const LoopSample& sample);
 
   std::int64_t every() const noexcept;
-  /// Samples that were kept.
+  /// Number of recorded samples.
   std::int64_t kept() const noexcept;
-  /// Lines of JSON: what was measured at all nodes, then the windows and plans.
+  /// JSON lines: first the measurements at all nodes, then the windows and plans.
   std::string nodes_line(int variant) const;
   const std::string& records() const noexcept;
 
@@ -40,9 +40,9 @@ class RHEC_EXPORT HorizonLog {
   std::unique_ptr<Parts> parts_;
 };
 
-/// horizons.jsonl of a run and of estimations from a log: the model and what the ground was like, then the lines of
-/// each HorizonLog. docs/results.md describes them. The same bytes for the same scenario and seed. Of a log, the
-/// horizons are those of each variant for each suffix that its name has.
+/// Content of horizons.jsonl for a run or for estimates from a log: the model and the true ground parameters, then the
+/// lines of each HorizonLog. docs/results.md describes them. Byte-identical for the same scenario and seed. For a log,
+/// there are horizons for each variant and each suffix of its name.
 RHEC_EXPORT std::string horizons_text(const HorizonLog& horizons, const RunLog& log, const Scenario& scenario);
 RHEC_EXPORT std::string horizons_text(const std::vector<HorizonLog>& horizons, const RecordedLog& log,
                                       const LogScenario& scenario, const HoldOut& hold_out,

@@ -12,37 +12,39 @@
 
 namespace rhec::sim {
 
-/// The section `log` of a scenario: how a drive was recorded, and what its columns mean to the model.
+/// The section `log` of a scenario: how a drive was recorded and how its columns map to the model.
 struct LogOptions {
-  double wheel_offset = 0.0;    ///< the speed was measured at a wheel this far left of the axle's middle [m]
-  double steering_bias = 0.0;   ///< the steering's reading when driving straight [rad]
-  double fix_delay = 0.0;       ///< how much later than the dead reckoning a fix is stamped [s]
-  double agreement = 1.0;       ///< a fix agrees with its neighbours where it is this near to the line between them [m]
-  double neighbour_time = 1.0;  ///< and they are this near in time [s]
-  std::vector<std::string> position{"x_gps", "y_gps"};  ///< outputs that a fix measures
-  std::string steering = "delta";                       ///< output that the steering's reading is
+  double wheel_offset = 0.0;    ///< lateral offset of the speed-measuring wheel, left of the axle's centre [m]
+  double steering_bias = 0.0;   ///< steering reading when driving straight [rad]
+  double fix_delay = 0.0;       ///< delay of the fixes' time stamps relative to dead reckoning [s]
+  double agreement = 1.0;       ///< a fix agrees with its neighbours if it is this close to the line between them [m]
+  double neighbour_time = 1.0;  ///< and they are this close in time [s]
+  std::vector<std::string> position{"x_gps", "y_gps"};  ///< outputs measured by a fix
+  std::string steering = "delta";                       ///< output measured by the steering sensor
   std::string speed = "u1", steering_rate = "u2";       ///< inputs
   static const OptionTable<LogOptions>& table();
 };
 
-/// A scenario for recorded data: the keys of RobotOptions, how the log was recorded, and what to run side by side.
+/// A scenario for recorded data: the keys of RobotOptions, how the log was recorded, and the variants to run side by
+/// side.
 struct LogScenarioOptions : RobotOptions {
   std::string name = "log";
   Settings log, variants;
   static const OptionTable<LogScenarioOptions>& table();
 };
 
-/// The sections that a scenario for recorded data has beside those of a robot.
+/// Sections of a scenario for recorded data, in addition to those of a robot.
 RHEC_EXPORT std::vector<OptionSection> log_sections();
 
-/// One of the estimators that run side by side: the scenario with the keys of its variant put over it.
+/// One of the estimators that run side by side: the scenario, overridden by the keys of its variant.
 struct LogVariant {
   std::string name;
   Robot robot;
 };
 
-/// A scenario for recorded data with all that it names made. Throws Error for whatever is wrong, naming file, line and
-/// key. Without `variants` it is one variant itself; `chosen` (where not empty) are the names of those to be made.
+/// A scenario for recorded data with all its objects constructed. Throws Error, naming file, line and key, if it is
+/// invalid. Without `variants` the scenario is the only variant; `chosen`, if not empty, names the variants to
+/// construct.
 class RHEC_EXPORT LogScenario {
  public:
   LogScenario(const Host& host, const Settings& settings, const std::vector<std::string>& chosen = {});
@@ -60,30 +62,30 @@ class RHEC_EXPORT LogScenario {
 
 /// A row of dead reckoning; NaN where a reading is missing.
 struct DeadReckoning {
-  double time = 0.0;                   ///< [s]; rows of one stamp are spread evenly until the next
-  double stamp = 0.0;                  ///< as recorded: when the row is known
-  double speed = 0.0, steering = 0.0;  ///< of the axle's middle [m/s], without the bias [rad]
+  double time = 0.0;                   ///< [s]; rows with equal stamps are spread evenly up to the next stamp
+  double stamp = 0.0;                  ///< as recorded: when the row becomes available
+  double speed = 0.0, steering = 0.0;  ///< at the axle's centre [m/s]; without bias [rad]
 };
 /// A measured position; NaN where a coordinate is missing.
 struct Fix {
   double time = 0.0, x = 0.0, y = 0.0;  ///< [s], [m]
-  std::int64_t line = 0;                ///< of the file
-  bool agrees = false;                  ///< with its neighbours, whether these are withheld or not
+  std::int64_t line = 0;                ///< in the file
+  bool agrees = false;                  ///< with its neighbours, withheld or not
 };
 
-/// A drive as it was recorded.
+/// A recorded drive.
 struct RecordedLog {
   std::vector<DeadReckoning> rows;
   std::vector<Fix> fixes;
   std::int64_t missing_speeds = 0, missing_steerings = 0, missing_coordinates = 0;
 };
 /// Reads dead reckoning (time, wheel speed, steering angle) and fixes (time, x, y), comma-separated, without a header.
-/// Missing readings are masked and counted. Throws Error naming file and line for all that is no such log.
+/// Missing readings are masked and counted. Throws Error, naming file and line, if a file is not such a log.
 RHEC_EXPORT RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const std::filesystem::path& gps,
                                           const LogScenario& scenario);
 
-/// Which fixes are withheld from the estimator, so that they can be predicted: those whose place in the file, counted
-/// from 0, leaves the rest `phase` when divided by `every`; every = 0: none.
+/// Fixes withheld from the estimator to test its predictions: those with zero-based index i in the file where i mod
+/// `every` = `phase`; every = 0: none.
 struct HoldOut {
   int every = 0;
   int phase = 0;
@@ -92,43 +94,44 @@ struct HoldOut {
   }
 };
 
-/// An estimate at a node, or the prediction of a fix that was withheld.
+/// An estimate at a node, or the prediction of a withheld fix.
 struct LoggedEstimate {
   double time = 0.0;
   Eigen::VectorXd values, sigmas;  ///< of [state; parameters]
-  std::int64_t fix = -1;           ///< the place of the fix at this time; -1: a node between fixes
+  std::int64_t fix = -1;           ///< index of the fix at this time; -1: a node between fixes
   bool held_out = false;
   double residual = std::numeric_limits<double>::quiet_NaN();  ///< distance of the fix from the estimate [m]
   bool fallback = false;
 };
 struct Replay {
-  std::string name;  ///< of the variant, for files and pictures
+  std::string name;  ///< of the variant, for files and figures
   std::vector<LoggedEstimate> estimates;
   Estimator::Counts counts;
-  std::int64_t unpredicted = 0;  ///< withheld fixes before there was an estimate
+  std::int64_t unpredicted = 0;  ///< withheld fixes before the first estimate
   std::vector<double> solve_us;  ///< preparation and feedback of each solve [us]
   double seconds = 0.0;          ///< of the whole replay
 };
-/// Drives through a log with an estimator made anew: everything is pushed in the order in which it became known, and
-/// the estimator is asked at each node. Nodes lie at the fixes that are not withheld and at most the robot's step
-/// apart; between fixes they measure the steering alone. A withheld fix is asked for at its time and leaves no trace.
+/// Replays a log through a new estimator: pushes all data in the order in which it became available and queries the
+/// estimator at each node. Nodes lie at the fixes that are not withheld and at most the robot's step apart; nodes
+/// between fixes measure only the steering. At the time of a withheld fix the estimator is queried without changing its
+/// state.
 RHEC_EXPORT Replay replay(const Robot& robot, const RecordedLog& log, const LogOptions& options,
                           const HoldOut& hold_out, const LoopHooks& hooks = {});
 
-/// How well withheld fixes were predicted.
+/// Prediction errors of withheld fixes.
 struct PredictionErrors {
   std::int64_t count = 0;
   double median = 0.0;       ///< [m]
-  double rmse_capped = 0.0;  ///< root mean square, an error above `error_cap` counting as that [m]
+  double rmse_capped = 0.0;  ///< root mean square of errors capped at `error_cap` [m]
 };
 constexpr double error_cap = 5.0;
 struct HeldOutSummary {
   PredictionErrors all, consistent;  ///< consistent: fixes that agree with their neighbours
 };
-/// A withheld fix of which there was no prediction counts with the cap.
+/// A withheld fix without a prediction counts as `error_cap`.
 RHEC_EXPORT HeldOutSummary summarise(const Replay& replay, const RecordedLog& log);
 
-/// The files of a replay. The picture shows one, and the parameters of another one beside it.
+/// The files of a replay. The figure shows one replay and compares its parameters with another one's.
 RHEC_EXPORT std::string estimates_csv(const std::vector<Replay>& replays, const RecordedLog& log,
                                       const LogScenario& scenario);
 RHEC_EXPORT std::string summary_json(const std::vector<Replay>& replays, const RecordedLog& log,

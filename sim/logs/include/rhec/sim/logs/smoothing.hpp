@@ -7,21 +7,21 @@
 
 namespace rhec::sim {
 
-/// Behind the name of a variant: its estimates of the drive as it went.
+/// Suffix of a variant's name for its causal (online) estimates.
 inline constexpr const char* causal_suffix = " causal";
 
-/// A recorded drive estimated as a whole, and the estimates of the drive as it went that it started from.
+/// A recorded drive estimated as one problem, and the causal estimates used as its initial guess.
 struct SmoothedReplay {
-  Replay smoothed;  ///< at the same times as `causal`: at its nodes, and at the fixes that were withheld
+  Replay smoothed;  ///< at the same times as `causal`: its nodes and the withheld fixes
   Replay causal;
-  Report report;            ///< of the one large problem
-  int intervals = 0;        ///< N of it
-  bool has_sigmas = false;  ///< the solver gave covariances
+  Report report;            ///< of the single large problem
+  int intervals = 0;        ///< its N
+  bool has_sigmas = false;  ///< whether the solver returned covariances
   double solve_seconds = 0.0;
 };
 
-/// Replays a log with the robot's estimator, then estimates all of its nodes at once. A withheld fix is not seen by
-/// either; the smoothed position at its time is integrated from the node before it.
+/// Replays a log with the robot's estimator, then estimates all of its nodes at once. Neither uses withheld fixes; the
+/// smoothed position at a withheld fix is integrated from the preceding node.
 RHEC_EXPORT SmoothedReplay smooth(const std::string& name, const Robot& robot, const RecordedLog& log,
                                   const LogOptions& options, const HoldOut& hold_out, const LoopHooks& hooks = {});
 

@@ -15,29 +15,30 @@ namespace rhec::sim {
 struct Sample {
   std::int64_t step = 0;
   double time = 0.0;
-  Eigen::VectorXd true_state, true_parameters;  ///< parameters: the ground's at the vehicle's position
+  Eigen::VectorXd true_state, true_parameters;  ///< parameters: those of the ground at the vehicle's position
   Eigen::VectorXd state, parameters;            ///< estimated
-  Eigen::VectorXd sigma;                        ///< standard deviations of [state; parameters]; empty: none known
-  double nees = 0.0;  ///< normalised estimation error squared of [state; parameters]; NaN where no covariance is known
+  Eigen::VectorXd sigma;                        ///< standard deviations of [state; parameters]; empty if unknown
+  double nees = 0.0;  ///< normalised estimation error squared of [state; parameters]; NaN without covariance
   std::vector<double> inputs;
   PathPoint reference;
   double tracking = 0.0;  ///< signed distance of the true position from the path [m]
   Status estimator_status = Status::solved, controller_status = Status::solved;
   bool estimator_fallback = false, controller_fallback = false, relaxed = false;
   double estimator_us = 0.0, controller_us = 0.0;  ///< preparation and feedback of the solvers [us]
-  double estimator_feedback_us = 0.0;              ///< of it, what came after the measurement [us]
+  double estimator_feedback_us = 0.0;              ///< of this, the time after the measurement [us]
 };
 
 struct RunLog {
   std::vector<Sample> samples;
   bool completed = false;  ///< the end of the path was reached
-  std::string ended = {};  ///< why the run ended, in words
+  std::string ended = {};  ///< why the run ended
 };
 
-/// Runs estimator -> controller -> truth until the path ends, the vehicle is lost, or it takes far too long.
+/// Runs estimator -> controller -> ground truth until the path ends, the vehicle is lost, or the run takes far too
+/// long.
 RHEC_EXPORT RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks = {});
 
-/// Mean absolute and root mean square errors of a run, and what its solvers reported.
+/// Errors of a run, mean absolute or root mean square.
 struct ErrorSummary {
   std::map<std::string, double> parameters;  ///< by the model's names
   double position = 0.0;                     ///< Euclidean [m]
@@ -51,9 +52,9 @@ struct RunSummary {
   ErrorSummary mae, rmse;
   ErrorSummary mae_after_start;        ///< without the first N_e samples
   double nees = 0.0;                   ///< mean; its expected value is the number of states and parameters
-  Spread estimator_us, controller_us;  ///< zeros where there was no solve
+  Spread estimator_us, controller_us;  ///< zeros without solves
   std::map<std::string, std::int64_t> estimator_statuses, controller_statuses;
-  std::int64_t fallbacks = 0;  ///< solves whose result could not be used
+  std::int64_t fallbacks = 0;  ///< solves with unusable results
   std::int64_t solves = 0;
 };
 RHEC_EXPORT RunSummary summarise(const RunLog& log, const Scenario& scenario);

@@ -7,7 +7,7 @@
 
 namespace rhec::sim {
 
-/// The files of a run: steps.csv, summary.json, run.svg (the same bytes for the same scenario and seed, but for the
+/// The files of a run: steps.csv, summary.json, run.svg (byte-identical for the same scenario and seed, except for the
 /// solve times in the summary), and times.csv.
 RHEC_EXPORT std::string steps_csv(const RunLog& log, const Scenario& scenario);
 RHEC_EXPORT std::string times_csv(const RunLog& log);

@@ -12,7 +12,7 @@
 
 namespace rhec::sim {
 
-/// A closed-loop experiment: the keys of RobotOptions, and what the world is like.
+/// A closed-loop experiment: the keys of RobotOptions plus those of the simulated world.
 struct ScenarioOptions : RobotOptions {
   std::string name = "run";
   double speed = 8.0;  ///< reference ground speed [m/s]
@@ -21,11 +21,11 @@ struct ScenarioOptions : RobotOptions {
   RHEC_EXPORT static const OptionTable<ScenarioOptions>& table();
 };
 
-/// The sections of a scenario, its first one without a name (the root).
+/// The sections of a scenario; the first one has no name (the root).
 RHEC_EXPORT std::vector<OptionSection> scenario_sections();
 
-/// A scenario with all that it names made: the path, the ground, the vehicle on it. Throws Error for whatever is wrong,
-/// naming file, line and key.
+/// A scenario with all its objects constructed: path, ground and vehicle. Throws Error, naming file, line and key, if
+/// it is invalid.
 class RHEC_EXPORT Scenario {
  public:
   Scenario(const Host& host, const Settings& settings);
@@ -35,7 +35,7 @@ class RHEC_EXPORT Scenario {
   const Path& path() const noexcept { return path_; }
   const SlipField& terrain() const noexcept { return *terrain_; }
   const TruthOptions& vehicle() const noexcept { return vehicle_; }
-  /// The start: on the path's first point, facing along it, all else zero.
+  /// Initial state: at the path's first point, heading along the path, all else zero.
   const Eigen::VectorXd& initial_state() const noexcept { return initial_state_; }
 
  private:

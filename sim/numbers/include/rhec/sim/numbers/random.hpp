@@ -8,8 +8,7 @@
 
 namespace rhec::sim {
 
-/// Scatters a 64-bit number over all 64-bit numbers, one to one (the output function of splitmix64, Steele et al.
-/// 2014).
+/// A bijective hash of 64-bit numbers (the output function of splitmix64, Steele et al. 2014).
 constexpr std::uint64_t scatter(std::uint64_t z) noexcept {
   z += 0x9E3779B97F4A7C15u;
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
@@ -20,11 +19,11 @@ constexpr std::uint64_t scatter(std::uint64_t z) noexcept {
 /// The upper 53 bits as a number in [0, 1).
 constexpr double to_unit_interval(std::uint64_t bits) noexcept { return static_cast<double>(bits >> 11) * 0x1.0p-53; }
 
-/// A stream of random numbers (xoshiro256++, Blackman & Vigna 2019). The distributions are our own, since those of the
+/// A stream of random numbers (xoshiro256++, Blackman & Vigna 2019). It has its own distributions, since those of the
 /// standard library differ between implementations.
 ///
-/// One seed gives as many independent streams as there are names, so that whoever begins to draw numbers, under a name
-/// of its own, shifts nobody else's.
+/// Seed and name together select the stream. A new consumer with its own name therefore does not shift the numbers of
+/// other streams.
 class RHEC_EXPORT RandomStream {
  public:
   RandomStream(std::uint64_t seed, std::string_view name) noexcept;

@@ -7,11 +7,10 @@
 
 namespace rhec::sim {
 
-/// The value that a variable of Student's distribution with so many degrees of freedom (1 at least) stays below with a
-/// probability of 97.5 %: half of a two-sided interval of 95 %.
+/// The 97.5 % quantile of Student's t distribution (`degrees` at least 1): half the width of a two-sided 95 % interval.
 RHEC_EXPORT double student_975(std::size_t degrees);
 
-/// The same, each found once.
+/// The same quantiles, cached.
 class RHEC_EXPORT StudentQuantiles {
  public:
   double of(std::size_t degrees);
@@ -20,13 +19,13 @@ class RHEC_EXPORT StudentQuantiles {
   std::map<std::size_t, double> known_;
 };
 
-/// Mean and standard deviation of numbers that come one after the other.
+/// Running mean and standard deviation.
 class RHEC_EXPORT Moments {
  public:
   void add(double value) noexcept;
   std::size_t count() const noexcept { return count_; }
-  double mean() const noexcept;  ///< NaN of none
-  /// Of the 95 % interval of the mean; NaN of fewer than two.
+  double mean() const noexcept;  ///< NaN without values
+  /// Half width of the mean's 95 % confidence interval; NaN for fewer than two values.
   double half_width(StudentQuantiles& quantiles) const;
 
  private:

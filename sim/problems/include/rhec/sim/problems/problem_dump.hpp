@@ -15,31 +15,32 @@
 
 namespace rhec::sim {
 
-/// Saves problems that loops solve as problem files, rhe.jsonl and rhc.jsonl, with the guess that each solve began with
-/// and under `origin` what came of it: those whose solve failed (`is_usable`), and of every n-th step the one that
-/// counted.
+/// Saves problems solved in loops to the problem files rhe.jsonl and rhc.jsonl, with each solve's initial guess and,
+/// under `origin`, its outcome. Saves problems whose solve failed (not `is_usable`), and the final solve of every n-th
+/// step.
 ///
-/// Their ids are run/rhe/STEP and run/rhc/STEP. Where a step solved several times (a controller that starts anew, a
-/// search for the heading) that is the last one; failures before it are run/rhe/attempt1/STEP and so on.
+/// Their ids are run/rhe/STEP and run/rhc/STEP. If a step solves several times (controller restart, heading search),
+/// this is the last solve; earlier failures are run/rhe/attempt1/STEP and so on.
 class RHEC_EXPORT ProblemDump {
  public:
-  /// Files of these kinds in a folder, written aside until `commit`. every = 0: failures alone. Throws Error.
+  /// Writes files of these kinds to a folder; they are temporary until `commit`. every = 0: only failures. Throws
+  /// Error.
   ProblemDump(const std::filesystem::path& folder, const std::vector<std::string>& kinds, int every);
   ProblemDump(const ProblemDump&) = delete;
   ProblemDump& operator=(const ProblemDump&) = delete;
 
-  /// What to hang into a loop that drives this robot; `run` is its name. One loop after the other.
+  /// Callback for a loop with this robot; `run` is the loop's name. One loop at a time.
   decltype(LoopHooks::solved) watch(const std::string& run, const Robot& robot);
 
-  /// Puts the files into place, empty ones too: what was there is of another run. Throws Error, also for what could not
-  /// be saved in the meantime.
+  /// Moves the files into place, even empty ones, to replace those of earlier runs. Throws Error, also for problems
+  /// that could not be saved before.
   void commit();
 
-  /// One of the files, as it is after `commit`.
+  /// One of the files after `commit`.
   struct File {
     std::filesystem::path path;
     std::int64_t problems = 0;
-    /// `--solver NAME --set KEY=VALUE ...` of the solvers that they were put to.
+    /// `--solver NAME --set KEY=VALUE ...` of the solvers used.
     std::vector<std::string> solvers;
   };
   std::vector<File> files() const;
@@ -49,8 +50,8 @@ class RHEC_EXPORT ProblemDump {
     std::filesystem::path path;
     std::ofstream file;
     std::int64_t problems = 0;
-    std::map<std::string, std::int64_t> solvers;  ///< problems of each
-    std::optional<ProblemRecord> last;            ///< of the step that is going on, where it is to be saved
+    std::map<std::string, std::int64_t> solvers;  ///< number of problems per solver
+    std::optional<ProblemRecord> last;            ///< of the current step, if it is to be saved
     std::string prefix;                           ///< of its id
     std::string solver;
     std::int64_t step = -1;

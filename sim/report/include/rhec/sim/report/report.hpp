@@ -7,11 +7,12 @@
 
 namespace rhec::sim {
 
-/// What a report shows, as one JSON object: of the folder of a run (`rhec run`) or of an estimation (`rhec estimate`),
-/// of the database of a sweep, or of a comparison (`compare.json` or its folder). docs/report.md says what it keeps of
-/// long runs; its notes say so, too. Numbers that are not finite are null. `program` made it, e.g. "rhec 0.1.0".
+/// The content of a report as one JSON object, for the folder of a run (`rhec run`) or an estimation (`rhec estimate`),
+/// the database of a sweep, or a comparison (`compare.json` or its folder). docs/report.md describes what it keeps of
+/// long runs; the report's notes do too. Non-finite numbers become null. `program` is the program that made it, e.g.
+/// "rhec 0.1.0".
 ///
-/// Throws Error, naming file and line and what to do, for what is none of these, or is not whole.
+/// Throws Error, naming file, line and what to do, if the source is none of these or is incomplete.
 RHEC_EXPORT std::string report_document(const std::filesystem::path& source, const std::string& program);
 
 }  // namespace rhec::sim

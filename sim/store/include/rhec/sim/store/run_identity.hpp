@@ -9,7 +9,7 @@
 
 namespace rhec::sim {
 
-/// What tells one run from all others: the first 128 bits of SHA-256 of its whole configuration.
+/// Identifies a run: the first 128 bits of the SHA-256 hash of its whole configuration.
 struct RunIdentity {
   std::uint64_t high = 0, low = 0;
   bool operator==(const RunIdentity&) const = default;
@@ -20,8 +20,8 @@ struct RunIdentity {
 };
 RHEC_EXPORT RunIdentity identity_of(std::string_view configuration);
 
-/// Settings as JSON in one line, the same for all ways to write the same: keys are sorted, what reads as a number is
-/// written as the shortest text that reads as that double (8, 8.0 and 0.8e1 alike), infinity as ".inf".
+/// Settings as canonical JSON in one line: keys are sorted, a number is written as the shortest text that parses to the
+/// same double (8, 8.0 and 0.8e1 alike), infinity as ".inf".
 RHEC_EXPORT std::string canonical_text(const Settings& settings);
 
 }  // namespace rhec::sim

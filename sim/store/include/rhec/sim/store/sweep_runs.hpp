@@ -11,19 +11,19 @@
 
 namespace rhec::sim {
 
-/// Of one seed: the measures, or none where the run was not completed. NaN where a run does not have one.
+/// The measures of one seed's run; empty if the run was not completed. NaN for a measure that a run does not have.
 struct SeedOutcome {
   std::optional<std::int64_t> seed;
-  std::vector<double> values;  ///< as many as measures were known then; empty: not completed
+  std::vector<double> values;  ///< one per measure known at that time; empty: not completed
 };
 
-/// Runs of one configuration, which differ in their seed alone.
+/// Runs of one configuration, which differ only in their seed.
 struct RunGroup {
   std::map<std::string, std::string> keys;  ///< dotted keys and their values as JSON, without the seed
   std::vector<SeedOutcome> outcomes;
 };
 
-/// What a sweep's database holds.
+/// Content of a sweep's database.
 struct SweepRuns {
   std::vector<std::string> measures;  ///< "mae.kappa", "rhe.median", ...
   std::vector<RunGroup> groups;
@@ -32,7 +32,7 @@ struct SweepRuns {
   std::int64_t total = 0;
 };
 
-/// Throws Error for a file that is no database of this version, is cut off, or has no runs.
+/// Throws Error if the file is not a database of this version, is truncated, or has no runs.
 RHEC_EXPORT SweepRuns read_sweep_runs(const std::filesystem::path& file);
 
 }  // namespace rhec::sim

@@ -15,42 +15,42 @@
 
 namespace rhec::sim {
 
-/// What came of a run.
+/// Outcome of a run.
 enum class RunStatus {
   completed,      ///< the end of the path was reached
   not_completed,  ///< the vehicle was lost or far too slow
-  refused,        ///< its configuration is wrong: values that do not fit one another
-  failed,         ///< it ended with an error that should not have been
+  refused,        ///< invalid configuration, e.g. inconsistent values
+  failed,         ///< it ended with an unexpected error
 };
 RHEC_EXPORT std::string_view name_of(RunStatus status);
 
-/// A run as it is kept. The texts are JSON, with the keys of summary.json (docs/results.md); they are empty where the
-/// run was refused or failed.
+/// A stored run. The texts are JSON with the keys of summary.json (docs/results.md); they are empty if the run was
+/// refused or failed.
 struct SweepRow {
   RunIdentity identity;
-  std::string configuration;  ///< canonical_text of the whole of it
-  std::optional<int> seed;    ///< none where the configuration has none that can be read
+  std::string configuration;  ///< canonical_text of the whole configuration
+  std::optional<int> seed;    ///< none if the configuration has no readable seed
   RunStatus status = RunStatus::failed;
-  std::string reason;  ///< how the run ended, in words
+  std::string reason;  ///< how the run ended
   std::int64_t steps = 0, solves = 0, fallbacks = 0;
   double nees = std::numeric_limits<double>::quiet_NaN();
   std::string mae, rmse, mae_after_start, statuses;
-  std::string solve_time_us;  ///< of this machine, like `seconds`; all else repeats itself
-  double seconds = 0.0;       ///< that the run took
+  std::string solve_time_us;  ///< depends on the machine, like `seconds`; all else is reproducible
+  double seconds = 0.0;       ///< duration of the run
   bool has_summary() const noexcept { return !mae.empty(); }
 };
 
-/// The SQLite file that a sweep's runs go to; docs/sweep.md has its schema. It belongs to one store at a time: a second
-/// one, of whatever process on this machine, is refused. Others may read it meanwhile.
+/// The SQLite file that stores a sweep's runs; docs/sweep.md has its schema. Only one store at a time may own it: a
+/// second one, in any process on this machine, is refused. Others may read it concurrently.
 ///
-/// All functions throw Error, naming the file and what to do: a file that is no database, is another program's or of
-/// another version, is damaged or cut short, cannot be written, or is in use. What was there stays as it was.
+/// All functions throw Error, naming the file and what to do, if the file is not a database, belongs to another program
+/// or version, is damaged or truncated, cannot be written, or is in use. They leave its content unchanged.
 class RHEC_EXPORT SweepStore {
  public:
   static constexpr int application_id = 0x72686563;  ///< "rhec"
   static constexpr int version = 1;                  ///< of the schema
 
-  /// Opens the file, or makes it, with its folders. `program` is written beside each run, e.g. "rhec 0.1.0".
+  /// Opens the file, or creates it with its folders. `program` is stored with each run, e.g. "rhec 0.1.0".
   explicit SweepStore(const std::filesystem::path& file, std::string program = {});
   ~SweepStore();
   SweepStore(const SweepStore&) = delete;
@@ -58,10 +58,10 @@ class RHEC_EXPORT SweepStore {
 
   const std::filesystem::path& file() const noexcept;
   std::int64_t count() const;
-  /// What came of a run; none where the file does not have it.
+  /// Outcome of a run; none if it is not in the file.
   std::optional<RunStatus> find(const RunIdentity& identity) const;
-  /// All rows or none are written, and are on the disk when this returns; those that are there already stay as they
-  /// are. Waits for a minute where another program reads at that moment.
+  /// Writes all rows or none; they are on disk when this returns. Existing rows are unchanged. Waits up to a minute
+  /// while another program reads.
   void write(std::span<const SweepRow> rows);
   /// All runs, in the order of their identities.
   std::vector<SweepRow> rows() const;

@@ -14,33 +14,33 @@
 
 namespace rhec::sim {
 
-/// A grid of runs over the keys of a scenario; docs/sweep.md has the form of the file. Runs are counted from 0, in the
-/// order of the blocks, where the last key of a block varies fastest. Values are made when they are asked for, so that
-/// a grid may be as large as one likes.
+/// A grid of runs over the keys of a scenario; docs/sweep.md describes the file format. Runs are numbered from 0, in
+/// the order of the blocks; the last key of a block varies fastest. Values are generated on demand, so a grid may be
+/// arbitrarily large.
 class RHEC_EXPORT Sweep {
  public:
-  /// Of a file. Throws Error, naming file, line and key, for whatever is wrong in its form: a key that is not known, a
-  /// grid without runs, a range that does not reach its end, groups of unequal length, a key that undoes another,
-  /// more than 10^15 runs. Scenarios that it names are read, too.
+  /// Reads a file and the scenarios that it names. Throws Error, naming file, line and key, for any error of form: an
+  /// unknown key, a grid without runs, a range that does not reach its end, groups of unequal length, a key that
+  /// overrides an earlier one, more than 10^15 runs.
   static Sweep from_file(const std::filesystem::path& file);
-  /// Of settings whose origin is a file, beside which scenarios are looked for.
+  /// From settings whose origin is a file; scenarios are looked up relative to that file.
   explicit Sweep(const Settings& description);
 
   const std::string& name() const noexcept { return name_; }
   std::int64_t count() const noexcept { return count_; }
-  /// The same for two sweeps that were read from the same texts, and scenarios too.
+  /// Equal for sweeps that were read from the same texts, scenarios included.
   const RunIdentity& fingerprint() const noexcept { return fingerprint_; }
 
   /// The whole configuration of a run.
   Settings settings(std::int64_t run) const;
-  /// What the grid gives a run, for people: "speed=4, blocking.kappa.size=2".
+  /// The grid's values for a run, for display: "speed=4, blocking.kappa.size=2".
   std::string assignments(std::int64_t run) const;
 
-  /// Throws Error, naming file, line and key, for a value that no run can have. Each listed value, and the first and
-  /// last ones of each range, are tried with several of the others; nothing is simulated. Values that do not fit one
-  /// another, though each fits others, are not found: such a run says so when its turn comes.
+  /// Throws Error, naming file, line and key, for a value that is invalid in every run. Tries each listed value, and
+  /// the first and last of each range, with several of the others; simulates nothing. Does not find combinations that
+  /// are invalid although each value is valid in others; such a run reports it when it is made.
   void check_values(const Host& host) const;
-  /// Of all runs, in their order. Throws Error naming two runs that are the same, if there are any.
+  /// Identities of all runs, in order. Throws Error, naming both, if two runs are identical.
   std::vector<RunIdentity> identities() const;
 
  private:
@@ -62,7 +62,7 @@ class RHEC_EXPORT Sweep {
     std::vector<Axis> axes;
     std::int64_t first = 0, count = 0;
   };
-  using Indices = std::vector<std::int64_t>;  // of the values, axis by axis
+  using Indices = std::vector<std::int64_t>;  // of the values, by axis
 
   static Values read_values(const Settings& from);
   static Values read_range(const Settings& from);
@@ -77,10 +77,10 @@ class RHEC_EXPORT Sweep {
   void check_values(const Host& host, const Block& block) const;
 
   std::string name_;
-  std::string scenario_;                   // of blocks that name none; empty: there is none
-  Settings set_;                           // over each scenario
+  std::string scenario_;                   // default of blocks that name none; may be empty
+  Settings set_;                           // overrides each scenario
   std::filesystem::path folder_;           // of the file
-  std::map<std::string, Settings> bases_;  // by the scenario's name in the sweep, with `set_` over them
+  std::map<std::string, Settings> bases_;  // by the scenario's name in the sweep, overridden by `set_`
   std::vector<Block> blocks_;
   std::int64_t count_ = 0;
   RunIdentity fingerprint_;

@@ -18,26 +18,27 @@
 
 namespace rhec::sim {
 
-/// Makes one run of a sweep. What goes wrong in it is in the row; only a lack of memory throws.
+/// Makes one run of a sweep. Its errors are stored in the row; only running out of memory throws.
 RHEC_EXPORT SweepRow make_run(const Host& host, const Sweep& sweep, std::int64_t run);
 
-/// Those who make runs, wherever they are. All calls come from one thread.
+/// Interface of workers that make runs, anywhere. All calls come from one thread.
 class RHEC_EXPORT SweepWorkers {
  public:
   virtual ~SweepWorkers();
-  /// How many more runs can be given now, so that nobody waits.
+  /// How many more runs to submit now so that no worker idles.
   virtual std::int64_t room() = 0;
   virtual void give(std::int64_t run) = 0;
-  /// What has been finished since; waits a while if that is nothing. Throws what ended a worker.
+  /// Rows finished since the last call; waits up to `patience` if there are none. Rethrows an exception that ended a
+  /// worker.
   virtual std::vector<SweepRow> take(std::chrono::milliseconds patience) = 0;
-  /// Takes back the runs that nobody has begun; returns how many these were.
+  /// Withdraws the runs that no worker has begun; returns their number.
   virtual std::int64_t withdraw() = 0;
 };
 
-/// Threads of this process. Those that are at a run when it is destroyed finish it first.
+/// Threads of this process. On destruction, running threads finish their run first.
 class RHEC_EXPORT ThreadWorkers final : public SweepWorkers {
  public:
-  /// `host` and `sweep` must outlive it. At least one thread.
+  /// `host` and `sweep` must outlive this object. At least one thread.
   ThreadWorkers(const Host& host, const Sweep& sweep, int threads);
   ~ThreadWorkers() override;
   ThreadWorkers(const ThreadWorkers&) = delete;
@@ -64,20 +65,20 @@ class RHEC_EXPORT ThreadWorkers final : public SweepWorkers {
 
 struct SweepProgress {
   std::int64_t total = 0;                      ///< runs of the grid
-  std::int64_t there = 0;                      ///< of them, found in the store when their turn came
-  std::int64_t made = 0;                       ///< of them, made and written since
-  std::map<RunStatus, std::int64_t> statuses;  ///< of those made, and of those that were there
+  std::int64_t there = 0;                      ///< runs already in the store
+  std::int64_t made = 0;                       ///< runs made and written
+  std::map<RunStatus, std::int64_t> statuses;  ///< of the runs made and those already there
   double seconds = 0.0;                        ///< since the start
-  bool stopped = false;                        ///< as asked: no more runs are begun
+  bool stopped = false;                        ///< stopped on request: no more runs are begun
 };
 
 struct SweepHooks {
-  std::function<void(const SweepProgress&)> progress = {};  ///< told several times a second
-  std::function<bool()> stop = {};  ///< asked as often; after yes only runs under way are finished
+  std::function<void(const SweepProgress&)> progress = {};  ///< called several times a second
+  std::function<bool()> stop = {};  ///< polled as often; once true, only running runs are finished
 };
 
-/// Makes the runs of a sweep that the store does not have, and writes each as soon as it is finished; several at once
-/// where they finish faster than the disk is. Throws Error as the store does; what was written before stays.
+/// Makes the runs of a sweep that are missing in the store, and writes each as soon as it is finished, several at once
+/// if they finish faster than the disk writes. Throws Error as the store does; rows written before are kept.
 RHEC_EXPORT SweepProgress run_sweep(const Sweep& sweep, SweepStore& store, SweepWorkers& workers,
                                     const SweepHooks& hooks = {});
 

@@ -9,42 +9,41 @@
 
 namespace rhec::sim {
 
-/// How the ground slips: the model's parameters (one channel each, in the model's order) as a function of position.
+/// Slip of the ground: the model's parameters (one channel each, in the model's order) as a function of position.
 /// Const, thread-safe, allocation-free.
 class RHEC_EXPORT SlipField {
  public:
   virtual ~SlipField() = default;
   virtual int channels() const noexcept = 0;
-  /// True for a field without edges and kinks, on which a vehicle's integration may take steps as long as their error
-  /// allows.
+  /// True for a field without edges and kinks, on which an integrator may choose its steps by error control.
   virtual bool is_smooth() const noexcept { return false; }
-  /// Writes `channels()` values for the position (x, y) [m], anywhere on the plane; NaNs if it is not a position.
+  /// Writes `channels()` values for any position (x, y) [m]; NaNs if the position is invalid.
   void sample(double x, double y, double* values) const noexcept;
 
  private:
-  /// The same for coordinates that are finite and below 1e9 m.
+  /// The same for finite coordinates below 1e9 m.
   virtual void look_up(double x, double y, double* values) const noexcept = 0;
 };
 
-/// The values that one channel of a random field takes.
+/// Range of values of one channel of a random field.
 struct SlipRange {
   double lower = 0.5;
   double upper = 1.0;
 };
 
-/// The same everywhere.
+/// The same values everywhere.
 RHEC_EXPORT std::unique_ptr<const SlipField> constant_field(std::vector<double> values);
 
-/// A smooth random field. Each channel is a stationary Gaussian field g of unit variance, of its own noise, with
+/// A smooth random field. Each channel is an independent stationary Gaussian field g of unit variance with
 ///
 ///     E[g(a) g(b)] = exp(-|a - b|^2 / (2 L^2)),      value = lower + (upper - lower) * Phi(g),
 ///
-/// L the correlation length and Phi the normal distribution function, so that values are uniform in [lower, upper].
+/// where L is the correlation length and Phi the normal distribution function. Values are uniform in [lower, upper].
 ///
-/// g is white noise on a square lattice, smoothed by the kernel exp(-d^2 / L^2), which convolved with itself is the
-/// correlation asked for. Values are so exactly normal, not only in the limit of many terms as with random Fourier
-/// features, at about a tenth of their cost. A lattice of 0.7 L leaves ripples below 2e-4 in the variance. The lattice
-/// is periodic: the field repeats itself after at least `period`.
+/// g is white noise on a square lattice, smoothed by the kernel exp(-d^2 / L^2), whose convolution with itself is the
+/// required correlation. Values are therefore exactly normal, not only in the limit of many terms as with random
+/// Fourier features, at about a tenth of their cost. A lattice of 0.7 L leaves ripples below 2e-4 in the variance. The
+/// lattice is periodic: the field repeats itself after at least `period`.
 struct GaussianField {
   std::uint64_t seed = 1;
   std::vector<SlipRange> channels = {{}, {}};
@@ -54,8 +53,8 @@ struct GaussianField {
 /// Throws Error for no channels, lower > upper, lengths that are not positive, or a lattice of more than 10^7 points.
 RHEC_EXPORT std::unique_ptr<const SlipField> gaussian_random_field(const GaussianField& options);
 
-/// Patches with sharp edges: the Voronoi cells of seeded sites, each with a value of its own per channel, uniform in
-/// the channel's range. There is one site, uniformly placed, in each square of side `patch_size`, over the whole plane.
+/// Patches with sharp edges: the Voronoi cells of seeded sites, each with its own value per channel, uniform in the
+/// channel's range. Each square of side `patch_size` in the plane has one uniformly placed site.
 struct PatchField {
   std::uint64_t seed = 1;
   std::vector<SlipRange> channels = {{}, {}};
@@ -71,7 +70,7 @@ RHEC_EXPORT std::unique_ptr<const SlipField> patch_field(const PatchField& optio
 ///     0.8,0.81,0.79, ...                values at y = origin_y, x growing
 ///     0.8,0.82,0.80, ...                values at y = origin_y + cell_size, and so on
 ///
-/// Beyond the grid its edge goes on. The files of several channels may have different grids.
+/// Outside the grid the edge values continue. Files of different channels may have different grids.
 struct RasterField {
   enum class Interpolation { bilinear, nearest };
   std::vector<std::filesystem::path> files;

@@ -14,32 +14,32 @@ namespace rhec::sim {
 
 struct TruthOptions {
   double step = 0.01;            ///< Runge-Kutta step [s]: at most 20 in an interval of 0.2 s
-  bool mechanical_stops = true;  ///< a state with bounds (the steering angle) cannot leave them, whatever the input
+  bool mechanical_stops = true;  ///< bounded states (the steering angle) cannot leave their bounds, whatever the input
 };
 
-/// The vehicle as it really moves:
+/// The simulated true vehicle:
 ///
 ///     dx/dt = f(x, u, p(x)),      p(x) the slip field at the vehicle's position
 ///
-/// by classical Runge-Kutta steps that look up the slip at each of their stages, with the input held between two calls.
-/// On smooth ground, away from its stops, up to five steps are made at once where the difference to the embedded method
-/// of third order is below 1e-8 of every state's typical magnitude.
-/// `advance` does not allocate or throw.
+/// integrated with classical Runge-Kutta steps that look up the slip at each stage; the input is held between two
+/// calls. On smooth ground, away from the stops, one step replaces up to five if the difference from the embedded
+/// third-order method is below 1e-8 of every state's typical magnitude. `advance` does not allocate or throw.
 class RHEC_EXPORT TruthVehicle {
  public:
-  /// `model` and `field` must outlive the vehicle. Throws Error if the field has not one channel per parameter, if the
-  /// model has no position, or if the initial state has another size, is not finite or lies outside its bounds.
+  /// `model` and `field` must outlive the vehicle. Throws Error if the field does not have one channel per parameter,
+  /// if the model has no position, or if the initial state has the wrong size, is not finite or violates its bounds.
   TruthVehicle(const Model& model, const SlipField& field, const Eigen::VectorXd& initial_state,
                const TruthOptions& options = {});
 
-  /// Drives on for a time [s] with the inputs held.
+  /// Advances by `duration` [s] with constant inputs.
   void advance(const double* inputs, double duration) noexcept;
 
   double time() const noexcept { return time_; }  ///< since the start [s]
   const Eigen::VectorXd& state() const noexcept { return state_; }
-  /// The slip at the present position.
+  /// Slip at the current position.
   const Eigen::VectorXd& parameters() const noexcept { return parameters_; }
-  /// The mean over time of the slip along the last `advance`: what a parameter held over that interval should be.
+  /// Time average of the slip over the last `advance`: the true value of a parameter that is constant over that
+  /// interval.
   const Eigen::VectorXd& mean_parameters() const noexcept { return mean_parameters_; }
 
  private:
@@ -58,17 +58,17 @@ class RHEC_EXPORT TruthVehicle {
   Eigen::VectorXd step_parameters_, sum_parameters_;
 };
 
-/// Standard deviations of what is measured, in the units of the model's outputs and inputs; empty: no noise.
+/// Standard deviations of the measurement noise, in the units of the model's outputs and inputs; empty: no noise.
 struct SensorNoise {
   std::vector<double> outputs;
   std::vector<double> inputs;
 };
 
-/// Measures with Gaussian noise. Every output and input has a random stream of its own, named after it, so that a
-/// sensor more or less, or one that is read less often, leaves the noise of the others as it was.
+/// Sensors with Gaussian noise. Every output and input has its own random stream, named after it, so that adding,
+/// removing or reading a sensor less often does not change the noise of the others.
 class RHEC_EXPORT Sensors {
  public:
-  /// `model` must outlive the sensors. Throws Error for a wrong number of standard deviations or a negative one.
+  /// `model` must outlive the sensors. Throws Error for a wrong number of standard deviations or for a negative one.
   Sensors(const Model& model, const SensorNoise& noise, std::uint64_t seed);
 
   /// outputs = h(state) + noise. Does not allocate or throw.

@@ -5,8 +5,9 @@
 
 namespace rhec::sim {
 
-/// The estimators that a scenario can name: those of every robot, and `truth`, which knows what `vehicle` is and does.
-/// The vehicle must outlive what is made; without one, as in the replay of a log, the making of `truth` throws Error.
+/// The estimators that a scenario can name: those of every robot, and `truth`, which returns the true state and
+/// parameters of `vehicle`. The vehicle must outlive the estimators; without one, as in log replay, constructing
+/// `truth` throws Error.
 RHEC_EXPORT EstimatorMakers scenario_estimators(const TruthVehicle* vehicle = nullptr);
 
 }  // namespace rhec::sim
