@@ -55,8 +55,7 @@ class Models {
     try {
       if (!model) model = host_->make_model(record.model, record.model_options);
     } catch (const Error& mistake) {
-      const std::string text =
-          mistake.what();  // errors in the model's options begin with a place, errors in its name do not
+      const std::string text = mistake.what();  // errors in options begin with a place, errors in the name do not
       throw text.starts_with(record.where) ? mistake : Error(fmt::format("{}: model: {}", record.where, text));
     }
     return model;

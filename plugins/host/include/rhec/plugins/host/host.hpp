@@ -42,7 +42,7 @@ struct RHEC_EXPORT PluginRecord {
 struct PluginTrial {
   enum class Outcome {
     made,
-    needs_options,  ///< not made: by the plugin's own error, an option without a default is missing
+    needs_options,  ///< not made: the plugin reports that an option without a default is missing
     failed
   };
   Outcome outcome = Outcome::made;

@@ -70,7 +70,7 @@ struct PluginInterface<PluginKind::solver> {
   static constexpr const char* word = "solver";
 };
 
-/// The manifest's functions for a class `Product`; they turn every exception into a message.
+/// The functions of a manifest for a class `Product`; they turn every exception into a message.
 template <PluginKind kind, class Product, const PluginInfo& info>
 struct PluginFunctions {
   using Interface = typename PluginInterface<kind>::Type;
