@@ -61,7 +61,7 @@ TEST(EveryFunction, IsRefusedWithADescriptionThatDoesNotFit) {
   EXPECT_EQ(why_refused(describe()), "it is not refused");
 }
 
-/// Not inlined, so that the compiler does not see what is wrong with the formula.
+/// noipa keeps the compiler from seeing what is wrong with the formula.
 template <class Scalar>
 [[gnu::noipa]] void write(const Scalar& value, int count, Scalar* results) {
   for (int j = 0; j < count; ++j) results[j] = value * 1.0;

@@ -238,7 +238,7 @@ void expect_same(const KktResidual& one, const KktResidual& other) {
   near(one.complementarity, other.complementarity, "complementarity");
 }
 
-/// Goes through a problem in a window; gives the values of the whole, with 9 where nobody writes.
+/// Linearises a problem piece by piece in a window, and collects the whole; 9 marks entries that are not written.
 struct InPieces {
   InPieces(const View& view, const Iterate& point, StageQp& window) {
     std::vector<double> scratch(view.problem.scratch_size());
