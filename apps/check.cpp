@@ -47,14 +47,14 @@ RobotOptions robot_of_model(const CheckArguments& arguments) {
   return options;
 }
 
-/// What a scenario says of its robot, and its speed.
+/// The robot of a scenario, and its speed.
 RobotOptions robot_of_scenario(const CheckArguments& arguments, std::optional<double>& speed) {
   Settings settings = load_yaml(arguments.model);
   apply_assignments(settings, arguments.assignments);
   const Settings* given = settings.find("speed");
   Settings robot = Settings::map(settings.origin());
   for (const auto& [key, value] : settings.members())
-    if (key != "log" && key != "variants") robot.add(key, value);  // of recorded drives
+    if (key != "log" && key != "variants") robot.add(key, value);  // keys of recorded drives
   auto options = sim::ScenarioOptions::table().parse(settings.is_null() ? settings : robot, "scenario");
   if (given && !speed) speed = options.speed;
   return options;

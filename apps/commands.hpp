@@ -13,19 +13,18 @@ class App;
 
 namespace rhec::apps {
 
-/// What the program answers to whoever called it.
+/// Exit codes of the program.
 enum ExitCode : int {
   exit_fine = 0,
-  exit_error = 1,      ///< a mistake that the user can mend: rhec::Error
-  exit_usage = 2,      ///< of the command line itself
-  exit_not_solved = 3  ///< all was done, but some answers are not usable
+  exit_error = 1,      ///< an error that the user can fix: rhec::Error
+  exit_usage = 2,      ///< a wrong command line
+  exit_not_solved = 3  ///< everything ran, but some results are not usable
 };
 
 /// What to do once the command line has been read; returns an exit code.
 using Action = std::function<int()>;
 
-// One function a command: adds it to the program, and puts what it does into `chosen` when it is the one that was
-// called.
+// One function per command: adds the command to the program, and sets `chosen` to its action if it is the one called.
 void add_check(CLI::App& program, Action& chosen);
 void add_compare(CLI::App& program, Action& chosen);
 void add_estimate(CLI::App& program, Action& chosen);
@@ -37,15 +36,15 @@ void add_sweep(CLI::App& program, Action& chosen);
 void add_options(CLI::App& program, Action& chosen);
 void add_plugins(CLI::App& program, Action& chosen);
 
-// Options that several commands have.
+// Options shared by several commands.
 
 /// `--plugin-path DIR`.
 void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& directories);
-/// `--set KEY=VALUE`; `what` a key is, for the help.
+/// `--set KEY=VALUE`; `what` describes a key, for the help.
 void add_assignments(CLI::App& command, std::vector<std::string>& assignments, const std::string& what);
-/// Puts what `--set` gave over settings, in the order given.
+/// Applies the assignments of `--set` to `settings`, in the order given.
 void apply_assignments(Settings& settings, const std::vector<std::string>& assignments);
-/// `--out`, to a file or a folder, as `type` says.
+/// `--out`; `type` says whether it takes a file or a folder.
 void add_out(CLI::App& command, std::string& out, const std::string& type, const std::string& meaning);
 
 }  // namespace rhec::apps

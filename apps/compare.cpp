@@ -41,9 +41,9 @@ struct CompareArguments {
 constexpr const char* default_drive = "gn_rti:mode=converge";
 constexpr const char* form = "expected [LABEL=]NAME[:KEY=VALUE,...]";
 
-// ---- what --solvers says
+// ---- parsing of --solvers
 
-/// Where a character is, outside of brackets, braces and quotes.
+/// The position of a character outside of brackets, braces and quotes.
 std::size_t find_outside(std::string_view text, char wanted, std::size_t from = 0) {
   int depth = 0;
   char quote = 0;
@@ -74,15 +74,15 @@ std::vector<std::string> split_outside(std::string_view text, char at) {
   }
 }
 
-/// A solver as it was written: "fast=gn_rti:mode=rti" has a label, a name and one option.
+/// A solver as written on the command line: "fast=gn_rti:mode=rti" has a label, a name and one option.
 struct Written {
   std::string text, label, name;
   std::vector<std::string> options;
   bool has_colon = false;
 };
 
-/// The solvers of a list. Commas separate solvers and the options of one: what has a '=', but neither a colon nor the
-/// name of a solver behind the '=', is another option of the solver before, where that has options.
+/// Parses a list of solvers. Commas separate solvers, and also the options of one solver: a part that has a '=', but no
+/// colon and no solver's name after the '=', is another option of the preceding solver if that one has options.
 std::vector<Written> read_list(const std::string& list, const std::vector<std::string>& known) {
   std::vector<Written> solvers;
   for (const std::string& part : split_outside(list, ',')) {
@@ -111,18 +111,18 @@ std::vector<Written> read_list(const std::string& list, const std::vector<std::s
   return solvers;
 }
 
-/// The backend that was written, made once to see that it can be made.
+/// The backend as written. Its solver is made once to check that it can be made.
 Backend backend_of(const Host& host, const Written& written, const std::string& flag) {
   Backend backend{written.label, written.name, Settings::map()};
   const std::string options_at = fmt::format("{} {}:", flag, written.name);
   const auto told = [&](const Error& mistake) {
-    const std::string text = mistake.what();  // of an option it names the place, as if it had been given by --set
+    const std::string text = mistake.what();  // errors in options begin with a place, as if given by --set
     constexpr std::string_view set = "--set ";
     return Error(text.starts_with(set) ? options_at + text.substr(set.size())
                                        : fmt::format("{} {}: {}", flag, written.name, text));
   };
   try {
-    host.options(PluginKind::solver, written.name);  // whether there is such a solver, before what its options are
+    host.options(PluginKind::solver, written.name);  // checks that the solver exists before reading its options
     for (const std::string& option : written.options) apply_assignment(backend.options, option);
     host.make_solver(written.name, backend.options);
   } catch (const Error& mistake) {
@@ -155,7 +155,7 @@ std::vector<Backend> read_backends(const Host& host, const std::vector<std::stri
   return backends;
 }
 
-/// A label of --solvers, or a solver of its own.
+/// Parses --drive: a label of --solvers, or another solver.
 Backend read_drive(const Host& host, const std::string& text, const std::vector<Backend>& backends) {
   for (const Backend& backend : backends)
     if (backend.label == text) return backend;
@@ -166,7 +166,7 @@ Backend read_drive(const Host& host, const std::string& text, const std::vector<
   return backend;
 }
 
-// ---- what is printed
+// ---- output
 
 /// "gn_rti, mode: converge"
 std::string described(const Backend& backend) {
@@ -176,7 +176,7 @@ std::string described(const Backend& backend) {
   return text;
 }
 
-/// Wide enough for the labels, but not so wide that the table is.
+/// Wide enough for the labels, but limited to keep the table narrow.
 std::size_t label_width(const Comparison& comparison) {
   std::size_t width = 8;
   for (const Backend& backend : comparison.backends) width = std::max(width, backend.label.size());
@@ -252,7 +252,7 @@ void print_answers(const Comparison& comparison, const sim::SameProblems& same) 
                same.without_best);
 }
 
-/// An error of a run, and the digits that it is shown with.
+/// An error measure of a run, and how many digits to print.
 struct Column {
   std::string name;
   int digits;

@@ -16,7 +16,7 @@ namespace {
 
 struct Finding {
   PluginRecord plugin;
-  PluginTrial trial;  ///< of an accepted plugin
+  PluginTrial trial;  ///< if the plugin is accepted
 
   bool shadowed() const { return !plugin.used_instead.empty(); }
   bool failed() const { return plugin.accepted() && trial.outcome == PluginTrial::Outcome::failed; }
@@ -98,7 +98,7 @@ std::string title_of(const PluginRecord& plugin) {
   return text;
 }
 
-/// A line below that of a file; its own line breaks keep the margin.
+/// Prints indented text below the line of a file; line breaks in it keep the indent.
 void print_below(const std::string& text) {
   constexpr std::string_view margin = "            ";
   std::string line(margin);

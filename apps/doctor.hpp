@@ -8,13 +8,12 @@
 
 namespace rhec::apps {
 
-/// The error for a name that is none of the known ones: `what` says so, then come the nearest one and all that was
-/// found.
+/// The error for an unknown name: `what` went wrong, the nearest known name, and everything that was found.
 Error unknown_plugin(const std::string& what, const std::string& name, const std::vector<std::string>& known,
                      const Host& host);
 
-/// Prints what the search for plugins looked at and what came of each file, as text or JSON; of the files and plugins
-/// that are called `name` alone, unless that is empty. Returns an exit code. Throws Error where nothing has that name.
+/// Prints the places that were searched for plugins and the result for each file, as text or JSON; if `name` is not
+/// empty, only for files and plugins of that name. Returns an exit code. Throws Error if nothing has that name.
 int examine_plugins(const Host& host, const std::string& name, bool json);
 
 }  // namespace rhec::apps

@@ -9,7 +9,7 @@
 namespace rhec::apps {
 namespace {
 
-/// As it is written in a shell: quoted where it has to be.
+/// The text as a shell word, quoted if necessary.
 std::string as_shell_word(const std::string& text) {
   constexpr std::string_view plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./-+=:,@%";
   if (!text.empty() && text.find_first_not_of(plain) == std::string::npos) return text;

@@ -20,14 +20,14 @@ struct DumpArguments {
 /// `--dump DIR` and `--dump-every N`.
 void add_dump(CLI::App& command, DumpArguments& arguments);
 
-/// The problems that a command saves, if it was asked to.
+/// Saves the problems that a command solves, if requested.
 class Dump {
  public:
   Dump(const DumpArguments& arguments, const std::vector<std::string>& kinds);
 
   decltype(sim::LoopHooks::solved) watch(const std::string& run, const Robot& robot);
   void commit();
-  /// Prints what was saved, and how it is replayed with the plugins of the same places.
+  /// Prints what was saved, and how to replay it with the same plugin directories.
   void tell(const std::vector<std::filesystem::path>& plugin_path) const;
 
  private:

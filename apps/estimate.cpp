@@ -17,7 +17,7 @@
 namespace rhec::apps {
 namespace {
 
-// Windows kept for a report, of all variants together.
+// Windows kept for a report, over all variants.
 constexpr std::int64_t most_windows = 1500;
 
 struct EstimateArguments : LogArguments {
@@ -56,7 +56,7 @@ int estimate(const EstimateArguments& arguments) {
   Dump dump(arguments.dump, {"rhe"});
   std::vector<sim::Replay> replays;
   std::vector<sim::HorizonLog> horizons;
-  // At most so many nodes: at the fixes, and one a step between them.
+  // Limits the number of nodes: one per fix, and one per step between fixes.
   const double seconds = log.rows.back().time - log.rows.front().time;
   bool all_usable = true;
   for (const sim::LogVariant& variant : scenario.variants()) {

@@ -12,7 +12,7 @@ class App;
 
 namespace rhec::apps {
 
-/// What commands on a recorded log are told.
+/// The arguments of commands that work on a recorded log.
 struct LogArguments {
   std::string scenario, dead_reckoning, gps, out = "out";
   std::vector<std::string> assignments, variants;
@@ -22,7 +22,7 @@ struct LogArguments {
 
 void add_log_arguments(CLI::App& command, LogArguments& arguments);
 
-/// The same, read. Throws Error for whatever is wrong.
+/// The input that these arguments name, read and checked. Throws Error for any mistake.
 struct LogInput {
   explicit LogInput(const LogArguments& arguments);
   sim::LogScenario scenario;

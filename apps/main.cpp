@@ -21,7 +21,7 @@ void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& dire
       .add_option_function<std::vector<std::string>>(
           "--plugin-path",
           [&directories](const std::vector<std::string>& given) {
-            // The search passes over what is not there; who names a directory here means it.
+            // The search skips missing directories, but one named explicitly must exist.
             for (const std::string& directory : given)
               if (!std::filesystem::is_directory(directory))
                 throw Error(
@@ -75,7 +75,7 @@ int usage_error(std::string_view what) {
   return exit_usage;
 }
 
-/// What is wrong with the command, if it is missing or unknown; empty if all is well.
+/// An error message if the command is missing or unknown; otherwise empty.
 std::string wrong_command(const CLI::App& program, int count, char** words) {
   std::vector<std::string> commands;
   for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))

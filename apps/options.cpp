@@ -22,7 +22,7 @@ struct OptionsArguments {
 
 using Row = std::vector<std::string>;
 
-/// A row of a Markdown table; a bar within a cell would end it.
+/// A row of a Markdown table; a bar inside a cell is escaped, since it would end the cell.
 std::string line_of(const Row& cells) {
   std::string line = "|";
   for (const std::string& cell : cells) {

@@ -31,7 +31,7 @@ struct PluginsArguments {
 
 using Table = std::vector<std::vector<std::string>>;
 
-/// Columns as wide as their widest cell, the last one open.
+/// Each column is as wide as its widest cell, except the last, which is not padded.
 void print_table(const Table& rows, std::string_view indent) {
   std::vector<std::size_t> widths;
   for (const auto& row : rows) {
@@ -84,14 +84,14 @@ constexpr VariableKind variable_kinds[] = {{"states", &ModelDescription::states}
                                            {"parameters", &ModelDescription::parameters},
                                            {"outputs", &ModelDescription::outputs}};
 
-/// A model as it is without any options, with all the outputs that it could have.
+/// A model made without options, with all the outputs it offers.
 std::shared_ptr<Model> model_with_all_outputs(const Host& host, const std::string& name) {
   Settings options;
   options.set("outputs", Settings::scalar("all"));
   return host.make_model(name, options);
 }
 
-/// What a configuration of the model names.
+/// The variables that a configuration can name.
 void print_variables(const ModelDescription& about) {
   Table table{{"VARIABLE", "UNIT", "BOUNDS", "MEANING"}};
   for (const VariableKind& kind : variable_kinds) {
@@ -112,7 +112,7 @@ void print_variables(const ModelDescription& about) {
 
 sim::Json as_json(const Variable& variable) {
   sim::Json all{{"name", variable.name}, {"unit", variable.unit}, {"meaning", variable.meaning}};
-  all["lower"] = variable.lower;  // null where there is none
+  all["lower"] = variable.lower;  // null if there is none
   all["upper"] = variable.upper;
   all["scale"] = variable.scale;
   return all;
@@ -176,7 +176,7 @@ sim::Json as_json(const Host& host, const PluginRecord& plugin) {
   return all;
 }
 
-/// Of the plugins of one kind and name, the first one found is the one that is used.
+/// The plugins of that name. Of several of one kind, only the first one found is used.
 std::vector<PluginRecord> named(const Host& host, const std::string& name) {
   std::vector<PluginRecord> found;
   std::vector<std::string> known;

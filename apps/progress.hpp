@@ -13,7 +13,7 @@
 
 namespace rhec::apps {
 
-/// A bar on a terminal; nothing where the output is read by a program.
+/// A progress bar on a terminal; prints nothing elsewhere.
 class ProgressBar {
  public:
   explicit ProgressBar(std::string title) : title_(std::move(title)), terminal_(isatty(STDERR_FILENO) != 0) {}
@@ -41,14 +41,13 @@ class ProgressBar {
   int shown_ = -1;
 };
 
-/// How far many runs are, at which rate, and the time left: a line that is drawn anew on a terminal, a line a minute
-/// where the output is read by a program.
+/// Progress, rate and remaining time of many runs: one line, redrawn, on a terminal; one line per minute elsewhere.
 class RateLine {
  public:
   struct State {
-    std::int64_t total = 0, there = 0, made = 0;  ///< `there` from before, `made` since the start
+    std::int64_t total = 0, there = 0, made = 0;  ///< `there` before the start, `made` since
     double seconds = 0.0;                         ///< since the start
-    bool ends = false;                            ///< only what is under way is finished
+    bool ends = false;                            ///< stopping: only runs under way are finished
   };
 
   explicit RateLine(std::string title) : title_(std::move(title)), terminal_(isatty(STDERR_FILENO) != 0) {}

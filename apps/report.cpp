@@ -20,7 +20,7 @@ struct ReportArguments {
   std::string source, page = "report.html", figures;
 };
 
-/// Writes one file beside where it shall be, to be put into place by `commit`.
+/// Writes one file next to its destination; `commit` moves it into place.
 class OutputFile {
  public:
   OutputFile(const std::filesystem::path& file, const std::string& content) : folder_(folder_of(file)) {

@@ -67,7 +67,7 @@ int smooth(const LogArguments& arguments) {
   folder.write("estimates.csv", sim::estimates_csv(replays, input.log, input.scenario));
   folder.write("summary.json", sim::summary_json(replays, input.log, input.scenario, input.hold_out));
   folder.write("times.csv", sim::times_csv(replays));
-  // A smoother has no windows; what a report has to know of the model stands there nevertheless.
+  // A smoother has no windows, but a report reads the description of the model from this file.
   std::vector<sim::HorizonLog> none;
   for (const sim::LogVariant& variant : input.scenario.variants())
     for (int i = 0; i < 2; ++i) none.emplace_back(variant.robot, 1);

@@ -44,7 +44,7 @@ struct SolveArguments {
   std::vector<std::filesystem::path> plugin_path;
 };
 
-/// The model of a record: one object for all records that name it with the same options.
+/// The models of the records: one object for all records with the same model and options.
 class Models {
  public:
   explicit Models(const Host& host) : host_(&host) {}
@@ -55,7 +55,7 @@ class Models {
     try {
       if (!model) model = host_->make_model(record.model, record.model_options);
     } catch (const Error& mistake) {
-      const std::string text = mistake.what();  // of the model's options it names the place, of the model itself not
+      const std::string text = mistake.what();  // errors in options begin with a place, errors in the name do not
       throw text.starts_with(record.where) ? mistake : Error(fmt::format("{}: model: {}", record.where, text));
     }
     return model;
@@ -73,13 +73,13 @@ class Models {
   std::map<std::string, std::shared_ptr<const Model>> made_;
 };
 
-/// A solver with the problem that it was set up for; takes one record after the other.
+/// A solver and the problem it was set up for; solves one record after the other.
 class Bench {
  public:
   Bench(std::string name, std::shared_ptr<Solver> solver, bool cold)
       : name_(std::move(name)), solver_(std::move(solver)), cold_(cold) {}
 
-  /// The problem by itself, from its guess or a cold start.
+  /// Solves the problem independently of others, from its initial guess or a cold start.
   std::string solve_alone(const ProblemRecord& record, const std::shared_ptr<const Model>& model, Outcome& outcome) {
     load(record, model, record.intervals);
     begin(record);
@@ -87,9 +87,9 @@ class Bench {
     return sim::solution_line(record, *problem_, point_, outcome);
   }
 
-  /// The next problem of a sequence, from the solution of the one before. What a controller is judged by is what its
-  /// inputs do, so its states are simulated: no defect flatters the objective. An estimator hands out its states as
-  /// they are.
+  /// Solves the next problem of a sequence, starting from the previous solution. A controller is evaluated by the
+  /// effect of its inputs, so its states are simulated: otherwise defects could lower the objective. An estimator's
+  /// states are kept as they are.
   std::string solve_next(const ProblemRecord& record, const std::shared_ptr<const Model>& model, int max_intervals,
                          Outcome& outcome) {
     if (last_first_) shifter_->take(*problem_, point_);
@@ -146,7 +146,7 @@ class Bench {
     outcome.solver = name_;
     outcome.status = report.status;
     outcome.iterations = report.iterations;
-    // The very number that a live solve reports; of what is no point there is none.
+    // The same number that a live solve reports; bad input has none, so the point is evaluated.
     outcome.objective =
         report.status == Status::bad_input ? problem_->evaluate(point, nullptr, scratch_) : report.objective;
     outcome.kkt_residual = kkt_residual(*problem_, point, qp_, scratch_).largest();
@@ -162,10 +162,10 @@ class Bench {
   StageQp qp_;
   std::vector<double> scratch_;
   std::optional<GuessShifter> shifter_;
-  std::optional<std::int64_t> last_first_;  ///< where the window of `point_` began, if it can be a guess
+  std::optional<std::int64_t> last_first_;  ///< start of the window of `point_`, if that can serve as a guess
 };
 
-/// Sequences run in the order of their steps.
+/// The longest horizon of each sequence. Throws Error if the steps of a sequence do not increase.
 std::map<std::string, int> longest_of_each(const std::vector<ProblemRecord>& records) {
   std::map<std::string, int> longest;
   std::map<std::string, const ProblemRecord*> last;
@@ -184,7 +184,7 @@ std::map<std::string, int> longest_of_each(const std::vector<ProblemRecord>& rec
   return longest;
 }
 
-/// What the summary tells of one id prefix.
+/// The data of the summary for one id prefix.
 struct Group {
   std::map<std::string, int> statuses;
   std::vector<double> iterations, times;
@@ -200,12 +200,12 @@ std::shared_ptr<Solver> make_solver(const Host& host, const std::string& name, c
   try {
     return host.make_solver(name, options);
   } catch (const Error& mistake) {
-    const std::string text = mistake.what();  // of an option it names the place
+    const std::string text = mistake.what();  // errors in options begin with a place
     throw text.starts_with("--set ") ? mistake : Error(fmt::format("--solver {}: {}", name, text));
   }
 }
 
-/// Where the solutions go, if not to standard output. Known before anything is solved: it may take long.
+/// The file for the solutions, if not standard output. Checked before solving, which may take long.
 class Destination {
  public:
   explicit Destination(const std::string& out) {
@@ -266,7 +266,7 @@ int solve(const SolveArguments& arguments) {
   apply_assignments(options, arguments.assignments);
   Destination destination(arguments.out);
   Models models(host);
-  std::map<std::string, Bench> benches;  // one for all, or one a sequence
+  std::map<std::string, Bench> benches;  // one for all, or one per sequence
   std::map<std::string, Group> groups;
   std::string lines;
   bool all_usable = true;

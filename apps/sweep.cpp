@@ -36,11 +36,12 @@ struct SweepArguments {
   std::vector<std::filesystem::path> plugin_path;
 };
 
-/// A grid of more runs is asked about, and looked through for equal runs only while it is made.
+/// Larger grids need confirmation, and are checked for equal runs only while they run.
 constexpr std::int64_t many_runs = 1'000'000;
 
-/// While there is one, the first Ctrl-C (or a request to end) asks to stop; one that comes a second later or more ends
-/// the program as usual. Not at once, since some who end programs (timeout, for one) send the same signal twice.
+/// While an object of this class exists, the first SIGINT or SIGTERM requests a stop; one that comes a second or two
+/// later ends the program as usual. An immediate repetition is ignored, since some programs (e.g. timeout) send the
+/// signal twice.
 class StopRequest {
  public:
   StopRequest() {
@@ -72,7 +73,7 @@ class StopRequest {
   static bool asked() { return asked_; }
 
  private:
-  static std::atomic<bool> asked_;             // without locks, as a handler needs it
+  static std::atomic<bool> asked_;             // lock-free, as a signal handler requires
   static std::atomic<std::int64_t> asked_at_;  // [s]
   static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<std::int64_t>::is_always_lock_free);
   struct sigaction interrupt_ {};
@@ -81,7 +82,7 @@ class StopRequest {
 std::atomic<bool> StopRequest::asked_ = false;
 std::atomic<std::int64_t> StopRequest::asked_at_ = 0;
 
-/// Asks on a terminal; without one, or with another answer than yes, the grid is refused.
+/// Asks for confirmation on a terminal. Throws Error without a terminal, or if the answer is not yes.
 void confirm(const sim::Sweep& sweep, const std::string& file, bool yes) {
   if (yes || sweep.count() <= many_runs) return;
   if (isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0) {
@@ -99,7 +100,7 @@ std::string counted(std::int64_t count, const std::string& word) {
   return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
 }
 
-/// What was done, and the exit code; `there` is how many runs of the grid the database had.
+/// Prints what was done and returns the exit code; `there` is how many runs the database already had.
 int tell(const sim::Sweep& sweep, const sim::SweepProgress& done, std::int64_t there,
          const std::filesystem::path& file) {
   fmt::print("{}: {} made in {:.1f} s", sweep.name(), counted(done.made, "run"), done.seconds);
@@ -115,13 +116,13 @@ int tell(const sim::Sweep& sweep, const sim::SweepProgress& done, std::int64_t t
   return left > 0 || !all_completed ? exit_not_solved : exit_fine;
 }
 
-/// What ranks other than the first do.
+/// The work of all ranks but the first.
 int serve(const SweepArguments& arguments, const Host& host, SweepRanks& ranks, int threads) {
   std::optional<sim::Sweep> sweep;
   std::string problem;
   try {
     sweep.emplace(sim::Sweep::from_file(arguments.sweep));
-  } catch (const Error& mistake) {  // is told by rank 0, once
+  } catch (const Error& mistake) {  // reported by rank 0, once
     problem = mistake.what();
   }
   ranks.serve(host, sweep, problem, threads);
@@ -132,7 +133,7 @@ int sweep(const SweepArguments& arguments) {
   const Host host(arguments.plugin_path);
   const int rank_count = started_ranks();
   const std::unique_ptr<SweepRanks> ranks = rank_count > 1 ? start_ranks(host, rank_count) : nullptr;
-  // Several processes are meant to have a core each, where nothing else is said.
+  // By default, each of several processes uses one core.
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int threads = arguments.threads > 0 ? arguments.threads : ranks ? 1 : cores;
   if (ranks && ranks->rank() > 0) return serve(arguments, host, *ranks, threads);
@@ -140,7 +141,7 @@ int sweep(const SweepArguments& arguments) {
   const sim::Sweep sweep = sim::Sweep::from_file(arguments.sweep);
   sweep.check_values(host);
   if (!arguments.dry_run) confirm(sweep, arguments.sweep, arguments.yes);
-  // All of them before there is a file; where they are too many, each is looked up when its turn comes.
+  // Identify all runs before the database is created; if there are too many, look up each when its turn comes.
   const std::vector<sim::RunIdentity> runs =
       sweep.count() <= many_runs ? sweep.identities() : std::vector<sim::RunIdentity>();
   if (arguments.dry_run) {

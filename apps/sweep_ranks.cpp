@@ -13,7 +13,8 @@
 namespace rhec::apps {
 
 int started_ranks() {
-  // Open MPI's mpirun; MPICH's and others that speak PMI; a step of Slurm, not the script that starts steps.
+  // Set by Open MPI's mpirun; by MPICH's and others that use PMI; in a Slurm job step, but not in the script that
+  // starts steps.
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"}) {
     const char* text = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): before there are threads
     const int count = text ? std::atoi(text) : 0;
@@ -31,7 +32,7 @@ std::unique_ptr<SweepRanks> start_ranks(const Host& host, int expected) {
         "started as one of {} processes, but this program was built without MPI: there is no {}; install Open MPI "
         "(libopenmpi-dev) and build it again, or start it alone",
         expected, library.string()));
-  // MPI loads parts of its own, which look for its symbols.
+  // MPI loads its own components, which need its symbols (RTLD_GLOBAL).
   void* loaded = dlopen(library.c_str(), RTLD_NOW | RTLD_GLOBAL);
   if (!loaded) {
     const char* reason = dlerror();

@@ -1,4 +1,4 @@
-// The ranks of a sweep on Open MPI. Only the first thread of a process speaks MPI.
+// The ranks of a sweep on Open MPI. Only the main thread of a process calls MPI.
 #include <mpi.h>
 #include <unistd.h>
 
@@ -31,7 +31,7 @@ using Bytes = std::vector<std::uint8_t>;
 using Steady = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-// What a message is. From rank 0: begin (whether to), runs, withdraw, over; to it: all others.
+// Message tags. Rank 0 sends begin (with true or false), runs, withdraw and over; it receives all others.
 enum Tag : int { tag_ready = 1, tag_begin, tag_runs, tag_rows, tag_withdraw, tag_withdrawn, tag_failure, tag_over };
 
 struct Message {
@@ -64,7 +64,7 @@ std::optional<Message> next_message(int from = MPI_ANY_SOURCE, int tag = MPI_ANY
   return receive(status);
 }
 
-/// Waits for it without keeping the processor busy, as MPI's own waiting would.
+/// Waits for the next message by polling: MPI's own blocking calls would keep the processor busy.
 Message wait_for_message(int from = MPI_ANY_SOURCE, int tag = MPI_ANY_TAG) {
   for (;;) {
     if (auto message = next_message(from, tag)) return std::move(*message);
@@ -116,7 +116,7 @@ std::string host_name() {
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "an unknown host";
 }
 
-/// All ranks, as rank 0 sees them: threads of its own, and the other ranks.
+/// All ranks, as rank 0 sees them: its own threads, and the other ranks.
 class RankWorkers final : public sim::SweepWorkers {
  public:
   RankWorkers(const Host& host, const sim::Sweep& sweep, int threads, int ranks)
@@ -181,12 +181,12 @@ class RankWorkers final : public sim::SweepWorkers {
 
  private:
   struct Other {
-    std::int64_t under_way = 0;  // runs that it has
+    std::int64_t under_way = 0;  // runs sent but not finished
     std::vector<std::int64_t> outbox;
   };
   int rank_count() const { return static_cast<int>(others_.size()); }
 
-  /// A rank is given as much as it makes in a fifth of a second, and more once it has half of that.
+  /// A rank gets runs for about a fifth of a second, and more once half of them are done.
   std::int64_t room_of(int rank) const {
     constexpr double batch_seconds = 0.2;
     const double batch = seconds_ > 0.0 ? std::clamp(std::ceil(batch_seconds / seconds_), 1.0, 64.0) : 1.0;
@@ -216,10 +216,10 @@ class RankWorkers final : public sim::SweepWorkers {
 
   sim::ThreadWorkers own_;
   int threads_;
-  std::vector<Other> others_;  // by rank; the first is nobody
+  std::vector<Other> others_;  // by rank; the first is unused
   std::vector<sim::SweepRow> backlog_;
   std::string failure_;
-  double seconds_ = 0.0;  // that a run takes, of late
+  double seconds_ = 0.0;  // moving average of the time of a run
 };
 
 class MpiRanks final : public SweepRanks {
@@ -258,7 +258,7 @@ class MpiRanks final : public SweepRanks {
 
   void serve(const Host& host, const std::optional<sim::Sweep>& sweep, const std::string& problem,
              int threads) override {
-    // Whoever ends the sweep tells rank 0, which lets the others finish what they have begun.
+    // Rank 0 handles the request to stop, and lets the other ranks finish the runs they have begun.
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     send(0, tag_ready,
@@ -266,7 +266,7 @@ class MpiRanks final : public SweepRanks {
     if (!wait_for_message(0, tag_begin).json().get<bool>()) return;
     try {
       make_runs(host, *sweep, threads);
-    } catch (const std::exception& failure) {  // is thrown again by rank 0
+    } catch (const std::exception& failure) {  // rank 0 throws it again
       send(0, tag_failure, fmt::format("rank {} on {}: {}", rank_, host_name(), failure.what()));
       for (;;) {
         const int tag = wait_for_message(0).tag;

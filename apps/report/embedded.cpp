@@ -1,6 +1,6 @@
 #include "embedded.hpp"
 
-// The assembler reads the files as they are; a text in C++ would have to be cut in pieces and take a compiler's time.
+// The assembler embeds the files as they are; a C++ string literal would have to be split, and would compile slowly.
 #define RHEC_EMBED(NAME, FILE)                                                   \
   __asm__(".pushsection .rodata\n" #NAME "_begin:\n.incbin \"" FILE "\"\n" #NAME \
           "_end:\n"                                                              \

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-// What apps/report/build.mjs made, in the program's read-only data.
+// The output of apps/report/build.mjs, in the program's read-only data.
 namespace rhec::apps {
 
 std::string_view embedded_page();

@@ -1,4 +1,4 @@
-// A build without the page (-DRHEC_REPORT=OFF).
+// For builds without the report page (-DRHEC_REPORT=OFF).
 #include "report_page.hpp"
 #include "rhec/core/base/error.hpp"
 

@@ -11,7 +11,7 @@ namespace rhec::apps {
 
 namespace {
 
-/// Inside <script> nothing may look like markup; JSON has '<' in texts alone, where the escape means the same.
+/// Inside <script> nothing may look like markup. JSON has '<' only inside strings, where the escape means the same.
 std::string without_markup(const std::string& json) {
   std::string text;
   text.reserve(json.size());

@@ -7,15 +7,15 @@
 namespace rhec::apps {
 
 struct ReportFigure {
-  std::string name;  ///< stem of a file's name
-  std::string svg;   ///< the whole file
+  std::string name;  ///< file name without extension
+  std::string svg;   ///< contents of the file
 };
 
 /// Whether this build has the page; the functions below throw rhec::Error if not.
 bool has_report_page();
-/// One HTML file, which needs no other.
+/// One self-contained HTML file.
 std::string report_page(const std::string& document);
-/// The figures of that page, drawn for paper.
+/// The figures of that page, drawn for print.
 std::vector<ReportFigure> report_figures(const std::string& document);
 
 }  // namespace rhec::apps

@@ -16,7 +16,7 @@ struct DestroyHeap {
   void operator()(duk_context* context) const { duk_destroy_heap(context); }
 };
 
-/// Only what is not protected comes here, and nothing below is unprotected but pushing texts: memory has run out.
+/// Called for errors outside of protected calls. Below, only pushing strings is unprotected, so memory has run out.
 [[noreturn]] void on_fatal(void*, const char* message) {
   throw Error(fmt::format("rhec report: the script of the figures failed: {}", message ? message : "no reason given"));
 }

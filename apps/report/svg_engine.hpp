@@ -4,7 +4,8 @@
 
 namespace rhec::apps {
 
-/// Runs the figures' script without a browser (Duktape): a report document in, an array [{name, svg}] in JSON out.
+/// Runs the script of the figures without a browser (Duktape): takes a report document, returns an array [{name, svg}]
+/// in JSON.
 std::string draw_figures(const std::string& document);
 
 }  // namespace rhec::apps

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kCopyAgain = "copy or build it again";
 
-/// Reads at offsets that the file itself gives, and so may be anything.
+/// Reads at offsets taken from the file itself, which may have any value.
 class Reader {
  public:
   explicit Reader(const fs::path& file) {
@@ -37,11 +37,11 @@ class Reader {
     if (!problem_) size_ = fs::file_size(file, problem_);
   }
 
-  /// Why nothing can be read; none if it can.
+  /// Why the file cannot be read; no error if it can.
   const std::error_code& problem() const { return problem_; }
   std::uint64_t size() const { return size_; }
 
-  /// `count` records; none where the file ends before.
+  /// `count` records; none if the file ends before.
   template <class Record>
   std::optional<std::vector<Record>> read(std::uint64_t offset, std::uint64_t count) {
     if (count > size_ / sizeof(Record) || offset > size_ || count * sizeof(Record) > size_ - offset) {
@@ -61,7 +61,7 @@ class Reader {
   std::uint64_t size_ = 0;
 };
 
-/// Where a part of the file ends; the largest number where that is no number.
+/// Where a part of the file ends; saturates instead of overflowing.
 std::uint64_t end_of(std::uint64_t offset, std::uint64_t bytes) {
   constexpr auto largest = std::numeric_limits<std::uint64_t>::max();
   return bytes > largest - offset ? largest : offset + bytes;
@@ -90,7 +90,7 @@ constexpr Platform kNative {
 #elif defined(__aarch64__)
       EM_AARCH64
 #else
-      EM_NONE  // not known: left to the loader
+      EM_NONE  // unknown here: left to the loader
 #endif
 };
 
@@ -119,7 +119,7 @@ std::string text_of(const Platform& platform) {
                      platform.order == ELFDATA2LSB ? "little" : "big");
 }
 
-/// Why what has this name is no file to read; empty if it is one. Opening a pipe would wait for who writes to it.
+/// Why the path is not a regular file; empty if it is one. Opening a pipe would wait for a writer.
 Refusal why_no_file(const fs::path& path) {
   std::error_code problem;
   const fs::file_status status = fs::status(path, problem);
@@ -136,7 +136,7 @@ Refusal why_no_file(const fs::path& path) {
   return {"it is a pipe, a socket or a device, not a file", "remove it"};
 }
 
-/// True for a program whose code may lie anywhere, which has the type of a shared library.
+/// True for a position-independent executable, which has the ELF type of a shared library.
 bool is_program(Reader& file, const std::vector<Segment>& segments) {
   for (const Segment& segment : segments) {
     if (segment.p_type != PT_DYNAMIC) continue;
@@ -149,7 +149,7 @@ bool is_program(Reader& file, const std::vector<Segment>& segments) {
   return false;
 }
 
-/// The definition of a data symbol in the table of symbols that a library shows; none where it is not there.
+/// The definition of a data symbol in the dynamic symbol table; none if there is none.
 std::optional<Symbol> find_symbol(Reader& file, const std::vector<Section>& sections, const std::string& name) {
   for (const Section& section : sections) {
     if (section.sh_type != SHT_DYNSYM || section.sh_link >= sections.size()) continue;
@@ -196,13 +196,13 @@ Refusal why_not_loadable(const fs::path& path, const std::string& symbol, std::s
     return {fmt::format("it is {}, not a shared library", type), link_as_module};
   }
 
-  // A library without a table of sections can be loaded still, and is asked afterwards.
+  // A library without a section table can still be loaded; its symbol is looked up after that.
   const bool has_sections = header.e_shoff != 0;
   if (header.e_phentsize != sizeof(Segment)) return damaged("segments", header.e_phentsize, sizeof(Segment));
   if (has_sections && header.e_shentsize != sizeof(Section)) {
     return damaged("sections", header.e_shentsize, sizeof(Section));
   }
-  // A linker puts the table of sections last, so this is the size of the whole file as a rule.
+  // Linkers put the section table last, so this is usually the size of the whole file.
   std::uint64_t expected = end_of(header.e_phoff, header.e_phnum * sizeof(Segment));
   if (has_sections) expected = std::max(expected, end_of(header.e_shoff, header.e_shnum * sizeof(Section)));
   const auto segments = file.read<Segment>(header.e_phoff, header.e_phnum);

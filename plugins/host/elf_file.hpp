@@ -8,12 +8,12 @@
 
 namespace rhec {
 
-/// Why a file should not be handed to the loader as a plugin; empty if it may be: it is a whole ELF shared library for
-/// this machine that defines a data symbol `symbol` of at least `symbol_size` bytes. Only reads the file. The loader
-/// itself does not check that a library is whole: it maps what is missing, and the process dies on the first access.
+/// Why a file must not be passed to the loader as a plugin; empty if it is a complete ELF shared library for this
+/// machine that defines a data symbol `symbol` of at least `symbol_size` bytes. Only reads the file. The loader itself
+/// does not check that a library is complete: it maps missing parts too, and the process crashes on the first access.
 Refusal why_not_loadable(const std::filesystem::path& file, const std::string& symbol, std::size_t symbol_size);
 
-/// What is said of a library without the data symbol of a manifest.
+/// The refusal of a library without the manifest's data symbol.
 Refusal no_manifest(const std::string& symbol);
 
 }  // namespace rhec

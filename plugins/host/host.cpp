@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// `rhec/plugins` beside the library that this function is in; empty if the loader does not know it.
+/// `rhec/plugins` next to the library that contains this function; empty if the loader does not know it.
 fs::path installed_directory() {
   Dl_info info{};
   if (dladdr(reinterpret_cast<const void*>(&installed_directory), &info) == 0 || info.dli_fname == nullptr) return {};
@@ -91,11 +91,11 @@ std::vector<fs::path> libraries_in(const fs::path& directory) {
   for (fs::directory_iterator entry(directory, problem), end; !problem && entry != end; entry.increment(problem)) {
     if (entry->path().extension() == ".so") files.push_back(entry->path());
   }
-  std::sort(files.begin(), files.end());  // a directory has no order of its own
+  std::sort(files.begin(), files.end());  // directory entries come in no particular order
   return files;
 }
 
-/// All lines after the first one moved to the right.
+/// Indents all lines after the first.
 std::string indented(const std::string& text, std::size_t indent) {
   std::string result;
   for (const char c : text) {
@@ -105,13 +105,13 @@ std::string indented(const std::string& text, std::size_t indent) {
   return result;
 }
 
-/// An error about the plugin that `settings` names, at the place where it does.
+/// An error about the plugin that `settings` names, with the place of its name.
 Error plugin_error(const Settings& settings, const std::string& text) {
   const Settings* name = settings.find("name");
   return name != nullptr ? name->error(text) : Error(text);
 }
 
-/// The model with the outputs that its section names; the usual ones where it names none.
+/// The model with the outputs that its section names, or the usual ones by default.
 std::shared_ptr<Model> choose_outputs(std::shared_ptr<Model> model, const Settings& section) {
   const ModelDescription& about = model->description();
   const Settings* wanted = section.find("outputs");
@@ -148,7 +148,7 @@ std::string numbers_of_variables(const Model& model) {
                      model.parameter_count(), model.output_count());
 }
 
-/// Room for what a plugin's function says when it fails.
+/// Buffer for the message of a plugin's function that fails.
 using ErrorText = std::array<char, 4096>;
 
 std::string said(const ErrorText& text) {
@@ -165,7 +165,7 @@ struct Host::Search {
     return records_;
   }
 
-  /// The library of a plugin; throws Error with the whole diagnosis where there is none.
+  /// The library of a plugin; throws Error with the whole diagnosis if there is none.
   const Library& require(PluginKind kind, std::string_view name, const Settings& settings, const Host& host) {
     for (std::size_t i = 0; i < records().size(); ++i) {
       const PluginRecord& record = records_[i];
@@ -187,7 +187,7 @@ struct Host::Search {
     const Library& library = require(kind, name, settings, host);
     ErrorText error{};
     void* object = library.manifest->create(&settings, error.data(), error.size());
-    if (object == nullptr && error[0] != '\0') throw Error(error.data());  // says already whose error it is
+    if (object == nullptr && error[0] != '\0') throw Error(error.data());  // already says which plugin it is about
     if (object == nullptr) {
       throw plugin_error(settings, fmt::format("{} '{}' could not be made: {}", word_of(kind), name, said(error)));
     }
@@ -228,7 +228,7 @@ struct Host::Search {
 
   std::once_flag done_;
   std::vector<PluginRecord> records_;
-  std::vector<Library> libraries_;  ///< one a record
+  std::vector<Library> libraries_;  ///< one per record
 };
 
 std::string PluginRecord::explanation() const { return remedy.empty() ? refusal : refusal + "; " + remedy; }

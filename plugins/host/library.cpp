@@ -41,7 +41,7 @@ Refusal why_head_not_usable(const ManifestHead& head) {
   return {};
 }
 
-/// What a manifest says of the plugin; texts that are missing stay empty.
+/// Copies the manifest's contents into the record; missing texts stay empty.
 void tell(const Manifest& manifest, PluginRecord& record) {
   const auto text = [](const char* given) { return std::string(given != nullptr ? given : ""); };
   record.kind = manifest.kind;
@@ -117,7 +117,7 @@ Refusal why_contents_not_usable(const Manifest& manifest, const std::string& tit
   return {};
 }
 
-/// The loader's own words without what is put around them.
+/// The loader's own message, without the wrapper's text around it.
 std::string loader_words(const std::string& message) {
   const std::string before = "(dlerror system message: ";
   const std::size_t start = message.find(before);
@@ -126,7 +126,7 @@ std::string loader_words(const std::string& message) {
   return message.substr(start + before.size(), end - start - before.size());
 }
 
-/// The symbol that the loader misses, as it is written in source; empty if it speaks of none.
+/// The undefined symbol in the loader's message, demangled; empty if there is none.
 std::string missing_symbol(const std::string& words) {
   const std::string before = "undefined symbol: ";
   const std::size_t start = words.find(before);
@@ -135,7 +135,7 @@ std::string missing_symbol(const std::string& words) {
   return boost::core::demangle(symbol.substr(0, symbol.find(',')).c_str());
 }
 
-/// What usually stands behind the loader's words.
+/// The usual cause of the loader's message, and its remedy.
 Refusal refused_by_loader(const std::string& words) {
   const auto says = [&](std::string_view part) { return words.find(part) != std::string::npos; };
   if (says("cannot open shared object file")) {
@@ -158,7 +158,7 @@ Refusal refused_by_loader(const std::string& words) {
   return {reason, kRebuild};
 }
 
-/// From here on the library stays until the process ends, whoever closes it.
+/// Keeps the library loaded until the process ends, whoever closes it.
 void pin(const std::filesystem::path& file) {
   if (void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_NOLOAD | RTLD_NODELETE)) dlclose(handle);
 }
@@ -187,7 +187,7 @@ Library load_library(const std::filesystem::path& file) {
   }
   const auto& head = library->get<const ManifestHead>(kManifestSymbol);
   if (refused(why_head_not_usable(head))) return result;
-  // The head has said that it is the start of a whole manifest of this layout.
+  // The head has been checked: it starts a complete manifest of this layout.
   const auto& manifest = reinterpret_cast<const Manifest&>(head);
   tell(manifest, result.record);
   const std::string title = result.record.title();

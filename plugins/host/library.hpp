@@ -8,14 +8,15 @@
 
 namespace rhec {
 
-/// A plugin's library that has been loaded and whose manifest has been checked, or the reason why not.
+/// A plugin's library, loaded and with its manifest checked, or the reason why not.
 struct Library {
-  PluginRecord record;                 ///< names the plugin as soon as the layout of its manifest is known to be ours
+  PluginRecord record;                 ///< names the plugin once the layout of its manifest is known to match ours
   const Manifest* manifest = nullptr;  ///< null if refused
-  std::shared_ptr<const void> pinned;  ///< keeps the library
+  std::shared_ptr<const void> pinned;  ///< keeps the library loaded
 };
 
-/// Loads one file, now-bound and local, and checks everything that its manifest says. Throws nothing of its own.
+/// Loads one file with RTLD_NOW and RTLD_LOCAL, and checks its whole manifest. Reports failures in the result, not by
+/// exceptions.
 Library load_library(const std::filesystem::path& file);
 
 }  // namespace rhec

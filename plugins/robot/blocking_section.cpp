@@ -15,7 +15,7 @@ constexpr PluginOption<Blocking> of_parameter{.otherwise = "full_horizon"};
 BlockingSection::BlockingSection(std::shared_ptr<const RobotContext> context, const Settings& section)
     : context_(std::move(context)), section_(section) {
   check_keys(section_, names_of(context_->about.parameters), "blocking");
-  make();  // what is wrong shows now
+  make();  // reports mistakes now
 }
 
 OptionSection BlockingSection::documentation() {

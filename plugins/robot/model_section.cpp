@@ -11,7 +11,7 @@ ModelSection::ModelSection(const Host& host, const Settings& section)
     : section_(section), model_(vehicle.make(host, section)) {}
 
 OptionSection ModelSection::documentation() {
-  // The outputs are chosen by the host, for any model.
+  // The host selects the outputs, for any model.
   return {"model",
           "The vehicle.",
           {vehicle.row(),

@@ -12,7 +12,7 @@
 namespace rhec {
 namespace {
 
-/// How the host makes a product, and what it is called.
+/// How the host makes a product, and the product's name.
 template <class Product>
 struct Maker;
 template <>
@@ -40,7 +40,7 @@ std::string name_in(const Settings& section, const char* otherwise) {
   return name ? name->as_text() : otherwise;
 }
 
-/// True where a message begins with a place that is written in this part of the settings.
+/// True if a message begins with a place inside this part of the settings.
 bool names_place_of(const Settings& settings, std::string_view message) {
   const std::string& file = settings.origin().file;
   if (!file.empty() && message.starts_with(file + ":")) return true;
@@ -59,7 +59,7 @@ std::shared_ptr<Product> PluginOption<Product>::make(const Host& host, const Set
     return (host.*Maker<Product>::make)(name_in(section, otherwise),
                                         is_name ? Settings::map(section.origin()) : section);
   } catch (const Error& mistake) {
-    // A plugin that finds its options at odds with each other does not know where they are written.
+    // A plugin that finds its options inconsistent does not know where they are written.
     if (section.is_null() || names_place_of(section, mistake.what())) throw;
     throw section.error(mistake.what());
   }

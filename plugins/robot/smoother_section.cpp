@@ -26,7 +26,7 @@ const OptionTable<SmootherOptions>& SmootherOptions::table() {
 
 SmootherSection::SmootherSection(std::shared_ptr<const RobotContext> context, const Settings& section)
     : context_(std::move(context)), options_(SmootherOptions::table().parse(section, "smoother")) {
-  robust_losses(options_.robust, context_->about, "smoother");  // what is wrong shows now
+  robust_losses(options_.robust, context_->about, "smoother");  // reports mistakes now
 }
 
 OptionSection SmootherSection::documentation() {
@@ -38,7 +38,7 @@ OptionSection SmootherSection::documentation() {
 
 FullInformationEstimation SmootherSection::make(const EstimatorParts& estimator) const {
   FullInformationEstimation::Setup setup;
-  setup.problem = estimator.problem();  // its horizon is that of the log, once it is there
+  setup.problem = estimator.problem();  // its horizon is set from the log later
   if (!options_.robust.is_null()) setup.problem.robust = robust_losses(options_.robust, context_->about, "smoother");
   setup.blockings =
       options_.blocking.is_null() ? estimator.blocking.make() : BlockingSection(context_, options_.blocking).make();

@@ -9,7 +9,7 @@
 namespace rhec {
 namespace {
 
-/// Where the text came from, and whether its lines mean something to the user.
+/// Where the text came from, and whether its line numbers mean anything to the user.
 struct Source {
   std::string name;
   bool has_lines;
@@ -18,8 +18,8 @@ struct Source {
   Error error(const YAML::Mark& mark, const std::string& what) const { return Settings::null(at(mark)).error(what); }
 };
 
-/// Turns yaml-cpp's graph into a tree. Aliases may make a small graph a huge or endless tree, so both depth and size
-/// end.
+/// Turns yaml-cpp's graph into a tree. Aliases can turn a small graph into a huge or infinite tree, so depth and size
+/// are limited.
 class Converter {
  public:
   explicit Converter(const Source& source) : source_(source) {}
@@ -55,10 +55,11 @@ class Converter {
     for (const auto& member : node) {
       const YAML::Node& key = member.first;
       if (!key.IsScalar() || key.Scalar().empty()) throw source_.error(key.Mark(), "a key must be a plain text");
-      // A member is where its key is: the value may start lines below, or be an alias of something far away.
+      // The origin of a member is that of its key: the value may start lines below, or be an alias of something far
+      // away.
       if (key.Scalar() != "<<") map.add(key.Scalar(), convert(member.second, key.Mark()));
     }
-    // What is merged yields to what is written here, and what is merged first wins.
+    // Keys written here take precedence over merged ones, and earlier merges over later ones.
     for (const auto& member : node) {
       if (member.first.Scalar() == "<<") merge(map, member.second, member.first.Mark());
     }

@@ -32,7 +32,7 @@ inline double distance(const StageQp& qp, const Iterate& a, const Iterate& b) {
   return largest;
 }
 
-/// Everything that a solution needs, for one QP.
+/// Everything needed to solve one QP.
 struct Attempt {
   Riccati riccati;
   DualActiveSet method;

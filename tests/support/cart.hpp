@@ -10,8 +10,8 @@
 
 namespace rhec::testing {
 
-/// A cart with position and speed, which an acceleration drives and drag holds back: x' = v, v' = gain a - drag v^2.
-/// Its position is measured, and its speed squared.
+/// A cart with position and speed, driven by an acceleration and slowed by drag: x' = v, v' = gain a - drag v^2. Its
+/// position is measured, and its speed squared.
 struct Cart {
   static constexpr int state_count = 2, input_count = 1, parameter_count = 2, output_count = 2;
   template <class Scalar>
@@ -64,7 +64,7 @@ inline std::unique_ptr<RhcProblem> cart_control(int intervals, std::vector<int> 
   return problem;
 }
 
-/// An estimator's problem with measurements of no particular drive.
+/// An estimator's problem with arbitrary measurements.
 inline std::unique_ptr<RheProblem> cart_estimation(int intervals, RheProblem::Setup setup = {}) {
   setup.max_intervals = intervals;
   if (setup.output_weights.empty()) setup.output_weights = {4.0, 1.0};
@@ -83,7 +83,7 @@ inline std::unique_ptr<RheProblem> cart_estimation(int intervals, RheProblem::Se
   return problem;
 }
 
-/// A point with another number everywhere, of no simulation.
+/// A point with a different number everywhere, not from a simulation.
 inline Iterate scattered_point(const Ocp& ocp) {
   Iterate point(ocp.capacity());
   double next = 0.0;

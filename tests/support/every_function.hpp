@@ -4,7 +4,7 @@
 
 namespace rhec {
 
-/// No vehicle: every operation and function that a formula may use, with constants of every kind on every side.
+/// Not a vehicle, but every operation and function that a formula may use, with constants of every kind on either side.
 struct EveryFunction {
   static constexpr int state_count = 3, input_count = 1, parameter_count = 2, output_count = 11;
 

@@ -100,7 +100,7 @@ ReferenceFilter::ReferenceFilter(const Model& model, Noise noise, std::vector<Ch
 
 void ReferenceFilter::predict(int interval, const Sample& sample) {
   const int nx = model_.state_count(), nu = model_.input_count(), np = model_.parameter_count(), n = nx + np;
-  // The formula is linear: its jacobians are the same everywhere, and what it gives at zero is the drift.
+  // The formula is linear: its Jacobians are constant, and its value at zero is the drift.
   const std::vector<double> zero(n + nu, 0.0);
   std::vector<double> drift(nx), jacobian(nx * (nx + nu + 2 * np));
   Model::Intervals request;

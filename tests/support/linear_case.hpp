@@ -19,7 +19,7 @@ namespace rhec::testing {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-/// A trolley with drift whose position is measured, and its position mixed with its speed.
+/// A trolley with drift. Measured are its position, and a combination of position and speed.
 struct Trolley {
   static constexpr int state_count = 2, input_count = 1, parameter_count = 0, output_count = 2;
   template <class Scalar>
@@ -34,7 +34,7 @@ struct Trolley {
   }
 };
 
-/// Three states, the last of which no noise drives; one parameter.
+/// Three states, the last one without process noise; one parameter.
 struct Boat {
   static constexpr int state_count = 3, input_count = 1, parameter_count = 1, output_count = 2;
   template <class Scalar>
@@ -50,7 +50,7 @@ struct Boat {
   }
 };
 
-/// Four states, two inputs and two parameters, each of which enters at another place.
+/// Four states, two inputs and two parameters, each of which enters in a different place.
 struct Hovercraft {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 3;
   template <class Scalar>
@@ -83,7 +83,7 @@ inline std::shared_ptr<Solver> gn_rti(const std::string& options = "{mode: rti}"
   return host().make_solver("gn_rti", parse_yaml(options, "test"));
 }
 
-/// What is measured in a run. Sample 0 has outputs only.
+/// A sample of measurements. Sample 0 has outputs only.
 struct Sample {
   double duration = 0.0;
   std::vector<double> inputs = {}, outputs = {};
@@ -99,19 +99,19 @@ Eigen::VectorXd initial_mean(const Model& model);
 /// With correlations, also between states and parameters.
 Eigen::MatrixXd initial_covariance(const Model& model);
 
-/// A run with noise, a parameter that wanders, intervals of equal or of different lengths, and gaps: single outputs,
-/// and whole nodes.
+/// A run with noise, a varying parameter, intervals of equal or different lengths, and missing measurements: single
+/// outputs and whole nodes.
 std::vector<Sample> simulate(const Model& model, int steps, bool equal_intervals, unsigned seed);
 
 /// How a parameter moves: at which intervals it changes, by what variance, and whether within the interval.
 struct Change {
   int size = 1;           ///< blocks start at multiples of it; 0: never
-  double variance = 0.0;  ///< a step
+  double variance = 0.0;  ///< per step
   bool ramp = false;
   double process_noise = 0.0;  ///< variance added at every interval but the first, wherever blocks start
 };
 
-/// The textbook's filter on z = [x; p], in long double so that it is the more exact of the two.
+/// The textbook filter on z = [x; p], in long double to be the more accurate of the two.
 class ReferenceFilter {
  public:
   using Real = long double;

@@ -7,7 +7,7 @@
 
 namespace rhec::testing {
 
-/// All that another model says, for who changes some of it.
+/// Forwards everything to another model: a base for models that change part of one.
 class OtherModel : public Model {
  public:
   explicit OtherModel(std::shared_ptr<const Model> model) : model_(std::move(model)) {}

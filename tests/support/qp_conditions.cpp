@@ -43,7 +43,7 @@ StageQp bounded_qp(RandomQp& random, bool given, double tightness) {
       qp.control_lower(i)[j] = -random.uniform(0.1, 1.0) * tightness;
       qp.control_upper(i)[j] = random.uniform(0.1, 1.0) * tightness;
     }
-    // Roomy enough that some trajectory keeps them.
+    // Wide enough that some trajectory satisfies them.
     for (int j = 0; j < qp.states(i); ++j) {
       qp.state_lower(i)[j] = -4.0;
       qp.state_upper(i)[j] = 4.0;

@@ -5,7 +5,7 @@
 
 namespace rhec::testing {
 
-/// Largest violation of the KKT conditions of the QP by a step with its multipliers.
+/// Largest violation of the QP's KKT conditions by a step and its multipliers.
 double kkt_violation(const StageQp& qp, const Iterate& step);
 
 /// A random strictly convex QP with bounds on all controls, the tighter the smaller `tightness`, and on the
@@ -13,7 +13,7 @@ double kkt_violation(const StageQp& qp, const Iterate& step);
 StageQp bounded_qp(RandomQp& random, bool given, double tightness);
 
 /// A random QP whose bounds leave room around some trajectory, so that it has a solution; the less room, the more
-/// of them are active there.
+/// bounds are active there.
 StageQp feasible_qp(RandomQp& random, bool given, double room);
 
 }  // namespace rhec::testing

@@ -14,7 +14,7 @@
 
 namespace rhec::testing {
 
-/// Random but sensible problems of any model: a drive inside its bounds, measured with noise, or to be followed.
+/// Random but plausible problems for any model: a drive inside its bounds, measured with noise, or to be followed.
 class RandomProblem {
  public:
   RandomProblem(std::shared_ptr<const Model> model, unsigned seed) : model_(std::move(model)), random_(seed) {}
@@ -22,7 +22,7 @@ class RandomProblem {
   double uniform(double lower, double upper) { return std::uniform_real_distribution<double>(lower, upper)(random_); }
   double normal() { return std::normal_distribution<double>()(random_); }
 
-  /// A value well inside the bounds of a variable, of its typical size where it has none.
+  /// A value well inside the bounds of a variable; without bounds, one of its typical size.
   double typical(const Variable& v) {
     const double lower = std::isfinite(v.lower) ? v.lower : -v.scale,
                  upper = std::isfinite(v.upper) ? v.upper : v.scale;
@@ -32,7 +32,7 @@ class RandomProblem {
   struct Drive {
     std::vector<double> durations, states, inputs, parameters;  // N, (N+1) x n_x, N x n_u, N x n_p
   };
-  /// Inputs and parameters wander a little from interval to interval; states stay inside their bounds.
+  /// Inputs and parameters vary a little from interval to interval; states stay inside their bounds.
   Drive drive(const std::vector<double>& durations, bool constant_parameters) {
     const auto& about = model_->description();
     const int nx = model_->state_count(), N = static_cast<int>(durations.size());
@@ -90,14 +90,14 @@ class RandomProblem {
     int room = 0;  ///< intervals of capacity, where that is more than are used
     double dt = 0.2;
     double longest = 0.0;         ///< if more than dt, intervals last from dt to this [s]
-    double missing = 0.0;         ///< share of outputs that are masked
-    double missing_inputs = 0.0;  ///< share of measured inputs that are masked
+    double missing = 0.0;         ///< fraction of outputs that are masked
+    double missing_inputs = 0.0;  ///< fraction of measured inputs that are masked
     bool robust = false;
-    int block = 0;  ///< 0: one value for the horizon; otherwise a block every so many intervals
+    int block = 0;  ///< intervals per block; 0: one value for the horizon
     bool linked = true;
     Transition transition = Transition::step;
-    double noise = 0.01;  ///< of everything measured, as a share of the scale
-    /// Changes what cannot be changed once the problem is made: weights, losses and bounds. It sees the true drive.
+    double noise = 0.01;  ///< of all measurements, as a fraction of the scale
+    /// Changes what is fixed once the problem is made: weights, losses and bounds. Receives the true drive.
     std::function<void(RheProblem::Setup&, const Drive&)> adjust;
   };
   std::unique_ptr<RheProblem> rhe(const RheSpec& spec) {
@@ -165,10 +165,10 @@ class RandomProblem {
     int room = 0;  ///< intervals of capacity, where that is more than are used
     double dt = 0.2;
     double longest = 0.0;  ///< if more than dt, intervals last from dt to this [s]
-    double off = 0.1;      ///< how far the initial state is from the drive to be followed, as a share of the scales
+    double off = 0.1;      ///< offset of the initial state from the drive to be followed, as a fraction of the scales
     std::vector<int> blocked_inputs;
     int block = 3;
-    /// Changes what cannot be changed once the problem is made: weights and bounds. It sees the drive to be followed.
+    /// Changes what is fixed once the problem is made: weights and bounds. Receives the drive to be followed.
     std::function<void(RhcProblem::Setup&, const Drive&)> adjust;
   };
   std::unique_ptr<RhcProblem> rhc(const RhcSpec& spec) {

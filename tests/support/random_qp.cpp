@@ -32,7 +32,7 @@ StageQp RandomQp::make(int intervals, int states, int controls, bool given) {
       qp.control_upper(i)[c] = infinity;
     }
     if (i == intervals) break;
-    // The next stage's size is not known yet, but all have as many states.
+    // The next stage's size is unknown here, but all stages have the same number of states.
     for (int r = 0; r < states; ++r) {
       double* F = qp.AB(i) + r * qp.stride();
       for (int c = 0; c < states; ++c) F[c] = uniform(-0.6, 0.6);

@@ -21,7 +21,7 @@ class RandomQp {
   /// Controls per stage vary between 0 and the capacity's. Bounds are infinite.
   StageQp make(int intervals, int states, int controls, bool given);
 
-  /// Lets most intervals hand on some of their last states as they are, and says so or not.
+  /// Makes most intervals carry over some of their last states unchanged, and declares that or not.
   void carry(StageQp& qp, bool says_so = true);
 
  private:

@@ -4,7 +4,7 @@
 
 namespace rhec::testing {
 
-/// x' = u, where nothing is curved and every optimum is known.
+/// x' = u: a linear model whose optima are known.
 struct Integrator {
   static constexpr int state_count = 1, input_count = 1, parameter_count = 0, output_count = 1;
   template <class Scalar>
@@ -17,7 +17,7 @@ struct Integrator {
   }
 };
 
-/// Another model without its second derivatives.
+/// Wraps another model, without its second derivatives.
 class WithoutSecondDerivatives final : public OtherModel {
  public:
   using OtherModel::OtherModel;

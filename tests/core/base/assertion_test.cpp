@@ -1,5 +1,4 @@
-// Assertions stand where one room calls another; in builds without NDEBUG a broken one ends the program with what it
-// says.
+// Assertions guard the calls between components; without NDEBUG, a violated one ends the program with its message.
 #include "rhec/core/base/assertion.hpp"
 
 #include <gmock/gmock.h>

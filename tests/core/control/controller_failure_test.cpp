@@ -1,4 +1,4 @@
-// What a robot is told when its solver fails: a fresh start, else the last plan, and how it gets back from there.
+// What a controller commands when its solver fails: a fresh start, else the last plan, and the recovery from there.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -38,7 +38,7 @@ void PrintTo(Fault fault, std::ostream* out) {
   *out << names[static_cast<int>(fault)];
 }
 
-/// A solver that can be told to go wrong.
+/// A solver that fails on request.
 class Unreliable final : public SolverDecorator {
  public:
   using SolverDecorator::SolverDecorator;
@@ -93,7 +93,7 @@ Path winding() {
   return Path(waypoints);
 }
 
-/// Puts an unreliable solver round each that a robot makes, and says where the last one is.
+/// Wraps each solver that a robot makes into an unreliable one, and keeps the last one in `made`.
 class UnreliableSolver final : public RobotHooks {
  public:
   explicit UnreliableSolver(std::shared_ptr<Unreliable>& made) : made_(made) {}
@@ -106,7 +106,7 @@ class UnreliableSolver final : public RobotHooks {
   std::shared_ptr<Unreliable>& made_;
 };
 
-/// A bicycle that follows a path from beside it, its controller, and another one that is told the same and never fails.
+/// A bicycle that starts beside its path, its controller, and a second controller with the same input that never fails.
 class Drive {
  public:
   explicit Drive(const std::string& mode = "converge") {
@@ -156,7 +156,7 @@ class Drive {
     for (int k = 0; k < samples; ++k) drive(ask().inputs, prepare);
   }
 
-  /// What the present plan says for each interval.
+  /// The inputs of the current plan for each interval.
   std::vector<std::vector<double>> planned() const {
     std::vector<std::vector<double>> inputs(intervals, std::vector<double>(2));
     for (int i = 0; i < intervals; ++i)
@@ -178,7 +178,7 @@ class Drive {
   std::shared_ptr<Unreliable> solver;
   std::unique_ptr<Controller> controller, sound;
   Estimate now;
-  std::vector<double> reference;  ///< what the other one says
+  std::vector<double> reference;  ///< the second controller's inputs
 };
 
 /// The fault, whether `prepare` is called, and the solver's mode.
@@ -203,7 +203,7 @@ TEST_P(EveryFailure, OfTheLastPlanIsFollowedByAFreshStart) {
   EXPECT_TRUE(command.report.fallback_used);
   EXPECT_FALSE(command.fallback);
   EXPECT_EQ(drive.controller->fallbacks(), 0);
-  // In mode rti the other one has not converged.
+  // In mode rti the second controller has not converged.
   EXPECT_TRUE(drive.is_as_the_other(std::get<2>(GetParam()) == "rti" ? 0.05 : 1e-7));
 }
 
@@ -240,7 +240,7 @@ TEST_P(EveryFailure, IsOverWithTheNextGoodSolve) {
     EXPECT_FALSE(command.fallback) << k;
     EXPECT_FALSE(command.report.fallback_used) << k;
     EXPECT_EQ(command.report.status, converges ? Status::solved : Status::step_taken) << k;
-    // Real-time iterations forget in some samples where they began.
+    // Real-time iterations take some samples to forget their starting point.
     EXPECT_TRUE(drive.is_as_the_other(converges ? 1e-7 : k < 6 ? 0.3 : 1e-3)) << k;
     drive.drive(command.inputs, prepares());
   }
@@ -339,7 +339,7 @@ TEST_P(NotANumber, InAFinishedPlanMakesTheNextSampleStartAfresh) {
   EXPECT_TRUE(drive.is_as_the_other(mode == "rti" ? 0.05 : 1e-7));
 }
 
-/// Whether `prepare` is called. In mode rti the one step is as quick as a look at the clock, and is made all the same.
+/// Whether `prepare` is called. Not in mode rti, whose single step is taken in any case.
 class PassedDeadline : public ::testing::TestWithParam<bool> {};
 
 INSTANTIATE_TEST_SUITE_P(Controller, PassedDeadline, ::testing::Bool());
@@ -383,7 +383,7 @@ TEST(ControllerBounds, OutOfTheEstimatesReachAreMovedAndSaidSo) {
   Drive drive;
   drive.go_well(3, false);
   EXPECT_FALSE(drive.ask().relaxed);
-  // The estimate has the wheels steered further than they can be, by what takes two samples at the largest rate.
+  // The estimated steering angle exceeds its limit by an amount that takes two samples at the maximum rate.
   drive.now.state[3] = steering_limit * (1.0 + 0.2 * 1.5);
   for (int k = 0; k < 2; ++k) {
     const auto& command = drive.ask();

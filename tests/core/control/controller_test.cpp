@@ -1,4 +1,4 @@
-// What a controller asks of a vehicle: its place on the path, and inputs that go straight on where the ground slips so.
+// What a controller computes for a vehicle: its place on the path, and reference inputs that compensate slip.
 #include "rhec/core/control/controller.hpp"
 
 #include <gmock/gmock.h>
@@ -29,7 +29,7 @@ std::unique_ptr<Controller> controller_for(const std::string& configuration) {
   return robot.make_controller(Path({{0.0, 0.0, speed}, {50.0, 50.0, speed}}));
 }
 
-/// The reference inputs for a vehicle at the path's start, facing along it, on ground that slips so.
+/// The reference inputs for a vehicle at the path's start, facing along it, with the given slip.
 std::vector<double> reference(Controller& controller, const std::vector<double>& slip) {
   const Model& model = controller.problem().model();
   Estimate estimate;
@@ -45,8 +45,8 @@ TEST(ControllerReference, MakesUpForSlipAsFarAsItIsTrusted) {
   const auto controller = controller_for("model: bicycle_slip");
   EXPECT_THAT(reference(*controller, {1.0, 1.0}), ElementsAre(2.0, 0.0));
   EXPECT_THAT(reference(*controller, {0.5, 1.0}), ElementsAre(4.0, 0.0));
-  // An estimate of less than 0.3 is not trusted, nor is one that is no number at all.
-  const double clipped = 2.0 / 0.3;  // and no more than the bound allows, 2.5 * 2 + 1
+  // An estimate below 0.3 is not trusted, nor is NaN.
+  const double clipped = 2.0 / 0.3;  // within the bound 2.5 * 2 + 1
   ASSERT_GT(clipped, 6.0);
   for (const double kappa : {0.3, 0.1, 0.0, -0.5, std::numeric_limits<double>::quiet_NaN()})
     EXPECT_THAT(reference(*controller, {kappa, 1.0}), ElementsAre(6.0, 0.0)) << kappa;
@@ -113,7 +113,7 @@ TEST(ControllerReference, KnowsVehiclesWhoseInputIsAnAcceleration) {
   EXPECT_THAT(reference(controller, {0.5}), ElementsAre(0.0, 0.0));
   EXPECT_DOUBLE_EQ(controller.problem().state_reference(3)[3], speed / 0.5);
   EXPECT_EQ(controller.problem().input_upper(3, 0), 1.0);
-  // And it drives: from a standstill to its end at the speed that was asked for over ground.
+  // And it drives from standstill to the end of the path, at the requested speed over ground.
   Estimate now;
   now.state = Eigen::VectorXd::Zero(4);
   now.state[2] = 0.25 * std::numbers::pi;

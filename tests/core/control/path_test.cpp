@@ -97,7 +97,7 @@ TEST(Path, ClosestPointIsWhatAFineSearchFinds) {
   }
 }
 
-/// Short segments that wind about, so that the nearest of many may be anywhere.
+/// Short winding segments, so that the nearest one may be anywhere.
 Path winding_path(unsigned seed, std::vector<double>* arc_lengths) {
   std::mt19937 random(seed);
   std::normal_distribution<double> turn(0.0, 0.4);
@@ -125,7 +125,7 @@ TEST(Path, ClosestPointIsTheBestOfAllSegments) {
       const double x = place(random), y = place(random);
       double from = path.length() * share(random), to = path.length() * share(random);
       if (from > to) std::swap(from, to);
-      // One segment after the other, each by itself.
+      // Reference: each segment separately.
       double nearest = std::numeric_limits<double>::infinity(), begin = from;
       for (const double end : arc_lengths) {
         if (end <= begin || end >= to) continue;
@@ -235,7 +235,7 @@ TEST(PathFollower, NeverJumpsBranchesAtACrossing) {
 }
 
 TEST(PathFollower, ResultDoesNotDependOnResolution) {
-  // A straight line given coarsely and finely; the window cuts the coarse segments.
+  // A straight line with few and with many waypoints; the window cuts the long segments.
   std::vector<Waypoint> fine;
   for (int i = 0; i <= 10000; ++i) fine.push_back({0.01 * i, 0.0, {}});
   const Path coarse_path({{0, 0, {}}, {100, 0, {}}}), fine_path(fine);

@@ -1,4 +1,4 @@
-// Once set up, estimator and controller allocate nothing: every allocation of this program is counted.
+// After setup, estimator and controller allocate nothing: every allocation of this program is counted.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -22,8 +22,7 @@ namespace {
 std::atomic<long> allocations{0};
 }  // namespace
 
-// Eigen takes its memory from malloc rather than from operator new: both are counted. A sanitizer has a malloc of its
-// own.
+// Eigen allocates with malloc rather than operator new, so both are counted. Sanitizers replace malloc.
 #if defined(__SANITIZE_ADDRESS__)
 void* operator new(std::size_t size) {
   ++allocations;
@@ -86,7 +85,7 @@ std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& mode
   return std::make_unique<FilterEstimation>(model, own);
 }
 
-/// The closed loop; returns what was allocated in it, of 40 samples from the very first one.
+/// Runs the closed loop for 40 samples; returns the number of allocations, from the first sample on.
 long allocations_in_the_loop(const Options& options) {
   const std::shared_ptr<Model> model = host().make_model("bicycle_slip");
   Estimator estimator(make_method(model, options));

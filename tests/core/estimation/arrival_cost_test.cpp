@@ -1,4 +1,4 @@
-// What is remembered of the measurements that have left the window.
+// The arrival cost: the information of measurements that have left the window.
 #include "rhec/core/estimation/arrival_cost.hpp"
 
 #include <gtest/gtest.h>
@@ -85,7 +85,7 @@ TEST(ArrivalCost, SingularCovariancesAreWrittenFinite) {
   for (const ArrivalKind kind : recursive) {
     ArrivalCost cost = window.arrival(kind);
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Ones(4, 4);  // all the same variable
-    covariance.row(2).setZero();                               // and one that is known
+    covariance.row(2).setZero();                               // and one known exactly
     covariance.col(2).setZero();
     cost.reset(initial_mean(*window.model), covariance);
     for (int slide = 0; slide < 5; ++slide) {
@@ -141,7 +141,7 @@ TEST(ArrivalCost, FilteringAndSmoothingAgreeInTheEstimatorWithForgetting) {
 TEST(ArrivalCost, ARobustResidualLeavesWithItsWeight) {
   const double delta = 1.5;
   OneInterval window(linear_model<Trolley>(), {{.outputs = {0, 1}, .delta = delta}});
-  window.problem.output(0)[0] = 7.0;  // wild
+  window.problem.output(0)[0] = 7.0;  // an outlier
   // By hand: s is the weighted squared residual of the group at the solution, the weight 1 / sqrt(1 + s / delta^2).
   const Noise noise = noise_of(*window.model);
   const double *x = window.solution.state(0), *y = window.problem.output(0);

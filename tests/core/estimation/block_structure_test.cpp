@@ -15,7 +15,7 @@ namespace {
 using testing::cart_estimation;
 using ::testing::ElementsAre;
 
-/// Blocks that start at 0 and at the intervals that are listed, counted from the start of the run.
+/// Blocks that start at 0 and at the listed intervals, counted from the start of the run.
 class Listed final : public Blocking {
  public:
   explicit Listed(std::set<std::int64_t> starts, std::optional<double> sigma = {}, Transition how = Transition::step)

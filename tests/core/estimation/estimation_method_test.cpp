@@ -1,4 +1,4 @@
-// The methods behind an estimator: what they give for the same data in another order, and after what goes wrong.
+// Estimation methods: their results for the same data in another order, and after failures.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -105,8 +105,8 @@ TEST(EstimationMethods, ADeadlineInThePastStillGivesAnEstimate) {
 }
 
 TEST(EstimationMethods, AMeasurementThatComesAfterPreparationCountsAsIfItHadBeenThere) {
-  // With one that is merged into the newest node after `prepare` and one that is two nodes late; both against the
-  // filter.
+  // With one measurement merged into the newest node after `prepare`, and one that is two nodes late; both compared
+  // with the filter.
   const auto model = linear_model<Boat>();
   std::vector<Sample> samples = simulate(*model, 40, true, 9);
   for (Sample& sample : samples)
@@ -139,7 +139,7 @@ TEST(EstimationMethods, AMeasurementThatComesAfterPreparationCountsAsIfItHadBeen
 }
 
 TEST(EstimationMethods, UnmeasuredInputsAreUnknown) {
-  // The filter takes an unmeasured input for one of a wide standard deviation, the window for one of an infinite one.
+  // The filter gives an unmeasured input a large standard deviation, the window an infinite one.
   const auto model = linear_model<Hovercraft>();
   const std::vector<Sample> complete = simulate(*model, 40, true, 12);
   Estimator estimator(make_method(false, model)), baseline(make_method(true, model));
@@ -159,7 +159,7 @@ TEST(EstimationMethods, UnmeasuredInputsAreUnknown) {
   });
 }
 
-/// Puts NaNs into the guess at one of its solves, as a solver that breaks its promise would.
+/// Puts NaNs into the guess in one of its solves, as a faulty solver could.
 class Poisoner final : public SolverDecorator {
  public:
   Poisoner(std::shared_ptr<Solver> inner, int at) : SolverDecorator(std::move(inner)), at_(at) {}
@@ -204,7 +204,7 @@ TEST(EstimationMethods, APoisonedGuessIsReportedAndGoneAtTheNextSample) {
   }
 }
 
-/// Comes to no end in some of its solves, and leaves the point where it has strayed to.
+/// Does not converge in some of its solves, and leaves the iterate far off.
 class Strayer final : public SolverDecorator {
  public:
   Strayer(std::shared_ptr<Solver> inner, int first, int count, double distance)
@@ -249,7 +249,7 @@ TEST(EstimationMethods, ASolveThatHasGoneAstrayStartsAgainFromThePrior) {
   };
   const int usual = static_cast<int>(samples.size());
   for (const bool prepares : {false, true}) {
-    // From the prior, the second solve finds what the first should have found.
+    // Started from the prior, the second solve finds the solution that the first missed.
     EXPECT_EQ(drive_with(prepares, 1, 1000.0,
                          [&](int k, const Estimate& estimate, double error) {
                            EXPECT_LE(error, 1e-9) << k;
@@ -259,7 +259,7 @@ TEST(EstimationMethods, ASolveThatHasGoneAstrayStartsAgainFromThePrior) {
                            }
                          }),
               usual + 1);
-    // Where that goes astray too, the prior itself is better, and says so.
+    // If that fails too, the prior itself is better, and the report shows it.
     EXPECT_EQ(drive_with(prepares, 2, 1000.0,
                          [&](int k, const Estimate& estimate, double error) {
                            EXPECT_LE(error, k == at ? 1.0 : 1e-6) << k;
@@ -271,7 +271,7 @@ TEST(EstimationMethods, ASolveThatHasGoneAstrayStartsAgainFromThePrior) {
                            }
                          }),
               usual + 1);
-    // What is better than the prior is kept, whether its solve has come to an end or not.
+    // A point better than the prior is kept, whether or not its solve converged.
     EXPECT_EQ(drive_with(prepares, 1, 0.0,
                          [&](int k, const Estimate& estimate, double error) {
                            EXPECT_LE(error, 1e-9) << k;
@@ -281,7 +281,7 @@ TEST(EstimationMethods, ASolveThatHasGoneAstrayStartsAgainFromThePrior) {
   }
 }
 
-/// Counts what it is asked to prepare.
+/// Counts the calls of `prepare`.
 class PreparationCounter final : public SolverDecorator {
  public:
   using SolverDecorator::SolverDecorator;
@@ -332,7 +332,7 @@ TEST(EstimationMethods, WhatIsInfiniteOrAbsurdCountsAsMissing) {
       drive(one, with_gaps, prepares, [&](std::size_t, const Estimate& estimate) { expected.push_back(estimate); });
       drive(two, poisoned, prepares,
             [&](std::size_t k, const Estimate& estimate) { EXPECT_TRUE(same_bits(estimate, expected[k])) << k; });
-      // The method itself gets cleaned numbers; a duration that is none makes no node.
+      // The method itself receives cleaned numbers; an invalid duration makes no node.
       const auto direct = make_method(filter, model);
       Estimate estimate = empty_estimate(*model);
       for (std::size_t k = 0; k < with_gaps.size(); ++k) {

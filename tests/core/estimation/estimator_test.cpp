@@ -1,5 +1,4 @@
-// The timeline: which nodes and intervals are made of stamped rows, and what becomes of what is late, missing or
-// absurd.
+// The timeline: which nodes and intervals result from time-stamped rows, including late, missing and absurd ones.
 #include "rhec/core/estimation/estimator.hpp"
 
 #include <gmock/gmock.h>
@@ -21,7 +20,7 @@ using ::testing::HasSubstr;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Keeps what an Estimator tells a method, and answers with the number of nodes.
+/// Records what an Estimator passes to its method, and returns the number of nodes.
 class Recorder final : public EstimationMethod {
  public:
   struct Node {
@@ -134,7 +133,7 @@ TEST_F(Timeline, InputsAreAveragedOverAnInterval) {
   measure(1.2, 0.0);
   measure(1.4, 0.0);
   measure(1.6, 0.0);
-  // Rows at irregular times, not in order, each holding until the next.
+  // Rows at irregular times, out of order, each valid until the next.
   input(1.15, 6.0);
   input(0.7, 2.0);
   input(1.05, 4.0);
@@ -276,7 +275,7 @@ TEST_F(Timeline, BuffersThatAreFullLoseTheirOldest) {
   ASSERT_EQ(recorder->nodes.size(), 4u);
   for (int i = 0; i < 4; ++i) EXPECT_EQ(recorder->nodes[i].outputs[0], 7.0 + i);
   EXPECT_EQ(recorder->nodes[1].inputs[0], 7.0);
-  // Full and emptied again and again, so that the rows go round their memory.
+  // Filled and emptied repeatedly, so that the rows wrap around in their buffer.
   for (int i = 11; i < 100; ++i) {
     measure(i, i);
     input(i, i);

@@ -27,7 +27,7 @@ FilterEstimation::Setup bicycle_setup(double heading, double sigma, int starts) 
   return setup;
 }
 
-/// Drives straight on in a direction; the error of the estimated heading after so many samples.
+/// Drives straight in a direction; returns the error of the estimated heading after a number of samples.
 double heading_error(FilterEstimation& filter, double direction, int steps) {
   const std::vector<double> inputs = {2.0, 0.0};
   const auto outputs = [&](int k) {

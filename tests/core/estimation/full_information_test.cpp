@@ -26,8 +26,8 @@ struct Moments {
   Matrix covariance;
 };
 
-/// The textbook's smoother (Rauch, Tung and Striebel 1965) on z = [x; p]: the filter forwards, then a pass backwards
-/// with the covariance of each state and the next, which the filter's linear prediction gives column by column.
+/// The textbook smoother (Rauch, Tung and Striebel 1965) on z = [x; p]: the filter forwards, then a backward pass with
+/// the cross-covariance of each state and the next, which the filter's linear prediction gives column by column.
 std::vector<Moments> rauch_tung_striebel(const Model& model, const std::vector<Change>& changes,
                                          const std::vector<Sample>& samples) {
   ReferenceFilter filter(model, noise_of(model), changes);
@@ -85,8 +85,8 @@ FullInformationEstimation::Setup setup_of(const Model& model, std::vector<std::s
   return {from.problem, from.blockings, from.walks, from.initial_mean, from.initial_covariance};
 }
 
-/// The largest deviation of means and covariances from the textbook's, relative to its standard deviations. Node 0's
-/// parameters belong to the first interval, as the textbook's do.
+/// The largest deviation of means and covariances from the textbook smoother's, relative to its standard deviations.
+/// Node 0's parameters belong to the first interval in both.
 double deviation(const SmoothedRun& run, const Model& model, const std::vector<Moments>& reference) {
   const int nx = model.state_count(), np = model.parameter_count(), n = nx + np;
   double worst = 0.0;

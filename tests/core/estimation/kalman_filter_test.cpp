@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;
 
-/// The variances that a linear case's noise has.
+/// The noise variances of a linear case.
 KalmanFilter::Noise variances_of(const Model& model) {
   const testing::Noise noise = noise_of(model);
   const double infinity = std::numeric_limits<double>::infinity();
@@ -115,7 +115,7 @@ TEST(KalmanFilter, KeepsItsParametersWithinTheirBounds) {
   KalmanFilter filter(cart(), {{0.01, 0.01}, {0.01}, {0.0, 0.2}, {0.5, 2.0}}, 2);
   filter.mean = Eigen::Vector4d(0.0, 3.0, 0.3, 1.0);
   filter.covariance = Eigen::Vector4d(0.1, 0.1, 1.0, 1.0).asDiagonal();
-  // It gains speed against all drag that there can be.
+  // It gains speed whatever the drag.
   for (int k = 1; k <= 10; ++k) {
     const double u = 0.0, y[] = {0.65 * k, std::pow(3.0 + 0.1 * k, 2)};
     filter.predict(&u, &u, 0.2);

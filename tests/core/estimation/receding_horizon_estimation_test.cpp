@@ -117,7 +117,7 @@ void expect_kalman(Case run, int least_horizon = 1) {
     for (const ArrivalKind arrival : {ArrivalKind::ekf, ArrivalKind::smoothing}) {
       for (const bool equal : {true, false}) {
         for (const std::string solver : {"{mode: rti}", "{mode: converge}"}) {
-          // Rounding then stops a converging solver above its tolerance, and it says so.
+          // Rounding then stops a converging solver above its tolerance, and it reports that.
           if (run.tolerance > 1e-9 && solver != "{mode: rti}") continue;
           for (const Way way : {Way::method, Way::prepared, Way::estimator, Way::prepared_estimator}) {
             if (horizon > 4 && turn++ % 7 != 0) continue;
@@ -155,7 +155,7 @@ TEST(Kalman, VagueAndSharpPriors) {
   for (const double vagueness : {1e-4, 1e-2, 30.0, 1000.0}) {
     Case run{linear_model<Hovercraft>(), {structured(3, 1), full_horizon()}};
     run.vagueness = vagueness;
-    // What a recursion in informations loses is the rounding times the prior's variance over the measurements'.
+    // An information recursion loses the rounding error times the ratio of the prior's variance to the measurements'.
     if (vagueness > 100.0) run.tolerance = 1e-6;
     expect_kalman(run);
   }

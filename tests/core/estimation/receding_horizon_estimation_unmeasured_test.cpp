@@ -1,6 +1,5 @@
-// Blocks that nothing, or little, determines: a vehicle that drives straight on, its steering at zero, says nothing of
-// its side slip mu, and a single interval says little of its longitudinal slip kappa. The estimate has to stay
-// sensible.
+// Blocks that the measurements hardly determine: driving straight with zero steering gives no information on the side
+// slip mu, and a single interval little on the longitudinal slip kappa. The estimate must stay plausible.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -117,15 +116,15 @@ TEST(UnmeasuredBlock, LongitudinalSlipConvergesWithEveryBlocking) {
         error += result.kappa_error / 4.0;
         bias += result.kappa_bias / 4.0;
       }
-      // A single interval of 0.64 m between two fixes of 0.03 m tells kappa to 0.06.
+      // A single interval of 0.64 m between two fixes of 0.03 m determines kappa to 0.06.
       EXPECT_LT(error, drive.size == 1 && drive.overlap < 2 ? 0.07 : 0.045);
       EXPECT_LT(std::abs(bias), 0.02);
     });
   }
 }
 
-// The noise in the steering angle looks like steering that has no effect, and so speaks for a small mu: that now and
-// then a bound is reached is the measurements' doing. It must stay rare, though, and not last.
+// Noise in the steering angle looks like steering without effect, which suggests a small mu: the measurements
+// themselves occasionally drive mu to a bound. That must stay rare and brief.
 TEST(UnmeasuredBlock, WithALinkOrAsOneBlockSideSlipSeldomReachesABound) {
   for (const bool whole : {false, true}) {
     int at_bound = 0, all = 0;
@@ -143,8 +142,8 @@ TEST(UnmeasuredBlock, WithALinkOrAsOneBlockSideSlipSeldomReachesABound) {
   }
 }
 
-// Blocks that are not linked are held by `block_sigma` while they are in the window, and restart when they become its
-// first. A parameter that is hardly seen needs a restart no wider than its bounds.
+// Blocks that are not linked are regularised by `block_sigma` while they are in the window, and restart when they
+// become its first. A hardly observable parameter needs a restart no wider than its bounds.
 TEST(UnmeasuredBlock, WithoutALinkTheWalkHoldsTheSideSlip) {
   struct Row {
     double restart_sigma, most;

@@ -1,4 +1,4 @@
-// A start for smoothing: poses from motions and positions alone, whatever the track's headings were before.
+// An initial guess for smoothing: poses from motions and positions alone, whatever the track's previous headings.
 #include "core/estimation/track_alignment.hpp"
 
 #include <gtest/gtest.h>
@@ -17,14 +17,14 @@ namespace {
 
 constexpr int nodes = 401, gap_start = 200, gap_end = 230;
 
-/// A vehicle, what it is driven with, and how it slips.
+/// A vehicle, its inputs and its slip.
 struct Vehicle {
   const char* model = "bicycle_slip";
   std::vector<double> (*inputs)(int) = [](int k) { return std::vector<double>{3.0, 0.15 * std::cos(0.15 * k)}; };
   std::vector<double> slip = {0.95, 0.9}, believed = {1.0, 1.0};
 };
 
-/// A vehicle that winds its way for 80 s, with a position at every second node, some of them 50 m off, and a gap.
+/// A vehicle on a winding drive of 80 s, with a position at every second node, some of them 50 m off, and a gap.
 class TrackAlignment : public ::testing::Test {
  protected:
   explicit TrackAlignment(const Vehicle& vehicle = {}) : model_(Host().make_model(vehicle.model)) {
@@ -68,11 +68,11 @@ class TrackAlignment : public ::testing::Test {
       model_->integrate(request);
       state = next;
       inputs_.insert(inputs_.end(), inputs.begin(), inputs.end());
-      parameters_.insert(parameters_.end(), vehicle.believed.begin(), vehicle.believed.end());  // slip is not known
+      parameters_.insert(parameters_.end(), vehicle.believed.begin(), vehicle.believed.end());  // slip is unknown
     }
     states_ = truth_;
   }
-  /// Of so long a stretch that no piece of track reaches across.
+  /// Removes the positions of a stretch longer than any piece of track.
   void lose_positions() {
     for (int k = 80; k < nodes - 80; ++k)
       for (int j = 0; j < model_->output_count(); ++j) problem_->output(k)[j] = std::nan("");
@@ -84,7 +84,7 @@ class TrackAlignment : public ::testing::Test {
   double distance(int node) {
     return std::hypot(of(states_, node, x_) - of(truth_, node, x_), of(states_, node, y_) - of(truth_, node, y_));
   }
-  /// Poses near the truth, and headings that follow each other without whole turns in between.
+  /// Expects poses near the truth, and headings without jumps by whole turns.
   void expect_truth(const char* what) {
     const double turns = std::round((of(states_, 0, heading_) - of(truth_, 0, heading_)) / (2.0 * std::numbers::pi)) *
                          2.0 * std::numbers::pi;
@@ -107,7 +107,7 @@ TEST_F(TrackAlignment, FindsPosesThatTheTrackHadWrong) {
   for (int k = 0; k < nodes; ++k) {
     of(states_, k, x_) += 20.0 * normal();
     of(states_, k, y_) += 20.0 * normal();
-    // The wrong way round for a while, whole turns off for another.
+    // Pointing the wrong way in one part, off by whole turns in another.
     if (k > 100 && k < 300) of(states_, k, heading_) += 2.7;
     if (k > 250) of(states_, k, heading_) -= 4.0 * std::numbers::pi;
   }
@@ -150,7 +150,7 @@ TEST_F(TrackAlignment, KeepsAStandingVehicleWhereItIs) {
 
 TEST_F(TrackAlignment, StretchesTheSpeedOfALongGapAlone) {
   lose_positions();
-  for (int k = 0; k < nodes - 1; ++k) inputs_[2 * static_cast<std::size_t>(k)] *= 0.75;  // a wheel that is not known
+  for (int k = 0; k < nodes - 1; ++k) inputs_[2 * static_cast<std::size_t>(k)] *= 0.75;  // an unknown wheel radius
   const std::vector<double> before = inputs_;
   align_track(*problem_, states_, inputs_, parameters_);
   const auto middle = 2 * static_cast<std::size_t>(nodes / 2);
@@ -159,7 +159,7 @@ TEST_F(TrackAlignment, StretchesTheSpeedOfALongGapAlone) {
     EXPECT_EQ(inputs_[2 * k + 1], before[2 * k + 1]) << "the steering rate is no speed; node " << k;
 }
 
-/// Neither input is the speed: each side has its own.
+/// Neither input is the speed: each side has its own speed.
 class SkidSteeredTrack : public TrackAlignment {
  protected:
   static std::vector<double> inputs(int k) {

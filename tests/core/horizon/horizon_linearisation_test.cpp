@@ -1,5 +1,4 @@
-// A linearisation that remembers where it was made must be the one that would be made anew, and must ask the model for
-// less.
+// A cached linearisation must equal one computed from scratch, with fewer evaluations of the model.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -18,7 +17,7 @@ namespace {
 
 using testing::RandomProblem;
 
-/// Counts the intervals and nodes that it is asked for.
+/// Counts the intervals and nodes that it evaluates.
 class CountingModel final : public testing::OtherModel {
  public:
   using OtherModel::OtherModel;
@@ -33,7 +32,7 @@ class CountingModel final : public testing::OtherModel {
   mutable std::atomic<int> intervals{0}, nodes{0};
 };
 
-/// All that a stage of a QP is made of.
+/// Everything in a stage of a QP.
 void expect_same(const StageQp& found, const StageQp& expected, const std::string& where) {
   ASSERT_EQ(found.intervals(), expected.intervals()) << where;
   ASSERT_EQ(found.initial_state_is_given, expected.initial_state_is_given) << where;
@@ -58,7 +57,7 @@ void expect_same(const StageQp& found, const StageQp& expected, const std::strin
   if (expected.initial_state_is_given) compare(found.initial_step(), expected.initial_step(), ns, "initial", 0);
 }
 
-/// A horizon that moves along a longer drive, with a guess that is stepped away from in every sample.
+/// A horizon that moves along a longer drive; every sample takes a step from its guess.
 class Journey {
  public:
   Journey(std::shared_ptr<const Model> inner, unsigned seed)
@@ -76,14 +75,14 @@ class Journey {
     point_ = RandomProblem::cold_start(problem);
     assess();
   }
-  /// The window is another one, of the same problem and QP. Before, that held the exact Hessian for a while.
+  /// Starts with another window of the same problem and QP, which meanwhile held the exact Hessian.
   void begin_again(const std::function<void()>& set_window) {
     if (problem_->has_second_derivatives()) remembering_->linearise(point_, Hessian::exact);
     set_window();
     point_ = RandomProblem::cold_start(*problem_);
     assess();
   }
-  /// As a solver does with its new point: linearises there, somewhere near the guess.
+  /// Linearises at a new point near the guess, as a solver does after a step.
   void assess() {
     const HorizonProblem& problem = *problem_;
     for (int i = 0; i <= problem.intervals(); ++i) {
@@ -98,7 +97,7 @@ class Journey {
     shifter_->take(problem, point_);
   }
   bool move(int steps) { return shifter_->apply(steps, *problem_, point_); }
-  /// Prepares both linearisations at the guess; the one that remembers asks the model for so many intervals and nodes.
+  /// Prepares both linearisations at the guess; the cached one may evaluate only so many intervals and nodes.
   void compare(const std::string& where, int most_intervals, int most_nodes) {
     model_->intervals = model_->nodes = 0;
     remembering_->prepare(point_, hessian_);
@@ -143,7 +142,7 @@ struct Blocks {
   bool ends_early;
 };
 
-/// Blocks that stand still in the world while the window moves over them, the last one as long as two.
+/// Blocks that stay fixed in time while the window moves over them, the last one twice as long.
 void set_window(RheProblem& to, const RheProblem& from, int first, int count, const Blocks& blocks) {
   const int ny = to.model().output_count(), nu = to.model().input_count(), np = to.model().parameter_count();
   to.set_intervals(count);
@@ -195,7 +194,7 @@ TEST_P(LinearisationCacheTest, AnEstimatorsQpMovesWithItsWindow) {
           for (int j = 0; j < problem.model().output_count(); ++j) problem.output(count)[j] += 0.1;
         };
         ASSERT_TRUE(journey.move(steps));
-        // One more than was foreseen, and those where blocks start or end otherwise now.
+        // One more than planned, and those where the start or end of blocks has changed.
         const int most = blocks.length == 0 ? (steps == 2 ? 2 : 0) : 4;
         journey.compare("sample " + std::to_string(sample) + ", blocks of " + std::to_string(blocks.length), most,
                         steps == 2 ? 2 : 1);
@@ -222,7 +221,7 @@ TEST_P(LinearisationCacheTest, AControllersQpMovesWithItsPlan) {
     for (int sample = 0; sample < 8; ++sample) {
       const int steps = sample == 5 ? 2 : 1;
       ASSERT_TRUE(journey.move(steps));
-      // Of the exact Hessian's QP, the interval that comes next is known beforehand.
+      // With the exact Hessian, the next interval is already known.
       const int unknown = hessian == Hessian::exact ? steps - 1 : steps;
       journey.compare("sample " + std::to_string(sample), unknown, 0);
       if (HasFatalFailure()) return;

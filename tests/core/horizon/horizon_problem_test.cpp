@@ -26,7 +26,7 @@ Iterate perturbed(const Ocp& ocp, const Iterate& from, RandomProblem& random, do
   return point;
 }
 
-/// Compares a linearisation with finite differences of what `evaluate` says.
+/// Compares a linearisation with finite differences of `evaluate`.
 void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance) {
   std::vector<double> scratch(ocp.scratch_size()), defects(ocp.capacity().intervals * ocp.capacity().states);
   std::vector<double> plus(defects), minus(defects);
@@ -37,7 +37,7 @@ void check_linearisation(const Ocp& ocp, const Iterate& point, double tolerance)
   const int ns = ocp.capacity().states, N = ocp.intervals();
   for (int i = 0; i < N; ++i)
     for (int j = 0; j < ns; ++j) ASSERT_NEAR(qp.b(i)[j], defects[i * ns + j], 1e-12);
-  // The objective is the sum of its stages' costs, each of which its own state and control change alone.
+  // The objective is the sum of the stage costs, each of which depends only on its own state and control.
   std::vector<double> costs(N + 1), moved_costs(N + 1);
   const double objective = ocp.evaluate_stages(point, nullptr, costs.data(), scratch);
   ASSERT_EQ(objective, ocp.evaluate(point, nullptr, scratch));
@@ -116,7 +116,7 @@ TEST_P(OcpTest, TheEstimationProblemIsTheDerivativeOfWhatItEvaluates) {
         spec.robust = robust;
         spec.block = block;
         spec.transition = transition;
-        spec.noise = 0.3;  // weights near one, so that differences are not all rounding
+        spec.noise = 0.3;  // weights near one, so that rounding does not dominate the differences
         const auto problem = random.rhe(spec);
         check_linearisation(*problem, perturbed(*problem, RandomProblem::cold_start(*problem), random, 0.05), 2e-5);
         if (HasFatalFailure()) return;
@@ -152,7 +152,7 @@ TEST_P(OcpTest, ARangeOfStagesIsWhatTheWholeHorizonGives) {
   problem->linearise({0, 3}, point, Hessian::exact, parts, scratch);
   problem->linearise({4, 9}, point, Hessian::exact, parts, scratch);
   for (int i = 0; i <= 9; ++i) {
-    // Lanes of a pack are evaluated alike wherever they stand.
+    // All lanes of a pack are evaluated alike.
     EXPECT_TRUE(Q_of(whole, i).isApprox(Q_of(parts, i), 1e-13)) << i;
     EXPECT_TRUE(q_of(whole, i).isApprox(q_of(parts, i), 1e-13)) << i;
     if (i < 9) {

@@ -9,7 +9,7 @@ constexpr int nodes = 5, outputs = 2, jacobians = 3;
 
 const auto always = [](int) { return true; };
 
-/// A cache that knows its nodes, with numbers from which a node's age can be told.
+/// A filled cache, with numbers that show a node's age.
 struct Filled {
   explicit Filled(int first_value = 0) {
     int end = 0;
@@ -27,7 +27,7 @@ struct Filled {
     for (int j = 0; j < jacobians; ++j) same &= cache.jacobians_of(node)[j] == -value - 0.1 * j;
     return same;
   }
-  /// The first node from `node` on that is not known.
+  /// The first unknown node from `node` on.
   int unknown(int node = 0) {
     int end = 0;
     return cache.mark_unknown(node, nodes - 1, end);
@@ -60,7 +60,7 @@ TEST(OutputCache, FindsStretchesBetweenWhatIsKnown) {
 
 TEST(OutputCache, MovesWithTheHorizonAsOftenAsNeeded) {
   Filled filled;
-  // More often than there is room behind, so that rows have to go back to the front.
+  // More often than there is spare room, so that rows must move back to the front.
   for (int step = 1; step <= 4 * nodes; ++step) {
     filled.cache.move(1, nodes, always);
     EXPECT_EQ(filled.unknown(), nodes - 1) << step;

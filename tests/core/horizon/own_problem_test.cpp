@@ -1,4 +1,4 @@
-// A kind of problem that is written outside of rhec, against its public headers: examples/problem.
+// A user-defined problem class, written against rhec's public headers: examples/problem.
 #include <gtest/gtest.h>
 
 #include <cmath>

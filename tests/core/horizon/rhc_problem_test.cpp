@@ -19,7 +19,7 @@ using testing::scattered_point;
 
 constexpr double infinity = HUGE_VAL;
 
-/// The sum that the header writes, term by term.
+/// The sum given in the header, term by term.
 double tracking_cost(const RhcProblem& problem, const Iterate& point) {
   double total = 0.0;
   const RhcProblem::Setup& setup = problem.setup();

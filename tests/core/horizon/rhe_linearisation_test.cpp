@@ -1,4 +1,4 @@
-// The linearisation of an estimator's horizon looks at its sensors only where the horizon is new.
+// The linearisation of an estimator's horizon evaluates the output function only at new nodes.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -18,7 +18,7 @@ using testing::scattered_point;
 
 constexpr int intervals = 5;
 
-/// Counts the nodes that its sensors are asked for.
+/// Counts the nodes at which its outputs are evaluated.
 class Watched final : public testing::OtherModel {
  public:
   Watched() : OtherModel(cart()) {}
@@ -40,7 +40,7 @@ class RheLinearisationTest : public ::testing::Test {
     linearisation = problem.make_linearisation();
     point = scattered_point(problem);
   }
-  /// How many nodes a preparation looks at.
+  /// How many nodes a preparation evaluates.
   int observed() {
     const int before = model->nodes;
     linearisation->prepare(point, Hessian::gauss_newton);
@@ -61,7 +61,7 @@ class RheLinearisationTest : public ::testing::Test {
       EXPECT_LT((Q_of(qp, i) - Q_of(expected, i)).cwiseAbs().maxCoeff(), 1e-13) << i;
     }
   }
-  /// The window slides: a node leaves at the front, and one comes in behind.
+  /// The window slides: the oldest node leaves, and a new one enters.
   void slide() {
     problem.drop_first_interval();
     problem.output(intervals)[0] = 1.5;

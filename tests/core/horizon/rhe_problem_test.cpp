@@ -31,7 +31,7 @@ std::array<double, 2> residuals(const RheProblem& problem, const Iterate& point,
   return found;
 }
 
-/// The sum that the header writes, without links and robust losses.
+/// The sum given in the header, without links and robust losses.
 double estimation_cost(const RheProblem& problem, const Iterate& point) {
   const Eigen::Map<const Eigen::VectorXd> start(point.state(0), 4);
   const Eigen::VectorXd error = start - problem.arrival_mean;

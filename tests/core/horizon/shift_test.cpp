@@ -22,7 +22,7 @@ namespace {
 std::atomic<long> allocations{0};
 }  // namespace
 
-// Not inlined: gcc would take malloc and delete for a mismatched pair.
+// Not inlined: otherwise gcc would warn of a mismatch of malloc and delete.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   ++allocations;
   if (void* memory = std::malloc(size)) return memory;
@@ -71,7 +71,7 @@ RheProblem estimator(int intervals) {
   return problem;
 }
 
-/// Blocks of `drag` begin where said; `gain` is one block.
+/// Blocks of `drag` begin at the given intervals; `gain` is one block.
 void set_blocks(RheProblem& problem, int intervals, std::vector<int> starts, Transition transition = Transition::step) {
   problem.set_intervals(intervals);
   for (int i = 0; i < intervals; ++i) problem.set_duration(i, 0.1);
@@ -314,7 +314,7 @@ TEST(Shift, SaysWhenNothingIsLeft) {
   EXPECT_FALSE(shifter.apply(1, problem, guess));
 }
 
-/// Costates of carried parameters are those of stationarity in the new structure too.
+/// The costates of carried parameters satisfy stationarity in the new structure too.
 TEST(Shift, CostatesOfCarriedParametersFitTheNewStructure) {
   RheProblem problem = estimator(6);
   set_blocks(problem, 6, {0, 2, 4});

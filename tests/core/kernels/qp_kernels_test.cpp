@@ -1,4 +1,4 @@
-// The loops over QPs: every instruction set that this machine can run against the narrowest.
+// The QP kernels: every instruction set that this machine supports, compared with the narrowest.
 #include "rhec/core/kernels/qp_kernels.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ struct RandomRows {
   Iterate point;
   QpView view;
 
-  /// Of sizes that kernels are compiled for, or of any.
+  /// With sizes that kernels are compiled for, or arbitrary ones.
   explicit RandomRows(RandomQp& random, bool is_usual = false)
       : qp(random.make(random.integer(1, 9), is_usual ? random.integer(5, 8) : random.integer(1, 11),
                        is_usual ? 2 : random.integer(1, 9), random.integer(0, 1) == 0)),

@@ -1,4 +1,4 @@
-// The Riccati recursion against dense systems, on every instruction set that this machine can run.
+// The Riccati recursion, compared with dense systems, on every instruction set that this machine supports.
 #include "rhec/core/kernels/riccati_kernels.hpp"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 using testing::DenseQp;
 using testing::RandomQp;
 
-/// What the recursion keeps of a QP.
+/// What the recursion stores for a QP.
 struct Recursion {
   AlignedDoubles P, U, V, closed, T, inverse, drift, g, p;
   std::vector<std::uint8_t> fixes, special;
@@ -75,7 +75,7 @@ struct Recursion {
   }
 };
 
-/// Holds some controls at bounds of their own.
+/// Holds some controls at their bounds.
 ActiveSet some_active_controls(RandomQp& random, StageQp& qp) {
   ActiveSet active(qp.capacity());
   for (int i = 0; i < qp.intervals(); ++i) {
@@ -92,7 +92,7 @@ ActiveSet some_active_controls(RandomQp& random, StageQp& qp) {
 TEST(RiccatiKernels, OfTheRecursionAgreeWithTheDenseSystem) {
   RandomQp random(7);
   for (int trial = 0; trial < 300; ++trial) {
-    // Five to eight states have kernels of their own, with two to four controls; long rows take several registers.
+    // There are special kernels for five to eight states with two to four controls; long rows take several registers.
     const int states = trial % 3 == 0 ? random.integer(1, 14) : random.integer(5, 8);
     const int controls = trial % 3 == 0 ? random.integer(1, 12) : random.integer(2, 4);
     StageQp qp = random.make(random.integer(1, 7), states, controls, true);
@@ -138,7 +138,7 @@ TEST(RiccatiKernels, OfResponsesAreWhatAStepDiffersBy) {
         return values[(static_cast<std::size_t>(i) * qp.stride() + k) * response_batch + lane];
       };
       at(stage, place, number) = 1.0;
-      // Where there are no gradients, what is in their place is not looked at.
+      // Without gradients, their storage is not read.
       std::vector<unsigned char> has_gradient(N + 1, 0);
       has_gradient[stage] = 1;
       for (int i = 0; i <= N; ++i)
@@ -191,7 +191,7 @@ TEST(RiccatiKernels, InvertAndSolveSymmetricSystems) {
     Eigen::MatrixXd root(n, n), P = Eigen::MatrixXd::Zero(n, n);
     for (double& entry : root.reshaped()) entry = random.uniform(-1.0, 1.0);
     P = root * root.transpose() + 0.1 * Eigen::MatrixXd::Identity(n, n);
-    // What rows have beyond the matrix is not theirs.
+    // The padding of the rows is not part of the matrix.
     AlignedDoubles matrix(static_cast<std::size_t>(n) * stride, 7.0), inverse(matrix.size(), 0.0), p(stride, 3.0),
         x(stride, 0.0), batch(static_cast<std::size_t>(n) * response_batch);
     for (int r = 0; r < n; ++r)
@@ -217,7 +217,7 @@ TEST(RiccatiKernels, InvertAndSolveSymmetricSystems) {
           EXPECT_NEAR(answers[r * response_batch + k], sum, 1e-11 * (1.0 + expected.norm())) << set.instruction_set;
         }
       }
-      // Not positive definite, or hardly so.
+      // Indefinite, or barely positive definite.
       AlignedDoubles bad = matrix;
       bad[0] = -1.0;
       EXPECT_FALSE(set.riccati->invert(bad.data(), n, stride, 1e-11, inverse.data())) << set.instruction_set;

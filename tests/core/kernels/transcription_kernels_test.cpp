@@ -1,5 +1,5 @@
-// The loops that write costs and dynamics: every instruction set that this machine can run, against plain sums and the
-// narrowest.
+// The kernels for costs and dynamics: every instruction set that this machine supports, compared with plain sums and
+// with the narrowest.
 #include "rhec/core/kernels/transcription_kernels.hpp"
 
 #include <gtest/gtest.h>
@@ -96,7 +96,7 @@ struct RandomCosts {
   }
 };
 
-/// What is used of H and all of h must agree.
+/// The used part of H and all of h must agree.
 void expect_same_costs(const RandomCosts& a, const RandomCosts& b, bool matrices, const char* set) {
   expect_same_rows(a.h.data(), b.h.data(), static_cast<std::ptrdiff_t>(a.h.size()), 1e-12, set);
   for (int i = 0; matrices && i <= a.N; ++i) {
@@ -126,7 +126,7 @@ TEST(TranscriptionKernels, OfCostsAgree) {
       }
       expect_same_costs(generic, wide, matrices, set.instruction_set);
       if (tracks) continue;
-      // Where H is zero already, but for what measurements write to, it comes to the same.
+      // If H is already zero except where measurements write, the result is the same.
       RandomCosts again = wide;
       again.clean.assign(again.N + 1, matrices ? 1 : 0);
       evaluate(again, *set.transcription);

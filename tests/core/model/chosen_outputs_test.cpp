@@ -1,4 +1,4 @@
-// A vehicle with some of its sensors: what is observed is what was chosen of all, and all else is untouched.
+// A vehicle with some of its outputs: the chosen ones equal those of the full model, and everything else is unchanged.
 #include "rhec/core/model/chosen_outputs.hpp"
 
 #include <gmock/gmock.h>
@@ -32,7 +32,7 @@ std::string error_of(const std::string& options) {
   return "no error";
 }
 
-/// All that can be observed at random nodes.
+/// All outputs at random nodes.
 struct Observation {
   std::vector<double> outputs, jacobians, hessians;
 };
@@ -57,7 +57,7 @@ TEST(ChosenOutputs, AreThoseOfAllOutputsInTheOrderAskedFor) {
   const std::size_t nx = all->state_count(), ny = all->output_count(), chosen = picked.size();
   ASSERT_EQ(ny, 8U);
   testing::RandomProblem random(all, 1);
-  // More nodes than are evaluated at a time.
+  // More nodes than are evaluated in one batch.
   for (const std::size_t count : {0U, 1U, 3U, 72U, 73U, 500U}) {
     std::vector<double> states(count * nx), multipliers(count * chosen), spread(count * ny, 0.0);
     for (double& value : states) value = random.uniform(-2.0, 2.0);

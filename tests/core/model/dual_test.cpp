@@ -19,7 +19,7 @@ struct Expansion {
   double value, x, y, xx, xy, yy;
 };
 
-/// From differences of the fourth order; h balances their error and that of rounding.
+/// By fourth-order differences; h balances truncation and rounding errors.
 template <class Function>
 Expansion differences(Function f, double x, double y) {
   const double h = 2e-3;
@@ -53,7 +53,7 @@ void expect_derivatives(const std::string& name, Function f, double x, double y)
   for (int j = 0; j < 2; ++j) near(second.d[j], first.d[j], 1e-15);
 }
 
-// A function of one variable is tried on x * y + x, so that the chain rule has a curved inner function to work on.
+// A function of one variable is applied to x * y + x, so that the chain rule meets a nonlinear inner function.
 #define EXPECT_DERIVATIVES_OF(FUNCTION, X, Y)                                         \
   expect_derivatives(                                                                 \
       #FUNCTION,                                                                      \

@@ -1,4 +1,4 @@
-// A formula with all that formulas may use, compiled for every instruction set as models are.
+// A formula with everything that formulas may use, compiled for every instruction set, as models are.
 #include "support/every_function.hpp"
 
 #include "models/model_checks.hpp"
@@ -61,13 +61,13 @@ TEST(EveryFunction, IsRefusedWithADescriptionThatDoesNotFit) {
   EXPECT_EQ(why_refused(describe()), "it is not refused");
 }
 
-/// In a function that the compiler does not look into, lest it sees what is wrong with the formula.
+/// noipa keeps the compiler from seeing what is wrong with the formula.
 template <class Scalar>
 [[gnu::noipa]] void write(const Scalar& value, int count, Scalar* results) {
   for (int j = 0; j < count; ++j) results[j] = value * 1.0;
 }
 
-/// A formula that writes other results than it says that it has.
+/// A formula that writes other results than it declares.
 struct Forgetful {
   static constexpr int state_count = 2, input_count = 0, parameter_count = 0, output_count = 1;
   int rates = 2, measured = 1;
@@ -129,7 +129,7 @@ TEST(EveryFunction, IsTheSameOnEveryInstructionSet) {
   }
 }
 
-// Packs reduce the arguments of sine and cosine by another way when they are large, and must not lose digits there.
+// Packs use another reduction for large arguments of sine and cosine, which must not lose digits.
 TEST(EveryFunction, KnowsLargeAngles) {
   auto model = make_model();
   for (const std::string& set : model.instruction_sets()) {

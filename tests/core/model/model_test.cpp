@@ -38,7 +38,7 @@ TEST(Roles, PlaceAndTurnAllBodiesAndNothingElse) {
   EXPECT_EQ(state, before);
 }
 
-/// A model that knows nothing of rows: they are the base class's.
+/// A model without its own row functions: it uses the base class's.
 class WithoutRows final : public testing::OtherModel {
  public:
   using OtherModel::OtherModel;
@@ -67,7 +67,7 @@ struct Stages {
     }
   }
   Numbers x, u, p, p_end, durations = Numbers{0.1, 0.2, 0.3}, multipliers = Numbers{0.3, -0.7, 0.9, 0.2, -0.4, 1.0};
-  Numbers rows = Numbers(count * row, 7.0);  // what is beyond a row's entries is not looked at
+  Numbers rows = Numbers(count * row, 7.0);  // a row's padding is not read
 };
 
 TEST(Model, IntegratesRowsAsItIntegrates) {

@@ -14,7 +14,7 @@ using testing::scattered_point;
 
 class PlainLinearisation : public ::testing::Test {
  protected:
-  /// Whether the QP is what the problem says now.
+  /// Whether the QP matches the problem's current data.
   void expect_as_anew(Hessian hessian) {
     std::vector<double> scratch(problem->scratch_size());
     StageQp expected(problem->capacity());

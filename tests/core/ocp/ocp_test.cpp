@@ -62,7 +62,7 @@ TEST(Ocp, CanRollOutWhereTheInitialStateIsGiven) {
   EXPECT_FALSE(cart_estimation(3)->can_roll_out());
 }
 
-/// A problem of others in as few words as there can be: what it does not say is the base class's.
+/// A minimal Ocp: the base class provides everything it does not define.
 class Plain final : public Ocp {
  public:
   explicit Plain(const Ocp& of) : of_(of) {}

@@ -8,7 +8,7 @@
 namespace rhec {
 namespace {
 
-/// Writes down what it is asked, and answers with what can be told apart from a default.
+/// Records its calls, and returns values that differ from the defaults.
 class Witness final : public Solver {
  public:
   std::string why_not(const Ocp&) const override { return "a reason"; }
@@ -56,7 +56,7 @@ class Witness final : public Solver {
   }
 };
 
-/// Nothing is asked of it.
+/// Its functions are never called.
 class NoProblem final : public Ocp {
  public:
   Capacity capacity() const noexcept override { return {}; }

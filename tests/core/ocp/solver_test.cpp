@@ -66,7 +66,7 @@ TEST(Judgement, IsTheSameThroughAWindowOfTheHorizon) {
   }
 }
 
-/// A solver that has no more than it must have.
+/// A solver that implements only the required functions.
 class Least final : public Solver {
  public:
   std::string why_not(const Ocp&) const override { return {}; }

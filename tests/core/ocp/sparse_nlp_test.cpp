@@ -1,4 +1,4 @@
-// The sparse view holds the same numbers as the stages that it is made of, and its patterns hold at every point.
+// The sparse view holds the same numbers as the stages it is made of, and its patterns are valid at every point.
 
 #include "rhec/core/ocp/sparse_nlp.hpp"
 
@@ -61,7 +61,7 @@ struct View {
   double objective = 0.0;
 };
 
-/// Derivatives of the view against central differences of its own functions.
+/// Compares the view's derivatives with central differences of its functions.
 void check_view(const HorizonProblem& problem, RandomProblem& random) {
   View view(problem);
   Iterate point = RandomProblem::cold_start(problem);
@@ -128,7 +128,7 @@ TEST(SparseNlp, HasTheDerivativesOfItsFunctionsInControl) {
 }
 
 TEST(SparseNlp, ASmallerPatternThanAllOnesIsStillEnough) {
-  // What is not marked must be zero in the linearisation itself.
+  // Entries outside the pattern must be zero in the linearisation itself.
   RandomProblem random(bicycle(), 5);
   RandomProblem::RheSpec spec;
   spec.intervals = 6;
@@ -199,7 +199,7 @@ TEST(SparseNlp, PointsGoThereAndBack) {
   }
 }
 
-/// Estimation with blocks and a controller, each at points of all kinds: within bounds and beyond, with multipliers.
+/// Estimation with blocks, and a controller, each at various points: within and beyond bounds, with multipliers.
 std::vector<std::unique_ptr<HorizonProblem>> problems_to_judge(RandomProblem& random) {
   std::vector<std::unique_ptr<HorizonProblem>> problems;
   for (const int block : {0, 3}) {
@@ -238,7 +238,7 @@ void expect_same(const KktResidual& one, const KktResidual& other) {
   near(one.complementarity, other.complementarity, "complementarity");
 }
 
-/// Goes through a problem in a window; gives the values of the whole, with 9 where nobody writes.
+/// Linearises a problem piece by piece in a window, and collects the whole; 9 marks entries that are not written.
 struct InPieces {
   InPieces(const View& view, const Iterate& point, StageQp& window) {
     std::vector<double> scratch(view.problem.scratch_size());

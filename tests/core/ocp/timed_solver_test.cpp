@@ -30,7 +30,7 @@ class Rest final : public Model {
   ModelDescription description_;
 };
 
-/// Takes its time, and says nothing of it.
+/// Takes some time, but does not report it.
 class Waiter final : public Solver {
  public:
   std::string why_not(const Ocp&) const override { return "it waits only"; }

@@ -1,5 +1,5 @@
-// What core/qp/active_columns.cpp does for the dual active set: bounds that cost no factorisation, those that depend on
-// each other, and those that there is no room for.
+// core/qp/active_columns.cpp, part of the dual active-set method: bounds that need no factorisation, linearly dependent
+// ones, and those that exceed the capacity.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -26,7 +26,7 @@ TEST(ActiveColumns, AddsBoundsWithoutAnotherFactorisation) {
 }
 
 TEST(ActiveColumns, SettlesWhereActiveBoundsDependOnEachOther) {
-  // The state is bounded where controls at their bounds bring it anyway: any of them may be called active.
+  // Controls at their bounds already bring the state to its bound: any of these bounds may be reported active.
   StageQp qp = integrator(10, 20.0);
   for (int i = 0; i < 10; ++i) {
     qp.control_lower(i)[0] = -0.5;

@@ -26,12 +26,12 @@ TEST(DualActiveSet, AgreesWithTheInteriorPointMethodWhereManyBoundsAreActive) {
     ASSERT_LT(kkt_violation(qp, attempt.step), 1e-8) << "trial " << trial;
     StageQpSolver other(qp.capacity());
     Iterate expected(qp.capacity());
-    // Where hardly anything is inside, the interior-point method may find nothing.
+    // If the feasible set has almost no interior, the interior-point method may fail.
     if (other.solve_by_interior_point(qp, expected) == StageQpSolver::Outcome::infeasible) continue;
     ++compared;
     ASSERT_LT(distance(qp, attempt.step, expected), 1e-6) << "trial " << trial;
   }
-  // The rest has more active bounds, or changes, than it provides for.
+  // The rest has more active bounds, or changes of the active set, than the method provides for.
   EXPECT_GT(solved, trials * 9 / 10);
   EXPECT_GT(compared, trials * 8 / 10);
   EXPECT_GT(active_bounds, 8 * solved);
@@ -65,7 +65,7 @@ TEST(DualActiveSet, ComesToTheSameSolutionFromAnyClaim) {
     ++compared;
     ASSERT_LT(kkt_violation(qp, warm.step), 1e-8) << "trial " << trial;
     ASSERT_LT(distance(qp, warm.step, cold.step), 1e-8) << "trial " << trial;
-    // With the right claim there is nothing to do but one factorisation.
+    // With the right initial active set, one factorisation suffices.
     const Attempt again(qp, &cold.active);
     ASSERT_EQ(again.outcome, DualActiveSet::Outcome::solved) << "trial " << trial;
     EXPECT_EQ(again.method.factorisations(), 1);
@@ -100,7 +100,7 @@ TEST(DualActiveSet, SeesThatBoundsContradictEachOther) {
   int seen = 0;
   for (int trial = 0; trial < 60; ++trial) {
     StageQp qp = feasible_qp(random, true, 0.5);
-    // No control reaches so far, if all have bounds.
+    // Bounded controls cannot reach that far.
     for (int i = 0; i < qp.intervals(); ++i)
       for (int j = 0; j < qp.controls(i); ++j) qp.control_lower(i)[j] = -1.0, qp.control_upper(i)[j] = 1.0;
     qp.state_lower(qp.intervals())[0] = 50.0;

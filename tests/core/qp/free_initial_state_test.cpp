@@ -1,4 +1,4 @@
-// The recursion's last step, core/qp/free_initial_state.cpp: where the initial state is free it is decided too.
+// The recursion's last step, core/qp/free_initial_state.cpp: a free initial state is a decision variable too.
 #include <cmath>
 
 #include <gtest/gtest.h>

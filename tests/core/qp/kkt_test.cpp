@@ -12,7 +12,7 @@ namespace {
 
 using testing::RandomQp;
 
-/// A QP without defects, linearised at a point that is stationary.
+/// A QP without defects, linearised at a stationary point.
 struct Stationary {
   explicit Stationary(bool given, unsigned seed) : qp(RandomQp(seed).make(5, 3, 2, given)), point(qp.capacity()) {
     for (int i = 0; i <= 5; ++i) {
@@ -21,11 +21,11 @@ struct Stationary {
     }
     for (int j = 0; j < 3; ++j) qp.initial_step()[j] = 0.0;
     set_costates(qp, point);
-    // Controls at which nothing pulls.
+    // Controls with zero gradient.
     for (int i = 0; i < 5; ++i)
       for (int j = 0; j < qp.controls(i); ++j)
         for (int r = 0; r < 3; ++r) qp.r(i)[j] -= B_of(qp, i)(r, j) * point.costate(i + 1)[r];
-    // And a free initial state that is at its optimum.
+    // And a free initial state at its optimum.
     if (!given)
       for (int j = 0; j < 3; ++j) {
         double pull = 0.0;

@@ -146,7 +146,7 @@ TEST(Riccati, CombinesResponsesToTheSolutionWithTheirGradients) {
 TEST(Riccati, TheCovarianceIsThatOfTheDenseInverse) {
   RandomQp random(4);
   for (int trial = 0; trial < 60; ++trial) {
-    // Six states have kernels of their own, with two to four controls.
+    // There are special kernels for six states with two to four controls.
     const bool is_usual = trial % 2 == 0;
     StageQp qp = random.make(random.integer(1, 9), is_usual ? 6 : random.integer(1, 4),
                              is_usual ? random.integer(2, 4) : random.integer(1, 3), false);

@@ -1,4 +1,4 @@
-// The stages of the recursion that core/qp/special_stages.cpp takes: controls that have to keep bounds of the next
+// The stages of the recursion that core/qp/special_stages.cpp handles: controls that must satisfy bounds of the next
 // state, a free initial state that is held at bounds, and reduced Hessians that are not positive definite.
 #include <Eigen/SVD>
 #include <array>
@@ -36,7 +36,7 @@ TEST(SpecialStages, AgreesWithTheDenseSystemWithActiveControlsAndStates) {
         qp.control_lower(i)[j] = random.uniform(-0.5, 0.5);
       }
     }
-    // Where the active rows depend on each other there is no unique answer to compare with.
+    // If the active rows are linearly dependent, there is no unique solution to compare with.
     const DenseQp dense(qp, active);
     if (dense.E.rows() > dense.E.cols()) continue;
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(dense.E);

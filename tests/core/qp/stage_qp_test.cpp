@@ -12,7 +12,7 @@ namespace {
 
 using testing::RandomQp;
 
-/// All that a QP holds of one stage and that moves.
+/// Everything that a QP holds for one stage and that moves with it.
 std::vector<double> contents(const StageQp& qp, int i) {
   const Capacity& capacity = qp.capacity();
   std::vector<double> all;
@@ -45,7 +45,7 @@ TEST(StageQp, MovesTowardsTheFrontAndLeavesZerosBehind) {
     qp.set_intervals(0);
     write(0);
     for (int move = 0; move < 60; ++move) {
-      // Now and then a shorter horizon begins, and grows to what there is room for.
+      // Now and then a shorter horizon begins, and grows to the capacity.
       const int steps = random.integer(0, 9) == 0 ? intervals : std::min(intervals, random.integer(0, 2));
       qp.drop_first(steps);
       stages.erase(stages.begin(), stages.begin() + steps);

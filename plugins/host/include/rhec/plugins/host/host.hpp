@@ -15,55 +15,54 @@ class Model;
 class Blocking;
 class Solver;
 
-/// A directory that plugins are looked for in.
+/// A directory that is searched for plugins.
 struct PluginPlace {
   std::filesystem::path directory;
   std::string origin;   ///< "given", "RHEC_PLUGIN_PATH" or "installed"
   std::string skipped;  ///< why it was not searched; empty if it was
 };
 
-/// A file that could be a plugin, and what came of it.
+/// A candidate file, and whether it is used as a plugin.
 struct RHEC_EXPORT PluginRecord {
   std::filesystem::path path;
-  std::string refusal;  ///< why it is not used: what was found and what was expected; empty: it is used
-  std::string remedy;   ///< what to do about that
-  /// The plugin of the same kind and name that is used in the place of this one, which is fine in itself; else empty.
+  std::string refusal;  ///< why it is not used: what was found and what was expected; empty if it is used
+  std::string remedy;   ///< how to fix that
+  /// The plugin of the same kind and name that is used instead of this one, if this one is valid; otherwise empty.
   std::filesystem::path used_instead;
-  // What the manifest says; empty where it could not be read.
+  // From the manifest; empty if it could not be read.
   PluginKind kind{};
   std::string name, version, licence, source, backend, backend_version, capabilities;
 
   bool accepted() const noexcept { return refusal.empty(); }
-  std::string explanation() const;  ///< refusal and remedy in one
-  std::string title() const;        ///< "blocking 'structured' 0.1.0"; "the plugin" where it has no name
+  std::string explanation() const;  ///< refusal and remedy in one text
+  std::string title() const;        ///< "blocking 'structured' 0.1.0"; "the plugin" if it has no name
 };
 
-/// What came of making an object of an accepted plugin with no options given.
+/// The result of making an object of an accepted plugin without options.
 struct PluginTrial {
   enum class Outcome {
     made,
-    needs_options,  ///< not made for lack of an option without a default, as the plugin itself says
+    needs_options,  ///< not made: the plugin reports that an option without a default is missing
     failed
   };
   Outcome outcome = Outcome::made;
-  std::string text;  ///< the plugin's words where none was made; the numbers of variables of a model
+  std::string text;  ///< the plugin's error if no object was made; for a model, its numbers of variables
 };
 
 /// Finds plugins, loads them, and makes objects of them.
 ///
-/// Searched are, in this order: the directories given; those of the environment variable RHEC_PLUGIN_PATH (absolute,
-/// with colons between them; empty and relative entries are skipped, since they would mean the working directory); and
-/// `rhec/plugins` beside the library that this class is in. Of two plugins of one kind and name the first one found is
-/// used.
+/// It searches, in this order: the directories given; those of the environment variable RHEC_PLUGIN_PATH (absolute,
+/// separated by colons; empty and relative entries are skipped, since they would refer to the working directory); and
+/// `rhec/plugins` next to the library that contains this class. Of two plugins of the same kind and name, the first one
+/// found is used.
 ///
-/// A candidate is whatever has a name that ends in `.so`. It is handed to the loader only if it is a whole shared
-/// library for this machine that shows a manifest: loading runs the constructors of a library and of those it needs
-/// before anything in it can be checked, so a directory on the search path must be one whose files are trusted to run.
-/// All else is checked after loading and before any function of the plugin is called. Accepted libraries stay loaded
-/// until the process ends, since objects, texts and types of theirs may be anywhere; refused ones are let go.
+/// A candidate is any entry whose name ends in `.so`. It is passed to the loader only if it is a complete shared
+/// library for this machine that exports a manifest. Loading runs the constructors of a library and of its dependencies
+/// before anything in it can be checked, so list only directories whose files you trust. Everything else is checked
+/// after loading and before any function of the plugin is called. Accepted libraries stay loaded until the process
+/// ends, since their objects, texts and types may still be in use; refused ones are unloaded.
 ///
-/// The search is done once, on first use. All calls are const and may come from several threads; copies share one
-/// search.
+/// The search runs once, on first use. All calls are const and thread-safe; copies share one search.
 class RHEC_EXPORT Host {
  public:
   explicit Host(const std::vector<std::filesystem::path>& given = {});
@@ -71,15 +70,14 @@ class RHEC_EXPORT Host {
   const std::vector<PluginPlace>& places() const;
   /// All candidates, accepted or not, in search order.
   const std::vector<PluginRecord>& discover() const;
-  /// Those of one place.
+  /// The candidates of one place.
   std::vector<PluginRecord> found_in(const PluginPlace& place) const;
   /// The accepted plugins of a kind, in search order.
   std::vector<std::string> names(PluginKind kind) const;
 
-  /// A new object of the plugin `name`, with the options in `settings` (a map whose key "name" is passed over, or null
-  /// for defaults). Throws Error: where there is no such plugin, with every place searched, why files there were
-  /// refused and what there is; where options are wrong, with the place of the mistake; where the plugin failed, with
-  /// its words.
+  /// A new object of the plugin `name`, with the options in `settings` (a map whose key "name" is ignored, or null for
+  /// defaults). Throws Error if there is no such plugin, with every place searched, why files there were refused and
+  /// which plugins exist; if options are wrong, with the place of the mistake; if the plugin failed, with its message.
   std::shared_ptr<Model> make_model(std::string_view name, const Settings& settings = {}) const;
   std::shared_ptr<Blocking> make_blocking(std::string_view name, const Settings& settings = {}) const;
   std::shared_ptr<Solver> make_solver(std::string_view name, const Settings& settings = {}) const;
@@ -87,12 +85,12 @@ class RHEC_EXPORT Host {
   /// The options of a plugin. Throws Error as above.
   std::vector<OptionRow> options(PluginKind kind, std::string_view name) const;
 
-  /// Asks an accepted plugin for its options, and for an object with their defaults. An option counts as one without a
-  /// default if that is an empty text or list, and its lack as told if the error names it as a key ("lengths: ...").
-  /// Throws Error for a plugin that is not accepted: nothing of it is called.
+  /// Reads the options of an accepted plugin, and makes an object with their defaults. An option has no default if its
+  /// default is an empty text or list; it counts as missing if the error names it as a key ("lengths: ..."). Throws
+  /// Error for a plugin that is not accepted, without calling it.
   PluginTrial try_out(const PluginRecord& plugin) const;
 
-  /// Every place and what was found there, for people, in lines.
+  /// Every place and what was found there, as human-readable lines.
   std::string diagnosis() const;
 
  private:

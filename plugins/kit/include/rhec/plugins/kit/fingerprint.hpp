@@ -1,19 +1,18 @@
 #pragma once
 
-// Of Eigen the macros alone, as Eigen/Core includes them: the whole of it would take most of a plugin's time to
-// compile.
+// Only Eigen's macros, in the way Eigen/Core includes them: all of Eigen would take most of a plugin's compile time.
 #include <Eigen/src/Core/util/Macros.h>
 //
 #include <Eigen/src/Core/util/ConfigureVectorization.h>
 
 #include <string>  // defines the macros of the standard library
 
-/// What two libraries must have in common before they may hand each other C++ objects, as one constant text. It is put
-/// together where it is compiled, so that a plugin carries its own and the host compares.
+/// What two libraries must have in common to exchange C++ objects, as one constant text. It is composed at compile
+/// time, so a plugin carries its own and the host compares the two.
 ///
-/// Eigen's alignment, of memory that it takes and of objects of fixed size ("static"), follows the compiler's flags
-/// (-march, -mavx) and Eigen's macros (EIGEN_DONT_ALIGN, EIGEN_MAX_STATIC_ALIGN_BYTES): compile the file with the
-/// plugin's manifest with the same ones as rhec, and put kernels for wider registers into files of their own.
+/// Eigen's alignment of allocated memory and of fixed-size objects ("static") depends on the compiler's flags (-march,
+/// -mavx) and Eigen's macros (EIGEN_DONT_ALIGN, EIGEN_MAX_STATIC_ALIGN_BYTES). Compile the file with the plugin's
+/// manifest with the same ones as rhec, and put kernels for wider registers into separate files.
 
 #define RHEC_TEXT_OF_TOKEN(token) #token
 #define RHEC_TEXT_OF(macro) RHEC_TEXT_OF_TOKEN(macro)

@@ -10,7 +10,7 @@
 #include "rhec/plugins/kit/fingerprint.hpp"
 #include "rhec/plugins/kit/manifest.hpp"
 
-/// All that a plugin's author needs. A plugin is a class and one line:
+/// Everything a plugin author needs. A plugin is a class and one line:
 ///
 ///     class EveryOther : public rhec::Blocking {
 ///      public:
@@ -21,11 +21,11 @@
 ///     RHEC_PLUGIN(rhec::PluginKind::blocking, EveryOther,
 ///                 {.name = "every_other", .version = "1.0.0", .licence = "MIT"})
 ///
-/// compiled into a shared library with hidden visibility (-fvisibility=hidden: else statics of inline functions would
-/// be shared with plugins that use the same names), linked to rhec::core, and put into a directory that the host
-/// searches. A class whose name holds a comma needs an alias. What has no options says `using Options =
-/// rhec::NoOptions`. The constructor throws rhec::Error where its options do not fit together; destructors do not
-/// throw. The file with this line includes the interface that it implements (rhec/core/model/model.hpp, blocking.hpp or
+/// compiled into a shared library with hidden visibility (-fvisibility=hidden: otherwise plugins that use the same
+/// names would share statics of inline functions), linked to rhec::core, and placed in a directory that the host
+/// searches. A class whose name contains a comma needs an alias. A plugin without options declares `using Options =
+/// rhec::NoOptions`. The constructor throws rhec::Error if its options are inconsistent; destructors do not throw. The
+/// file with this line includes the interface that the plugin implements (rhec/core/model/model.hpp, blocking.hpp or
 /// solver.hpp).
 namespace rhec {
 
@@ -33,7 +33,7 @@ class Model;
 class Blocking;
 class Solver;
 
-/// What an author says of a plugin; see Manifest for the meaning. `name` and `version` must be given.
+/// The author's description of a plugin; see Manifest for the meaning. `name` and `version` are required.
 struct PluginInfo {
   const char* name;
   const char* version;
@@ -44,7 +44,7 @@ struct PluginInfo {
   const char* capabilities = "";
 };
 
-/// The options of a plugin that has none.
+/// For plugins without options.
 struct NoOptions {
   static const OptionTable<NoOptions>& table() {
     static const OptionTable<NoOptions> empty;
@@ -70,7 +70,7 @@ struct PluginInterface<PluginKind::solver> {
   static constexpr const char* word = "solver";
 };
 
-/// The functions of a manifest for a class `Product`, with everything that may be thrown turned into a text.
+/// The functions of a manifest for a class `Product`; they turn every exception into a message.
 template <PluginKind kind, class Product, const PluginInfo& info>
 struct PluginFunctions {
   using Interface = typename PluginInterface<kind>::Type;
@@ -89,7 +89,7 @@ struct PluginFunctions {
   static void* create(const Settings* settings, char* error, std::size_t error_size) noexcept {
     void* made = nullptr;
     guarded(error, error_size, [&] {
-      // "outputs" is the host's: it chooses among those of any model.
+      // The host handles "outputs": it selects among the outputs of any model.
       const Options options = kind == PluginKind::model
                                   ? Options::table().parse(*settings, title(), {"name", "outputs"})
                                   : Options::table().parse(*settings, title(), {"name"});
@@ -106,7 +106,7 @@ struct PluginFunctions {
     try {
       work();
       return true;
-    } catch (const Error& mistake) {  // says all that is needed
+    } catch (const Error& mistake) {  // its message is complete
       std::snprintf(error, error_size, "%s", mistake.what());
     } catch (const std::exception& failure) {
       std::snprintf(error, error_size, "%s '%s' failed: %s", PluginInterface<kind>::word, info.name, failure.what());
@@ -139,8 +139,8 @@ constexpr Manifest make_manifest() {
 
 }  // namespace rhec
 
-/// Makes a plugin of the library that it stands in, at namespace scope, once: RHEC_PLUGIN(kind, class, {PluginInfo}).
-/// The manifest is constant data: it can be read although nothing of the plugin has run.
+/// Makes the library that contains it a plugin: RHEC_PLUGIN(kind, class, {PluginInfo}), once, at namespace scope. The
+/// manifest is constant data: it can be read before any code of the plugin has run.
 #define RHEC_PLUGIN(KIND, CLASS, ...)                                                                             \
   static constexpr ::rhec::PluginInfo rhec_plugin_info = __VA_ARGS__;                                             \
   extern "C" {                                                                                                    \

@@ -11,18 +11,18 @@
 
 namespace rhec {
 
-/// The section `blocking`, or that of the smoother: by parameter, the blocking that says which intervals of a horizon
+/// The section `blocking`, or that of the smoother: for each parameter, the blocking, i.e. which intervals of a horizon
 /// share one value.
 class RHEC_EXPORT BlockingSection {
  public:
   BlockingSection(std::shared_ptr<const RobotContext> context, const Settings& section);
   static OptionSection documentation();
-  /// The row of a parameter; `otherwise` takes the place of the default plugin's name.
+  /// The row of a parameter; `otherwise`, if not empty, replaces the default plugin's name.
   static OptionRow row(const std::string& otherwise = {});
 
-  /// One a parameter.
+  /// One per parameter.
   std::vector<std::shared_ptr<const Blocking>> make() const;
-  /// Throws Error where one of them cannot take the horizon, which `key` sets.
+  /// Throws Error if one of them does not support this horizon; `key` is the key that sets it.
   std::vector<std::shared_ptr<const Blocking>> make_for(int horizon, const std::string& key) const;
   PluginChoice choice(int parameter) const;
 

@@ -14,7 +14,7 @@ class RHEC_EXPORT BoundsSection {
   BoundsSection(const Settings& section, const ModelDescription& about);
   static OptionSection documentation();
 
-  /// What the model says of itself, with the bounds of the configuration.
+  /// The model's description, with the bounds of the configuration.
   const ModelDescription& bounded() const noexcept { return bounded_; }
 
  private:

@@ -11,7 +11,7 @@
 
 namespace rhec {
 
-/// A number that may not be infinite, whatever its range.
+/// A number that must be finite, whatever its range.
 struct RHEC_EXPORT FiniteValue {
   Range range;
   double read(const Settings& from, const OptionContext& context) const;
@@ -19,14 +19,14 @@ struct RHEC_EXPORT FiniteValue {
   std::string constraint() const { return NumberValue{range}.constraint(); }
 };
 
-/// [lower, upper] as it is written in a configuration; null stands for no bound.
+/// [lower, upper] as written in a configuration; null stands for no bound.
 struct RHEC_EXPORT BoundsValue {
   std::pair<double, double> read(const Settings& from, const OptionContext& context) const;
   std::string type() const { return "list of 2 numbers"; }
   std::string constraint() const { return "lower <= upper; null for none"; }
 };
 
-/// What a variable has that is not named, in words and as a value.
+/// The default of a variable that is not named, as text and as a value.
 template <class Item>
 struct DefaultByName {
   std::string text;
@@ -34,11 +34,11 @@ struct DefaultByName {
 };
 /// The same number for all.
 RHEC_EXPORT DefaultByName<double> constant_default(double number);
-/// A share of the variable's typical magnitude.
+/// A fraction of the variable's typical magnitude.
 RHEC_EXPORT DefaultByName<double> scaled_default(double share);
 
-/// A map of a configuration from names of a model's variables to values of one kind, e.g. `process_noise: {kappa:
-/// 0.03}`: what may be named, what holds for those that are not, and how both are documented.
+/// A configuration map from names of a model's variables to values of one type, e.g. `process_noise: {kappa: 0.03}`:
+/// which variables it may name, the defaults of the others, and the documentation of both.
 template <class Value>
 class ByName {
  public:
@@ -46,18 +46,19 @@ class ByName {
 
   /// Variables that the map may name.
   struct Kind {
-    std::string placeholder;  ///< "PARAMETER": stands for the names in the documentation; kinds that share it, share it
+    std::string
+        placeholder;  ///< "PARAMETER": stands for the names in the documentation; consecutive kinds may share one
     std::vector<Variable> ModelDescription::*variables;
     DefaultByName<Item> otherwise;
     std::string meaning;
   };
 
-  /// `owner` is whose values they are, for errors.
+  /// `owner` says whose values they are, for error messages.
   ByName(std::string owner, Value value, std::vector<Kind> kinds)
       : owner_(std::move(owner)), value_(std::move(value)), kinds_(std::move(kinds)) {}
 
-  /// The values of a model's variables, kind after kind. Throws Error for unknown names, with the nearest, and for
-  /// values that cannot be read.
+  /// The values of a model's variables, one kind after the other. Throws Error for unknown names, with the nearest
+  /// known one, and for values that cannot be read.
   std::vector<Item> read(const Settings& map, const ModelDescription& about) const {
     std::vector<std::string> known;
     for (const Kind& kind : kinds_)
@@ -76,7 +77,7 @@ class ByName {
     return items;
   }
 
-  /// One row a placeholder.
+  /// One row per placeholder.
   std::vector<OptionRow> rows() const {
     std::vector<OptionRow> rows;
     for (const Kind& kind : kinds_)

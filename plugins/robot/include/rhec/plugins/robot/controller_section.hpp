@@ -31,7 +31,7 @@ class RHEC_EXPORT ControllerSection {
 
   const ControllerOptions& options() const noexcept { return options_; }
   PluginChoice solver_choice() const;
-  /// Weights and blocking are read here, since a robot that only estimates may be of a vehicle that they do not fit.
+  /// Weights and blocking are read only here, since they may not fit the vehicle of a robot that only estimates.
   std::unique_ptr<Controller> make(const Path& path, const RobotHooks& hooks = {}) const;
 
  private:

@@ -16,20 +16,20 @@
 
 namespace rhec {
 
-/// All that a configuration says of an estimator, read and checked: what estimation methods are made of.
+/// The estimator's configuration, read and checked: the input for making estimation methods.
 struct RHEC_EXPORT EstimatorParts {
   std::shared_ptr<const RobotContext> context;
-  Settings section;  ///< `estimator` as it was written, for errors
+  Settings section;  ///< `estimator` as written, for error messages
   int horizon, substeps, heading_starts;
   ArrivalKind arrival;
   std::vector<RobustLoss> robust;
-  std::vector<ParameterWalk> walks;    ///< one a parameter
+  std::vector<ParameterWalk> walks;    ///< one per parameter
   Eigen::VectorXd initial_mean;        ///< of [x; p]
   Eigen::MatrixXd initial_covariance;  ///< of [x; p]
   BlockingSection blocking;
-  std::function<std::shared_ptr<Solver>()> make_solver;  ///< the one that the section names
+  std::function<std::shared_ptr<Solver>()> make_solver;  ///< makes the solver that the section names
 
-  /// The problem of a window.
+  /// The estimation problem of a window.
   RheProblem::Setup problem() const;
 };
 
@@ -37,18 +37,18 @@ struct RHEC_EXPORT EstimatorParts {
 struct EstimatorMaker {
   std::string name;
   std::string meaning;  ///< one phrase
-  /// Throws Error where it cannot be made of these parts.
+  /// Throws Error if it cannot be made from these parts.
   std::function<std::unique_ptr<EstimationMethod>(const EstimatorParts& parts)> make;
 };
 
-/// The estimators that `estimator.name` chooses from: `rhe`, `ekf`, and those that a program adds.
+/// The estimators that `estimator.name` chooses from: `rhe`, `ekf`, and those that the application adds.
 class RHEC_EXPORT EstimatorMakers {
  public:
   EstimatorMakers();
-  /// Throws Error where there is one of that name.
+  /// Throws Error if that name is taken.
   EstimatorMakers& add(EstimatorMaker maker);
   const std::vector<EstimatorMaker>& all() const noexcept { return all_; }
-  /// Throws Error where there is none of that name.
+  /// Throws Error if there is none of that name.
   const EstimatorMaker& named(std::string_view name) const;
 
  private:

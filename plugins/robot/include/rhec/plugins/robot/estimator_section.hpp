@@ -25,18 +25,18 @@ struct RHEC_EXPORT EstimatorOptions {
 /// The section `estimator`: how state and parameters are estimated.
 class RHEC_EXPORT EstimatorSection {
  public:
-  /// Checks what the estimator of this name does not use, too: a mistake there would show only once another one is
-  /// chosen.
+  /// Also checks keys that the chosen estimator does not use: otherwise a mistake there would show up only with another
+  /// estimator.
   EstimatorSection(std::shared_ptr<const RobotContext> context, BlockingSection blocking, const Settings& section,
                    EstimatorMakers makers = {});
   static OptionSection documentation(const EstimatorMakers& makers = {});
 
   const EstimatorOptions& options() const noexcept { return options_; }
   PluginChoice solver_choice() const;
-  /// Takes the place of the makers so far.
+  /// Replaces the makers.
   void use(EstimatorMakers makers) { makers_ = std::move(makers); }
 
-  /// The initial state, where given, takes the place of a default one, not of the section's.
+  /// `initial_state`, if given, replaces the default; the section's own initial state takes precedence.
   EstimatorParts parts(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
   std::unique_ptr<Estimator> make(const std::optional<Eigen::VectorXd>& initial_state = {},
                                   const RobotHooks& hooks = {}) const;
@@ -45,7 +45,7 @@ class RHEC_EXPORT EstimatorSection {
   EstimatorMakers makers_;
   EstimatorOptions options_;
   EstimatorParts parts_;
-  bool has_initial_state_ = false;  ///< the section says where the robot starts
+  bool has_initial_state_ = false;  ///< the section gives the initial state
 };
 
 }  // namespace rhec

@@ -9,19 +9,18 @@
 
 namespace rhec {
 
-/// What a program hangs into the estimators and controllers that a robot makes, to watch them or to take times: derive
-/// from it. As it is, it changes nothing. The objects it returns are used in place of those it is given, and are never
-/// null.
+/// Hooks of an application into the estimators and controllers that a robot makes, e.g. to observe or time them: derive
+/// from this class. The defaults change nothing. The returned objects replace those passed in, and must not be null.
 class RHEC_EXPORT RobotHooks {
  public:
   virtual ~RobotHooks() = default;
-  /// Is given the solver of each estimator ("rhe") and controller ("rhc").
+  /// Called with the solver of each estimator (kind "rhe") and controller ("rhc").
   virtual std::shared_ptr<Solver> wrap_solver(std::string_view kind, std::shared_ptr<Solver> solver) const;
-  /// Is given the method of each estimator.
+  /// Called with the method of each estimator.
   virtual std::unique_ptr<EstimationMethod> wrap_method(std::unique_ptr<EstimationMethod> method) const;
 };
 
-/// Hooks one round the other: the first one added is the innermost.
+/// Nested hooks: the first one added is the innermost.
 class RHEC_EXPORT RobotHookChain final : public RobotHooks {
  public:
   void add(std::shared_ptr<const RobotHooks> hooks);

@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-/// The section `noise`: standard deviations of what is measured.
+/// The section `noise`: standard deviations of the measured variables.
 struct RHEC_EXPORT NoiseSection {
   NoiseSection(const Settings& section, const ModelDescription& about);
   static OptionSection documentation();
@@ -16,7 +16,7 @@ struct RHEC_EXPORT NoiseSection {
   std::vector<double> output_sigmas, input_sigmas;
 };
 
-/// Standard deviations of measured variables where a configuration gives none: a share of their typical magnitudes.
+/// Default standard deviations of measured variables: a fraction of their typical magnitudes.
 RHEC_EXPORT std::vector<double> default_sigmas(const std::vector<Variable>& variables);
 
 }  // namespace rhec

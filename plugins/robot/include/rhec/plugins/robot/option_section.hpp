@@ -7,8 +7,8 @@
 
 namespace rhec {
 
-/// A section of a configuration file with its keys, for people. A name in capitals stands for each variable of its
-/// kind.
+/// A section of a configuration file with its keys, for the documentation. A name in capitals stands for each variable
+/// of its kind.
 struct OptionSection {
   std::string name;
   std::string meaning;

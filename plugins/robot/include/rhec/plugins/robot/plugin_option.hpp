@@ -9,20 +9,19 @@
 
 namespace rhec {
 
-/// A plugin as a configuration names it.
+/// A plugin, as named in a configuration.
 struct PluginChoice {
   std::string name;
   Settings options;  ///< a map, without the name
 };
 
-/// A part of a configuration that names a plugin: a map of `name` and, beside it, the plugin's options; or the name
-/// alone. Product is Model, Blocking or Solver.
+/// A part of a configuration that names a plugin: a map of `name` and the plugin's options, or just the name. Product
+/// is Model, Blocking or Solver.
 template <class Product>
 struct RHEC_EXPORT PluginOption {
-  const char* otherwise;  ///< the plugin where none is named
+  const char* otherwise;  ///< the plugin if none is named
 
-  /// Throws Error as the host does, and with the section's place where a plugin finds its options at odds with each
-  /// other.
+  /// Throws Error as the host does, with the section's place if the plugin finds its options inconsistent.
   std::shared_ptr<Product> make(const Host& host, const Settings& section) const;
   PluginChoice choice(const Settings& section) const;
   /// For the documentation, named "name".

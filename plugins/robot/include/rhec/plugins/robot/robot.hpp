@@ -16,13 +16,13 @@
 
 namespace rhec {
 
-/// What of a configuration file a robot needs; each is a section of its own, described in docs/configuration.md.
+/// The part of a configuration file that a robot needs; docs/configuration.md describes each section.
 struct RobotOptions {
   double step = Estimator::Timeline{}.longest_interval;  ///< dt [s]
   Settings model, noise, bounds, blocking, estimator, controller, smoother;
 
   RHEC_EXPORT static const OptionTable<RobotOptions>& table();
-  /// The same rows for a struct that has more keys beside them.
+  /// Adds the same rows to the table of a struct that has further keys.
   template <class Derived>
   static OptionTable<Derived>& add_to(OptionTable<Derived>& rows) {
     return rows
@@ -45,9 +45,9 @@ RHEC_EXPORT std::vector<OptionSection> robot_sections(const EstimatorMakers& est
 /// Makes models, estimators and controllers from configuration, with plugins by name.
 class RHEC_EXPORT Robot {
  public:
-  /// Throws Error, naming file, line and key, for whatever is wrong in any section.
+  /// Throws Error, with file, line and key, for any mistake in any section.
   Robot(const Host& host, const RobotOptions& options, EstimatorMakers estimators = {});
-  /// From a file that has just the keys of RobotOptions.
+  /// From a file with only the keys of RobotOptions.
   static Robot from_file(const Host& host, const std::string& yaml_file);
 
   const std::shared_ptr<const Model>& model() const noexcept { return context_->model; }
@@ -60,20 +60,20 @@ class RHEC_EXPORT Robot {
   const SmootherOptions& smoother_options() const noexcept { return smoother_.options(); }
   const std::vector<double>& output_sigmas() const noexcept { return context_->noise.output_sigmas; }
   const std::vector<double>& input_sigmas() const noexcept { return context_->noise.input_sigmas; }
-  /// What the model says of itself, with the bounds of this configuration.
+  /// The model's description, with the bounds of this configuration.
   const ModelDescription& bounded_description() const noexcept { return context_->about; }
   /// Of the section `blocking`, by parameter.
   std::vector<std::shared_ptr<const Blocking>> make_blockings() const { return blocking_.make(); }
 
-  /// Takes the place of the estimators that it was made with, e.g. with one that knows what exists only by now.
+  /// Replaces the estimators passed to the constructor, e.g. to add one that needs objects created later.
   void use_estimators(EstimatorMakers estimators);
-  /// Hung into all that is made from now on, round what is hung in already; copies of the robot have them too.
+  /// Applies to everything made from now on, outside of the hooks added before. Copies of the robot keep the hooks.
   void add_hooks(std::shared_ptr<const RobotHooks> hooks);
 
-  /// The estimator of the section `estimator`; the initial state, where given, is used if that section has none.
+  /// The estimator of the section `estimator`; `initial_state`, if given, is used if that section has none.
   std::unique_ptr<Estimator> make_estimator(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
   std::unique_ptr<Controller> make_controller(const Path& path) const;
-  /// What estimates a whole log at once (sections `smoother` and `estimator`).
+  /// Estimates a whole log at once (sections `smoother` and `estimator`).
   FullInformationEstimation make_smoother(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
 
  private:

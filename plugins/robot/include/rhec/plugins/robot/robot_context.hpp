@@ -8,12 +8,12 @@
 
 namespace rhec {
 
-/// What the sections `model`, `bounds` and `noise` say, which all others are read with.
+/// The contents of the sections `model`, `bounds` and `noise`, which all other sections need.
 struct RobotContext {
   Host host;
   double step;  ///< longest interval of the estimator, interval of the controller [s]
   std::shared_ptr<const Model> model;
-  ModelDescription about;  ///< what the model says of itself, with the bounds of the configuration
+  ModelDescription about;  ///< the model's description, with the bounds of the configuration
   NoiseSection noise;
 };
 

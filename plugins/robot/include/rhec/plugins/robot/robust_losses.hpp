@@ -10,10 +10,10 @@
 
 namespace rhec {
 
-/// The losses of a section `robust`; none of one that is null. `owner` is the section that it stands in. Throws Error.
+/// The losses of a section `robust`; none if it is null. `owner` is the section that contains it. Throws Error.
 RHEC_EXPORT std::vector<RobustLoss> robust_losses(const Settings& section, const ModelDescription& about,
                                                   const std::string& owner);
-/// Its rows; `otherwise` says which outputs have a loss where none is named.
+/// The rows of that section; `otherwise` says which outputs have a loss by default.
 RHEC_EXPORT std::vector<OptionRow> robust_rows(const std::string& otherwise);
 
 }  // namespace rhec

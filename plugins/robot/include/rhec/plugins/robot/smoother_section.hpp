@@ -17,7 +17,7 @@ struct RHEC_EXPORT SmootherOptions {
   static const OptionTable<SmootherOptions>& table();
 };
 
-/// The section `smoother`: the estimator's problem over a whole log. What is not in it is as in `estimator`.
+/// The section `smoother`: the estimator's problem over a whole log. Everything else is taken from `estimator`.
 class RHEC_EXPORT SmootherSection {
  public:
   SmootherSection(std::shared_ptr<const RobotContext> context, const Settings& section);

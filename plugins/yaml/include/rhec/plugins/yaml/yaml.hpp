@@ -9,17 +9,16 @@
 namespace rhec {
 
 /// Reads a YAML file into Settings whose nodes know file and line. Anchors, aliases and merge keys (`<<`) work; tags
-/// other than YAML's own do not. An empty file gives null. Throws Error with file and line: a file that is not there or
-/// cannot be read, wrong syntax, a key written twice, a key that is no plain text, more than one document.
+/// other than YAML's own do not. An empty file gives null. Throws Error with file and line for a missing or unreadable
+/// file, a syntax error, a duplicate key, a key that is not plain text, or more than one document.
 RHEC_EXPORT Settings load_yaml(const std::filesystem::path& file);
 
-/// The same of a text; `name` stands for the file in errors.
+/// The same for a text; `name` replaces the file name in errors.
 RHEC_EXPORT Settings parse_yaml(const std::string& text, const std::string& name);
 
-/// Puts an assignment of the command line, "horizon.length=25" or "weights=[1, 2]", into `settings`, in the place of
-/// what was there. The value is read as YAML; in errors its origin is "--set horizon.length=25". Throws Error where
-/// there is no '=' or no key, where the value is not YAML, and where the path leads through something that is not a
-/// map.
+/// Applies an assignment of the command line, "horizon.length=25" or "weights=[1, 2]", to `settings`, replacing the
+/// previous value. The value is read as YAML; in errors its origin is "--set horizon.length=25". Throws Error if there
+/// is no '=' or no key, if the value is not YAML, or if the path leads through something that is not a map.
 RHEC_EXPORT void apply_assignment(Settings& settings, std::string_view assignment);
 
 }  // namespace rhec
