@@ -362,10 +362,10 @@ void add_compare(CLI::App& program, Action& chosen) {
       "compare", "Compares solvers on a scenario: the same problems, then each in the closed loop.");
   command->footer(
       "First one solver drives the scenario, and all of those compared solve every problem on its way from the same\n"
-      "guess, judged by the same residual; so one's drift is not another's input. Then each drives by itself, over "
-      "the\n"
-      "same ground and with the same noise. Writes compare.json and compare.svg to the output folder; docs/compare.md\n"
-      "says what each figure means.\n\n"
+      "guess, so that one's drift is not another's input. One KKT residual assesses all of them. Then each drives "
+      "alone,\n"
+      "over the same ground and with the same noise. Writes compare.json and compare.svg to the output folder;\n"
+      "docs/compare.md says what each figure means.\n\n"
       "A solver is NAME, NAME:KEY=VALUE,KEY=VALUE with options of its own, and may have a label: "
       "LABEL=NAME:KEY=VALUE.\n\n"
       "The exit code is 3 where a solver refused a problem or had no usable answer to it, or a run was not "

@@ -125,8 +125,8 @@ std::vector<Finding> check_derivatives(const CheckedModel& checked) {
       }
     }
   }
-  const auto judge = [&](const Worst& worst, double tolerance, const char* what, const char* against,
-                         const char* advice) {
+  const auto report_worst = [&](const Worst& worst, double tolerance, const char* what, const char* against,
+                                const char* advice) {
     if (!(worst.entry.error > tolerance)) return;
     findings.fail(worst.entry.where,
                   fmt::format("{}: {:.6g} by the model, {:.6g} by {}; relative error {:.2g} ({})", what,
@@ -135,11 +135,14 @@ std::vector<Finding> check_derivatives(const CheckedModel& checked) {
                   {{"error", worst.entry.error}, {"given", worst.entry.given}, {"expected", worst.entry.expected}});
   };
   constexpr const char *differences = "differences", *steps = "Runge-Kutta steps of rates()";
-  judge(integration, integration_tolerance, "values of F", steps, "let integrate() and rates() be of one formula");
-  judge(first, derivative_tolerance, "first derivative of F", differences, "mend `jacobians` of integrate()");
-  judge(second, derivative_tolerance, "second derivative of F", differences, "mend `hessians` of integrate()");
-  judge(output_first, derivative_tolerance, "first derivative of h", differences, "mend `jacobians` of observe()");
-  judge(output_second, derivative_tolerance, "second derivative of h", differences, "mend `hessians` of observe()");
+  report_worst(integration, integration_tolerance, "values of F", steps,
+               "let integrate() and rates() be of one formula");
+  report_worst(first, derivative_tolerance, "first derivative of F", differences, "mend `jacobians` of integrate()");
+  report_worst(second, derivative_tolerance, "second derivative of F", differences, "mend `hessians` of integrate()");
+  report_worst(output_first, derivative_tolerance, "first derivative of h", differences,
+               "mend `jacobians` of observe()");
+  report_worst(output_second, derivative_tolerance, "second derivative of h", differences,
+               "mend `hessians` of observe()");
   if (compared == 0 && findings.empty() && skipped > 0)
     findings.skip("no derivative is finite at random points inside the bounds; see 'numbers'");
   if (findings.empty()) {

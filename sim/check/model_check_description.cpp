@@ -228,7 +228,7 @@ std::vector<Finding> check_symmetry(const CheckedModel& checked) {
     }
   }
   double largest = 0.0;
-  const auto judge = [&](const std::vector<Worst>& worst, const char* what, const char* advice) {
+  const auto report_worst = [&](const std::vector<Worst>& worst, const char* what, const char* advice) {
     for (std::size_t j = 0; j < nx; ++j) {
       largest = std::max(largest, worst[j].error);
       if (!(worst[j].error > tolerance)) continue;
@@ -238,11 +238,12 @@ std::vector<Finding> check_symmetry(const CheckedModel& checked) {
                     advice, {{"error", worst[j].error}});
     }
   };
-  judge(of_shifting, "shifted as a whole",
-        "let no rate depend on the position; or mend roles.position_x and position_y");
-  judge(of_turning, "turned as a whole",
-        "let no rate depend on a heading but through the direction of the velocity; name the headings of all bodies in "
-        "roles.heading and roles.other_headings");
+  report_worst(of_shifting, "shifted as a whole",
+               "let no rate depend on the position; or mend roles.position_x and position_y");
+  report_worst(
+      of_turning, "turned as a whole",
+      "let no rate depend on a heading but through the direction of the velocity; name the headings of all bodies in "
+      "roles.heading and roles.other_headings");
   if (findings.empty() && looked_at == 0) findings.skip("no rate is finite at random points; see 'numbers'");
   if (findings.empty())
     findings.pass(fmt::format("shifted and turned as a whole it moves as before: {} points, largest relative error "

@@ -211,8 +211,8 @@ struct Tally {
 };
 
 template <class IsBad>
-void judge(Explorer& explorer, const Tally& bad, int samples, const char* what, FindingList& findings,
-           const IsBad& is_bad) {
+void report_bad(Explorer& explorer, const Tally& bad, int samples, const char* what, FindingList& findings,
+                const IsBad& is_bad) {
   if (bad.points.empty()) return;
   const std::string region = region_of(explorer, bad.points, is_bad);
   findings.fail(
@@ -256,8 +256,8 @@ std::vector<Finding> check_numbers(const CheckedModel& checked) {
       slopes.emplace_back(look.slope, std::move(z));
     }
   }
-  judge(explorer, step, samples, "next states", findings, [](const Look& look) { return look.bad_step(); });
-  judge(explorer, output, samples, "outputs", findings, [](const Look& look) { return look.bad_output(); });
+  report_bad(explorer, step, samples, "next states", findings, [](const Look& look) { return look.bad_step(); });
+  report_bad(explorer, output, samples, "outputs", findings, [](const Look& look) { return look.bad_output(); });
 
   if (!slopes.empty()) {
     std::sort(slopes.begin(), slopes.end());

@@ -207,7 +207,7 @@ void IpoptSolver::keep_if_better(const PrimalDual& iterate) noexcept {
   if (!(residual <= options_.tolerance || residual < best_kkt_.largest())) return;
   best_kkt_ = seen_kkt_;
   best_objective_ = nlp_->objective();
-  nlp_->exchange_judged(best_);
+  nlp_->exchange_assessed(best_);
 }
 
 bool IpoptSolver::see(int iteration, const PrimalDual* iterate) noexcept {

@@ -168,7 +168,7 @@ double OcpNlp::linearise(const double* z, const double* multipliers, const doubl
                          const Take& take) noexcept {
   const int N = ocp_->intervals();
   double objective = 0.0;
-  is_judged_ = false;
+  is_assessed_ = false;
   for (StageRange piece{0, 0}; piece.first <= N; piece.first = piece.last + 1) {
     // Includes the stage after the piece, in which its dynamics end.
     const int behind = std::min(piece.first + pieces_.window() - 1, N);
@@ -204,7 +204,7 @@ void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noex
   linear_kkt_ = terms.residual();
   // If a number in the gradient or the Jacobian is not finite, the stationarity is not finite either.
   linearised_.is_sound = std::isfinite(linear_kkt_.stationarity);
-  is_judged_ = true;
+  is_assessed_ = true;
 }
 
 /// Sets the bound multipliers of fixed variables of a piece such that stationarity holds.
@@ -237,7 +237,7 @@ void OcpNlp::write_hessian(const double* z, const double* multipliers, double fa
 
 /// Whether the linearisation is that of this iterate, and the iterate is within its bounds.
 bool OcpNlp::has_judged(const PrimalDual& iterate) const noexcept {
-  if (!is_judged_ || !linearised_.is_known || linear_kkt_.bound_violation > 0.0) return false;
+  if (!is_assessed_ || !linearised_.is_known || linear_kkt_.bound_violation > 0.0) return false;
   if (linear_tag_ != 0 && linear_tag_ == iterate.tag) return true;
   const auto& [of_constraints, of_bounds] = iterate.multipliers;
   return are_equal(linearised_.z, iterate.z.data()) &&
@@ -254,9 +254,9 @@ KktResidual OcpNlp::residual_at(const PrimalDual& iterate) noexcept {
   return linear_kkt_;
 }
 
-void OcpNlp::exchange_judged(Iterate& iterate) noexcept {
+void OcpNlp::exchange_assessed(Iterate& iterate) noexcept {
   std::swap(linear_, iterate);
-  is_judged_ = false;
+  is_assessed_ = false;
 }
 
 double OcpNlp::complementarity_gap() const noexcept {
@@ -389,7 +389,7 @@ void OcpNlp::finalize_solution(Ipopt::SolverReturn, Ipopt::Index, const double* 
 /// Invalidates `seen_` and what was computed with its multipliers.
 void OcpNlp::forget_seen() noexcept {
   seen_.tag = 0;
-  if (linear_iterate_ == &seen_) is_judged_ = is_linear_exact_ = false;
+  if (linear_iterate_ == &seen_) is_assessed_ = is_linear_exact_ = false;
 }
 
 /// Copies Ipopt's current iterate to `seen_`. Ipopt 3.11 gives it only in its own layout: scaled and without fixed

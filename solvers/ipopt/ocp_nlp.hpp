@@ -75,7 +75,7 @@ class OcpNlp final : public Ipopt::TNLP {
   KktResidual residual_at(const PrimalDual& iterate) noexcept;
   // For the iterate whose residual was computed last:
   /// Swaps it with an iterate of the same capacity. Once only.
-  void exchange_judged(Iterate& iterate) noexcept;
+  void exchange_assessed(Iterate& iterate) noexcept;
   /// Sum of |bound multiplier| x distance from the bound: the barrier's remaining contribution to the objective.
   double complementarity_gap() const noexcept;
   double objective() const noexcept { return linear_objective_; }
@@ -176,7 +176,7 @@ class OcpNlp final : public Ipopt::TNLP {
   std::vector<double> gradient_, jacobian_, hessian_;
   KktResidual linear_kkt_;
   double linear_objective_ = 0.0;
-  bool is_judged_ = false;
+  bool is_assessed_ = false;
   bool is_linear_exact_ = false;  ///< the Hessian is exact, for these multipliers
 
   bool starts_with_multipliers_ = false, any_fixed_ = false;

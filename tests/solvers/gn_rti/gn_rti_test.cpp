@@ -187,14 +187,14 @@ TEST(GnRti, AnswersFirstAndJudgesAfterwards) {
         Report report = in_parts->feedback(parts, Clock::time_point::max());
         expect_same_bits(*problem, parts, whole, where + ", answered");
         in_parts->finish(parts, report);
-        expect_same_bits(*problem, parts, whole, where + ", judged");
+        expect_same_bits(*problem, parts, whole, where + ", finished");
         EXPECT_EQ(report.status, expected.status) << where;
         EXPECT_EQ(report.iterations, expected.iterations) << where;
         EXPECT_EQ(report.objective, expected.objective) << where;
         EXPECT_EQ(report.kkt.largest(), expected.kkt.largest()) << where;
         // It costs time to leave it out, and nothing else.
         without_finish->feedback(unfinished, Clock::time_point::max());
-        expect_same_bits(*problem, unfinished, whole, where + ", not judged");
+        expect_same_bits(*problem, unfinished, whole, where + ", not finished");
         if (HasFatalFailure()) return;
       }
     }
