@@ -76,12 +76,14 @@ class FormulaModel : public Model {
     RHEC_ASSERT(request.count == 0 || (request.states && request.durations), "where to integrate");
     RHEC_ASSERT(request.count == 0 || Formula::input_count == 0 || request.inputs, "the inputs");
     RHEC_ASSERT(request.count == 0 || Formula::parameter_count == 0 || request.parameters, "the parameters");
-    RHEC_ASSERT(!request.hessians || request.multipliers, "second derivatives are weighted by multipliers");
+    RHEC_ASSERT(request.count == 0 || !request.hessians || request.multipliers,
+                "second derivatives are weighted by multipliers");
     kernels_->integrate(&formula_, request);
   }
   void observe(const Nodes& request) const noexcept override {
     RHEC_ASSERT(request.count == 0 || (request.count > 0 && request.states), "where to observe");
-    RHEC_ASSERT(!request.hessians || request.multipliers, "second derivatives are weighted by multipliers");
+    RHEC_ASSERT(request.count == 0 || !request.hessians || request.multipliers,
+                "second derivatives are weighted by multipliers");
     kernels_->observe(&formula_, request);
   }
   void integrate_rows(const IntervalRows& request) const noexcept override {
