@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstddef>
-#include <source_location>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -11,10 +10,12 @@ namespace rhec {
 
 /// Throws std::logic_error, which says what did not hold and where. In a noexcept function, such as all that run in a
 /// control loop, the program ends there with that message.
-[[noreturn, gnu::cold, gnu::noinline]] inline void assertion_failed(
-    const char* condition, const char* meaning, const std::source_location& place = std::source_location::current()) {
-  throw std::logic_error(std::string(place.file_name()) + ":" + std::to_string(place.line()) + ": " +
-                         place.function_name() + ": not true: " + condition + " (" + meaning + ")");
+[[noreturn, gnu::cold, gnu::noinline]] inline void assertion_failed(const char* condition, const char* meaning,
+                                                                    const char* file = __builtin_FILE(),
+                                                                    int line = __builtin_LINE(),
+                                                                    const char* function = __builtin_FUNCTION()) {
+  throw std::logic_error(std::string(file) + ":" + std::to_string(line) + ": " + function + ": not true: " + condition +
+                         " (" + meaning + ")");
 }
 
 /// Whether all `count` numbers are finite; true for null, which means 'not requested'.
