@@ -45,12 +45,14 @@ OptionSection BoundsSection::documentation() {
 
 std::vector<double> lower_bounds_of(const std::vector<Variable>& variables) {
   std::vector<double> bounds;
+  bounds.reserve(variables.size());
   for (const Variable& variable : variables) bounds.push_back(variable.lower);
   return bounds;
 }
 
 std::vector<double> upper_bounds_of(const std::vector<Variable>& variables) {
   std::vector<double> bounds;
+  bounds.reserve(variables.size());
   for (const Variable& variable : variables) bounds.push_back(variable.upper);
   return bounds;
 }

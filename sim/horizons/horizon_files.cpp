@@ -53,7 +53,7 @@ Json position_outputs(const Model& model) {
 }
 
 Json json_of(const Robot& robot) {
-  const ModelDescription about = robot.bounded_description();
+  const ModelDescription& about = robot.bounded_description();
   Json json;
   json["name"] = about.name;
   json["source"] = about.source;
