@@ -286,12 +286,12 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
       }
       if (ending != Ending::near && ending != Ending::lost && ending != Ending::infeasible) break;
       report.fallback_used = true;
-      if (begun == Start::adaptive) {
-        if (claimed_infeasible && best_kkt_.defect > clear_violation) ending = Ending::infeasible;
-        break;
-      }
+      if (begun == Start::adaptive) break;
       start = begun = start_after(begun, ending);
     }
+    // A claim stands if no later run has come near to refuting it, also where that run was cut off.
+    const bool is_open = ending != Ending::converged && ending != Ending::out_of_time;
+    if (is_open && claimed_infeasible && best_kkt_.defect > clear_violation) ending = Ending::infeasible;
   }
   switch (ending) {
     case Ending::converged:

@@ -135,7 +135,7 @@ std::vector<Compared> compare(const std::vector<Verdict>& verdicts) {
 
 /// What became of all problems of a family, for one solver.
 struct Summary {
-  int problems = 0, good = 0, refused = 0, undecided = 0, most_iterations = 0, other_optima = 0;
+  int problems = 0, good = 0, refused = 0, most_iterations = 0, other_optima = 0;
   std::string outcome, words;
   double residual = 0.0, gap = 0.0, distance = 0.0, milliseconds = 0.0;
 };
@@ -153,10 +153,6 @@ Summary summarise(const std::vector<const Compared*>& of_family) {
       s.words += fmt::format("{}seed {}: {}", s.words.empty() ? "" : "; ", v.seed, v.reason);
     } else {
       ++s.good;
-      if (v.outcome == "undecided") {
-        ++s.undecided;
-        continue;
-      }
       s.outcome = v.outcome;
       s.most_iterations = std::max(s.most_iterations, v.iterations);
       if (v.outcome == "solved") {
@@ -177,9 +173,7 @@ Summary summarise(const std::vector<const Compared*>& of_family) {
 
 std::string describe(const Summary& s) {
   if (s.outcome == "refused" || s.good < s.problems) return s.words;
-  if (s.outcome == "infeasible")
-    return s.undecided == 0 ? "and it is"
-                            : fmt::format("and it is; not recognised in {} of {}", s.undecided, s.problems);
+  if (s.outcome == "infeasible") return "and it is";
   std::string text = fmt::format("{:3} iterations, residual {:.0e}, gap {:.0e}, distance {:.0e}, {:.1f} ms",
                                  s.most_iterations, s.residual, s.gap, s.distance, s.milliseconds);
   if (s.other_optima > 0) text += fmt::format(" ({} in another optimum)", s.other_optima);

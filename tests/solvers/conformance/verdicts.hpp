@@ -14,7 +14,7 @@ struct Verdict {
   std::string solver, model, family;
   bool several_optima = false;
   unsigned seed = 0;
-  std::string outcome;  ///< "solved", "infeasible" (and it is), "undecided" (it is infeasible), "refused" or "failed"
+  std::string outcome;  ///< "solved", "infeasible" (and it is), "refused" or "failed"
   std::string reason;   ///< of a refusal or a failure
   std::string status;
   int iterations = 0;
