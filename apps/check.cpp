@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -138,34 +137,31 @@ int check(const CheckArguments& arguments) {
 
 }  // namespace
 
-void add_check(CLI::App& program, Action& chosen) {
+void add_check(Program& program) {
   auto arguments = std::make_shared<CheckArguments>();
-  CLI::App* command = program.add_subcommand(
-      "check", "Looks at a model before its first run: derivatives, scales, NaN, what can be estimated, time.");
-  command->footer(
+  Command command = program.add(
+      "check", "Looks at a model before its first run: derivatives, scales, NaN, what can be estimated, time.",
       "The exit code is 3 where a check fails; warnings are no failure. docs/check.md explains each check.\n\n"
       "Examples:\n"
       "  rhec check bicycle_slip\n"
       "  rhec check bicycle_slip --set wheelbase=2.8 --set gps_offset=0\n"
       "  rhec check scenarios/figure8.yaml --set bounds.delta='[-1.5, 1.5]'\n"
-      "  rhec check my_model --plugin-path build/my_model --json");
+      "  rhec check my_model --plugin-path build/my_model --json",
+      [arguments] { return check(*arguments); });
   command
-      ->add_option("model", arguments->model,
-                   "a model plugin, or a scenario (*.yaml), whose model is looked at with its noise, bounds, step, "
-                   "horizon and blocking")
-      ->type_name("MODEL")
-      ->required();
-  add_assignments(*command, arguments->assignments, "an option of the model, or a key of the scenario");
-  command->add_option("--seed", arguments->seed, "of random points")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      .add("model", arguments->model,
+           "a model plugin, or a scenario (*.yaml), whose model is looked at with its noise, bounds, step, "
+           "horizon and blocking")
+      .value("MODEL")
+      .required();
+  add_assignments(command, arguments->assignments, "an option of the model, or a key of the scenario");
+  command.add("--seed", arguments->seed, "of random points").not_negative().shows_default();
   command
-      ->add_option("--speed", arguments->speed,
-                   "ground speed of the drives [m/s]; else the scenario's, or what the inputs' scales make")
-      ->check(CLI::PositiveNumber);
-  command->add_flag("--json", arguments->json, "print JSON");
-  add_plugin_path(*command, arguments->plugin_path);
-  command->callback([&chosen, arguments] { chosen = [arguments] { return check(*arguments); }; });
+      .add("--speed", arguments->speed,
+           "ground speed of the drives [m/s]; else the scenario's, or what the inputs' scales make")
+      .positive();
+  command.add_flag("--json", arguments->json, "print JSON");
+  add_plugin_path(command, arguments->plugin_path);
 }
 
 }  // namespace rhec::apps

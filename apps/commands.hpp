@@ -1,15 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
+#include "command.hpp"
 #include "rhec/core/config/settings.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace rhec::apps {
 
@@ -21,30 +17,27 @@ enum ExitCode : int {
   exit_not_solved = 3  ///< everything ran, but some results are not usable
 };
 
-/// What to do once the command line has been read; returns an exit code.
-using Action = std::function<int()>;
-
-// One function per command: adds the command to the program, and sets `chosen` to its action if it is the one called.
-void add_check(CLI::App& program, Action& chosen);
-void add_compare(CLI::App& program, Action& chosen);
-void add_estimate(CLI::App& program, Action& chosen);
-void add_report(CLI::App& program, Action& chosen);
-void add_run(CLI::App& program, Action& chosen);
-void add_smooth(CLI::App& program, Action& chosen);
-void add_solve(CLI::App& program, Action& chosen);
-void add_sweep(CLI::App& program, Action& chosen);
-void add_options(CLI::App& program, Action& chosen);
-void add_plugins(CLI::App& program, Action& chosen);
+// One function per command: adds the command to the program.
+void add_check(Program& program);
+void add_compare(Program& program);
+void add_estimate(Program& program);
+void add_report(Program& program);
+void add_run(Program& program);
+void add_smooth(Program& program);
+void add_solve(Program& program);
+void add_sweep(Program& program);
+void add_options(Program& program);
+void add_plugins(Program& program);
 
 // Options shared by several commands.
 
 /// `--plugin-path DIR`.
-void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& directories);
+void add_plugin_path(Command& command, std::vector<std::filesystem::path>& directories);
 /// `--set KEY=VALUE`; `what` describes a key, for the help.
-void add_assignments(CLI::App& command, std::vector<std::string>& assignments, const std::string& what);
+void add_assignments(Command& command, std::vector<std::string>& assignments, const std::string& what);
 /// Applies the assignments of `--set` to `settings`, in the order given.
 void apply_assignments(Settings& settings, const std::vector<std::string>& assignments);
 /// `--out`; `type` says whether it takes a file or a folder.
-void add_out(CLI::App& command, std::string& out, const std::string& type, const std::string& meaning);
+void add_out(Command& command, std::string& out, const std::string& type, const std::string& meaning);
 
 }  // namespace rhec::apps

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -355,12 +354,11 @@ int compare(const CompareArguments& arguments) {
 
 }  // namespace
 
-void add_compare(CLI::App& program, Action& chosen) {
+void add_compare(Program& program) {
   auto arguments = std::make_shared<CompareArguments>();
   arguments->drive = default_drive;
-  CLI::App* command = program.add_subcommand(
-      "compare", "Compares solvers on a scenario: the same problems, then each in the closed loop.");
-  command->footer(
+  Command command = program.add(
+      "compare", "Compares solvers on a scenario: the same problems, then each in the closed loop.",
       "First one solver drives the scenario, and all of those compared solve every problem on its way from the same\n"
       "guess, so that one's drift is not another's input. One KKT residual assesses all of them. Then each drives "
       "alone,\n"
@@ -373,38 +371,35 @@ void add_compare(CLI::App& program, Action& chosen) {
       "Examples:\n"
       "  rhec compare scenarios/figure8.yaml --solvers rti=gn_rti,converged=gn_rti:mode=converge --out out/compare\n"
       "  rhec compare scenarios/zigzag.yaml --solvers gn_rti:mode=converge,tolerance=1e-6 --seeds 4 --no-closed-loop\n"
-      "  rhec compare scenarios/figure8.yaml --solvers gn_rti,sparse_sqp --accuracy 1e-8 --set speed=4");
-  command->add_option("scenario", arguments->scenario, "a YAML file")->required();
+      "  rhec compare scenarios/figure8.yaml --solvers gn_rti,sparse_sqp --accuracy 1e-8 --set speed=4",
+      [arguments] { return compare(*arguments); });
+  command.add("scenario", arguments->scenario, "a YAML file").required();
   command
-      ->add_option("--solvers", arguments->solvers,
-                   "solvers of 'rhec plugins', with commas between them; may be given several times")
-      ->required()
-      ->type_name("A,B,...")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command->add_option("--seeds", arguments->seeds, "the scenario's seed and those that follow it")
-      ->type_name("N")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
-  command->add_option("--drive", arguments->drive, "who drives while problems are recorded: a solver, or a label")
-      ->type_name("SOLVER")
-      ->capture_default_str();
+      .add_list("--solvers", arguments->solvers,
+                "solvers of 'rhec plugins', with commas between them; may be given several times")
+      .required()
+      .value("A,B,...");
+  command.add("--seeds", arguments->seeds, "the scenario's seed and those that follow it")
+      .value("N")
+      .within(1, 10000)
+      .shows_default();
+  command.add("--drive", arguments->drive, "who drives while problems are recorded: a solver, or a label")
+      .value("SOLVER")
+      .shows_default();
   command
-      ->add_option("--every", arguments->every,
-                   "problems of every N-th step alone; otherwise as many as leave about 400 of a kind")
-      ->type_name("N")
-      ->check(CLI::Range(1, 1000000));
+      .add("--every", arguments->every,
+           "problems of every N-th step alone; otherwise as many as leave about 400 of a kind")
+      .value("N")
+      .within(1, 1000000);
   command
-      ->add_option("--accuracy", arguments->accuracy,
-                   "tighten each solver's tolerance until 99 % of the same problems have this KKT residual or less")
-      ->type_name("EPS")
-      ->check(CLI::PositiveNumber);
-  command->add_flag("--no-closed-loop", arguments->no_closed_loop, "the same problems alone");
-  add_assignments(*command, arguments->assignments, "a key of the scenario");
-  add_out(*command, arguments->out, "DIR", "folder of the results");
-  add_plugin_path(*command, arguments->plugin_path);
-  command->callback([&chosen, arguments] { chosen = [arguments] { return compare(*arguments); }; });
+      .add("--accuracy", arguments->accuracy,
+           "tighten each solver's tolerance until 99 % of the same problems have this KKT residual or less")
+      .value("EPS")
+      .positive();
+  command.add_flag("--no-closed-loop", arguments->no_closed_loop, "the same problems alone");
+  add_assignments(command, arguments->assignments, "a key of the scenario");
+  add_out(command, arguments->out, "DIR", "folder of the results");
+  add_plugin_path(command, arguments->plugin_path);
 }
 
 }  // namespace rhec::apps

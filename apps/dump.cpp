@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <string_view>
 
@@ -20,16 +19,16 @@ std::string as_shell_word(const std::string& text) {
 
 }  // namespace
 
-void add_dump(CLI::App& command, DumpArguments& arguments) {
-  auto* folder =
+void add_dump(Command& command, DumpArguments& arguments) {
+  const Argument folder =
       command
-          .add_option("--dump", arguments.folder,
-                      "save every problem whose solve failed there, for 'rhec solve', in rhe.jsonl and rhc.jsonl")
-          ->type_name("DIR");
-  command.add_option("--dump-every", arguments.every, "save those of every N-th step too")
-      ->type_name("N")
-      ->check(CLI::Range(1, 1000000))
-      ->needs(folder);
+          .add("--dump", arguments.folder,
+               "save every problem whose solve failed there, for 'rhec solve', in rhe.jsonl and rhc.jsonl")
+          .value("DIR");
+  command.add("--dump-every", arguments.every, "save those of every N-th step too")
+      .value("N")
+      .within(1, 1000000)
+      .needs(folder);
 }
 
 Dump::Dump(const DumpArguments& arguments, const std::vector<std::string>& kinds) {

@@ -4,11 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "command.hpp"
 #include "rhec/sim/problems/problem_dump.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace rhec::apps {
 
@@ -18,7 +15,7 @@ struct DumpArguments {
 };
 
 /// `--dump DIR` and `--dump-every N`.
-void add_dump(CLI::App& command, DumpArguments& arguments);
+void add_dump(Command& command, DumpArguments& arguments);
 
 /// Saves the problems that a command solves, if requested.
 class Dump {

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -86,20 +85,19 @@ int estimate(const EstimateArguments& arguments) {
 
 }  // namespace
 
-void add_estimate(CLI::App& program, Action& chosen) {
+void add_estimate(Program& program) {
   auto arguments = std::make_shared<EstimateArguments>();
-  CLI::App* command = program.add_subcommand(
-      "estimate", "Estimates state and slip from a recorded drive, and predicts what it withholds.");
-  command->footer(
+  Command command = program.add(
+      "estimate", "Estimates state and slip from a recorded drive, and predicts what it withholds.",
       "Files are comma-separated without a header: time, wheel speed, steering angle; and time, x, y. Writes\n"
       "estimates.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; 'rhec report' makes a\n"
       "page of them. The exit code is 3 where a solve failed.\n\n"
       "Examples:\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/park\n"
-      "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 --variant ekf");
-  add_log_arguments(*command, *arguments);
-  add_dump(*command, arguments->dump);
-  command->callback([&chosen, arguments] { chosen = [arguments] { return estimate(*arguments); }; });
+      "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 --variant ekf",
+      [arguments] { return estimate(*arguments); });
+  add_log_arguments(command, *arguments);
+  add_dump(command, arguments->dump);
 }
 
 }  // namespace rhec::apps

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
-
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
@@ -33,23 +31,18 @@ LogInput::LogInput(const LogArguments& arguments)
       hold_out(read_hold_out(arguments)),
       log(sim::read_recorded_log(arguments.dead_reckoning, arguments.gps, scenario)) {}
 
-void add_log_arguments(CLI::App& command, LogArguments& arguments) {
-  command.add_option("scenario", arguments.scenario, "a YAML file")->required();
-  command.add_option("--dead-reckoning", arguments.dead_reckoning, "time [s], wheel speed [m/s], steering angle [rad]")
-      ->type_name("FILE")
-      ->required();
-  command.add_option("--gps", arguments.gps, "time [s], x [m], y [m]")->type_name("FILE")->required();
-  command.add_option("--hold-out", arguments.hold_out, "withhold one of so many fixes and predict it; 0: none")
-      ->check(CLI::Range(0, 1000000))
-      ->capture_default_str();
-  command
-      .add_option("--hold-out-phase", arguments.phase,
-                  "place of the first one withheld, from 0; default: the last of them")
-      ->check(CLI::Range(0, 1000000));
-  command.add_option("--variant", arguments.variants, "run this variant alone; may be given several times")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+void add_log_arguments(Command& command, LogArguments& arguments) {
+  command.add("scenario", arguments.scenario, "a YAML file").required();
+  command.add("--dead-reckoning", arguments.dead_reckoning, "time [s], wheel speed [m/s], steering angle [rad]")
+      .value("FILE")
+      .required();
+  command.add("--gps", arguments.gps, "time [s], x [m], y [m]").value("FILE").required();
+  command.add("--hold-out", arguments.hold_out, "withhold one of so many fixes and predict it; 0: none")
+      .within(0, 1000000)
+      .shows_default();
+  command.add("--hold-out-phase", arguments.phase, "place of the first one withheld, from 0; default: the last of them")
+      .within(0, 1000000);
+  command.add_list("--variant", arguments.variants, "run this variant alone; may be given several times");
   add_assignments(command, arguments.assignments, "a key of the scenario");
   add_out(command, arguments.out, "DIR", "folder of the results");
   add_plugin_path(command, arguments.plugin_path);

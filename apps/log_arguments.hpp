@@ -4,11 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "command.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace rhec::apps {
 
@@ -20,7 +17,7 @@ struct LogArguments {
   std::vector<std::filesystem::path> plugin_path;
 };
 
-void add_log_arguments(CLI::App& command, LogArguments& arguments);
+void add_log_arguments(Command& command, LogArguments& arguments);
 
 /// The input that these arguments name, read and checked. Throws Error for any mistake.
 struct LogInput {

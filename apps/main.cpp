@@ -1,24 +1,20 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/core/config/option_values.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::apps {
 
-void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& directories) {
+void add_plugin_path(Command& command, std::vector<std::filesystem::path>& directories) {
   command
-      .add_option_function<std::vector<std::string>>(
+      .add_list(
           "--plugin-path",
           [&directories](const std::vector<std::string>& given) {
             // The search skips missing directories, but one named explicitly must exist.
@@ -31,26 +27,19 @@ void add_plugin_path(CLI::App& command, std::vector<std::filesystem::path>& dire
             directories.assign(given.begin(), given.end());
           },
           "look for plugins there first; may be given several times")
-      ->type_name("DIR")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+      .value("DIR");
 }
 
-void add_assignments(CLI::App& command, std::vector<std::string>& assignments, const std::string& what) {
-  command.add_option("--set", assignments, what + "; may be given several times")
-      ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+void add_assignments(Command& command, std::vector<std::string>& assignments, const std::string& what) {
+  command.add_list("--set", assignments, what + "; may be given several times").value("KEY=VALUE");
 }
 
 void apply_assignments(Settings& settings, const std::vector<std::string>& assignments) {
   for (const std::string& assignment : assignments) apply_assignment(settings, assignment);
 }
 
-void add_out(CLI::App& command, std::string& out, const std::string& type, const std::string& meaning) {
-  command.add_option("--out", out, meaning)->type_name(type)->capture_default_str();
+void add_out(Command& command, std::string& out, const std::string& type, const std::string& meaning) {
+  command.add("--out", out, meaning).value(type).shows_default();
 }
 
 namespace {
@@ -70,54 +59,19 @@ constexpr const char* examples =
     "  rhec report out/figure8 -o out/figure8.html\n\n"
     "'rhec COMMAND --help' says more of each command.";
 
-int usage_error(std::string_view what) {
-  fmt::print(stderr, "rhec: error: {}\n", what);
-  return exit_usage;
-}
-
-/// An error message if the command is missing or unknown; otherwise empty.
-std::string wrong_command(const CLI::App& program, int count, char** words) {
-  std::vector<std::string> commands;
-  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
-    commands.push_back(command->get_name());
-  const std::string expected = fmt::format("expected one of {}; see 'rhec --help'", fmt::join(commands, ", "));
-  if (count < 2) return "no command; " + expected;
-  const std::string word = words[1];
-  if (word == "-h" || word == "--help" || word == "--version") return {};
-  if (word.starts_with('-')) return fmt::format("unknown option '{}'; {}", word, expected);
-  if (std::find(commands.begin(), commands.end(), word) != commands.end()) return {};
-  const std::string near = nearest(word, commands);
-  return fmt::format("unknown command '{}'; {}", word,
-                     near.empty() ? expected : fmt::format("did you mean '{}'?", near));
-}
-
 int run(int count, char** words) {
-  CLI::App program(about, "rhec");
-  program.set_version_flag("--version", "rhec " RHEC_PROJECT_VERSION);
-  program.require_subcommand(1);
-  program.footer(examples);
-  Action chosen;
-  add_run(program, chosen);
-  add_estimate(program, chosen);
-  add_smooth(program, chosen);
-  add_solve(program, chosen);
-  add_compare(program, chosen);
-  add_sweep(program, chosen);
-  add_report(program, chosen);
-  add_check(program, chosen);
-  add_options(program, chosen);
-  add_plugins(program, chosen);
-
-  if (const std::string problem = wrong_command(program, count, words); !problem.empty()) return usage_error(problem);
-  try {
-    program.parse(count, words);
-  } catch (const CLI::ParseError& end) {
-    if (end.get_exit_code() == 0) return program.exit(end);  // --help, --version
-    const auto called = program.get_subcommands();
-    return usage_error(
-        fmt::format("{}; see 'rhec {}--help'", end.what(), called.empty() ? "" : called.front()->get_name() + " "));
-  }
-  return chosen();
+  Program program(about, examples);
+  add_run(program);
+  add_estimate(program);
+  add_smooth(program);
+  add_solve(program);
+  add_compare(program);
+  add_sweep(program);
+  add_report(program);
+  add_check(program);
+  add_options(program);
+  add_plugins(program);
+  return program.run(count, words);
 }
 
 }  // namespace

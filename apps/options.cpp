@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -110,16 +109,15 @@ int show(const OptionsArguments& arguments) {
 
 }  // namespace
 
-void add_options(CLI::App& program, Action& chosen) {
+void add_options(Program& program) {
   auto arguments = std::make_shared<OptionsArguments>();
-  CLI::App* command = program.add_subcommand("options", "Lists every key of a scenario with its default, as Markdown.");
-  command->footer(
-      "Examples:\n"
-      "  rhec options\n"
-      "  rhec options estimator");
-  command->add_option("section", arguments->section, "show this section alone")->type_name("SECTION");
-  add_plugin_path(*command, arguments->plugin_path);
-  command->callback([=, &chosen] { chosen = [=] { return show(*arguments); }; });
+  Command command = program.add("options", "Lists every key of a scenario with its default, as Markdown.",
+                                "Examples:\n"
+                                "  rhec options\n"
+                                "  rhec options estimator",
+                                [arguments] { return show(*arguments); });
+  command.add("section", arguments->section, "show this section alone").value("SECTION");
+  add_plugin_path(command, arguments->plugin_path);
 }
 
 }  // namespace rhec::apps

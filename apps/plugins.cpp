@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -211,27 +210,25 @@ int show(const PluginsArguments& arguments) {
 
 }  // namespace
 
-void add_plugins(CLI::App& program, Action& chosen) {
+void add_plugins(Program& program) {
   auto arguments = std::make_shared<PluginsArguments>();
-  CLI::App* command =
-      program.add_subcommand("plugins", "Lists the models, blockings and solvers that are found, or says all of one.");
-  command->footer(
-      "Examples:\n"
-      "  rhec plugins\n"
-      "  rhec plugins gn_rti\n"
-      "  rhec plugins --doctor              why each file was or was not accepted\n"
-      "  rhec plugins --json --plugin-path my/plugins");
+  Command command =
+      program.add("plugins", "Lists the models, blockings and solvers that are found, or says all of one.",
+                  "Examples:\n"
+                  "  rhec plugins\n"
+                  "  rhec plugins gn_rti\n"
+                  "  rhec plugins --doctor              why each file was or was not accepted\n"
+                  "  rhec plugins --json --plugin-path my/plugins",
+                  [arguments] { return show(*arguments); });
   command
-      ->add_option("name", arguments->name,
-                   "show this plugin, its options, and what a model has; a plugin or a file with --doctor")
-      ->type_name("NAME");
-  command->add_flag("--json", arguments->json, "print JSON, options included");
-  command->add_flag(
-      "--doctor", arguments->doctor,
-      "say of every file that could be a plugin if it is accepted, or why not and what to do, and try the "
-      "accepted ones; the exit code is 3 if one is refused, not used, or fails");
-  add_plugin_path(*command, arguments->plugin_path);
-  command->callback([=, &chosen] { chosen = [=] { return show(*arguments); }; });
+      .add("name", arguments->name,
+           "show this plugin, its options, and what a model has; a plugin or a file with --doctor")
+      .value("NAME");
+  command.add_flag("--json", arguments->json, "print JSON, options included");
+  command.add_flag("--doctor", arguments->doctor,
+                   "say of every file that could be a plugin if it is accepted, or why not and what to do, and try the "
+                   "accepted ones; the exit code is 3 if one is refused, not used, or fails");
+  add_plugin_path(command, arguments->plugin_path);
 }
 
 }  // namespace rhec::apps

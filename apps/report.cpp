@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -61,27 +60,25 @@ int report(const ReportArguments& arguments) {
 
 }  // namespace
 
-void add_report(CLI::App& program, Action& chosen) {
+void add_report(Program& program) {
   auto arguments = std::make_shared<ReportArguments>();
-  CLI::App* command = program.add_subcommand(
-      "report", "Makes a page to look at of a run, an estimation, a sweep or a comparison of solvers.");
-  command->footer(
+  Command command = program.add(
+      "report", "Makes a page to look at of a run, an estimation, a sweep or a comparison of solvers.",
       "The page is one HTML file that needs no network: open it in a browser. It has every figure with its numbers, "
       "and a\n"
       "window that can be moved through a run: blocks, measurements, the plan.\n\n"
       "Examples:\n"
       "  rhec report out/figure8 -o figure8.html\n"
       "  rhec report out/blocks.sqlite -o blocks.html --svg out/figures\n"
-      "  rhec report out/compare/compare.json");
+      "  rhec report out/compare/compare.json",
+      [arguments] { return report(*arguments); });
   command
-      ->add_option("source", arguments->source,
-                   "the folder of 'rhec run' or 'rhec estimate', the database of 'rhec sweep', or compare.json")
-      ->type_name("RUN_OR_DB_OR_COMPARISON")
-      ->required();
-  command->add_option("-o,--out", arguments->page, "the page")->type_name("FILE")->capture_default_str();
-  command->add_option("--svg", arguments->figures, "folder for the figures, each a file of its own for a paper")
-      ->type_name("DIR");
-  command->callback([&chosen, arguments] { chosen = [arguments] { return report(*arguments); }; });
+      .add("source", arguments->source,
+           "the folder of 'rhec run' or 'rhec estimate', the database of 'rhec sweep', or compare.json")
+      .value("RUN_OR_DB_OR_COMPARISON")
+      .required();
+  command.add("-o,--out", arguments->page, "the page").value("FILE").shows_default();
+  command.add("--svg", arguments->figures, "folder for the figures, each a file of its own for a paper").value("DIR");
 }
 
 }  // namespace rhec::apps

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -76,11 +75,10 @@ int run(const RunArguments& arguments) {
 
 }  // namespace
 
-void add_run(CLI::App& program, Action& chosen) {
+void add_run(Program& program) {
   auto arguments = std::make_shared<RunArguments>();
-  CLI::App* command =
-      program.add_subcommand("run", "Runs a scenario: a robot on simulated ground learns its slip and holds its path.");
-  command->footer(
+  Command command = program.add(
+      "run", "Runs a scenario: a robot on simulated ground learns its slip and holds its path.",
       "Writes steps.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; 'rhec report' makes "
       "a\n"
       "page of them. The exit code is 3 where the robot did not reach the end of its path.\n\n"
@@ -88,13 +86,13 @@ void add_run(CLI::App& program, Action& chosen) {
       "  rhec run scenarios/figure8.yaml --out out/figure8\n"
       "  rhec run scenarios/figure8.yaml --set speed=4 --set 'blocking.kappa={name: full_horizon}' --out out/fhb\n"
       "  rhec run scenarios/zigzag.yaml --set estimator.name=ekf --set seed=3 --out out/ekf\n"
-      "  rhec run scenarios/zigzag.yaml --dump out/problems --dump-every 10");
-  command->add_option("scenario", arguments->scenario, "a YAML file")->required();
-  add_assignments(*command, arguments->assignments, "a key of the scenario");
-  add_out(*command, arguments->out, "DIR", "folder of the results");
-  add_dump(*command, arguments->dump);
-  add_plugin_path(*command, arguments->plugin_path);
-  command->callback([&chosen, arguments] { chosen = [arguments] { return run(*arguments); }; });
+      "  rhec run scenarios/zigzag.yaml --dump out/problems --dump-every 10",
+      [arguments] { return run(*arguments); });
+  command.add("scenario", arguments->scenario, "a YAML file").required();
+  add_assignments(command, arguments->assignments, "a key of the scenario");
+  add_out(command, arguments->out, "DIR", "folder of the results");
+  add_dump(command, arguments->dump);
+  add_plugin_path(command, arguments->plugin_path);
 }
 
 }  // namespace rhec::apps

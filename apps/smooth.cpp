@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -80,20 +79,19 @@ int smooth(const LogArguments& arguments) {
 
 }  // namespace
 
-void add_smooth(CLI::App& program, Action& chosen) {
+void add_smooth(Program& program) {
   auto arguments = std::make_shared<LogArguments>();
-  CLI::App* command = program.add_subcommand(
-      "smooth", "Estimates a whole recorded drive at once: every moment from what was measured before and after it.");
-  command->footer(
+  Command command = program.add(
+      "smooth", "Estimates a whole recorded drive at once: every moment from what was measured before and after it.",
       "The scenario's estimator goes through the log first; its estimates are the start. The section `smoother` says\n"
       "which blocks the whole log has and which solver is used. Writes estimates.csv, times.csv, summary.json,\n"
       "horizons.jsonl and run.svg to the output folder. The exit code is 3 where the problem was not solved.\n\n"
       "Examples:\n"
       "  rhec smooth scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/park\n"
       "  rhec smooth scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 \\\n"
-      "    --set 'smoother.blocking.kappa={name: structured, size: 50, neighbour_sigma: 0.004}'");
-  add_log_arguments(*command, *arguments);
-  command->callback([&chosen, arguments] { chosen = [arguments] { return smooth(*arguments); }; });
+      "    --set 'smoother.blocking.kappa={name: structured, size: 50, neighbour_sigma: 0.004}'",
+      [arguments] { return smooth(*arguments); });
+  add_log_arguments(command, *arguments);
 }
 
 }  // namespace rhec::apps

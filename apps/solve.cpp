@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -295,11 +294,10 @@ int solve(const SolveArguments& arguments) {
 
 }  // namespace
 
-void add_solve(CLI::App& program, Action& chosen) {
+void add_solve(Program& program) {
   auto arguments = std::make_shared<SolveArguments>();
-  CLI::App* command = program.add_subcommand(
-      "solve", "Solves the problems of a file, one a line, each alone; writes one solution a line.");
-  command->footer(
+  Command command = program.add(
+      "solve", "Solves the problems of a file, one a line, each alone; writes one solution a line.",
       "A solve begins at the line's guess, where it has one, and otherwise (or with --cold) at a simulation with the\n"
       "measured or the reference inputs.\n\n"
       "With --sequence the lines of one id prefix (run/rhe of run/rhe/19) are a sequence over time: the guess is the\n"
@@ -309,18 +307,18 @@ void add_solve(CLI::App& program, Action& chosen) {
       "Examples:\n"
       "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
       "  head -1 problems.jsonl | rhec solve - --solver gn_rti\n"
-      "  rhec solve problems.jsonl --solver gn_rti --sequence --verbose > solutions.jsonl");
-  command->add_option("problems", arguments->problems, "a file of problems; - for standard input")
-      ->required()
-      ->type_name("PROBLEMS.jsonl");
-  command->add_option("--solver", arguments->solver, "a solver of 'rhec plugins'")->required()->type_name("NAME");
-  add_assignments(*command, arguments->assignments, "an option of the solver");
-  command->add_flag("--sequence", arguments->sequence, "warm starts along each id prefix");
-  command->add_flag("--cold", arguments->cold, "pass over the guesses of the file");
-  add_out(*command, arguments->out, "FILE", "write there, whole or not at all, instead of to standard output");
-  command->add_flag("--verbose", arguments->verbose, "print a summary even where standard error is no terminal");
-  add_plugin_path(*command, arguments->plugin_path);
-  command->callback([=, &chosen] { chosen = [=] { return solve(*arguments); }; });
+      "  rhec solve problems.jsonl --solver gn_rti --sequence --verbose > solutions.jsonl",
+      [arguments] { return solve(*arguments); });
+  command.add("problems", arguments->problems, "a file of problems; - for standard input")
+      .required()
+      .value("PROBLEMS.jsonl");
+  command.add("--solver", arguments->solver, "a solver of 'rhec plugins'").required().value("NAME");
+  add_assignments(command, arguments->assignments, "an option of the solver");
+  command.add_flag("--sequence", arguments->sequence, "warm starts along each id prefix");
+  command.add_flag("--cold", arguments->cold, "pass over the guesses of the file");
+  add_out(command, arguments->out, "FILE", "write there, whole or not at all, instead of to standard output");
+  command.add_flag("--verbose", arguments->verbose, "print a summary even where standard error is no terminal");
+  add_plugin_path(command, arguments->plugin_path);
 }
 
 }  // namespace rhec::apps

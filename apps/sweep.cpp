@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
 #include <csignal>
@@ -177,10 +176,10 @@ int sweep(const SweepArguments& arguments) {
 
 }  // namespace
 
-void add_sweep(CLI::App& program, Action& chosen) {
+void add_sweep(Program& program) {
   auto arguments = std::make_shared<SweepArguments>();
-  CLI::App* command = program.add_subcommand("sweep", "Runs a scenario over a grid of its keys, on all cores.");
-  command->footer(
+  Command command = program.add(
+      "sweep", "Runs a scenario over a grid of its keys, on all cores.",
       "A sweep is a YAML file that names a scenario and gives some of its keys lists or ranges of values; "
       "docs/sweep.md\n"
       "describes it, and the SQLite database that the runs go to. A run is written as soon as it is finished, and one\n"
@@ -189,19 +188,18 @@ void add_sweep(CLI::App& program, Action& chosen) {
       "The exit code is 3 where a run of the grid did not reach the end of its path, or where it was stopped.\n\n"
       "Examples:\n"
       "  rhec sweep scenarios/sweep_blocks.yaml --out out/blocks.sqlite\n"
-      "  rhec sweep scenarios/sweep_blocks.yaml --dry-run");
-  command->add_option("sweep", arguments->sweep, "a YAML file")->required();
-  command->add_option("--out", arguments->out, "database of the runs; otherwise out/ and the sweep's name")
-      ->type_name("FILE");
+      "  rhec sweep scenarios/sweep_blocks.yaml --dry-run",
+      [arguments] { return sweep(*arguments); });
+  command.add("sweep", arguments->sweep, "a YAML file").required();
+  command.add("--out", arguments->out, "database of the runs; otherwise out/ and the sweep's name").value("FILE");
   command
-      ->add_option("--threads", arguments->threads,
-                   "runs at the same time; otherwise as many as there are cores, or 1 in each process of mpirun")
-      ->type_name("N")
-      ->check(CLI::Range(1, 4096));
-  command->add_flag("--yes", arguments->yes, "begin a grid of more than a million runs without being asked");
-  command->add_flag("--dry-run", arguments->dry_run, "check the sweep and count its runs, no more");
-  add_plugin_path(*command, arguments->plugin_path);
-  command->callback([&chosen, arguments] { chosen = [arguments] { return sweep(*arguments); }; });
+      .add("--threads", arguments->threads,
+           "runs at the same time; otherwise as many as there are cores, or 1 in each process of mpirun")
+      .value("N")
+      .within(1, 4096);
+  command.add_flag("--yes", arguments->yes, "begin a grid of more than a million runs without being asked");
+  command.add_flag("--dry-run", arguments->dry_run, "check the sweep and count its runs, no more");
+  add_plugin_path(command, arguments->plugin_path);
 }
 
 }  // namespace rhec::apps

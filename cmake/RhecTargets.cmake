@@ -27,6 +27,39 @@ if(RHEC_SANITIZE_THREADS)
   target_link_options(rhec_flags INTERFACE -fsanitize=thread)
 endif()
 
+# rhec_add_precompiled_headers(NAME): what most sources include, parsed once with the options of this folder. Those of its
+# targets, and of the folders below and after it, that call rhec_precompile have it.
+#   A source includes what it needs all the same: it compiles without these, and clang-tidy reads it so.
+function(rhec_add_precompiled_headers NAME)
+  if(NOT RHEC_PRECOMPILE)
+    return()
+  endif()
+  file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/${NAME}.cpp" CONTENT "// Headers alone.\n")
+  add_library(${NAME} OBJECT EXCLUDE_FROM_ALL "${CMAKE_CURRENT_BINARY_DIR}/${NAME}.cpp")
+  target_compile_features(${NAME} PRIVATE cxx_std_20)
+  target_compile_options(${NAME} PRIVATE ${RHEC_PRECOMPILED_OPTIONS})
+  target_link_libraries(${NAME} PRIVATE rhec_flags Eigen3::Eigen fmt::fmt)
+  target_precompile_headers(${NAME} PRIVATE ${RHEC_PRECOMPILED_HEADERS})
+  set(RHEC_PRECOMPILED ${NAME} PARENT_SCOPE)
+endfunction()
+set(RHEC_PRECOMPILED_HEADERS
+  <algorithm> <array> <charconv> <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory> <numbers> <optional>
+  <set> <span> <string> <string_view> <utility> <vector> <fmt/format.h> <Eigen/Cholesky> <Eigen/Core>)
+# ccache is to know what a precompiled header holds. gcc 12 warns of sums of texts, once std::string is precompiled, that they
+# are written beyond the short texts' place in the object.
+set(RHEC_PRECOMPILED_OPTIONS "$<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess;-Wno-array-bounds;-Wno-stringop-overflow>")
+
+# rhec_precompile(TARGET): the target's sources have the precompiled headers.
+function(rhec_precompile TARGET)
+  if(NOT RHEC_PRECOMPILE)
+    return()
+  endif()
+  target_precompile_headers(${TARGET} REUSE_FROM ${RHEC_PRECOMPILED})
+  target_compile_options(${TARGET} PRIVATE ${RHEC_PRECOMPILED_OPTIONS})
+  # What fmt is told must be the same for all, also where it is not linked.
+  target_compile_definitions(${TARGET} PRIVATE $<TARGET_PROPERTY:fmt::fmt,INTERFACE_COMPILE_DEFINITIONS>)
+endfunction()
+
 # rhec_set_up_shared_library(NAME): what all shared libraries of ours have. The target is `rhec_<NAME>`, its alias and its
 # name in the package are `rhec::<NAME>`.
 function(rhec_set_up_shared_library NAME)
@@ -59,12 +92,14 @@ function(rhec_add_room FLOOR ROOM)
     target_link_options(${TARGET} PRIVATE "LINKER:--as-needed")
     rhec_set_up_shared_library(${FLOOR}_${ROOM})
     set_property(GLOBAL APPEND PROPERTY RHEC_ROOMS_${FLOOR} rhec::${FLOOR}_${ROOM})
+    rhec_precompile(${TARGET})
   elseif(ARG_SOURCES)
     add_library(${TARGET} OBJECT ${ARG_SOURCES})
     target_include_directories(${TARGET} PUBLIC "${HEADERS}")
     target_link_libraries(${TARGET} PUBLIC ${ARG_AFTER} ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} rhec_flags)
     target_compile_features(${TARGET} PUBLIC cxx_std_20)
     rhec_add_objects(${FLOOR} ${TARGET})
+    rhec_precompile(${TARGET})
   else()
     add_library(${TARGET} INTERFACE)
     target_include_directories(${TARGET} INTERFACE "${HEADERS}")
@@ -108,6 +143,7 @@ include("${CMAKE_CURRENT_LIST_DIR}/RhecPlugin.cmake")
 function(rhec_add_plugin NAME)
   rhec_plugin_module(${NAME} ${ARGN})
   target_link_libraries(${NAME} PRIVATE rhec_flags)
+  rhec_precompile(${NAME})
   file(RELATIVE_PATH LIB_FROM_PLUGINS "${CMAKE_INSTALL_FULL_LIBDIR}/rhec/plugins" "${CMAKE_INSTALL_FULL_LIBDIR}")
   set_target_properties(${NAME} PROPERTIES
     LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/${RHEC_PLUGIN_DIRECTORY}"

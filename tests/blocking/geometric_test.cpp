@@ -1,5 +1,6 @@
 // The strategy of plugins/template.
 #include "blocking/view.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {
@@ -43,7 +44,7 @@ TEST(Geometric, BordersOfAnEstimatorStayWhereTheyAreOrVanishForGood) {
 }
 
 TEST(Geometric, RefusesWhatItCannotDo) {
-  EXPECT_THAT(message([] { make("geometric"); }), HasSubstr("now: expected 'end' for an estimator or 'start'"));
+  EXPECT_THAT(error_of([] { make("geometric"); }), HasSubstr("now: expected 'end' for an estimator or 'start'"));
   EXPECT_EQ(make("geometric", "{now: end, first: 4}")->why_not(15), "");
   EXPECT_THAT(make("geometric", "{now: end, first: 15}")->why_not(15), HasSubstr("as long as the horizon"));
 }

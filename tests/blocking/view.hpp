@@ -14,6 +14,7 @@
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::testing {
 
@@ -52,19 +53,9 @@ inline View view(const Blocking& blocking, std::int64_t k, int intervals) {
   return result;
 }
 
-template <class Call>
-std::string message(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 /// What is said of options that make no sense.
 inline std::string mistake(const std::string& name, const std::string& yaml) {
-  return message([&] { make(name, yaml); });
+  return error_of([&] { make(name, yaml); });
 }
 
 }  // namespace rhec::testing

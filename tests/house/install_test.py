@@ -2,6 +2,7 @@
 """The installed tree can be moved and used: install, move away, run, and build against it from outside.
 
     install_test.py <build directory> --source <source root> [--cxxflags <flags>] [--cmake <cmake>] [--cxx <compiler>]
+                    [--instruction-sets <set>,<set>]
 """
 import argparse
 import json
@@ -153,7 +154,8 @@ def check_problem(prefix, work, arguments):
 def check_template(home, arguments):
     """What the README says of a plugin from outside, command by command, as someone whose rhec lies in ~/rhec.
 
-    Where the page names a build of rhec itself, it is the one under test.
+    Where the page names a build of rhec itself, it is the one under test, and the vehicle is compiled for the instruction
+    sets that its models have.
     """
     blocks = RUN_BLOCK.findall((arguments.source / "README.md").read_text())
     expect(len(blocks) == 4, f"README.md has {len(blocks)} blocks of commands that are run here, and not 4")
@@ -163,6 +165,10 @@ def check_template(home, arguments):
     if arguments.cxx:
         environment["CXX"] = arguments.cxx
     script = "set -euo pipefail\n" + "".join(blocks).replace("build/release", shlex.quote(str(arguments.build.resolve())))
+    configure = "cmake -S my_robot -B my_robot/build"
+    expect(script.count(configure) == 1, f"README.md does not say '{configure}'")
+    if arguments.instruction_sets:
+        script = script.replace(configure, f"{configure} -DRHEC_MODEL_INSTRUCTION_SETS={shlex.quote(arguments.instruction_sets.replace(',', ';'))}")
     result = subprocess.run(["bash", "-c", script], cwd=home, env=environment, text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     expect(result.returncode == 0, f"the README's page on plugins from outside ends with {result.returncode}:\n{result.stdout}")
@@ -187,6 +193,7 @@ def main():
     parser.add_argument("--cmake", default="cmake")
     parser.add_argument("--cxx", default="")
     parser.add_argument("--cxxflags", default="")
+    parser.add_argument("--instruction-sets", default="")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="rhec-install-") as directory:
         work = pathlib.Path(directory).resolve()

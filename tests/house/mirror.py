@@ -32,24 +32,25 @@ SUITES = {
 }
 # Sources without a test of their own -> the file that tests them, and what it does with them.
 UNTESTED = {
-    "apps/estimate.cpp": "tests/cli/report.py: the files of an estimation are those that its report is held against",
+    "apps/command.cpp": "tests/cli/bad_input.py: wrong commands and arguments; tests/cli/runs.py: the help",
+    "apps/estimate.cpp": "tests/cli/report_log.py: the files of an estimation are those that its report is held against",
     "apps/log_arguments.cpp": "tests/cli/smooth.py: `rhec smooth` has the arguments that `rhec estimate` has",
     "apps/main.cpp": "tests/cli/bad_input.py: commands, usage and exit codes",
     "apps/options.cpp": "tests/cli/configuration.py: docs/configuration.md is what it prints",
     "apps/plugins.cpp": "tests/cli/runs.py: the list, and one plugin's options; tests/cli/doctor.py has --doctor",
     "apps/report/embedded.cpp": "tests/report/report.py: the page, which it holds, is looked at in a browser",
-    "apps/report/report_page.cpp": "tests/cli/report.py: the document is read from the page",
+    "apps/report/report_page.cpp": "tests/cli/report_run.py: the document is read from the page",
     "apps/report/svg_engine.cpp": "tests/report/figures.py: each figure of each kind of report",
     "apps/run.cpp": "tests/cli/runs.py: every choice of a scenario, and what a run leaves behind",
     "apps/solve.cpp": "tests/cli/dump.py: problems that were saved are solved again; tests/cli/bad_input.py has mistakes",
     "apps/sweep_ranks.cpp": "tests/cli/sweep_mpi.py: sweeps under mpirun, and of a build without MPI",
     "sim/comparison/bench.cpp": "tests/sim/comparison/comparison_test.cpp: every answer is of a bench; refusals, too",
     "sim/problems/problem_dump.cpp": "tests/cli/dump.py: what a loop saves, attempts and failures, and its replay",
-    "sim/report/report_comparison.cpp": "tests/cli/report.py: needs a comparison's files, which that test makes",
-    "sim/report/report_horizons.cpp": "tests/cli/report.py: needs a run's horizons.jsonl, which that test makes",
-    "sim/report/report_log.cpp": "tests/cli/report.py: needs an estimation's files, which that test makes",
-    "sim/report/report_run.cpp": "tests/cli/report.py: needs a run's files, which that test makes",
-    "sim/report/report_sweep.cpp": "tests/cli/report.py: needs a sweep's database, which that test makes",
+    "sim/report/report_comparison.cpp": "tests/cli/report_study.py: needs a comparison's files, which that test makes",
+    "sim/report/report_horizons.cpp": "tests/cli/report_run.py: needs a run's horizons.jsonl, which that test makes",
+    "sim/report/report_log.cpp": "tests/cli/report_log.py: needs an estimation's files, which that test makes",
+    "sim/report/report_run.cpp": "tests/cli/report_run.py: needs a run's files, which that test makes",
+    "sim/report/report_sweep.cpp": "tests/cli/report_study.py: needs a sweep's database, which that test makes",
 }
 # Tests that mirror no source -> what they are about.
 ALONE = {

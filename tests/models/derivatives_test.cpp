@@ -1,27 +1,12 @@
 // Every model plugin that is found: `rhec check`, instruction sets, and no allocation in evaluation.
 #include <gmock/gmock.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <memory>
-#include <new>
 
 #include "model_checks.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/check/model_check.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-// Not inlined, lest the compiler takes malloc and delete for a mismatched pair.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "support/allocations.hpp"
 
 namespace rhec {
 namespace {
@@ -107,10 +92,10 @@ TEST_P(EveryModel, EvaluatesWithoutAllocation) {
     checks::Stages s = checks::random_stages(*model_, 15, true, 5);
     const auto intervals = s.intervals(true, true, second);
     const auto nodes = s.nodes(true, true, second);
-    const long before = allocations;
+    const long before = allocation_count();
     model_->integrate(intervals);
     model_->observe(nodes);
-    EXPECT_EQ(allocations, before);
+    EXPECT_EQ(allocation_count(), before);
   });
 }
 

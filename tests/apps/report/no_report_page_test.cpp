@@ -5,6 +5,7 @@
 
 #include "apps/report/report_page.hpp"
 #include "rhec/core/base/error.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -12,21 +13,11 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-template <class Call>
-std::string message_of(const Call& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 TEST(NoReportPage, SaysHowToBuildRhecWithIt) {
   EXPECT_FALSE(has_report_page());
   const auto remedy = AllOf(HasSubstr("built without the report's page"), HasSubstr("-DRHEC_REPORT=ON"));
-  EXPECT_THAT(message_of([] { report_page("{}"); }), remedy);
-  EXPECT_THAT(message_of([] { report_figures("{}"); }), remedy);
+  EXPECT_THAT(error_of([] { report_page("{}"); }), remedy);
+  EXPECT_THAT(error_of([] { report_figures("{}"); }), remedy);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include "rhec/core/config/options.hpp"
+#include "support/error_of.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -62,12 +63,7 @@ Settings line(int number, const std::string& text) { return Settings::scalar(tex
 Options parse(const Settings& from) { return Options::table().parse(from, "solver 'toy'", {"name"}); }
 
 std::string message(const Settings& from) {
-  try {
-    parse(from);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
+  return error_of([&] { parse(from); });
 }
 
 std::string message(const std::string& key, const std::string& text) {

@@ -1,4 +1,5 @@
 #include "rhec/core/config/settings.hpp"
+#include "support/error_of.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,16 +13,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 Settings written(const std::string& text, int line = 1) { return Settings::scalar(text, {"field.yaml", line}); }
-
-template <class Call>
-std::string message(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 TEST(Settings, ANewNodeIsNull) {
   const Settings node;
@@ -59,7 +50,7 @@ TEST(Settings, SetReplacesWhatWasThereAndKeepsTheOrder) {
 TEST(Settings, SetRefusesAWayThroughAScalar) {
   Settings root;
   root.set("a", written("1", 4));
-  const std::string text = message([&] { root.set("a.b", Settings::scalar("2", {"--set a.b=2", 0})); });
+  const std::string text = error_of([&] { root.set("a.b", Settings::scalar("2", {"--set a.b=2", 0})); });
   EXPECT_THAT(text, HasSubstr("--set a.b=2"));
   EXPECT_THAT(text, HasSubstr("'a' is '1', written at field.yaml:4"));
 }
@@ -67,7 +58,7 @@ TEST(Settings, SetRefusesAWayThroughAScalar) {
 TEST(Settings, SetRefusesMalformedPathsAndChangesNothing) {
   for (const char* path : {"", ".", "a.", ".a", "a..b", "a.b."}) {
     Settings root;
-    EXPECT_THAT(message([&] { root.set(path, written("1")); }), HasSubstr("empty")) << path;
+    EXPECT_THAT(error_of([&] { root.set(path, written("1")); }), HasSubstr("empty")) << path;
     EXPECT_EQ(root.find("a"), nullptr) << path;
   }
 }
@@ -76,7 +67,7 @@ TEST(Settings, AddTakesKeysWithDotsAndRefusesASecondOne) {
   Settings root = Settings::map({"field.yaml", 1});
   root.add("linear.solver", written("ma57", 2));
   EXPECT_EQ(root.find("linear.solver")->text(), "ma57");
-  const std::string text = message([&] { root.add("linear.solver", written("mumps", 7)); });
+  const std::string text = error_of([&] { root.add("linear.solver", written("mumps", 7)); });
   EXPECT_THAT(text, HasSubstr("field.yaml:7: linear.solver: the key is written twice, first at field.yaml:2"));
 }
 
@@ -122,17 +113,17 @@ TEST(Settings, ReadsIntegersWholeOrNotAtAll) {
 TEST(Settings, ReadsFlags) {
   EXPECT_TRUE(written("true").as_flag());
   EXPECT_FALSE(written("false").as_flag());
-  EXPECT_EQ(message([] { written("yes", 5).as_flag(); }), "field.yaml:5: found 'yes', expected true or false");
+  EXPECT_EQ(error_of([] { written("yes", 5).as_flag(); }), "field.yaml:5: found 'yes', expected true or false");
 }
 
 TEST(Settings, ErrorsSayWhereAndWhat) {
   Settings root;
   root.set("horizon.length", written("five", 12));
-  EXPECT_EQ(message([&] { root.find_path("horizon.length")->as_integer(); }),
+  EXPECT_EQ(error_of([&] { root.find_path("horizon.length")->as_integer(); }),
             "field.yaml:12: horizon.length: found 'five', expected an integer");
-  EXPECT_THAT(message([&] { root.find("horizon")->as_number(); }),
+  EXPECT_THAT(error_of([&] { root.find("horizon")->as_number(); }),
               HasSubstr("horizon: found a map, expected a number"));
-  EXPECT_THAT(message([&] { root.find_path("horizon.length")->as_numbers(); }),
+  EXPECT_THAT(error_of([&] { root.find_path("horizon.length")->as_numbers(); }),
               HasSubstr("expected a list of numbers"));
 }
 
@@ -142,7 +133,7 @@ TEST(Settings, ListErrorsNameTheItem) {
   Settings list = *root.find("sigma");
   list.append(written("1", 2));
   list.append(written("x", 3));
-  EXPECT_EQ(message([&] { list.as_numbers(); }), "field.yaml:3: sigma[1]: found 'x', expected a number");
+  EXPECT_EQ(error_of([&] { list.as_numbers(); }), "field.yaml:3: sigma[1]: found 'x', expected a number");
 }
 
 }  // namespace

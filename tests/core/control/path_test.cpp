@@ -3,13 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <random>
 #include <string>
 
 #include "rhec/core/base/error.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {
@@ -18,15 +18,6 @@ constexpr double pi = std::numbers::pi;
 
 // An L: 3 m along +x, then 4 m along +y.
 Path corner() { return Path({{0, 0, 1.0}, {3, 0, 2.0}, {3, 4, 4.0}}); }
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 TEST(Path, IsAddressedByArcLength) {
   const Path path = corner();
@@ -66,9 +57,9 @@ TEST(Path, RefusesWhatIsNoPath) {
   EXPECT_THROW(Path(std::vector<Waypoint>{}), Error);
   EXPECT_THROW(Path(std::vector<Waypoint>{{1, 2, {}}}), Error);
   EXPECT_THROW(Path({{1, 2, {}}, {1, 2, {}}}), Error);
-  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {nan, 0, {}}}); }).find("waypoint 2"), std::string::npos);
-  EXPECT_NE(message_of([&] { Path({{0, infinity, {}}, {1, 0, {}}}); }).find("waypoint 1"), std::string::npos);
-  EXPECT_NE(message_of([&] { Path({{0, 0, {}}, {1, 0, nan}}); }).find("waypoint 2"), std::string::npos);
+  EXPECT_NE(error_of([&] { Path({{0, 0, {}}, {nan, 0, {}}}); }).find("waypoint 2"), std::string::npos);
+  EXPECT_NE(error_of([&] { Path({{0, infinity, {}}, {1, 0, {}}}); }).find("waypoint 1"), std::string::npos);
+  EXPECT_NE(error_of([&] { Path({{0, 0, {}}, {1, 0, nan}}); }).find("waypoint 2"), std::string::npos);
 }
 
 TEST(Path, ClosestPointIsWhatAFineSearchFinds) {

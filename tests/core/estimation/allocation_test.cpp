@@ -2,10 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <atomic>
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <numbers>
 #include <vector>
 
@@ -17,27 +14,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/world/paths.hpp"
 #include "rhec/sim/world/truth.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}  // namespace
-
-// Eigen allocates with malloc rather than operator new, so both are counted. Sanitizers replace malloc.
-#if defined(__SANITIZE_ADDRESS__)
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-#else
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-#endif
+#include "support/allocations.hpp"
 
 namespace rhec {
 namespace {
@@ -102,7 +79,7 @@ long allocations_in_the_loop(const Options& options) {
   std::array<double, 2> measured{};
   std::array<double, 3> outputs{};
   int fallbacks = 0;
-  const long before = allocations;
+  const long before = allocation_count();
   for (int k = 0; k < 40; ++k) {
     const double time = 0.2 * k;
     sensors.observe(vehicle.state().data(), outputs.data());
@@ -118,7 +95,7 @@ long allocations_in_the_loop(const Options& options) {
     sensors.measure_inputs(command.inputs.data(), measured.data());
     estimator.push_input(time, measured.data());
   }
-  const long after = allocations;
+  const long after = allocation_count();
   EXPECT_EQ(fallbacks, 0);
   EXPECT_GT(controller.follower().arc_length(), 15.0);
   EXPECT_LT(std::hypot(estimator.estimate(7.8).state[0] - vehicle.state()[0],
@@ -128,13 +105,13 @@ long allocations_in_the_loop(const Options& options) {
 }
 
 TEST(EstimationAllocation, AllocationsAreCounted) {
-  long before = allocations;
+  long before = allocation_count();
   const auto memory = std::make_unique<std::vector<double>>(100);
-  EXPECT_GE(allocations - before, 2);
-  before = allocations;
+  EXPECT_GE(allocation_count() - before, 2);
+  before = allocation_count();
 #if !defined(__SANITIZE_ADDRESS__)
   const Eigen::VectorXd vector = Eigen::VectorXd::Zero(100);
-  EXPECT_GE(allocations - before, 1);
+  EXPECT_GE(allocation_count() - before, 1);
 #endif
 }
 

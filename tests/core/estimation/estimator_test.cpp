@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
+#include "support/error_of.hpp"
 #include "support/linear_case.hpp"
 
 namespace rhec {
@@ -287,14 +288,7 @@ TEST_F(Timeline, BuffersThatAreFullLoseTheirOldest) {
 }
 
 TEST_F(Timeline, RefusesNumbersThatMakeNoSense) {
-  const auto message = [&](const Estimator::Timeline& timeline) -> std::string {
-    try {
-      make(timeline);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "no error";
-  };
+  const auto message = [&](const Estimator::Timeline& timeline) { return error_of([&] { make(timeline); }); };
   EXPECT_THAT(message({.longest_interval = 0.0}), HasSubstr("longest interval"));
   EXPECT_THAT(message({.longest_interval = nan}), HasSubstr("longest interval"));
   EXPECT_THAT(message({.tolerance = -1.0}), HasSubstr("tolerance"));

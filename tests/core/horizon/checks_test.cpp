@@ -7,6 +7,7 @@
 #include <string>
 
 #include "rhec/core/base/error.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {
@@ -18,21 +19,11 @@ constexpr double infinity = HUGE_VAL;
 const std::vector<Variable> variables = {{.name = "x", .unit = "m", .meaning = "place", .lower = -1.0, .upper = 2.0},
                                          {.name = "v", .unit = "m/s", .meaning = "speed", .lower = 0.0}};
 
-template <class Call>
-std::string message(const Call& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 TEST(Weights, AreOneFiniteNumberOfAtLeastZeroEach) {
   const auto said = [](const std::vector<double>& weights) {
-    return message([&] { check_weights("state weights", weights, variables); });
+    return error_of([&] { check_weights("state weights", weights, variables); });
   };
-  EXPECT_EQ(said({0.0, 3.0}), "no error");
+  EXPECT_EQ(said({0.0, 3.0}), "");
   EXPECT_THAT(said({1.0}), HasSubstr("state weights: 1 given; expected 2, one for each variable"));
   EXPECT_THAT(said({1.0, -1.0}), HasSubstr("state weights: -1 for 'v'; expected a finite number of at least 0"));
   EXPECT_THAT(said({infinity, 1.0}), HasSubstr("inf for 'x'"));
@@ -60,9 +51,9 @@ TEST(DefaultBounds, LeaveWhatIsGiven) {
 
 TEST(DefaultBounds, MustFit) {
   const auto said = [](std::vector<double> lower, std::vector<double> upper) {
-    return message([&] { fill_default_bounds("input bounds", lower, upper, variables, true); });
+    return error_of([&] { fill_default_bounds("input bounds", lower, upper, variables, true); });
   };
-  EXPECT_EQ(said({1.0, 1.0}, {1.0, 1.0}), "no error");
+  EXPECT_EQ(said({1.0, 1.0}, {1.0, 1.0}), "");
   EXPECT_THAT(said({1.0}, {1.0}), HasSubstr("input bounds: expected 2 of each side"));
   EXPECT_THAT(said({1.0, 3.0}, {1.0, 2.0}), HasSubstr("input bounds: [3, 2] for 'v'; expected lower <= upper"));
   EXPECT_THAT(said({1.0, std::nan("")}, {1.0, 2.0}), HasSubstr("for 'v'; expected lower <= upper"));

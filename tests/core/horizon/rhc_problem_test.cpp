@@ -9,6 +9,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "support/cart.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {
@@ -54,12 +55,7 @@ TEST(RhcProblem, RefusesASetUpThatDoesNotFit) {
   const auto refused = [&](const auto& spoil) {
     RhcProblem::Setup setup = right;
     spoil(setup);
-    try {
-      RhcProblem(cart(), setup);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return error_of([&] { RhcProblem(cart(), setup); });
   };
   EXPECT_EQ(refused([](RhcProblem::Setup&) {}), "");
   EXPECT_NE(refused([](RhcProblem::Setup& s) { s.state_weights = {1.0}; }).find("state weights"), std::string::npos);

@@ -4,12 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <memory>
-#include <new>
 #include <vector>
 
 #include "rhec/core/horizon/rhc_problem.hpp"
@@ -17,19 +14,7 @@
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/core/qp/kkt.hpp"
 #include "rhec/core/qp/stage_qp_views.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}  // namespace
-
-// Not inlined: otherwise gcc would warn of a mismatch of malloc and delete.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "support/allocations.hpp"
 
 namespace rhec {
 namespace {
@@ -164,14 +149,14 @@ TEST(Shift, MayWriteIntoThePointThatWasTaken) {
   Iterate point = point_of(problem);
   GuessShifter shifter(problem);
   Iterate fresh(problem.capacity());
-  long before = allocations;
+  long before = allocation_count();
   shifter.take(problem, point);
-  EXPECT_EQ(allocations - before, 0);
+  EXPECT_EQ(allocation_count() - before, 0);
   set_blocks(problem, 6, {0, 3});
-  before = allocations;
+  before = allocation_count();
   ASSERT_TRUE(shifter.apply(1, problem, fresh));
   ASSERT_TRUE(shifter.apply(1, problem, point));
-  EXPECT_EQ(allocations - before, 0) << "nothing is allocated once the shifter is there";
+  EXPECT_EQ(allocation_count() - before, 0) << "nothing is allocated once the shifter is there";
   for (int i = 0; i <= 6; ++i) {
     for (int j = 0; j < problem.capacity().states; ++j) {
       EXPECT_EQ(point.state(i)[j], fresh.state(i)[j]);

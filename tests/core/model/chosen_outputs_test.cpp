@@ -6,6 +6,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/error_of.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec {
@@ -23,13 +24,8 @@ std::shared_ptr<Model> model_with(const std::string& options) {
   return host().make_model("tractor_trailer", parse_yaml(options, "robot.yaml"));
 }
 
-std::string error_of(const std::string& options) {
-  try {
-    model_with(options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
+std::string error_of_options(const std::string& options) {
+  return error_of([&] { model_with(options); });
 }
 
 /// All outputs at random nodes.
@@ -121,12 +117,12 @@ TEST(ChosenOutputs, LeaveTheVehicleAsItIs) {
 }
 
 TEST(ChosenOutputs, MistakesAreNamedWithTheirPlace) {
-  EXPECT_THAT(error_of("outputs:\n  - delta\n  - x_gps"),
+  EXPECT_THAT(error_of_options("outputs:\n  - delta\n  - x_gps"),
               HasSubstr("robot.yaml:3: outputs[1]: found 'x_gps', expected an output of the model 'tractor_trailer': "
                         "x_trailer_gps, "));
-  EXPECT_THAT(error_of("outputs: [delta, delta]"), HasSubstr("outputs[1]: this output is named twice"));
-  EXPECT_THAT(error_of("outputs: []"), HasSubstr("expected 'all' or a list of outputs"));
-  EXPECT_THAT(error_of("outputs: delta"), HasSubstr("expected 'all' or a list of outputs"));
+  EXPECT_THAT(error_of_options("outputs: [delta, delta]"), HasSubstr("outputs[1]: this output is named twice"));
+  EXPECT_THAT(error_of_options("outputs: []"), HasSubstr("expected 'all' or a list of outputs"));
+  EXPECT_THAT(error_of_options("outputs: delta"), HasSubstr("expected 'all' or a list of outputs"));
   EXPECT_THROW(with_outputs(host().make_model("bicycle_slip"), {3}), Error);
   EXPECT_THROW(with_outputs(host().make_model("bicycle_slip"), {-1}), Error);
   EXPECT_THROW(with_outputs(host().make_model("bicycle_slip"), {0, 0}), Error);

@@ -16,16 +16,6 @@ namespace fs = std::filesystem;
 
 inline fs::path fixture(const std::string& name) { return fs::path(FIXTURES) / name; }
 
-template <class Call>
-std::string message(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 /// What the host says of the files in its first place.
 inline std::vector<PluginRecord> records_in(const fs::path& directory) {
   const Host host({directory});

@@ -13,6 +13,7 @@
 #include "plugins/host/fixtures.hpp"
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/model/model.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {
@@ -74,11 +75,11 @@ TEST(Host, WrongOptionsAreToldWithTheirPlace) {
   const Host host({fixture("good")});
   Settings settings;
   settings.set("sise", Settings::scalar("2", {"field.yaml", 7}));
-  EXPECT_THAT(message([&] { host.make_blocking("toy", settings); }),
+  EXPECT_THAT(error_of([&] { host.make_blocking("toy", settings); }),
               HasSubstr("field.yaml:7: sise: blocking 'toy' has no option 'sise'; did you mean 'size'?"));
   Settings thirteen;
   thirteen.set("size", Settings::scalar("13"));
-  EXPECT_EQ(message([&] { host.make_blocking("toy", thirteen); }), "size 13 does not fit; take 12");
+  EXPECT_EQ(error_of([&] { host.make_blocking("toy", thirteen); }), "size 13 does not fit; take 12");
 }
 
 TEST(Host, APluginThatIsNotThereIsAnsweredWithAllThatWasTried) {
@@ -87,7 +88,7 @@ TEST(Host, APluginThatIsNotThereIsAnsweredWithAllThatWasTried) {
   const Host host({fixture("good"), fixture("old_abi"), empty.path()});
   Settings settings;
   settings.set("blocking.name", Settings::scalar("tpy", {"field.yaml", 4}));
-  const std::string text = message([&] { host.make_blocking("tpy", *settings.find("blocking")); });
+  const std::string text = error_of([&] { host.make_blocking("tpy", *settings.find("blocking")); });
   EXPECT_THAT(text, HasSubstr("field.yaml:4: blocking.name: there is no blocking plugin 'tpy'; did you mean 'toy'?"));
   EXPECT_THAT(text, HasSubstr("available: toy"));
   EXPECT_THAT(text, HasSubstr(fixture("good").string() + " (given)\n"));
@@ -101,8 +102,8 @@ TEST(Host, APluginThatIsNotThereIsAnsweredWithAllThatWasTried) {
 
 TEST(Host, APluginOfAnotherKindIsNotTaken) {
   const Host host({fixture("good")});
-  EXPECT_THAT(message([&] { host.make_model("toy"); }), HasSubstr("there is no model plugin 'toy'"));
-  EXPECT_THAT(message([&] { host.make_solver("toy"); }), HasSubstr("there is no solver plugin 'toy'"));
+  EXPECT_THAT(error_of([&] { host.make_model("toy"); }), HasSubstr("there is no model plugin 'toy'"));
+  EXPECT_THAT(error_of([&] { host.make_solver("toy"); }), HasSubstr("there is no solver plugin 'toy'"));
 }
 
 TEST(Host, OfTwoWithOneNameTheFirstIsTaken) {
@@ -187,13 +188,13 @@ TEST(Host, SeveralThreadsMayAsk) {
 
 TEST(BadPlugin, FailuresOfAFactoryBecomeWords) {
   const auto failure = [](const std::string& name) {
-    return message([&] { Host({fixture(name)}).make_blocking("failing"); });
+    return error_of([&] { Host({fixture(name)}).make_blocking("failing"); });
   };
   EXPECT_EQ(failure("throws_exception"), "blocking 'failing' failed: out of tea");
   EXPECT_THAT(failure("throws_int"), HasSubstr("threw something that is no std::exception"));
   EXPECT_EQ(failure("throws_long").size(), 4095u);
   EXPECT_THAT(failure("returns_null"), HasSubstr("blocking 'failing' could not be made: it gave no reason"));
-  EXPECT_THAT(message([] { Host({fixture("returns_null")}).options(PluginKind::blocking, "failing"); }),
+  EXPECT_THAT(error_of([] { Host({fixture("returns_null")}).options(PluginKind::blocking, "failing"); }),
               HasSubstr("cannot be told"));
 }
 
@@ -217,8 +218,8 @@ TEST(Trial, AFailureIsToldInThePluginsWords) {
 }
 
 TEST(Trial, NothingOfARefusedPluginIsCalled) {
-  EXPECT_THAT(message([] { trial_of("other_revision"); }), HasSubstr("revision 77"));
-  EXPECT_THAT(message([] { trial_of("other_alignment"); }), HasSubstr("alignment 32"));
+  EXPECT_THAT(error_of([] { trial_of("other_revision"); }), HasSubstr("revision 77"));
+  EXPECT_THAT(error_of([] { trial_of("other_alignment"); }), HasSubstr("alignment 32"));
 }
 
 TEST(Trial, PluginsOfTheHouseAreMadeOrSayWhatTheyNeed) {

@@ -8,6 +8,7 @@
 #include "plugins/robot/robots.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/plugins/robot/estimator_section.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "plugins/robot/robots.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "plugins/robot/robots.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {

@@ -5,6 +5,7 @@
 
 #include "plugins/robot/robots.hpp"
 #include "rhec/core/horizon/blocking.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "plugins/robot/robots.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {

@@ -30,17 +30,6 @@ inline std::shared_ptr<const RobotContext> context_with(const std::string& bound
                    NoiseSection({}, model->description())});
 }
 
-/// What the Error says that `act` throws.
-template <class Act>
-std::string error_of(const Act& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "(no error)";
-}
-
 /// The default that a section's documentation shows of a key.
 inline std::string documented_default(const OptionSection& section, const std::string& key) {
   for (const OptionRow& row : section.rows)

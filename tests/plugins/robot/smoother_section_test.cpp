@@ -6,6 +6,7 @@
 
 #include "plugins/robot/robots.hpp"
 #include "rhec/plugins/robot/estimator_section.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {

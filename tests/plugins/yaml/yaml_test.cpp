@@ -1,4 +1,5 @@
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/error_of.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,18 +17,8 @@ using testing::StartsWith;
 
 Settings yaml(const std::string& text) { return parse_yaml(text, "field.yaml"); }
 
-template <class Call>
-std::string message(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 std::string mistake(const std::string& text) {
-  return message([&] { yaml(text); });
+  return error_of([&] { yaml(text); });
 }
 
 TEST(Yaml, NodesKnowTheirLines) {
@@ -117,10 +108,10 @@ TEST(Yaml, FilesAreNamedInErrors) {
   const std::filesystem::path file = folder / "run.yaml";
   std::ofstream(file) << "a: 1\nb: x\n";
   const Settings root = load_yaml(file);
-  EXPECT_THAT(message([&] { root.find("b")->as_number(); }), StartsWith(file.string() + ":2: b: found 'x'"));
-  EXPECT_THAT(message([&] { load_yaml(folder / "gone.yaml"); }),
+  EXPECT_THAT(error_of([&] { root.find("b")->as_number(); }), StartsWith(file.string() + ":2: b: found 'x'"));
+  EXPECT_THAT(error_of([&] { load_yaml(folder / "gone.yaml"); }),
               AllOf(HasSubstr("gone.yaml"), HasSubstr("no such file")));
-  EXPECT_THAT(message([&] { load_yaml(folder); }), HasSubstr("is a directory"));
+  EXPECT_THAT(error_of([&] { load_yaml(folder); }), HasSubstr("is a directory"));
   std::filesystem::remove_all(folder);
 }
 
@@ -142,7 +133,7 @@ TEST(Assignment, PutsValuesInTheirPlace) {
 
 TEST(Assignment, WrongOnesAreNamed) {
   Settings root = yaml("a: 1\n");
-  const auto wrong = [&](const char* text) { return message([&] { apply_assignment(root, text); }); };
+  const auto wrong = [&](const char* text) { return error_of([&] { apply_assignment(root, text); }); };
   EXPECT_EQ(wrong("horizon.length"), "--set horizon.length: expected key.path=value, e.g. horizon.length=25");
   EXPECT_THAT(wrong("=5"), HasSubstr("expected key.path=value"));
   EXPECT_THAT(wrong("b=[1"), HasSubstr("--set b=[1: not valid YAML"));

@@ -59,7 +59,7 @@ TEST(RandomStages, KeepAwayFromBoundsAndStandStillNowAndThen) {
 }
 
 TEST(DerivativeErrors, AreRoundingWhereDerivativesAreRight) {
-  const FormulaModel<Unicycle> model({}, unicycle_description());
+  const PassedOn model;
   const StagePoints stages = random_stages(model.description(), 20, 3);
   for (const bool ramp : {false, true}) {
     const DerivativeErrors errors = derivative_errors(model, model.description(), stages, ramp, 2);

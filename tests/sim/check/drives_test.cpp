@@ -20,7 +20,7 @@ class DrivesTest : public testing::Test {
  protected:
   const Drive& named(const std::string& name, const ModelCheckOptions& options = {}) {
     options_ = options;
-    const CheckedModel checked{model_, model_.description(), options_, {0.1, 0.1}, {0.1, 0.1}};
+    const CheckedModel checked{*model_, model_->description(), options_, {0.1, 0.1}, {0.1, 0.1}};
     Drives drives(checked);
     drives_ = drives.all();
     duration_ = drives.duration();
@@ -30,7 +30,7 @@ class DrivesTest : public testing::Test {
     throw Error("no drive " + name);
   }
 
-  FormulaModel<Unicycle> model_{{}, unicycle_description()};
+  const std::unique_ptr<Model> model_ = unicycle();
   ModelCheckOptions options_;
   std::vector<Drive> drives_;
   double duration_ = 0.0, condition_ = 0.0;
@@ -85,19 +85,10 @@ TEST_F(DrivesTest, ATurnGoesOnAndASlalomGoesToBothSides) {
   }
 }
 
-/// What the unicycle's yaw rate follows is its own rate, as of a steering angle.
-struct Steered : Unicycle {
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    Unicycle::dynamics(x, u, p, dxdt);
-    dxdt[3] = u[1];
-  }
-};
-
 TEST_F(DrivesTest, AnInputThatWouldDriveAStateTooFarIsLeftOut) {
-  FormulaModel<Steered> model({}, unicycle_description());
+  const std::unique_ptr<Model> model = unicycle(Fault::rate_is_commanded);
   const ModelCheckOptions options;
-  const CheckedModel checked{model, model.description(), options, {0.1, 0.1}, {0.1, 0.1}};
+  const CheckedModel checked{*model, model->description(), options, {0.1, 0.1}, {0.1, 0.1}};
   for (const Drive& drive : Drives(checked).all()) {
     if (drive.name != "turn" && drive.name != "slalom") continue;
     EXPECT_LE(drive.states.row(3).cwiseAbs().maxCoeff(), 0.4 + 1e-9) << drive.name << ": the inner half of its bounds";
@@ -115,13 +106,13 @@ TEST_F(DrivesTest, SensitivitiesAreThoseOfTheIntervals) {
       Eigen::VectorXd from = drive.states.col(7);
       from[column] += side == 0 ? -step : step;
       const Eigen::VectorXd inputs = drive.inputs.col(7);
-      model_.integrate({.count = 1,
-                        .states = from.data(),
-                        .inputs = inputs.data(),
-                        .parameters = parameters,
-                        .durations = &interval,
-                        .substeps = 1,
-                        .next_states = ends[side].data()});
+      model_->integrate({.count = 1,
+                         .states = from.data(),
+                         .inputs = inputs.data(),
+                         .parameters = parameters,
+                         .durations = &interval,
+                         .substeps = 1,
+                         .next_states = ends[side].data()});
     }
     change = (ends[1] - ends[0]) / (2.0 * step);
     EXPECT_LT((drive.jacobians[7].col(column) - change).norm(), 1e-8) << column;

@@ -13,32 +13,6 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-struct KnowsItsHeading : Unicycle {
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    using std::cos;
-    Unicycle::dynamics(x, u, p, dxdt);
-    dxdt[3] = dxdt[3] + 0.1 * cos(x[2]);  // a slope that pulls to one side of the world
-  }
-};
-
-struct KnowsItsPlace : Unicycle {
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    using std::tanh;
-    Unicycle::dynamics(x, u, p, dxdt);
-    dxdt[3] = dxdt[3] + 0.1 * tanh(x[1]);
-  }
-};
-
-struct PullsAside : Unicycle {
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    Unicycle::dynamics(x, u, p, dxdt);
-    dxdt[2] = dxdt[2] + 0.1;
-  }
-};
-
 TEST(ModelCheck, FindsWhatADescriptionGetsWrong) {
   using About = ModelDescription;
   const std::vector<std::pair<std::function<void(About&)>, std::string>> cases = {
@@ -72,16 +46,16 @@ TEST(ModelCheck, FindsARoleThatPointsAtAnotherVariable) {
 }
 
 TEST(ModelCheck, FindsDynamicsThatKnowWhereTheyAre) {
-  const ModelCheck heading = check<KnowsItsHeading>();
+  const ModelCheck heading = check(Fault::knows_its_heading);
   EXPECT_THAT(faults(heading), ElementsAre("fail symmetry: d rate / dt"));
   EXPECT_THAT(finding_of(heading, "symmetry").found, HasSubstr("turned"));
-  const ModelCheck place = check<KnowsItsPlace>();
+  const ModelCheck place = check(Fault::knows_its_place);
   EXPECT_THAT(faults(place), ElementsAre("fail symmetry: d rate / dt"));
   EXPECT_THAT(finding_of(place, "symmetry").found, HasSubstr("shifted"));
 }
 
 TEST(ModelCheck, FindsThatStraightIsNotStraight) {
-  EXPECT_THAT(faults(check<PullsAside>()), ElementsAre("fail straight_motion: d psi / dt"));
+  EXPECT_THAT(faults(check(Fault::pulls_aside)), ElementsAre("fail straight_motion: d psi / dt"));
   // The speed factor is not said: at other parameters the vehicle is slower than it should be.
   EXPECT_THAT(faults(check([](ModelDescription& about) { about.roles.speed_factor = -1; })),
               ElementsAre("warn straight_motion: at other parameters"));

@@ -10,34 +10,15 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-struct UnseenParameter : Unicycle {
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    Unicycle::dynamics(x, u, p, dxdt);
-    dxdt[2] = x[3] + 0.0 * p[1];
-  }
-};
-
-/// Two parameters of which only the product matters.
-struct ProductOfParameters : Unicycle {
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    Unicycle::dynamics(x, u, p, dxdt);
-    const Scalar both[2] = {p[0] * p[1], p[0]};
-    Unicycle::dynamics(x, u, both, dxdt);
-    dxdt[2] = x[3];
-  }
-};
-
 TEST(ModelCheck, FindsAParameterThatNothingSees) {
-  const ModelCheck found = check<UnseenParameter>();
+  const ModelCheck found = check(Fault::unseen_parameter);
   EXPECT_THAT(faults(found), ElementsAre("fail observability: parameter mu"));
   EXPECT_THAT(finding_of(found, "observability").found, HasSubstr("can never learn it"));
   EXPECT_THAT(drive_of(found, "slalom").undetermined, ElementsAre("mu"));
 }
 
 TEST(ModelCheck, NamesACombinationThatIsNotDetermined) {
-  const ModelCheck found = check<ProductOfParameters>();
+  const ModelCheck found = check(Fault::product_of_parameters);
   EXPECT_THAT(faults(found),
               testing::IsSupersetOf({"fail observability: parameter kappa", "fail observability: parameter mu"}));
   // At kappa = mu and the same scales, what is gained by one is lost by the other.

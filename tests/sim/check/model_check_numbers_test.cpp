@@ -12,35 +12,8 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-struct RootOfAState : Unicycle {
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    using std::sqrt;
-    Unicycle::dynamics(x, u, p, dxdt);
-    dxdt[3] = 0.1 * (u[1] - x[3]) - 0.01 * sqrt(x[3] + 0.5);  // not a number below -0.5
-  }
-};
-
-struct PoleOfAState : Unicycle {
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    using std::tan;
-    Unicycle::dynamics(x, u, p, dxdt);
-    dxdt[2] = p[1] * tan(x[3]);
-  }
-};
-
-struct LogOfAnOutput : Unicycle {
-  template <class Scalar>
-  constexpr void outputs(const Scalar* x, Scalar* y) const {
-    using std::log;
-    y[0] = x[0];
-    y[1] = x[1] + 0.01 * log(0.9 - x[3]);
-  }
-};
-
 TEST(ModelCheck, FindsWhereNumbersAreNotFinite) {
-  const ModelCheck found = check<RootOfAState>();
+  const ModelCheck found = check(Fault::root_of_a_state);
   ASSERT_THAT(faults(found), testing::SizeIs(1));
   const Finding& numbers = finding_of(found, "numbers");
   EXPECT_EQ(numbers.verdict, Verdict::fail);
@@ -50,7 +23,7 @@ TEST(ModelCheck, FindsWhereNumbersAreNotFinite) {
 }
 
 TEST(ModelCheck, FindsWhereOutputsAreNotFiniteWithoutBounds) {
-  const ModelCheck found = check<LogOfAnOutput>([](ModelDescription& about) {
+  const ModelCheck found = check(Fault::log_of_an_output, [](ModelDescription& about) {
     about.states[3].lower = -HUGE_VAL;
     about.states[3].upper = HUGE_VAL;
   });
@@ -59,11 +32,11 @@ TEST(ModelCheck, FindsWhereOutputsAreNotFiniteWithoutBounds) {
   EXPECT_THAT(numbers.where, testing::StartsWith("rate in [0.9")) << numbers.where;
   EXPECT_THAT(numbers.found, HasSubstr("outputs"));
   // Within bounds that keep away from it, there is nothing to find.
-  EXPECT_THAT(faults(check<LogOfAnOutput>()), ElementsAre());
+  EXPECT_THAT(faults(check(Fault::log_of_an_output)), ElementsAre());
 }
 
 TEST(ModelCheck, FindsAPoleThatIsFiniteEverywhere) {
-  const ModelCheck found = check<PoleOfAState>([](ModelDescription& about) {
+  const ModelCheck found = check(Fault::pole_of_a_state, [](ModelDescription& about) {
     about.states[3].unit = "rad";
     about.states[3].lower = -HUGE_VAL;
     about.states[3].upper = HUGE_VAL;
@@ -72,7 +45,7 @@ TEST(ModelCheck, FindsAPoleThatIsFiniteEverywhere) {
   const Finding& numbers = finding_of(found, "numbers");
   EXPECT_EQ(numbers.verdict, Verdict::warn);
   EXPECT_THAT(numbers.where, HasSubstr("rate in [")) << numbers.where;
-  EXPECT_THAT(faults(check<PoleOfAState>()), ElementsAre());
+  EXPECT_THAT(faults(check(Fault::pole_of_a_state)), ElementsAre());
 }
 
 }  // namespace

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <string>
 
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
 
 std::string message_for(const std::string& text, const CsvOptions& options = {}) {
-  return message_of([&] { parse_csv(text, "log.csv", options); });
+  return error_of([&] { parse_csv(text, "log.csv", options); });
 }
 
 TEST(Csv, ReadsNumbersAndCountsWhatIsMissing) {
@@ -46,19 +46,19 @@ TEST(Csv, NamesFileLineAndWhatWasFound) {
     EXPECT_CONTAINS(message_for(std::string("0,0\n0,") + wrong), "log.csv:2: field 2 is");
   }
   EXPECT_CONTAINS(message_for(""), "empty");
-  EXPECT_CONTAINS(message_of([] { read_csv("no/such.csv"); }), "no/such.csv: cannot be read");
-  EXPECT_CONTAINS(message_of([] { read_csv(testing::TempDir()); }), "is a folder");
+  EXPECT_CONTAINS(error_of([] { read_csv("no/such.csv"); }), "no/such.csv: cannot be read");
+  EXPECT_CONTAINS(error_of([] { read_csv(testing::TempDir()); }), "is a folder");
 }
 
 TEST(Csv, FindsTimeThatRunsBackwards) {
   EXPECT_NO_THROW(check_time_order(parse_csv("1,0\n1,0\n2,0\n", "log.csv")));
-  EXPECT_CONTAINS(message_of([] {
+  EXPECT_CONTAINS(error_of([] {
                     check_time_order(parse_csv("t,x\n1,0\n3,0\n2.5,0\n", "log.csv", {.header = CsvHeader::required}));
                   }),
                   "log.csv:4: time runs backwards, from 3 s to 2.5 s");
-  EXPECT_CONTAINS(message_of([] { check_time_order(parse_csv("0,1\n0,\n", "log.csv"), 1); }),
+  EXPECT_CONTAINS(error_of([] { check_time_order(parse_csv("0,1\n0,\n", "log.csv"), 1); }),
                   "log.csv:2: the time is missing");
-  EXPECT_CONTAINS(message_of([] { check_time_order(parse_csv("0,1\n", "log.csv"), 2); }), "no column 3");
+  EXPECT_CONTAINS(error_of([] { check_time_order(parse_csv("0,1\n", "log.csv"), 2); }), "no column 3");
 }
 
 TEST(Csv, ReadsALongLogQuickly) {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "rhec/sim/files/csv.hpp"
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -83,20 +83,20 @@ TEST_F(OutputFolderTest, TwoRunsAtOnceDoNotMix) {
 
 TEST_F(OutputFolderTest, RefusesBeforeAnythingIsReplaced) {
   put(root_ / "file", "");
-  EXPECT_CONTAINS(message_of([&] { OutputFolder folder(root_ / "file"); }), "is a file");
-  EXPECT_CONTAINS(message_of([&] { OutputFolder folder(root_ / "file" / "below"); }), "cannot be created");
-  EXPECT_CONTAINS(message_of([&] { OutputFolder folder(""); }), "empty");
+  EXPECT_CONTAINS(error_of([&] { OutputFolder folder(root_ / "file"); }), "is a file");
+  EXPECT_CONTAINS(error_of([&] { OutputFolder folder(root_ / "file" / "below"); }), "cannot be created");
+  EXPECT_CONTAINS(error_of([&] { OutputFolder folder(""); }), "empty");
   fs::create_directories(root_ / "run" / "b.csv");
   put(root_ / "run" / "a.csv", "old");
   OutputFolder folder(root_ / "run");
   for (const char* name : {"", ".", "..", "../a", "a/b", "/a"}) EXPECT_THROW(folder.file(name), Error) << name;
   folder.write("a.csv", "new");
   folder.write("b.csv", "new");
-  EXPECT_CONTAINS(message_of([&] { folder.commit(); }), "in the way");
+  EXPECT_CONTAINS(error_of([&] { folder.commit(); }), "in the way");
   EXPECT_EQ(read_text(root_ / "run" / "a.csv"), "old");
   OutputFolder forgetful(root_ / "other");
   forgetful.file("a.csv");
-  EXPECT_CONTAINS(message_of([&] { forgetful.commit(); }), "never written");
+  EXPECT_CONTAINS(error_of([&] { forgetful.commit(); }), "never written");
 }
 
 }  // namespace

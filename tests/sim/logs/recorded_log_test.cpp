@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "sim/support/message_of.hpp"
 #include "sim/support/recorded_drive.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -19,7 +19,7 @@ using testing::HasSubstr;
 class RecordedLogTest : public RecordedDriveTest {
  protected:
   std::string message_for(const std::string& rows, const std::string& fixes) const {
-    return message_of([&] { log(scenario_of(), rows, fixes); });
+    return error_of([&] { log(scenario_of(), rows, fixes); });
   }
 };
 
@@ -131,7 +131,7 @@ TEST_F(RecordedLogTest, NamesFileLineAndWhatIsWrong) {
   EXPECT_THAT(message_for(rows_, "0,1,0\n1e9,1,0\n"), HasSubstr("gps.txt:2: time leaps"));
   EXPECT_THAT(message_for(rows_, "100,1,0\n101,1,0\n"), HasSubstr("expected logs of one drive"));
   EXPECT_THAT(message_for("0,1,80\n", fixes_), AllOf(HasSubstr("drs.txt:1: "), HasSubstr("expected")));
-  EXPECT_THAT(message_of([&] { read_recorded_log(file("none.txt"), file("none.txt"), scenario_of()); }),
+  EXPECT_THAT(error_of([&] { read_recorded_log(file("none.txt"), file("none.txt"), scenario_of()); }),
               HasSubstr("none.txt: cannot be read"));
 }
 
@@ -139,7 +139,7 @@ TEST(LogScenario, RefusesWhatDoesNotFit) {
   const auto message = [](const std::string& from, const std::string& to) {
     std::string text = scenario_text;
     text.replace(text.find(from), from.size(), to);
-    return message_of([&] { scenario_of(text); });
+    return error_of([&] { scenario_of(text); });
   };
   EXPECT_THAT(message("wheel_offset", "wheel_ofset"), AllOf(HasSubstr("circle.yaml:5"), HasSubstr("wheel_offset")));
   EXPECT_THAT(message("{wheel_offset: 0.5}", "{steering: gamma}"),
@@ -148,7 +148,7 @@ TEST(LogScenario, RefusesWhatDoesNotFit) {
   EXPECT_THAT(message("rhe: {}", "rhe: {estimator: {horizont: 3}}"),
               AllOf(HasSubstr("horizont"), HasSubstr("horizon")));
   EXPECT_THAT(message("rhe: {}", "rhe: {log: {}}"), HasSubstr("shared by all variants"));
-  EXPECT_THAT(message_of([] { scenario_of(scenario_text, {"best"}); }),
+  EXPECT_THAT(error_of([] { scenario_of(scenario_text, {"best"}); }),
               AllOf(HasSubstr("'best'"), HasSubstr("rhe, robust, ekf")));
 }
 

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "sim/support/message_of.hpp"
 #include "sim/support/recorded_drive.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -82,7 +82,7 @@ TEST_F(SmoothingTest, WithoutAFixNothingCanBeEstimated) {
   drive.fixes.resize(5);
   drive.fixes.erase(drive.fixes.begin(), drive.fixes.begin() + 4);
   const LogVariant& variant = scenario_.variants().front();
-  EXPECT_THAT(message_of([&] {
+  EXPECT_THAT(error_of([&] {
                 smooth(variant.name, variant.robot, drive, scenario_.log(), {1, 0});
               }),
               HasSubstr("the log has no fix that is not withheld"));

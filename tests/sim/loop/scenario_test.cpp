@@ -11,7 +11,7 @@
 
 #include "sim/support/figure8.hpp"
 #include "sim/support/folder_test.hpp"
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -75,7 +75,7 @@ TEST_F(ScenarioFileTest, FilesAreMeantBesideTheScenarioThatNamesThem) {
   EXPECT_DOUBLE_EQ(scenario.path().length(), 30.0);
   EXPECT_EQ(slip_at(scenario, 5.0, 5.0), (std::array{0.5, 0.75}));
   put("mine.yaml", "model: bicycle_slip\npath:\n  name: file\n  file: none.csv\n");
-  EXPECT_THAT(message_of([&] { Scenario(Host(), load_yaml(yaml.string())); }),
+  EXPECT_THAT(error_of([&] { Scenario(Host(), load_yaml(yaml.string())); }),
               AllOf(HasSubstr("mine.yaml:4: "), HasSubstr("found 'none.csv', expected a file"),
                     HasSubstr(file("none.csv").string())));
 }
@@ -101,7 +101,7 @@ TEST(Scenario, MistakesAreToldWithTheirKey) {
       {{"spede=4"}, "spede", "did you mean 'speed'"},
   };
   for (const auto& each : cases)
-    EXPECT_THAT(message_of([&] { figure8_with(each.assignments); }), AllOf(HasSubstr(each.key), HasSubstr(each.what)))
+    EXPECT_THAT(error_of([&] { figure8_with(each.assignments); }), AllOf(HasSubstr(each.key), HasSubstr(each.what)))
         << each.assignments.front();
 }
 

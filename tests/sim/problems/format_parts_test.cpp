@@ -6,6 +6,7 @@
 #include <string>
 
 #include "sim/support/problem_lines.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -39,17 +40,17 @@ TEST(BlockStarts, AreTheIntervalsOnWhichABlockBegins) {
 TEST(BlockStarts, OfAHorizonWithoutIntervals) {
   const ProblemRecord record = starts_of(R"({"grip": [0], "ramp": []})", 0);
   EXPECT_THAT(begins_of(record, "grip"), ElementsAre());
-  EXPECT_THAT(message_of([] { starts_of(R"({"ramp": [0]})", 0); }),
+  EXPECT_THAT(error_of([] { starts_of(R"({"ramp": [0]})", 0); }),
               HasSubstr("block_starts.ramp[0]: found 0, expected none: the horizon has no interval"));
 }
 
 TEST(BlockStarts, AreRefusedWhereTheyAreNotInOrderOrBeyondTheHorizon) {
-  EXPECT_THAT(message_of([] { starts_of(R"({"grip": [0, 3]})"); }),
+  EXPECT_THAT(error_of([] { starts_of(R"({"grip": [0, 3]})"); }),
               HasSubstr("set.jsonl:3: block_starts.grip[1]: found 3, expected an interval of 0 .. 2"));
-  EXPECT_THAT(message_of([] { starts_of(R"({"grip": [0, 2, 1]})"); }), HasSubstr("expected starts that increase"));
-  EXPECT_THAT(message_of([] { starts_of(R"({"grip": [1]})"); }), HasSubstr("0 first"));
-  EXPECT_THAT(message_of([] { starts_of(R"({"step": []})"); }), HasSubstr("0 first"));
-  EXPECT_EQ(message_of([] { starts_of(R"({"ramp": []})"); }), "no error") << "no ramp need start in a window";
+  EXPECT_THAT(error_of([] { starts_of(R"({"grip": [0, 2, 1]})"); }), HasSubstr("expected starts that increase"));
+  EXPECT_THAT(error_of([] { starts_of(R"({"grip": [1]})"); }), HasSubstr("0 first"));
+  EXPECT_THAT(error_of([] { starts_of(R"({"step": []})"); }), HasSubstr("0 first"));
+  EXPECT_EQ(error_of([] { starts_of(R"({"ramp": []})"); }), "") << "no ramp need start in a window";
 }
 
 TEST(OneBlock, IsAParameterThatKeepsItsValueOverTheHorizon) {
@@ -102,14 +103,14 @@ TEST(ModelNames, TellWhatTheModelDoesNotHave) {
   record.where = "set.jsonl:3";
   const ModelNames names(record, *model);
   const std::map<std::string, double> good = {{"speed", 1.0}, {"pos", 1.0}}, bad = {{"psh", 1.0}};
-  EXPECT_EQ(message_of([&] { names.check("weights", good, {&about.states, &about.inputs}); }), "no error");
-  EXPECT_EQ(message_of([&] {
+  EXPECT_EQ(error_of([&] { names.check("weights", good, {&about.states, &about.inputs}); }), "");
+  EXPECT_EQ(error_of([&] {
               names.check("weights", bad, {&about.states, &about.inputs});
             }),
             "set.jsonl:3: weights.psh: model 'cart' has no such variable here; did you mean 'push'?");
-  EXPECT_EQ(message_of([&] { names.check_count("inputs[0]", 3, about.inputs); }),
+  EXPECT_EQ(error_of([&] { names.check_count("inputs[0]", 3, about.inputs); }),
             "set.jsonl:3: inputs[0]: 3 numbers, expected 2, for speed, push of model 'cart'");
-  EXPECT_EQ(message_of([&] { names.check_count("inputs[0]", 2, about.inputs); }), "no error");
+  EXPECT_EQ(error_of([&] { names.check_count("inputs[0]", 2, about.inputs); }), "");
 }
 
 }  // namespace

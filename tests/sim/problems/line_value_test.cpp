@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -52,7 +52,7 @@ TEST(LineValue, GivesWhatIsWritten) {
 TEST(LineValue, AnotherKindIsToldWithFileLineAndKey) {
   const Line line(R"({"text": "4", "decimals": 2.5, "list": [1, "x"], "map": {"a": 1}, "rows": [[1, 2], [3]],
                       "missing": [[1, null]], "large": 3000000000, "less": -1})");
-  const auto said = [&](const std::function<void()>& ask) { return message_of(ask); };
+  const auto said = [&](const std::function<void()>& ask) { return error_of(ask); };
   EXPECT_EQ(said([&] { line["text"].number(); }), "set.jsonl:7: text: found \"4\", expected a number");
   EXPECT_EQ(said([&] { line["map"].number(); }), "set.jsonl:7: map: found a map, expected a number");
   EXPECT_EQ(said([&] { line["list"].number(); }), "set.jsonl:7: list: found a list of 2, expected a number");
@@ -76,13 +76,13 @@ TEST(LineValue, AnotherKindIsToldWithFileLineAndKey) {
 TEST(LineValue, KeysAreToldWithTheMapsThatTheyAreIn) {
   const Line line(R"({"horizon": {"dt": "x", "steps": 3, "guess": 1}})");
   const LineValue horizon = line["horizon"];
-  EXPECT_EQ(message_of([&] { horizon["dt"].number(); }), "set.jsonl:7: horizon.dt: found \"x\", expected a number");
-  EXPECT_THAT(message_of([&] { horizon["intervals"]; }), HasSubstr("set.jsonl:7: horizon.intervals: missing"));
-  EXPECT_EQ(message_of([&] {
+  EXPECT_EQ(error_of([&] { horizon["dt"].number(); }), "set.jsonl:7: horizon.dt: found \"x\", expected a number");
+  EXPECT_THAT(error_of([&] { horizon["intervals"]; }), HasSubstr("set.jsonl:7: horizon.intervals: missing"));
+  EXPECT_EQ(error_of([&] {
               horizon.allow({"dt", "step", "guess"});
             }),
             "set.jsonl:7: horizon.steps: unknown key; did you mean 'step'?");
-  EXPECT_EQ(message_of([&] {
+  EXPECT_EQ(error_of([&] {
               horizon.allow({"dt", "steps"}, {"guess"}, 1);
             }),
             "set.jsonl:7: horizon.guess: is a key of version 2; add \"version\": 2 to the line");

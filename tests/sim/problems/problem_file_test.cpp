@@ -9,6 +9,7 @@
 
 #include "rhec/sim/files/json.hpp"
 #include "sim/support/problem_lines.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -68,7 +69,7 @@ TEST(ProblemFile, ReadsWholeFilesAndCountsTheirLines) {
   ASSERT_EQ(records.size(), 2u);
   EXPECT_EQ(records[0].where, "set.jsonl:2");
   EXPECT_EQ(records[1].where, "set.jsonl:4");
-  EXPECT_THAT(message_of([&] { read_problems(one + "\n{", "set.jsonl"); }), StartsWith("set.jsonl:2: column"));
+  EXPECT_THAT(error_of([&] { read_problems(one + "\n{", "set.jsonl"); }), StartsWith("set.jsonl:2: column"));
 }
 
 TEST(ProblemFile, IdsWithoutAStepStandAlone) {
@@ -112,7 +113,7 @@ TEST(ProblemFile, NamesThePlaceAndTheRemedy) {
 
 TEST(ProblemFile, RefusesWhatIsNoProblem) {
   for (const char* text : {"", "[]", "3", "null", "{\"id\": 1}", "{\"id\": \"x\"", "{} {}", "\xff"})
-    EXPECT_THAT(message_of([&] { read_problem(text, "set.jsonl", 3); }), StartsWith("set.jsonl:3: ")) << text;
+    EXPECT_THAT(error_of([&] { read_problem(text, "set.jsonl", 3); }), StartsWith("set.jsonl:3: ")) << text;
 }
 
 }  // namespace

@@ -12,8 +12,8 @@
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/plugins/host/host.hpp"
-#include "sim/support/message_of.hpp"
 #include "sim/support/same_point.hpp"
+#include "support/error_of.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec::sim {
@@ -27,8 +27,8 @@ TEST(ProblemFormat, IsFoundByTheNameOfItsKind) {
   EXPECT_THAT(problem_kinds(), ::testing::ElementsAre("rhe", "rhc"));
   for (const std::string& kind : problem_kinds()) EXPECT_EQ(problem_format(kind).traits().kind, kind);
   EXPECT_EQ(find_problem_format("parking"), nullptr);
-  EXPECT_CONTAINS(message_of([] { problem_format("parking"); }), "'parking'");
-  EXPECT_CONTAINS(message_of([] { problem_format("parking"); }), "rhe, rhc");
+  EXPECT_CONTAINS(error_of([] { problem_format("parking"); }), "'parking'");
+  EXPECT_CONTAINS(error_of([] { problem_format("parking"); }), "rhe, rhc");
 }
 
 TEST(ProblemFormat, ACopyIsAProblemOfItsOwn) {
@@ -72,9 +72,8 @@ class Impostor final : public HorizonProblem {
 TEST(ProblemFormat, RefusesAClassThatOnlyBorrowsTheName) {
   RandomProblem random(bicycle(), 5);
   const Impostor impostor(*random.rhc({}));
-  EXPECT_CONTAINS(message_of([&] { record_of(impostor, nullptr, "x", "bicycle_slip", {}); }),
-                  "another name than 'rhe'");
-  EXPECT_CONTAINS(message_of([&] { problem_format(impostor.kind()).copy(impostor); }), "another class");
+  EXPECT_CONTAINS(error_of([&] { record_of(impostor, nullptr, "x", "bicycle_slip", {}); }), "another name than 'rhe'");
+  EXPECT_CONTAINS(error_of([&] { problem_format(impostor.kind()).copy(impostor); }), "another class");
 }
 
 }  // namespace

@@ -5,18 +5,15 @@
 #include <string>
 
 #include "rhec/core/base/error.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
 
 TEST(ReportDocument, RefusesWhatIsNotThere) {
-  try {
-    report_document("no/such/folder", "test");
-    FAIL() << "was accepted";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("no/such/folder"), std::string::npos) << error.what();
-    EXPECT_NE(std::string(error.what()).find("rhec run"), std::string::npos) << error.what();
-  }
+  const std::string refusal = error_of([] { report_document("no/such/folder", "test"); });
+  EXPECT_CONTAINS(refusal, "no/such/folder");
+  EXPECT_CONTAINS(refusal, "rhec run");
 }
 
 }  // namespace

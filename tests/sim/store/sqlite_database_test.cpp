@@ -6,7 +6,7 @@
 #include <string>
 
 #include "sim/support/folder_test.hpp"
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -66,24 +66,24 @@ TEST_F(SqliteDatabaseTest, ATransactionIsUndoneUnlessItIsCommitted) {
 }
 
 TEST_F(SqliteDatabaseTest, OneThatIsReadStaysAsItIs) {
-  EXPECT_THAT(message_of([&] { SqliteDatabase(path(), SqliteDatabase::Access::read); }),
+  EXPECT_THAT(error_of([&] { SqliteDatabase(path(), SqliteDatabase::Access::read); }),
               StartsWith(path().string() + ": cannot be opened"));
   EXPECT_FALSE(std::filesystem::exists(path()));
   SqliteDatabase(path()).execute("CREATE TABLE t (a)");
   const std::string before = content_of(path());
   SqliteDatabase database(path(), SqliteDatabase::Access::read);
-  EXPECT_THAT(message_of([&] { database.execute("INSERT INTO t VALUES (1)"); }), HasSubstr("readonly"));
+  EXPECT_THAT(error_of([&] { database.execute("INSERT INTO t VALUES (1)"); }), HasSubstr("readonly"));
   EXPECT_EQ(content_of(path()), before);
 }
 
 TEST_F(SqliteDatabaseTest, ErrorsNameTheFileAndHaveSqlitesWords) {
   SqliteDatabase database(path());
-  EXPECT_THAT(message_of([&] { database.execute("CREATE nonsense"); }),
+  EXPECT_THAT(error_of([&] { database.execute("CREATE nonsense"); }),
               AllOf(StartsWith(path().string() + ": "), HasSubstr("near \"nonsense\"")));
-  EXPECT_THAT(message_of([&] { database.prepare("SELECT a FROM nowhere"); }), HasSubstr("no such table: nowhere"));
+  EXPECT_THAT(error_of([&] { database.prepare("SELECT a FROM nowhere"); }), HasSubstr("no such table: nowhere"));
   database.execute("CREATE TABLE t (a UNIQUE); INSERT INTO t VALUES (1)");
   SqliteStatement again = database.prepare("INSERT INTO t VALUES (1)");
-  EXPECT_THAT(message_of([&] { again.step(); }), HasSubstr("UNIQUE"));
+  EXPECT_THAT(error_of([&] { again.step(); }), HasSubstr("UNIQUE"));
 }
 
 TEST_F(SqliteDatabaseTest, OneThatIsInUseIsWaitedForAsLongAsAsked) {
@@ -91,14 +91,14 @@ TEST_F(SqliteDatabaseTest, OneThatIsInUseIsWaitedForAsLongAsAsked) {
   one.execute("CREATE TABLE t (a)");
   const SqliteTransaction under_way(one);
   other.set_patience(1);
-  EXPECT_THAT(message_of([&] { const SqliteTransaction second(other); }), HasSubstr("is in use by another program"));
+  EXPECT_THAT(error_of([&] { const SqliteTransaction second(other); }), HasSubstr("is in use by another program"));
 }
 
 TEST_F(SqliteDatabaseTest, MissesAPartOfTheLastPage) {
   SqliteDatabase(path()).execute("CREATE TABLE t (a); INSERT INTO t VALUES (zeroblob(20000))");
   SqliteDatabase(path(), SqliteDatabase::Access::read).require_whole();
   std::filesystem::resize_file(path(), std::filesystem::file_size(path()) - 1);
-  EXPECT_THAT(message_of([&] { SqliteDatabase(path(), SqliteDatabase::Access::read).require_whole(); }),
+  EXPECT_THAT(error_of([&] { SqliteDatabase(path(), SqliteDatabase::Access::read).require_whole(); }),
               HasSubstr("is damaged or cut short"));
 }
 

@@ -11,7 +11,7 @@
 #include "rhec/sim/store/sweep_store.hpp"
 #include "sim/store/sqlite_database.hpp"
 #include "sim/support/folder_test.hpp"
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -121,7 +121,7 @@ TEST_F(SweepRunsTest, WhatWasNotCompletedHasNoValues) {
 }
 
 TEST_F(SweepRunsTest, RefusesWhatIsNoSweep) {
-  const auto message = [&] { return message_of([&] { read_sweep_runs(path()); }); };
+  const auto message = [&] { return error_of([&] { read_sweep_runs(path()); }); };
   EXPECT_THAT(message(), HasSubstr("runs.sqlite: cannot be opened"));
   put("runs.sqlite", std::string(5000, 'x'));
   EXPECT_THAT(message(), HasSubstr("is no SQLite database"));
@@ -139,7 +139,7 @@ TEST_F(SweepRunsTest, NamesTheRunWhoseSummaryIsBroken) {
   SweepRow broken = row_of(R"({"seed":1})", 1);
   broken.mae = R"({"kappa":)";
   write({broken});
-  const std::string message = message_of([&] { read_sweep_runs(path()); });
+  const std::string message = error_of([&] { read_sweep_runs(path()); });
   EXPECT_THAT(message, HasSubstr("run " + broken.identity.text() + ": mae is no map of JSON"));
 }
 

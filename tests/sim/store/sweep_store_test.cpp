@@ -4,12 +4,12 @@
 
 #include <cmath>
 #include <fstream>
-#include <functional>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "rhec/core/base/error.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -61,15 +61,11 @@ class SweepStoreTest : public testing::Test {
     return row;
   }
   /// What the store says of a file; empty: it takes it.
-  std::string error_of(const fs::path& name) const {
-    try {
-      const SweepStore store(name);
-    } catch (const Error& mistake) {
-      const std::string text = mistake.what();
-      EXPECT_THAT(text, StartsWith(name.string() + ": "));
-      return text.substr(name.string().size() + 2);
-    }
-    return {};
+  std::string refusal_of(const fs::path& name) const {
+    const std::string text = error_of([&] { const SweepStore store(name); });
+    if (text.empty()) return text;
+    EXPECT_THAT(text, StartsWith(name.string() + ": "));
+    return text.substr(name.string().size() + 2);
   }
   static std::string bytes_of(const fs::path& name) {
     std::ifstream stream(name, std::ios::binary);
@@ -182,7 +178,7 @@ TEST_F(SweepStoreTest, RefusesASecondStoreAndLetsOthersRead) {
   filled(2);
   {
     SweepStore store(file());
-    EXPECT_THAT(error_of(file()), HasSubstr("another sweep writes to it"));
+    EXPECT_THAT(refusal_of(file()), HasSubstr("another sweep writes to it"));
     EXPECT_THAT(Sqlite(file())("SELECT count(*) FROM runs"), ElementsAre("2"));
     store.write(std::vector{row_of(2)});
     EXPECT_THAT(Sqlite(file())("SELECT count(*) FROM runs"), ElementsAre("3"));
@@ -195,14 +191,14 @@ TEST_F(SweepStoreTest, RefusesASecondStoreAndLetsOthersRead) {
 TEST_F(SweepStoreTest, ALockFileThatWasLeftBehindLocksNothing) {
   filled(2);
   std::ofstream(file("runs.sqlite.lock")) << "";
-  EXPECT_EQ(error_of(file()), "");
+  EXPECT_EQ(refusal_of(file()), "");
 }
 
 TEST_F(SweepStoreTest, RefusesADatabaseThatIsLocked) {
   filled(2);
   Sqlite other(file());
   other("BEGIN EXCLUSIVE");
-  EXPECT_THAT(error_of(file()), AllOf(HasSubstr("is in use by another program"), HasSubstr("start again")));
+  EXPECT_THAT(refusal_of(file()), AllOf(HasSubstr("is in use by another program"), HasSubstr("start again")));
   other("COMMIT");
   EXPECT_EQ(SweepStore(file()).count(), 2);
 }
@@ -210,21 +206,21 @@ TEST_F(SweepStoreTest, RefusesADatabaseThatIsLocked) {
 TEST_F(SweepStoreTest, RefusesOtherVersions) {
   filled(2);
   Sqlite{file()}("PRAGMA user_version = 2");
-  EXPECT_THAT(error_of(file()), HasSubstr("has version 2 of the schema, and this program writes version 1"));
+  EXPECT_THAT(refusal_of(file()), HasSubstr("has version 2 of the schema, and this program writes version 1"));
   EXPECT_THAT(Sqlite(file())("SELECT count(*) FROM runs"), ElementsAre("2"));
 }
 
 TEST_F(SweepStoreTest, RefusesWhatIsNotItsOwn) {
   Sqlite(file("other.sqlite"))("CREATE TABLE runs (a); INSERT INTO runs VALUES (5)");
-  EXPECT_THAT(error_of(file("other.sqlite")), HasSubstr("not one of rhec's sweeps"));
+  EXPECT_THAT(refusal_of(file("other.sqlite")), HasSubstr("not one of rhec's sweeps"));
   EXPECT_THAT(Sqlite(file("other.sqlite"))("SELECT a FROM runs"), ElementsAre("5"));
   std::ofstream(file("text")) << std::string(5000, 'x');
-  EXPECT_THAT(error_of(file("text")), HasSubstr("is no SQLite database"));
+  EXPECT_THAT(refusal_of(file("text")), HasSubstr("is no SQLite database"));
   EXPECT_EQ(bytes_of(file("text")), std::string(5000, 'x'));
   Sqlite(file("empty.sqlite"))(
       fmt::format("CREATE TABLE other (a); PRAGMA application_id = {}; PRAGMA user_version = {}",
                   SweepStore::application_id, SweepStore::version));
-  EXPECT_THAT(error_of(file("empty.sqlite")), HasSubstr("does not have the form that was expected"));
+  EXPECT_THAT(refusal_of(file("empty.sqlite")), HasSubstr("does not have the form that was expected"));
 }
 
 TEST_F(SweepStoreTest, RefusesADatabaseThatIsCutShort) {
@@ -233,25 +229,25 @@ TEST_F(SweepStoreTest, RefusesADatabaseThatIsCutShort) {
   for (const std::size_t left :
        {whole.size() - 1, whole.size() - 5000, whole.size() / 2, std::size_t{4096}, std::size_t{50}}) {
     std::ofstream(file("cut.sqlite"), std::ios::binary | std::ios::trunc) << whole.substr(0, left);
-    EXPECT_THAT(error_of(file("cut.sqlite")), HasSubstr("is damaged or cut short")) << left;
+    EXPECT_THAT(refusal_of(file("cut.sqlite")), HasSubstr("is damaged or cut short")) << left;
     EXPECT_EQ(bytes_of(file("cut.sqlite")), whole.substr(0, left));
   }
 }
 
 TEST_F(SweepStoreTest, RefusesPlacesThatCannotBeWritten) {
-  EXPECT_THAT(error_of("/proc/nobody/runs.sqlite"), HasSubstr("its folder cannot be made"));
-  EXPECT_THAT(error_of("/proc/runs.sqlite"), HasSubstr("cannot be written"));
-  EXPECT_THAT(error_of(file().parent_path()), HasSubstr("is a folder"));
+  EXPECT_THAT(refusal_of("/proc/nobody/runs.sqlite"), HasSubstr("its folder cannot be made"));
+  EXPECT_THAT(refusal_of("/proc/runs.sqlite"), HasSubstr("cannot be written"));
+  EXPECT_THAT(refusal_of(file().parent_path()), HasSubstr("is a folder"));
   EXPECT_THROW(SweepStore(""), Error);
   std::ofstream(file("text")) << "x";
-  EXPECT_THAT(error_of(file("text") / "runs.sqlite"), HasSubstr("its folder cannot be made"));
+  EXPECT_THAT(refusal_of(file("text") / "runs.sqlite"), HasSubstr("its folder cannot be made"));
 }
 
 TEST_F(SweepStoreTest, RefusesAFileThatMayOnlyBeRead) {
   if (geteuid() == 0) GTEST_SKIP() << "root may write to every file";
   filled(2);
   fs::permissions(file(), fs::perms::owner_read);
-  EXPECT_THAT(error_of(file()), HasSubstr("cannot be opened and written"));
+  EXPECT_THAT(refusal_of(file()), HasSubstr("cannot be opened and written"));
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ TEST(SweepGrid, TakesNoRoomForItsRuns) {
   const Sweep sweep = grid_of("  seed: {from: 1, to: 1000000000}\n  speed: [1, 2]\n");
   EXPECT_EQ(sweep.count(), 2000000000);
   EXPECT_EQ(sweep.assignments(1999999999), "seed=1000000000, speed=2");
-  EXPECT_EQ(error_of([&] { sweep.check_values(host()); }), "");
+  EXPECT_EQ(mistake_of([&] { sweep.check_values(host()); }), "");
 }
 
 TEST(SweepGrid, SettingsAreThoseOfTheScenarioWithWhatIsSetAndGiven) {
@@ -108,7 +108,7 @@ TEST(SweepGrid, AScenarioIsAKeyToo) {
   EXPECT_EQ(sweep.settings(1).find_path("model.name")->text(), "bicycle_slip");
   EXPECT_EQ(sweep.settings(3).find_path("model.name")->text(), "skid_steer");
   EXPECT_EQ(sweep.settings(3).find("scenario"), nullptr);
-  EXPECT_EQ(error_of([&] { sweep.check_values(host()); }), "");
+  EXPECT_EQ(mistake_of([&] { sweep.check_values(host()); }), "");
 }
 
 // ---- mistakes

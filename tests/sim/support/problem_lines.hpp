@@ -8,7 +8,7 @@
 
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/sim/problems/problem_file.hpp"
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 // Lines of problem files about a small model, and what is said of those that are wrong.
 namespace rhec::sim {
@@ -75,7 +75,7 @@ inline std::string replaced(std::string text, const std::string& old, const std:
 
 /// What reading, and building, says of a line with one thing changed.
 inline std::string mistake(const std::string& line, const std::string& old, const std::string& with) {
-  return message_of([&] { build(read_problem(replaced(line, old, with), "set.jsonl", 3), cart()); });
+  return error_of([&] { build(read_problem(replaced(line, old, with), "set.jsonl", 3), cart()); });
 }
 
 /// One thing that is changed in a line, and what is said of it.

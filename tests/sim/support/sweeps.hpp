@@ -1,11 +1,11 @@
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/study/sweep.hpp"
+#include "support/error_of.hpp"
 
 // Sweeps as texts, for tests that are told the folder of scenarios as SCENARIOS.
 namespace rhec::sim {
@@ -22,20 +22,16 @@ inline Sweep sweep_of(const std::string& text) {
 inline Sweep grid_of(const std::string& grid) { return sweep_of("scenario: figure8.yaml\ngrid:\n" + grid); }
 
 /// What the error says, without the folder; empty where there is none.
-inline std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& mistake) {
-    std::string text = mistake.what();
-    const std::string folder = std::string(SCENARIOS) + "/";
-    for (std::size_t at = text.find(folder); at != std::string::npos; at = text.find(folder))
-      text.erase(at, folder.size());
-    return text;
-  }
-  return {};
+template <class Call>
+std::string mistake_of(const Call& call) {
+  std::string text = error_of(call);
+  const std::string folder = std::string(SCENARIOS) + "/";
+  for (std::size_t at = text.find(folder); at != std::string::npos; at = text.find(folder))
+    text.erase(at, folder.size());
+  return text;
 }
 inline std::string mistake_in(const std::string& text) {
-  return error_of([&] {
+  return mistake_of([&] {
     const Sweep sweep = sweep_of(text);
     sweep.check_values(host());
     sweep.identities();

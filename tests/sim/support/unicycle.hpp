@@ -1,112 +1,92 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/core/model/formula_model.hpp"
+#include "rhec/core/model/model.hpp"
 #include "rhec/sim/check/model_check.hpp"
 
 // A model that is right, for tests of the checks of models: each test gives it one fault.
 namespace rhec::sim {
 
-/// A unicycle with slip. What it has beside that is the fault of a derived formula.
-struct Unicycle {
-  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 2;
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    using std::sin, std::cos;
-    dxdt[0] = p[0] * u[0] * cos(x[2]);
-    dxdt[1] = p[0] * u[0] * sin(x[2]);
-    dxdt[2] = p[1] * x[3];
-    dxdt[3] = 5.0 * (u[1] - x[3]);  // the yaw rate follows its command
-  }
-  template <class Scalar>
-  constexpr void outputs(const Scalar* x, Scalar* y) const {
-    y[0] = x[0];
-    y[1] = x[1];
-  }
+/// What the formula of a unicycle with slip has beside what is right.
+enum class Fault {
+  none,
+  knows_its_heading,      ///< a slope that pulls to one side of the world
+  knows_its_place,        ///< the yaw rate depends on y
+  pulls_aside,            ///< turns with all wheels straight
+  unseen_parameter,       ///< the second parameter has no effect
+  product_of_parameters,  ///< of two parameters only the product matters
+  root_of_a_state,        ///< the rates are not a number where the yaw rate is below -0.5
+  pole_of_a_state,        ///< the tangent of the yaw rate
+  log_of_an_output,       ///< an output is not a number where the yaw rate is above 0.9
+  rate_is_commanded,      ///< the input is the yaw rate's derivative, as of a steering angle; no fault
 };
 
-inline ModelDescription unicycle_description() {
-  ModelDescription about;
-  about.name = "unicycle";
-  about.source = "this test";
-  about.states = {{.name = "x", .unit = "m", .meaning = "x", .scale = 2.0},
-                  {.name = "y", .unit = "m", .meaning = "y", .scale = 2.0},
-                  {.name = "psi", .unit = "rad", .meaning = "heading", .is_angle = true},
-                  {.name = "rate", .unit = "rad/s", .meaning = "yaw rate", .lower = -0.8, .upper = 0.8, .scale = 0.5}};
-  about.inputs = {{.name = "v", .unit = "m/s", .meaning = "speed", .scale = 2.0},
-                  {.name = "w", .unit = "rad/s", .meaning = "yaw rate", .lower = -0.8, .upper = 0.8, .scale = 0.5}};
-  about.parameters = {
-      {.name = "kappa", .unit = "1", .meaning = "speed factor", .lower = 0.2, .upper = 1.0, .scale = 0.5},
-      {.name = "mu", .unit = "1", .meaning = "yaw factor", .lower = 0.2, .upper = 1.0, .scale = 0.5}};
-  about.outputs = {{.name = "x_gps", .unit = "m", .meaning = "x", .scale = 2.0},
-                   {.name = "y_gps", .unit = "m", .meaning = "y", .scale = 2.0}};
-  about.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0, .speed_factor = 0};
-  return about;
-}
+ModelDescription unicycle_description();
+std::unique_ptr<Model> unicycle(Fault fault = Fault::none);
+
+/// Passes on all that it is asked to a unicycle.
+class PassedOn : public Model {
+ public:
+  explicit PassedOn(Fault fault = Fault::none) : inner_(unicycle(fault)) {}
+  const ModelDescription& description() const noexcept override { return inner_->description(); }
+  void integrate(const Intervals& request) const noexcept override { inner_->integrate(request); }
+  void observe(const Nodes& request) const noexcept override { inner_->observe(request); }
+  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
+    inner_->rates(x, u, p, dxdt);
+  }
+  bool has_second_derivatives() const noexcept override { return inner_->has_second_derivatives(); }
+  std::vector<std::string> instruction_sets() const override { return inner_->instruction_sets(); }
+  bool use_instruction_set(const std::string& name) override { return inner_->use_instruction_set(name); }
+
+ private:
+  std::unique_ptr<Model> inner_;
+};
 
 /// A model that is described by somebody else: a formula's own would be refused where roles point nowhere.
-template <class Formula>
-class Described : public FormulaModel<Formula> {
+class Described : public PassedOn {
  public:
-  explicit Described(ModelDescription about)
-      : FormulaModel<Formula>({}, unicycle_description()), about_(std::move(about)) {}
+  Described(ModelDescription about, Fault fault) : PassedOn(fault), about_(std::move(about)) {}
   const ModelDescription& description() const noexcept override { return about_; }
 
  private:
   ModelDescription about_;
 };
 
-/// Passes on all that it is asked to another model, then spoils some of it.
-class Spoilt : public FormulaModel<Unicycle> {
+/// Spoils some of what the unicycle answers.
+class Spoilt : public PassedOn {
  public:
-  Spoilt() : FormulaModel({}, unicycle_description()) {}
   std::function<void(const Intervals&, int)> spoil_step = [](const Intervals&, int) {};
   std::function<void(const Nodes&)> spoil_node = [](const Nodes&) {};
   bool second = true;
 
   void integrate(const Intervals& request) const noexcept override {
-    FormulaModel::integrate(request);
+    PassedOn::integrate(request);
     spoil_step(request, 6 + (request.parameters_end ? 4 : 2));
   }
   void observe(const Nodes& request) const noexcept override {
-    FormulaModel::observe(request);
+    PassedOn::observe(request);
     spoil_node(request);
   }
   bool has_second_derivatives() const noexcept override { return second; }
 };
 
-template <class Formula = Unicycle>
-ModelCheck check(const std::function<void(ModelDescription&)>& spoil = {}, const ModelCheckOptions& options = {}) {
-  ModelDescription about = unicycle_description();
-  if (spoil) spoil(about);
-  Described<Formula> model(std::move(about));
-  return check_model(model, options);
+/// The check of a unicycle with a fault, its description spoilt.
+ModelCheck check(Fault fault, const std::function<void(ModelDescription&)>& spoil = {},
+                 const ModelCheckOptions& options = {});
+inline ModelCheck check(const std::function<void(ModelDescription&)>& spoil = {},
+                        const ModelCheckOptions& options = {}) {
+  return check(Fault::none, spoil, options);
 }
 
 /// "check: where" of the findings that are neither passed nor skipped.
-inline std::vector<std::string> faults(const ModelCheck& check) {
-  std::vector<std::string> all;
-  for (const Finding& finding : check.findings)
-    if (finding.verdict == Verdict::fail || finding.verdict == Verdict::warn)
-      all.push_back(std::string(word_of(finding.verdict)) + " " + finding.check + ": " + finding.where);
-  return all;
-}
-
-inline const Finding& finding_of(const ModelCheck& check, const std::string& name) {
-  for (const Finding& finding : check.findings)
-    if (finding.check == name) return finding;
-  throw Error("no finding of " + name);
-}
-
-inline const DriveInformation& drive_of(const ModelCheck& check, const std::string& name) {
-  for (const DriveInformation& drive : check.drives)
-    if (drive.name == name) return drive;
-  throw Error("no drive " + name);
-}
+std::vector<std::string> faults(const ModelCheck& check);
+const Finding& finding_of(const ModelCheck& check, const std::string& name);
+const DriveInformation& drive_of(const ModelCheck& check, const std::string& name);
 
 }  // namespace rhec::sim

@@ -2,38 +2,23 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <vector>
 
 #include "rhec/core/control/path.hpp"
 #include "rhec/sim/world/paths.hpp"
 #include "rhec/sim/world/truth.hpp"
 #include "sim/support/bicycle.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}  // namespace
-
-// Not inlined: gcc would take malloc and delete for a mismatched pair.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "support/allocations.hpp"
 
 namespace rhec::sim {
 namespace {
 
 TEST(Allocation, IsCounted) {
-  const long before = allocations;
+  const long before = allocation_count();
   const auto memory = std::make_unique<std::vector<double>>(100);
-  EXPECT_EQ(allocations - before, 2);
+  EXPECT_EQ(allocation_count() - before, 2);
 }
 
 TEST(Allocation, NoneInALoopOfTruthSensorsFieldsAndFollower) {
@@ -49,14 +34,14 @@ TEST(Allocation, NoneInALoopOfTruthSensorsFieldsAndFollower) {
     PathFollower follower(path);
     std::array<double, 2> inputs{};
     std::array<double, 3> outputs{};
-    const long before = allocations;
+    const long before = allocation_count();
     for (int i = 0; i < 20; ++i) {
       inputs[0] = path.point_at(follower.advance(vehicle.state()[0], vehicle.state()[1])).speed;
       vehicle.advance(inputs.data(), 0.2);
       sensors.observe(vehicle.state().data(), outputs.data());
       sensors.measure_inputs(inputs.data(), inputs.data());
     }
-    EXPECT_EQ(allocations - before, 0);
+    EXPECT_EQ(allocation_count() - before, 0);
     EXPECT_GT(follower.arc_length(), 3.0);
   }
 }

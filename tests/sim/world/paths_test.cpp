@@ -10,6 +10,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/sim/numbers/random.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -21,15 +22,8 @@ std::filesystem::path file_with(const std::string& content) {
 }
 
 std::string message_for(const std::string& content) {
-  try {
-    load_waypoints(file_with(content));
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
+  return error_of([&] { load_waypoints(file_with(content)); });
 }
-
-#define EXPECT_CONTAINS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
 // The largest turn of heading per metre along a path [1/m].
 double largest_curvature(const Path& path) {

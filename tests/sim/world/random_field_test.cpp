@@ -9,7 +9,7 @@
 
 #include "rhec/sim/numbers/random.hpp"
 #include "rhec/sim/world/slip_field.hpp"
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -133,11 +133,11 @@ TEST(GaussianRandomField, AnotherChannelLeavesTheFirstAsItWas) {
 }
 
 TEST(RandomFields, RefuseNonsense) {
-  EXPECT_CONTAINS(message_of([] { gaussian_random_field({.channels = {}}); }), "no channels");
-  EXPECT_CONTAINS(message_of([] { gaussian_random_field({.channels = {{1.0, 0.5}}}); }), "lower <= upper");
-  EXPECT_CONTAINS(message_of([] { gaussian_random_field({.correlation_length = 0.0}); }), "correlation_length");
-  EXPECT_CONTAINS(message_of([] { gaussian_random_field({.correlation_length = 0.01}); }), "lattice points");
-  EXPECT_CONTAINS(message_of([] { patch_field({.patch_size = -1.0}); }), "patch_size");
+  EXPECT_CONTAINS(error_of([] { gaussian_random_field({.channels = {}}); }), "no channels");
+  EXPECT_CONTAINS(error_of([] { gaussian_random_field({.channels = {{1.0, 0.5}}}); }), "lower <= upper");
+  EXPECT_CONTAINS(error_of([] { gaussian_random_field({.correlation_length = 0.0}); }), "correlation_length");
+  EXPECT_CONTAINS(error_of([] { gaussian_random_field({.correlation_length = 0.01}); }), "lattice points");
+  EXPECT_CONTAINS(error_of([] { patch_field({.patch_size = -1.0}); }), "patch_size");
 }
 
 TEST(PatchField, HasConstantPatchesWithSharpEdges) {

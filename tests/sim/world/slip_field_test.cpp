@@ -9,7 +9,7 @@
 #include <limits>
 #include <string>
 
-#include "sim/support/message_of.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -51,7 +51,7 @@ TEST(RasterField, InterpolatesAndGoesOnBeyondTheEdge) {
 
 TEST(RasterField, NamesFileAndLineOfAMistake) {
   const auto message_for = [](const std::string& content) {
-    return message_of([&] { raster_field({.files = {file_with(content)}}); });
+    return error_of([&] { raster_field({.files = {file_with(content)}}); });
   };
   const std::string head = "origin_x,origin_y,cell_size\n0,0,1\n";
   EXPECT_CONTAINS(message_for(head + "1,2\n1,2,3\n"), "rhec_raster.csv:4: 3 field(s) where 2");
@@ -62,9 +62,8 @@ TEST(RasterField, NamesFileAndLineOfAMistake) {
   EXPECT_CONTAINS(message_for("origin_x,origin_y,cell_size\n0,0\n1,2\n"), "rhec_raster.csv:2: 2 field(s) where 3");
   EXPECT_CONTAINS(message_for("origin_x,origin_y,cell_size\n0,0,1\n"), "empty");
   EXPECT_CONTAINS(message_for("1,2\n"), "no values");
-  EXPECT_CONTAINS(message_of([] { raster_field({.files = {"no/such/file.csv"}}); }),
-                  "no/such/file.csv: cannot be read");
-  EXPECT_CONTAINS(message_of([] { raster_field({}); }), "no files");
+  EXPECT_CONTAINS(error_of([] { raster_field({.files = {"no/such/file.csv"}}); }), "no/such/file.csv: cannot be read");
+  EXPECT_CONTAINS(error_of([] { raster_field({}); }), "no files");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "rhec/plugins/robot/robot.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -44,20 +45,12 @@ TEST(TruthEstimator, KnowsTheVehicleWhateverIsMeasured) {
 }
 
 TEST(TruthEstimator, IsNotMadeWithoutAVehicle) {
-  const auto error = [](const auto& act) -> std::string {
-    try {
-      act();
-    } catch (const Error& thrown) {
-      return thrown.what();
-    }
-    return "(no error)";
-  };
   constexpr const char* expected = "known to a simulation only; choose rhe or ekf";
-  const std::string made = error([] { robot().make_estimator(); });
+  const std::string made = error_of([] { robot().make_estimator(); });
   EXPECT_THAT(made, StartsWith("run.yaml:2: estimator: name: 'truth'"));
   EXPECT_THAT(made, HasSubstr(expected));
   // Nor is a replay of a log that asks for it.
-  EXPECT_THAT(error([] { LogScenario(Host(), parse_yaml(configuration, "log.yaml"), {}); }), HasSubstr(expected));
+  EXPECT_THAT(error_of([] { LogScenario(Host(), parse_yaml(configuration, "log.yaml"), {}); }), HasSubstr(expected));
 }
 
 TEST(TruthEstimator, IsOneOfThoseThatAScenarioNames) {

@@ -2,33 +2,17 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
-#include <new>
 
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/core/horizon/shift.hpp"
 #include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/allocations.hpp"
 #include "support/other_model.hpp"
 #include "support/random_problem.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}  // namespace
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-// The compiler sees both ends and not that they fit.
-#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace rhec {
 namespace {
@@ -56,9 +40,9 @@ RandomProblem::RheSpec blocks_of(int intervals) {
 }
 
 TEST(GnRti, AllocatesNothingAfterSetup) {
-  const long before_all = allocations;
+  const long before_all = allocation_count();
   const auto model = bicycle();
-  EXPECT_GT(allocations, before_all) << "the counter does not count";
+  EXPECT_GT(allocation_count(), before_all) << "the counter does not count";
   for (const char* options :
        {"{mode: rti}", "{mode: converge}", "{mode: converge, hessian: exact}", "{mode: rti, iterations: 3}"}) {
     for (unsigned seed = 1; seed <= 4; ++seed) {
@@ -73,13 +57,13 @@ TEST(GnRti, AllocatesNothingAfterSetup) {
         const auto solver = gn_rti(options);
         solver->setup(*problem);
         Iterate point = RandomProblem::cold_start(*problem);
-        const long before = allocations;
+        const long before = allocation_count();
         for (int repeat = 0; repeat < 3; ++repeat) {
           solver->prepare(point);
           solver->solve(point);
         }
         solver->reset();
-        EXPECT_EQ(allocations - before, 0) << options << ", seed " << seed;
+        EXPECT_EQ(allocation_count() - before, 0) << options << ", seed " << seed;
       }
     }
   }

@@ -173,7 +173,7 @@ TEST(Ipopt, PrintsNothingAndReadsNoFile) {
       }
     }
   }
-  EXPECT_NE(error_of("{native: {mu_strategy: never}}"), "");
+  EXPECT_NE(error_of_options("{native: {mu_strategy: never}}"), "");
   std::fflush(nullptr);
   EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");

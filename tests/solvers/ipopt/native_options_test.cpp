@@ -60,22 +60,23 @@ TEST(IpoptNativeOptions, PassesNativeOptionsOn) {
 }
 
 TEST(IpoptNativeOptions, RefusesNativeOptionsWithTheirPlace) {
-  EXPECT_EQ(error_of("native:\n  mu_strategy: adaptive\n  mu_stategy: adaptive"),
+  EXPECT_EQ(error_of_options("native:\n  mu_strategy: adaptive\n  mu_stategy: adaptive"),
             "options.yaml:3: native.mu_stategy: solver 'ipopt': Ipopt has no option 'mu_stategy'; did you mean "
             "'mu_strategy'?");
-  EXPECT_NE(error_of("native: {mu_strategy: often}").find("found 'often', expected monotone | adaptive"),
+  EXPECT_NE(error_of_options("native: {mu_strategy: often}").find("found 'often', expected monotone | adaptive"),
             std::string::npos);
-  EXPECT_NE(error_of("native: {mu_init: -1}").find("found '-1', expected a number, above 0"), std::string::npos);
-  EXPECT_NE(error_of("native: {max_soc: many}").find("found 'many', expected an integer, at least 0"),
+  EXPECT_NE(error_of_options("native: {mu_init: -1}").find("found '-1', expected a number, above 0"),
             std::string::npos);
-  EXPECT_NE(error_of("native: {mu_init: [1]}").find("options.yaml:1: native.mu_init"), std::string::npos);
-  EXPECT_NE(error_of("native: adaptive").find("expected a map of options of Ipopt"), std::string::npos);
+  EXPECT_NE(error_of_options("native: {max_soc: many}").find("found 'many', expected an integer, at least 0"),
+            std::string::npos);
+  EXPECT_NE(error_of_options("native: {mu_init: [1]}").find("options.yaml:1: native.mu_init"), std::string::npos);
+  EXPECT_NE(error_of_options("native: adaptive").find("expected a map of options of Ipopt"), std::string::npos);
   // What would print, read files or contradict an option of ours.
-  EXPECT_NE(error_of("native: {print_level: 5}").find("a solver prints nothing"), std::string::npos);
-  EXPECT_NE(error_of("native: {option_file_name: mine.opt}").find("cannot be set here"), std::string::npos);
-  EXPECT_NE(error_of("native: {tol: 1e-3}").find("option 'tolerance'"), std::string::npos);
+  EXPECT_NE(error_of_options("native: {print_level: 5}").find("a solver prints nothing"), std::string::npos);
+  EXPECT_NE(error_of_options("native: {option_file_name: mine.opt}").find("cannot be set here"), std::string::npos);
+  EXPECT_NE(error_of_options("native: {tol: 1e-3}").find("option 'tolerance'"), std::string::npos);
   // Only Ipopt itself knows that this one is not there, and only when it starts.
-  EXPECT_NE(error_of("native:\n  mu_init: 0.1\n  linear_solver: pardiso")
+  EXPECT_NE(error_of_options("native:\n  mu_init: 0.1\n  linear_solver: pardiso")
                 .find("options.yaml:3: native.linear_solver: solver 'ipopt': Ipopt cannot start"),
             std::string::npos);
 }

@@ -10,6 +10,7 @@
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/error_of.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec::ipopt::testing {
@@ -25,13 +26,8 @@ inline std::shared_ptr<Solver> ipopt_with(const std::string& options) {
 }
 inline std::shared_ptr<const Model> bicycle() { return host().make_model("bicycle_slip"); }
 
-inline std::string error_of(const std::string& options) {
-  try {
-    ipopt_with(options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+inline std::string error_of_options(const std::string& options) {
+  return error_of([&] { ipopt_with(options); });
 }
 
 inline RandomProblem::RheSpec blocks_of(int block, int intervals = 15) {

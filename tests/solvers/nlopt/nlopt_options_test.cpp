@@ -100,11 +100,12 @@ TEST(NloptOptions, RefuseWhatAnAlgorithmCannotTake) {
 }
 
 TEST(NloptOptions, SayWhatIsWrongWithThem) {
-  EXPECT_NE(error_of("{algorithm: LD_SLSPQ}").find("LD_SLSQP"), std::string::npos);
-  EXPECT_NE(error_of("{algorithm: LD_LBFGS, scaling: full}").find("diagonal"), std::string::npos);
-  EXPECT_NE(error_of("{algorithm: AUGLAG, local_algorithm: G_MLSL}").find("local_algorithm"), std::string::npos);
-  EXPECT_NE(error_of("{native: {verbosity: 1}}").find("prints nothing"), std::string::npos);
-  EXPECT_NE(error_of("{native: {inner_maxeval: many}}").find("options:1"), std::string::npos);
+  EXPECT_NE(error_of_options("{algorithm: LD_SLSPQ}").find("LD_SLSQP"), std::string::npos);
+  EXPECT_NE(error_of_options("{algorithm: LD_LBFGS, scaling: full}").find("diagonal"), std::string::npos);
+  EXPECT_NE(error_of_options("{algorithm: AUGLAG, local_algorithm: G_MLSL}").find("local_algorithm"),
+            std::string::npos);
+  EXPECT_NE(error_of_options("{native: {verbosity: 1}}").find("prints nothing"), std::string::npos);
+  EXPECT_NE(error_of_options("{native: {inner_maxeval: many}}").find("options:1"), std::string::npos);
 }
 
 }  // namespace

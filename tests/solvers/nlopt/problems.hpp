@@ -13,6 +13,7 @@
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/error_of.hpp"
 #include "support/random_problem.hpp"
 #include "support/test_models.hpp"
 
@@ -30,13 +31,8 @@ inline std::shared_ptr<Solver> nlopt_with(const std::string& options) {
 }
 inline std::shared_ptr<const Model> bicycle() { return host().make_model("bicycle_slip"); }
 
-inline std::string error_of(const std::string& options) {
-  try {
-    nlopt_with(options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+inline std::string error_of_options(const std::string& options) {
+  return error_of([&] { nlopt_with(options); });
 }
 
 /// A controller's problem that starts off its path, with limits of the steering rate that bind.

@@ -1,0 +1,121 @@
+#include "command.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "commands.hpp"
+#include "rhec/core/config/option_values.hpp"
+
+namespace rhec::apps {
+
+Argument& Argument::required() {
+  option_->required();
+  return *this;
+}
+Argument& Argument::value(const std::string& word) {
+  option_->type_name(word);
+  return *this;
+}
+Argument& Argument::shows_default() {
+  option_->capture_default_str();
+  return *this;
+}
+Argument& Argument::within(int lowest, int highest) {
+  option_->check(CLI::Range(lowest, highest));
+  return *this;
+}
+Argument& Argument::positive() {
+  option_->check(CLI::PositiveNumber);
+  return *this;
+}
+Argument& Argument::not_negative() {
+  option_->check(CLI::NonNegativeNumber);
+  return *this;
+}
+Argument& Argument::needs(const Argument& other) {
+  option_->needs(other.option_);
+  return *this;
+}
+
+template <class Variable>
+Argument Command::add(const std::string& names, Variable& variable, const std::string& meaning) {
+  return Argument(app_->add_option(names, variable, meaning));
+}
+template Argument Command::add(const std::string&, int&, const std::string&);
+template Argument Command::add(const std::string&, double&, const std::string&);
+template Argument Command::add(const std::string&, std::optional<double>&, const std::string&);
+template Argument Command::add(const std::string&, std::string&, const std::string&);
+template Argument Command::add(const std::string&, std::optional<std::string>&, const std::string&);
+
+namespace {
+CLI::Option* one_value_each_time(CLI::Option* option) {
+  return option->expected(1)->allow_extra_args(false)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+}  // namespace
+
+Argument Command::add_list(const std::string& name, std::vector<std::string>& values, const std::string& meaning) {
+  return Argument(one_value_each_time(app_->add_option(name, values, meaning)));
+}
+Argument Command::add_list(const std::string& name, std::function<void(const std::vector<std::string>&)> take,
+                           const std::string& meaning) {
+  return Argument(
+      one_value_each_time(app_->add_option_function<std::vector<std::string>>(name, std::move(take), meaning)));
+}
+void Command::add_flag(const std::string& name, bool& variable, const std::string& meaning) {
+  app_->add_flag(name, variable, meaning);
+}
+
+Program::Program(const std::string& about, const std::string& examples)
+    : app_(std::make_unique<CLI::App>(about, "rhec")) {
+  app_->set_version_flag("--version", "rhec " RHEC_PROJECT_VERSION);
+  app_->require_subcommand(1);
+  app_->footer(examples);
+}
+Program::~Program() = default;
+
+Command Program::add(const std::string& name, const std::string& about, const std::string& notes, Action action) {
+  CLI::App* command = app_->add_subcommand(name, about);
+  command->footer(notes);
+  command->callback([this, action = std::move(action)] { chosen_ = action; });
+  return Command(command);
+}
+
+std::string Program::wrong_command(int count, char** words) const {
+  std::vector<std::string> commands;
+  for (const CLI::App* command : std::as_const(*app_).get_subcommands([](const CLI::App*) { return true; }))
+    commands.push_back(command->get_name());
+  const std::string expected = fmt::format("expected one of {}; see 'rhec --help'", fmt::join(commands, ", "));
+  if (count < 2) return "no command; " + expected;
+  const std::string word = words[1];
+  if (word == "-h" || word == "--help" || word == "--version") return {};
+  if (word.starts_with('-')) return fmt::format("unknown option '{}'; {}", word, expected);
+  if (std::find(commands.begin(), commands.end(), word) != commands.end()) return {};
+  const std::string near = nearest(word, commands);
+  return fmt::format("unknown command '{}'; {}", word,
+                     near.empty() ? expected : fmt::format("did you mean '{}'?", near));
+}
+
+int Program::run(int count, char** words) {
+  const auto usage_error = [](std::string_view what) {
+    fmt::print(stderr, "rhec: error: {}\n", what);
+    return exit_usage;
+  };
+  if (const std::string problem = wrong_command(count, words); !problem.empty()) return usage_error(problem);
+  try {
+    app_->parse(count, words);
+  } catch (const CLI::ParseError& end) {
+    if (end.get_exit_code() == 0) return app_->exit(end);  // --help, --version
+    const auto called = app_->get_subcommands();
+    return usage_error(
+        fmt::format("{}; see 'rhec {}--help'", end.what(), called.empty() ? "" : called.front()->get_name() + " "));
+  }
+  return chosen_();
+}
+
+}  // namespace rhec::apps

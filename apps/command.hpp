@@ -1,0 +1,80 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+// What commands say of their arguments. The parsing is CLI11's; command.cpp alone includes it, since it takes long to
+// compile.
+namespace rhec::apps {
+
+/// What to do once the command line has been read; returns an exit code.
+using Action = std::function<int()>;
+
+/// One argument of a command, to be described further.
+class Argument {
+ public:
+  explicit Argument(CLI::Option* option) : option_(option) {}
+  Argument& required();
+  /// The word for its value in the help, e.g. FILE.
+  Argument& value(const std::string& word);
+  /// Shows the variable's value in the help, as the default.
+  Argument& shows_default();
+  /// Only from `lowest` to `highest`.
+  Argument& within(int lowest, int highest);
+  Argument& positive();
+  Argument& not_negative();
+  /// Only together with another one.
+  Argument& needs(const Argument& other);
+
+ private:
+  CLI::Option* option_;
+};
+
+/// A command of the program. What its arguments are read into must outlive the program.
+class Command {
+ public:
+  explicit Command(CLI::App* app) : app_(app) {}
+
+  /// An argument that is read into `variable`: an int, a double, a std::string, or a std::optional of the latter two.
+  /// `names` are "-o,--out" for an option, "scenario" for what is given by its place.
+  template <class Variable>
+  Argument add(const std::string& names, Variable& variable, const std::string& meaning);
+  /// An option that may be given several times, with one value each time.
+  Argument add_list(const std::string& name, std::vector<std::string>& values, const std::string& meaning);
+  /// The same; `take` is called with all of them, and throws Error for a wrong one.
+  Argument add_list(const std::string& name, std::function<void(const std::vector<std::string>&)> take,
+                    const std::string& meaning);
+  void add_flag(const std::string& name, bool& variable, const std::string& meaning);
+
+ private:
+  CLI::App* app_;
+};
+
+/// The program: one of its commands is called.
+class Program {
+ public:
+  Program(const std::string& about, const std::string& examples);
+  ~Program();
+
+  /// `notes` follow the help of the command's arguments.
+  Command add(const std::string& name, const std::string& about, const std::string& notes, Action action);
+  /// Reads the command line and calls its command's action, or prints help, the version, or what is wrong. Returns an
+  /// exit code. Throws what the action throws.
+  int run(int count, char** words);
+
+ private:
+  /// An error message if the command is missing or unknown; otherwise empty.
+  std::string wrong_command(int count, char** words) const;
+
+  std::unique_ptr<CLI::App> app_;
+  Action chosen_;
+};
+
+}  // namespace rhec::apps
