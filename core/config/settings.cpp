@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
+
+#include "rhec/core/base/infinity.hpp"
 
 namespace rhec {
 namespace {
@@ -130,7 +131,6 @@ std::string Settings::where() const {
 
 std::optional<double> Settings::number() const noexcept {
   if (kind_ != Kind::scalar) return std::nullopt;
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   if (text_ == ".inf" || text_ == "+.inf" || text_ == "inf" || text_ == "+inf") return infinity;
   if (text_ == "-.inf" || text_ == "-inf") return -infinity;
   const std::optional<double> value = read_whole<double>(text_);

@@ -1,20 +1,18 @@
 #include "rhec/core/horizon/horizon_problem.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "horizon_linearisation.hpp"
 #include "interval_dynamics.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/kernels/transcription_kernels.hpp"
 
 namespace rhec {
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Whether an interval uses the value in its stage state: if no block starts, or a ramp starts there.
 bool uses_carried_value(const HorizonStructure& structure, int interval, int lifted) noexcept {

@@ -2,24 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <utility>
 
 #include "checks.hpp"
 #include "cost_view.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/base/scratch.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/kernels/transcription_kernels.hpp"
 
 namespace rhec {
-namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
-
 RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup)
     : HorizonProblem(std::move(model), {{.max_intervals = setup.max_intervals,
                                          .blocked_inputs = setup.blocked_inputs,

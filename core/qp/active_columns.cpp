@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/qp/dual_active_set.hpp"
 #include "sensitivity_sums.hpp"
 
 namespace rhec {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // A bound is linearly dependent on the others if at most this fraction of its own curvature is left.
 constexpr double dependence = 1e-10;
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/qp/stage_checks.hpp"
 #include "sensitivity_sums.hpp"
 #include "tolerances.hpp"
@@ -12,7 +12,6 @@
 namespace rhec {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // A solution is accepted if active bounds are met to within this fraction of the tolerance for violations.
 constexpr double exactness = 0.1;
 // With more violated bounds, the allowed number of changes is unlikely to suffice.

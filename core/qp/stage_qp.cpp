@@ -1,15 +1,10 @@
 #include "rhec/core/qp/stage_qp.hpp"
 
 #include <algorithm>
-#include <limits>
+
+#include "rhec/core/base/infinity.hpp"
 
 namespace rhec {
-namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
-
 StageQp::StageQp(const Capacity& capacity) : StageQp(capacity, capacity.intervals + 1) {
   window_ = 0;
   // Space for twice the stages, so that they are copied back to the front only once in many drops.

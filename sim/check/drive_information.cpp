@@ -1,19 +1,19 @@
 // Information in the measurements along a drive about its unknowns: the initial state and each block of parameters.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
+#include "rhec/core/base/infinity.hpp"
+
 #include "drives.hpp"
 
 namespace rhec::sim {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double least_sigma = 1e-9;        // of noise, in scales, so that one measurement does not dominate all others
 constexpr double largest_null_part = 1e-6;  // of a unit vector, in the undetermined subspace
 

@@ -1,12 +1,13 @@
 // Checks on typical drives: magnitudes against scales, and observability of states and parameters.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+
+#include "rhec/core/base/infinity.hpp"
 
 #include "drives.hpp"
 
@@ -15,7 +16,6 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double far_off = 100.0;        // ratio of a magnitude to its scale
 constexpr double ill_conditioned = 1e6;  // of the scaled Jacobian of F
 

@@ -3,18 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "assessment.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/infinity.hpp"
 
 namespace rhec::sim {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // Tolerances tried: 10^-2 ... 10^-12.
 constexpr int loosest_exponent = -2, tightest_exponent = -12;
 

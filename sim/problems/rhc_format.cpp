@@ -18,7 +18,7 @@ std::map<std::string, double> read_named_weights(const LineValue& map) {
   return weights;
 }
 
-RhcProblem::Setup setup_of(const ProblemRecord& record, const Model& model) {
+RhcProblem::Setup control_setup_of(const ProblemRecord& record, const Model& model) {
   const ModelDescription& about = model.description();
   const ModelNames names(record, model);
   const auto N = static_cast<std::size_t>(record.intervals);
@@ -179,7 +179,7 @@ class RhcFormat final : public ProblemFormat {
 
   std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                         int max_intervals, std::vector<int>) const override {
-    RhcProblem::Setup setup = setup_of(record, *model);
+    RhcProblem::Setup setup = control_setup_of(record, *model);
     setup.max_intervals = std::max({record.intervals, max_intervals, 1});
     auto problem = std::make_unique<RhcProblem>(std::move(model), std::move(setup));
     fill(record, *problem);
@@ -189,7 +189,7 @@ class RhcFormat final : public ProblemFormat {
 
   bool refill(const ProblemRecord& record, HorizonProblem& filled) const override {
     auto& problem = as_kind<RhcProblem>(filled);
-    if (!fits(setup_of(record, problem.model()), problem.setup())) return false;
+    if (!fits(control_setup_of(record, problem.model()), problem.setup())) return false;
     fill(record, problem);
     check_guess(record, problem);
     return true;

@@ -120,7 +120,7 @@ std::vector<RobustLoss> robust_losses(const ProblemRecord& record, const ModelNa
   return losses;
 }
 
-RheProblem::Setup setup_of(const ProblemRecord& record, const Model& model) {
+RheProblem::Setup estimation_setup_of(const ProblemRecord& record, const Model& model) {
   const ModelDescription& about = model.description();
   const ModelNames names(record, model);
   names.check_count("arrival.state", record.arrival_state.size(), about.states);
@@ -294,7 +294,7 @@ class RheFormat final : public ProblemFormat {
 
   std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                         int max_intervals, std::vector<int> one_block) const override {
-    RheProblem::Setup setup = setup_of(record, *model);
+    RheProblem::Setup setup = estimation_setup_of(record, *model);
     setup.one_block = std::move(one_block);
     setup.max_intervals = std::max({record.intervals, max_intervals, 1});
     auto problem = std::make_unique<RheProblem>(std::move(model), std::move(setup));
@@ -305,7 +305,7 @@ class RheFormat final : public ProblemFormat {
 
   bool refill(const ProblemRecord& record, HorizonProblem& filled) const override {
     auto& problem = as_kind<RheProblem>(filled);
-    if (!fits(setup_of(record, problem.model()), problem.setup())) return false;
+    if (!fits(estimation_setup_of(record, problem.model()), problem.setup())) return false;
     for (const int parameter : problem.setup().one_block)
       if (!is_one_block(record, problem.model(), parameter)) return false;
     fill(record, problem);

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int version = 1;
+constexpr int document_version = 1;
 constexpr const char* what_there_is =
     "expected the folder of a run (steps.csv, times.csv, summary.json: 'rhec run' makes it) or of an estimation "
     "(estimates.csv, summary.json: 'rhec estimate'), the database of a sweep ('rhec sweep'), or compare.json ('rhec "
@@ -85,7 +85,7 @@ std::string report_document(const fs::path& source, const std::string& program) 
         fmt::format("{}: there is no such folder or file; {}", source.empty() ? "''" : source.string(), what_there_is));
   Json document;
   document["form"] = "rhec report";
-  document["version"] = version;
+  document["version"] = document_version;
   try {
     document.update(fs::is_directory(status) ? folder_report(source) : file_report(source));
   } catch (const JsonError& error) {

@@ -14,7 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* maker = log_maker;
 // A longer time without fixes is a gap [s].
 constexpr double least_gap = 2.0;
 
@@ -26,13 +25,13 @@ struct Range {
 class LogReport {
  public:
   LogReport(const fs::path& folder, const Json& summary)
-      : folder_(folder), summary_(summary), table_(folder / "estimates.csv", maker), time_(table_.numbers("time")) {
+      : folder_(folder), summary_(summary), table_(folder / "estimates.csv", log_maker), time_(table_.numbers("time")) {
     find_variants();
     if (fs::exists(folder / "horizons.jsonl")) {
-      horizons_ = read_horizons(folder / "horizons.jsonl", maker, "log");
+      horizons_ = read_horizons(folder / "horizons.jsonl", log_maker, "log");
       require_same_log();
     }
-    if (fs::exists(folder / "times.csv")) times_.emplace(folder / "times.csv", maker);
+    if (fs::exists(folder / "times.csv")) times_.emplace(folder / "times.csv", log_maker);
     read_names();
   }
 
@@ -57,7 +56,7 @@ class LogReport {
 
  private:
   void find_variants() {
-    const Json& variants = member(summary_, "variants", folder_ / "summary.json", maker);
+    const Json& variants = member(summary_, "variants", folder_ / "summary.json", log_maker);
     const std::size_t name = table_.column("variant"), held_out = table_.column("held_out");
     std::int64_t row = 0;
     for (const auto& [variant, numbers] : variants.items()) {
@@ -66,22 +65,22 @@ class LogReport {
       for (; row < table_.rows() && table_.text(row, name) == variant; ++row)
         nodes += table_.text(row, held_out) == "0";
       range.end = row;
-      const auto expected = member(numbers, "nodes", folder_ / "summary.json", maker).get<std::int64_t>();
+      const auto expected = member(numbers, "nodes", folder_ / "summary.json", log_maker).get<std::int64_t>();
       if (nodes != expected)
         throw Error(
             fmt::format("{}:{}: the rows of variant '{}' end after {} nodes, expected {} as summary.json says; take a "
                         "copy that is whole, or make it again with '{}'",
-                        table_.file().string(), table_.line_of(row) - 1, variant, nodes, expected, maker));
+                        table_.file().string(), table_.line_of(row) - 1, variant, nodes, expected, log_maker));
       variants_.emplace_back(variant, range);
     }
     if (row < table_.rows())
       throw Error(
           fmt::format("{}:{}: variant '{}' is not in summary.json; the two files are of different estimations: "
                       "make them again with '{}'",
-                      table_.file().string(), table_.line_of(row), table_.text(row, name), maker));
+                      table_.file().string(), table_.line_of(row), table_.text(row, name), log_maker));
     if (variants_.empty())
       throw Error(fmt::format("{}: variants: there is none; expected one at least; make it again with '{}'",
-                              (folder_ / "summary.json").string(), maker));
+                              (folder_ / "summary.json").string(), log_maker));
   }
 
   void require_same_log() const {
@@ -96,7 +95,7 @@ class LogReport {
       throw Error(
           fmt::format("{}: is of another estimation than estimates.csv; make it again with '{}', or take the "
                       "file away (the report then does without horizons)",
-                      (folder_ / "horizons.jsonl").string(), maker));
+                      (folder_ / "horizons.jsonl").string(), log_maker));
   }
 
   bool hold_out_is_same() const {
@@ -326,7 +325,7 @@ class LogReport {
       throw Error(fmt::format(
           "{}:{}: has {} rows of variant '{}', expected {} as summary.json says; take a copy that is "
           "whole, or make it again with '{}'",
-          times_->file().string(), times_->rows() + 1, times.size(), name, numbers.at("nodes").dump(), maker));
+          times_->file().string(), times_->rows() + 1, times.size(), name, numbers.at("nodes").dump(), log_maker));
     Json histogram = times_histogram(times);
     if (!histogram.is_null()) histogram.update(numbers.at("solve_time_us"));
     return histogram;

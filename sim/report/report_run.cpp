@@ -15,7 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* maker = run_maker;
 const std::vector<std::string> other_errors = {"position", "heading", "tracking"};
 
 /// The variables of a run, from the names of its columns.
@@ -25,7 +24,7 @@ struct Names {
 
 Names names_of(const ResultTable& steps, const Json& summary, const fs::path& folder) {
   Names names;
-  const Json& mae = member(summary, "mae", folder / "summary.json", maker);
+  const Json& mae = member(summary, "mae", folder / "summary.json", run_maker);
   for (const std::string& column : steps.header()) {
     if (!column.starts_with("true_")) continue;
     const std::string name = column.substr(5);
@@ -39,7 +38,7 @@ Names names_of(const ResultTable& steps, const Json& summary, const fs::path& fo
   const std::size_t first = 2 + 3 * (names.states.size() + names.parameters.size()), end = steps.column("reference_x");
   if (names.states.empty() || end < first)
     throw Error(fmt::format("{}:1: has no columns of a run; expected those of docs/results.md; make it again with '{}'",
-                            steps.file().string(), maker));
+                            steps.file().string(), run_maker));
   for (std::size_t i = first; i < end; ++i) names.inputs.push_back(steps.header()[i]);
   return names;
 }
@@ -66,12 +65,13 @@ class RunReport {
   RunReport(const fs::path& folder, const Json& summary)
       : folder_(folder),
         summary_(summary),
-        steps_(folder / "steps.csv", maker),
+        steps_(folder / "steps.csv", run_maker),
         names_(names_of(steps_, summary, folder)),
         time_(steps_.numbers("time")) {
-    steps_.require_rows(member(summary, "steps", folder / "summary.json", maker).get<std::int64_t>(), "summary.json");
+    steps_.require_rows(member(summary, "steps", folder / "summary.json", run_maker).get<std::int64_t>(),
+                        "summary.json");
     if (fs::exists(folder / "horizons.jsonl")) {
-      horizons_ = read_horizons(folder / "horizons.jsonl", maker, "run");
+      horizons_ = read_horizons(folder / "horizons.jsonl", run_maker, "run");
       require_same_run();
     }
   }
@@ -119,7 +119,7 @@ class RunReport {
       throw Error(
           fmt::format("{}: is of another run than steps.csv; make the run again with '{}', or take the file away (the "
                       "report then does without horizons)",
-                      (folder_ / "horizons.jsonl").string(), maker));
+                      (folder_ / "horizons.jsonl").string(), run_maker));
   }
 
   bool is_of_this_run(const Json& record) const {
@@ -174,7 +174,7 @@ class RunReport {
       const Json* found = find_variable("states", name);
       is_angle_.push_back(is_angle_known && found && found->at("is_angle").get<bool>());
     }
-    document_["subtitle"] = member(summary_, "ended", folder_ / "summary.json", maker);
+    document_["subtitle"] = member(summary_, "ended", folder_ / "summary.json", run_maker);
     document_["summary"] = summary_;
   }
 
@@ -311,7 +311,7 @@ class RunReport {
   }
 
   void statuses() {
-    const Json& counts = member(summary_, "statuses", folder_ / "summary.json", maker);
+    const Json& counts = member(summary_, "statuses", folder_ / "summary.json", run_maker);
     document_["statuses"] = {
         {"rhe", status_of("estimator_status", counts.value("rhe", Json::object()), "estimator")},
         {"rhc", status_of("controller_status", counts.value("rhc", Json::object()), "controller")}};
@@ -356,10 +356,10 @@ class RunReport {
     document_["solve_times"] = {{"rhe", nullptr}, {"rhc", nullptr}};
     if (!fs::exists(folder_ / "times.csv"))
       throw Error(fmt::format("{}: is missing; expected steps.csv, times.csv and summary.json; make it again with '{}'",
-                              (folder_ / "times.csv").string(), maker));
-    const ResultTable times(folder_ / "times.csv", maker);
+                              (folder_ / "times.csv").string(), run_maker));
+    const ResultTable times(folder_ / "times.csv", run_maker);
     times.require_rows(steps_.rows(), "steps.csv");
-    const Json& spreads = member(summary_, "solve_time_us", folder_ / "summary.json", maker);
+    const Json& spreads = member(summary_, "solve_time_us", folder_ / "summary.json", run_maker);
     for (const char* who : {"rhe", "rhc"}) {
       Json histogram = times_histogram(times.numbers(std::string(who) + "_us"));
       if (histogram.is_null()) continue;

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "rhec/core/base/infinity.hpp"
 
 namespace rhec::sparse_sqp {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int active_set_rounds = 10;
 constexpr int polishing_rounds = 6;
 // The active set is far from settled if a round releases this many bounds and more than half as many as the round
@@ -26,7 +26,7 @@ constexpr double active_set_tolerance = 1e-11;
 // regularisation.
 constexpr double believable = 1e-8;
 constexpr double accurate = 1e-11;
-constexpr double longest_step = 1e10;
+constexpr double largest_step = 1e10;
 // Interior point: residuals relative to the magnitudes in the QP.
 constexpr double interior_tolerance = 1e-12;
 constexpr double good_enough_interior = 1e-6;
@@ -230,7 +230,7 @@ SparseQp::ActiveSet SparseQp::solve_active(const Data& qp, int rounds) {
         if (active_[k] != 2) mu_[k] = active_[k] * std::max(0.0, mu_[k] * active_[k]);
       }
       // A direction that neither cost nor equations nor bounds determine.
-      if (!(max_abs(d_.data(), n_) <= longest_step)) return ActiveSet::unknown;
+      if (!(max_abs(d_.data(), n_) <= largest_step)) return ActiveSet::unknown;
       return settled ? ActiveSet::optimal : ActiveSet::feasible;
     }
   }

@@ -4,16 +4,18 @@
     clang_tidy.py <source root> <build directory> [--jobs N] [--thorough] [folder or file ...]
 
 A file that passed is not looked at again until it, a header of ours that it includes, its flags, .clang-tidy or
-clang-tidy itself changes; what passed is kept in <build directory>/clang-tidy. Checks that take long and find little are
-left to --thorough, for the night.
+clang-tidy itself changes; what passed is kept in <build directory>/clang-tidy. --thorough, for the night: with checks that
+take long and find little, and each file by itself, so that none has a header from the one before it.
 """
 import argparse
+import collections
 import concurrent.futures
 import hashlib
 import json
 import pathlib
 import re
 import subprocess
+import tempfile
 import time
 
 import house
@@ -28,6 +30,14 @@ EXTRA = ["--extra-arg=-Wno-error", "--extra-arg=-Wno-unknown-warning-option", "-
 UNKNOWN_TO_CLANG = {"-fno-tree-loop-distribute-patterns"}
 # A header that gcc has precompiled for a test is none for clang.
 PRECOMPILED = re.compile(r" -Winvalid-pch| -fpch-preprocess| -include \S+cmake_pch\.hxx")
+
+
+# So few sources of a folder are looked at one by one, so many at once.
+FEW, MOST = 2, 8
+
+
+def checks_option(without):
+    return f"--checks={','.join(f'-{name}' for name in without)}"
 
 
 class Headers:
@@ -82,31 +92,59 @@ def main():
             entries.setdefault(file, entry["command"])
 
     version = subprocess.run(["clang-tidy", "--version"], check=True, capture_output=True, text=True).stdout
-    options = EXTRA + ([] if arguments.thorough else [f"--checks={','.join(f'-{name}' for name in SLOW)}"])
-    common = version + (root / ".clang-tidy").read_text() + " ".join(options)
+    common = version + (root / ".clang-tidy").read_text() + " ".join(EXTRA) + ("" if arguments.thorough else " ".join(SLOW))
     headers = Headers(root)
     header_filter = f"--header-filter=^{re.escape(str(root))}/({'|'.join(house.FOLDERS)})/"
 
-    def look(file):
-        key = hashlib.sha256((common + str(file) + entries[file] + headers.digest(file)).encode()).hexdigest()
-        stamp = passed / key
-        if stamp.exists():
-            return file, "", 0.0
-        start = time.monotonic()
-        command = ["clang-tidy", "--quiet", "-p", str(passed), header_filter, *options, str(file)]
+    def stamp_of(file):
+        return passed / hashlib.sha256((common + str(file) + entries[file] + headers.digest(file)).encode()).hexdigest()
+
+    def tidy(folder, file, *more):
+        """What clang-tidy says of a file, with the commands in `folder`; empty if nothing."""
+        command = ["clang-tidy", "--quiet", "-p", str(folder), f"--config-file={root / '.clang-tidy'}", header_filter,
+                   checks_option(SLOW * (not arguments.thorough) + list(more)), *EXTRA, str(file)]
         result = subprocess.run(command, capture_output=True, text=True)
         if result.returncode == 0:
-            stamp.touch()
-            return file, "", time.monotonic() - start
-        return file, result.stdout + (result.stderr if "error:" not in result.stdout else ""), time.monotonic() - start
+            return ""
+        return result.stdout + (result.stderr if "error:" not in result.stdout else "") or f"{file}: clang-tidy ended with {result.returncode}"
+
+    def look(files):
+        """What is wrong with files that are compiled alike. Several are looked at as one, for headers take most of the time;
+        where that does not pass, because of a finding or of names that two of them have, each half is looked at by itself.
+        """
+        start = time.monotonic()
+        if len(files) == 1:
+            text = tidy(passed, files[0])
+        else:
+            with tempfile.TemporaryDirectory(dir=passed) as folder:
+                unit = pathlib.Path(folder, "together.cpp")
+                unit.write_text("".join(f'#include "{file}"\n' for file in files))
+                command = entries[files[0]].replace(str(files[0]), str(unit))
+                pathlib.Path(folder, "compile_commands.json").write_text(
+                    json.dumps([{"directory": str(build), "file": str(unit), "command": command}]))
+                text = tidy(folder, unit, "bugprone-suspicious-include")
+            if text:
+                half = len(files) // 2
+                return look(files[:half]) + look(files[half:])
+        for file in () if text else files:
+            stamp_of(file).touch()
+        print(f"{', '.join(str(file.relative_to(root)) for file in files)}: {time.monotonic() - start:.1f} s", flush=True)
+        return [text.rstrip()] if text else []
+
+    alike = collections.defaultdict(list)
+    for file in sorted(entries):
+        if not stamp_of(file).exists():
+            flags = re.sub(r" -o \S+| -D\w+_EXPORTS", "", entries[file].replace(str(file), ""))
+            alike[file.parent, flags].append(file)
+    groups = []
+    for files in alike.values():
+        size = 1 if arguments.thorough or len(files) <= FEW else MOST
+        groups += [files[i:i + size] for i in range(0, len(files), size)]
 
     violations = []
     with concurrent.futures.ThreadPoolExecutor(max_workers=arguments.jobs) as pool:
-        for file, text, seconds in pool.map(look, sorted(entries)):
-            if seconds > 0:
-                print(f"{file.relative_to(root)}: {seconds:.1f} s", flush=True)
-            if text:
-                violations.append(text.rstrip())
+        for found in pool.map(look, sorted(groups, key=len, reverse=True)):
+            violations += found
     house.tell("clang-tidy", list(dict.fromkeys(violations)), len(entries))
 
 

@@ -5,7 +5,7 @@
 
 #include "rhec/core/model/model.hpp"
 
-namespace rhec::testing {
+namespace rhec {
 
 /// Forwards everything to another model: a base for models that change part of one.
 class OtherModel : public Model {
@@ -26,4 +26,4 @@ class OtherModel : public Model {
   std::shared_ptr<const Model> model_;
 };
 
-}  // namespace rhec::testing
+}  // namespace rhec

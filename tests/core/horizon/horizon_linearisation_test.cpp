@@ -18,7 +18,7 @@ namespace {
 using testing::RandomProblem;
 
 /// Counts the intervals and nodes that it evaluates.
-class CountingModel final : public testing::OtherModel {
+class CountingModel final : public OtherModel {
  public:
   using OtherModel::OtherModel;
   void integrate_rows(const IntervalRows& request) const noexcept override {

@@ -19,7 +19,7 @@ using testing::scattered_point;
 constexpr int intervals = 5;
 
 /// Counts the nodes at which its outputs are evaluated.
-class Watched final : public testing::OtherModel {
+class Watched final : public OtherModel {
  public:
   Watched() : OtherModel(cart()) {}
   void observe(const Nodes& request) const noexcept override {

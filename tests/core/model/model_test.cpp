@@ -39,7 +39,7 @@ TEST(Roles, PlaceAndTurnAllBodiesAndNothingElse) {
 }
 
 /// A model without its own row functions: it uses the base class's.
-class WithoutRows final : public testing::OtherModel {
+class WithoutRows final : public OtherModel {
  public:
   using OtherModel::OtherModel;
   void integrate_rows(const IntervalRows& request) const noexcept override { Model::integrate_rows(request); }
@@ -160,7 +160,7 @@ TEST(Model, ObservesChosenOutputsByRows) {
 }
 
 /// A model that says with which variables it goes straight on.
-class Wheeled final : public testing::OtherModel {
+class Wheeled final : public OtherModel {
  public:
   explicit Wheeled(Roles roles) : OtherModel(cart()), about_(cart()->description()) { about_.roles = std::move(roles); }
   const ModelDescription& description() const noexcept override { return about_; }

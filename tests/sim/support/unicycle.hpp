@@ -9,6 +9,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/sim/check/model_check.hpp"
+#include "support/other_model.hpp"
 
 // A model that is right, for tests of the checks of models: each test gives it one fault.
 namespace rhec::sim {
@@ -31,21 +32,15 @@ ModelDescription unicycle_description();
 std::unique_ptr<Model> unicycle(Fault fault = Fault::none);
 
 /// Passes on all that it is asked to a unicycle.
-class PassedOn : public Model {
+class PassedOn : public OtherModel {
  public:
-  explicit PassedOn(Fault fault = Fault::none) : inner_(unicycle(fault)) {}
-  const ModelDescription& description() const noexcept override { return inner_->description(); }
-  void integrate(const Intervals& request) const noexcept override { inner_->integrate(request); }
-  void observe(const Nodes& request) const noexcept override { inner_->observe(request); }
-  void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override {
-    inner_->rates(x, u, p, dxdt);
-  }
-  bool has_second_derivatives() const noexcept override { return inner_->has_second_derivatives(); }
+  explicit PassedOn(Fault fault = Fault::none) : PassedOn(std::shared_ptr<Model>(unicycle(fault))) {}
   std::vector<std::string> instruction_sets() const override { return inner_->instruction_sets(); }
   bool use_instruction_set(const std::string& name) override { return inner_->use_instruction_set(name); }
 
  private:
-  std::unique_ptr<Model> inner_;
+  explicit PassedOn(std::shared_ptr<Model> inner) : OtherModel(inner), inner_(std::move(inner)) {}
+  std::shared_ptr<Model> inner_;
 };
 
 /// A model that is described by somebody else: a formula's own would be refused where roles point nowhere.

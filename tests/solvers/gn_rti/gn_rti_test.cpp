@@ -112,7 +112,7 @@ TEST(GnRti, PreparesControlForAnotherInitialState) {
 }
 
 /// Asks another model, and once in a while gets no number.
-class UnsureModel final : public testing::OtherModel {
+class UnsureModel final : public OtherModel {
  public:
   using OtherModel::OtherModel;
   void integrate_rows(const IntervalRows& request) const noexcept override {
