@@ -32,8 +32,10 @@ UNKNOWN_TO_CLANG = {"-fno-tree-loop-distribute-patterns"}
 PRECOMPILED = re.compile(r" -Winvalid-pch| -fpch-preprocess| -include \S+cmake_pch\.hxx")
 
 
-# So few sources of a folder are looked at one by one, so many at once.
-FEW, MOST = 2, 8
+# Templates that nothing uses are read at night.
+QUICK = ["--extra-arg=-fdelayed-template-parsing"]
+# Of a folder so many sources are looked at together. Where others of it have passed, so few are looked at one by one.
+MOST, FEW = 10, 2
 
 
 def checks_option(without):
@@ -92,7 +94,7 @@ def main():
             entries.setdefault(file, entry["command"])
 
     version = subprocess.run(["clang-tidy", "--version"], check=True, capture_output=True, text=True).stdout
-    common = version + (root / ".clang-tidy").read_text() + " ".join(EXTRA) + ("" if arguments.thorough else " ".join(SLOW))
+    common = version + (root / ".clang-tidy").read_text() + " ".join(EXTRA + ([] if arguments.thorough else SLOW + QUICK))
     headers = Headers(root)
     header_filter = f"--header-filter=^{re.escape(str(root))}/({'|'.join(house.FOLDERS)})/"
 
@@ -102,7 +104,7 @@ def main():
     def tidy(folder, file, *more):
         """What clang-tidy says of a file, with the commands in `folder`; empty if nothing."""
         command = ["clang-tidy", "--quiet", "-p", str(folder), f"--config-file={root / '.clang-tidy'}", header_filter,
-                   checks_option(SLOW * (not arguments.thorough) + list(more)), *EXTRA, str(file)]
+                   *([] if arguments.thorough else [checks_option([*SLOW, *more]), *QUICK]), *EXTRA, str(file)]
         result = subprocess.run(command, capture_output=True, text=True)
         if result.returncode == 0:
             return ""
@@ -133,13 +135,12 @@ def main():
 
     alike = collections.defaultdict(list)
     for file in sorted(entries):
-        if not stamp_of(file).exists():
-            flags = re.sub(r" -o \S+| -D\w+_EXPORTS", "", entries[file].replace(str(file), ""))
-            alike[file.parent, flags].append(file)
+        alike[file.parent, re.sub(r" -o \S+| -D\w+_EXPORTS", "", entries[file].replace(str(file), ""))].append(file)
     groups = []
     for files in alike.values():
-        size = 1 if arguments.thorough or len(files) <= FEW else MOST
-        groups += [files[i:i + size] for i in range(0, len(files), size)]
+        left = [file for file in files if not stamp_of(file).exists()]
+        size = 1 if arguments.thorough or len(files) > len(left) <= FEW else MOST
+        groups += [left[i:i + size] for i in range(0, len(left), size)]
 
     violations = []
     with concurrent.futures.ThreadPoolExecutor(max_workers=arguments.jobs) as pool:
