@@ -5,7 +5,7 @@
 #include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
-WideKernels two_axle_steering_wide_kernels();  // defined by rhec_add_wide_kernels
+ModelKernelSets two_axle_steering_kernels();  // defined by rhec_add_model_kernels
 }
 
 namespace {
@@ -44,8 +44,7 @@ class TwoAxleSteeringModel : public rhec::FormulaModel<TwoAxleSteering> {
  public:
   using Options = TwoAxleSteeringOptions;
   explicit TwoAxleSteeringModel(const Options& options)
-      : FormulaModel(static_cast<const TwoAxleSteering&>(options), describe(), rhec::two_axle_steering_wide_kernels()) {
-  }
+      : FormulaModel(static_cast<const TwoAxleSteering&>(options), describe(), rhec::two_axle_steering_kernels()) {}
 };
 
 }  // namespace

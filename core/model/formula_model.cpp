@@ -42,6 +42,14 @@ namespace {
 constexpr std::uint64_t unwritten = 0x7ff8'dead'0bad'f00d;  // a NaN that no operation returns
 }
 
+void check_kernels(const ModelDescription& description, const ModelKernelSets& kernels) {
+  if (!kernels.generic || !kernels.generic->integrate || !kernels.generic->observe)
+    throw Error(
+        fmt::format("model '{}': the generic kernels are missing; give FormulaModel what rhec_add_model defines, or no "
+                    "kernels",
+                    description.name));
+}
+
 double unwritten_result() noexcept { return std::bit_cast<double>(unwritten); }
 
 void check_results(const ModelDescription& description, const char* function, const std::vector<Variable>& variables,

@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-WideKernels bicycle_sideslip_wide_kernels();  // defined by rhec_add_model
+ModelKernelSets bicycle_sideslip_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -83,7 +83,7 @@ class BicycleSideslipModel : public FormulaModel<BicycleSideslip> {
  public:
   using Options = BicycleSideslipOptions;
   explicit BicycleSideslipModel(const Options& options)
-      : FormulaModel(static_cast<const BicycleSideslip&>(options), describe(), bicycle_sideslip_wide_kernels()) {}
+      : FormulaModel(static_cast<const BicycleSideslip&>(options), describe(), bicycle_sideslip_kernels()) {}
 };
 
 }  // namespace

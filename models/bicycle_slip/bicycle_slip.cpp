@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-WideKernels bicycle_slip_wide_kernels();  // defined by rhec_add_model
+ModelKernelSets bicycle_slip_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -81,7 +81,7 @@ class BicycleSlipModel : public FormulaModel<BicycleSlip> {
  public:
   using Options = BicycleSlipOptions;
   explicit BicycleSlipModel(const Options& options)
-      : FormulaModel(static_cast<const BicycleSlip&>(options), describe(), bicycle_slip_wide_kernels()) {}
+      : FormulaModel(static_cast<const BicycleSlip&>(options), describe(), bicycle_slip_kernels()) {}
 };
 
 }  // namespace

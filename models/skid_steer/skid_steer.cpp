@@ -6,7 +6,7 @@
 
 namespace rhec {
 
-WideKernels skid_steer_wide_kernels();  // defined by rhec_add_model
+ModelKernelSets skid_steer_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -70,7 +70,7 @@ class SkidSteerModel : public FormulaModel<SkidSteer> {
  public:
   using Options = SkidSteerOptions;
   explicit SkidSteerModel(const Options& options)
-      : FormulaModel(static_cast<const SkidSteer&>(options), describe(), skid_steer_wide_kernels()),
+      : FormulaModel(static_cast<const SkidSteer&>(options), describe(), skid_steer_kernels()),
         wheel_radius_(options.wheel_radius) {}
 
   // No single input is the speed: each side has its own wheel speed and slip.

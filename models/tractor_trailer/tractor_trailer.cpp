@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-WideKernels tractor_trailer_wide_kernels();  // defined by rhec_add_model
+ModelKernelSets tractor_trailer_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -97,7 +97,7 @@ class TractorTrailerModel : public FormulaModel<TractorTrailer> {
  public:
   using Options = TractorTrailerOptions;
   explicit TractorTrailerModel(const Options& options)
-      : FormulaModel(static_cast<const TractorTrailer&>(options), describe(), tractor_trailer_wide_kernels()) {}
+      : FormulaModel(static_cast<const TractorTrailer&>(options), describe(), tractor_trailer_kernels()) {}
 };
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 namespace rhec {
 
-WideKernels unicycle_traction_wide_kernels();  // defined by rhec_add_model
+ModelKernelSets unicycle_traction_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -67,7 +67,7 @@ class UnicycleTractionModel : public FormulaModel<UnicycleTraction> {
  public:
   using Options = UnicycleTractionOptions;
   explicit UnicycleTractionModel(const Options& options)
-      : FormulaModel(static_cast<const UnicycleTraction&>(options), describe(), unicycle_traction_wide_kernels()) {}
+      : FormulaModel(static_cast<const UnicycleTraction&>(options), describe(), unicycle_traction_kernels()) {}
 };
 
 }  // namespace

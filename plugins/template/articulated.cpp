@@ -6,7 +6,7 @@
 #include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
-WideKernels articulated_wide_kernels();  // rhec_add_model(articulated ...) in CMakeLists.txt defines it
+ModelKernelSets articulated_kernels();  // rhec_add_model(articulated ...) in CMakeLists.txt defines it
 }
 
 namespace {
@@ -56,7 +56,7 @@ class ArticulatedModel : public rhec::FormulaModel<Articulated> {
  public:
   using Options = ArticulatedOptions;
   explicit ArticulatedModel(const Options& options)
-      : FormulaModel(static_cast<const Articulated&>(options), describe(), rhec::articulated_wide_kernels()) {}
+      : FormulaModel(static_cast<const Articulated&>(options), describe(), rhec::articulated_kernels()) {}
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-WideKernels every_function_wide_kernels();  // defined by rhec_add_wide_kernels
+ModelKernelSets every_function_kernels();  // defined by rhec_add_model_kernels
 
 namespace {
 
@@ -30,7 +30,7 @@ ModelDescription describe() {
 }
 
 FormulaModel<EveryFunction> make_model() {
-  return FormulaModel<EveryFunction>({}, describe(), every_function_wide_kernels());
+  return FormulaModel<EveryFunction>({}, describe(), every_function_kernels());
 }
 
 std::string why_refused(const ModelDescription& description) {

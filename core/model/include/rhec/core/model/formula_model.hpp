@@ -9,11 +9,12 @@
 
 namespace rhec {
 
-/// Kernels for instruction sets wider than that of the program; null if they were not built. `rhec_add_model(<name>
-/// ...)` in CMake defines `rhec::WideKernels <name>_wide_kernels()` for its model.
-struct WideKernels {
-  const ModelKernels* avx2 = nullptr;
-  const ModelKernels* avx512 = nullptr;
+/// The kernels of a formula by instruction set. `rhec_add_model(<name> ...)` in CMake compiles them, in units of their
+/// own, and defines `rhec::ModelKernelSets <name>_kernels()`.
+struct ModelKernelSets {
+  const ModelKernels* generic = nullptr;
+  const ModelKernels* avx2 = nullptr;    ///< null if it was not built
+  const ModelKernels* avx512 = nullptr;  ///< likewise
 };
 
 /// Numbers of variables of a formula.
@@ -22,6 +23,9 @@ struct FormulaCounts {
 };
 /// Throws Error if a description has other numbers of variables, or gives a role to a variable that does not exist.
 RHEC_EXPORT void check_description(const ModelDescription& description, const FormulaCounts& counts);
+
+/// Throws Error if the generic kernels are missing.
+RHEC_EXPORT void check_kernels(const ModelDescription& description, const ModelKernelSets& kernels);
 
 /// A value that no formula computes. It marks results that have not been written.
 RHEC_EXPORT double unwritten_result() noexcept;
@@ -47,26 +51,28 @@ RHEC_EXPORT void check_results(const ModelDescription& description, const char* 
 template <class Formula>
 class FormulaModel : public Model {
  public:
-  /// Throws Error if the numbers of variables in the description differ from those of the formula.
-  explicit FormulaModel(Formula formula, ModelDescription description, WideKernels wide = {})
+  /// With kernels that are compiled here, for the program's own instruction set. Throws Error if the numbers of
+  /// variables in the description differ from those of the formula.
+  FormulaModel(Formula formula, ModelDescription description)
+      : FormulaModel(std::move(formula), std::move(description), {.generic = own_kernels()}) {}
+  /// With kernels that were compiled elsewhere, the generic ones among them. Throws as above.
+  FormulaModel(Formula formula, ModelDescription description, const ModelKernelSets& kernels)
       : formula_(std::move(formula)), description_(std::move(description)) {
     check_description(description_, {.states = Formula::state_count,
                                      .inputs = Formula::input_count,
                                      .parameters = Formula::parameter_count,
                                      .outputs = Formula::output_count});
     check_written();
-    static constexpr ModelKernels generic = make_model_kernels<Formula, double>();
-    add("generic", &generic);
+    check_kernels(description_, kernels);
+    add("generic", kernels.generic);
 #if defined(__x86_64__)
     // All instruction sets that the kernels use (cmake/RhecModel.cmake), not only the one in their name.
     const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
                             __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
                             __builtin_cpu_supports("avx512vl");
-    if (wide.avx2 && has_avx2) add("avx2", wide.avx2);
-    if (wide.avx512 && has_avx2 && has_avx512) add("avx512", wide.avx512);
-#else
-    static_cast<void>(wide);
+    if (kernels.avx2 && has_avx2) add("avx2", kernels.avx2);
+    if (kernels.avx512 && has_avx2 && has_avx512) add("avx512", kernels.avx512);
 #endif
   }
 
@@ -125,6 +131,10 @@ class FormulaModel : public Model {
     check_results(description_, "dynamics", description_.states, rates);
     formula_.outputs(x.data(), outputs.data());
     check_results(description_, "outputs", description_.outputs, outputs);
+  }
+  static const ModelKernels* own_kernels() {
+    static constexpr ModelKernels own = make_model_kernels<Formula, double>();
+    return &own;
   }
   void add(std::string name, const ModelKernels* kernels) {
     available_.emplace_back(std::move(name), kernels);

@@ -10,11 +10,11 @@ namespace rhec {
 /// The evaluation of one model for one instruction set: plain functions over the formula, so that translation units
 /// compiled for different instruction sets share nothing but this table.
 struct ModelKernels {
-  void (*integrate)(const void* formula, const Model::Intervals& request);
-  void (*observe)(const void* formula, const Model::Nodes& request);
+  void (*integrate)(const void* formula, const Model::Intervals& request) = nullptr;
+  void (*observe)(const void* formula, const Model::Nodes& request) = nullptr;
   /// For one Runge-Kutta step per interval, without ramps and with Jacobians. Both are null for a wide model.
-  void (*integrate_rows)(const void* formula, const IntervalRows& request);
-  void (*observe_rows)(const void* formula, const NodeRows& request);
+  void (*integrate_rows)(const void* formula, const IntervalRows& request) = nullptr;
+  void (*observe_rows)(const void* formula, const NodeRows& request) = nullptr;
 };
 
 namespace kernels {

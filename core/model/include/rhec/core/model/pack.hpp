@@ -1,9 +1,9 @@
 #pragma once
 
 // Packs of doubles for SIMD across stages. Included only by translation units that are compiled for one instruction set
-// (rhec_add_wide_kernels in CMake generates them), each of which defines its own RHEC_PACK_NAMESPACE. xsimd has helpers
-// that are neither templates nor tied to an instruction set. Of several compiled copies the linker would keep one for
-// all units, and a machine without its instructions would crash. So each unit renames xsimd.
+// (rhec_add_model_kernels in CMake generates them), each of which defines its own RHEC_PACK_NAMESPACE. xsimd has
+// helpers that are neither templates nor tied to an instruction set. Of several compiled copies the linker would keep
+// one for all units, and a machine without its instructions would crash. So each unit renames xsimd.
 
 #if defined(RHEC_PACK_NAMESPACE)
 #define xsimd RHEC_PACK_NAMESPACE

@@ -167,10 +167,16 @@ void observe_rows(const void* formula, const NodeRows& q) {
 
 }  // namespace kernels
 
-/// The kernels of a formula for one number type (double, or a pack for one instruction set).
+/// The kernels of a formula on dense arrays, for one number type (double, or a pack for one instruction set).
 template <class Formula, class Lane>
-constexpr ModelKernels make_model_kernels() {
-  ModelKernels table{&kernels::integrate<Formula, Lane>, &kernels::observe<Formula, Lane>, nullptr, nullptr};
+constexpr ModelKernels make_dense_kernels() {
+  return {&kernels::integrate<Formula, Lane>, &kernels::observe<Formula, Lane>, nullptr, nullptr};
+}
+
+/// Those on padded rows.
+template <class Formula, class Lane>
+constexpr ModelKernels make_row_kernels() {
+  ModelKernels table{};
   // Unrolled for a wide model, they would take too long to compile.
   constexpr int nz = Formula::state_count + Formula::parameter_count + Formula::input_count;
   if constexpr (nz <= longest_list && Formula::output_count <= longest_list) {
@@ -178,6 +184,15 @@ constexpr ModelKernels make_model_kernels() {
     table.observe_rows = &kernels::observe_rows<Formula, Lane>;
   }
   return table;
+}
+
+/// Both in one table.
+constexpr ModelKernels join(const ModelKernels& dense, const ModelKernels& rows) {
+  return {dense.integrate, dense.observe, rows.integrate_rows, rows.observe_rows};
+}
+template <class Formula, class Lane>
+constexpr ModelKernels make_model_kernels() {
+  return join(make_dense_kernels<Formula, Lane>(), make_row_kernels<Formula, Lane>());
 }
 
 }  // namespace rhec
