@@ -49,7 +49,7 @@ constinit const ModelKernels ${TABLE} = make_${KERNELS}_kernels<${ARG_FORMULA}, 
   if(xsimd_FOUND AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
     foreach(SET IN LISTS RHEC_MODEL_INSTRUCTION_SETS)
       if(SET STREQUAL "generic")
-        continue()  # done
+        continue()  # in units of its own, above
       elseif(NOT DEFINED RHEC_WIDE_FLAGS_${SET})
         message(FATAL_ERROR "RHEC_MODEL_INSTRUCTION_SETS: '${SET}' is none of generic, avx2, avx512")
       endif()

@@ -1,8 +1,9 @@
 #include "rhec/core/config/options.hpp"
-#include "support/error_of.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {

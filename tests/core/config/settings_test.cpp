@@ -1,10 +1,11 @@
 #include "rhec/core/config/settings.hpp"
-#include "support/error_of.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {

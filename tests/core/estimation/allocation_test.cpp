@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "rhec/core/base/aligned.hpp"
 #include "rhec/core/control/controller.hpp"
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
@@ -108,6 +109,9 @@ TEST(EstimationAllocation, AllocationsAreCounted) {
   long before = allocation_count();
   const auto memory = std::make_unique<std::vector<double>>(100);
   EXPECT_GE(allocation_count() - before, 2);
+  before = allocation_count();
+  const AlignedDoubles row(100);
+  EXPECT_GE(allocation_count() - before, 1);
   before = allocation_count();
 #if !defined(__SANITIZE_ADDRESS__)
   const Eigen::VectorXd vector = Eigen::VectorXd::Zero(100);

@@ -1,11 +1,12 @@
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "support/error_of.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
+
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace {
