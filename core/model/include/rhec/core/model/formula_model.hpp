@@ -95,7 +95,7 @@ class FormulaModel : public Model {
   void integrate_rows(const IntervalRows& request) const noexcept override {
     if (!kernels_->integrate_rows || request.substeps != 1 || request.ramp || !request.jacobians)
       return Model::integrate_rows(request);
-    kernels_->integrate_rows(&formula_, request);
+    (request.hessians ? kernels_->integrate_rows_with_hessians : kernels_->integrate_rows)(&formula_, request);
   }
   void observe_rows(const NodeRows& request) const noexcept override {
     if (!kernels_->observe_rows) return Model::observe_rows(request);

@@ -12,8 +12,10 @@ namespace rhec {
 struct ModelKernels {
   void (*integrate)(const void* formula, const Model::Intervals& request) = nullptr;
   void (*observe)(const void* formula, const Model::Nodes& request) = nullptr;
-  /// For one Runge-Kutta step per interval, without ramps and with Jacobians. Both are null for a wide model.
+  /// For one Runge-Kutta step per interval, without ramps and with Jacobians: with Hessians and without. All three are
+  /// null for a wide model.
   void (*integrate_rows)(const void* formula, const IntervalRows& request) = nullptr;
+  void (*integrate_rows_with_hessians)(const void* formula, const IntervalRows& request) = nullptr;
   void (*observe_rows)(const void* formula, const NodeRows& request) = nullptr;
 };
 

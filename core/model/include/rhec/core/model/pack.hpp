@@ -9,6 +9,8 @@
 #define xsimd RHEC_PACK_NAMESPACE
 #endif
 
+#include <immintrin.h>
+
 #include <utility>
 #include <xsimd/xsimd.hpp>
 
@@ -17,11 +19,81 @@
 
 namespace rhec {
 
+/// The doubles of one register. Arithmetic is the compiler's own on vector types: a kernel has thousands of operations,
+/// and through xsimd's layers of functions it takes twice as long to compile. Elementary functions are xsimd's.
+template <class Arch>
+struct Pack {
+  using Batch = xsimd::batch<double, Arch>;
+  using Register = typename Batch::register_type;
+  static constexpr int width = static_cast<int>(Batch::size);
+  Register values;
+
+  Pack() = default;
+  RHEC_INLINE Pack(Register given) : values(given) {}      // NOLINT(google-explicit-constructor)
+  RHEC_INLINE Pack(const Batch& given) : values(given) {}  // NOLINT(google-explicit-constructor)
+  RHEC_INLINE Pack(double value) {                         // NOLINT(google-explicit-constructor)
+    if constexpr (width == 8)
+      values = _mm512_set1_pd(value);
+    else
+      values = _mm256_set1_pd(value);
+  }
+  RHEC_INLINE static Pack load(const double* from) {
+    if constexpr (width == 8)
+      return _mm512_loadu_pd(from);
+    else
+      return _mm256_loadu_pd(from);
+  }
+  RHEC_INLINE void store(double* to) const {
+    if constexpr (width == 8)
+      _mm512_storeu_pd(to, values);
+    else
+      _mm256_storeu_pd(to, values);
+  }
+
+  RHEC_INLINE friend Pack operator+(Pack a, Pack b) { return a.values + b.values; }
+  RHEC_INLINE friend Pack operator-(Pack a, Pack b) { return a.values - b.values; }
+  RHEC_INLINE friend Pack operator*(Pack a, Pack b) { return a.values * b.values; }
+  RHEC_INLINE friend Pack operator/(Pack a, Pack b) { return a.values / b.values; }
+  RHEC_INLINE friend Pack operator-(Pack a) { return -Batch(a.values); }
+  RHEC_INLINE friend Pack& operator+=(Pack& a, Pack b) { return a = a + b; }
+  RHEC_INLINE friend Pack& operator-=(Pack& a, Pack b) { return a = a - b; }
+  RHEC_INLINE friend Pack& operator*=(Pack& a, Pack b) { return a = a * b; }
+  RHEC_INLINE friend Pack& operator/=(Pack& a, Pack b) { return a = a / b; }
+
+  RHEC_INLINE friend std::pair<Pack, Pack> sincos(Pack angle) {
+    const auto [sine, cosine] = pack_functions::sine_cosine(Batch(angle.values));
+    return {sine, cosine};
+  }
+  RHEC_INLINE friend Pack sin(Pack angle) { return sincos(angle).first; }
+  RHEC_INLINE friend Pack cos(Pack angle) { return sincos(angle).second; }
+  RHEC_INLINE friend Pack tan(Pack angle) {
+    const auto [sine, cosine] = sincos(angle);
+    return sine / cosine;
+  }
+  RHEC_INLINE friend Pack sqrt(Pack a) { return xsimd::sqrt(Batch(a.values)); }
+  RHEC_INLINE friend Pack exp(Pack a) { return xsimd::exp(Batch(a.values)); }
+  RHEC_INLINE friend Pack log(Pack a) { return xsimd::log(Batch(a.values)); }
+  RHEC_INLINE friend Pack tanh(Pack a) { return xsimd::tanh(Batch(a.values)); }
+  RHEC_INLINE friend Pack asin(Pack a) { return xsimd::asin(Batch(a.values)); }
+  RHEC_INLINE friend Pack acos(Pack a) { return xsimd::acos(Batch(a.values)); }
+  RHEC_INLINE friend Pack atan(Pack a) { return xsimd::atan(Batch(a.values)); }
+  RHEC_INLINE friend Pack atan2(Pack y, Pack x) { return xsimd::atan2(Batch(y.values), Batch(x.values)); }
+};
+
+/// The widest pack of the instruction set for which this unit is compiled.
+#if defined(__AVX512F__)
+using WidestPack = Pack<xsimd::avx512dq>;
+#elif defined(__AVX2__)
+using WidestPack = Pack<xsimd::fma3<xsimd::avx2>>;
+#endif
+
 #if defined(__AVX2__)
 /// Transposes four packs of four, taken as a matrix.
-RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::fma3<xsimd::avx2>>* a) {
-  const __m256d low01 = _mm256_unpacklo_pd(a[0], a[1]), high01 = _mm256_unpackhi_pd(a[0], a[1]);
-  const __m256d low23 = _mm256_unpacklo_pd(a[2], a[3]), high23 = _mm256_unpackhi_pd(a[2], a[3]);
+RHEC_INLINE inline void transpose(Pack<xsimd::fma3<xsimd::avx2>>* a) {
+  const __m256d low01 = _mm256_unpacklo_pd(a[0].values, a[1].values),
+                high01 = _mm256_unpackhi_pd(a[0].values, a[1].values);
+  const __m256d low23 = _mm256_unpacklo_pd(a[2].values, a[3].values),
+                high23 = _mm256_unpackhi_pd(a[2].values, a[3].values);
   a[0] = _mm256_permute2f128_pd(low01, low23, 0x20);
   a[1] = _mm256_permute2f128_pd(high01, high23, 0x20);
   a[2] = _mm256_permute2f128_pd(low01, low23, 0x31);
@@ -31,11 +103,11 @@ RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::fma3<xsimd::avx2>>
 
 #if defined(__AVX512F__)
 /// Transposes eight packs of eight, taken as a matrix: pairs of columns, then quarters of the pack, then its halves.
-RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::avx512dq>* a) {
+RHEC_INLINE inline void transpose(Pack<xsimd::avx512dq>* a) {
   __m512d pairs[8], quads[8];
   for (int i = 0; i < 8; i += 2) {
-    pairs[i] = _mm512_unpacklo_pd(a[i], a[i + 1]);
-    pairs[i + 1] = _mm512_unpackhi_pd(a[i], a[i + 1]);
+    pairs[i] = _mm512_unpacklo_pd(a[i].values, a[i + 1].values);
+    pairs[i + 1] = _mm512_unpackhi_pd(a[i].values, a[i + 1].values);
   }
   for (int i = 0; i < 8; i += 4) {
     for (int j = 0; j < 2; ++j) {
@@ -50,10 +122,11 @@ RHEC_INLINE inline void transpose(xsimd::batch<double, xsimd::avx512dq>* a) {
 }
 
 /// Transposes four packs of eight and four of zeros, taken as a matrix.
-RHEC_INLINE inline void transpose_half(xsimd::batch<double, xsimd::avx512dq>* a) {
+RHEC_INLINE inline void transpose_half(Pack<xsimd::avx512dq>* a) {
   // Rows 0, 2, 4, 6 and rows 1, 3, 5, 7, the first two columns and the others.
-  const __m512d pairs[2] = {_mm512_unpacklo_pd(a[0], a[1]), _mm512_unpackhi_pd(a[0], a[1])};
-  const __m512d others[2] = {_mm512_unpacklo_pd(a[2], a[3]), _mm512_unpackhi_pd(a[2], a[3])};
+  const __m512d pairs[2] = {_mm512_unpacklo_pd(a[0].values, a[1].values), _mm512_unpackhi_pd(a[0].values, a[1].values)};
+  const __m512d others[2] = {_mm512_unpacklo_pd(a[2].values, a[3].values),
+                             _mm512_unpackhi_pd(a[2].values, a[3].values)};
   for_indices<4>([&](auto i) RHEC_INLINE {
     constexpr int at = 2 * i;
     const __m512i row = _mm512_setr_epi64(at, at + 1, at + 8, at + 9, 0, 0, 0, 0);
@@ -62,7 +135,7 @@ RHEC_INLINE inline void transpose_half(xsimd::batch<double, xsimd::avx512dq>* a)
 }
 
 /// The first four entries of eight rows, as four packs.
-RHEC_INLINE inline void load_half(const double* const* rows, xsimd::batch<double, xsimd::avx512dq>* a) {
+RHEC_INLINE inline void load_half(const double* const* rows, Pack<xsimd::avx512dq>* a) {
   __m512d both[4];  // row i and, in the upper half, row i + 4
   for (int i = 0; i < 4; ++i)
     both[i] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(rows[i])), _mm256_loadu_pd(rows[i + 4]), 1);
@@ -78,14 +151,14 @@ RHEC_INLINE inline void load_half(const double* const* rows, xsimd::batch<double
 #endif
 
 template <class Arch>
-struct LaneTraits<xsimd::batch<double, Arch>> {
-  using Lane = xsimd::batch<double, Arch>;
-  static constexpr int width = static_cast<int>(Lane::size);
+struct LaneTraits<Pack<Arch>> {
+  using Lane = Pack<Arch>;
+  static constexpr int width = Lane::width;
 
   template <int size>
   static void load(const double* rows, int count, std::ptrdiff_t step, Lane* out) {
     const auto load_entry = [&]<int... i>(int k, std::integer_sequence<int, i...>) {
-      return Lane{rows[(i < count ? i : count - 1) * step + k]...};
+      return Lane(typename Lane::Batch{rows[(i < count ? i : count - 1) * step + k]...});
     };
     for (int k = 0; k < size; ++k) out[k] = load_entry(k, std::make_integer_sequence<int, width>());
   }
@@ -101,9 +174,8 @@ struct LaneTraits<xsimd::batch<double, Arch>> {
     }
     for_indices<padded(size) / width>([&](auto part) RHEC_INLINE {
       Lane block[width];
-      for_indices<width>([&](auto i) RHEC_INLINE {
-        block[i] = Lane::load_unaligned(rows + (i < count ? i : count - 1) * step + part * width);
-      });
+      for_indices<width>(
+          [&](auto i) RHEC_INLINE { block[i] = Lane::load(rows + (i < count ? i : count - 1) * step + part * width); });
       transpose(block);
       for_indices<width>([&](auto i) RHEC_INLINE {
         if constexpr (part * width + i < size) out[part * width + i] = block[i];
@@ -125,7 +197,7 @@ struct LaneTraits<xsimd::batch<double, Arch>> {
       else if constexpr (part * width < size)
         transpose(block);
       for_indices<width>([&](auto i) RHEC_INLINE {
-        if (i < count) block[i].store_unaligned(rows + i * step + part * width);
+        if (i < count) block[i].store(rows + i * step + part * width);
       });
     });
   }
@@ -137,39 +209,14 @@ struct LaneTraits<xsimd::batch<double, Arch>> {
       Lane block[width];
       for (int i = 0; i < width; ++i) block[i] = entries[k + i];
       transpose(block);
-      for (int i = 0; i < count; ++i) block[i].store_unaligned(rows + i * size + k);
+      for (int i = 0; i < count; ++i) block[i].store(rows + i * size + k);
     }
     for (; k < size; ++k) {
       alignas(64) double spread[width];
-      entries[k].store_aligned(spread);
+      entries[k].store(spread);
       for (int i = 0; i < count; ++i) rows[i * size + k] = spread[i];
     }
   }
 };
 
-/// The widest pack of the instruction set for which this unit is compiled.
-#if defined(__AVX512F__)
-using WidestPack = xsimd::batch<double, xsimd::avx512dq>;
-#elif defined(__AVX2__)
-using WidestPack = xsimd::batch<double, xsimd::fma3<xsimd::avx2>>;
-#endif
-
 }  // namespace rhec
-
-#if defined(__AVX2__)
-// In the pack's namespace, where formulas find them before xsimd's own.
-namespace xsimd {
-
-[[gnu::always_inline]] inline std::pair<rhec::WidestPack, rhec::WidestPack> sincos(const rhec::WidestPack& angle) {
-  const auto [sine, cosine] = rhec::pack_functions::sine_cosine(angle);
-  return {sine, cosine};
-}
-[[gnu::always_inline]] inline rhec::WidestPack sin(const rhec::WidestPack& angle) { return sincos(angle).first; }
-[[gnu::always_inline]] inline rhec::WidestPack cos(const rhec::WidestPack& angle) { return sincos(angle).second; }
-[[gnu::always_inline]] inline rhec::WidestPack tan(const rhec::WidestPack& angle) {
-  const auto [sine, cosine] = sincos(angle);
-  return sine / cosine;
-}
-
-}  // namespace xsimd
-#endif

@@ -68,56 +68,76 @@ class SensitiveStep {
     }
   }
 
+  /// dx_k/dz where it can be non-zero: computed once, since every row of the products below needs it.
+  template <int k>
+  RHEC_INLINE void set_sensitivities(Lane (&S)[nx][nz]) const {
+    if constexpr (k > 0)
+      for_indices<nx>([&](auto a) RHEC_INLINE {
+        for_indices<nz>([&](auto j) RHEC_INLINE {
+          if constexpr (Pattern::is_argument(a) && Pattern::template argument_depends<k>(a, j)) {
+            S[a][j] = Lane(a == j ? 1.0 : 0.0);
+            if constexpr (Pattern::template rate_depends<k - 1>(a, j))
+              S[a][j] = S[a][j] + h * Lane(reach[k]) * slopes_[slot(k - 1)][a][j];
+          }
+        });
+      });
+  }
   /// d(argument a of f_k)/dz_j, where it can be non-zero.
   template <int k, int a, int j>
-  RHEC_INLINE Lane sensitivity() const {
-    if constexpr (a >= nx || k == 0) {
+  RHEC_INLINE static Lane sensitivity(const Lane (&S)[nx][nz]) {
+    if constexpr (a >= nx || k == 0)
       return Lane(1.0);
-    } else {
-      Lane value(a == j ? 1.0 : 0.0);
-      if constexpr (Pattern::template rate_depends<k - 1>(a, j))
-        value = value + h * Lane(reach[k]) * slopes_[slot(k - 1)][a][j];
-      return value;
-    }
+    else
+      return S[a][j];
   }
 
-  template <int k>
-  [[gnu::flatten]] void evaluate(const Formula& formula) {
+  /// f_k and its derivatives at the argument, into rates_[k] and the slots of k. One function for all four stages: the
+  /// formula is most of what the compiler reads, and of what the processor's instruction cache holds.
+  [[gnu::flatten, gnu::noinline]] static void differentiate(const Formula& formula, const Lane* argument, Lane* rates,
+                                                            Lane* first, [[maybe_unused]] Lane* second) {
     Number x[nx], p[room_for(np)], u[room_for(nu)];
-    const auto set = [&]<int a>(std::integral_constant<int, a>, Number& number, const Lane& value) RHEC_INLINE {
+    const auto set = [&]<int a>(std::integral_constant<int, a>, Number& number) RHEC_INLINE {
       if constexpr (Pattern::pattern.direction_of[a] >= 0)
-        number = Number::template variable<Pattern::pattern.direction_of[a]>(value);
+        number = Number::template variable<Pattern::pattern.direction_of[a]>(argument[a]);
       else
-        number = Number(value);
+        number = Number(argument[a]);
     };
-    for_indices<nx>([&](auto r) RHEC_INLINE {
-      Lane value = z[r];
-      if constexpr (k > 0) value = value + h * Lane(reach[k]) * rates_[k - 1][r];
-      set(r, x[r], value);
-    });
-    for_indices<np>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + j>(), p[j], z[nx + j]); });
-    for_indices<nu>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + np + j>(), u[j], z[nx + np + j]); });
+    for_indices<nx>([&](auto r) RHEC_INLINE { set(r, x[r]); });
+    for_indices<np>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + j>(), p[j]); });
+    for_indices<nu>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + np + j>(), u[j]); });
     // Only entries that can be non-zero are kept, so that the compiler drops what only leads to the others.
     Number f[nx];
     formula.dynamics(static_cast<const Number*>(x), static_cast<const Number*>(u), static_cast<const Number*>(p), f);
     for_indices<nx>([&](auto r) RHEC_INLINE {
-      rates_[k][r] = f[r].value;
+      rates[r] = f[r].value;
       for_indices<nz>([&](auto a) RHEC_INLINE {
         if constexpr (Pattern::pattern.first[r] >> a & 1)
-          first_[slot(k)][Pattern::first_place(r, a)] = f[r].d[Pattern::pattern.direction_of[a]];
+          first[Pattern::first_place(r, a)] = f[r].d[Pattern::pattern.direction_of[a]];
         for_indices<a + 1>([&](auto b) RHEC_INLINE {
           if constexpr (with_hessian && Pattern::bends(r, a, b))
-            second_[k][Pattern::second_place(r, a, b)] = f[r].dd[Pattern::pair_of_directions(a, b)];
+            second[Pattern::second_place(r, a, b)] = f[r].dd[Pattern::pair_of_directions(a, b)];
         });
       });
     });
+  }
+
+  template <int k>
+  void evaluate(const Formula& formula) {
+    Lane argument[nz];
+    for_indices<nz>([&](auto a) RHEC_INLINE {
+      argument[a] = z[a];
+      if constexpr (k > 0 && a < nx) argument[a] = argument[a] + h * Lane(reach[k]) * rates_[k - 1][a];
+    });
+    differentiate(formula, argument, rates_[k], first_[slot(k)], second_[with_hessian ? k : 0]);
+    Lane S[nx][nz];
+    set_sensitivities<k>(S);
     for_indices<nx>([&](auto r) RHEC_INLINE {
       for_indices<nz>([&](auto j) RHEC_INLINE {
         if constexpr (Pattern::template rate_depends<k>(r, j)) {
           Lane sum(0.0);
           for_indices<nz>([&](auto a) RHEC_INLINE {
             if constexpr ((Pattern::pattern.first[r] >> a & 1) && Pattern::template argument_depends<k>(a, j))
-              sum = sum + first_[slot(k)][Pattern::first_place(r, a)] * sensitivity<k, a, j>();
+              sum = sum + first_[slot(k)][Pattern::first_place(r, a)] * sensitivity<k, a, j>(S);
           });
           add_share<k, r, j>(sum);
         }
@@ -153,6 +173,8 @@ class SensitiveStep {
   /// Adds S_k' (sum_r mu_r d2f_r) S_k to the lower triangle.
   template <int k>
   void add_curvature(const Lane* mu) {
+    Lane S[nx][nz];
+    set_sensitivities<k>(S);
     for_indices<nz>([&](auto b) RHEC_INLINE {
       if constexpr (Pattern::pattern.second[b] != 0) {
         Lane second[nz];
@@ -171,11 +193,11 @@ class SensitiveStep {
             Lane product(0.0);
             for_indices<nz>([&](auto a) RHEC_INLINE {
               if constexpr (Pattern::curves(b, a) && Pattern::template argument_depends<k>(a, j))
-                product = product + second[a] * sensitivity<k, a, j>();
+                product = product + second[a] * sensitivity<k, a, j>(S);
             });
             for_indices<nz>([&](auto i) RHEC_INLINE {
               if constexpr (i >= j && Pattern::template argument_depends<k>(b, i))
-                hessian[i][j] = hessian[i][j] + sensitivity<k, b, i>() * product;
+                hessian[i][j] = hessian[i][j] + sensitivity<k, b, i>(S) * product;
             });
           }
         });
