@@ -213,7 +213,7 @@ int show(const PluginsArguments& arguments) {
 void add_plugins(Program& program) {
   auto arguments = std::make_shared<PluginsArguments>();
   Command command =
-      program.add("plugins", "Lists the models, blockings and solvers that are found, or says all of one.",
+      program.add("plugins", "Lists the models, blockings, priors and solvers that are found, or says all of one.",
                   "Examples:\n"
                   "  rhec plugins\n"
                   "  rhec plugins gn_rti\n"

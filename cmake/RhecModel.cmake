@@ -29,7 +29,7 @@ function(rhec_add_model_kernels TARGET PREFIX)
     set(UNIT "${FOLDER}/generic_${KERNELS}.cpp")
     set(TABLE ${PREFIX}_kernels_generic_${KERNELS})
     file(CONFIGURE OUTPUT "${UNIT}" CONTENT "\
-#include \"rhec/core/model/row_kernels.hpp\"
+#include \"rhec/core/model/kernel_tables.hpp\"
 
 #include \"${HEADER}\"
 

@@ -12,6 +12,7 @@
 #include "library.hpp"
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/model/chosen_outputs.hpp"
+#include "rhec/core/prior/prior.hpp"
 
 namespace rhec {
 namespace {
@@ -307,6 +308,9 @@ PluginTrial Host::try_out(const PluginRecord& plugin) const {
       case PluginKind::solver:
         make_solver(plugin.name);
         break;
+      case PluginKind::prior:
+        make_prior(plugin.name);
+        break;
     }
   } catch (const Error& error) {
     const bool needs = std::any_of(rows.begin(), rows.end(),
@@ -328,6 +332,10 @@ std::shared_ptr<Solver> Host::make_solver(std::string_view name, const Settings&
   return search_->make<Solver>(PluginKind::solver, name, settings, *this);
 }
 
+std::shared_ptr<Prior> Host::make_prior(std::string_view name, const Settings& settings) const {
+  return search_->make<Prior>(PluginKind::prior, name, settings, *this);
+}
+
 std::string_view word_of(PluginKind kind) {
   switch (kind) {
     case PluginKind::model:
@@ -336,6 +344,8 @@ std::string_view word_of(PluginKind kind) {
       return "blocking";
     case PluginKind::solver:
       return "solver";
+    case PluginKind::prior:
+      return "prior";
   }
   return "plugin of an unknown kind";
 }

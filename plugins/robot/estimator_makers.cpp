@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/bank_estimation.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/plugins/robot/bounds_section.hpp"
 
@@ -39,6 +40,22 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
   return std::make_unique<FilterEstimation>(context.model, std::move(setup));
 }
 
+std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
+  const RobotContext& context = *parts.context;
+  BankEstimation::Setup setup;
+  setup.bank.members = parts.priors.combinations();
+  for (const double sigma : context.noise.output_sigmas) setup.bank.output_variances.push_back(sigma * sigma);
+  for (const double sigma : context.noise.input_sigmas) setup.bank.input_variances.push_back(sigma * sigma);
+  setup.bank.substeps = parts.substeps;
+  setup.parameter_lower = lower_bounds_of(context.about.parameters);
+  setup.parameter_upper = upper_bounds_of(context.about.parameters);
+  const int nx = context.model->state_count();
+  setup.initial_state = parts.initial_mean.head(nx);
+  setup.initial_covariance = parts.initial_covariance.topLeftCorner(nx, nx);
+  setup.heading_starts = parts.heading_starts;
+  return std::make_unique<BankEstimation>(context.model, std::move(setup));
+}
+
 }  // namespace
 
 RheProblem::Setup EstimatorParts::problem() const {
@@ -57,7 +74,9 @@ RheProblem::Setup EstimatorParts::problem() const {
 
 EstimatorMakers::EstimatorMakers()
     : all_({{"rhe", "receding horizon", make_receding_horizon},
-            {"ekf", "extended Kalman filter", make_kalman_filter}}) {}
+            {"ekf", "extended Kalman filter", make_kalman_filter},
+            {"bank", "Kalman filters with different priors of the parameters, mixed by their likelihood", make_bank}}) {
+}
 
 EstimatorMakers& EstimatorMakers::add(EstimatorMaker maker) {
   for (const EstimatorMaker& other : all_)

@@ -124,6 +124,7 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
       .map("process_noise", &E::process_noise, process_noise_by_name().rows())
       .map("restart_sigma", &E::restart_sigma, restart_sigma_by_name().rows())
       .map("block_sigma", &E::block_sigma, block_sigma_by_name().rows())
+      .map("priors", &E::priors, PriorsSection::rows())
       .map("initial", &E::initial, InitialOptions::table().schema())
       .map("robust", &E::robust, robust_rows("[]"))
       .map("solver", &E::solver, {default_solver.row()})
@@ -144,6 +145,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
              .walks = {},
              .initial_mean = {},
              .initial_covariance = {},
+             .priors = PriorsSection(parts_.context, options_.priors),
              .blocking = std::move(blocking),
              .make_solver = {}} {
   const ModelDescription& about = parts_.context->about;

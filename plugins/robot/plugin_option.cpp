@@ -8,6 +8,7 @@
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/ocp/solver.hpp"
+#include "rhec/core/prior/prior.hpp"
 
 namespace rhec {
 namespace {
@@ -29,6 +30,12 @@ template <>
 struct Maker<Solver> {
   static constexpr auto make = &Host::make_solver;
   static constexpr const char* word = "a solver plugin";
+};
+
+template <>
+struct Maker<Prior> {
+  static constexpr auto make = &Host::make_prior;
+  static constexpr const char* word = "a prior plugin";
 };
 
 std::string name_in(const Settings& section, const char* otherwise) {
@@ -81,5 +88,6 @@ OptionRow PluginOption<Product>::row(std::string meaning) const {
 template struct PluginOption<Model>;
 template struct PluginOption<Blocking>;
 template struct PluginOption<Solver>;
+template struct PluginOption<Prior>;
 
 }  // namespace rhec

@@ -107,7 +107,7 @@ SETTINGS = [
     ("terrain.correlation_length=0", "greater than 0"),
     ("vehicle.step=0", "between 1e-06"),
     # names
-    ("estimator.name=nonsense", "one of rhe, ekf, truth"),
+    ("estimator.name=nonsense", "one of rhe, ekf, bank, truth"),
     ("estimator.arrival.name=ekv", "did you mean 'ekf'"),
     ("path.name=zig", "one of figure8, zigzag, file"),
     ("terrain.name=gauss", "one of gaussian"),

@@ -26,11 +26,12 @@ MAY_USE = {
     "solvers": ("core", "plugins"),
     "models": ("core", "plugins"),
     "blocking": ("core", "plugins"),
+    "priors": ("core", "plugins"),
     "sim": ("core", "plugins", "sim"),
     "apps": ("core", "plugins", "sim", "apps"),
     "benchmarks": ("core", "plugins", "sim"),
 }
-PLUGIN_FOLDERS = ("solvers", "models", "blocking")
+PLUGIN_FOLDERS = ("solvers", "models", "blocking", "priors")
 CORE_THIRD_PARTY = ("Eigen", "unsupported/Eigen", "fmt", "xsimd")
 CORE_LIBRARIES = ("libfmt", "libstdc++", "libm.", "libgcc_s", "libc.", "ld-linux", "libasan", "libubsan", "libtsan")
 STANDARD = set("""
@@ -40,6 +41,7 @@ ios iosfwd iostream istream iterator latch limits list locale map memory memory_
 optional ostream queue random ranges ratio regex scoped_allocator semaphore set shared_mutex source_location span
 sstream stack stdexcept stop_token streambuf string string_view strstream syncstream system_error thread tuple
 type_traits typeindex typeinfo unordered_map unordered_set utility valarray variant vector version
+immintrin.h
 cassert cctype cerrno cfenv cfloat cinttypes climits clocale cmath csetjmp csignal cstdarg cstddef cstdint cstdio
 cstdlib cstring ctime cuchar cwchar cwctype
 """.split())

@@ -16,7 +16,7 @@ import tempfile
 import house
 
 # The floors whose sources and tests must mirror each other.
-FLOORS = ("core", "plugins", "solvers", "models", "blocking", "sim", "apps")
+FLOORS = ("core", "plugins", "solvers", "models", "blocking", "priors", "sim", "apps")
 # Folders of tests that are about more than one source: whole suites, and programs in other languages.
 SUITES = {
     "cli": "the commands of apps/, from outside: apps/check.cpp is tested by tests/cli/check.py",
@@ -58,6 +58,7 @@ ALONE = {
     "tests/core/estimation/allocation_test.cpp": "all methods of estimation, which must not allocate",
     "tests/core/horizon/own_problem_test.cpp": "a kind of problem from outside, examples/problem",
     "tests/models/derivatives_test.cpp": "every model that is found",
+    "tests/priors/conformance_test.cpp": "every prior that is found",
     "tests/sim/world/allocation_test.cpp": "paths, ground and the true vehicle, which must not allocate",
 }
 

@@ -11,7 +11,8 @@ import sys
 import house
 
 DEFAULT = "bicycle_slip"
-FOLDERS = ("core", "plugins/kit", "plugins/host", "plugins/yaml", "plugins/robot", "sim", "apps", "solvers", "blocking", "cmake")
+FOLDERS = ("core", "plugins/kit", "plugins/host", "plugins/yaml", "plugins/robot", "sim", "apps", "solvers", "blocking", "priors",
+           "cmake")
 LINK = re.compile(r"\]\((\.\./\.\./scenarios/[^)]+\.yaml)\)")
 
 

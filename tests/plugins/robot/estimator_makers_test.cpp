@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "plugins/robot/robots.hpp"
+#include "rhec/core/estimation/bank_estimation.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/plugins/robot/estimator_section.hpp"
 #include "support/error_of.hpp"
@@ -49,12 +50,16 @@ EstimatorSection section(const std::string& text, EstimatorMakers makers) {
 
 TEST(EstimatorMakers, HaveTheRobotsOwn) {
   const EstimatorMakers makers;
-  ASSERT_EQ(makers.all().size(), 2U);
+  ASSERT_EQ(makers.all().size(), 3U);
   EXPECT_EQ(makers.all()[0].name, "rhe");
   EXPECT_EQ(makers.all()[1].name, "ekf");
+  EXPECT_EQ(makers.all()[2].name, "bank");
   const EstimatorParts parts = section("", makers).parts();
   EXPECT_NE(dynamic_cast<RecedingHorizonEstimation*>(makers.named("rhe").make(parts).get()), nullptr);
   EXPECT_NE(dynamic_cast<FilterEstimation*>(makers.named("ekf").make(parts).get()), nullptr);
+  const auto bank = makers.named("bank").make(parts);
+  ASSERT_NE(dynamic_cast<BankEstimation*>(bank.get()), nullptr);
+  EXPECT_EQ(dynamic_cast<BankEstimation&>(*bank).bank().member_count(), 21);
 }
 
 TEST(EstimatorMakers, TakeThoseOfAProgram) {
@@ -66,24 +71,25 @@ TEST(EstimatorMakers, TakeThoseOfAProgram) {
   EXPECT_EQ(estimator->estimate(0.0).state, Eigen::Vector4d(0.0, 0.0, 0.5, 0.0));
 
   const OptionRow row = EstimatorSection::documentation(EstimatorMakers().add(stubborn())).rows.front();
-  EXPECT_EQ(row.constraint, "one of rhe, ekf, stubborn");
+  EXPECT_EQ(row.constraint, "one of rhe, ekf, bank, stubborn");
   EXPECT_THAT(row.meaning, HasSubstr("stubborn: keeps its first opinion"));
 }
 
 TEST(EstimatorMakers, AreOnlyThoseOfTheRobotThatHasThem) {
   EXPECT_THAT(error_of([] { section("name: stubborn", {}); }),
-              AllOf(StartsWith("robot.yaml:1: name: found 'stubborn', expected one of rhe, ekf"),
+              AllOf(StartsWith("robot.yaml:1: name: found 'stubborn', expected one of rhe, ekf, bank"),
                     testing::Not(HasSubstr("ekf, stubborn"))));
   EstimatorSection chosen = section("name: stubborn", EstimatorMakers().add(stubborn()));
   chosen.use({});
-  EXPECT_THAT(error_of([&] { chosen.make(); }), HasSubstr("no estimator 'stubborn'; expected one of rhe, ekf"));
+  EXPECT_THAT(error_of([&] { chosen.make(); }), HasSubstr("no estimator 'stubborn'; expected one of rhe, ekf, bank"));
 }
 
 TEST(EstimatorMakers, HaveEachNameOnce) {
   EstimatorMakers makers;
   makers.add(stubborn());
+  const std::size_t count = makers.all().size();
   EXPECT_THAT(error_of([&] { makers.add(stubborn()); }), HasSubstr("an estimator 'stubborn' already"));
-  EXPECT_EQ(makers.all().size(), 3U);
+  EXPECT_EQ(makers.all().size(), count);
 }
 
 TEST(EstimatorMakers, MakeNothingOfABlockingThatDoesNotFitTheHorizon) {

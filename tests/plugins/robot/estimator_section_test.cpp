@@ -99,7 +99,7 @@ TEST(EstimatorSection, TakesAnInitialStateWhereItHasNone) {
 TEST(EstimatorSection, RefusesUnknownNamesWithTheNearest) {
   const std::vector<std::pair<const char*, const char*>> wrong = {
       {"horzion: 3", "horzion: estimator has no option 'horzion'; did you mean 'horizon'?"},
-      {"name: ekv", "name: found 'ekv', expected one of rhe, ekf"},
+      {"name: ekv", "name: found 'ekv', expected one of rhe, ekf, bank"},
       {"arrival: {name: ekv}", "did you mean 'ekf'?"},
       {"process_noise: {kapa: 1}", "process_noise.kapa: process_noise has no option 'kapa'; did you mean 'kappa'?"},
       {"forgetting: {kappa: 1}", "'forgetting' of estimator is called 'process_noise' now; rename the key"},

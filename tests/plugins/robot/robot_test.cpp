@@ -67,7 +67,7 @@ TEST(Robot, NamesThePlaceOfAMistakeInAnySection) {
         "blocking: {kapa: unblocked}", "estimator: {horzion: 3}", "controller: {horzion: 3}", "smoother: {deadine: 3}"})
     EXPECT_THAT(error_of([&] { robot(std::string("step: 0.2\n") + wrong); }), StartsWith("robot.yaml:2: ")) << wrong;
   EXPECT_THAT(error_of([] { robot("estimator: {name: truth}"); }),
-              StartsWith("robot.yaml:1: estimator.name: found 'truth', expected one of rhe, ekf"));
+              StartsWith("robot.yaml:1: estimator.name: found 'truth', expected one of rhe, ekf, bank"));
 }
 
 TEST(Robot, DocumentsEachOfItsSections) {

@@ -7,6 +7,7 @@ namespace rhec {
 struct RiccatiKernels;
 struct QpKernels;
 struct TranscriptionKernels;
+struct BankKernels;
 
 /// The kernels for one instruction set.
 struct KernelSet {
@@ -14,6 +15,7 @@ struct KernelSet {
   const RiccatiKernels* riccati;
   const QpKernels* qp;
   const TranscriptionKernels* transcription;
+  const BankKernels* bank;
 };
 /// The sets that this machine can run, narrowest first.
 std::span<const KernelSet> runnable_kernels() noexcept;
@@ -22,5 +24,6 @@ std::span<const KernelSet> runnable_kernels() noexcept;
 const RiccatiKernels& riccati_kernels() noexcept;
 const QpKernels& qp_kernels() noexcept;
 const TranscriptionKernels& transcription_kernels() noexcept;
+const BankKernels& bank_kernels() noexcept;
 
 }  // namespace rhec

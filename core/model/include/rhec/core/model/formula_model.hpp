@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "rhec/core/base/assertion.hpp"
-#include "rhec/core/model/row_kernels.hpp"
+#include "rhec/core/model/kernel_tables.hpp"
 
 namespace rhec {
 

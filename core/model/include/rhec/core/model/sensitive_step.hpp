@@ -1,5 +1,6 @@
 #pragma once
 
+#include "rhec/core/model/stage_derivatives.hpp"
 #include "rhec/core/model/step_pattern.hpp"
 
 namespace rhec::kernels {
@@ -50,7 +51,6 @@ class SensitiveStep {
   }
 
   static constexpr double reach[4] = {0.0, 0.5, 0.5, 1.0}, share[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
-  using Number = SecondOrder<Lane, Pattern::pattern.directions, with_hessian ? Pattern::pattern.curved : 0>;
 
   /// Where the derivatives of f_k are stored. Without a Hessian they are not needed after the next stage, and their
   /// part of the Jacobian is added at once: a small working set leaves the cache to other data.
@@ -91,36 +91,6 @@ class SensitiveStep {
       return S[a][j];
   }
 
-  /// f_k and its derivatives at the argument, into rates_[k] and the slots of k. One function for all four stages: the
-  /// formula is most of what the compiler reads, and of what the processor's instruction cache holds.
-  [[gnu::flatten, gnu::noinline]] static void differentiate(const Formula& formula, const Lane* argument, Lane* rates,
-                                                            Lane* first, [[maybe_unused]] Lane* second) {
-    Number x[nx], p[room_for(np)], u[room_for(nu)];
-    const auto set = [&]<int a>(std::integral_constant<int, a>, Number& number) RHEC_INLINE {
-      if constexpr (Pattern::pattern.direction_of[a] >= 0)
-        number = Number::template variable<Pattern::pattern.direction_of[a]>(argument[a]);
-      else
-        number = Number(argument[a]);
-    };
-    for_indices<nx>([&](auto r) RHEC_INLINE { set(r, x[r]); });
-    for_indices<np>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + j>(), p[j]); });
-    for_indices<nu>([&](auto j) RHEC_INLINE { set(std::integral_constant<int, nx + np + j>(), u[j]); });
-    // Only entries that can be non-zero are kept, so that the compiler drops what only leads to the others.
-    Number f[nx];
-    formula.dynamics(static_cast<const Number*>(x), static_cast<const Number*>(u), static_cast<const Number*>(p), f);
-    for_indices<nx>([&](auto r) RHEC_INLINE {
-      rates[r] = f[r].value;
-      for_indices<nz>([&](auto a) RHEC_INLINE {
-        if constexpr (Pattern::pattern.first[r] >> a & 1)
-          first[Pattern::first_place(r, a)] = f[r].d[Pattern::pattern.direction_of[a]];
-        for_indices<a + 1>([&](auto b) RHEC_INLINE {
-          if constexpr (with_hessian && Pattern::bends(r, a, b))
-            second[Pattern::second_place(r, a, b)] = f[r].dd[Pattern::pair_of_directions(a, b)];
-        });
-      });
-    });
-  }
-
   template <int k>
   void evaluate(const Formula& formula) {
     Lane argument[nz];
@@ -128,7 +98,8 @@ class SensitiveStep {
       argument[a] = z[a];
       if constexpr (k > 0 && a < nx) argument[a] = argument[a] + h * Lane(reach[k]) * rates_[k - 1][a];
     });
-    differentiate(formula, argument, rates_[k], first_[slot(k)], second_[with_hessian ? k : 0]);
+    StageDerivatives<Formula, Lane, with_hessian>::evaluate(formula, argument, rates_[k], first_[slot(k)],
+                                                            second_[with_hessian ? k : 0]);
     Lane S[nx][nz];
     set_sensitivities<k>(S);
     for_indices<nx>([&](auto r) RHEC_INLINE {

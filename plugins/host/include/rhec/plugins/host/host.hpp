@@ -14,6 +14,7 @@ namespace rhec {
 class Model;
 class Blocking;
 class Solver;
+class Prior;
 
 /// A directory that is searched for plugins.
 struct PluginPlace {
@@ -81,6 +82,8 @@ class RHEC_EXPORT Host {
   std::shared_ptr<Model> make_model(std::string_view name, const Settings& settings = {}) const;
   std::shared_ptr<Blocking> make_blocking(std::string_view name, const Settings& settings = {}) const;
   std::shared_ptr<Solver> make_solver(std::string_view name, const Settings& settings = {}) const;
+  /// To be set up for a parameter.
+  std::shared_ptr<Prior> make_prior(std::string_view name, const Settings& settings = {}) const;
 
   /// The options of a plugin. Throws Error as above.
   std::vector<OptionRow> options(PluginKind kind, std::string_view name) const;
@@ -98,7 +101,7 @@ class RHEC_EXPORT Host {
   std::shared_ptr<Search> search_;
 };
 
-/// "model", "blocking" or "solver".
+/// "model", "blocking", "solver" or "prior".
 RHEC_EXPORT std::string_view word_of(PluginKind kind);
 
 }  // namespace rhec

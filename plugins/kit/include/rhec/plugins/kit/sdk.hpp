@@ -25,13 +25,14 @@
 /// names would share statics of inline functions), linked to rhec::core, and placed in a directory that the host
 /// searches. A class whose name contains a comma needs an alias. A plugin without options declares `using Options =
 /// rhec::NoOptions`. The constructor throws rhec::Error if its options are inconsistent; destructors do not throw. The
-/// file with this line includes the interface that the plugin implements (rhec/core/model/model.hpp, blocking.hpp or
-/// solver.hpp).
+/// file with this line includes the interface that the plugin implements (rhec/core/model/model.hpp, blocking.hpp,
+/// solver.hpp or prior.hpp).
 namespace rhec {
 
 class Model;
 class Blocking;
 class Solver;
+class Prior;
 
 /// The author's description of a plugin; see Manifest for the meaning. `name` and `version` are required.
 struct PluginInfo {
@@ -68,6 +69,11 @@ template <>
 struct PluginInterface<PluginKind::solver> {
   using Type = Solver;
   static constexpr const char* word = "solver";
+};
+template <>
+struct PluginInterface<PluginKind::prior> {
+  using Type = Prior;
+  static constexpr const char* word = "prior";
 };
 
 /// The functions of a manifest for a class `Product`; they turn every exception into a message.

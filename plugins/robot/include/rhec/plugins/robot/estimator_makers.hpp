@@ -12,6 +12,7 @@
 #include "rhec/core/estimation/estimation_method.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/plugins/robot/blocking_section.hpp"
+#include "rhec/plugins/robot/priors_section.hpp"
 #include "rhec/plugins/robot/robot_context.hpp"
 
 namespace rhec {
@@ -26,6 +27,7 @@ struct RHEC_EXPORT EstimatorParts {
   std::vector<ParameterWalk> walks;    ///< one per parameter
   Eigen::VectorXd initial_mean;        ///< of [x; p]
   Eigen::MatrixXd initial_covariance;  ///< of [x; p]
+  PriorsSection priors;
   BlockingSection blocking;
   std::function<std::shared_ptr<Solver>()> make_solver;  ///< makes the solver that the section names
 
@@ -41,7 +43,7 @@ struct EstimatorMaker {
   std::function<std::unique_ptr<EstimationMethod>(const EstimatorParts& parts)> make;
 };
 
-/// The estimators that `estimator.name` chooses from: `rhe`, `ekf`, and those that the application adds.
+/// The estimators that `estimator.name` chooses from: `rhe`, `ekf`, `bank`, and those that the application adds.
 class RHEC_EXPORT EstimatorMakers {
  public:
   EstimatorMakers();

@@ -1,0 +1,101 @@
+#include "rhec/core/estimation/bank_estimation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+
+namespace rhec {
+
+BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup setup)
+    : setup_(std::move(setup)), bank_(model, setup_.bank) {
+  const Eigen::Index nx = model->state_count(), np = model->parameter_count();
+  if (setup_.initial_state.size() != nx || setup_.initial_covariance.rows() != nx ||
+      setup_.initial_covariance.cols() != nx)
+    throw Error(fmt::format("bank: the initial mean and covariance must have the size {} of x", nx));
+  mean_ = Eigen::VectorXd::Zero(nx + np);
+  covariance_ = Eigen::MatrixXd::Zero(nx + np, nx + np);
+  if (setup_.heading_starts > 1 && model->description().roles.heading >= 0) {
+    FilterEstimation::Setup search;
+    search.noise = {setup_.bank.output_variances, setup_.bank.input_variances, setup_.parameter_lower,
+                    setup_.parameter_upper};
+    search.walk.assign(np, 0.0);
+    search.initial_mean = mean_;
+    search.initial_mean.head(nx) = setup_.initial_state;
+    search.initial_covariance = covariance_;
+    search.initial_covariance.topLeftCorner(nx, nx) = setup_.initial_covariance;
+    std::vector<double> start(Prior::max_states), spread(std::size_t{Prior::max_states} * Prior::max_states);
+    for (Eigen::Index j = 0; j < np; ++j) {
+      setup_.bank.members.front()[j]->start(start.data(), spread.data());
+      search.initial_mean[nx + j] = start[0];
+      search.initial_covariance(nx + j, nx + j) = spread[0];
+    }
+    search.substeps = setup_.bank.substeps;
+    search.heading_starts = setup_.heading_starts;
+    search_ = std::make_unique<FilterEstimation>(model, std::move(search));
+  }
+  reset();
+}
+
+void BankEstimation::reset() noexcept {
+  bank_.reset(setup_.initial_state, setup_.initial_covariance);
+  if (search_) search_->reset();
+  searching_ = search_ != nullptr;
+}
+
+void BankEstimation::start(const double* outputs) noexcept {
+  reset();
+  if (!searching_) return bank_.update(outputs);
+  search_->start(outputs);
+  start_bank_if_found();
+}
+
+/// Once one heading is left, the bank goes on from that filter's vehicle; its measurements are in it already.
+void BankEstimation::start_bank_if_found() noexcept {
+  if (search_->is_searching()) return;
+  search_->estimate(found_, Clock::time_point::max());
+  const Eigen::Index nx = setup_.initial_state.size();
+  bank_.reset(found_.state, found_.covariance.topLeftCorner(nx, nx));
+  searching_ = false;
+}
+
+void BankEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+  if (searching_) {
+    search_->add_node(duration, inputs, outputs);
+    return start_bank_if_found();
+  }
+  if (duration > 0.0 && std::isfinite(duration)) bank_.predict(inputs, duration);
+  bank_.update(outputs);
+}
+
+bool BankEstimation::amend(int back, const double* outputs) noexcept {
+  if (back != 0) return false;  // a filter cannot use measurements of older nodes
+  if (searching_) {
+    search_->amend(back, outputs);
+    start_bank_if_found();
+  } else {
+    bank_.update(outputs);
+  }
+  return true;
+}
+
+void BankEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
+  if (searching_) return search_->estimate(result, deadline);
+  bank_.moments(mean_, covariance_);
+  const Eigen::Index nx = setup_.initial_state.size(), np = mean_.size() - nx;
+  result.state = mean_.head(nx);
+  result.parameters = mean_.tail(np);
+  for (Eigen::Index j = 0; j < np; ++j)
+    result.parameters[j] =
+        std::min(std::max(result.parameters[j], setup_.parameter_lower[j]), setup_.parameter_upper[j]);
+  result.covariance = covariance_;
+  result.report = {};
+  result.report.status = Status::solved;
+  result.fallback = !mean_.allFinite();
+  result.predicted = false;
+}
+
+}  // namespace rhec

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+
+#include "rhec/core/estimation/estimation_method.hpp"
+#include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/core/estimation/prior_bank.hpp"
+
+namespace rhec {
+
+/// A bank of Kalman filters with different priors for the Estimator (docs/method.md, section 8). If the initial heading
+/// is unknown, filters with constant parameters search it first, as in FilterEstimation; the bank starts from what they
+/// find.
+class RHEC_EXPORT BankEstimation final : public EstimationMethod {
+ public:
+  struct Setup {
+    PriorBank::Setup bank;
+    Eigen::VectorXd initial_state;                         ///< n_x
+    Eigen::MatrixXd initial_covariance;                    ///< n_x x n_x
+    std::vector<double> parameter_lower, parameter_upper;  ///< bounds of the estimate's mean
+    int heading_starts = 1;
+  };
+  BankEstimation(const std::shared_ptr<const Model>& model, Setup setup);
+
+  const Model& model() const noexcept override { return bank_.model(); }
+  int substeps() const noexcept override { return setup_.bank.substeps; }
+  void start(const double* outputs) noexcept override;
+  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
+  bool amend(int back, const double* outputs) noexcept override;
+  void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
+  void reset() noexcept override;
+
+  const PriorBank& bank() const noexcept { return bank_; }
+
+ private:
+  void start_bank_if_found() noexcept;
+
+  Setup setup_;
+  PriorBank bank_;
+  std::unique_ptr<FilterEstimation> search_;  ///< null if the heading is known
+  bool searching_ = false;
+  Eigen::VectorXd mean_;
+  Eigen::MatrixXd covariance_;
+  Estimate found_;
+};
+
+}  // namespace rhec

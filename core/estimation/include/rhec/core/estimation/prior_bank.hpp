@@ -1,0 +1,86 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rhec/core/base/aligned.hpp"
+#include "rhec/core/model/model.hpp"
+#include "rhec/core/prior/standard_bank.hpp"
+
+namespace rhec {
+
+/// Extended Kalman filters with different priors of the parameters, side by side in the processor's lanes and mixed as
+/// interacting multiple models (Blom and Bar-Shalom 1988; docs/method.md, section 8). Each works on [x; z], where z are
+/// the states of its processes. With one member it is the Kalman filter of that prior. The ground covered on an
+/// interval comes from the vehicle's motion at the mixture's mean, and is then data.
+///
+/// Values that are not finite, or lead to such, are skipped. Allocates in its constructor only.
+class RHEC_EXPORT PriorBank {
+ public:
+  struct Setup {
+    std::vector<PriorCombination> members;
+    std::vector<double> output_variances;  ///< n_y
+    std::vector<double> input_variances;   ///< n_u, of measured inputs
+    int substeps = 1;
+    double memory = 100.0;  ///< ground after which another law may hold [m]: exp(-d / memory) is the share that stays
+    double least_speed = 0.025;  ///< a vehicle that stands counts as creeping at this speed [m/s]
+    double gate = 16.0;          ///< largest squared innovation, in variances, by which one output changes the weights
+  };
+  /// Throws Error if sizes do not match.
+  PriorBank(std::shared_ptr<const Model> model, Setup setup);
+  PriorBank(PriorBank&&) noexcept;
+  ~PriorBank();
+
+  /// Starts all members at a vehicle state (n_x) and its covariance, and their processes at their own starts.
+  void reset(const Eigen::VectorXd& state, const Eigen::MatrixXd& covariance) noexcept;
+  /// Measurement update with y (n_y, NaN where missing).
+  void update(const double* y) noexcept;
+  /// Time update by `duration` [s] with a measured input (n_u, NaN where missing: 0, with a standard deviation of a
+  /// hundred times the variable's typical magnitude).
+  void predict(const double* measured_input, double duration) noexcept;
+
+  const Model& model() const noexcept { return *model_; }
+  int member_count() const noexcept { return members_; }
+  /// Probability of each member.
+  std::span<const double> weights() const noexcept { return {weights_.data(), static_cast<std::size_t>(members_)}; }
+  /// Moments of the mixture: [x; p], n_x + n_p.
+  void moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept;
+  /// Moments of one member: [x; p].
+  void moments_of(int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) const noexcept;
+  /// Ground covered on the last interval [m].
+  double distance() const noexcept { return distance_; }
+
+ private:
+  struct Process {
+    int first = 0, count = 0;         ///< entries of [x; z]
+    std::vector<const Prior*> kinds;  ///< the different priors of this parameter
+    std::vector<int> kind_of;         ///< per member
+    AlignedDoubles F, Q, ramp;        ///< lanes
+    std::vector<double> F_of, Q_of;   ///< per kind
+  };
+  struct Views;  ///< what the kernels are given
+  void take_step(const double* input, double duration) noexcept;
+  void find_distance(const double* input, double duration) noexcept;
+  void advance_processes(double duration) noexcept;
+  void mix_members() noexcept;
+
+  std::shared_ptr<const Model> model_;
+  Setup setup_;
+  int members_, lanes_, nx_, nu_, np_, ny_, n_ = 0;
+  std::vector<Process> processes_;
+  AlignedDoubles mean_, covariance_, work_, weights_, keep_, take_, next_, jacobian_, predicted_, gradient_, squares_,
+      determinants_;
+  // Rows of the model: one per member.
+  std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
+      gradient_rows_;
+  std::vector<double> input_, variances_, start_, start_covariance_;
+  Eigen::VectorXd full_mean_;
+  Eigen::MatrixXd full_covariance_;
+  double distance_ = 0.0;
+  std::unique_ptr<Views> views_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,311 @@
+#include "rhec/core/estimation/prior_bank.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/kernels/bank_kernels.hpp"
+#include "rhec/core/kernels/kernel_sets.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr int lanes_at_once = 8;
+/// Below this probability a member's weight does not fall, so that it can come back.
+constexpr double least_weight = 1e-10;
+
+}  // namespace
+
+struct PriorBank::Views {
+  std::vector<BankProcess> processes;
+  std::vector<BankOutput> outputs;
+};
+
+PriorBank::PriorBank(PriorBank&&) noexcept = default;
+PriorBank::~PriorBank() = default;
+
+PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
+    : model_(std::move(model)),
+      setup_(std::move(setup)),
+      members_(static_cast<int>(setup_.members.size())),
+      lanes_((members_ + lanes_at_once - 1) / lanes_at_once * lanes_at_once),
+      nx_(model_->state_count()),
+      nu_(model_->input_count()),
+      np_(model_->parameter_count()),
+      ny_(model_->output_count()) {
+  if (members_ < 1) throw Error("bank: expected at least 1 member");
+  for (const PriorCombination& member : setup_.members)
+    if (static_cast<int>(member.size()) != np_)
+      throw Error(fmt::format("bank: a member has {} priors; expected {}, one a parameter", member.size(), np_));
+  if (static_cast<int>(setup_.output_variances.size()) != ny_ || static_cast<int>(setup_.input_variances.size()) != nu_)
+    throw Error("bank: expected one variance for every output and every input");
+  n_ = nx_;
+  for (int j = 0; j < np_; ++j) {
+    Process process;
+    process.first = n_;
+    for (const PriorCombination& member : setup_.members) {
+      const Prior* prior = member[j].get();
+      auto found = std::find(process.kinds.begin(), process.kinds.end(), prior);
+      if (found == process.kinds.end()) found = process.kinds.insert(found, prior);
+      process.kind_of.push_back(static_cast<int>(found - process.kinds.begin()));
+      process.count = std::max(process.count, prior->state_count());
+    }
+    const auto size = static_cast<std::size_t>(process.count) * process.count;
+    process.F.assign(size * lanes_, 0.0);
+    process.Q.assign(size * lanes_, 0.0);
+    process.ramp.assign(lanes_, 0.0);
+    process.F_of.assign(Prior::max_states * Prior::max_states, 0.0);
+    process.Q_of = process.F_of;
+    for (int m = 0; m < members_; ++m) process.ramp[m] = setup_.members[m][j]->course() == Course::ramp ? 1.0 : 0.0;
+    n_ += process.count;
+    processes_.push_back(std::move(process));
+  }
+  const auto n = static_cast<std::size_t>(n_), M = static_cast<std::size_t>(lanes_), nx = static_cast<std::size_t>(nx_);
+  const std::size_t columns = nx + nu_ + 2 * np_;
+  mean_.assign(n * M, 0.0);
+  covariance_.assign(n * n * M, 0.0);
+  work_.assign((2 * n * n + 4 * n) * M, 0.0);
+  for (auto* v : {&weights_, &keep_, &take_, &squares_, &determinants_}) v->assign(M, 0.0);
+  next_.assign(nx * M, 0.0);
+  jacobian_.assign(nx * columns * M, 0.0);
+  predicted_.assign(ny_ * M, 0.0);
+  gradient_.assign(ny_ * nx * M, 0.0);
+  states_.assign(M * nx, 0.0);
+  inputs_.assign(M * nu_, 0.0);
+  parameters_.assign(M * np_, 0.0);
+  ends_ = parameters_;
+  durations_.assign(M, 0.0);
+  next_rows_.assign(M * nx, 0.0);
+  jacobian_rows_.assign(M * nx * columns, 0.0);
+  output_rows_.assign(M * ny_, 0.0);
+  gradient_rows_.assign(M * ny_ * nx, 0.0);
+  input_.assign(nu_, 0.0);
+  variances_.assign(nu_, 0.0);
+  start_.assign(Prior::max_states, 0.0);
+  start_covariance_.assign(Prior::max_states * Prior::max_states, 0.0);
+  full_mean_ = Eigen::VectorXd::Zero(n_);
+  full_covariance_ = Eigen::MatrixXd::Zero(n_, n_);
+  views_ = std::make_unique<Views>();
+  for (const Process& process : processes_)
+    views_->processes.push_back(
+        {process.first, process.count, process.F.data(), process.Q.data(), process.ramp.data()});
+  views_->outputs.resize(ny_);
+  reset(Eigen::VectorXd::Zero(nx_), Eigen::MatrixXd::Identity(nx_, nx_));
+}
+
+void PriorBank::reset(const Eigen::VectorXd& state, const Eigen::MatrixXd& covariance) noexcept {
+  std::fill(mean_.begin(), mean_.end(), 0.0);
+  std::fill(covariance_.begin(), covariance_.end(), 0.0);
+  std::fill(weights_.begin(), weights_.end(), 0.0);
+  for (int m = 0; m < lanes_; ++m) {
+    // Lanes without a member compute what the last one does, with weight 0: no lane has undefined values.
+    const int member = std::min(m, members_ - 1);
+    for (int r = 0; r < nx_; ++r) mean_[r * lanes_ + m] = state[r];
+    for (int c = 0; c < nx_; ++c)
+      for (int r = 0; r < nx_; ++r) covariance_[(c * n_ + r) * lanes_ + m] = covariance(r, c);
+    for (int j = 0; j < np_; ++j) {
+      const Prior& prior = *setup_.members[member][j];
+      const int count = prior.state_count(), first = processes_[j].first;
+      prior.start(start_.data(), start_covariance_.data());
+      for (int r = 0; r < count; ++r) mean_[(first + r) * lanes_ + m] = start_[r];
+      for (int c = 0; c < count; ++c)
+        for (int r = 0; r < count; ++r)
+          covariance_[((first + c) * n_ + first + r) * lanes_ + m] = start_covariance_[c * count + r];
+    }
+  }
+  for (int m = 0; m < members_; ++m) weights_[m] = 1.0 / members_;
+  distance_ = 0.0;
+}
+
+void PriorBank::update(const double* y) noexcept {
+  for (int m = 0; m < lanes_; ++m)
+    for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean_[r * lanes_ + m];
+  model_->observe(
+      {.count = lanes_, .states = states_.data(), .outputs = output_rows_.data(), .jacobians = gradient_rows_.data()});
+  for (int m = 0; m < lanes_; ++m) {
+    for (int j = 0; j < ny_; ++j) {
+      predicted_[j * lanes_ + m] = output_rows_[m * ny_ + j];
+      for (int c = 0; c < nx_; ++c) gradient_[(j * nx_ + c) * lanes_ + m] = gradient_rows_[(m * nx_ + c) * ny_ + j];
+    }
+  }
+  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
+  std::fill(squares_.begin(), squares_.end(), 0.0);
+  std::fill(determinants_.begin(), determinants_.end(), 1.0);
+  int taken = 0;
+  for (int j = 0; j < ny_; ++j) {
+    if (std::isnan(y[j])) continue;
+    views_->outputs[taken++] = {.predicted = predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
+                                .gradient = gradient_.data() + static_cast<std::ptrdiff_t>(j) * nx_ * lanes_,
+                                .measured = y[j],
+                                .variance = setup_.output_variances[j],
+                                .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
+  }
+  if (taken == 0) return;
+  bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(), determinants_.data());
+  if (members_ == 1) return;
+  double best = -std::numeric_limits<double>::infinity();
+  for (int m = 0; m < members_; ++m) {
+    squares_[m] = -0.5 * (squares_[m] + std::log(determinants_[m]));
+    if (squares_[m] > best) best = squares_[m];
+  }
+  double sum = 0.0;
+  for (int m = 0; m < members_; ++m) {
+    const double likelihood = std::exp(squares_[m] - best);
+    weights_[m] *= std::isfinite(likelihood) ? likelihood : 0.0;
+    sum += weights_[m];
+  }
+  for (int m = 0; m < members_; ++m)
+    weights_[m] = sum > 0.0 ? std::max(weights_[m] / sum, least_weight) : 1.0 / members_;
+}
+
+/// Ground covered on an interval, from the vehicle's motion at the mixture's mean.
+void PriorBank::find_distance(const double* input, double duration) noexcept {
+  const Roles& roles = model_->description().roles;
+  std::fill_n(states_.data(), nx_, 0.0);
+  std::fill_n(parameters_.data(), np_, 0.0);
+  for (int m = 0; m < members_; ++m) {
+    for (int r = 0; r < nx_; ++r) states_[r] += weights_[m] * mean_[r * lanes_ + m];
+    for (int j = 0; j < np_; ++j) parameters_[j] += weights_[m] * mean_[processes_[j].first * lanes_ + m];
+  }
+  double sum = 0.0;
+  for (int m = 0; m < members_; ++m) sum += weights_[m];
+  for (int r = 0; r < nx_; ++r) states_[r] /= sum;
+  for (int j = 0; j < np_; ++j) parameters_[j] /= sum;
+  const double least = setup_.least_speed * duration;
+  distance_ = least;
+  if (roles.position_x < 0 || roles.position_y < 0) return;
+  model_->integrate({.count = 1,
+                     .states = states_.data(),
+                     .inputs = input,
+                     .parameters = parameters_.data(),
+                     .durations = &duration,
+                     .substeps = setup_.substeps,
+                     .next_states = next_rows_.data()});
+  const double covered = std::hypot(next_rows_[roles.position_x] - states_[roles.position_x],
+                                    next_rows_[roles.position_y] - states_[roles.position_y]);
+  if (std::isfinite(covered)) distance_ = std::max(least, covered);
+}
+
+/// F and Q of every process over the interval.
+void PriorBank::advance_processes(double duration) noexcept {
+  for (Process& process : processes_) {
+    for (std::size_t kind = 0; kind < process.kinds.size(); ++kind) {
+      const Prior& prior = *process.kinds[kind];
+      const int count = prior.state_count(), all = process.count;
+      prior.advance(prior.along() == Along::time ? duration : distance_, process.F_of.data(), process.Q_of.data());
+      for (int m = 0; m < lanes_; ++m) {
+        if (process.kind_of[std::min(m, members_ - 1)] != static_cast<int>(kind)) continue;
+        for (int c = 0; c < count; ++c) {
+          for (int r = 0; r < count; ++r) {
+            process.F[(c * all + r) * lanes_ + m] = process.F_of[c * count + r];
+            process.Q[(c * all + r) * lanes_ + m] = process.Q_of[c * count + r];
+          }
+        }
+      }
+    }
+  }
+}
+
+/// Over the ground covered, another law may have come to hold.
+void PriorBank::mix_members() noexcept {
+  const double change = -std::expm1(-distance_ / setup_.memory), each = change / members_;
+  if (!(change > 0.0)) return;
+  double sum = 0.0;
+  for (int m = 0; m < members_; ++m) sum += weights_[m];
+  for (int m = 0; m < lanes_; ++m) {
+    const bool is_member = m < members_;
+    weights_[m] = is_member ? weights_[m] / sum : 0.0;
+    const double next = (1.0 - change) * weights_[m] + each;
+    take_[m] = each / next;
+    keep_[m] = 1.0 - take_[m];
+  }
+  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
+  bank_kernels().mix(view, weights_.data(), keep_.data(), take_.data());
+  for (int m = 0; m < members_; ++m) weights_[m] = (1.0 - change) * weights_[m] + each;
+}
+
+void PriorBank::predict(const double* measured_input, double duration) noexcept {
+  for (int j = 0; j < nu_; ++j) {
+    const bool missing = std::isnan(measured_input[j]);
+    const double wide = 100.0 * model_->description().inputs[j].scale;
+    input_[j] = missing ? 0.0 : measured_input[j];
+    variances_[j] = missing ? wide * wide : setup_.input_variances[j];
+  }
+  find_distance(input_.data(), duration);
+  advance_processes(duration);
+  if (members_ > 1) mix_members();
+  take_step(input_.data(), duration);
+}
+
+void PriorBank::take_step(const double* input, double duration) noexcept {
+  const int columns = nx_ + nu_ + 2 * np_;
+  for (int m = 0; m < lanes_; ++m) {
+    for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean_[r * lanes_ + m];
+    for (int j = 0; j < nu_; ++j) inputs_[m * nu_ + j] = input[j];
+    durations_[m] = duration;
+    for (int j = 0; j < np_; ++j) {
+      const Process& process = processes_[j];
+      const double start = mean_[process.first * lanes_ + m];
+      double end = start;
+      if (process.ramp[m] != 0.0) {
+        end = 0.0;
+        for (int k = 0; k < process.count; ++k)
+          end += process.F[k * process.count * lanes_ + m] * mean_[(process.first + k) * lanes_ + m];
+      }
+      parameters_[m * np_ + j] = start;
+      ends_[m * np_ + j] = end;
+    }
+  }
+  model_->integrate({.count = lanes_,
+                     .states = states_.data(),
+                     .inputs = inputs_.data(),
+                     .parameters = parameters_.data(),
+                     .parameters_end = ends_.data(),
+                     .durations = durations_.data(),
+                     .substeps = setup_.substeps,
+                     .next_states = next_rows_.data(),
+                     .jacobians = jacobian_rows_.data()});
+  for (int m = 0; m < lanes_; ++m) {
+    for (int r = 0; r < nx_; ++r) next_[r * lanes_ + m] = next_rows_[m * nx_ + r];
+    for (int e = 0; e < nx_ * columns; ++e) jacobian_[e * lanes_ + m] = jacobian_rows_[m * nx_ * columns + e];
+  }
+  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
+  bank_kernels().predict(view, {.inputs = nu_,
+                                .processes = np_,
+                                .process = views_->processes.data(),
+                                .next_states = next_.data(),
+                                .jacobian = jacobian_.data(),
+                                .input_variances = variances_.data()});
+}
+
+void PriorBank::moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept {
+  double sum = 0.0;
+  for (int m = 0; m < members_; ++m) sum += weights_[m];
+  for (int m = 0; m < members_; ++m) weights_[m] /= sum;
+  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
+  bank_kernels().moments(view, weights_.data(), full_mean_.data(), full_covariance_.data());
+  const auto at = [&](int k) { return k < nx_ ? k : processes_[k - nx_].first; };
+  mean.resize(nx_ + np_);
+  covariance.resize(nx_ + np_, nx_ + np_);
+  for (int c = 0; c < nx_ + np_; ++c) {
+    mean[c] = full_mean_[at(c)];
+    for (int r = 0; r < nx_ + np_; ++r) covariance(r, c) = full_covariance_(at(r), at(c));
+  }
+}
+
+void PriorBank::moments_of(int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) const noexcept {
+  const auto at = [&](int k) { return k < nx_ ? k : processes_[k - nx_].first; };
+  mean.resize(nx_ + np_);
+  covariance.resize(nx_ + np_, nx_ + np_);
+  for (int c = 0; c < nx_ + np_; ++c) {
+    mean[c] = mean_[at(c) * lanes_ + member];
+    for (int r = 0; r < nx_ + np_; ++r) covariance(r, c) = covariance_[(at(c) * n_ + at(r)) * lanes_ + member];
+  }
+}
+
+}  // namespace rhec

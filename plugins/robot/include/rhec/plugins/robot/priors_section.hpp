@@ -1,0 +1,28 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "rhec/core/prior/standard_bank.hpp"
+#include "rhec/plugins/robot/option_section.hpp"
+#include "rhec/plugins/robot/plugin_option.hpp"
+#include "rhec/plugins/robot/robot_context.hpp"
+
+namespace rhec {
+
+/// `estimator.priors`: for each parameter how it varies along the way. A prior, a list of priors that are weighed
+/// against each other, or `auto`.
+class RHEC_EXPORT PriorsSection {
+ public:
+  PriorsSection(std::shared_ptr<const RobotContext> context, const Settings& section);
+  static std::vector<OptionRow> rows();
+
+  /// The members of a bank: all combinations.
+  std::vector<PriorCombination> combinations() const;
+
+ private:
+  std::shared_ptr<const RobotContext> context_;
+  Settings section_;
+};
+
+}  // namespace rhec

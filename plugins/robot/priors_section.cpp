@@ -1,0 +1,60 @@
+#include "rhec/plugins/robot/priors_section.hpp"
+
+#include <cstddef>
+#include <utility>
+
+#include "rhec/core/base/error.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr PluginOption<Prior> of_parameter{.otherwise = "auto"};
+
+std::shared_ptr<const Prior> make(const RobotContext& context, const Settings& section, const Variable& parameter) {
+  std::shared_ptr<Prior> prior = of_parameter.make(context.host, section);
+  prior->set_up(parameter);
+  return prior;
+}
+
+/// The priors that a section gives; none if it leaves that open.
+PriorCombination choices(const RobotContext& context, const Settings& section, const Variable& parameter) {
+  if (section.is_null() || (section.kind() == Settings::Kind::scalar && section.text() == of_parameter.otherwise))
+    return {};
+  if (section.kind() != Settings::Kind::list) return {make(context, section, parameter)};
+  if (section.items().empty()) throw section.mismatch("at least one prior, or 'auto'");
+  PriorCombination all;
+  for (const Settings& item : section.items()) all.push_back(make(context, item, parameter));
+  return all;
+}
+
+}  // namespace
+
+PriorsSection::PriorsSection(std::shared_ptr<const RobotContext> context, const Settings& section)
+    : context_(std::move(context)), section_(section) {
+  check_keys(section_, names_of(context_->about.parameters), "estimator: priors");
+  combinations();  // reports mistakes now
+}
+
+std::vector<OptionRow> PriorsSection::rows() {
+  OptionRow row = of_parameter.row(
+      "how the parameter varies along the way: a prior with its options beside the name, a list of priors that are "
+      "weighed against each other, or auto: a set that serves for slip of any kind");
+  row.name = "PARAMETER";
+  row.type = "prior, or list of priors";
+  return {row};
+}
+
+std::vector<PriorCombination> PriorsSection::combinations() const {
+  std::vector<PriorCombination> given;
+  for (const Variable& parameter : context_->about.parameters) {
+    const Settings* section = section_.find(parameter.name);
+    given.push_back(section ? choices(*context_, *section, parameter) : PriorCombination{});
+  }
+  try {
+    return standard_bank(context_->about, given);
+  } catch (const Error& mistake) {
+    throw section_.error(mistake.what());
+  }
+}
+
+}  // namespace rhec

@@ -1,0 +1,330 @@
+#include "rhec/core/estimation/prior_bank.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numbers>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/prior/standard_bank.hpp"
+#include "support/error_of.hpp"
+#include "support/linear_case.hpp"
+
+namespace rhec {
+namespace {
+
+using namespace testing;
+
+std::shared_ptr<const Prior> prior(const std::string& name, const std::string& options) {
+  Variable parameter;
+  parameter.lower = -1.0;
+  parameter.upper = 2.0;
+  auto made = host().make_prior(name, parse_yaml(options, "test"));
+  made->set_up(parameter);
+  return made;
+}
+
+PriorBank::Setup setup_for(const Model& model, std::vector<PriorCombination> members) {
+  const testing::Noise noise = noise_of(model);
+  PriorBank::Setup setup;
+  setup.members = std::move(members);
+  for (const double sigma : noise.outputs) setup.output_variances.push_back(sigma * sigma);
+  for (const double sigma : noise.inputs) setup.input_variances.push_back(sigma * sigma);
+  return setup;
+}
+
+double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
+
+/// The textbook's Kalman filter on [x; z] of a linear model and one prior a parameter. Its matrices are differences of
+/// the model's own results.
+class DenseFilter {
+ public:
+  DenseFilter(const Model& model, PriorCombination priors)
+      : model_(model), priors_(std::move(priors)), nx_(model.state_count()), np_(model.parameter_count()) {
+    n_ = nx_;
+    for (const auto& each : priors_) {
+      first_.push_back(n_);
+      n_ += each->state_count();
+    }
+    mean = Eigen::VectorXd::Zero(n_);
+    covariance = Eigen::MatrixXd::Zero(n_, n_);
+    for (int j = 0; j < np_; ++j) {
+      const int count = priors_[j]->state_count();
+      Eigen::MatrixXd P(count, count);
+      priors_[j]->start(mean.data() + first_[j], P.data());
+      covariance.block(first_[j], first_[j], count, count) = P;
+    }
+  }
+
+  void predict(const Sample& sample, const std::vector<double>& input_variances) {
+    const int nu = model_.input_count();
+    std::vector<double> input(nu), variances(nu);
+    for (int j = 0; j < nu; ++j) {
+      const bool missing = std::isnan(sample.inputs[j]);
+      input[j] = missing ? 0.0 : sample.inputs[j];
+      variances[j] = missing ? std::pow(100.0 * model_.description().inputs[j].scale, 2) : input_variances[j];
+    }
+    Eigen::MatrixXd F = Eigen::MatrixXd::Zero(n_, n_), Q = F;
+    for (int j = 0; j < np_; ++j) {
+      const int count = priors_[j]->state_count();
+      Eigen::MatrixXd block(count, count), noise(count, count);
+      priors_[j]->advance(sample.duration, block.data(), noise.data());
+      F.block(first_[j], first_[j], count, count) = block;
+      Q.block(first_[j], first_[j], count, count) = noise;
+    }
+    // [x; z] -> next, as a function of the noise w of z, and of the inputs.
+    const auto next = [&](const Eigen::VectorXd& from, const Eigen::VectorXd& w, const std::vector<double>& u) {
+      Eigen::VectorXd to = F * from + w, x(nx_), p(np_), end(np_);
+      for (int j = 0; j < np_; ++j) {
+        p[j] = from[first_[j]];
+        end[j] = priors_[j]->course() == Course::ramp ? to[first_[j]] : p[j];
+      }
+      const Eigen::VectorXd start = from.head(nx_);
+      model_.integrate({.count = 1,
+                        .states = start.data(),
+                        .inputs = u.data(),
+                        .parameters = p.data(),
+                        .parameters_end = end.data(),
+                        .durations = &sample.duration,
+                        .next_states = x.data()});
+      to.head(nx_) = x;
+      return to;
+    };
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(n_), at = next(none, none, std::vector<double>(nu, 0.0));
+    Eigen::MatrixXd A(n_, n_), G = Eigen::MatrixXd::Zero(n_, n_), B(n_, nu);
+    const std::vector<double> rest(nu, 0.0);
+    for (int k = 0; k < n_; ++k) {
+      A.col(k) = next(Eigen::VectorXd::Unit(n_, k), none, rest) - at;
+      if (k >= nx_) G.col(k) = next(none, Eigen::VectorXd::Unit(n_, k), rest) - at;
+    }
+    Eigen::VectorXd input_noise(nu);
+    for (int j = 0; j < nu; ++j) {
+      std::vector<double> one(nu, 0.0);
+      one[j] = 1.0;
+      B.col(j) = next(none, none, one) - at;
+      input_noise[j] = variances[j];
+    }
+    mean = next(mean, none, input);
+    covariance = A * covariance * A.transpose() + B * input_noise.asDiagonal() * B.transpose() + G * Q * G.transpose();
+  }
+
+  /// Returns -2 log likelihood, without constants.
+  double update(const Sample& sample, const std::vector<double>& variances) {
+    const int ny = model_.output_count();
+    double sum = 0.0;
+    for (int j = 0; j < ny; ++j) {
+      if (std::isnan(sample.outputs[j])) continue;
+      Eigen::VectorXd y(ny);
+      const auto output = [&](const Eigen::VectorXd& state) {
+        const Eigen::VectorXd x = state.head(nx_);
+        model_.observe({.count = 1, .states = x.data(), .outputs = y.data()});
+        return y[j];
+      };
+      const double at = output(Eigen::VectorXd::Zero(n_));
+      Eigen::VectorXd h = Eigen::VectorXd::Zero(n_);
+      for (int k = 0; k < nx_; ++k) h[k] = output(Eigen::VectorXd::Unit(n_, k)) - at;
+      const double innovation = sample.outputs[j] - output(mean), S = h.dot(covariance * h) + variances[j];
+      const Eigen::VectorXd gain = covariance * h / S;
+      mean += gain * innovation;
+      covariance -= gain * S * gain.transpose();
+      sum += innovation * innovation / S + std::log(S);
+    }
+    return sum;
+  }
+
+  /// Moments of [x; p].
+  Eigen::VectorXd chosen_mean() const { return chosen() * mean; }
+  Eigen::MatrixXd chosen_covariance() const { return chosen() * covariance * chosen().transpose(); }
+
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+
+ private:
+  Eigen::MatrixXd chosen() const {
+    Eigen::MatrixXd pick = Eigen::MatrixXd::Zero(nx_ + np_, n_);
+    pick.leftCols(nx_).topRows(nx_).setIdentity();
+    for (int j = 0; j < np_; ++j) pick(nx_ + j, first_[j]) = 1.0;
+    return pick;
+  }
+
+  const Model& model_;
+  PriorCombination priors_;
+  int nx_, np_, n_ = 0;
+  std::vector<int> first_;
+};
+
+/// All priors of the house, along time, ramped and held.
+std::vector<PriorCombination> linear_members() {
+  return {{prior("walk", "{sigma: 0.2, along: time}"), prior("matern", "{length: 2, along: time}")},
+          {prior("matern", "{length: 3, smoothness: 5/2, along: time}"), prior("jumps", "{length: 2, along: time}")},
+          {prior("constant", "{}"), prior("matern", "{length: 1, along: time, course: held, mean_walk: 0.3}")}};
+}
+
+TEST(PriorBank, IsTheKalmanFilterOfItsPriorOnALinearModel) {
+  const auto model = linear_model<Hovercraft>();
+  for (const PriorCombination& member : linear_members()) {
+    const PriorBank::Setup setup = setup_for(*model, {member});
+    PriorBank bank(model, setup);
+    DenseFilter reference(*model, member);
+    const Eigen::VectorXd start = initial_mean(*model).head(4);
+    const Eigen::MatrixXd spread = initial_covariance(*model).topLeftCorner(4, 4);
+    bank.reset(start, spread);
+    reference.mean.head(4) = start;
+    reference.covariance.topLeftCorner(4, 4) = spread;
+    const auto samples = simulate(*model, 60, false, 5);
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd covariance;
+    for (int k = 0; k <= 60; ++k) {
+      if (k > 0) {
+        reference.predict(samples[k], setup.input_variances);
+        bank.predict(samples[k].inputs.data(), samples[k].duration);
+      }
+      reference.update(samples[k], setup.output_variances);
+      bank.update(samples[k].outputs.data());
+      bank.moments(mean, covariance);
+      ASSERT_LT(largest(mean - reference.chosen_mean()), 1e-9) << k;
+      ASSERT_LT(largest(covariance - reference.chosen_covariance()), 1e-9 * (1.0 + largest(covariance))) << k;
+    }
+  }
+}
+
+/// With members that never change places, the weights are the posterior probabilities of independent filters, and the
+/// moments are those of their mixture.
+TEST(PriorBank, WeighsItsMembersByTheirLikelihood) {
+  const auto model = linear_model<Hovercraft>();
+  const std::vector<PriorCombination> members = linear_members();
+  PriorBank::Setup setup = setup_for(*model, members);
+  setup.memory = std::numeric_limits<double>::infinity();
+  setup.gate = std::numeric_limits<double>::infinity();
+  PriorBank bank(model, setup);
+  std::vector<DenseFilter> filters;
+  std::vector<double> costs(members.size(), 0.0);
+  const Eigen::VectorXd start = initial_mean(*model).head(4);
+  const Eigen::MatrixXd spread = initial_covariance(*model).topLeftCorner(4, 4);
+  bank.reset(start, spread);
+  for (const PriorCombination& member : members) {
+    filters.emplace_back(*model, member);
+    filters.back().mean.head(4) = start;
+    filters.back().covariance.topLeftCorner(4, 4) = spread;
+  }
+  const auto samples = simulate(*model, 12, false, 8);
+  for (int k = 0; k <= 12; ++k) {
+    if (k > 0) bank.predict(samples[k].inputs.data(), samples[k].duration);
+    bank.update(samples[k].outputs.data());
+    double best = HUGE_VAL, total = 0.0;
+    for (std::size_t m = 0; m < filters.size(); ++m) {
+      if (k > 0) filters[m].predict(samples[k], setup.input_variances);
+      costs[m] += filters[m].update(samples[k], setup.output_variances);
+      best = std::min(best, costs[m]);
+    }
+    std::vector<double> weights;
+    for (const double cost : costs) total += weights.emplace_back(std::exp(0.5 * (best - cost)));
+    Eigen::VectorXd expected = Eigen::VectorXd::Zero(6), mean;
+    Eigen::MatrixXd second = Eigen::MatrixXd::Zero(6, 6), covariance;
+    for (std::size_t m = 0; m < filters.size(); ++m) {
+      weights[m] /= total;
+      ASSERT_NEAR(bank.weights()[m], weights[m], 1e-8) << k;
+      const Eigen::VectorXd own = filters[m].chosen_mean();
+      expected += weights[m] * own;
+      second += weights[m] * (filters[m].chosen_covariance() + own * own.transpose());
+    }
+    bank.moments(mean, covariance);
+    ASSERT_LT(largest(mean - expected), 1e-8) << k;
+    ASSERT_LT(largest(covariance - (second - expected * expected.transpose())), 1e-7) << k;
+  }
+}
+
+/// Mixing moves moments between members and leaves those of the whole as they are.
+TEST(PriorBank, KeepsTheMomentsOfTheMixtureWhenItMixes) {
+  const auto model = linear_model<Hovercraft>();
+  PriorBank::Setup setup = setup_for(*model, linear_members());
+  setup.memory = 1.0;  // a fourth changes within an interval
+  PriorBank bank(model, setup);
+  bank.reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
+  const auto samples = simulate(*model, 50, false, 8);
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+  for (int k = 1; k <= 50; ++k) {
+    bank.predict(samples[k].inputs.data(), samples[k].duration);
+    bank.update(samples[k].outputs.data());
+    double total = 0.0;
+    for (const double weight : bank.weights()) {
+      EXPECT_GT(weight, 0.0);
+      total += weight;
+    }
+    EXPECT_NEAR(total, 1.0, 1e-8);
+    bank.moments(mean, covariance);
+    EXPECT_TRUE(mean.allFinite());
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(covariance).eigenvalues()[0], 0.0) << k;
+  }
+}
+
+TEST(PriorBank, PassesOverWhatIsNoNumber) {
+  const auto model = linear_model<Hovercraft>();
+  PriorBank bank(model, setup_for(*model, linear_members()));
+  bank.reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
+  Eigen::VectorXd before, after;
+  Eigen::MatrixXd covariance;
+  bank.moments(before, covariance);
+  const double nothing[] = {nan, nan, nan}, infinite[] = {HUGE_VAL, nan, nan}, missing[] = {nan, nan};
+  bank.update(nothing);
+  bank.moments(after, covariance);
+  EXPECT_EQ(before, after);
+  bank.update(infinite);
+  bank.predict(missing, 1e300);
+  bank.moments(after, covariance);
+  EXPECT_TRUE(after.allFinite() && covariance.allFinite());
+}
+
+/// A vehicle that drives on ground with patches: the ground covered is what the vehicle did cover, and members whose
+/// law is wrong lose their weight.
+TEST(PriorBank, MeasuresTheGroundAndFindsTheLaw) {
+  const std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
+  ModelDescription about = model->description();
+  for (Variable& parameter : about.parameters) parameter.lower = 0.0, parameter.upper = 1.0;
+  PriorBank::Setup setup;
+  setup.members = standard_bank(about);
+  setup.output_variances = {1e-4, 1e-4, 1e-4};
+  setup.input_variances = {1e-4, 1e-4};
+  PriorBank bank(model, setup);
+  bank.reset(Eigen::Vector4d::Zero(), 1e-3 * Eigen::Matrix4d::Identity());
+  const double u[] = {2.0, 0.0};
+  Eigen::Vector4d x = Eigen::Vector4d::Zero(), next;
+  const double p[] = {0.7, 0.9}, duration = 0.2;  // the same everywhere
+  double y[3];
+  for (int k = 0; k < 400; ++k) {
+    model->integrate({.count = 1,
+                      .states = x.data(),
+                      .inputs = u,
+                      .parameters = p,
+                      .durations = &duration,
+                      .next_states = next.data()});
+    bank.predict(u, duration);
+    EXPECT_NEAR(bank.distance(), (next - x).head(2).norm(), k < 20 ? 0.2 : 0.01);
+    x = next;
+    model->observe({.count = 1, .states = x.data(), .outputs = y});
+    y[0] += 0.01 * std::sin(7.0 * k);
+    y[1] += 0.01 * std::cos(5.0 * k);
+    bank.update(y);
+  }
+  // Over 112 m of one value, the laws that vary least are left.
+  double slow = 0.0, fast = 0.0;
+  for (int m = 0; m < bank.member_count(); ++m) {
+    double F[16], Q[16];
+    const Prior& law = *setup.members[m][model->description().roles.speed_factor];
+    law.advance(1.0, F, Q);
+    (Q[0] < 1e-4 ? slow : fast) += bank.weights()[m];
+  }
+  EXPECT_GT(slow, 5.0 * fast);
+}
+
+TEST(PriorBank, RefusesWhatDoesNotFit) {
+  const auto model = linear_model<Hovercraft>();
+  EXPECT_THAT(error_of([&] { PriorBank(model, setup_for(*model, {})); }), ::testing::HasSubstr("at least 1 member"));
+  EXPECT_THAT(error_of([&] { PriorBank(model, setup_for(*model, {{prior("walk", "{}")}})); }),
+              ::testing::HasSubstr("expected 2"));
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,228 @@
+// The kernels of banks of filters: every instruction set that this machine supports, compared with plain matrices.
+#include "rhec/core/kernels/bank_kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <numbers>
+
+#include "rhec/core/base/aligned.hpp"
+#include "rhec/core/kernels/kernel_sets.hpp"
+#include "support/random_qp.hpp"
+
+namespace rhec {
+namespace {
+
+using testing::RandomQp;
+
+double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
+
+/// A bank with random moments, in both forms.
+struct RandomBank {
+  int members, nx, n;
+  std::vector<int> first, count;
+  std::vector<Eigen::VectorXd> means;
+  std::vector<Eigen::MatrixXd> covariances;
+  AlignedDoubles mean, covariance, work;
+
+  explicit RandomBank(RandomQp& random) : members(8 * random.integer(1, 3)), nx(random.integer(1, 5)), n(nx) {
+    for (int j = random.integer(0, 3); j > 0; --j) {
+      first.push_back(n);
+      count.push_back(random.integer(1, 4));
+      n += count.back();
+    }
+    mean.assign(static_cast<std::size_t>(n) * members, 0.0);
+    covariance.assign(static_cast<std::size_t>(n) * n * members, 0.0);
+    work.assign(static_cast<std::size_t>(2 * n * n + 4 * n) * members, 0.0);
+    for (int m = 0; m < members; ++m) {
+      means.push_back(matrix(random, n, 1));
+      const Eigen::MatrixXd root = matrix(random, n, n + 1);
+      covariances.emplace_back(root * root.transpose());
+      put(means.back(), mean, m);
+      put(covariances.back(), covariance, m);
+    }
+  }
+  static Eigen::MatrixXd matrix(RandomQp& random, int rows, int columns) {
+    Eigen::MatrixXd entries(rows, columns);
+    for (double& entry : entries.reshaped()) entry = random.uniform(-1.0, 1.0);
+    return entries;
+  }
+  void put(const Eigen::MatrixXd& from, AlignedDoubles& to, int member) const {
+    for (Eigen::Index e = 0; e < from.size(); ++e) to[e * members + member] = from.data()[e];
+  }
+  Eigen::MatrixXd taken(const AlignedDoubles& from, int member, int rows, int columns) const {
+    Eigen::MatrixXd entries(rows, columns);
+    for (Eigen::Index e = 0; e < entries.size(); ++e) entries.data()[e] = from[e * members + member];
+    return entries;
+  }
+  BankView view() { return {members, nx, n, mean.data(), covariance.data(), work.data()}; }
+  void expect_equal(const char* set) const {
+    for (int m = 0; m < members; ++m) {
+      EXPECT_LT(largest(taken(mean, m, n, 1) - means[m]), 1e-12) << set;
+      EXPECT_LT(largest(taken(covariance, m, n, n) - covariances[m]), 1e-11) << set;
+      EXPECT_EQ(largest(taken(covariance, m, n, n) - taken(covariance, m, n, n).transpose()), 0.0) << set;
+    }
+  }
+};
+
+class BankKernelsTest : public ::testing::TestWithParam<int> {};
+
+TEST_P(BankKernelsTest, PredictByTheWholeTransition) {
+  for (const KernelSet& set : runnable_kernels()) {
+    RandomQp random(GetParam());
+    RandomBank bank(random);
+    const int np = static_cast<int>(bank.first.size()), nu = random.integer(0, 3), nx = bank.nx, n = bank.n;
+    const int columns = nx + nu + 2 * np;
+    AlignedDoubles next(static_cast<std::size_t>(nx) * bank.members), jacobian(next.size() * columns);
+    std::vector<AlignedDoubles> F(np), Q(np), ramp(np);
+    std::vector<BankProcess> processes;
+    std::vector<double> variances(nu);
+    for (double& variance : variances) variance = random.uniform(0.0, 1.0);
+    for (int j = 0; j < np; ++j) {
+      F[j].assign(static_cast<std::size_t>(bank.count[j]) * bank.count[j] * bank.members, 0.0);
+      Q[j] = F[j];
+      ramp[j].assign(bank.members, 0.0);
+      processes.push_back({bank.first[j], bank.count[j], F[j].data(), Q[j].data(), ramp[j].data()});
+    }
+    for (int m = 0; m < bank.members; ++m) {
+      const Eigen::MatrixXd J = RandomBank::matrix(random, nx, columns), x = RandomBank::matrix(random, nx, 1);
+      bank.put(J, jacobian, m);
+      bank.put(x, next, m);
+      // The transition of [x; z], and the matrix through which the noise of z enters.
+      Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n), G = Eigen::MatrixXd::Identity(n, n),
+                      N = Eigen::MatrixXd::Zero(n, n);
+      A.topLeftCorner(nx, nx) = J.leftCols(nx);
+      for (int j = 0; j < np; ++j) {
+        const int first = bank.first[j], count = bank.count[j];
+        const Eigen::MatrixXd own = RandomBank::matrix(random, count, count),
+                              root = RandomBank::matrix(random, count, count);
+        const Eigen::MatrixXd noise = root * root.transpose();
+        bank.put(own, F[j], m);
+        bank.put(noise, Q[j], m);
+        const bool runs = random.integer(0, 1) == 1;
+        ramp[j][m] = runs ? 1.0 : 0.0;
+        A.block(first, first, count, count) = own;
+        N.block(first, first, count, count) = noise;
+        const Eigen::VectorXd start = J.col(nx + nu + j), end = J.col(nx + nu + np + j);
+        A.block(0, first, nx, 1) += start;
+        if (runs) {
+          A.block(0, first, nx, count) += end * own.row(0);
+          G.block(0, first, nx, 1) = end;
+        } else {
+          A.block(0, first, nx, 1) += end;
+        }
+      }
+      Eigen::MatrixXd after = A * bank.covariances[m] * A.transpose() + G * N * G.transpose();
+      for (int j = 0; j < nu; ++j)
+        after.topLeftCorner(nx, nx) += J.col(nx + j) * variances[j] * J.col(nx + j).transpose();
+      bank.covariances[m] = after;
+      Eigen::VectorXd moved = A * bank.means[m];
+      moved.head(nx) = x;
+      bank.means[m] = moved;
+    }
+    set.bank->predict(bank.view(), {nu, np, processes.data(), next.data(), jacobian.data(), variances.data()});
+    bank.expect_equal(set.instruction_set);
+  }
+}
+
+TEST_P(BankKernelsTest, UpdateAsTheTextbookDoes) {
+  for (const KernelSet& set : runnable_kernels()) {
+    RandomQp random(GetParam());
+    RandomBank bank(random);
+    const int count = random.integer(1, 4), n = bank.n;
+    std::vector<AlignedDoubles> predicted(count), gradients(count);
+    std::vector<BankOutput> outputs;
+    AlignedDoubles squares(bank.members, 0.5), determinants(bank.members, 2.0), expected_squares = squares,
+                                                                                expected_determinants = determinants;
+    std::vector<Eigen::VectorXd> corrections(bank.members, Eigen::VectorXd::Zero(n));
+    for (int j = 0; j < count; ++j) {
+      predicted[j].assign(bank.members, 0.0);
+      gradients[j].assign(static_cast<std::size_t>(bank.nx) * bank.members, 0.0);
+      // An angle that was measured some turns away is as near as the same one without.
+      const bool is_angle = random.integer(0, 1) == 1;
+      const double turns = is_angle ? 2.0 * std::numbers::pi * random.integer(-3, 3) : 0.0;
+      const double measured = random.uniform(-1.0, 1.0), variance = random.uniform(0.01, 1.0);
+      outputs.push_back({predicted[j].data(), gradients[j].data(), measured + turns, variance,
+                         is_angle ? 2.0 * std::numbers::pi : 0.0});
+      for (int m = 0; m < bank.members; ++m) {
+        predicted[j][m] = random.uniform(-1.0, 1.0);
+        Eigen::VectorXd h = Eigen::VectorXd::Zero(n);
+        h.head(bank.nx) = RandomBank::matrix(random, bank.nx, 1);
+        bank.put(h.head(bank.nx), gradients[j], m);
+        const double innovation = measured - predicted[j][m] - h.dot(corrections[m]);
+        const double S = h.dot(bank.covariances[m] * h) + variance;
+        const Eigen::VectorXd gain = bank.covariances[m] * h / S;
+        corrections[m] += gain * innovation;
+        bank.covariances[m] -= Eigen::MatrixXd(gain * S * gain.transpose());
+        expected_squares[m] += std::min(innovation * innovation / S, 1.5);
+        expected_determinants[m] *= S;
+      }
+    }
+    for (int m = 0; m < bank.members; ++m) bank.means[m] += corrections[m];
+    set.bank->update(bank.view(), outputs.data(), count, 1.5, squares.data(), determinants.data());
+    bank.expect_equal(set.instruction_set);
+    for (int m = 0; m < bank.members; ++m) {
+      EXPECT_NEAR(squares[m], expected_squares[m], 1e-11);
+      EXPECT_NEAR(determinants[m] / expected_determinants[m], 1.0, 1e-12);
+    }
+  }
+}
+
+TEST_P(BankKernelsTest, MixMomentsAsMixturesDo) {
+  for (const KernelSet& set : runnable_kernels()) {
+    RandomQp random(GetParam());
+    RandomBank bank(random);
+    AlignedDoubles weights(bank.members), keep(bank.members), take(bank.members);
+    double total = 0.0;
+    for (double& weight : weights) total += weight = random.uniform(0.0, 1.0);
+    const int n = bank.n;
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(n), found(n);
+    Eigen::MatrixXd second = Eigen::MatrixXd::Zero(n, n), spread(n, n);
+    for (int m = 0; m < bank.members; ++m) {
+      weights[m] /= total;
+      take[m] = random.uniform(0.0, 1.0);
+      keep[m] = 1.0 - take[m];
+      mean += weights[m] * bank.means[m];
+      second += weights[m] * (bank.covariances[m] + bank.means[m] * bank.means[m].transpose());
+    }
+    const Eigen::MatrixXd covariance = second - mean * mean.transpose();
+    set.bank->moments(bank.view(), weights.data(), found.data(), spread.data());
+    EXPECT_LT(largest(found - mean), 1e-13) << set.instruction_set;
+    EXPECT_LT(largest(spread - covariance), 1e-12) << set.instruction_set;
+    for (int m = 0; m < bank.members; ++m) {
+      const Eigen::VectorXd own = bank.means[m];
+      bank.means[m] = keep[m] * own + take[m] * mean;
+      const Eigen::MatrixXd both =
+          keep[m] * (bank.covariances[m] + own * own.transpose()) + take[m] * (covariance + mean * mean.transpose());
+      bank.covariances[m] = both - bank.means[m] * bank.means[m].transpose();
+    }
+    set.bank->mix(bank.view(), weights.data(), keep.data(), take.data());
+    bank.expect_equal(set.instruction_set);
+  }
+}
+
+/// One member in a thousand may go wrong; it stays as it was, and no other notices.
+TEST(BankKernels, LeaveAMemberAsItWasWhereNoNumberComesOut) {
+  for (const KernelSet& set : runnable_kernels()) {
+    RandomQp random(11);
+    RandomBank bank(random);
+    AlignedDoubles predicted(bank.members, 0.0), gradient(static_cast<std::size_t>(bank.nx) * bank.members, 1.0),
+        squares(bank.members, 0.0), determinants(bank.members, 1.0);
+    predicted[3] = std::nan("");
+    const BankOutput output{predicted.data(), gradient.data(), 0.5, 0.1, 0.0};
+    set.bank->update(bank.view(), &output, 1, 16.0, squares.data(), determinants.data());
+    EXPECT_EQ(largest(bank.taken(bank.mean, 3, bank.n, 1) - bank.means[3]), 0.0);
+    EXPECT_EQ(largest(bank.taken(bank.covariance, 3, bank.n, bank.n) - bank.covariances[3]), 0.0);
+    EXPECT_EQ(squares[3], 16.0) << "as if it were an outlier";
+    for (int m = 0; m < bank.members; ++m) {
+      EXPECT_TRUE(bank.taken(bank.mean, m, bank.n, 1).allFinite());
+      if (m == 3) continue;
+      EXPECT_GT(largest(bank.taken(bank.mean, m, bank.n, 1) - bank.means[m]), 0.0);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, BankKernelsTest, ::testing::Range(1, 25));
+
+}  // namespace
+}  // namespace rhec
