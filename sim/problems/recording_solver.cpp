@@ -69,6 +69,7 @@ void RecordingSolver::finish(Iterate& iterate, Report& report) noexcept {
 
 Robot with_hooks(Robot robot, const LoopHooks& hooks, std::function<std::int64_t()> step) {
   robot.add_hooks(std::make_shared<SolverHooks>(hooks.solved, std::move(step)));
+  if (hooks.robot) robot.add_hooks(hooks.robot);
   return robot;
 }
 

@@ -73,6 +73,8 @@ struct LoopHooks {
   std::function<void(LoopPart part)> begins = {};
   /// Called for each sample before the next one is prepared, e.g. to inspect windows and plans.
   std::function<void(const LoopSample& sample)> sampled = {};
+  /// Added to the robot's own, e.g. to let other estimators see what the loop's estimator sees.
+  std::shared_ptr<const RobotHooks> robot = {};
 };
 
 /// A copy of a robot whose solvers are timed and call `hooks.solved` if it is set; `step` is called at each solve.

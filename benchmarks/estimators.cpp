@@ -1,0 +1,194 @@
+// Estimators beside each other on the same drives: each closed loop is driven by the estimator of a scenario, and
+// others see the same measurements. One line of JSON per drive and estimator: mean absolute errors, mean NEES, and the
+// shares of samples whose truth lies within two standard deviations.
+//
+//     estimators --scenario scenarios/baseline/ekf.yaml --set speed=5 --set seed=7 --beside 'bank: estimator.name=bank'
+//
+// What stands after --beside is a name and assignments, separated by ';'. scripts/measure/estimators runs the whole
+// grid.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <Eigen/Dense>
+
+#include "rhec/core/base/angle.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+#include "rhec/sim/loop/closed_loop.hpp"
+
+namespace rhec::bench {
+namespace {
+
+struct Beside {
+  std::string name;
+  std::unique_ptr<Estimator> estimator;
+  std::vector<Estimate> estimates = {};
+};
+
+/// Passes on what the driving estimator sees.
+class Forwarding final : public EstimationMethod {
+ public:
+  Forwarding(std::unique_ptr<EstimationMethod> inner, std::vector<Beside>& others)
+      : inner_(std::move(inner)), others_(others) {}
+  const Model& model() const noexcept override { return inner_->model(); }
+  int substeps() const noexcept override { return inner_->substeps(); }
+  void start(const double* outputs) noexcept override {
+    inner_->start(outputs);
+    time_ = 0.0;
+    for (Beside& other : others_) other.estimator->push_measurement(time_, outputs);
+  }
+  void add_node(double duration, const double* inputs, const double* outputs) noexcept override {
+    inner_->add_node(duration, inputs, outputs);
+    for (Beside& other : others_) {
+      other.estimator->push_input(time_, inputs);
+      other.estimator->push_measurement(time_ + duration, outputs);
+    }
+    time_ += duration;
+  }
+  bool amend(int back, const double* outputs) noexcept override { return inner_->amend(back, outputs); }
+  void estimate(Estimate& result, Clock::time_point deadline) noexcept override {
+    inner_->estimate(result, deadline);
+    for (Beside& other : others_) {
+      other.estimates.push_back(other.estimator->estimate(time_));
+      other.estimator->prepare();
+    }
+  }
+  void prepare() noexcept override { inner_->prepare(); }
+  void reset() noexcept override { inner_->reset(); }
+
+ private:
+  std::unique_ptr<EstimationMethod> inner_;
+  std::vector<Beside>& others_;
+  double time_ = 0.0;
+};
+
+class ForwardingHooks final : public RobotHooks {
+ public:
+  explicit ForwardingHooks(std::vector<Beside>& others) : others_(others) {}
+  std::unique_ptr<EstimationMethod> wrap_method(std::unique_ptr<EstimationMethod> method) const override {
+    return std::make_unique<Forwarding>(std::move(method), others_);
+  }
+
+ private:
+  std::vector<Beside>& others_;
+};
+
+/// Errors of one estimator over a drive.
+struct Errors {
+  explicit Errors(const ModelDescription& description)
+      : about(description),
+        parameters(description.parameters.size(), 0.0),
+        inside(description.parameters.size() + description.states.size(), 0.0) {}
+  void add(const sim::Sample& truth, const Eigen::VectorXd& state, const Eigen::VectorXd& p,
+           const Eigen::MatrixXd& covariance) {
+    ++count;
+    Eigen::VectorXd error(state.size() + p.size());
+    error << state - truth.true_state, p - truth.true_parameters;
+    for (std::size_t j = 0; j < about.states.size(); ++j)
+      if (about.states[j].is_angle) error[j] = angle_difference(state[j], truth.true_state[j]);
+    const Roles& roles = about.roles;
+    if (roles.position_x >= 0) position += std::hypot(error[roles.position_x], error[roles.position_y]);
+    if (roles.heading >= 0) heading += std::abs(error[roles.heading]);
+    for (std::size_t j = 0; j < parameters.size(); ++j) parameters[j] += std::abs(error[state.size() + j]);
+    nees += error.dot(covariance.ldlt().solve(error));
+    for (Eigen::Index j = 0; j < error.size(); ++j)
+      inside[j] += std::abs(error[j]) <= 2.0 * std::sqrt(covariance(j, j));
+  }
+  std::string json() const {
+    const auto mean = [&](double sum) { return sum / count; };
+    std::string text = fmt::format("\"samples\": {}, \"position\": {:.6g}, \"heading\": {:.6g}, \"nees\": {:.6g}",
+                                   count, mean(position), mean(heading), mean(nees));
+    for (std::size_t j = 0; j < parameters.size(); ++j)
+      text += fmt::format(", \"{0}\": {1:.6g}, \"{0}_inside\": {2:.6g}", about.parameters[j].name, mean(parameters[j]),
+                          mean(inside[about.states.size() + j]));
+    return text;
+  }
+
+  const ModelDescription& about;
+  int count = 0;
+  double position = 0.0, heading = 0.0, nees = 0.0;
+  std::vector<double> parameters, inside;
+};
+
+struct Arguments {
+  std::string scenario;
+  std::vector<std::string> assignments, beside;
+};
+
+Arguments read(int count, char** words) {
+  Arguments arguments;
+  for (int i = 1; i < count; ++i) {
+    const std::string word = words[i];
+    if (i + 1 == count) throw Error("'" + word + "' needs a value");
+    const std::string value = words[++i];
+    if (word == "--scenario")
+      arguments.scenario = value;
+    else if (word == "--set")
+      arguments.assignments.push_back(value);
+    else if (word == "--beside")
+      arguments.beside.push_back(value);
+    else
+      throw Error("'" + word + "' is none of --scenario, --set, --beside");
+  }
+  if (arguments.scenario.empty()) throw Error("--scenario FILE is missing");
+  return arguments;
+}
+
+sim::Scenario scenario_with(const Host& host, const Arguments& arguments, const std::string& more) {
+  Settings settings = load_yaml(arguments.scenario);
+  for (const std::string& assignment : arguments.assignments) apply_assignment(settings, assignment);
+  for (std::size_t at = 0; at < more.size();) {
+    const std::size_t end = std::min(more.find(';', at), more.size());
+    const std::size_t first = more.find_first_not_of(' ', at);
+    if (first < end) apply_assignment(settings, more.substr(first, end - first));
+    at = end + 1;
+  }
+  return {host, settings};
+}
+
+void run(const Arguments& arguments) {
+  const Host host;
+  sim::Scenario driver = scenario_with(host, arguments, "");
+  std::vector<sim::Scenario> variants;
+  std::vector<Beside> others;
+  variants.reserve(arguments.beside.size());
+  for (const std::string& beside : arguments.beside) {
+    const std::size_t colon = beside.find(':');
+    if (colon == std::string::npos) throw Error("--beside '" + beside + "': expected 'NAME: ASSIGNMENT; ...'");
+    variants.push_back(scenario_with(host, arguments, beside.substr(colon + 1)));
+    others.push_back({beside.substr(0, colon), variants.back().robot().make_estimator(driver.initial_state())});
+  }
+  const ModelDescription& about = driver.robot().bounded_description();
+  sim::LoopHooks hooks;
+  hooks.robot = std::make_shared<ForwardingHooks>(others);
+  const sim::RunLog log = sim::run_closed_loop(driver, hooks);
+  for (const Beside& other : others) {
+    if (other.estimates.size() != log.samples.size())
+      throw Error(fmt::format("{} estimates for {} samples", other.estimates.size(), log.samples.size()));
+    Errors errors(about);
+    for (std::size_t i = 0; i < log.samples.size(); ++i)
+      errors.add(log.samples[i], other.estimates[i].state, other.estimates[i].parameters,
+                 other.estimates[i].covariance);
+    fmt::print("{{\"estimator\": \"{}\", {}}}\n", other.name, errors.json());
+  }
+}
+
+}  // namespace
+}  // namespace rhec::bench
+
+int main(int count, char** words) {
+  try {
+    rhec::bench::run(rhec::bench::read(count, words));
+  } catch (const std::exception& mistake) {
+    fmt::print(stderr, "estimators: {}\n", mistake.what());
+    return EXIT_FAILURE;
+  }
+}
