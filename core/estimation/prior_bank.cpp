@@ -19,6 +19,52 @@ constexpr int lanes_at_once = 8;
 /// Below this probability a member's weight does not fall, so that it can come back.
 constexpr double least_weight = 1e-10;
 
+/// Fills up the states of one prior to those of all priors of its parameter, so that a state has one meaning for all
+/// members that are mixed. Where a prior has no mean, its mean is the parameter; where it has no derivatives, these are
+/// unknown: independent, with the variance that they have elsewhere.
+struct Filling {
+  const Prior& prior;
+  const std::array<int, process_state_kinds>& place;
+  const std::array<double, process_state_kinds>& filler;
+  int count;
+
+  /// The prior's own state of a kind, or -1.
+  int own(std::size_t kind) const noexcept {
+    const auto states = prior.states();
+    for (std::size_t k = 0; k < states.size(); ++k)
+      if (static_cast<std::size_t>(states[k]) == kind) return static_cast<int>(k);
+    return -1;
+  }
+  /// The own state that stands at a place: its own kind, or the value for a mean that is missing; -1 for none.
+  int source(std::size_t kind) const noexcept {
+    const int found = own(kind);
+    return found < 0 && kind == static_cast<std::size_t>(ProcessState::mean) ? 0 : found;
+  }
+  void vector(const double* from, double* to) const noexcept {
+    for (std::size_t kind = 0; kind < place.size(); ++kind)
+      if (place[kind] >= 0) to[place[kind]] = source(kind) >= 0 ? from[source(kind)] : 0.0;
+  }
+  void transition(const double* from, double* to) const noexcept {
+    const int n = prior.state_count();
+    std::fill_n(to, count * count, 0.0);
+    for (std::size_t row = 0; row < place.size(); ++row)
+      for (std::size_t column = 0; column < place.size(); ++column)
+        if (place[row] >= 0 && place[column] >= 0 && source(row) >= 0 && own(column) >= 0)
+          to[place[column] * count + place[row]] = from[own(column) * n + source(row)];
+  }
+  void covariance(const double* from, double* to) const noexcept {
+    const int n = prior.state_count();
+    std::fill_n(to, count * count, 0.0);
+    for (std::size_t row = 0; row < place.size(); ++row) {
+      if (place[row] < 0) continue;
+      for (std::size_t column = 0; column < place.size(); ++column)
+        if (place[column] >= 0 && source(row) >= 0 && source(column) >= 0)
+          to[place[column] * count + place[row]] = from[source(column) * n + source(row)];
+      if (own(row) < 0) to[place[row] * count + place[row]] += filler[row];
+    }
+  }
+};
+
 }  // namespace
 
 struct PriorBank::Views {
@@ -53,14 +99,12 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
       auto found = std::find(process.kinds.begin(), process.kinds.end(), prior);
       if (found == process.kinds.end()) found = process.kinds.insert(found, prior);
       process.kind_of.push_back(static_cast<int>(found - process.kinds.begin()));
-      process.count = std::max(process.count, prior->state_count());
     }
+    find_places(process);
     const auto size = static_cast<std::size_t>(process.count) * process.count;
     process.F.assign(size * lanes_, 0.0);
     process.Q.assign(size * lanes_, 0.0);
     process.ramp.assign(lanes_, 0.0);
-    process.F_of.assign(Prior::max_states * Prior::max_states, 0.0);
-    process.Q_of = process.F_of;
     for (int m = 0; m < members_; ++m) process.ramp[m] = setup_.members[m][j]->course() == Course::ramp ? 1.0 : 0.0;
     n_ += process.count;
     processes_.push_back(std::move(process));
@@ -86,8 +130,8 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   gradient_rows_.assign(M * ny_ * nx, 0.0);
   input_.assign(nu_, 0.0);
   variances_.assign(nu_, 0.0);
-  start_.assign(Prior::max_states, 0.0);
-  start_covariance_.assign(Prior::max_states * Prior::max_states, 0.0);
+  for (auto* v : {&start_, &own_, &own_covariance_, &filled_, &filled_covariance_})
+    v->assign(std::size_t{Prior::max_states} * Prior::max_states, 0.0);
   full_mean_ = Eigen::VectorXd::Zero(n_);
   full_covariance_ = Eigen::MatrixXd::Zero(n_, n_);
   views_ = std::make_unique<Views>();
@@ -96,6 +140,44 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
         {process.first, process.count, process.F.data(), process.Q.data(), process.ramp.data()});
   views_->outputs.resize(ny_);
   reset(Eigen::VectorXd::Zero(nx_), Eigen::MatrixXd::Identity(nx_, nx_));
+}
+
+/// Which states any of a parameter's priors has, and how far they spread.
+void PriorBank::find_places(Process& process) const {
+  std::array<int, process_state_kinds> having{};
+  std::array<double, process_state_kinds> sum{};
+  std::vector<double> mean(Prior::max_states), covariance(std::size_t{Prior::max_states} * Prior::max_states);
+  for (const Prior* prior : process.kinds) {
+    const auto states = prior->states();
+    if (states.empty() || states[0] != ProcessState::value)
+      throw Error("bank: a prior whose first state is not the parameter itself");
+    prior->start(mean.data(), covariance.data());
+    const std::size_t count = states.size();
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto kind = static_cast<std::size_t>(states[k]);
+      ++having[kind];
+      // Of the mean, what counts is how far the parameter is from it.
+      sum[kind] += states[k] == ProcessState::mean ? covariance[0] - 2.0 * covariance[k] + covariance[k * count + k]
+                                                   : covariance[k * count + k];
+    }
+  }
+  for (std::size_t kind = 0; kind < having.size(); ++kind) {
+    process.place[kind] = having[kind] > 0 ? process.count++ : -1;
+    process.filler[kind] = having[kind] > 0 ? sum[kind] / having[kind] : 0.0;
+  }
+}
+
+void PriorBank::write_start(const Process& process, const Prior& prior, int lane) noexcept {
+  prior.start(own_.data(), own_covariance_.data());
+  const Filling filling{prior, process.place, process.filler, process.count};
+  filling.vector(own_.data(), start_.data());
+  filling.covariance(own_covariance_.data(), filled_covariance_.data());
+  for (int c = 0; c < process.count; ++c) {
+    mean_[(process.first + c) * lanes_ + lane] = start_[c];
+    for (int r = 0; r < process.count; ++r)
+      covariance_[((process.first + c) * n_ + process.first + r) * lanes_ + lane] =
+          filled_covariance_[c * process.count + r];
+  }
 }
 
 void PriorBank::reset(const Eigen::VectorXd& state, const Eigen::MatrixXd& covariance) noexcept {
@@ -108,15 +190,7 @@ void PriorBank::reset(const Eigen::VectorXd& state, const Eigen::MatrixXd& covar
     for (int r = 0; r < nx_; ++r) mean_[r * lanes_ + m] = state[r];
     for (int c = 0; c < nx_; ++c)
       for (int r = 0; r < nx_; ++r) covariance_[(c * n_ + r) * lanes_ + m] = covariance(r, c);
-    for (int j = 0; j < np_; ++j) {
-      const Prior& prior = *setup_.members[member][j];
-      const int count = prior.state_count(), first = processes_[j].first;
-      prior.start(start_.data(), start_covariance_.data());
-      for (int r = 0; r < count; ++r) mean_[(first + r) * lanes_ + m] = start_[r];
-      for (int c = 0; c < count; ++c)
-        for (int r = 0; r < count; ++r)
-          covariance_[((first + c) * n_ + first + r) * lanes_ + m] = start_covariance_[c * count + r];
-    }
+    for (int j = 0; j < np_; ++j) write_start(processes_[j], *setup_.members[member][j], m);
   }
   for (int m = 0; m < members_; ++m) weights_[m] = 1.0 / members_;
   distance_ = 0.0;
@@ -196,15 +270,15 @@ void PriorBank::advance_processes(double duration) noexcept {
   for (Process& process : processes_) {
     for (std::size_t kind = 0; kind < process.kinds.size(); ++kind) {
       const Prior& prior = *process.kinds[kind];
-      const int count = prior.state_count(), all = process.count;
-      prior.advance(prior.along() == Along::time ? duration : distance_, process.F_of.data(), process.Q_of.data());
+      prior.advance(prior.along() == Along::time ? duration : distance_, own_.data(), own_covariance_.data());
+      const Filling filling{prior, process.place, process.filler, process.count};
+      filling.transition(own_.data(), filled_.data());
+      filling.covariance(own_covariance_.data(), filled_covariance_.data());
       for (int m = 0; m < lanes_; ++m) {
         if (process.kind_of[std::min(m, members_ - 1)] != static_cast<int>(kind)) continue;
-        for (int c = 0; c < count; ++c) {
-          for (int r = 0; r < count; ++r) {
-            process.F[(c * all + r) * lanes_ + m] = process.F_of[c * count + r];
-            process.Q[(c * all + r) * lanes_ + m] = process.Q_of[c * count + r];
-          }
+        for (int e = 0; e < process.count * process.count; ++e) {
+          process.F[e * lanes_ + m] = filled_[e];
+          process.Q[e * lanes_ + m] = filled_covariance_[e];
         }
       }
     }

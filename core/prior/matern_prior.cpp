@@ -12,6 +12,16 @@ void MaternPrior::set_up(const Variable& parameter) {
   mean_rate_ = law_.mean_rate.value_or(0.005 * range.width);
 }
 
+std::span<const ProcessState> MaternPrior::states() const noexcept {
+  static constexpr ProcessState half[] = {ProcessState::value, ProcessState::mean};
+  static constexpr ProcessState three_halves[] = {ProcessState::value, ProcessState::slope, ProcessState::mean};
+  static constexpr ProcessState five_halves[] = {ProcessState::value, ProcessState::slope, ProcessState::curvature,
+                                                 ProcessState::mean};
+  if (law_.states == 1) return half;
+  if (law_.states == 2) return three_halves;
+  return five_halves;
+}
+
 // With the deviation e from the mean m, the states are [m + e; e'; e''; m].
 
 void MaternPrior::start(double* mean, double* covariance) const noexcept {

@@ -8,6 +8,11 @@ void WalkPrior::set_up(const Variable& parameter) {
   sigma_ = walk_.mean_sigma.value_or(0.2 * range.width);
 }
 
+std::span<const ProcessState> WalkPrior::states() const noexcept {
+  static constexpr ProcessState all[] = {ProcessState::value};
+  return all;
+}
+
 void WalkPrior::start(double* mean, double* covariance) const noexcept {
   mean[0] = mean_;
   covariance[0] = sigma_ * sigma_;

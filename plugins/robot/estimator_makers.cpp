@@ -47,6 +47,7 @@ std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
   for (const double sigma : context.noise.output_sigmas) setup.bank.output_variances.push_back(sigma * sigma);
   for (const double sigma : context.noise.input_sigmas) setup.bank.input_variances.push_back(sigma * sigma);
   setup.bank.substeps = parts.substeps;
+  setup.bank.memory = parts.bank.memory;
   setup.parameter_lower = lower_bounds_of(context.about.parameters);
   setup.parameter_upper = upper_bounds_of(context.about.parameters);
   const int nx = context.model->state_count();
@@ -57,6 +58,16 @@ std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
 }
 
 }  // namespace
+
+const OptionTable<BankOptions>& BankOptions::table() {
+  static const auto rows =
+      OptionTable<BankOptions>().number("memory", &BankOptions::memory,
+                                        "ground after which another combination of priors may hold: of each metre, 1 / "
+                                        "memory of all probability is dealt "
+                                        "out anew [m]",
+                                        greater_than(0.0));
+  return rows;
+}
 
 RheProblem::Setup EstimatorParts::problem() const {
   RheProblem::Setup setup;

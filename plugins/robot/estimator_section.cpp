@@ -125,6 +125,7 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
       .map("restart_sigma", &E::restart_sigma, restart_sigma_by_name().rows())
       .map("block_sigma", &E::block_sigma, block_sigma_by_name().rows())
       .map("priors", &E::priors, PriorsSection::rows())
+      .map("bank", &E::bank, BankOptions::table().schema())
       .map("initial", &E::initial, InitialOptions::table().schema())
       .map("robust", &E::robust, robust_rows("[]"))
       .map("solver", &E::solver, {default_solver.row()})
@@ -146,6 +147,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
              .initial_mean = {},
              .initial_covariance = {},
              .priors = PriorsSection(parts_.context, options_.priors),
+             .bank = BankOptions::table().parse(options_.bank, "estimator: bank"),
              .blocking = std::move(blocking),
              .make_solver = {}} {
   const ModelDescription& about = parts_.context->about;

@@ -1,6 +1,7 @@
 // What every prior promises, over every plugin that is found and some of their options.
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "view.hpp"
@@ -45,9 +46,29 @@ double least_eigenvalue(const Eigen::MatrixXd& covariance) {
   return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scaled).eigenvalues()[0];
 }
 
-TEST_P(EveryPrior, HasAStateOfAFewVariables) {
-  EXPECT_GE(prior_->state_count(), 1);
-  EXPECT_LE(prior_->state_count(), Prior::max_states);
+TEST_P(EveryPrior, HasStatesOfWhichEachIsOfAnotherKind) {
+  ASSERT_GE(prior_->state_count(), 1);
+  ASSERT_LE(prior_->state_count(), Prior::max_states);
+  const auto states = prior_->states();
+  EXPECT_EQ(states[0], ProcessState::value);
+  EXPECT_EQ(std::set<ProcessState>(states.begin(), states.end()).size(), states.size());
+}
+
+/// The slope is what the value changes by, and the curvature what the slope changes by.
+TEST_P(EveryPrior, HasDerivativesThatAreThose) {
+  constexpr double d = 1e-6;
+  const Advance step(*prior_, d);
+  const auto states = prior_->states();
+  for (std::size_t k = 1; k < states.size(); ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    if (states[k] == ProcessState::slope) {
+      EXPECT_NEAR(step.F(0, column) / d, 1.0, 1e-4);
+    } else if (states[k] == ProcessState::curvature) {
+      EXPECT_NEAR(step.F(column - 1, column) / d, 1.0, 1e-4);
+    } else {
+      EXPECT_NEAR(step.F(column, column), 1.0, 1e-4);
+    }
+  }
 }
 
 TEST_P(EveryPrior, StartsWithACovariance) {

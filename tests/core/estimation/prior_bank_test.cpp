@@ -235,6 +235,34 @@ TEST(PriorBank, WeighsItsMembersByTheirLikelihood) {
   }
 }
 
+/// What is mixed has the same meaning, in members with and without states beside the parameter.
+TEST(PriorBank, MixesStatesOfOneMeaning) {
+  const auto model = linear_model<Boat>();
+  // Very smooth, with three states besides the parameter, and a walk without any.
+  const std::vector<PriorCombination> members = {
+      {prior("matern", "{length: 50, smoothness: 5/2, along: time, mean: 0.9, mean_sigma: 0.01}")},
+      {prior("matern", "{length: 50, along: time, mean: 0.9, mean_sigma: 0.01}")},
+      {prior("walk", "{sigma: 0.001, along: time, mean: 0.9, mean_sigma: 0.01}")}};
+  PriorBank::Setup setup = setup_for(*model, members);
+  setup.memory = 0.5;
+  PriorBank bank(model, setup);
+  bank.reset(initial_mean(*model).head(3), initial_covariance(*model).topLeftCorner(3, 3));
+  const double nothing[] = {nan, nan}, u[] = {0.0};
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+  // Nothing is measured, so no member learns anything, and all keep the mean that they have in common: a mean that was
+  // taken for a curvature would drive it away.
+  for (int k = 0; k < 200; ++k) {
+    bank.predict(u, 0.2);
+    bank.update(nothing);
+    for (int m = 0; m < 3; ++m) {
+      bank.moments_of(m, mean, covariance);
+      ASSERT_NEAR(mean[3], 0.9, 1e-9) << k << " " << m;
+      ASSERT_LT(covariance(3, 3), 2.0 * 0.45 * 0.45) << "0.15 of the width of the bounds, 3" << k << " " << m;
+    }
+  }
+}
+
 /// Mixing moves moments between members and leaves those of the whole as they are.
 TEST(PriorBank, KeepsTheMomentsOfTheMixtureWhenItMixes) {
   const auto model = linear_model<Hovercraft>();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -55,12 +56,16 @@ class RHEC_EXPORT PriorBank {
 
  private:
   struct Process {
-    int first = 0, count = 0;         ///< entries of [x; z]
+    int first = 0, count = 0;  ///< entries of [x; z]: all states that any of its priors has
+    /// Per kind of state: its place among them, or -1, and the variance with which a member that lacks it is filled up.
+    std::array<int, process_state_kinds> place{};
+    std::array<double, process_state_kinds> filler{};
     std::vector<const Prior*> kinds;  ///< the different priors of this parameter
     std::vector<int> kind_of;         ///< per member
     AlignedDoubles F, Q, ramp;        ///< lanes
-    std::vector<double> F_of, Q_of;   ///< per kind
   };
+  void find_places(Process& process) const;
+  void write_start(const Process& process, const Prior& prior, int lane) noexcept;
   struct Views;  ///< what the kernels are given
   void take_step(const double* input, double duration) noexcept;
   void find_distance(const double* input, double duration) noexcept;
@@ -76,7 +81,8 @@ class RHEC_EXPORT PriorBank {
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;
-  std::vector<double> input_, variances_, start_, start_covariance_;
+  std::vector<double> input_, variances_;
+  std::vector<double> start_, own_, own_covariance_, filled_, filled_covariance_;  ///< moments of one process
   Eigen::VectorXd full_mean_;
   Eigen::MatrixXd full_covariance_;
   double distance_ = 0.0;

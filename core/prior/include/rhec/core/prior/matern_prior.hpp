@@ -20,7 +20,7 @@ class RHEC_EXPORT MaternPrior : public Prior {
   explicit MaternPrior(const Law& law) : law_(law) {}
 
   void set_up(const Variable& parameter) override;
-  int state_count() const noexcept override { return law_.states + 1; }
+  std::span<const ProcessState> states() const noexcept override;
   Along along() const noexcept override { return law_.along; }
   Course course() const noexcept override { return law_.course; }
   void start(double* mean, double* covariance) const noexcept override;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "rhec/core/base/export.hpp"
 
 namespace rhec {
@@ -15,6 +17,15 @@ enum class Course {
   held   ///< it keeps the value of the interval's first node, and changes at the next
 };
 
+/// What a state of a process is. Processes are mixed state by state, so that each of them has one meaning for all.
+enum class ProcessState {
+  value,      ///< the parameter itself
+  slope,      ///< its derivative by the advance
+  curvature,  ///< its second derivative
+  mean        ///< the level about which it varies
+};
+inline constexpr int process_state_kinds = 4;
+
 /// How a parameter varies: a Gaussian Markov process z of a few states, the first of which is the parameter itself
 /// (docs/method.md, section 8; Hartikainen and Särkkä 2010). Over an advance d [s, or m of ground],
 ///
@@ -24,8 +35,8 @@ enum class Course {
 /// After `set_up`, all calls are const, thread-safe and allocation-free.
 class RHEC_EXPORT Prior {
  public:
-  /// No process has more states.
-  static constexpr int max_states = 4;
+  /// No process has more states: one of each kind.
+  static constexpr int max_states = process_state_kinds;
 
   virtual ~Prior() = default;
 
@@ -33,7 +44,9 @@ class RHEC_EXPORT Prior {
   /// Throws Error if the bounds are needed and there are none.
   virtual void set_up(const Variable& parameter) = 0;
 
-  virtual int state_count() const noexcept = 0;
+  /// The states of z in their order: the first one is the value, and no kind comes twice.
+  virtual std::span<const ProcessState> states() const noexcept = 0;
+  int state_count() const noexcept { return static_cast<int>(states().size()); }
   virtual Along along() const noexcept = 0;
   virtual Course course() const noexcept = 0;
   /// Moments of z before anything is known: mean (n) and covariance (n x n).

@@ -13,7 +13,7 @@ class RHEC_EXPORT WalkPrior : public Prior {
   explicit WalkPrior(const Walk& walk) : walk_(walk) {}
 
   void set_up(const Variable& parameter) override;
-  int state_count() const noexcept override { return 1; }
+  std::span<const ProcessState> states() const noexcept override;
   Along along() const noexcept override { return walk_.along; }
   Course course() const noexcept override { return walk_.course; }
   void start(double* mean, double* covariance) const noexcept override;

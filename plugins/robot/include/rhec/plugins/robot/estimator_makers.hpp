@@ -8,14 +8,21 @@
 
 #include <Eigen/Core>
 
-#include "rhec/core/config/settings.hpp"
+#include "rhec/core/config/options.hpp"
 #include "rhec/core/estimation/estimation_method.hpp"
+#include "rhec/core/estimation/prior_bank.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/plugins/robot/blocking_section.hpp"
 #include "rhec/plugins/robot/priors_section.hpp"
 #include "rhec/plugins/robot/robot_context.hpp"
 
 namespace rhec {
+
+/// The keys of `estimator.bank`.
+struct RHEC_EXPORT BankOptions {
+  double memory = PriorBank::Setup{}.memory;
+  static const OptionTable<BankOptions>& table();
+};
 
 /// The estimator's configuration, read and checked: the input for making estimation methods.
 struct RHEC_EXPORT EstimatorParts {
@@ -28,6 +35,7 @@ struct RHEC_EXPORT EstimatorParts {
   Eigen::VectorXd initial_mean;        ///< of [x; p]
   Eigen::MatrixXd initial_covariance;  ///< of [x; p]
   PriorsSection priors;
+  BankOptions bank;
   BlockingSection blocking;
   std::function<std::shared_ptr<Solver>()> make_solver;  ///< makes the solver that the section names
 

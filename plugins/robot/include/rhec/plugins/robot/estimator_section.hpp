@@ -18,7 +18,7 @@ struct RHEC_EXPORT EstimatorOptions {
   int horizon = RheProblem::Setup{}.max_intervals;
   int substeps = RheProblem::Setup{}.substeps;
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
-  Settings arrival, process_noise, restart_sigma, block_sigma, priors, initial, robust, solver;
+  Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, initial, robust, solver;
   static OptionTable<EstimatorOptions> table(const EstimatorMakers& makers);
 };
 
