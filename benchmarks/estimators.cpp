@@ -1,12 +1,13 @@
 // Estimators beside each other on the same drives: each closed loop is driven by the estimator of a scenario, and
-// others see the same measurements. One line of JSON per drive and estimator: mean absolute errors, mean NEES, and the
-// shares of samples whose truth lies within two standard deviations.
+// others see the same measurements. One line of JSON per drive and estimator: mean absolute errors, mean NEES, the
+// shares of samples whose truth lies within two standard deviations, and the median time of a sample.
 //
 //     estimators --scenario scenarios/baseline/ekf.yaml --set speed=5 --set seed=7 --beside 'bank: estimator.name=bank'
 //
 // What stands after --beside is a name and assignments, separated by ';'. scripts/measure/estimators runs the whole
 // grid.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -31,6 +32,7 @@ struct Beside {
   std::string name;
   std::unique_ptr<Estimator> estimator;
   std::vector<Estimate> estimates = {};
+  std::vector<double> microseconds = {};  ///< of each sample, without what is prepared for the next
 };
 
 /// Passes on what the driving estimator sees.
@@ -57,7 +59,11 @@ class Forwarding final : public EstimationMethod {
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override {
     inner_->estimate(result, deadline);
     for (Beside& other : others_) {
-      other.estimates.push_back(other.estimator->estimate(time_));
+      const auto begin = std::chrono::steady_clock::now();
+      const Estimate& estimate = other.estimator->estimate(time_);
+      const std::chrono::duration<double, std::micro> taken = std::chrono::steady_clock::now() - begin;
+      other.estimates.push_back(estimate);
+      other.microseconds.push_back(taken.count());
       other.estimator->prepare();
     }
   }
@@ -170,14 +176,16 @@ void run(const Arguments& arguments) {
   sim::LoopHooks hooks;
   hooks.robot = std::make_shared<ForwardingHooks>(others);
   const sim::RunLog log = sim::run_closed_loop(driver, hooks);
-  for (const Beside& other : others) {
+  for (Beside& other : others) {
     if (other.estimates.size() != log.samples.size())
       throw Error(fmt::format("{} estimates for {} samples", other.estimates.size(), log.samples.size()));
     Errors errors(about);
     for (std::size_t i = 0; i < log.samples.size(); ++i)
       errors.add(log.samples[i], other.estimates[i].state, other.estimates[i].parameters,
                  other.estimates[i].covariance);
-    fmt::print("{{\"estimator\": \"{}\", {}}}\n", other.name, errors.json());
+    const auto middle = other.microseconds.begin() + static_cast<std::ptrdiff_t>(other.microseconds.size() / 2);
+    std::nth_element(other.microseconds.begin(), middle, other.microseconds.end());
+    fmt::print("{{\"estimator\": \"{}\", {}, \"median_us\": {:.4g}}}\n", other.name, errors.json(), *middle);
   }
 }
 
