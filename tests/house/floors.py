@@ -41,7 +41,6 @@ ios iosfwd iostream istream iterator latch limits list locale map memory memory_
 optional ostream queue random ranges ratio regex scoped_allocator semaphore set shared_mutex source_location span
 sstream stack stdexcept stop_token streambuf string string_view strstream syncstream system_error thread tuple
 type_traits typeindex typeinfo unordered_map unordered_set utility valarray variant vector version
-immintrin.h
 cassert cctype cerrno cfenv cfloat cinttypes climits clocale cmath csetjmp csignal cstdarg cstddef cstdint cstdio
 cstdlib cstring ctime cuchar cwchar cwctype
 """.split())

@@ -9,8 +9,6 @@
 #define xsimd RHEC_PACK_NAMESPACE
 #endif
 
-#include <immintrin.h>
-
 #include <utility>
 #include <xsimd/xsimd.hpp>
 
@@ -26,29 +24,15 @@ struct Pack {
   using Batch = xsimd::batch<double, Arch>;
   using Register = typename Batch::register_type;
   static constexpr int width = static_cast<int>(Batch::size);
+  using InMemory [[gnu::aligned(sizeof(double)), gnu::may_alias]] = Register;  ///< at any address of a double
   Register values;
 
   Pack() = default;
-  RHEC_INLINE Pack(Register given) : values(given) {}      // NOLINT(google-explicit-constructor)
-  RHEC_INLINE Pack(const Batch& given) : values(given) {}  // NOLINT(google-explicit-constructor)
-  RHEC_INLINE Pack(double value) {                         // NOLINT(google-explicit-constructor)
-    if constexpr (width == 8)
-      values = _mm512_set1_pd(value);
-    else
-      values = _mm256_set1_pd(value);
-  }
-  RHEC_INLINE static Pack load(const double* from) {
-    if constexpr (width == 8)
-      return _mm512_loadu_pd(from);
-    else
-      return _mm256_loadu_pd(from);
-  }
-  RHEC_INLINE void store(double* to) const {
-    if constexpr (width == 8)
-      _mm512_storeu_pd(to, values);
-    else
-      _mm256_storeu_pd(to, values);
-  }
+  RHEC_INLINE Pack(Register given) : values(given) {}             // NOLINT(google-explicit-constructor)
+  RHEC_INLINE Pack(const Batch& given) : values(given) {}         // NOLINT(google-explicit-constructor)
+  RHEC_INLINE Pack(double value) : values(value - Register{}) {}  // NOLINT(google-explicit-constructor)
+  RHEC_INLINE static Pack load(const double* from) { return *reinterpret_cast<const InMemory*>(from); }
+  RHEC_INLINE void store(double* to) const { *reinterpret_cast<InMemory*>(to) = values; }
 
   RHEC_INLINE friend Pack operator+(Pack a, Pack b) { return a.values + b.values; }
   RHEC_INLINE friend Pack operator-(Pack a, Pack b) { return a.values - b.values; }

@@ -2,8 +2,6 @@
 
 // How packs are loaded from rows and stored to them. Included by pack.hpp, under the pack's namespace.
 
-#include <immintrin.h>
-
 #include <utility>
 
 #include "rhec/core/model/lane_traits.hpp"
