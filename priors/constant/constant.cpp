@@ -5,18 +5,9 @@
 namespace rhec {
 namespace {
 
-struct ConstantOptions {
-  std::optional<double> mean, mean_sigma;
-
+struct ConstantOptions : PriorStartOptions {
   static const OptionTable<ConstantOptions>& table() {
-    static const auto options =
-        OptionTable<ConstantOptions>()
-            .optional_number("mean", &ConstantOptions::mean,
-                             "mean before anything is known; none: half way from the middle of the parameter's bounds "
-                             "to its value without slip")
-            .optional_number("mean_sigma", &ConstantOptions::mean_sigma,
-                             "standard deviation of that mean; none: a fifth of the width of the bounds",
-                             at_least(0.0));
+    static const auto options = with_start_options(OptionTable<ConstantOptions>());
     return options;
   }
 };
@@ -24,8 +15,7 @@ struct ConstantOptions {
 class ConstantPlugin final : public WalkPrior {
  public:
   using Options = ConstantOptions;
-  explicit ConstantPlugin(const Options& options)
-      : WalkPrior({{options.mean, options.mean_sigma, Along::time, Course::held}, 0.0}) {}
+  explicit ConstantPlugin(const Options& options) : WalkPrior({{options, Along::time, Course::held}, 0.0}) {}
 };
 
 }  // namespace

@@ -17,7 +17,7 @@ TEST(WalkPrior, StartsFromTheBoundsUnlessToldOtherwise) {
   open.start(&mean, &variance);
   EXPECT_DOUBLE_EQ(mean, 0.75);
   EXPECT_DOUBLE_EQ(variance, 0.04);
-  WalkPrior told({{.mean = 0.5, .mean_sigma = 0.3}, 0.1});
+  WalkPrior told({{{.mean = 0.5, .mean_sigma = 0.3}}, 0.1});
   told.set_up(slip);
   told.start(&mean, &variance);
   EXPECT_DOUBLE_EQ(mean, 0.5);

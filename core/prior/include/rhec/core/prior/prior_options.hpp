@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 
 #include "rhec/core/base/export.hpp"
 #include "rhec/core/config/options.hpp"
@@ -10,25 +11,34 @@ namespace rhec {
 
 struct Variable;
 
-/// Options common to all processes. A process' options derive from it and add it to their table (with_common_options).
-struct CommonPriorOptions {
-  std::optional<double> mean;        ///< at the start; none: half way between the middle of the bounds and `nominal`
+/// The start of a process: options common to all. Its options derive from this and add it to their table.
+struct PriorStartOptions {
+  std::optional<double> mean;        ///< none: half way between the middle of the bounds and `nominal`
   std::optional<double> mean_sigma;  ///< none: a fifth of the width of the bounds
+};
+/// The table followed by the options of PriorStartOptions.
+template <class Options>
+OptionTable<Options> with_start_options(OptionTable<Options> table) {
+  table
+      .optional_number("mean", &PriorStartOptions::mean,
+                       "mean before anything is known; none: half way from the middle of the parameter's bounds to its "
+                       "value without slip")
+      .optional_number("mean_sigma", &PriorStartOptions::mean_sigma,
+                       "standard deviation of that mean; none: a fifth of the width of the bounds", at_least(0.0));
+  return table;
+}
+
+/// The same with the options of all processes that vary.
+struct CommonPriorOptions : PriorStartOptions {
   Along along = Along::distance;
   Course course = Course::ramp;
 };
-
-/// The table followed by the options of CommonPriorOptions.
 template <class Options>
 OptionTable<Options> with_common_options(OptionTable<Options> table) {
   Along Options::*const along = &CommonPriorOptions::along;
   Course Options::*const course = &CommonPriorOptions::course;
+  table = with_start_options(std::move(table));
   table
-      .optional_number("mean", &CommonPriorOptions::mean,
-                       "mean before anything is known; none: half way from the middle of the parameter's bounds to its "
-                       "value without slip")
-      .optional_number("mean_sigma", &CommonPriorOptions::mean_sigma,
-                       "standard deviation of that mean; none: a fifth of the width of the bounds", at_least(0.0))
       .choice("along", along, {{"distance", Along::distance}, {"time", Along::time}},
               "what the parameter varies along: metres of ground covered, or seconds")
       .choice("course", course, {{"ramp", Course::ramp}, {"held", Course::held}},
