@@ -36,6 +36,9 @@ BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup 
     search.substeps = setup_.bank.substeps;
     search.heading_starts = setup_.heading_starts;
     search_ = std::make_unique<FilterEstimation>(model, std::move(search));
+    found_.state = setup_.initial_state;
+    found_.parameters = mean_.tail(np);
+    found_.covariance = covariance_;
   }
   reset();
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,6 +17,7 @@ namespace rhec {
 namespace {
 
 constexpr int lanes_at_once = 8;
+constexpr int outputs_at_once = 8;
 /// Below this probability a member's weight does not fall, so that it can come back.
 constexpr double least_weight = 1e-10;
 
@@ -113,8 +115,9 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   const std::size_t columns = nx + nu_ + 2 * np_;
   mean_.assign(n * M, 0.0);
   covariance_.assign(n * n * M, 0.0);
-  work_.assign((2 * n * n + 4 * n) * M, 0.0);
-  for (auto* v : {&weights_, &keep_, &take_, &squares_, &determinants_}) v->assign(M, 0.0);
+  work_.assign((2 * n * n + 3 * n) * M, 0.0);
+  for (auto* v : {&weights_, &keep_, &take_, &squares_}) v->assign(M, 0.0);
+  innovation_variances_.assign(ny_ * M, 0.0);
   next_.assign(nx * M, 0.0);
   jacobian_.assign(nx * columns * M, 0.0);
   predicted_.assign(ny_ * M, 0.0);
@@ -180,7 +183,8 @@ void PriorBank::write_start(const Process& process, const Prior& prior, int lane
   }
 }
 
-void PriorBank::reset(const Eigen::VectorXd& state, const Eigen::MatrixXd& covariance) noexcept {
+void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
+                      const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept {
   std::fill(mean_.begin(), mean_.end(), 0.0);
   std::fill(covariance_.begin(), covariance_.end(), 0.0);
   std::fill(weights_.begin(), weights_.end(), 0.0);
@@ -209,7 +213,6 @@ void PriorBank::update(const double* y) noexcept {
   }
   const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
   std::fill(squares_.begin(), squares_.end(), 0.0);
-  std::fill(determinants_.begin(), determinants_.end(), 1.0);
   int taken = 0;
   for (int j = 0; j < ny_; ++j) {
     if (std::isnan(y[j])) continue;
@@ -220,11 +223,20 @@ void PriorBank::update(const double* y) noexcept {
                                 .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
   }
   if (taken == 0) return;
-  bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(), determinants_.data());
+  bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
+                        innovation_variances_.data());
   if (members_ == 1) return;
   double best = -std::numeric_limits<double>::infinity();
   for (int m = 0; m < members_; ++m) {
-    squares_[m] = -0.5 * (squares_[m] + std::log(determinants_[m]));
+    // One logarithm for several outputs; the product of many would leave the range of a double.
+    double logarithms = 0.0;
+    for (int first = 0; first < taken; first += outputs_at_once) {
+      double product = 1.0;
+      for (int j = first; j < std::min(first + outputs_at_once, taken); ++j)
+        product *= innovation_variances_[j * lanes_ + m];
+      logarithms += std::log(product);
+    }
+    squares_[m] = -0.5 * (squares_[m] + logarithms);
     if (squares_[m] > best) best = squares_[m];
   }
   double sum = 0.0;
@@ -235,6 +247,8 @@ void PriorBank::update(const double* y) noexcept {
   }
   for (int m = 0; m < members_; ++m)
     weights_[m] = sum > 0.0 ? std::max(weights_[m] / sum, least_weight) : 1.0 / members_;
+  sum = std::accumulate(weights_.begin(), weights_.begin() + members_, 0.0);
+  for (int m = 0; m < members_; ++m) weights_[m] /= sum;
 }
 
 /// Ground covered on an interval, from the vehicle's motion at the mixture's mean.
@@ -246,10 +260,6 @@ void PriorBank::find_distance(const double* input, double duration) noexcept {
     for (int r = 0; r < nx_; ++r) states_[r] += weights_[m] * mean_[r * lanes_ + m];
     for (int j = 0; j < np_; ++j) parameters_[j] += weights_[m] * mean_[processes_[j].first * lanes_ + m];
   }
-  double sum = 0.0;
-  for (int m = 0; m < members_; ++m) sum += weights_[m];
-  for (int r = 0; r < nx_; ++r) states_[r] /= sum;
-  for (int j = 0; j < np_; ++j) parameters_[j] /= sum;
   const double least = setup_.least_speed * duration;
   distance_ = least;
   if (roles.position_x < 0 || roles.position_y < 0) return;
@@ -289,11 +299,7 @@ void PriorBank::advance_processes(double duration) noexcept {
 void PriorBank::mix_members() noexcept {
   const double change = -std::expm1(-distance_ / setup_.memory), each = change / members_;
   if (!(change > 0.0)) return;
-  double sum = 0.0;
-  for (int m = 0; m < members_; ++m) sum += weights_[m];
   for (int m = 0; m < lanes_; ++m) {
-    const bool is_member = m < members_;
-    weights_[m] = is_member ? weights_[m] / sum : 0.0;
     const double next = (1.0 - change) * weights_[m] + each;
     take_[m] = each / next;
     keep_[m] = 1.0 - take_[m];
@@ -358,9 +364,6 @@ void PriorBank::take_step(const double* input, double duration) noexcept {
 }
 
 void PriorBank::moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept {
-  double sum = 0.0;
-  for (int m = 0; m < members_; ++m) sum += weights_[m];
-  for (int m = 0; m < members_; ++m) weights_[m] /= sum;
   const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
   bank_kernels().moments(view, weights_.data(), full_mean_.data(), full_covariance_.data());
   const auto at = [&](int k) { return k < nx_ ? k : processes_[k - nx_].first; };

@@ -194,7 +194,7 @@ void predict(const BankView& bank, const BankStep& step) {
 }
 
 void update(const BankView& bank, const BankOutput* outputs, int count, double gate, double* squares,
-            double* determinants) {
+            double* variances) {
   const int n = bank.states, nx = bank.vehicle_states, M = bank.members;
   for (int m = 0; m < M; m += lane_count) {
     const Entries mean(bank.mean, M, m), P(bank.covariance, M, m), next(bank.work, M, m);
@@ -251,7 +251,7 @@ void update(const BankView& bank, const BankOutput* outputs, int count, double g
       for (int r = 0; r < n; ++r) correction.add(r, is_finite ? gain[r] * innovation : Lanes{});
       const Lanes square = is_finite ? smaller(innovation * innovation / total, all(gate)) : all(gate);
       store(load(squares + m) + square, squares + m);
-      store(load(determinants + m) * (is_finite ? total : all(1.0)), determinants + m);
+      store(is_finite ? total : all(1.0), variances + static_cast<long>(j) * M + m);
     }
     for (int r = 0; r < n; ++r) mean.add(r, correction[r]);
   }

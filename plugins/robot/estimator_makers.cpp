@@ -13,6 +13,13 @@
 namespace rhec {
 namespace {
 
+std::vector<double> variances_of(const std::vector<double>& sigmas) {
+  std::vector<double> variances;
+  variances.reserve(sigmas.size());
+  for (const double sigma : sigmas) variances.push_back(sigma * sigma);
+  return variances;
+}
+
 std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& parts) {
   RecedingHorizonEstimation::Setup setup;
   setup.problem = parts.problem();
@@ -28,8 +35,8 @@ std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& pa
 std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts) {
   const RobotContext& context = *parts.context;
   FilterEstimation::Setup setup;
-  for (const double sigma : context.noise.output_sigmas) setup.noise.output_variances.push_back(sigma * sigma);
-  for (const double sigma : context.noise.input_sigmas) setup.noise.input_variances.push_back(sigma * sigma);
+  setup.noise.output_variances = variances_of(context.noise.output_sigmas);
+  setup.noise.input_variances = variances_of(context.noise.input_sigmas);
   setup.noise.parameter_lower = lower_bounds_of(context.about.parameters);
   setup.noise.parameter_upper = upper_bounds_of(context.about.parameters);
   for (const ParameterWalk& walk : parts.walks) setup.walk.push_back(walk.process_noise);
@@ -44,8 +51,8 @@ std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
   const RobotContext& context = *parts.context;
   BankEstimation::Setup setup;
   setup.bank.members = parts.priors.combinations();
-  for (const double sigma : context.noise.output_sigmas) setup.bank.output_variances.push_back(sigma * sigma);
-  for (const double sigma : context.noise.input_sigmas) setup.bank.input_variances.push_back(sigma * sigma);
+  setup.bank.output_variances = variances_of(context.noise.output_sigmas);
+  setup.bank.input_variances = variances_of(context.noise.input_sigmas);
   setup.bank.substeps = parts.substeps;
   setup.bank.memory = parts.bank.memory;
   setup.parameter_lower = lower_bounds_of(context.about.parameters);
@@ -62,9 +69,8 @@ std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
 const OptionTable<BankOptions>& BankOptions::table() {
   static const auto rows =
       OptionTable<BankOptions>().number("memory", &BankOptions::memory,
-                                        "ground after which another combination of priors may hold: of each metre, 1 / "
-                                        "memory of all probability is dealt "
-                                        "out anew [m]",
+                                        "ground after which another combination of priors may hold: over each metre, "
+                                        "1 / memory of all probability is dealt out anew [m]",
                                         greater_than(0.0));
   return rows;
 }

@@ -37,7 +37,8 @@ PriorsSection::PriorsSection(std::shared_ptr<const RobotContext> context, const 
 
 std::vector<OptionRow> PriorsSection::rows() {
   OptionRow row = of_parameter.row(
-      "how the parameter varies along the way: a prior with its options beside the name, a list of priors that are "
+      "of bank: how the parameter varies along the way, and its start. A prior with its options beside the name, a "
+      "list of priors that are "
       "weighed against each other, or auto: a set that serves for slip of any kind");
   row.name = "PARAMETER";
   row.type = "prior, or list of priors";

@@ -8,6 +8,7 @@
 
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/control/controller.hpp"
+#include "rhec/core/estimation/bank_estimation.hpp"
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
@@ -27,6 +28,7 @@ const Host& host() {
 
 struct Options {
   bool filter = false;
+  bool bank = false;  ///< of filters
   ArrivalKind arrival = ArrivalKind::ekf;
   const char* blocking = "{size: 5, overlap: 3}";
   const char* solver = "{mode: rti}";
@@ -47,6 +49,20 @@ std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& mode
   if (options.heading_starts > 1) {
     setup.heading_starts = options.heading_starts;
     setup.initial_covariance(2, 2) = 10.0;
+  }
+  if (options.bank) {
+    BankEstimation::Setup bank;
+    ModelDescription about = model->description();
+    for (Variable& parameter : about.parameters) parameter.lower = 0.0, parameter.upper = 1.0;
+    bank.bank.members = standard_bank(about);
+    bank.bank.output_variances = {0.0009, 0.0009, 0.0003};
+    bank.bank.input_variances = {0.01, 0.01};
+    bank.parameter_lower = {0.0, 0.0};
+    bank.parameter_upper = {1.0, 1.0};
+    bank.initial_state = setup.initial_mean.head(4);
+    bank.initial_covariance = setup.initial_covariance.topLeftCorner(4, 4);
+    bank.heading_starts = setup.heading_starts;
+    return std::make_unique<BankEstimation>(model, bank);
   }
   if (!options.filter)
     return std::make_unique<RecedingHorizonEstimation>(
@@ -132,9 +148,12 @@ TEST(EstimationAllocation, NoneInTheClosedLoop) {
 
 TEST(EstimationAllocation, NoneInTheClosedLoopOfAFilter) { EXPECT_EQ(allocations_in_the_loop({.filter = true}), 0); }
 
+TEST(EstimationAllocation, NoneInTheClosedLoopOfABank) { EXPECT_EQ(allocations_in_the_loop({.bank = true}), 0); }
+
 TEST(EstimationAllocation, NoneWhereTheHeadingIsSearchedFor) {
   EXPECT_EQ(allocations_in_the_loop({.heading_starts = 8}), 0);
   EXPECT_EQ(allocations_in_the_loop({.filter = true, .heading_starts = 8}), 0);
+  EXPECT_EQ(allocations_in_the_loop({.bank = true, .heading_starts = 8}), 0);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ struct RandomBank {
     }
     mean.assign(static_cast<std::size_t>(n) * members, 0.0);
     covariance.assign(static_cast<std::size_t>(n) * n * members, 0.0);
-    work.assign(static_cast<std::size_t>(2 * n * n + 4 * n) * members, 0.0);
+    work.assign(static_cast<std::size_t>(2 * n * n + 3 * n) * members, 0.0);
     for (int m = 0; m < members; ++m) {
       means.push_back(matrix(random, n, 1));
       const Eigen::MatrixXd root = matrix(random, n, n + 1);
@@ -132,8 +132,9 @@ TEST_P(BankKernelsTest, UpdateAsTheTextbookDoes) {
     const int count = random.integer(1, 4), n = bank.n;
     std::vector<AlignedDoubles> predicted(count), gradients(count);
     std::vector<BankOutput> outputs;
-    AlignedDoubles squares(bank.members, 0.5), determinants(bank.members, 2.0), expected_squares = squares,
-                                                                                expected_determinants = determinants;
+    AlignedDoubles squares(bank.members, 0.5), expected_squares = squares,
+                                               variances(static_cast<std::size_t>(count) * bank.members),
+                                               expected_variances = variances;
     std::vector<Eigen::VectorXd> corrections(bank.members, Eigen::VectorXd::Zero(n));
     for (int j = 0; j < count; ++j) {
       predicted[j].assign(bank.members, 0.0);
@@ -155,16 +156,16 @@ TEST_P(BankKernelsTest, UpdateAsTheTextbookDoes) {
         corrections[m] += gain * innovation;
         bank.covariances[m] -= Eigen::MatrixXd(gain * S * gain.transpose());
         expected_squares[m] += std::min(innovation * innovation / S, 1.5);
-        expected_determinants[m] *= S;
+        expected_variances[j * bank.members + m] = S;
       }
     }
     for (int m = 0; m < bank.members; ++m) bank.means[m] += corrections[m];
-    set.bank->update(bank.view(), outputs.data(), count, 1.5, squares.data(), determinants.data());
+    set.bank->update(bank.view(), outputs.data(), count, 1.5, squares.data(), variances.data());
     bank.expect_equal(set.instruction_set);
     for (int m = 0; m < bank.members; ++m) {
       EXPECT_NEAR(squares[m], expected_squares[m], 1e-11);
-      EXPECT_NEAR(determinants[m] / expected_determinants[m], 1.0, 1e-12);
     }
+    for (std::size_t k = 0; k < variances.size(); ++k) EXPECT_NEAR(variances[k] / expected_variances[k], 1.0, 1e-12);
   }
 }
 
@@ -207,13 +208,14 @@ TEST(BankKernels, LeaveAMemberAsItWasWhereNoNumberComesOut) {
     RandomQp random(11);
     RandomBank bank(random);
     AlignedDoubles predicted(bank.members, 0.0), gradient(static_cast<std::size_t>(bank.nx) * bank.members, 1.0),
-        squares(bank.members, 0.0), determinants(bank.members, 1.0);
+        squares(bank.members, 0.0), variances(bank.members, 0.0);
     predicted[3] = std::nan("");
     const BankOutput output{predicted.data(), gradient.data(), 0.5, 0.1, 0.0};
-    set.bank->update(bank.view(), &output, 1, 16.0, squares.data(), determinants.data());
+    set.bank->update(bank.view(), &output, 1, 16.0, squares.data(), variances.data());
     EXPECT_EQ(largest(bank.taken(bank.mean, 3, bank.n, 1) - bank.means[3]), 0.0);
     EXPECT_EQ(largest(bank.taken(bank.covariance, 3, bank.n, bank.n) - bank.covariances[3]), 0.0);
     EXPECT_EQ(squares[3], 16.0) << "as if it were an outlier";
+    EXPECT_EQ(variances[3], 1.0);
     for (int m = 0; m < bank.members; ++m) {
       EXPECT_TRUE(bank.taken(bank.mean, m, bank.n, 1).allFinite());
       if (m == 3) continue;

@@ -36,7 +36,8 @@ class RHEC_EXPORT PriorBank {
   ~PriorBank();
 
   /// Starts all members at a vehicle state (n_x) and its covariance, and their processes at their own starts.
-  void reset(const Eigen::VectorXd& state, const Eigen::MatrixXd& covariance) noexcept;
+  void reset(const Eigen::Ref<const Eigen::VectorXd>& state,
+             const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
   /// Measurement update with y (n_y, NaN where missing).
   void update(const double* y) noexcept;
   /// Time update by `duration` [s] with a measured input (n_u, NaN where missing: 0, with a standard deviation of a
@@ -77,7 +78,7 @@ class RHEC_EXPORT PriorBank {
   int members_, lanes_, nx_, nu_, np_, ny_, n_ = 0;
   std::vector<Process> processes_;
   AlignedDoubles mean_, covariance_, work_, weights_, keep_, take_, next_, jacobian_, predicted_, gradient_, squares_,
-      determinants_;
+      innovation_variances_;
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;

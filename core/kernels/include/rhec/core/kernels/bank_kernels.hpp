@@ -11,7 +11,7 @@ struct BankView {
   int members;
   int vehicle_states, states;  ///< n_x, and the size n of [x; z]
   double *mean, *covariance;   ///< n, n x n
-  double* work;                ///< room for 2 n^2 + 4 n entries
+  double* work;                ///< room for 2 n^2 + 3 n entries
 };
 
 /// One process of every member: entries first .. first + count - 1 of [x; z].
@@ -43,10 +43,10 @@ struct BankKernels {
   /// Time update. A member whose result is not finite keeps what it has.
   void (*predict)(const BankView& bank, const BankStep& step);
   /// Measurement update with one output after the other, all linearised at the same point (Joseph's form). Adds
-  /// min(r^2 / S, gate) to `squares` and multiplies `determinants` by S. A member whose result is not finite keeps what
-  /// it has.
+  /// min(r^2 / S, gate) to `squares` and writes S to `variances` (count entries). A member whose result is not finite
+  /// keeps what it has; its S is 1.
   void (*update)(const BankView& bank, const BankOutput* outputs, int count, double gate, double* squares,
-                 double* determinants);
+                 double* variances);
   /// Mean (n) and covariance (n x n) of the mixture.
   void (*moments)(const BankView& bank, const double* weights, double* mean, double* covariance);
 };
