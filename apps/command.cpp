@@ -62,10 +62,9 @@ CLI::Option* one_value_each_time(CLI::Option* option) {
 Argument Command::add_list(const std::string& name, std::vector<std::string>& values, const std::string& meaning) {
   return Argument(one_value_each_time(app_->add_option(name, values, meaning)));
 }
-Argument Command::add_list(const std::string& name, std::function<void(const std::vector<std::string>&)> take,
+Argument Command::add_list(const std::string& name, const std::function<void(const std::vector<std::string>&)>& take,
                            const std::string& meaning) {
-  return Argument(
-      one_value_each_time(app_->add_option_function<std::vector<std::string>>(name, std::move(take), meaning)));
+  return Argument(one_value_each_time(app_->add_option_function<std::vector<std::string>>(name, take, meaning)));
 }
 void Command::add_flag(const std::string& name, bool& variable, const std::string& meaning) {
   app_->add_flag(name, variable, meaning);

@@ -49,7 +49,7 @@ class Command {
   /// An option that may be given several times, with one value each time.
   Argument add_list(const std::string& name, std::vector<std::string>& values, const std::string& meaning);
   /// The same; `take` is called with all of them, and throws Error for a wrong one.
-  Argument add_list(const std::string& name, std::function<void(const std::vector<std::string>&)> take,
+  Argument add_list(const std::string& name, const std::function<void(const std::vector<std::string>&)>& take,
                     const std::string& meaning);
   void add_flag(const std::string& name, bool& variable, const std::string& meaning);
 

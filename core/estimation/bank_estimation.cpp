@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,7 +12,7 @@
 namespace rhec {
 
 BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup setup)
-    : setup_(std::move(setup)), bank_(model, setup_.bank) {
+    : setup_(std::move(setup)), history_(PriorBank(model, setup_.bank), setup_.remembered_nodes) {
   const Eigen::Index nx = model->state_count(), np = model->parameter_count();
   if (setup_.initial_state.size() != nx || setup_.initial_covariance.rows() != nx ||
       setup_.initial_covariance.cols() != nx)
@@ -40,18 +41,20 @@ BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup 
     found_.parameters = mean_.tail(np);
     found_.covariance = covariance_;
   }
+  nothing_.assign(model->output_count(), std::numeric_limits<double>::quiet_NaN());
   reset();
 }
 
 void BankEstimation::reset() noexcept {
-  bank_.reset(setup_.initial_state, setup_.initial_covariance);
+  history_.bank().reset(setup_.initial_state, setup_.initial_covariance);
   if (search_) search_->reset();
   searching_ = search_ != nullptr;
+  searched_ = 0;
 }
 
 void BankEstimation::start(const double* outputs) noexcept {
   reset();
-  if (!searching_) return bank_.update(outputs);
+  if (!searching_) return history_.start(outputs);
   search_->start(outputs);
   start_bank_if_found();
 }
@@ -61,33 +64,33 @@ void BankEstimation::start_bank_if_found() noexcept {
   if (search_->is_searching()) return;
   search_->estimate(found_, Clock::time_point::max());
   const Eigen::Index nx = setup_.initial_state.size();
-  bank_.reset(found_.state, found_.covariance.topLeftCorner(nx, nx));
+  history_.bank().reset(found_.state, found_.covariance.topLeftCorner(nx, nx));
+  history_.start(nothing_.data(), searched_);
   searching_ = false;
 }
 
 void BankEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
   if (searching_) {
     search_->add_node(duration, inputs, outputs);
+    if (duration > 0.0 && std::isfinite(duration)) ++searched_;
     return start_bank_if_found();
   }
-  if (duration > 0.0 && std::isfinite(duration)) bank_.predict(inputs, duration);
-  bank_.update(outputs);
+  if (duration > 0.0 && std::isfinite(duration))
+    history_.add(duration, inputs, outputs);
+  else
+    history_.amend(0, outputs);
 }
 
 bool BankEstimation::amend(int back, const double* outputs) noexcept {
-  if (back != 0) return false;  // a filter cannot use measurements of older nodes
-  if (searching_) {
-    search_->amend(back, outputs);
-    start_bank_if_found();
-  } else {
-    bank_.update(outputs);
-  }
+  if (!searching_) return history_.amend(back, outputs);
+  if (!search_->amend(back, outputs)) return false;
+  start_bank_if_found();
   return true;
 }
 
 void BankEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   if (searching_) return search_->estimate(result, deadline);
-  bank_.moments(mean_, covariance_);
+  history_.bank().moments(mean_, covariance_);
   const Eigen::Index nx = setup_.initial_state.size(), np = mean_.size() - nx;
   result.state = mean_.head(nx);
   result.parameters = mean_.tail(np);

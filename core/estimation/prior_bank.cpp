@@ -92,6 +92,8 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
       throw Error(fmt::format("bank: a member has {} priors; expected {}, one a parameter", member.size(), np_));
   if (static_cast<int>(setup_.output_variances.size()) != ny_ || static_cast<int>(setup_.input_variances.size()) != nu_)
     throw Error("bank: expected one variance for every output and every input");
+  if (!setup_.initial_parameters.empty() && static_cast<int>(setup_.initial_parameters.size()) != np_)
+    throw Error("bank: expected initial knowledge of every parameter, or of none");
   n_ = nx_;
   for (int j = 0; j < np_; ++j) {
     Process process;
@@ -118,6 +120,8 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   work_.assign((2 * n * n + 3 * n) * M, 0.0);
   for (auto* v : {&weights_, &keep_, &take_, &squares_}) v->assign(M, 0.0);
   innovation_variances_.assign(ny_ * M, 0.0);
+  for (const double variance : setup_.output_variances) output_variances_.insert(output_variances_.end(), M, variance);
+  if (!setup_.robust.empty()) surprises_.assign(ny_ * M, 0.0);
   next_.assign(nx * M, 0.0);
   jacobian_.assign(nx * columns * M, 0.0);
   predicted_.assign(ny_ * M, 0.0);
@@ -135,6 +139,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   variances_.assign(nu_, 0.0);
   for (auto* v : {&start_, &own_, &own_covariance_, &filled_, &filled_covariance_})
     v->assign(std::size_t{Prior::max_states} * Prior::max_states, 0.0);
+  is_own_.assign(n_, 0);
   full_mean_ = Eigen::VectorXd::Zero(n_);
   full_covariance_ = Eigen::MatrixXd::Zero(n_, n_);
   views_ = std::make_unique<Views>();
@@ -170,8 +175,20 @@ void PriorBank::find_places(Process& process) const {
   }
 }
 
-void PriorBank::write_start(const Process& process, const Prior& prior, int lane) noexcept {
+void PriorBank::write_start(int parameter, const Prior& prior, int lane) noexcept {
+  const Process& process = processes_[parameter];
   prior.start(own_.data(), own_covariance_.data());
+  if (!setup_.initial_parameters.empty()) {
+    const Setup::Knowledge& known = setup_.initial_parameters[parameter];
+    const int n = prior.state_count();
+    double* const P = own_covariance_.data();
+    std::copy_n(P, n, start_.data());  // the column of the value
+    const double total = P[0] + known.variance, innovation = known.mean - own_[0];
+    for (int c = 0; c < n && total > 0.0; ++c) {
+      own_[c] += start_[c] / total * innovation;
+      for (int r = 0; r < n; ++r) P[c * n + r] -= start_[r] * start_[c] / total;
+    }
+  }
   const Filling filling{prior, process.place, process.filler, process.count};
   filling.vector(own_.data(), start_.data());
   filling.covariance(own_covariance_.data(), filled_covariance_.data());
@@ -194,7 +211,7 @@ void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
     for (int r = 0; r < nx_; ++r) mean_[r * lanes_ + m] = state[r];
     for (int c = 0; c < nx_; ++c)
       for (int r = 0; r < nx_; ++r) covariance_[(c * n_ + r) * lanes_ + m] = covariance(r, c);
-    for (int j = 0; j < np_; ++j) write_start(processes_[j], *setup_.members[member][j], m);
+    for (int j = 0; j < np_; ++j) write_start(j, *setup_.members[member][j], m);
   }
   for (int m = 0; m < members_; ++m) weights_[m] = 1.0 / members_;
   distance_ = 0.0;
@@ -218,11 +235,12 @@ void PriorBank::update(const double* y) noexcept {
     if (std::isnan(y[j])) continue;
     views_->outputs[taken++] = {.predicted = predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
                                 .gradient = gradient_.data() + static_cast<std::ptrdiff_t>(j) * nx_ * lanes_,
+                                .variance = output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
                                 .measured = y[j],
-                                .variance = setup_.output_variances[j],
                                 .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
   }
   if (taken == 0) return;
+  if (!setup_.robust.empty()) weigh_outputs(y, taken);
   bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                         innovation_variances_.data());
   if (members_ == 1) return;
@@ -249,6 +267,28 @@ void PriorBank::update(const double* y) noexcept {
     weights_[m] = sum > 0.0 ? std::max(weights_[m] / sum, least_weight) : 1.0 / members_;
   sum = std::accumulate(weights_.begin(), weights_.begin() + members_, 0.0);
   for (int m = 0; m < members_; ++m) weights_[m] /= sum;
+}
+
+/// Pseudo-Huber losses of the innovations, as weights of the outputs: s = sum of r^2 / S over a group, and the loss
+/// 2 delta^2 (sqrt(1 + s / delta^2) - 1) has the slope 1 / sqrt(1 + s / delta^2).
+void PriorBank::weigh_outputs(const double* y, int taken) noexcept {
+  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
+  for (int j = 0; j < ny_; ++j)
+    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, setup_.output_variances[j]);
+  bank_kernels().surprise(view, views_->outputs.data(), taken, surprises_.data());
+  const auto place = [&](int output) {
+    return std::count_if(y, y + output, [](double each) { return !std::isnan(each); });
+  };
+  for (const RobustLoss& loss : setup_.robust) {
+    for (int m = 0; m < lanes_; ++m) {
+      double s = 0.0;
+      for (const int output : loss.outputs)
+        if (!std::isnan(y[output])) s += surprises_[place(output) * lanes_ + m];
+      const double inverse_weight = std::sqrt(1.0 + s / (loss.delta * loss.delta));
+      for (const int output : loss.outputs)
+        output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + m] *= inverse_weight;
+    }
+  }
 }
 
 /// Ground covered on an interval, from the vehicle's motion at the mixture's mean.
@@ -372,6 +412,75 @@ void PriorBank::moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noex
   for (int c = 0; c < nx_ + np_; ++c) {
     mean[c] = full_mean_[at(c)];
     for (int r = 0; r < nx_ + np_; ++r) covariance(r, c) = full_covariance_(at(r), at(c));
+  }
+}
+
+void PriorBank::save(double* state) const noexcept {
+  state = std::copy(mean_.begin(), mean_.end(), state);
+  state = std::copy(covariance_.begin(), covariance_.end(), state);
+  std::copy(weights_.begin(), weights_.end(), state);
+}
+
+void PriorBank::restore(const double* state) noexcept {
+  const auto take = [&](AlignedDoubles& to) {
+    std::copy_n(state, to.size(), to.begin());
+    state += to.size();
+  };
+  take(mean_);
+  take(covariance_);
+  take(weights_);
+}
+
+/// Where the states of a member's own prior are among those of its process.
+int PriorBank::own_places(int member, int parameter, int* places) const noexcept {
+  const auto states = setup_.members[member][parameter]->states();
+  for (std::size_t k = 0; k < states.size(); ++k)
+    places[k] = processes_[parameter].place[static_cast<std::size_t>(states[k])];
+  return static_cast<int>(states.size());
+}
+
+void PriorBank::saved_moments(const double* state, int member, Eigen::VectorXd& mean,
+                              Eigen::MatrixXd& covariance) noexcept {
+  const double* const P = state + mean_.size();
+  mean.setZero();
+  covariance.setIdentity();
+  std::fill(is_own_.begin(), is_own_.end(), std::uint8_t{0});
+  std::fill_n(is_own_.begin(), nx_, std::uint8_t{1});
+  std::array<int, Prior::max_states> places{};
+  for (int j = 0; j < np_; ++j) {
+    const int count = own_places(member, j, places.data());
+    for (int k = 0; k < count; ++k) is_own_[processes_[j].first + places[k]] = 1;
+  }
+  for (int c = 0; c < n_; ++c) {
+    if (!is_own_[c]) continue;
+    mean[c] = state[static_cast<std::ptrdiff_t>(c) * lanes_ + member];
+    for (int r = 0; r < n_; ++r)
+      if (is_own_[r]) covariance(r, c) = P[(static_cast<std::ptrdiff_t>(c) * n_ + r) * lanes_ + member];
+  }
+}
+
+void PriorBank::write_process(int member, int parameter, double duration, double distance, double* data) noexcept {
+  const Prior& prior = *setup_.members[member][parameter];
+  const int count = processes_[parameter].count;
+  std::array<int, Prior::max_states> places{};
+  const int own = own_places(member, parameter, places.data());
+  prior.advance(prior.along() == Along::time ? duration : distance, own_.data(), own_covariance_.data());
+  double *F = data + 1, *L = F + count * count;
+  std::fill_n(data, 1 + 2 * count * count, 0.0);
+  data[0] = prior.course() == Course::ramp ? 1.0 : 0.0;
+  // The Cholesky factor of a covariance that may be singular: what no pivot is left for is determined by those before.
+  for (int c = 0; c < own; ++c) {
+    const auto at = [&](int r, int k) -> double& { return L[places[k] * count + places[r]]; };
+    double pivot = own_covariance_[c * own + c];
+    for (int k = 0; k < c; ++k) pivot -= at(c, k) * at(c, k);
+    const bool has_pivot = pivot > std::numeric_limits<double>::epsilon() * own_covariance_[c * own + c];
+    const double root = has_pivot ? std::sqrt(pivot) : 0.0;
+    for (int r = c; r < own && has_pivot; ++r) {
+      double entry = own_covariance_[c * own + r];
+      for (int k = 0; k < c; ++k) entry -= at(r, k) * at(c, k);
+      at(r, c) = entry / root;
+    }
+    for (int r = 0; r < own; ++r) F[places[c] * count + places[r]] = own_[c * own + r];
   }
 }
 

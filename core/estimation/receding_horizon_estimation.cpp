@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "block_structure.hpp"
+#include "node_covariance.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/measurement.hpp"
@@ -53,9 +54,7 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
       point_(problem_.capacity()),
       trial_(problem_.capacity()),
       best_(problem_.capacity()),
-      covariance_qp_(problem_.capacity()),
-      covariance_riccati_(problem_.capacity()),
-      no_active_bounds_(problem_.capacity()) {
+      covariance_(std::make_unique<NodeCovariance>(problem_)) {
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
     throw Error("estimator: the solver cannot take this problem: " + reason);
   solver_->setup(problem_);
@@ -68,11 +67,11 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
   scratch_.assign(problem_.scratch_size(), 0.0);
   inputs_.assign(problem_.model().input_count(), 0.0);
   outputs_.assign(problem_.model().output_count(), 0.0);
-  const auto states = static_cast<std::size_t>(problem_.capacity().states);
-  covariances_.assign((intervals + 1) * states * states, 0.0);
   last_state_ = setup_.initial_mean;
   reset();
 }
+
+RecedingHorizonEstimation::~RecedingHorizonEstimation() = default;
 
 void RecedingHorizonEstimation::reset() noexcept {
   arrival_.reset(setup_.initial_mean, setup_.initial_covariance);
@@ -263,6 +262,16 @@ void RecedingHorizonEstimation::prepare() noexcept {
   prepared_ = true;
 }
 
+bool RecedingHorizonEstimation::arrival(double* mean, double* sigma) const noexcept {
+  const bool is_known = arrival_.kind() != ArrivalKind::off;
+  for (Eigen::Index j = 0; j < arrival_.mean().size(); ++j) {
+    mean[j] = arrival_.mean()[j];
+    sigma[j] =
+        is_known ? std::sqrt(std::max(0.0, arrival_.covariance()(j, j))) : std::numeric_limits<double>::infinity();
+  }
+  return is_known;
+}
+
 /// Solves from headings around the circle, each rolled out; keeps the best objective.
 void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexcept {
   double best_objective = std::numeric_limits<double>::infinity();
@@ -314,7 +323,7 @@ void RecedingHorizonEstimation::reconsider(Report& report, Clock::time_point dea
     point_ = best_;
     report.status = Status::iteration_limit;
     report.objective = prior;
-    report.kkt = kkt_residual(problem_, point_, covariance_qp_, scratch_);
+    report.kkt = kkt_residual(problem_, point_, covariance_->qp(), scratch_);
   }
   report.iterations = iterations;
 }
@@ -359,17 +368,9 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
 /// Covariance of the state of a node and the parameters before it. If it is not finite, the last one is kept.
 void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noexcept {
   const int n = static_cast<int>(last_state_.size()), ns = problem_.capacity().states;
-  const bool is_last = node == window_.intervals;
-  double* of_node = covariances_.data() + (is_last ? 0 : static_cast<std::ptrdiff_t>(node) * ns * ns);
-  if (!is_last || !solver_->covariances(point_, {node, node}, covariances_)) {
-    problem_.linearise(all_stages(problem_), point_, Hessian::gauss_newton, covariance_qp_, scratch_);
-    covariance_riccati_.factor_for_covariances(covariance_qp_, no_active_bounds_);
-    covariance_riccati_.covariances(covariance_qp_, is_last ? nullptr : covariances_.data(),
-                                    is_last ? of_node : nullptr);
-  }
-  if (!std::all_of(of_node, of_node + ns * ns, [](double value) { return std::isfinite(value); })) return;
-  result.covariance =
-      Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(of_node, n, n, Eigen::OuterStride<>(ns));
+  if (const double* found = covariance_->find(problem_, *solver_, point_, node))
+    result.covariance =
+        Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(found, n, n, Eigen::OuterStride<>(ns));
 }
 
 }  // namespace rhec

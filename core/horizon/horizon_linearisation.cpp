@@ -25,12 +25,13 @@ HorizonLinearisation::HorizonLinearisation(const HorizonProblem& problem) : Line
   costates_.assign((nodes + 1) * qp_.stride(), 0.0);
   curvature_behind_.assign(static_cast<std::size_t>(capacity.states + capacity.controls) * qp_.stride(), 0.0);
   durations_.assign(nodes, 0.0);
+  data_.assign(nodes * problem.model().data_count(), 0.0);
   starts_.assign(nodes * structure.lifted_count(), 0);
   for (auto* marks : {&same_, &same_costate_}) marks->assign(nodes, 0);
 }
 
 IntervalDynamics HorizonLinearisation::dynamics() const noexcept {
-  return {*problem_.model_, problem_.structure_, problem_.durations_.data(), problem_.substeps_};
+  return {*problem_.model_, problem_.structure_, problem_.durations_.data(), problem_.data_.data(), problem_.substeps_};
 }
 
 double* HorizonLinearisation::row(AlignedDoubles& rows, int stage) const noexcept {
@@ -100,7 +101,7 @@ void HorizonLinearisation::linearise_stages(const Iterate& iterate, Hessian hess
   forget();
   remember(iterate, 0);
   has_curvature_ = hessian == Hessian::exact && problem_.keeps_curvature() && N > 0;
-  const IntervalDynamics::Extension extension{rows_.data(), costates_.data(), durations_.data(),
+  const IntervalDynamics::Extension extension{rows_.data(), costates_.data(), durations_.data(), data_.data(),
                                               curvature_behind_.data()};
   if (has_curvature_) {
     extend_horizon();
@@ -118,6 +119,7 @@ void HorizonLinearisation::remember(const Iterate& iterate, int first) noexcept 
   if (problem_.keeps_curvature())
     std::copy_n(iterate.costate(0), static_cast<std::ptrdiff_t>(N + 1) * qp_.stride(), costates_.data());
   std::copy_n(problem_.durations_.data(), N, durations_.data());
+  std::copy_n(problem_.data_.data(), problem_.at_data(N), data_.data());
   std::copy_n(problem_.structure_.block_starts(0), static_cast<std::ptrdiff_t>(N) * problem_.structure_.lifted_count(),
               starts_.data());
 }
@@ -128,6 +130,8 @@ void HorizonLinearisation::extend_horizon() noexcept {
   std::copy_n(row(rows_, N - 1) + states, qp_.capacity().controls, row(rows_, N) + states);
   std::copy_n(row(costates_, N), qp_.stride(), row(costates_, N + 1));
   durations_[N] = durations_[N - 1];
+  const auto data_count = problem_.at_data(1);
+  std::copy_n(data_.data() + (N - 1) * data_count, data_count, data_.data() + N * data_count);
   std::fill_n(starts(N), lifted, std::uint8_t{0});
   is_extended_ = true;
 }
@@ -156,13 +160,22 @@ int HorizonLinearisation::match(const Iterate& iterate, int steps, bool is_exact
   return count;
 }
 
+/// Whether intervals from `interval` on have the durations and data of the cached ones `steps` later.
+bool HorizonLinearisation::has_same_data(int interval, int steps, int count) const noexcept {
+  const auto first = problem_.at_data(interval), cached = problem_.at_data(interval + steps);
+  return std::equal(problem_.durations_.data() + interval, problem_.durations_.data() + interval + count,
+                    durations_.data() + interval + steps) &&
+         std::equal(problem_.data_.data() + first, problem_.data_.data() + first + problem_.at_data(count),
+                    data_.data() + cached);
+}
+
 bool HorizonLinearisation::is_known(int interval, int steps, int count, bool is_exact) const noexcept {
   if (interval >= count || same_[interval] != 2) return false;
   // For the interval behind the horizon, the next state is not cached.
   const bool is_behind = interval == known_intervals_ - steps;
   if (!is_behind && same_[interval + 1] == 0) return false;
   if (is_exact && same_costate_[interval] == 0) return false;
-  if (problem_.durations_[interval] != durations_[interval + steps]) return false;
+  if (!has_same_data(interval, steps, 1)) return false;
   const int lifted = problem_.structure_.lifted_count();
   const std::uint8_t* known = starts_.data() + static_cast<std::ptrdiff_t>(interval + steps) * lifted;
   return std::memcmp(problem_.structure_.block_starts(interval), known, lifted) == 0;
@@ -176,9 +189,7 @@ bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) n
   const int N = structure.intervals();
   if (known_intervals_ < 0 || (is_exact && !has_curvature_) || !structure.is_direct() || structure.any_ramp())
     return false;
-  if (!is_exact && !problem_.has_late_bounds() && is_at(iterate) &&
-      std::equal(durations_.begin(), durations_.begin() + N, problem_.durations_.begin()))
-    return true;  // unchanged
+  if (!is_exact && !problem_.has_late_bounds() && is_at(iterate) && has_same_data(0, 0, N)) return true;  // unchanged
 
   const int steps = find_steps(iterate), end = known_intervals_ - steps, count = match(iterate, steps, is_exact);
   std::array<int, most_unknown> unknown;

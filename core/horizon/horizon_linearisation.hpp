@@ -54,6 +54,7 @@ class HorizonLinearisation : public Linearisation {
   bool has_lifted_rows() const noexcept;
   void remember(const Iterate& iterate, int first) noexcept;
   void extend_horizon() noexcept;
+  bool has_same_data(int interval, int steps, int count) const noexcept;
   bool is_known(int interval, int steps, int count, bool is_exact) const noexcept;
   int find_steps(const Iterate& iterate) const noexcept;
   int match(const Iterate& iterate, int steps, bool is_exact) noexcept;
@@ -63,13 +64,13 @@ class HorizonLinearisation : public Linearisation {
   void take_simulated(int interval, const Iterate& iterate) noexcept;
 
   const HorizonProblem& problem_;
-  int known_intervals_ = -1;          ///< of the QP; -1: the cache is empty
-  bool is_extended_ = false;          ///< the interval behind the horizon is cached: in AB, b and `curvature_behind_`
-  bool has_curvature_ = false;        ///< H holds all costs and the curvature of the dynamics at `costates_`
-  AlignedDoubles rows_, costates_;    ///< of the iterate at which the QP was made
-  AlignedDoubles curvature_behind_;   ///< H of the interval behind the horizon
-  std::vector<double> durations_;     ///< of the intervals
-  std::vector<std::uint8_t> starts_;  ///< of each interval's lifted variables
+  int known_intervals_ = -1;         ///< of the QP; -1: the cache is empty
+  bool is_extended_ = false;         ///< the interval behind the horizon is cached: in AB, b and `curvature_behind_`
+  bool has_curvature_ = false;       ///< H holds all costs and the curvature of the dynamics at `costates_`
+  AlignedDoubles rows_, costates_;   ///< of the iterate at which the QP was made
+  AlignedDoubles curvature_behind_;  ///< H of the interval behind the horizon
+  std::vector<double> durations_, data_;  ///< of the intervals
+  std::vector<std::uint8_t> starts_;      ///< of each interval's lifted variables
   /// Per node: 2 if the whole row matches, 1 if the state does; per interval, the same for costates.
   std::vector<std::uint8_t> same_, same_costate_;
 };

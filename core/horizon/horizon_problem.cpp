@@ -34,6 +34,7 @@ HorizonProblem::HorizonProblem(std::shared_ptr<const Model> model, const Setup& 
   if (substeps_ < 1) throw Error("substeps: expected at least 1 integration step per interval");
   const auto nodes = static_cast<std::size_t>(structure_.capacity().intervals) + 1;
   durations_.assign(nodes, 0.0);
+  data_.assign(nodes * model_->data_count(), 0.0);
   lower_.assign(nodes * stride(), -infinity);
   upper_.assign(nodes * stride(), infinity);
   const int row = IntervalDynamics::row_length(structure_);
@@ -50,6 +51,7 @@ void HorizonProblem::clear_bounds() noexcept {
 void HorizonProblem::take_horizon(const HorizonProblem& from) noexcept {
   structure_ = from.structure_;
   durations_ = from.durations_;
+  data_ = from.data_;
   lower_ = from.lower_;
   upper_ = from.upper_;
 }
@@ -78,7 +80,8 @@ double HorizonProblem::evaluate_stages(const Iterate& iterate, double* defects, 
                                        std::span<double> scratch) const noexcept {
   assert_ready(*this, iterate, scratch);
   if (defects)
-    IntervalDynamics{*model_, structure_, durations_.data(), substeps_}.write_defects(iterate, defects, scratch.data());
+    IntervalDynamics{*model_, structure_, durations_.data(), data_.data(), substeps_}.write_defects(iterate, defects,
+                                                                                                    scratch.data());
   if (stage_costs) std::fill_n(stage_costs, intervals() + 1, 0.0);
   return cost(iterate, stage_costs, scratch);
 }
@@ -86,7 +89,8 @@ double HorizonProblem::evaluate_stages(const Iterate& iterate, double* defects, 
 void HorizonProblem::simulate_interval(int interval, Iterate& iterate, std::span<double> scratch) const noexcept {
   assert_ready(*this, iterate, scratch);
   RHEC_ASSERT(interval >= 0 && interval < intervals(), "an interval of the horizon");
-  IntervalDynamics{*model_, structure_, durations_.data(), substeps_}.simulate(interval, iterate, scratch.data());
+  IntervalDynamics{*model_, structure_, durations_.data(), data_.data(), substeps_}.simulate(interval, iterate,
+                                                                                             scratch.data());
 }
 
 double HorizonProblem::linearise(StageRange range, const Iterate& iterate, Hessian hessian, StageQp& qp,
@@ -94,7 +98,7 @@ double HorizonProblem::linearise(StageRange range, const Iterate& iterate, Hessi
   assert_ready(*this, iterate, scratch);
   RHEC_ASSERT(range.first >= 0 && range.first <= range.last && range.last <= intervals(), "stages of the horizon");
   RHEC_ASSERT(qp.capacity() == capacity(), "a QP of the problem's capacity");
-  const IntervalDynamics dynamics{*model_, structure_, durations_.data(), substeps_};
+  const IntervalDynamics dynamics{*model_, structure_, durations_.data(), data_.data(), substeps_};
   dynamics.write_sizes(range, initial_state() != nullptr, qp);
   const StageRange steps{range.first, std::min(range.last, intervals() - 1)};
   if (steps.last >= steps.first) dynamics.linearise(steps, iterate, {.hessian = hessian}, qp, scratch.data());
@@ -141,20 +145,22 @@ bool HorizonProblem::keeps_curvature() const noexcept {
 
 void HorizonProblem::simulate_new_interval(int interval, Iterate& iterate, std::span<double> scratch) noexcept {
   const int row = IntervalDynamics::row_length(structure_);
-  const IntervalDynamics dynamics{*model_, structure_, durations_.data(), substeps_};
+  const IntervalDynamics dynamics{*model_, structure_, durations_.data(), data_.data(), substeps_};
   if (keeps_curvature()) {
     // A linearisation that keeps curvature has already evaluated the interval behind its horizon.
     dynamics.simulate(interval, iterate, scratch.data());
     return;
   }
   dynamics.gather_rows(iterate, {interval, interval}, simulated_.z.data());
-  // With a ramp, derivatives are with respect to both its ends, which a linearisation cannot reuse.
-  simulated_.duration = structure_.any_ramp() ? 0.0 : durations_[interval];
+  // With a ramp, derivatives are with respect to both its ends, which a linearisation cannot reuse; data may change.
+  const bool is_reusable = !structure_.any_ramp() && model_->data_count() == 0;
+  simulated_.duration = is_reusable ? durations_[interval] : 0.0;
   model_->integrate_rows({.count = 1,
                           .z = simulated_.z.data(),
                           .z_step = row,
                           .ramp = structure_.any_ramp(),
                           .durations = &durations_[interval],
+                          .data = interval_data(interval),
                           .substeps = substeps_,
                           .next_states = simulated_.next.data(),
                           .next_step = row,

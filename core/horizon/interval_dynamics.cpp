@@ -72,6 +72,7 @@ void IntervalDynamics::write_defects(const Iterate& iterate, double* defects, do
                      .parameters = rows.p,
                      .parameters_end = structure.any_ramp() ? rows.p_end : nullptr,
                      .durations = durations + first,
+                     .data = data_of(first),
                      .substeps = substeps,
                      .next_states = rows.next});
     const double* next = rows.next;
@@ -95,6 +96,7 @@ void IntervalDynamics::simulate(int interval, Iterate& iterate, double* scratch)
                    .parameters = rows.p,
                    .parameters_end = structure.any_ramp() ? rows.p_end : nullptr,
                    .durations = durations + interval,
+                   .data = data_of(interval),
                    .substeps = substeps,
                    .next_states = iterate.state(interval + 1)});
   structure.carry_lifted(interval, iterate);
@@ -148,10 +150,12 @@ void IntervalDynamics::linearise(StageRange range, const Iterate& iterate, const
   const bool in_place = structure.is_direct() && !structure.any_ramp();
   const bool is_exact = options.hessian == Hessian::exact;
   const Extension* extension = options.extension;
-  const double *inputs = z, *seconds = durations + range.first, *costates = iterate.costate(range.first + 1);
+  const double *inputs = z, *seconds = durations + range.first, *known = data_of(range.first),
+               *costates = iterate.costate(range.first + 1);
   if (extension) {
     inputs = extension->rows + static_cast<std::ptrdiff_t>(range.first) * stride;
     seconds = extension->durations;
+    known = extension->data;
     costates = extension->costates + stride;
   } else if (in_place && !structure.any_start()) {
     inputs = iterate.row(range.first);
@@ -164,6 +168,7 @@ void IntervalDynamics::linearise(StageRange range, const Iterate& iterate, const
                         .z_step = inputs == z ? row : stride,
                         .ramp = structure.any_ramp(),
                         .durations = seconds,
+                        .data = known,
                         .substeps = substeps,
                         .next_states = qp.b(range.first),
                         .next_step = stride,

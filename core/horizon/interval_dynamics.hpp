@@ -16,6 +16,7 @@ struct IntervalDynamics {
   const Model& model;
   const HorizonStructure& structure;
   const double* durations;  ///< of all intervals [s]
+  const double* data;       ///< of all intervals, n_d each
   int substeps;
 
   /// Length of a row [x; p; u (; p at the end)] as the model takes it.
@@ -35,7 +36,7 @@ struct IntervalDynamics {
   /// One more interval, for a range that reaches the end of the horizon.
   struct Extension {
     const double *rows, *costates;  ///< of all stages and the one behind
-    const double* durations;
+    const double *durations, *data;
     double* curvature;  ///< Hessian of the interval behind
   };
   struct Options {
@@ -54,6 +55,9 @@ struct IntervalDynamics {
   void gather_rows(const Iterate& iterate, StageRange range, double* rows) const noexcept;
 
  private:
+  const double* data_of(int interval) const noexcept {
+    return data + static_cast<std::ptrdiff_t>(interval) * model.data_count();
+  }
   void gather(const Iterate& iterate, StageRange range, double* x, double* u, double* p, double* p_end) const noexcept;
   void scatter(int interval, const double* jacobian, const double* hessian, StageQp& qp) const noexcept;
 };

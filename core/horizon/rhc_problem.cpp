@@ -142,6 +142,7 @@ int RhcProblem::relax_unreachable_bounds(std::span<double> scratch) noexcept {
                        .inputs = u,
                        .parameters = given_parameters(),
                        .durations = &seconds,
+                       .data = interval_data(interval),
                        .substeps = substeps(),
                        .next_states = next});
     std::copy_n(next, n, state);

@@ -162,7 +162,11 @@ void RheProblem::take_data(const RheProblem& from) noexcept {
 }
 
 void RheProblem::drop_first_interval() noexcept {
-  for (int i = 0; i + 1 < intervals(); ++i) set_duration(i, duration(i + 1));
+  const auto data_count = static_cast<std::size_t>(model().data_count());
+  for (int i = 0; i + 1 < intervals(); ++i) {
+    set_duration(i, duration(i + 1));
+    std::copy_n(interval_data(i + 1), data_count, interval_data(i));
+  }
   std::copy(outputs_.begin() + output_row_, outputs_.end(), outputs_.begin());
   std::copy(measured_inputs_.begin() + stride(), measured_inputs_.end(), measured_inputs_.begin());
 }

@@ -193,6 +193,36 @@ void predict(const BankView& bank, const BankStep& step) {
   }
 }
 
+/// Measured minus predicted; of an angle, to the nearest multiple of the period.
+inline Lanes innovation_of(const BankOutput& output, int m) {
+  Lanes innovation = output.measured - load(output.predicted + m);
+  if (output.period > 0.0) {
+    // Adding and subtracting 1.5 2^52 rounds to an integer.
+    constexpr double to_integer = 6755399441055744.0;
+    const Lanes turns = innovation * (1.0 / output.period);
+    innovation -= ((turns + to_integer) - to_integer) * output.period;
+  }
+  return innovation;
+}
+
+void surprise(const BankView& bank, const BankOutput* outputs, int count, double* squares) {
+  const int n = bank.states, nx = bank.vehicle_states, M = bank.members;
+  for (int m = 0; m < M; m += lane_count) {
+    const Entries P(bank.covariance, M, m);
+    for (int j = 0; j < count; ++j) {
+      const ConstEntries h(outputs[j].gradient, M, m);
+      const Lanes innovation = innovation_of(outputs[j], m);
+      Lanes total = load(outputs[j].variance + m);
+      for (int c = 0; c < nx; ++c) {
+        Lanes sum{};
+        for (int r = 0; r < nx; ++r) sum += P[static_cast<long>(c) * n + r] * h[r];
+        total += sum * h[c];
+      }
+      store(innovation * innovation / total, squares + static_cast<long>(j) * M + m);
+    }
+  }
+}
+
 void update(const BankView& bank, const BankOutput* outputs, int count, double gate, double* squares,
             double* variances) {
   const int n = bank.states, nx = bank.vehicle_states, M = bank.members;
@@ -205,14 +235,9 @@ void update(const BankView& bank, const BankOutput* outputs, int count, double g
     for (int j = 0; j < count; ++j) {
       const BankOutput& output = outputs[j];
       const ConstEntries h(output.gradient, M, m);
-      Lanes innovation = output.measured - load(output.predicted + m);
-      if (output.period > 0.0) {
-        // To the nearest multiple of the period: adding and subtracting 1.5 2^52 rounds to an integer.
-        constexpr double to_integer = 6755399441055744.0;
-        const Lanes turns = innovation * (1.0 / output.period);
-        innovation -= ((turns + to_integer) - to_integer) * output.period;
-      }
-      Lanes total = all(output.variance);
+      Lanes innovation = innovation_of(output, m);
+      const Lanes variance = load(output.variance + m);
+      Lanes total = variance;
       for (int r = 0; r < n; ++r) {
         Lanes sum{};
         for (int c = 0; c < nx; ++c) sum += P[static_cast<long>(c) * n + r] * h[c];
@@ -232,7 +257,7 @@ void update(const BankView& bank, const BankOutput* outputs, int count, double g
       for (int r = 0; r < n; ++r) {
         Lanes sum{};
         for (int c = 0; c < nx; ++c) sum += next[static_cast<long>(c) * n + r] * h[c];
-        image.set(r, output.variance * gain[r] - sum);
+        image.set(r, variance * gain[r] - sum);
       }
       Lanes zeros = 0.0 * innovation;
       for (int c = 0; c < n; ++c) {
@@ -264,6 +289,6 @@ void update(const BankView& bank, const BankOutput* outputs, int count, double g
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const BankKernels RHEC_TABLE(bank_kernels_, RHEC_SET);
 constinit const BankKernels RHEC_TABLE(bank_kernels_, RHEC_SET) = {&kernels::mix, &kernels::predict, &kernels::update,
-                                                                   &kernels::moments};
+                                                                   &kernels::surprise, &kernels::moments};
 
 }  // namespace rhec

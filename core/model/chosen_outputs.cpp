@@ -30,6 +30,7 @@ class ChosenOutputs final : public Model {
   }
 
   const ModelDescription& description() const noexcept override { return description_; }
+  int data_count() const noexcept override { return model_->data_count(); }
   void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
   void integrate_rows(const IntervalRows& request) const noexcept override { model_->integrate_rows(request); }
   void observe_rows(const NodeRows& request) const noexcept override {

@@ -71,6 +71,7 @@ void Model::integrate_rows(const IntervalRows& q) const noexcept {
   request.parameters = p;
   request.parameters_end = q.ramp ? p_end : nullptr;
   request.durations = q.durations;
+  request.data = q.data;
   request.substeps = q.substeps;
   request.next_states = q.next_states ? next : nullptr;
   request.jacobians = q.jacobians ? jacobians : nullptr;

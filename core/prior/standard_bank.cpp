@@ -1,5 +1,7 @@
 #include "rhec/core/prior/standard_bank.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <utility>
 
@@ -15,57 +17,68 @@ namespace {
 
 /// A law, in fractions of the width of the bounds.
 struct Law {
-  int states;             ///< 1: random walk; 2, 3: Matern 3/2 and 5/2
-  double rate_or_length;  ///< per square root of a metre; [m]
+  enum class Kind { walk, jumps, matern_3_2, matern_5_2 } kind;
+  double rate_or_length;  ///< of a walk per square root of a metre; else [m]
+  double sigma = 0.15;    ///< standard deviation about the mean
 };
-constexpr double share = 0.15;  ///< standard deviation about the mean
+constexpr auto walk = Law::Kind::walk, jumps = Law::Kind::jumps, smooth = Law::Kind::matern_3_2,
+               smoother = Law::Kind::matern_5_2;
 
 using Laws = std::vector<Law>;
 
 /// From the one that serves alone to a set that serves for slip of any kind: what `standard_bank` can afford is taken.
-/// For fields of 2 to 40 m, patches and constant slip.
+/// For fields of 2 to 40 m, patches and constant slip. Each set has a law that jumps, whose covariance grows at once:
+/// without it the estimate is too certain on patches.
 Laws laws(int count) {
   switch (count) {
     case 1:
-      return {{2, 10.0}};
+      return {{smooth, 10.0}};
     case 2:
-      return {{1, 0.004}, {2, 12.0}};
+      return {{walk, 0.004}, {jumps, 8.0}};
     case 3:
-      return {{1, 0.004}, {2, 6.0}, {2, 24.0}};
+      return {{walk, 0.003}, {jumps, 4.0, 0.158}, {smooth, 24.0}};
     case 4:
-      return {{1, 0.002}, {1, 0.025}, {2, 8.0}, {3, 40.0}};
+      return {{walk, 0.002}, {walk, 0.02}, {jumps, 6.0}, {smooth, 12.0}};
     case 5:
-    case 6:  // one less than the richest, which nothing but a full bank asks for
-      return {{1, 0.002}, {1, 0.025}, {2, 8.0}, {3, 14.0}, {3, 40.0}};
+      return {{walk, 0.002}, {walk, 0.02}, {jumps, 6.0}, {smooth, 8.0}, {smoother, 40.0}};
+    case 6:
+      return {{walk, 0.002}, {walk, 0.02}, {jumps, 6.0}, {smooth, 8.0}, {smoother, 14.0}, {smoother, 40.0}};
+    case 7:
+      return {{walk, 0.002}, {walk, 0.01},     {walk, 0.025},   {jumps, 6.0},
+              {smooth, 8.0}, {smoother, 14.0}, {smoother, 40.0}};
     default:
-      return {{1, 0.002}, {1, 0.01}, {1, 0.025}, {1, 0.06}, {2, 8.0}, {3, 14.0}, {3, 40.0}};
+      return {{walk, 0.002},      {walk, 0.01},  {walk, 0.025},    {jumps, 6.0},
+              {jumps, 20.0, 0.2}, {smooth, 8.0}, {smoother, 14.0}, {smoother, 40.0}};
   }
 }
+constexpr int most_laws = 8, usual_laws = 3;
 
 std::shared_ptr<const Prior> make(const Law& law, const Variable& parameter) {
   const double width = ParameterRange(parameter).width;
   std::shared_ptr<Prior> prior;
-  if (law.states == 1) {
-    WalkPrior::Walk walk;
-    walk.rate = law.rate_or_length * width;
-    prior = std::make_shared<WalkPrior>(walk);
+  if (law.kind == walk) {
+    WalkPrior::Walk with_rate;
+    with_rate.rate = law.rate_or_length * width;
+    prior = std::make_shared<WalkPrior>(with_rate);
   } else {
     MaternPrior::Law matern;
-    matern.states = law.states;
+    matern.states = law.kind == jumps ? 1 : law.kind == smooth ? 2 : 3;
     matern.length = law.rate_or_length;
-    matern.sigma = share * width;
+    matern.sigma = law.sigma * width;
+    // A level keeps its value until it changes.
+    if (law.kind == jumps) matern.course = Course::held;
     prior = std::make_shared<MaternPrior>(matern);
   }
   prior->set_up(parameter);
   return prior;
 }
 
-/// How many laws each parameter has: as many as are given, else seven and three if that is affordable, else fewer. The
-/// speed factor, the richest, gives way last.
+/// How many laws each parameter has: as many as are given, else eight for the richest and three for each other if that
+/// is affordable, else fewer: the one with most gives way, the richest last among equals.
 std::vector<int> counts(const std::vector<PriorCombination>& given, std::size_t richest) {
   std::vector<int> count;
   for (std::size_t j = 0; j < given.size(); ++j)
-    count.push_back(!given[j].empty() ? static_cast<int>(given[j].size()) : j == richest ? 7 : 3);
+    count.push_back(!given[j].empty() ? static_cast<int>(given[j].size()) : j == richest ? most_laws : usual_laws);
   const auto members = [&] {
     double product = 1.0;
     for (const int each : count) product *= each;
@@ -73,8 +86,11 @@ std::vector<int> counts(const std::vector<PriorCombination>& given, std::size_t 
   };
   while (members() > most_bank_members) {
     std::size_t largest = count.size();
-    for (std::size_t j = 0; j < count.size(); ++j)
-      if (given[j].empty() && count[j] > 1 && (largest == count.size() || count[j] > count[largest])) largest = j;
+    for (std::size_t j = 0; j < count.size(); ++j) {
+      if (!given[j].empty() || count[j] == 1) continue;
+      const bool is_first = largest == count.size();
+      if (is_first || count[j] > count[largest] || (count[j] == count[largest] && largest == richest)) largest = j;
+    }
     if (largest == count.size())
       throw Error(fmt::format("the priors given make {} combinations; a bank has {} members at most. Give fewer",
                               members(), most_bank_members));
@@ -83,11 +99,50 @@ std::vector<int> counts(const std::vector<PriorCombination>& given, std::size_t 
   return count;
 }
 
+/// Product of two elements of the field of four, as polynomials modulo x^2 + x + 1.
+unsigned product_in_field_of_four(unsigned a, unsigned b) {
+  unsigned product = (b & 1U ? a : 0U) ^ (b & 2U ? a << 1U : 0U);
+  if (product & 4U) product ^= 7U;
+  return product;
+}
+
+constexpr std::size_t most_with_four_laws = 5, most_with_two_laws = 15;
+
+/// Which of its laws each parameter has in a run of an orthogonal array of strength 2: every pair of laws of any two
+/// parameters comes equally often, in far fewer runs than all combinations (Hedayat, Sloane and Stufken 1999).
+unsigned law_in_run(unsigned run, std::size_t parameter, std::size_t parameters) {
+  if (parameters <= most_with_four_laws) {
+    const unsigned a = run % 4U, b = run / 4U;
+    return parameter == 0 ? b : a ^ product_in_field_of_four(static_cast<unsigned>(parameter - 1), b);
+  }
+  unsigned bits = run & static_cast<unsigned>(parameter + 1), parity = 0;
+  for (; bits != 0; bits >>= 1U) parity ^= bits & 1U;
+  return parity;
+}
+
+/// For three parameters and more, where combinations would leave room for two or three laws each.
+std::vector<PriorCombination> orthogonal_bank(const ModelDescription& about) {
+  const std::size_t parameters = about.parameters.size();
+  std::vector<PriorCombination> choices;
+  for (const Variable& parameter : about.parameters) {
+    choices.emplace_back();
+    for (const Law& law : laws(parameters <= most_with_four_laws ? 4 : 2))
+      choices.back().push_back(make(law, parameter));
+  }
+  const std::size_t runs = parameters <= most_with_four_laws ? 16 : std::bit_ceil(parameters + 1);
+  std::vector<PriorCombination> members(runs);
+  for (unsigned run = 0; run < runs; ++run)
+    for (std::size_t j = 0; j < parameters; ++j) members[run].push_back(choices[j][law_in_run(run, j, parameters)]);
+  return members;
+}
+
 }  // namespace
 
 std::vector<PriorCombination> standard_bank(const ModelDescription& about, const std::vector<PriorCombination>& given) {
   std::vector<PriorCombination> choices = given;
   choices.resize(about.parameters.size());
+  const bool all_open = std::all_of(choices.begin(), choices.end(), [](const auto& each) { return each.empty(); });
+  if (all_open && choices.size() > 2 && choices.size() <= most_with_two_laws) return orthogonal_bank(about);
   const std::size_t richest = about.roles.speed_factor >= 0 ? static_cast<std::size_t>(about.roles.speed_factor) : 0;
   const std::vector<int> count = counts(choices, richest);
   std::vector<PriorCombination> members(1);

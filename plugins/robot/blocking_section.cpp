@@ -19,7 +19,10 @@ BlockingSection::BlockingSection(std::shared_ptr<const RobotContext> context, co
 }
 
 OptionSection BlockingSection::documentation() {
-  return {"blocking", "Which intervals of the estimator share one value of a parameter.", {row()}};
+  return {"blocking",
+          "Which intervals of the estimator share one value of a parameter. Without this section, a window's "
+          "parameters follow `estimator.priors`.",
+          {row()}};
 }
 
 OptionRow BlockingSection::row(const std::string& otherwise) {

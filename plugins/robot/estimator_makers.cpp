@@ -8,6 +8,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/bank_estimation.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/core/estimation/prior_horizon_estimation.hpp"
 #include "rhec/plugins/robot/bounds_section.hpp"
 
 namespace rhec {
@@ -20,7 +21,16 @@ std::vector<double> variances_of(const std::vector<double>& sigmas) {
   return variances;
 }
 
+BankEstimation::Setup bank_setup(const EstimatorParts& parts);
+
 std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& parts) {
+  if (!parts.blocking.is_given())
+    return std::make_unique<PriorHorizonEstimation>(
+        parts.context->model, parts.make_solver(),
+        PriorHorizonEstimation::Setup{.filters = bank_setup(parts), .problem = parts.problem()});
+  if (parts.priors.is_given())
+    throw parts.priors.section().error(
+        "a window has either blocks or priors; take out the section 'blocking', or estimator.priors");
   RecedingHorizonEstimation::Setup setup;
   setup.problem = parts.problem();
   setup.arrival = parts.arrival;
@@ -47,7 +57,7 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
   return std::make_unique<FilterEstimation>(context.model, std::move(setup));
 }
 
-std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
+BankEstimation::Setup bank_setup(const EstimatorParts& parts) {
   const RobotContext& context = *parts.context;
   BankEstimation::Setup setup;
   setup.bank.members = parts.priors.combinations();
@@ -55,13 +65,20 @@ std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
   setup.bank.input_variances = variances_of(context.noise.input_sigmas);
   setup.bank.substeps = parts.substeps;
   setup.bank.memory = parts.bank.memory;
+  setup.bank.robust = parts.robust;
+  setup.bank.initial_parameters = parts.initial_parameters;
   setup.parameter_lower = lower_bounds_of(context.about.parameters);
   setup.parameter_upper = upper_bounds_of(context.about.parameters);
   const int nx = context.model->state_count();
   setup.initial_state = parts.initial_mean.head(nx);
   setup.initial_covariance = parts.initial_covariance.topLeftCorner(nx, nx);
   setup.heading_starts = parts.heading_starts;
-  return std::make_unique<BankEstimation>(context.model, std::move(setup));
+  setup.remembered_nodes = parts.horizon + 1;
+  return setup;
+}
+
+std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
+  return std::make_unique<BankEstimation>(parts.context->model, bank_setup(parts));
 }
 
 }  // namespace

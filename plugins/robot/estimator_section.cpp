@@ -146,6 +146,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
              .walks = {},
              .initial_mean = {},
              .initial_covariance = {},
+             .initial_parameters = {},
              .priors = PriorsSection(parts_.context, options_.priors),
              .bank = BankOptions::table().parse(options_.bank, "estimator: bank"),
              .blocking = std::move(blocking),
@@ -167,6 +168,14 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
   parts_.initial_mean = Eigen::Map<const Eigen::VectorXd>(mean.data(), size);
   parts_.initial_covariance.setZero(size, size);
   for (Eigen::Index j = 0; j < size; ++j) parts_.initial_covariance(j, j) = sigma[j] * sigma[j];
+  // A bank's priors have starts of their own; what the section says of a parameter's start is added to them.
+  const std::size_t nx = about.states.size();
+  for (std::size_t j = 0; j < about.parameters.size(); ++j) {
+    const bool is_given = initial.parameters.find(about.parameters[j].name) != nullptr;
+    parts_.initial_parameters.push_back(is_given
+                                            ? PriorBank::Setup::Knowledge{mean[nx + j], sigma[nx + j] * sigma[nx + j]}
+                                            : PriorBank::Setup::Knowledge{});
+  }
   parts_.make_solver = [host = parts_.context->host, named = options_.solver] {
     return default_solver.make(host, named);
   };

@@ -89,9 +89,18 @@ Json settings_of(const Robot& robot, bool has_controller) {
   Json& list = json["blocking"] = Json::array();
   for (int j = 0; j < robot.model()->parameter_count(); ++j) {
     Json blocking = {{"parameter", robot.model()->description().parameters[j].name}};
-    blocking.update(json_of(robot.blocking_choice(j)));
-    blocking["is_one_block"] = blockings[j]->is_one_block();
-    blocking["transition"] = blockings[j]->transition() == Transition::ramp ? "ramp" : "step";
+    if (robot.has_blockings()) {
+      blocking.update(json_of(robot.blocking_choice(j)));
+      blocking["is_one_block"] = blockings[j]->is_one_block();
+      blocking["transition"] = blockings[j]->transition() == Transition::ramp ? "ramp" : "step";
+    } else {
+      const std::string priors = robot.priors_text(j);
+      blocking.update({{"name", "prior"},
+                       {"options", Json::object()},
+                       {"text", "a value at each node, prior " + priors},
+                       {"is_one_block", false},
+                       {"transition", "ramp"}});
+    }
     list.push_back(std::move(blocking));
   }
   json["solvers"]["rhe"] = json_of(robot.solver_choice("rhe"));

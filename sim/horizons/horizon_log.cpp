@@ -118,7 +118,7 @@ struct HorizonLog::Parts {
 
   std::int64_t nodes() const { return std::ssize(times); }
 
-  void note_nodes(const RecedingHorizonEstimation& method, double time) {
+  void note_nodes(const WindowedEstimation& method, double time) {
     const RheProblem& problem = method.problem();
     const Window& window = method.window();
     const int nu = model->input_count(), ny = model->output_count();
@@ -163,8 +163,16 @@ struct HorizonLog::Parts {
     return view;
   }
 
+  static BlocksInView every_interval(const Window& window) {
+    BlocksInView view;
+    for (int i = 0; i < window.intervals; ++i) view.starts.push_back(window.first + i);
+    view.first_start = window.first;
+    view.next_start = window.first + window.intervals;
+    return view;
+  }
+
   /// Non-finite numbers if a window is not observable.
-  void find_covariances(const RecedingHorizonEstimation& method) {
+  void find_covariances(const WindowedEstimation& method) {
     const RheProblem& problem = method.problem();
     const Capacity capacity = problem.capacity();
     if (scratch.empty()) {
@@ -185,7 +193,7 @@ struct HorizonLog::Parts {
     return variance >= 0.0 ? std::sqrt(variance) : std::numeric_limits<double>::quiet_NaN();
   }
 
-  void write_window(const RecedingHorizonEstimation& method, const Estimate& estimate, Line& line) {
+  void write_window(const WindowedEstimation& method, const Estimate& estimate, Line& line) {
     const RheProblem& problem = method.problem();
     const Iterate& point = method.solution();
     const Window& window = method.window();
@@ -201,19 +209,24 @@ struct HorizonLog::Parts {
     line.open('[');
     for (int j = 0; j < nx; ++j) line.column(N + 1, state_decimals[j], [&](int i) { return point.state(i)[j]; });
     line.close(']');
-    row.resize(static_cast<std::size_t>(N) * std::max(nu, np));
+    const int decided = problem.model().input_count();
+    row.resize(static_cast<std::size_t>(N) * std::max(decided, np));
     line.key("input");
     line.open('[');
     for (int i = 0; i < N; ++i)
-      problem.structure().inputs_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * nu);
-    for (int j = 0; j < nu; ++j) line.column(N, input_decimals[j], [&](int i) { return row[i * nu + j]; });
+      problem.structure().inputs_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * decided);
+    for (int j = 0; j < nu; ++j) line.column(N, input_decimals[j], [&](int i) { return row[i * decided + j]; });
     line.close(']');
     line.key("blocks");
     line.open('[');
-    for (int i = 0; i < N; ++i)
+    const std::vector<int>& among_states = problem.model().description().parameter_states;
+    for (int i = 0; i < N && among_states.empty(); ++i)
       problem.structure().parameters_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * np);
     for (int j = 0; j < np && N > 0; ++j) {
-      const BlocksInView view = blocks_of(problem, window, j);
+      const int entry = among_states.empty() ? nx + j : among_states[j];
+      // A parameter that is a state has a value at every node: that at the end of an interval.
+      for (int i = 0; i < N && !among_states.empty(); ++i) row[i * np + j] = point.state(i + 1)[entry];
+      const BlocksInView view = among_states.empty() ? blocks_of(problem, window, j) : every_interval(window);
       const int count = static_cast<int>(view.starts.size());
       const auto interval = [&](int block) { return static_cast<int>(view.starts[block] - window.first); };
       line.open('{');
@@ -222,7 +235,7 @@ struct HorizonLog::Parts {
       line.key("values");
       line.column(count, parameter_decimals[j], [&](int b) { return row[interval(b) * np + j]; });
       line.key("sigmas");
-      line.column(count, parameter_decimals[j] + 1, [&](int b) { return sigma(interval(b) + 1, nx + j, ns); });
+      line.column(count, parameter_decimals[j] + 1, [&](int b) { return sigma(interval(b) + 1, entry, ns); });
       line.key("first_start");
       line.integer(view.first_start);
       line.key("next_start");
@@ -236,24 +249,32 @@ struct HorizonLog::Parts {
       line.close('}');
     }
     line.close(']');
-    const ArrivalCost& arrival = method.arrival();
+    row.resize(2 * static_cast<std::size_t>(nx + np));
+    const bool has_arrival = method.arrival(row.data(), row.data() + nx + np);
     const auto decimals = [&](int j) { return j < nx ? state_decimals[j] : parameter_decimals[j - nx]; };
     line.key("arrival");
     line.open('{');
     line.key("mean");
     line.open('[');
-    for (int j = 0; j < nx + np; ++j) line.number(arrival.mean()[j], decimals(j));
+    for (int j = 0; j < nx + np; ++j) line.number(row[j], decimals(j));
     line.close(']');
     line.key("sigma");
-    if (arrival.kind() == ArrivalKind::off) {
+    if (!has_arrival) {
       line.null();
     } else {
       line.open('[');
-      for (int j = 0; j < nx + np; ++j)
-        line.number(std::sqrt(std::max(0.0, arrival.covariance()(j, j))), decimals(j) + 1);
+      for (int j = 0; j < nx + np; ++j) line.number(row[nx + np + j], decimals(j) + 1);
       line.close(']');
     }
     line.close('}');
+    if (!among_states.empty()) {
+      // What was given out: the mixture of all laws, not the window of one.
+      line.key("estimate");
+      line.open('[');
+      for (int j = 0; j < nx; ++j) line.number(estimate.state[j], state_decimals[j]);
+      for (int j = 0; j < np; ++j) line.number(estimate.parameters[j], parameter_decimals[j]);
+      line.close(']');
+    }
     line.key("status");
     line.word(name_of(estimate.report.status));
     line.key("fallback");
@@ -329,7 +350,8 @@ const std::string& HorizonLog::records() const noexcept { return parts_->records
 
 void HorizonLog::take(const LoopSample& sample) {
   Parts& parts = *parts_;
-  const auto* window = dynamic_cast<const RecedingHorizonEstimation*>(&sample.estimator->method());
+  const auto* window = dynamic_cast<const WindowedEstimation*>(&sample.estimator->method());
+  if (window && !window->has_window()) window = nullptr;
   if (window) {
     parts.note_nodes(*window, sample.time);
     const Status status = sample.estimate->report.status;

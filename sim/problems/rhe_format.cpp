@@ -7,6 +7,8 @@
 
 #include "format_parts.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/core/prior/prior.hpp"
+#include "rhec/core/prior/process_model.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -88,6 +90,49 @@ void check_information(const LineValue& information, const ProblemRecord::Rows& 
                     least));
 }
 
+void read_processes(const LineValue& line, ProblemRecord& record) {
+  std::size_t count = 0;
+  line["processes"].for_each([&](const std::string& name, const LineValue& value) {
+    const int states = value.integer(1);
+    if (states > Prior::max_states)
+      throw value.mismatch(fmt::format("a number of states from 1 to {}", Prior::max_states));
+    record.processes[name] = states;
+    count += ProcessModel::process_data_count(states);
+  });
+  constexpr std::string_view what = "for every process: 1 for a ramp or 0, F, L";
+  record.data =
+      line["data"].rows(static_cast<std::size_t>(record.intervals), "one for each interval of the horizon", false);
+  for (const std::vector<double>& row : record.data)
+    if (row.size() != count)
+      throw line["data"].error(fmt::format("rows of {}, expected {}: {}", row.size(), count, what));
+}
+
+/// The vehicle with its processes, if the record has some.
+std::shared_ptr<const Model> with_processes(const ProblemRecord& record, std::shared_ptr<const Model> model) {
+  if (record.processes.empty()) return model;
+  const ModelNames names(record, *model);
+  names.check("processes", record.processes, {&model->description().parameters});
+  std::vector<int> counts;
+  for (const Variable& parameter : model->description().parameters) {
+    const auto found = record.processes.find(parameter.name);
+    if (found == record.processes.end())
+      throw names.error("processes." + parameter.name, "missing; say how many states its process has");
+    counts.push_back(found->second);
+  }
+  return std::make_shared<ProcessModel>(std::move(model), std::move(counts));
+}
+
+/// Parameter -> number of states of its process.
+std::map<std::string, int> process_counts(const ModelDescription& about) {
+  std::map<std::string, int> counts;
+  const auto& first = about.parameter_states;
+  for (std::size_t j = 0; j < first.size(); ++j) {
+    const std::size_t end = j + 1 < first.size() ? static_cast<std::size_t>(first[j + 1]) : about.states.size();
+    counts[about.states[first[j]].name] = static_cast<int>(end) - first[j];
+  }
+  return counts;
+}
+
 std::vector<double> read_weights(const LineValue& list) {
   std::vector<double> weights;
   for (const LineValue& item : list.items("a list of weights")) {
@@ -161,6 +206,7 @@ void fill(const ProblemRecord& record, RheProblem& problem) {
   for (int i = 0; i < record.intervals; ++i) {
     problem.set_duration(i, record.durations[i]);
     std::copy(record.inputs[i].begin(), record.inputs[i].end(), problem.measured_input(i));
+    if (!record.data.empty()) std::copy(record.data[i].begin(), record.data[i].end(), problem.interval_data(i));
   }
   for (std::size_t j = 0; j < about.parameters.size(); ++j) {
     const std::string& name = about.parameters[j].name;
@@ -194,13 +240,14 @@ bool fits(const RheProblem::Setup& wanted, const RheProblem::Setup& there) {
 class RheFormat final : public ProblemFormat {
  public:
   RheFormat()
-      : ProblemFormat({.kind = "rhe",
-                       .keys = {"version", "id", "problem", "model", "horizon", "arrival", "outputs", "inputs",
-                                "weights", "bounds", "block_starts"},
-                       .since_2 = {"robust", "neighbour_variance", "transition", "guess", "origin"},
-                       .looks_back = true,
-                       .may_be_empty = true,
-                       .finds_parameters = true}) {}
+      : ProblemFormat(
+            {.kind = "rhe",
+             .keys = {"version", "id", "problem", "model", "horizon", "arrival", "outputs", "inputs", "weights",
+                      "bounds", "block_starts"},
+             .since_2 = {"robust", "neighbour_variance", "transition", "guess", "origin", "processes", "data"},
+             .looks_back = true,
+             .may_be_empty = true,
+             .finds_parameters = true}) {}
 
   void read(const LineValue& line, ProblemRecord& record) const override {
     const auto N = static_cast<std::size_t>(record.intervals);
@@ -224,6 +271,7 @@ class RheFormat final : public ProblemFormat {
     read_block_starts(line["block_starts"], record);
     if (line.has("neighbour_variance")) read_neighbour_variances(line["neighbour_variance"], record);
     if (line.has("robust")) read_robust(line["robust"], record);
+    if (line.has("processes")) read_processes(line, record);
   }
 
   void write(const ProblemRecord& record, Json& line) const override {
@@ -244,6 +292,9 @@ class RheFormat final : public ProblemFormat {
         return Json(transition == Transition::ramp ? "ramp" : "step");
       });
     if (!record.neighbour_variance.empty()) line["neighbour_variance"] = map_of(record.neighbour_variance, list_of);
+    if (record.processes.empty()) return;
+    line["processes"] = map_of(record.processes, [](int states) { return Json(states); });
+    line["data"] = rows_of(record.data);
   }
 
   void keep(const HorizonProblem& kept, ProblemRecord& record) const override {
@@ -261,6 +312,9 @@ class RheFormat final : public ProblemFormat {
       if (i < record.intervals)
         record.inputs.push_back(copied(problem.measured_input(i), static_cast<int>(about.inputs.size())));
     }
+    record.processes = process_counts(about);
+    for (int i = 0; i < record.intervals && !record.processes.empty(); ++i)
+      record.data.push_back(copied(problem.interval_data(i), problem.model().data_count()));
     record.output_weights = setup.output_weights;
     record.input_weights = setup.input_weights;
     keep_bounds(record, about.states, setup.state_lower, setup.state_upper);
@@ -294,8 +348,9 @@ class RheFormat final : public ProblemFormat {
 
   std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                         int max_intervals, std::vector<int> one_block) const override {
+    model = with_processes(record, std::move(model));
     RheProblem::Setup setup = estimation_setup_of(record, *model);
-    setup.one_block = std::move(one_block);
+    if (record.processes.empty()) setup.one_block = std::move(one_block);
     setup.max_intervals = std::max({record.intervals, max_intervals, 1});
     auto problem = std::make_unique<RheProblem>(std::move(model), std::move(setup));
     fill(record, *problem);
@@ -305,6 +360,7 @@ class RheFormat final : public ProblemFormat {
 
   bool refill(const ProblemRecord& record, HorizonProblem& filled) const override {
     auto& problem = as_kind<RheProblem>(filled);
+    if (process_counts(problem.model().description()) != record.processes) return false;
     if (!fits(estimation_setup_of(record, problem.model()), problem.setup())) return false;
     for (const int parameter : problem.setup().one_block)
       if (!is_one_block(record, problem.model(), parameter)) return false;

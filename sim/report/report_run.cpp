@@ -136,9 +136,10 @@ class RunReport {
       }
     }
     if (window.is_object() && !window.at("fallback").get<bool>())
-      for (std::size_t j = 0; j < names_.states.size(); ++j)
-        if (!is_close(window.at("state").at(j).back(), steps_.number(row, steps_.column(names_.states[j]))))
-          return false;
+      for (std::size_t j = 0; j < names_.states.size(); ++j) {
+        const Json& last = window.contains("estimate") ? window.at("estimate").at(j) : window.at("state").at(j).back();
+        if (!is_close(last, steps_.number(row, steps_.column(names_.states[j])))) return false;
+      }
     return true;
   }
 

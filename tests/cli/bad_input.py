@@ -11,7 +11,7 @@ import sys
 import tempfile
 
 import cli
-from cli import ERROR, FIGURE8, NOT_SOLVED, SHORT, USAGE, Program, assignments
+from cli import ERROR, FIGURE8, NOT_SOLVED, PAPER, SHORT, USAGE, Program, assignments
 
 # What is set over the scenario, and what the line must say beside the key itself: the first part before '=', unless given.
 SETTINGS = [
@@ -266,8 +266,9 @@ class Test(cli.Findings):
 
     def settings(self):
         for assignment, text in SETTINGS:
-            self.refused(assignment, self.run(assignment), ERROR, text, assignment.split("=")[0].split(".")[0])
-        self.refused("overlap over the horizon", self.run("blocking.kappa.overlap=16"), ERROR, "blocking.kappa",
+            scenario = PAPER if assignment.startswith("blocking.") else FIGURE8
+            self.refused(assignment, self.run(assignment, scenario=scenario), ERROR, text, assignment.split("=")[0].split(".")[0])
+        self.refused("overlap over the horizon", self.run("blocking.kappa.overlap=16", scenario=PAPER), ERROR, "blocking.kappa",
                      "an overlap of 16 needs a horizon of at least 16 intervals", "estimator.horizon", "figure8.yaml:")
         for option in ("transition: ramp", "neighbour_sigma: 1"):
             self.refused(f"{option} of an input", self.run("controller.blocking={u1: {name: structured, %s}}" % option), ERROR,

@@ -8,7 +8,7 @@ import re
 import sys
 
 import cli
-from cli import ERROR, FIGURE8, FINE, NOT_SOLVED, USAGE, Program, assignments
+from cli import ERROR, FIGURE8, FINE, NOT_SOLVED, PAPER, USAGE, Program, assignments
 
 CHECKS = ["description", "symmetry", "straight_motion", "derivatives", "numbers", "scaling", "observability", "time"]
 DRIVES = ["straight", "turn", "slalom", "standing"]
@@ -68,13 +68,13 @@ class Test(cli.Findings):
             self.expect(all(times["values"]["median"] > 0 for times in found["time_ns"]), model, f"{found['time_ns']}")
 
     def scenario(self):
-        found = self.check("figure8", FIGURE8)
+        found = self.check("figure8", PAPER)
         self.expect(found["verdict"] == "pass", "figure8", f"{found['findings']}")
         self.expect("at 8 m/s" in found["drives"][0]["meaning"], "figure8", f"speed: {found['drives'][0]['meaning']}")
         # kappa in blocks of 2 with an overlap: more than one unknown of it; half the horizon: fewer.
         unknowns = found["drives"][0]["unknowns"]
         self.expect(unknowns > 4 + 2, "figure8", f"{unknowns} unknowns")
-        shorter = self.check("shorter", FIGURE8, *assignments("estimator.horizon=7"))
+        shorter = self.check("shorter", PAPER, *assignments("estimator.horizon=7"))
         self.expect(shorter["drives"][0]["unknowns"] < unknowns, "estimator.horizon", f"{shorter['drives'][0]}")
         one = self.check("one block", FIGURE8, *assignments("blocking.kappa={name: full_horizon}"))
         self.expect(one["drives"][0]["unknowns"] == 4 + 2, "blocking", f"{one['drives'][0]}")

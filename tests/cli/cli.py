@@ -6,6 +6,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 FIGURE8 = ROOT / "scenarios" / "figure8.yaml"
+PAPER = ROOT / "scenarios" / "paper" / "figure8.yaml"  # with blocks
 ZIGZAG = ROOT / "scenarios" / "zigzag.yaml"
 # A run of a second at most.
 SHORT = ("speed=10", "path.laps=1", "path.radius=12", "path.legs=2", "path.leg_length=40")

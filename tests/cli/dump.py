@@ -16,7 +16,8 @@ import cli
 from cli import ERROR, FIGURE8, FINE, NOT_SOLVED, SHORT, USAGE, Program, assignments
 
 # It cannot stop before the wall that it drives against: solves of the controller fail.
-WALL = ["controller.speed_bound_factor=.inf", "bounds.u1=[4, 20]", "bounds.x_pos=[-20, 6]"]
+WALL = ["blocking.kappa={name: structured, size: 2, overlap: 4}", "controller.speed_bound_factor=.inf", "bounds.u1=[4, 20]",
+        "bounds.x_pos=[-20, 6]"]
 BLOCKS = ["blocking.kappa={name: structured, size: 5, overlap: 2, transition: ramp, neighbour_sigma: 0.1}",
           "controller.blocking={u1: {name: pattern, lengths: [1, 2, 4, 8]}}"]
 LOG = """
@@ -67,7 +68,7 @@ class Test(cli.Findings):
         return solutions
 
     def every(self):
-        for name, settings in {"as it is": [], "blocks": BLOCKS, "converge": ["estimator.solver.mode=converge",
+        for name, settings in {"priors": [], "blocks": BLOCKS, "converge": ["estimator.solver.mode=converge",
                                                                              "controller.solver.mode=converge"]}.items():
             stdout, problems, out = self.run(name, settings, "--dump-every", 1)
             with (out / "steps.csv").open(newline="") as stream:
@@ -76,6 +77,8 @@ class Test(cli.Findings):
                 solutions = self.replay(name, stdout, problems / f"{kind}.jsonl")
                 ids = [solution["id"] for solution in solutions]
                 self.expect(ids == [f"figure8/{kind}/{step}" for step in range(len(rows))], name, f"ids: {ids[:3]} ...")
+                if kind == "rhe" and settings != BLOCKS:
+                    continue  # what is given out is the mixture of all laws
                 for row, solution in zip(rows, solutions):
                     got = solution["inputs"][0] if kind == "rhc" else solution["states"][-1]
                     told = [row["u1"], row["u2"]] if kind == "rhc" else [row["x_pos"], row["y_pos"], row["beta"], row["delta"]]
@@ -149,7 +152,12 @@ class Test(cli.Findings):
                 ({"guess": {"states": line["guess"]["states"]}}, ["guess.controls: missing"]),
                 ({"guess": {**line["guess"], "states": line["guess"]["states"][1:]}}, ["guess.states:", "rows, expected"]),
                 ({"guess": {**line["guess"], "controls": [[0.0]] * len(line["inputs"])}}, ["guess.controls[0]: 1 numbers"]),
-                ({"arrival": {**line["arrival"], "information": [[-1.0] * 6] * 6}}, ["arrival.information: [0][0] is -1"]),
+                ({"arrival": {**line["arrival"], "information": [[-1.0] * 11] * 11}}, ["arrival.information: [0][0] is -1"]),
+                ({"processes": {"kappa": 9, "mu": 3}}, ["processes.kappa: found 9, expected", "from 1 to 4"]),
+                ({"processes": {"kappa": 4}, "data": [row[:33] for row in line["data"]]}, ["processes.mu: missing"]),
+                ({"processes": {"kapa": 4, "mu": 3}}, ["processes.kapa", "did you mean 'kappa'"]),
+                ({"data": [row[1:] for row in line["data"]]}, ["data: rows of 51, expected 52"]),
+                ({"data": line["data"][1:]}, ["data:", "rows, expected"]),
                 ({"transition": {"kappa": "slope"}}, ["transition.kappa: found \"slope\", expected \"step\" or \"ramp\""]),
         ]:
             file.write_text(json.dumps(line) + "\n" + json.dumps({**line, **change}) + "\n")

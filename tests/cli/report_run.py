@@ -8,7 +8,7 @@ import math
 import statistics
 
 import reports
-from cli import FIGURE8, FINE, SHORT, assignments
+from cli import FIGURE8, FINE, PAPER, SHORT, assignments
 from reports import DOCUMENT, TERMS, Reports, close, rows_of
 
 # Solves of the controller fail where the vehicle cannot stop.
@@ -128,7 +128,7 @@ class RunReports(Reports):
     def fallbacks(self):
         """Where solves fail, each of them is shown, and is in the table."""
         folder = self.work / "failing"
-        self.rhec("run", FIGURE8, "--out", folder, *assignments(*SHORT, *WALL))
+        self.rhec("run", PAPER, "--out", folder, *assignments(*SHORT, *WALL))
         summary = json.loads((folder / "summary.json").read_text())
         self.expect(summary["fallbacks"] > 0, "fallbacks", "there are none")
         document, _ = self.page_of(folder)

@@ -19,7 +19,7 @@ import tempfile
 import time
 
 import cli
-from cli import CLEAN, ERROR, FINE, NOT_SOLVED, USAGE, Program
+from cli import CLEAN, ERROR, FIGURE8, FINE, NOT_SOLVED, PAPER, USAGE, Program
 from sweeps import SHORT, rows
 
 LINE = re.compile(r"\d+(\.\d+)? %, \d+ of \d+ runs, \d+\.\d a second, .* left")
@@ -91,7 +91,8 @@ class Test(cli.Findings):
 
     def killed(self):
         """SIGKILL at random moments, and on: the rows are those of a sweep that nobody disturbed."""
-        text = self.sweep(SHORT + "grid: {seed: {from: 1, to: 100}, estimator.horizon: [3, 12], blocking.kappa.overlap: [0, 4]}\n")
+        text = self.sweep(SHORT.replace(str(FIGURE8), str(PAPER)) +
+                          "grid: {seed: {from: 1, to: 100}, estimator.horizon: [3, 12], blocking.kappa.overlap: [0, 4]}\n")
         whole, out = self.out(), self.out()
         result = self.rhec("sweep", text, "--out", whole)
         self.expect(result.returncode == NOT_SOLVED, "refused runs", f"{result.returncode}: {result.stderr}")

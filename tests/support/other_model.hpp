@@ -12,6 +12,7 @@ class OtherModel : public Model {
  public:
   explicit OtherModel(std::shared_ptr<const Model> model) : model_(std::move(model)) {}
   const ModelDescription& description() const noexcept override { return model_->description(); }
+  int data_count() const noexcept override { return model_->data_count(); }
   void integrate(const Intervals& request) const noexcept override { model_->integrate(request); }
   void observe(const Nodes& request) const noexcept override { model_->observe(request); }
   void integrate_rows(const IntervalRows& request) const noexcept override { model_->integrate_rows(request); }

@@ -62,13 +62,13 @@ TEST(BankEstimation, FindsAHeadingByManyStarts) {
     EXPECT_NEAR(angle_difference(drive(bank, direction, 40).state[2], direction), 0.0, 0.05) << direction;
 }
 
-TEST(BankEstimation, TakesLateOutputsAtItsNewestNodeOnly) {
+TEST(BankEstimation, TakesLateOutputsAtTheNodesThatItRemembers) {
   const std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
   BankEstimation bank(model, bicycle_setup(*model, 0.4, 0.1, 1));
   const Estimate before = drive(bank, 0.4, 10);
   const double fix[] = {before.state[0] + 1.0, nan, nan};
-  EXPECT_FALSE(bank.amend(1, fix));
-  EXPECT_TRUE(bank.amend(0, fix));
+  EXPECT_FALSE(bank.amend(16, fix));
+  EXPECT_TRUE(bank.amend(2, fix));
   Estimate after = empty_estimate(*model);
   bank.estimate(after, Clock::time_point::max());
   EXPECT_GT(after.state[0], before.state[0] + 0.05);

@@ -9,31 +9,13 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/core/prior/standard_bank.hpp"
+#include "support/bank_case.hpp"
 #include "support/error_of.hpp"
-#include "support/linear_case.hpp"
 
 namespace rhec {
 namespace {
 
 using namespace testing;
-
-std::shared_ptr<const Prior> prior(const std::string& name, const std::string& options) {
-  Variable parameter;
-  parameter.lower = -1.0;
-  parameter.upper = 2.0;
-  auto made = host().make_prior(name, parse_yaml(options, "test"));
-  made->set_up(parameter);
-  return made;
-}
-
-PriorBank::Setup setup_for(const Model& model, std::vector<PriorCombination> members) {
-  const testing::Noise noise = noise_of(model);
-  PriorBank::Setup setup;
-  setup.members = std::move(members);
-  for (const double sigma : noise.outputs) setup.output_variances.push_back(sigma * sigma);
-  for (const double sigma : noise.inputs) setup.input_variances.push_back(sigma * sigma);
-  return setup;
-}
 
 double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
 
@@ -155,17 +137,10 @@ class DenseFilter {
   std::vector<int> first_;
 };
 
-/// All priors of the house, along time, ramped and held.
-std::vector<PriorCombination> linear_members() {
-  return {{prior("walk", "{sigma: 0.2, along: time}"), prior("matern", "{length: 2, along: time}")},
-          {prior("matern", "{length: 3, smoothness: 5/2, along: time}"), prior("jumps", "{length: 2, along: time}")},
-          {prior("constant", "{}"), prior("matern", "{length: 1, along: time, course: held, mean_walk: 0.3}")}};
-}
-
 TEST(PriorBank, IsTheKalmanFilterOfItsPriorOnALinearModel) {
   const auto model = linear_model<Hovercraft>();
-  for (const PriorCombination& member : linear_members()) {
-    const PriorBank::Setup setup = setup_for(*model, {member});
+  for (const PriorCombination& member : linear_priors()) {
+    const PriorBank::Setup setup = bank_setup(*model, {member});
     PriorBank bank(model, setup);
     DenseFilter reference(*model, member);
     const Eigen::VectorXd start = initial_mean(*model).head(4);
@@ -194,8 +169,8 @@ TEST(PriorBank, IsTheKalmanFilterOfItsPriorOnALinearModel) {
 /// moments are those of their mixture.
 TEST(PriorBank, WeighsItsMembersByTheirLikelihood) {
   const auto model = linear_model<Hovercraft>();
-  const std::vector<PriorCombination> members = linear_members();
-  PriorBank::Setup setup = setup_for(*model, members);
+  const std::vector<PriorCombination> members = linear_priors();
+  PriorBank::Setup setup = bank_setup(*model, members);
   setup.memory = std::numeric_limits<double>::infinity();
   setup.gate = std::numeric_limits<double>::infinity();
   PriorBank bank(model, setup);
@@ -244,7 +219,7 @@ TEST(PriorBank, MixesStatesOfOneMeaning) {
       {prior("matern", "{length: 50, smoothness: 5/2, along: time, mean: 0.9, mean_sigma: 0.01}")},
       {prior("matern", "{length: 50, along: time, mean: 0.9, mean_sigma: 0.01}")},
       {prior("walk", "{sigma: 0.001, along: time, mean: 0.9, mean_sigma: 0.01}")}};
-  PriorBank::Setup setup = setup_for(*model, members);
+  PriorBank::Setup setup = bank_setup(*model, members);
   setup.memory = 0.5;
   PriorBank bank(model, setup);
   bank.reset(initial_mean(*model).head(3), initial_covariance(*model).topLeftCorner(3, 3));
@@ -267,7 +242,7 @@ TEST(PriorBank, MixesStatesOfOneMeaning) {
 /// Mixing moves moments between members and leaves those of the whole as they are.
 TEST(PriorBank, KeepsTheMomentsOfTheMixtureWhenItMixes) {
   const auto model = linear_model<Hovercraft>();
-  PriorBank::Setup setup = setup_for(*model, linear_members());
+  PriorBank::Setup setup = bank_setup(*model, linear_priors());
   setup.memory = 1.0;  // a fourth changes within an interval
   PriorBank bank(model, setup);
   bank.reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
@@ -291,7 +266,7 @@ TEST(PriorBank, KeepsTheMomentsOfTheMixtureWhenItMixes) {
 
 TEST(PriorBank, PassesOverWhatIsNoNumber) {
   const auto model = linear_model<Hovercraft>();
-  PriorBank bank(model, setup_for(*model, linear_members()));
+  PriorBank bank(model, bank_setup(*model, linear_priors()));
   bank.reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
   Eigen::VectorXd before, after;
   Eigen::MatrixXd covariance;
@@ -387,8 +362,8 @@ TEST(PriorBank, WeighsItsMembersByAnyNumberOfOutputs) {
 
 TEST(PriorBank, RefusesWhatDoesNotFit) {
   const auto model = linear_model<Hovercraft>();
-  EXPECT_THAT(error_of([&] { PriorBank(model, setup_for(*model, {})); }), ::testing::HasSubstr("at least 1 member"));
-  EXPECT_THAT(error_of([&] { PriorBank(model, setup_for(*model, {{prior("walk", "{}")}})); }),
+  EXPECT_THAT(error_of([&] { PriorBank(model, bank_setup(*model, {})); }), ::testing::HasSubstr("at least 1 member"));
+  EXPECT_THAT(error_of([&] { PriorBank(model, bank_setup(*model, {{prior("walk", "{}")}})); }),
               ::testing::HasSubstr("expected 2"));
 }
 

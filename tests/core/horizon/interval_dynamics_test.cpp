@@ -40,7 +40,7 @@ class Intervals : public ::testing::TestWithParam<int> {
     point = scattered_point(*problem);
     scratch.assign(IntervalDynamics::scratch_size(*model, problem->structure(), count + 1), 0.0);
   }
-  IntervalDynamics dynamics() const { return {*model, problem->structure(), durations.data(), 2}; }
+  IntervalDynamics dynamics() const { return {*model, problem->structure(), durations.data(), nullptr, 2}; }
   std::vector<double> defects(const Iterate& at) {
     std::vector<double> found(static_cast<std::size_t>(count) * states(), 7.0);
     dynamics().write_defects(at, found.data(), scratch.data());

@@ -130,11 +130,13 @@ TEST_P(BankKernelsTest, UpdateAsTheTextbookDoes) {
     RandomQp random(GetParam());
     RandomBank bank(random);
     const int count = random.integer(1, 4), n = bank.n;
-    std::vector<AlignedDoubles> predicted(count), gradients(count);
+    std::vector<AlignedDoubles> predicted(count), gradients(count), noises(count);
+    AlignedDoubles surprises(static_cast<std::size_t>(count) * bank.members), expected_surprises = surprises;
     std::vector<BankOutput> outputs;
     AlignedDoubles squares(bank.members, 0.5), expected_squares = squares,
                                                variances(static_cast<std::size_t>(count) * bank.members),
                                                expected_variances = variances;
+    const std::vector<Eigen::MatrixXd> before = bank.covariances;
     std::vector<Eigen::VectorXd> corrections(bank.members, Eigen::VectorXd::Zero(n));
     for (int j = 0; j < count; ++j) {
       predicted[j].assign(bank.members, 0.0);
@@ -142,15 +144,19 @@ TEST_P(BankKernelsTest, UpdateAsTheTextbookDoes) {
       // An angle that was measured some turns away is as near as the same one without.
       const bool is_angle = random.integer(0, 1) == 1;
       const double turns = is_angle ? 2.0 * std::numbers::pi * random.integer(-3, 3) : 0.0;
-      const double measured = random.uniform(-1.0, 1.0), variance = random.uniform(0.01, 1.0);
-      outputs.push_back({predicted[j].data(), gradients[j].data(), measured + turns, variance,
+      const double measured = random.uniform(-1.0, 1.0);
+      noises[j].assign(bank.members, 0.0);
+      outputs.push_back({predicted[j].data(), gradients[j].data(), noises[j].data(), measured + turns,
                          is_angle ? 2.0 * std::numbers::pi : 0.0});
       for (int m = 0; m < bank.members; ++m) {
         predicted[j][m] = random.uniform(-1.0, 1.0);
         Eigen::VectorXd h = Eigen::VectorXd::Zero(n);
         h.head(bank.nx) = RandomBank::matrix(random, bank.nx, 1);
         bank.put(h.head(bank.nx), gradients[j], m);
-        const double innovation = measured - predicted[j][m] - h.dot(corrections[m]);
+        const double variance = noises[j][m] = random.uniform(0.01, 1.0);
+        const double alone = measured - predicted[j][m];
+        expected_surprises[j * bank.members + m] = alone * alone / (h.dot(before[m] * h) + variance);
+        const double innovation = alone - h.dot(corrections[m]);
         const double S = h.dot(bank.covariances[m] * h) + variance;
         const Eigen::VectorXd gain = bank.covariances[m] * h / S;
         corrections[m] += gain * innovation;
@@ -160,12 +166,16 @@ TEST_P(BankKernelsTest, UpdateAsTheTextbookDoes) {
       }
     }
     for (int m = 0; m < bank.members; ++m) bank.means[m] += corrections[m];
+    set.bank->surprise(bank.view(), outputs.data(), count, surprises.data());
     set.bank->update(bank.view(), outputs.data(), count, 1.5, squares.data(), variances.data());
     bank.expect_equal(set.instruction_set);
     for (int m = 0; m < bank.members; ++m) {
       EXPECT_NEAR(squares[m], expected_squares[m], 1e-11);
     }
-    for (std::size_t k = 0; k < variances.size(); ++k) EXPECT_NEAR(variances[k] / expected_variances[k], 1.0, 1e-12);
+    for (std::size_t k = 0; k < variances.size(); ++k) {
+      EXPECT_NEAR(variances[k] / expected_variances[k], 1.0, 1e-12);
+      EXPECT_NEAR(surprises[k], expected_surprises[k], 1e-11 * (1.0 + expected_surprises[k]));
+    }
   }
 }
 
@@ -210,7 +220,8 @@ TEST(BankKernels, LeaveAMemberAsItWasWhereNoNumberComesOut) {
     AlignedDoubles predicted(bank.members, 0.0), gradient(static_cast<std::size_t>(bank.nx) * bank.members, 1.0),
         squares(bank.members, 0.0), variances(bank.members, 0.0);
     predicted[3] = std::nan("");
-    const BankOutput output{predicted.data(), gradient.data(), 0.5, 0.1, 0.0};
+    const AlignedDoubles noise(bank.members, 0.1);
+    const BankOutput output{predicted.data(), gradient.data(), noise.data(), 0.5, 0.0};
     set.bank->update(bank.view(), &output, 1, 16.0, squares.data(), variances.data());
     EXPECT_EQ(largest(bank.taken(bank.mean, 3, bank.n, 1) - bank.means[3]), 0.0);
     EXPECT_EQ(largest(bank.taken(bank.covariance, 3, bank.n, bank.n) - bank.covariances[3]), 0.0);

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
+#include <utility>
 
 #include "rhec/core/model/model.hpp"
 #include "support/error_of.hpp"
@@ -29,13 +31,30 @@ TEST(StandardBank, IsNeverLargerThanTheProcessorCanBear) {
   }
 }
 
-TEST(StandardBank, HasSevenLawsOfTheSpeedFactorAndThreeOfAnother) {
+TEST(StandardBank, HasEightLawsOfTheSpeedFactorAndThreeOfAnother) {
   const auto members = standard_bank(vehicle(2));
-  EXPECT_EQ(members.size(), 21u);
+  EXPECT_EQ(members.size(), 24u);
   std::set<std::shared_ptr<const Prior>> other, factor;
   for (const auto& member : members) other.insert(member[0]), factor.insert(member[1]);
   EXPECT_EQ(other.size(), 3u);
-  EXPECT_EQ(factor.size(), 7u);
+  EXPECT_EQ(factor.size(), 8u);
+}
+
+/// From three parameters on, every pair of laws of any two parameters comes equally often.
+TEST(StandardBank, PairsTheLawsOfManyParametersEqually) {
+  for (const int parameters : {3, 4, 5, 6, 9, 15}) {
+    const auto members = standard_bank(vehicle(parameters));
+    const std::size_t laws = parameters <= 5 ? 4 : 2;
+    ASSERT_EQ(members.size() % (laws * laws), 0u) << parameters;
+    for (int a = 0; a < parameters; ++a) {
+      for (int b = 0; b < a; ++b) {
+        std::map<std::pair<const Prior*, const Prior*>, std::size_t> pairs;
+        for (const auto& member : members) ++pairs[{member[a].get(), member[b].get()}];
+        EXPECT_EQ(pairs.size(), laws * laws) << parameters;
+        for (const auto& [pair, count] : pairs) EXPECT_EQ(count, members.size() / (laws * laws));
+      }
+    }
+  }
 }
 
 TEST(StandardBank, TakesWhatIsGivenAndFillsTheRoomThatIsLeft) {

@@ -8,6 +8,7 @@
 #include "plugins/robot/robots.hpp"
 #include "rhec/core/estimation/bank_estimation.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/core/estimation/prior_horizon_estimation.hpp"
 #include "rhec/plugins/robot/estimator_section.hpp"
 #include "support/error_of.hpp"
 
@@ -55,11 +56,14 @@ TEST(EstimatorMakers, HaveTheRobotsOwn) {
   EXPECT_EQ(makers.all()[1].name, "ekf");
   EXPECT_EQ(makers.all()[2].name, "bank");
   const EstimatorParts parts = section("", makers).parts();
-  EXPECT_NE(dynamic_cast<RecedingHorizonEstimation*>(makers.named("rhe").make(parts).get()), nullptr);
+  EXPECT_NE(dynamic_cast<PriorHorizonEstimation*>(makers.named("rhe").make(parts).get()), nullptr);
+  const auto context = context_with();
+  const EstimatorSection blocked(context, BlockingSection(context, settings("{kappa: structured}")), settings(""));
+  EXPECT_NE(dynamic_cast<RecedingHorizonEstimation*>(makers.named("rhe").make(blocked.parts()).get()), nullptr);
   EXPECT_NE(dynamic_cast<FilterEstimation*>(makers.named("ekf").make(parts).get()), nullptr);
   const auto bank = makers.named("bank").make(parts);
   ASSERT_NE(dynamic_cast<BankEstimation*>(bank.get()), nullptr);
-  EXPECT_EQ(dynamic_cast<BankEstimation&>(*bank).bank().member_count(), 21);
+  EXPECT_EQ(dynamic_cast<BankEstimation&>(*bank).bank().member_count(), 24);
 }
 
 TEST(EstimatorMakers, TakeThoseOfAProgram) {

@@ -137,7 +137,7 @@ TEST(EstimatorSection, MakesTheEstimatorOfItsNameOnItsTimeline) {
   for (const char* name : {"rhe", "ekf"}) {
     const auto made = estimator(std::string("{name: ") + name + ", substeps: 3}").make();
     EXPECT_EQ(made->method().substeps(), 3);
-    EXPECT_EQ(dynamic_cast<const RecedingHorizonEstimation*>(&made->method()) != nullptr, name == std::string("rhe"));
+    EXPECT_EQ(dynamic_cast<const WindowedEstimation*>(&made->method()) != nullptr, name == std::string("rhe"));
     const double outputs[3] = {};
     made->push_measurement(0.0, outputs);
     made->push_measurement(1.0, outputs);

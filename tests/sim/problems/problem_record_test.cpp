@@ -272,14 +272,15 @@ constexpr const char* impossible = "{bounds: {u1: [4, 20], x_pos: [-20, 6]}, con
 class Replayed : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(
     ProblemRecord, Replayed,
-    ::testing::Values("{}", "{estimator: {solver: {mode: converge}}, controller: {solver: {mode: converge}}}",
-                      "{estimator: {solver: {iterations: 3}}, controller: {solver: {iterations: 2}}}",
-                      "{blocking: {kappa: {name: structured, size: 5, overlap: 2, transition: ramp}}}",
-                      "{blocking: {kappa: {name: unblocked, neighbour_sigma: 0.04}}}",
-                      "{controller: {blocking: {u1: {name: pattern, lengths: [1, 2, 4, 8]}}}}",
-                      "{estimator: {heading_starts: 4, initial: {sigma: {beta: 3}}}}",
-                      "{estimator: {robust: {outputs: [x_gps, y_gps]}, solver: {mode: converge}}}",
-                      "{estimator: {robust: {outputs: [x_gps, y_gps]}}}", impossible));
+    ::testing::Values(
+        "{}", "{estimator: {solver: {mode: converge}}, controller: {solver: {mode: converge}}}",
+        "{estimator: {solver: {iterations: 3}}, controller: {solver: {iterations: 2}}}",
+        "{blocking: {kappa: {name: structured, size: 5, overlap: 2, transition: ramp}}}",
+        "{blocking: {kappa: {name: unblocked, neighbour_sigma: 0.04}}}",
+        "{controller: {blocking: {u1: {name: pattern, lengths: [1, 2, 4, 8]}}}}",
+        "{blocking: {kappa: {name: structured}}, estimator: {heading_starts: 4, initial: {sigma: {beta: 3}}}}",
+        "{estimator: {robust: {outputs: [x_gps, y_gps]}, solver: {mode: converge}}}",
+        "{estimator: {robust: {outputs: [x_gps, y_gps]}}}", impossible));
 
 TEST_P(Replayed, GivesTheSameBits) {
   Settings settings = parse_yaml("{speed: 10, path: {laps: 1, radius: 12}}", "scenario");

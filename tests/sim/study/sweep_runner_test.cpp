@@ -31,9 +31,9 @@ Sweep small_sweep(const std::string& grid = "") {
   const std::string own =
       "  - {speed: [8, 10], seed: {from: 1, to: 4}}\n"
       "  - {estimator.horizon: [3, 6], blocking.kappa.overlap: [0, 5]}\n";
-  return Sweep(parse_yaml(
-      "scenario: figure8.yaml\nset: {path.laps: 1, path.radius: 8, speed: 10}\ngrid:\n" + (grid.empty() ? own : grid),
-      std::string(SCENARIOS) + "/sweep.yaml"));
+  return Sweep(parse_yaml("scenario: paper/figure8.yaml\nset: {path.laps: 1, path.radius: 8, speed: 10}\ngrid:\n" +
+                              (grid.empty() ? own : grid),
+                          std::string(SCENARIOS) + "/sweep.yaml"));
 }
 
 class SweepRunnerTest : public testing::Test {

@@ -19,7 +19,7 @@ inline const Host& host() {
 inline Sweep sweep_of(const std::string& text) {
   return Sweep(parse_yaml(text, std::string(SCENARIOS) + "/sweep.yaml"));
 }
-inline Sweep grid_of(const std::string& grid) { return sweep_of("scenario: figure8.yaml\ngrid:\n" + grid); }
+inline Sweep grid_of(const std::string& grid) { return sweep_of("scenario: paper/figure8.yaml\ngrid:\n" + grid); }
 
 /// What the error says, without the folder; empty where there is none.
 template <class Call>
@@ -38,7 +38,7 @@ inline std::string mistake_in(const std::string& text) {
   });
 }
 inline std::string mistake_in_grid(const std::string& grid) {
-  return mistake_in("scenario: figure8.yaml\ngrid:\n" + grid);
+  return mistake_in("scenario: paper/figure8.yaml\ngrid:\n" + grid);
 }
 
 }  // namespace rhec::sim

@@ -349,6 +349,7 @@ export function windowWords(document, horizon) {
       if (blocks.length === 0) return;
       const partial = [blocks[0].cut && "the first", blocks[blocks.length - 1].growing && (blocks.length === 1 && blocks[0].cut ? false : "the last")].filter(Boolean);
       const suppressed = rhe.blocks[p].suppressed || [];
+      if (rhe.estimate) return void sentences.push(`${variable.name}: a value at each node, by the most probable prior; what is given out is the mixture of all.`);
       sentences.push(`${variable.name}: ${blocks.length === 1 ? "one block" : `${blocks.length} blocks`}` +
         (blocks.length > 1 && partial.length ? `, ${listed(partial)} partial` : partial.length ? ", partial" : "") +
         (suppressed.length ? `; ${suppressed.length === 1 ? "a start" : "starts"} at step ${listed(suppressed.map(String))} suppressed by the overlap` : "") + ".");

@@ -2,15 +2,15 @@
 
 #include <memory>
 
+#include "rhec/core/estimation/bank_history.hpp"
 #include "rhec/core/estimation/estimation_method.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
-#include "rhec/core/estimation/prior_bank.hpp"
 
 namespace rhec {
 
 /// A bank of Kalman filters with different priors for the Estimator (docs/method.md, section 8). If the initial heading
 /// is unknown, filters with constant parameters search it first, as in FilterEstimation; the bank starts from what they
-/// find.
+/// find. Late measurements are used as if they had come in time.
 class RHEC_EXPORT BankEstimation final : public EstimationMethod {
  public:
   struct Setup {
@@ -19,10 +19,11 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
     Eigen::MatrixXd initial_covariance;                    ///< n_x x n_x
     std::vector<double> parameter_lower, parameter_upper;  ///< bounds of the estimate's mean
     int heading_starts = 1;
+    int remembered_nodes = 16;  ///< late measurements of these are used
   };
   BankEstimation(const std::shared_ptr<const Model>& model, Setup setup);
 
-  const Model& model() const noexcept override { return bank_.model(); }
+  const Model& model() const noexcept override { return history_.bank().model(); }
   int substeps() const noexcept override { return setup_.bank.substeps; }
   void start(const double* outputs) noexcept override;
   void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
@@ -30,15 +31,20 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
 
-  const PriorBank& bank() const noexcept { return bank_; }
+  const PriorBank& bank() const noexcept { return history_.bank(); }
+  BankHistory& history() noexcept { return history_; }
+  /// Whether the bank does not work yet, since the heading is unknown.
+  bool is_searching() const noexcept { return searching_; }
 
  private:
   void start_bank_if_found() noexcept;
 
   Setup setup_;
-  PriorBank bank_;
+  BankHistory history_;
   std::unique_ptr<FilterEstimation> search_;  ///< null if the heading is known
   bool searching_ = false;
+  std::int64_t searched_ = 0;    ///< number of the newest node while searching
+  std::vector<double> nothing_;  ///< outputs of a node without measurements
   Eigen::VectorXd mean_;
   Eigen::MatrixXd covariance_;
   Estimate found_;

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -8,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "rhec/core/base/aligned.hpp"
+#include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/prior/standard_bank.hpp"
 
@@ -26,9 +30,16 @@ class RHEC_EXPORT PriorBank {
     std::vector<double> output_variances;  ///< n_y
     std::vector<double> input_variances;   ///< n_u, of measured inputs
     int substeps = 1;
-    double memory = 100.0;  ///< ground after which another law may hold [m]: exp(-d / memory) is the share that stays
-    double least_speed = 0.025;  ///< a vehicle that stands counts as creeping at this speed [m/s]
-    double gate = 16.0;          ///< largest squared innovation, in variances, by which one output changes the weights
+    /// What else is known of the parameters at the start (n_p, or none): it is fused with the starts of the processes
+    /// as a measurement would be. An infinite variance: nothing.
+    struct Knowledge {
+      double mean = 0.0, variance = std::numeric_limits<double>::infinity();
+    };
+    std::vector<Knowledge> initial_parameters;
+    double memory = 40.0;  ///< ground after which another law may hold [m]: exp(-d / memory) is the share that stays
+    double least_speed = 0.025;      ///< a vehicle that stands counts as creeping at this speed [m/s]
+    std::vector<RobustLoss> robust;  ///< as in a window; each weighs its group's outputs by their innovations
+    double gate = 16.0;  ///< largest squared innovation, in variances, by which one output changes the weights
   };
   /// Throws Error if sizes do not match.
   PriorBank(std::shared_ptr<const Model> model, Setup setup);
@@ -52,6 +63,23 @@ class RHEC_EXPORT PriorBank {
   void moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept;
   /// Moments of one member: [x; p].
   void moments_of(int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) const noexcept;
+  /// Index in [x; z] of the first state of a parameter's process, and the number of states that any of its priors has.
+  int first_state(int parameter) const noexcept { return processes_[parameter].first; }
+  int process_states(int parameter) const noexcept { return processes_[parameter].count; }
+  int state_count() const noexcept { return n_; }
+
+  /// All that changes: moments and weights. `state_size` doubles.
+  std::size_t state_size() const noexcept { return mean_.size() + covariance_.size() + weights_.size(); }
+  void save(double* state) const noexcept;
+  void restore(const double* state) noexcept;
+
+  /// What a window needs of a member to take its place, on the states that the member's own priors have; the others are
+  /// 0, and nothing depends on them.
+  /// Moments of [x; z] (n, n x n) in what `save` has written; the others have the variance 1.
+  void saved_moments(const double* state, int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept;
+  /// Interval data of a parameter's process, as in ProcessModel: ramp, F, L, over an advance of this time and ground.
+  void write_process(int member, int parameter, double duration, double distance, double* data) noexcept;
+
   /// Ground covered on the last interval [m].
   double distance() const noexcept { return distance_; }
 
@@ -66,23 +94,26 @@ class RHEC_EXPORT PriorBank {
     AlignedDoubles F, Q, ramp;        ///< lanes
   };
   void find_places(Process& process) const;
-  void write_start(const Process& process, const Prior& prior, int lane) noexcept;
+  void write_start(int parameter, const Prior& prior, int lane) noexcept;
   struct Views;  ///< what the kernels are given
   void take_step(const double* input, double duration) noexcept;
   void find_distance(const double* input, double duration) noexcept;
   void advance_processes(double duration) noexcept;
   void mix_members() noexcept;
+  void weigh_outputs(const double* y, int taken) noexcept;
+  int own_places(int member, int parameter, int* places) const noexcept;
 
   std::shared_ptr<const Model> model_;
   Setup setup_;
   int members_, lanes_, nx_, nu_, np_, ny_, n_ = 0;
   std::vector<Process> processes_;
   AlignedDoubles mean_, covariance_, work_, weights_, keep_, take_, next_, jacobian_, predicted_, gradient_, squares_,
-      innovation_variances_;
+      innovation_variances_, output_variances_, surprises_;
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;
   std::vector<double> input_, variances_;
+  std::vector<std::uint8_t> is_own_;                                               ///< per entry of [x; z]
   std::vector<double> start_, own_, own_covariance_, filled_, filled_covariance_;  ///< moments of one process
   Eigen::VectorXd full_mean_;
   Eigen::MatrixXd full_covariance_;

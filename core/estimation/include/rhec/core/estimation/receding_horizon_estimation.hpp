@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "rhec/core/estimation/arrival_cost.hpp"
-#include "rhec/core/estimation/estimation_method.hpp"
+#include "rhec/core/estimation/windowed_estimation.hpp"
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/horizon/shift.hpp"
-#include "rhec/core/qp/riccati.hpp"
 
 namespace rhec {
+
+class NodeCovariance;
 
 /// Receding horizon estimation with structured blocking (docs/method.md, sections 2, 4 and 5). The horizon of at most
 /// `problem.max_intervals` intervals grows from the start of the run and then slides, with an arrival cost before it.
@@ -19,7 +20,7 @@ namespace rhec {
 /// `block_sigma`, about the previous block: what the data determine is unaffected, and a weakly determined block stays
 /// near its neighbour's value instead of being driven to a bound by noise. If it is infinite, the method is that of the
 /// paper, which reports that blocks of one and three intervals then do not converge.
-class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
+class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
  public:
   struct Setup {
     RheProblem::Setup problem;
@@ -34,6 +35,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   };
   /// Throws Error if sizes do not match or a blocking cannot take the horizon.
   RecedingHorizonEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Setup setup);
+  ~RecedingHorizonEstimation() override;
 
   const Model& model() const noexcept override { return problem_.model(); }
   int substeps() const noexcept override { return problem_.substeps(); }
@@ -44,11 +46,12 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   void prepare() noexcept override;
   void reset() noexcept override;
 
-  /// The present horizon, for inspection.
-  const RheProblem& problem() const noexcept { return problem_; }
-  const Iterate& solution() const noexcept { return point_; }
-  const Window& window() const noexcept { return window_; }
-  const ArrivalCost& arrival() const noexcept { return arrival_; }
+  bool has_window() const noexcept override { return started_; }
+  const RheProblem& problem() const noexcept override { return problem_; }
+  const Iterate& solution() const noexcept override { return point_; }
+  const Window& window() const noexcept override { return window_; }
+  bool arrival(double* mean, double* sigma) const noexcept override;
+  const ArrivalCost& arrival_cost() const noexcept { return arrival_; }
 
  private:
   const Roles& roles() const noexcept { return model().description().roles; }
@@ -76,10 +79,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public EstimationMethod {
   std::vector<std::int64_t> first_starts_;
   std::vector<ArrivalCost::Border> borders_;
   std::vector<double> scratch_, inputs_, outputs_;
-  StageQp covariance_qp_;
-  Riccati covariance_riccati_;
-  ActiveSet no_active_bounds_;
-  std::vector<double> covariances_;
+  std::unique_ptr<NodeCovariance> covariance_;
   Eigen::VectorXd last_state_;  ///< of the newest node, with the parameters of the interval before it
 };
 

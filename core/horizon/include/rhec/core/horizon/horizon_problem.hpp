@@ -37,6 +37,9 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   /// Length of an interval [s].
   double duration(int interval) const noexcept { return durations_[interval]; }
   void set_duration(int interval, double seconds) noexcept { durations_[interval] = seconds; }
+  /// The known data of an interval, Model::data_count entries.
+  double* interval_data(int interval) noexcept { return data_.data() + at_data(interval); }
+  const double* interval_data(int interval) const noexcept { return data_.data() + at_data(interval); }
   /// The known inputs of an interval (n_u, NaN where unknown), for an initial guess; null if none is known.
   virtual const double* known_inputs(int /*interval*/) const noexcept { return nullptr; }
 
@@ -79,7 +82,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   int np() const noexcept { return structure_.parameters(); }
   int stride() const noexcept { return structure_.stride(); }
   HorizonStructure& changing_structure() noexcept { return structure_; }
-  /// Copies structure, durations and bounds of a problem of the same capacity.
+  /// Copies structure, durations, known data and bounds of a problem of the same capacity.
   void take_horizon(const HorizonProblem& from) noexcept;
 
   /// Bounds of z = [s; w] at every stage, as rows of `stride()` entries. Initially there are none.
@@ -116,6 +119,9 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   const double* at(const AlignedDoubles& rows, int i) const noexcept {
     return rows.data() + static_cast<std::ptrdiff_t>(i) * structure_.stride();
   }
+  std::ptrdiff_t at_data(int interval) const noexcept {
+    return static_cast<std::ptrdiff_t>(interval) * model_->data_count();
+  }
   bool keeps_curvature() const noexcept;
   void write_bounds(const Iterate& iterate, StageRange range, StageQp& qp) const noexcept;
 
@@ -123,7 +129,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   HorizonStructure structure_;
   int substeps_;
   AlignedDoubles lower_, upper_;
-  std::vector<double> durations_;
+  std::vector<double> durations_, data_;
   /// The interval that `simulate_new_interval` has simulated, with its derivatives.
   struct SimulatedInterval {
     double duration = 0.0;                      ///< 0: none

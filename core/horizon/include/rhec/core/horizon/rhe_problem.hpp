@@ -73,8 +73,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void finish() noexcept;
   /// Copies data and structure of a problem with the same model and set-up, without allocation.
   void take_data(const RheProblem& from) noexcept;
-  /// Moves durations, outputs and measured inputs one interval towards the start of the horizon; the last ones stay
-  /// until they are overwritten.
+  /// Moves durations, known data, outputs and measured inputs one interval towards the start of the horizon; the last
+  /// ones stay until they are overwritten.
   void drop_first_interval() noexcept;
 
   /// Weights in (0, 1] that the robust losses give to the outputs at an iterate: d loss / d s.

@@ -31,8 +31,8 @@ struct BankStep {
 
 /// One measured output: the prediction at the mean of every member, and its gradient by x.
 struct BankOutput {
-  const double *predicted, *gradient;  ///< 1, n_x
-  double measured, variance;
+  const double *predicted, *gradient, *variance;  ///< 1, n_x, 1
+  double measured;
   double period;  ///< 2 pi for an angle, else 0
 };
 
@@ -47,6 +47,8 @@ struct BankKernels {
   /// keeps what it has; its S is 1.
   void (*update)(const BankView& bank, const BankOutput* outputs, int count, double gate, double* squares,
                  double* variances);
+  /// r^2 / S of each output on its own (count entries), before any update.
+  void (*surprise)(const BankView& bank, const BankOutput* outputs, int count, double* squares);
   /// Mean (n) and covariance (n x n) of the mixture.
   void (*moments)(const BankView& bank, const double* weights, double* mean, double* covariance);
 };

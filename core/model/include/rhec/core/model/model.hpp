@@ -50,6 +50,8 @@ struct ModelDescription {
   std::string source;  ///< where the equations were published
   std::vector<Variable> states, inputs, parameters, outputs;
   Roles roles;
+  /// Of a model that makes another one's parameters states: where these are, in their order; else empty.
+  std::vector<int> parameter_states = {};
 };
 
 /// How a vehicle moves and what its sensors measure:
@@ -69,6 +71,8 @@ class RHEC_EXPORT Model {
   int input_count() const noexcept { return static_cast<int>(description().inputs.size()); }
   int parameter_count() const noexcept { return static_cast<int>(description().parameters.size()); }
   int output_count() const noexcept { return static_cast<int>(description().outputs.size()); }
+  /// n_d: numbers of an interval that its dynamics depend on, and that are known instead of estimated or decided.
+  virtual int data_count() const noexcept { return 0; }
 
   /// One request to `integrate`. Row i of an array belongs to interval i of the range; rows are dense. A null result
   /// pointer means 'not requested'.
@@ -85,6 +89,7 @@ class RHEC_EXPORT Model {
     const double* parameters_end = nullptr;  ///< count x n_p, or null: p is constant on an interval; otherwise it runs
                                              ///< linearly from `parameters` to `parameters_end`
     const double* durations = nullptr;       ///< count, [s]
+    const double* data = nullptr;            ///< count x n_d
     int substeps = 1;                        ///< Runge-Kutta steps per interval
     double* next_states = nullptr;
     double* jacobians = nullptr;

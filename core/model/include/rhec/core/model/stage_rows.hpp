@@ -14,6 +14,7 @@ struct IntervalRows {
   std::ptrdiff_t z_step = 0;  ///< distance between the rows of consecutive intervals
   bool ramp = false;
   const double* durations = nullptr;
+  const double* data = nullptr;  ///< n_d entries per interval, without padding
   int substeps = 1;
   double* next_states = nullptr;
   std::ptrdiff_t next_step = 0;

@@ -24,7 +24,7 @@ inline constexpr std::uint64_t kManifestMagic = 0x47554C5043454852u;
 inline constexpr std::uint32_t kManifestAbi = 1;
 /// Incremented when an interface that plugins implement or receive changes: Model, Blocking, Solver, Prior,
 /// Settings, OptionRow.
-inline constexpr std::uint32_t kInterfaceRevision = 3;
+inline constexpr std::uint32_t kInterfaceRevision = 4;
 /// The name of the one symbol that a plugin exports.
 inline constexpr const char* kManifestSymbol = "rhec_plugin_manifest";
 

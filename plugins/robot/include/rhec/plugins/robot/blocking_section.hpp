@@ -20,6 +20,8 @@ class RHEC_EXPORT BlockingSection {
   /// The row of a parameter; `otherwise`, if not empty, replaces the default plugin's name.
   static OptionRow row(const std::string& otherwise = {});
 
+  /// Whether any parameter's blocking is given.
+  bool is_given() const noexcept { return !section_.members().empty(); }
   /// One per parameter.
   std::vector<std::shared_ptr<const Blocking>> make() const;
   /// Throws Error if one of them does not support this horizon; `key` is the key that sets it.

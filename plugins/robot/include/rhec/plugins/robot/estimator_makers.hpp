@@ -31,9 +31,10 @@ struct RHEC_EXPORT EstimatorParts {
   int horizon, substeps, heading_starts;
   ArrivalKind arrival;
   std::vector<RobustLoss> robust;
-  std::vector<ParameterWalk> walks;    ///< one per parameter
-  Eigen::VectorXd initial_mean;        ///< of [x; p]
-  Eigen::MatrixXd initial_covariance;  ///< of [x; p]
+  std::vector<ParameterWalk> walks;                             ///< one per parameter
+  Eigen::VectorXd initial_mean;                                 ///< of [x; p]
+  Eigen::MatrixXd initial_covariance;                           ///< of [x; p]
+  std::vector<PriorBank::Setup::Knowledge> initial_parameters;  ///< what the section gives of them
   PriorsSection priors;
   BankOptions bank;
   BlockingSection blocking;

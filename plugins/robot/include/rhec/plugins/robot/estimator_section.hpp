@@ -33,6 +33,8 @@ class RHEC_EXPORT EstimatorSection {
 
   const EstimatorOptions& options() const noexcept { return options_; }
   PluginChoice solver_choice() const;
+  /// The priors of a parameter as written, e.g. "auto" or "walk, matern".
+  std::string priors_text(int parameter) const { return parts_.priors.text(parameter); }
   /// Replaces the makers.
   void use(EstimatorMakers makers) { makers_ = std::move(makers); }
 

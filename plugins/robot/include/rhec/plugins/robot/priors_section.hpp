@@ -19,6 +19,11 @@ class RHEC_EXPORT PriorsSection {
 
   /// The members of a bank: all combinations.
   std::vector<PriorCombination> combinations() const;
+  /// Whether any parameter's prior is given, and not `auto`.
+  bool is_given() const;
+  const Settings& section() const noexcept { return section_; }
+  /// Names of a parameter's priors, e.g. "auto" or "walk, matern".
+  std::string text(int parameter) const;
 
  private:
   std::shared_ptr<const RobotContext> context_;

@@ -62,6 +62,10 @@ class RHEC_EXPORT Robot {
   const std::vector<double>& input_sigmas() const noexcept { return context_->noise.input_sigmas; }
   /// The model's description, with the bounds of this configuration.
   const ModelDescription& bounded_description() const noexcept { return context_->about; }
+  /// Whether the section `blocking` gives any; else a window's parameters follow the priors of `estimator.priors`.
+  bool has_blockings() const noexcept { return blocking_.is_given(); }
+  /// The priors of a parameter as written, e.g. "auto".
+  std::string priors_text(int parameter) const { return estimator_.priors_text(parameter); }
   /// Of the section `blocking`, by parameter.
   std::vector<std::shared_ptr<const Blocking>> make_blockings() const { return blocking_.make(); }
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "rhec/core/estimation/receding_horizon_estimation.hpp"
+#include "rhec/core/estimation/windowed_estimation.hpp"
 #include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/robot/robot.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"

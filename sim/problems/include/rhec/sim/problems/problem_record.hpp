@@ -60,6 +60,11 @@ struct ProblemRecord {
   /// By parameter, for each of its block_starts: variance of the jump from the previous block; infinite if unlinked.
   std::map<std::string, std::vector<double>> neighbour_variance;
 
+  /// By parameter that is a process (ProcessModel): its number of states. Then arrival, weights and bounds are those of
+  /// [x; z] and [u; w], and `data` has the processes of each interval (N rows).
+  std::map<std::string, int> processes;
+  Rows data;
+
   // RHC
   std::vector<double> initial_state, parameters;
   std::map<std::string, std::vector<double>> reference;  ///< N+1 values per state, N per input

@@ -1,0 +1,73 @@
+#include "rhec/core/estimation/bank_history.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rhec/core/base/assertion.hpp"
+
+namespace rhec {
+
+BankHistory::BankHistory(PriorBank bank, int nodes)
+    : bank_(std::move(bank)),
+      nu_(static_cast<std::size_t>(bank_.model().input_count())),
+      ny_(static_cast<std::size_t>(bank_.model().output_count())),
+      intervals_(static_cast<std::size_t>(std::max(nodes, 1))),
+      inputs_(intervals_.size() * nu_),
+      outputs_(intervals_.size() * ny_),
+      predicted_(intervals_.size() * bank_.state_size()) {}
+
+void BankHistory::begin_node(const double* outputs) noexcept {
+  const std::size_t at = place(newest_);
+  std::copy_n(outputs, ny_, outputs_.data() + at * ny_);
+  bank_.save(predicted_.data() + at * bank_.state_size());
+  bank_.update(outputs);
+  count_ = std::min(count_ + 1, static_cast<int>(intervals_.size()));
+}
+
+void BankHistory::start(const double* outputs, std::int64_t number) noexcept {
+  newest_ = number;
+  count_ = 0;
+  intervals_[place(number)] = {};
+  begin_node(outputs);
+}
+
+void BankHistory::add(double duration, const double* inputs, const double* outputs) noexcept {
+  RHEC_ASSERT(newest_ >= 0, "`start` comes first");
+  bank_.predict(inputs, duration);
+  ++newest_;
+  const std::size_t at = place(newest_);
+  intervals_[at] = {duration, bank_.distance()};
+  std::copy_n(inputs, nu_, inputs_.data() + at * nu_);
+  begin_node(outputs);
+}
+
+bool BankHistory::amend(int back, const double* outputs) noexcept {
+  if (back < 0 || back >= count_) return false;
+  const std::int64_t amended = newest_ - back;
+  double* const known = outputs_.data() + place(amended) * ny_;
+  for (std::size_t j = 0; j < ny_; ++j)
+    if (!std::isnan(outputs[j])) known[j] = outputs[j];
+  bank_.restore(predicted_.data() + place(amended) * bank_.state_size());
+  bank_.update(known);
+  for (std::int64_t number = amended + 1; number <= newest_; ++number) {
+    const std::size_t at = place(number);
+    bank_.predict(inputs_.data() + at * nu_, intervals_[at].duration);
+    intervals_[at].distance = bank_.distance();
+    bank_.save(predicted_.data() + at * bank_.state_size());
+    bank_.update(outputs_.data() + at * ny_);
+  }
+  return true;
+}
+
+BankHistory::Node BankHistory::node(std::int64_t number) const noexcept {
+  RHEC_ASSERT(number <= newest_ && number > newest_ - count_, "a node that is remembered");
+  const std::size_t at = place(number);
+  return {.duration = intervals_[at].duration,
+          .distance = intervals_[at].distance,
+          .inputs = inputs_.data() + at * nu_,
+          .outputs = outputs_.data() + at * ny_,
+          .predicted = predicted_.data() + at * bank_.state_size()};
+}
+
+}  // namespace rhec

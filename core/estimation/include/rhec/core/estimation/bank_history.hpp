@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rhec/core/base/aligned.hpp"
+#include "rhec/core/estimation/prior_bank.hpp"
+
+namespace rhec {
+
+/// A bank of filters that remembers its last nodes: their measurements, and its moments before each of these was used.
+/// So late measurements are used as if they had come in time, by filtering anew from their node on; and a window finds
+/// what was known before its first node.
+///
+/// Nodes count from 0, the start of the run. Allocates in its constructor only.
+class RHEC_EXPORT BankHistory {
+ public:
+  /// Remembers the last `nodes` nodes (at least 1).
+  BankHistory(PriorBank bank, int nodes);
+
+  PriorBank& bank() noexcept { return bank_; }
+  const PriorBank& bank() const noexcept { return bank_; }
+
+  /// The first node that is remembered, with its outputs (n_y, NaN where missing). The bank was reset before.
+  void start(const double* outputs, std::int64_t number = 0) noexcept;
+  /// The next node, `duration` [s] after the last, with the input measured in between (n_u).
+  void add(double duration, const double* inputs, const double* outputs) noexcept;
+  /// Adds outputs to the node `back` before the newest one; where there are some already, they are replaced. Returns
+  /// false if that node is forgotten.
+  bool amend(int back, const double* outputs) noexcept;
+
+  std::int64_t newest() const noexcept { return newest_; }
+  /// How many nodes are remembered.
+  int count() const noexcept { return count_; }
+
+  struct Node {
+    double duration = 0.0, distance = 0.0;  ///< of the interval before the node [s, m]
+    const double *inputs, *outputs;         ///< n_u on that interval, n_y
+    const double* predicted;                ///< PriorBank::save before the outputs were used
+  };
+  /// A node that is remembered.
+  Node node(std::int64_t number) const noexcept;
+
+ private:
+  struct Interval {
+    double duration = 0.0, distance = 0.0;
+  };
+  std::size_t place(std::int64_t number) const noexcept {
+    return static_cast<std::size_t>(number % static_cast<std::int64_t>(intervals_.size()));
+  }
+  void begin_node(const double* outputs) noexcept;
+
+  PriorBank bank_;
+  std::size_t nu_, ny_;
+  std::vector<Interval> intervals_;
+  std::vector<double> inputs_, outputs_;
+  AlignedDoubles predicted_;
+  std::int64_t newest_ = -1;
+  int count_ = 0;
+};
+
+}  // namespace rhec

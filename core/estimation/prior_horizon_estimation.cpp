@@ -1,0 +1,271 @@
+#include "rhec/core/estimation/prior_horizon_estimation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "node_covariance.hpp"
+#include "rhec/core/base/assertion.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/qp/kkt.hpp"
+
+namespace rhec {
+namespace {
+
+/// A law must be so much more probable than the present one to take its place: the window then needs another
+/// linearisation, and its solution jumps a little.
+constexpr double advantage = 2.0;
+
+std::shared_ptr<const ProcessModel> make_process_model(const std::shared_ptr<const Model>& vehicle,
+                                                       const PriorBank& bank) {
+  std::vector<int> counts(vehicle->parameter_count());
+  for (int j = 0; j < vehicle->parameter_count(); ++j) counts[j] = bank.process_states(j);
+  return std::make_shared<ProcessModel>(vehicle, std::move(counts));
+}
+
+RheProblem make_problem(std::shared_ptr<const ProcessModel> model, RheProblem::Setup setup) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const ModelDescription& vehicle = model->vehicle().description();
+  const auto fill_up = [](std::vector<double>& bounds, const std::vector<Variable>& variables, auto bound) {
+    if (bounds.empty())
+      for (const Variable& variable : variables) bounds.push_back(bound(variable));
+  };
+  fill_up(setup.state_lower, vehicle.states, [](const Variable& v) { return v.lower; });
+  fill_up(setup.state_upper, vehicle.states, [](const Variable& v) { return v.upper; });
+  fill_up(setup.parameter_lower, vehicle.parameters, [](const Variable& v) { return v.lower; });
+  fill_up(setup.parameter_upper, vehicle.parameters, [](const Variable& v) { return v.upper; });
+  for (std::size_t j = 0; j < vehicle.parameters.size(); ++j) {
+    const auto states = static_cast<std::size_t>(model->process_states(static_cast<int>(j)));
+    setup.state_lower.push_back(setup.parameter_lower[j]);
+    setup.state_upper.push_back(setup.parameter_upper[j]);
+    setup.state_lower.resize(setup.state_lower.size() + states - 1, -infinity);
+    setup.state_upper.resize(setup.state_upper.size() + states - 1, infinity);
+    setup.input_weights.resize(setup.input_weights.size() + states, 1.0);
+    if (!setup.input_lower.empty()) {
+      setup.input_lower.resize(setup.input_lower.size() + states, -infinity);
+      setup.input_upper.resize(setup.input_upper.size() + states, infinity);
+    }
+  }
+  setup.parameter_lower.clear();
+  setup.parameter_upper.clear();
+  setup.one_block.clear();
+  return {std::move(model), std::move(setup)};
+}
+
+BankEstimation::Setup with_memory(BankEstimation::Setup filters, int horizon) {
+  filters.remembered_nodes = std::max(filters.remembered_nodes, horizon + 1);
+  return filters;
+}
+
+}  // namespace
+
+PriorHorizonEstimation::PriorHorizonEstimation(const std::shared_ptr<const Model>& model,
+                                               std::shared_ptr<Solver> solver, Setup setup)
+    : filters_(model, with_memory(setup.filters, setup.problem.max_intervals)),
+      process_model_(make_process_model(model, filters_.bank())),
+      problem_(make_problem(process_model_, setup.problem)),
+      solver_(std::move(solver)),
+      covariance_(std::make_unique<NodeCovariance>(problem_)),
+      shifter_(problem_),
+      point_(problem_.capacity()),
+      trial_(problem_.capacity()),
+      best_(problem_.capacity()),
+      parameter_lower_(setup.filters.parameter_lower),
+      parameter_upper_(setup.filters.parameter_upper) {
+  if (const std::string reason = solver_->why_not(problem_); !reason.empty())
+    throw Error("estimator: the solver cannot take this problem: " + reason);
+  solver_->setup(problem_);
+  const int nx = model->state_count(), np = model->parameter_count(), n = process_model_->state_count();
+  scratch_.assign(problem_.scratch_size(), 0.0);
+  advances_.resize(setup.problem.max_intervals);
+  known_data_.assign(advances_.size() * process_model_->data_count(), 0.0);
+  for (int j = 0; j < nx; ++j) entries_.push_back(j);
+  for (int j = 0; j < np; ++j) entries_.push_back(process_model_->first_state(j));
+  mean_ = member_mean_ = shift_ = Eigen::VectorXd::Zero(nx + np);
+  mixture_ = member_covariance_ = Eigen::MatrixXd::Zero(nx + np, nx + np);
+  scale_ = Eigen::VectorXd::Zero(n);
+  predicted_ = scaled_ = inverse_ = Eigen::MatrixXd::Zero(n, n);
+  factor_ = Eigen::LLT<Eigen::MatrixXd>(n);
+  reset();
+}
+
+PriorHorizonEstimation::~PriorHorizonEstimation() = default;
+
+void PriorHorizonEstimation::reset() noexcept {
+  filters_.reset();
+  solver_->reset();
+  shifter_.forget();
+  window_ = {};
+  has_window_ = false;
+  law_ = 0;
+  std::fill(advances_.begin(), advances_.end(), Advance{});
+}
+
+void PriorHorizonEstimation::start(const double* outputs) noexcept {
+  reset();
+  filters_.start(outputs);
+}
+
+void PriorHorizonEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+  filters_.add_node(duration, inputs, outputs);
+}
+
+bool PriorHorizonEstimation::amend(int back, const double* outputs) noexcept { return filters_.amend(back, outputs); }
+
+void PriorHorizonEstimation::choose_law() noexcept {
+  const auto weights = bank().weights();
+  const auto best = std::max_element(weights.begin(), weights.end());
+  if (*best > advantage * weights[law_]) law_ = static_cast<int>(best - weights.begin());
+}
+
+void PriorHorizonEstimation::fill_interval(int interval, std::int64_t number) noexcept {
+  const BankHistory::Node node = filters_.history().node(number);
+  const int nu = model().input_count();
+  problem_.set_duration(interval, node.duration);
+  double* const inputs = problem_.measured_input(interval);
+  std::copy_n(node.inputs, nu, inputs);
+  std::fill(inputs + nu, inputs + process_model_->input_count(), 0.0);
+  std::copy_n(node.outputs, model().output_count(), problem_.output(interval + 1));
+  const auto place = static_cast<std::size_t>(number % static_cast<std::int64_t>(advances_.size()));
+  double* const data = known_data_.data() + place * process_model_->data_count();
+  const Advance advance{number, law_, node.duration, node.distance};
+  if (advances_[place] != advance) {
+    for (int j = 0; j < model().parameter_count(); ++j)
+      filters_.history().bank().write_process(law_, j, node.duration, node.distance, processes().process_data(j, data));
+    advances_[place] = advance;
+  }
+  std::copy_n(data, process_model_->data_count(), problem_.interval_data(interval));
+}
+
+/// Mean and information of [x; z] before the first node's outputs, from what the bank has saved there.
+void PriorHorizonEstimation::write_arrival(const double* saved) noexcept {
+  filters_.history().bank().saved_moments(saved, law_, problem_.arrival_mean, predicted_);
+  const Eigen::Index n = predicted_.rows();
+  for (Eigen::Index j = 0; j < n; ++j) scale_[j] = std::sqrt(std::max(predicted_(j, j), 1e-30));
+  // A covariance of full rank may lose it in rounding, if its correlations are almost 1.
+  for (const double added : {0.0, 1e-12, 1e-9, 1e-6}) {
+    for (Eigen::Index c = 0; c < n; ++c)
+      for (Eigen::Index r = 0; r < n; ++r)
+        scaled_(r, c) = predicted_(r, c) / (scale_[r] * scale_[c]) + (r == c ? added : 0.0);
+    factor_.compute(scaled_);
+    if (factor_.info() == Eigen::Success) break;
+  }
+  inverse_.setIdentity();
+  factor_.solveInPlace(inverse_);
+  for (Eigen::Index c = 0; c < n; ++c)
+    for (Eigen::Index r = 0; r < n; ++r)
+      problem_.arrival_information(r, c) = 0.5 * (inverse_(r, c) + inverse_(c, r)) / (scale_[r] * scale_[c]);
+}
+
+void PriorHorizonEstimation::fill_window() noexcept {
+  BankHistory& history = filters_.history();
+  const int N = std::min(problem_.capacity().intervals, history.count() - 1);
+  const Window next{history.newest() - N, N};
+  const std::int64_t steps = next.first - window_.first;
+  const bool has_guess = has_window_ && window_.intervals > 0 && steps < window_.intervals;
+  if (has_guess) shifter_.take(problem_, std::move(point_));
+  window_ = next;
+  has_window_ = true;
+  problem_.set_intervals(N);
+  const BankHistory::Node first = history.node(next.first);
+  std::copy_n(first.outputs, model().output_count(), problem_.output(0));
+  for (int i = 0; i < N; ++i) fill_interval(i, next.first + i + 1);
+  write_arrival(first.predicted);
+  problem_.finish();
+  if (!has_guess || !shifter_.apply(static_cast<int>(steps), problem_, point_)) start_cold();
+}
+
+/// Cold start: the arrival's mean, rolled out with the measured inputs and without process noise.
+void PriorHorizonEstimation::start_cold() noexcept {
+  const int inputs = process_model_->input_count();
+  for (int j = 0; j < process_model_->state_count(); ++j)
+    point_.state(0)[j] =
+        std::min(std::max(problem_.arrival_mean[j], problem_.state_lower(0)[j]), problem_.state_upper(0)[j]);
+  for (int i = 0; i < window_.intervals; ++i) {
+    for (int j = 0; j < inputs; ++j) {
+      const double measured = problem_.measured_input(i)[j];
+      point_.control(i)[j] = std::isnan(measured) ? 0.0 : measured;
+    }
+  }
+  point_.clear_multipliers();
+  problem_.simulate(point_, scratch_);
+}
+
+bool PriorHorizonEstimation::arrival(double* mean, double* sigma) const noexcept {
+  for (std::size_t j = 0; j < entries_.size(); ++j) {
+    mean[j] = problem_.arrival_mean[entries_[j]];
+    sigma[j] = scale_[entries_[j]];
+  }
+  return true;
+}
+
+/// The objective with the states simulated from the first one, i.e. without defects.
+double PriorHorizonEstimation::objective_from_start(const Iterate& iterate) noexcept {
+  trial_ = iterate;
+  problem_.simulate(trial_, scratch_);
+  const double objective = problem_.evaluate(trial_, nullptr, scratch_);
+  return std::isnan(objective) ? std::numeric_limits<double>::infinity() : objective;
+}
+
+/// A solve that failed, or that the prior explains better, had a bad guess: solve again from the prior.
+void PriorHorizonEstimation::reconsider(Report& report, Clock::time_point deadline) noexcept {
+  const double found =
+      is_usable(report.status) ? objective_from_start(point_) : std::numeric_limits<double>::infinity();
+  best_ = point_;
+  start_cold();
+  if (!is_usable(report.status)) solver_->reset();
+  if (!(problem_.evaluate(point_, nullptr, scratch_) < found)) {
+    point_ = best_;
+    return;
+  }
+  const int iterations = report.iterations;
+  report = solver_->solve(point_, deadline);
+  report.iterations += iterations;
+}
+
+/// The mixture of the bank, with the window in place of the filter of its law.
+void PriorHorizonEstimation::combine(Estimate& result) noexcept {
+  const int N = window_.intervals, n = static_cast<int>(entries_.size()), ns = problem_.capacity().states;
+  const double weight = bank().weights()[law_];
+  bank().moments_of(law_, member_mean_, member_covariance_);
+  const double* const state = point_.state(N);
+  for (int j = 0; j < n; ++j) shift_[j] = state[entries_[j]] - member_mean_[j];
+  if (!shift_.allFinite()) {
+    result.fallback = true;
+    return;
+  }
+  mean_ += weight * shift_;
+  const double* const found = covariance_->find(problem_, *solver_, point_, N);
+  if (!found) return;
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < n; ++r)
+      mixture_(r, c) +=
+          weight * (found[static_cast<std::ptrdiff_t>(entries_[c]) * ns + entries_[r]] - member_covariance_(r, c));
+}
+
+void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
+  if (filters_.is_searching()) return filters_.estimate(result, deadline);
+  const int nx = model().state_count(), np = model().parameter_count();
+  filters_.history().bank().moments(mean_, mixture_);
+  choose_law();
+  fill_window();
+  result.report = solver_->solve(point_, deadline);
+  if (result.report.status != Status::solved) reconsider(result.report, deadline);
+  result.fallback = !is_usable(result.report.status);
+  result.predicted = false;
+  if (result.fallback) {
+    start_cold();
+    solver_->reset();
+  } else {
+    combine(result);
+  }
+  result.state = mean_.head(nx);
+  result.parameters = mean_.tail(np);
+  for (int j = 0; j < np; ++j)
+    result.parameters[j] = std::min(std::max(result.parameters[j], parameter_lower_[j]), parameter_upper_[j]);
+  result.covariance = mixture_;
+  RHEC_ASSERT(result.state.allFinite() && result.parameters.allFinite(), "an estimate is finite");
+}
+
+}  // namespace rhec

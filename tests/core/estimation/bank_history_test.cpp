@@ -1,0 +1,92 @@
+#include "rhec/core/estimation/bank_history.hpp"
+
+#include <gtest/gtest.h>
+
+#include "support/bank_case.hpp"
+
+namespace rhec {
+namespace {
+
+using namespace testing;
+
+BankHistory history_for(const std::shared_ptr<const Model>& model, int nodes, std::vector<RobustLoss> robust = {}) {
+  PriorBank::Setup setup = bank_setup(*model, linear_priors());
+  setup.memory = 3.0;
+  setup.robust = std::move(robust);
+  BankHistory history(PriorBank(model, setup), nodes);
+  history.bank().reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
+  return history;
+}
+
+double difference(BankHistory& a, BankHistory& b) {
+  Eigen::VectorXd mean_a, mean_b;
+  Eigen::MatrixXd covariance_a, covariance_b;
+  a.bank().moments(mean_a, covariance_a);
+  b.bank().moments(mean_b, covariance_b);
+  double largest =
+      std::max((mean_a - mean_b).cwiseAbs().maxCoeff(), (covariance_a - covariance_b).cwiseAbs().maxCoeff());
+  for (std::size_t m = 0; m < a.bank().weights().size(); ++m)
+    largest = std::max(largest, std::abs(a.bank().weights()[m] - b.bank().weights()[m]));
+  return largest;
+}
+
+TEST(BankHistory, UsesLateMeasurementsAsIfTheyHadComeInTime) {
+  const auto model = linear_model<Hovercraft>();
+  const auto samples = simulate(*model, 40, false, 3);
+  for (const int late : {0, 1, 4, 9}) {
+    BankHistory in_time = history_for(model, 10), too_late = history_for(model, 10);
+    const std::vector<double> nothing(3, nan);
+    in_time.start(samples[0].outputs.data());
+    too_late.start(samples[0].outputs.data());
+    for (int k = 1; k <= 40; ++k) {
+      const Sample& sample = samples[k];
+      in_time.add(sample.duration, sample.inputs.data(), sample.outputs.data());
+      too_late.add(sample.duration, sample.inputs.data(), nothing.data());
+      ASSERT_TRUE(k <= late || too_late.amend(late, samples[k - late].outputs.data())) << k;
+    }
+    for (int k = 40 - late + 1; k <= 40; ++k) ASSERT_TRUE(too_late.amend(40 - k, samples[k].outputs.data()));
+    EXPECT_LT(difference(in_time, too_late), 1e-12) << late;
+  }
+}
+
+TEST(BankHistory, ForgetsWhatIsOlderThanItsNodes) {
+  const auto model = linear_model<Hovercraft>();
+  const auto samples = simulate(*model, 10, false, 3);
+  BankHistory history = history_for(model, 4);
+  history.start(samples[0].outputs.data(), 7);
+  EXPECT_EQ(history.newest(), 7);
+  EXPECT_FALSE(history.amend(1, samples[0].outputs.data()));
+  for (int k = 1; k <= 10; ++k) history.add(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
+  EXPECT_EQ(history.newest(), 17);
+  EXPECT_EQ(history.count(), 4);
+  EXPECT_TRUE(history.amend(3, samples[7].outputs.data()));
+  EXPECT_FALSE(history.amend(4, samples[6].outputs.data()));
+  EXPECT_FALSE(history.amend(-1, samples[6].outputs.data()));
+  EXPECT_EQ(history.node(17).duration, samples[10].duration);
+}
+
+/// A robust loss holds a fix back that is far off; the rest goes on as it was.
+TEST(BankHistory, BoundsTheInfluenceOfAnOutlier) {
+  const auto model = linear_model<Hovercraft>();
+  const auto shift_by = [&](double error, std::vector<RobustLoss> robust) {
+    BankHistory clean = history_for(model, 4, robust), spoilt = history_for(model, 4, robust);
+    auto samples = simulate(*model, 30, false, 3);
+    samples[29].outputs = {samples[28].outputs[0], 0.2, 0.1};
+    clean.start(samples[0].outputs.data());
+    spoilt.start(samples[0].outputs.data());
+    for (int k = 1; k <= 29; ++k) {
+      clean.add(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
+      if (k == 29) samples[k].outputs[0] += error;
+      spoilt.add(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
+    }
+    return difference(clean, spoilt);
+  };
+  const std::vector<RobustLoss> robust = {{{0}, 3.0}};
+  const double quadratic = shift_by(1000.0, {}), bounded = shift_by(1000.0, robust);
+  EXPECT_LT(bounded, 0.05 * quadratic);
+  // Its influence grows no further with the error.
+  EXPECT_LT(shift_by(10000.0, robust), 1.5 * bounded);
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,206 @@
+#include "rhec/core/prior/process_model.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/model/formula_model.hpp"
+#include "support/error_of.hpp"
+
+namespace rhec {
+namespace {
+
+/// Not linear in anything.
+struct Cart {
+  static constexpr int state_count = 3, input_count = 2, parameter_count = 2, output_count = 2;
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::cos;
+    using std::sin;
+    dxdt[0] = u[0] * p[0] * cos(x[2]);
+    dxdt[1] = u[0] * p[0] * sin(x[2]);
+    dxdt[2] = p[1] * u[1] * p[0];
+  }
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    using std::sin;
+    y[0] = x[0] * x[1];
+    y[1] = sin(x[2]);
+  }
+};
+
+std::shared_ptr<const Model> cart() {
+  ModelDescription about;
+  about.name = "cart";
+  about.states.resize(3);
+  about.inputs.resize(2);
+  about.parameters.resize(2);
+  about.outputs.resize(2);
+  about.parameters[0].name = "kappa";
+  about.parameters[0].upper = 1.0;
+  about.parameters[1].name = "mu";
+  about.roles.speed_factor = 0;
+  return std::make_shared<FormulaModel<Cart>>(Cart{}, about);
+}
+
+/// Three states for kappa, which runs to its next value, and one for mu, which is held.
+class ProcessModelTest : public ::testing::Test {
+ protected:
+  static constexpr int n = 7, inputs = 6, variables = n + inputs;
+  const ProcessModel model{cart(), {3, 1}};
+  std::mt19937 random{5};
+  std::vector<double> numbers(int count) {
+    std::uniform_real_distribution<double> uniform(0.2, 1.0);
+    std::vector<double> values(count);
+    for (double& value : values) value = uniform(random);
+    return values;
+  }
+  std::vector<double> data() {
+    std::vector<double> values = numbers(model.data_count());
+    *model.process_data(0, values.data()) = 1.0;
+    *model.process_data(1, values.data()) = 0.0;
+    return values;
+  }
+};
+
+TEST_F(ProcessModelTest, DescribesTheVehicleWithItsProcesses) {
+  EXPECT_EQ(model.state_count(), n);
+  EXPECT_EQ(model.input_count(), inputs);
+  EXPECT_EQ(model.parameter_count(), 0);
+  EXPECT_EQ(model.data_count(), 1 + 2 * 9 + 1 + 2);
+  EXPECT_EQ(model.description().parameter_states, (std::vector<int>{3, 6}));
+  EXPECT_EQ(model.description().states[3].name, "kappa");
+  EXPECT_EQ(model.description().states[3].upper, 1.0);
+  EXPECT_EQ(model.description().states[6].name, "mu");
+  EXPECT_EQ(model.description().roles.speed_factor, -1);
+}
+
+TEST_F(ProcessModelTest, MovesTheVehicleWithParametersThatMove) {
+  const auto s = numbers(n), v = numbers(inputs), d = data();
+  const double duration = 0.3;
+  std::vector<double> next(n);
+  model.integrate({.count = 1,
+                   .states = s.data(),
+                   .inputs = v.data(),
+                   .durations = &duration,
+                   .data = d.data(),
+                   .next_states = next.data()});
+  using Matrix = Eigen::Map<const Eigen::Matrix3d>;
+  const Eigen::Vector3d z(s[3], s[4], s[5]), w(v[2], v[3], v[4]);
+  const Eigen::Vector3d expected = Matrix(d.data() + 1) * z + Matrix(d.data() + 10) * w;
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(next[3 + k], expected[k], 1e-14);
+  EXPECT_NEAR(next[6], d[20] * s[6] + d[21] * v[5], 1e-14);
+  const double p[] = {s[3], s[6]}, p_end[] = {expected[0], s[6]};  // kappa runs, mu is held
+  double x[3];
+  cart()->integrate({.count = 1,
+                     .states = s.data(),
+                     .inputs = v.data(),
+                     .parameters = p,
+                     .parameters_end = p_end,
+                     .durations = &duration,
+                     .next_states = x});
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(next[k], x[k]);
+}
+
+TEST_F(ProcessModelTest, HasTheDerivativesOfItsOwnResults) {
+  constexpr int count = 40;  // more than are evaluated at once
+  std::vector<double> s, v, d, durations(count, 0.2), multipliers;
+  const auto append = [](std::vector<double>& to, const std::vector<double>& more) {
+    to.insert(to.end(), more.begin(), more.end());
+  };
+  for (int i = 0; i < count; ++i) append(s, numbers(n)), append(v, numbers(inputs)), append(d, data());
+  append(multipliers, numbers(count * n));
+  std::vector<double> jacobians(count * n * variables), hessians(count * variables * variables);
+  model.integrate({.count = count,
+                   .states = s.data(),
+                   .inputs = v.data(),
+                   .durations = durations.data(),
+                   .data = d.data(),
+                   .jacobians = jacobians.data(),
+                   .multipliers = multipliers.data(),
+                   .hessians = hessians.data()});
+  const auto jacobian_at = [&](const std::vector<double>& states, const std::vector<double>& controls) {
+    std::vector<double> result(jacobians.size());
+    model.integrate({.count = count,
+                     .states = states.data(),
+                     .inputs = controls.data(),
+                     .durations = durations.data(),
+                     .data = d.data(),
+                     .jacobians = result.data()});
+    return result;
+  };
+  const auto next_at = [&](const std::vector<double>& states, const std::vector<double>& controls) {
+    std::vector<double> result(count * n);
+    model.integrate({.count = count,
+                     .states = states.data(),
+                     .inputs = controls.data(),
+                     .durations = durations.data(),
+                     .data = d.data(),
+                     .next_states = result.data()});
+    return result;
+  };
+  constexpr double h = 1e-6;
+  for (int k = 0; k < variables; ++k) {
+    auto s_plus = s, s_minus = s, v_plus = v, v_minus = v;
+    for (int i = 0; i < count; ++i) {
+      if (k < n)
+        s_plus[i * n + k] += h, s_minus[i * n + k] -= h;
+      else
+        v_plus[i * inputs + k - n] += h, v_minus[i * inputs + k - n] -= h;
+    }
+    const auto plus = next_at(s_plus, v_plus), minus = next_at(s_minus, v_minus);
+    const auto J_plus = jacobian_at(s_plus, v_plus), J_minus = jacobian_at(s_minus, v_minus);
+    for (int i = 0; i < count; ++i) {
+      for (int r = 0; r < n; ++r)
+        ASSERT_NEAR(jacobians[(i * variables + k) * n + r], (plus[i * n + r] - minus[i * n + r]) / (2 * h), 1e-8)
+            << i << " " << r << " " << k;
+      for (int c = 0; c < variables; ++c) {
+        double expected = 0.0;
+        for (int r = 0; r < n; ++r)
+          expected += multipliers[i * n + r] *
+                      (J_plus[(i * variables + c) * n + r] - J_minus[(i * variables + c) * n + r]) / (2 * h);
+        ASSERT_NEAR(hessians[(i * variables + k) * variables + c], expected, 1e-7) << i << " " << k << " " << c;
+      }
+    }
+  }
+}
+
+TEST_F(ProcessModelTest, SeesWhatTheVehicleSees) {
+  const auto s = numbers(2 * n), multipliers = numbers(4);
+  std::vector<double> y(4), J(2 * 2 * n), H(2 * n * n), vehicle_y(2), vehicle_J(6), vehicle_H(9);
+  model.observe({.count = 2,
+                 .states = s.data(),
+                 .outputs = y.data(),
+                 .jacobians = J.data(),
+                 .multipliers = multipliers.data(),
+                 .hessians = H.data()});
+  for (int i = 0; i < 2; ++i) {
+    cart()->observe({.count = 1,
+                     .states = s.data() + i * n,
+                     .outputs = vehicle_y.data(),
+                     .jacobians = vehicle_J.data(),
+                     .multipliers = multipliers.data() + 2 * i,
+                     .hessians = vehicle_H.data()});
+    for (int j = 0; j < 2; ++j) {
+      EXPECT_EQ(y[i * 2 + j], vehicle_y[j]);
+      for (int c = 0; c < n; ++c) EXPECT_EQ(J[(i * n + c) * 2 + j], c < 3 ? vehicle_J[c * 2 + j] : 0.0);
+    }
+    for (int c = 0; c < n; ++c)
+      for (int r = 0; r < n; ++r) EXPECT_EQ(H[(i * n + c) * n + r], c < 3 && r < 3 ? vehicle_H[c * 3 + r] : 0.0);
+  }
+}
+
+TEST(ProcessModel, RefusesWhatItCannotHold) {
+  EXPECT_THAT(error_of([] { ProcessModel(cart(), {1}); }), ::testing::HasSubstr("expected 2, one a parameter"));
+  EXPECT_THAT(error_of([] { ProcessModel(cart(), {1, 9}); }), ::testing::HasSubstr("expected 1 to 4"));
+  const auto inner = std::make_shared<ProcessModel>(cart(), std::vector<int>{1, 1});
+  EXPECT_THAT(error_of([&] { ProcessModel(inner, {}); }), ::testing::HasSubstr("depends on data of the interval"));
+}
+
+}  // namespace
+}  // namespace rhec
