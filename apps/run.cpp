@@ -28,6 +28,29 @@ struct RunArguments {
   DumpArguments dump;
 };
 
+/// How sure the estimator is, and whether that is right.
+void print_certainty(const sim::RunSummary& summary) {
+  const char* words = "";
+  switch (summary.certainty) {
+    case sim::Certainty::unknown:
+      return;
+    case sim::Certainty::too_certain:
+      words = "errors are larger than the covariance says; do not rely on it";
+      break;
+    case sim::Certainty::right:
+      words = "the covariance is about right";
+      break;
+    case sim::Certainty::too_cautious:
+      words = "errors are much smaller than the covariance says";
+      break;
+  }
+  fmt::print("{:<12} {:>12} {:>12}\n", "CERTAINTY", "WITHIN 2 SD", "EXPECTED");
+  for (const auto& [name, unused] : summary.mae.parameters)
+    if (const auto share = summary.within_two_sigma.find(name); share != summary.within_two_sigma.end())
+      fmt::print("{:<12} {:>10.0f} % {:>10} %\n", name, 100.0 * share->second, 95);
+  fmt::print("{:<12} {:>12.1f} {:>12}   {}\n\n", "NEES", summary.nees, summary.nees_expected, words);
+}
+
 void print_table(const sim::RunSummary& summary, const std::filesystem::path& folder) {
   fmt::print("{:<12} {:>12} {:>12}\n", "ERROR", "MEAN ABS", "RMS");
   for (const auto& [name, value] : summary.mae.parameters)
@@ -35,6 +58,7 @@ void print_table(const sim::RunSummary& summary, const std::filesystem::path& fo
   fmt::print("{:<12} {:>10.3f} m {:>10.3f} m\n", "position", summary.mae.position, summary.rmse.position);
   fmt::print("{:<12} {:>8.4f} rad {:>8.4f} rad\n", "heading", summary.mae.heading, summary.rmse.heading);
   fmt::print("{:<12} {:>10.3f} m {:>10.3f} m\n\n", "tracking", summary.mae.tracking, summary.rmse.tracking);
+  print_certainty(summary);
   fmt::print("{:<12} {:>12} {:>12} {:>12}\n", "SOLVE [us]", "MEDIAN", "P99", "MAX");
   const auto times = [](const char* name, const sim::Spread& t) {
     fmt::print("{:<12} {:>12.1f} {:>12.1f} {:>12.1f}\n", name, t.median, t.p99, t.max);

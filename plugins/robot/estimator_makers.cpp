@@ -7,6 +7,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/bank_estimation.hpp"
+#include "rhec/core/estimation/banked_covariance.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/core/estimation/prior_horizon_estimation.hpp"
 #include "rhec/plugins/robot/bounds_section.hpp"
@@ -39,7 +40,10 @@ std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& pa
   setup.initial_mean = parts.initial_mean;
   setup.initial_covariance = parts.initial_covariance;
   setup.heading_starts = parts.heading_starts;
-  return std::make_unique<RecedingHorizonEstimation>(parts.context->model, parts.make_solver(), std::move(setup));
+  auto blocks =
+      std::make_unique<RecedingHorizonEstimation>(parts.context->model, parts.make_solver(), std::move(setup));
+  if (!parts.has_bank_beside_blocks) return blocks;
+  return std::make_unique<BankedCovariance>(std::move(blocks), bank_setup(parts));
 }
 
 std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts) {

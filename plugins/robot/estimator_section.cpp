@@ -120,6 +120,9 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
       .integer("substeps", &E::substeps, "Runge-Kutta steps per interval", between(1, 1000))
       .integer("heading_starts", &E::heading_starts,
                "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
+      .choice("covariance", &E::covariance, {{"bank", BlockCovariance::bank}, {"blocks", BlockCovariance::blocks}},
+              "of a window with blocks: that of a bank of filters beside it, with the difference of the two estimates, "
+              "which holds; or that of the block model, which leaves out that parameters vary within a block")
       .map("arrival", &E::arrival, ArrivalOptions::table().schema())
       .map("process_noise", &E::process_noise, process_noise_by_name().rows())
       .map("restart_sigma", &E::restart_sigma, restart_sigma_by_name().rows())
@@ -149,6 +152,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
              .initial_parameters = {},
              .priors = PriorsSection(parts_.context, options_.priors),
              .bank = BankOptions::table().parse(options_.bank, "estimator: bank"),
+             .has_bank_beside_blocks = options_.covariance == BlockCovariance::bank,
              .blocking = std::move(blocking),
              .make_solver = {}} {
   const ModelDescription& about = parts_.context->about;

@@ -110,6 +110,21 @@ Spread spread_of_times(std::vector<double> times) {
   return times.empty() ? Spread{0.0, 0.0, 0.0} : spread_of(std::move(times));
 }
 
+// From where on a covariance is called wrong: NEES in units of its expected value, share within two deviations.
+constexpr double most_nees = 1.5, least_nees = 0.5, least_share = 0.9;
+
+/// Counts the states and parameters whose truth is within two standard deviations.
+void count_inside(const Sample& sample, const ModelDescription& about, std::vector<std::int64_t>& inside) {
+  const auto states = static_cast<Eigen::Index>(about.states.size());
+  for (Eigen::Index j = 0; j < std::ssize(inside); ++j) {
+    const bool is_state = j < states;
+    double error = is_state ? sample.state[j] - sample.true_state[j]
+                            : sample.parameters[j - states] - sample.true_parameters[j - states];
+    if (is_state && about.states[j].is_angle) error = angle_difference(sample.state[j], sample.true_state[j]);
+    inside[j] += std::abs(error) <= 2.0 * sample.sigma[j];
+  }
+}
+
 }  // namespace
 
 RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
@@ -208,6 +223,28 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   return log;
 }
 
+Certainty certainty_of(const RunSummary& summary) noexcept {
+  if (!std::isfinite(summary.nees)) return Certainty::unknown;
+  const bool covers = std::all_of(summary.within_two_sigma.begin(), summary.within_two_sigma.end(),
+                                  [](const auto& share) { return share.second >= least_share; });
+  if (summary.nees > most_nees * summary.nees_expected || !covers) return Certainty::too_certain;
+  return summary.nees < least_nees * summary.nees_expected ? Certainty::too_cautious : Certainty::right;
+}
+
+std::string_view name_of(Certainty certainty) noexcept {
+  switch (certainty) {
+    case Certainty::too_certain:
+      return "too certain";
+    case Certainty::right:
+      return "right";
+    case Certainty::too_cautious:
+      return "too cautious";
+    case Certainty::unknown:
+      break;
+  }
+  return "";
+}
+
 RunSummary summarise(const RunLog& log, const Scenario& scenario) {
   const ModelDescription& about = scenario.robot().model()->description();
   RunSummary summary;
@@ -219,6 +256,7 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
   std::map<Status, std::int64_t> estimator_statuses, controller_statuses;
   double nees = 0.0;
   std::int64_t with_nees = 0;
+  std::vector<std::int64_t> inside(about.states.size() + about.parameters.size(), 0);
   const bool solves_estimation = scenario.robot().estimator_options().name == "rhe";
   for (const Sample& sample : log.samples) {
     all.add(sample);
@@ -226,6 +264,7 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
     if (std::isfinite(sample.nees)) {
       nees += sample.nees;
       ++with_nees;
+      count_inside(sample, about, inside);
     }
     if (solves_estimation) {
       estimator_us.push_back(sample.estimator_us);
@@ -244,6 +283,13 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
   summary.rmse = all.root_mean_square();
   summary.mae_after_start = after_start.absolute();
   summary.nees = with_nees > 0 ? nees / static_cast<double>(with_nees) : std::numeric_limits<double>::quiet_NaN();
+  summary.nees_expected = static_cast<int>(inside.size());
+  for (std::size_t j = 0; j < inside.size() && with_nees > 0; ++j) {
+    const std::size_t states = about.states.size();
+    const Variable& variable = j < states ? about.states[j] : about.parameters[j - states];
+    summary.within_two_sigma[variable.name] = static_cast<double>(inside[j]) / static_cast<double>(with_nees);
+  }
+  summary.certainty = certainty_of(summary);
   summary.estimator_us = spread_of_times(std::move(estimator_us));
   summary.controller_us = spread_of_times(std::move(controller_us));
   return summary;

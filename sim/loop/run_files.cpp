@@ -125,6 +125,9 @@ Json json_of(const RunSummary& summary) {
   json["rmse"] = json_of(summary.rmse);
   json["mae_after_start"] = json_of(summary.mae_after_start);
   json["nees"] = summary.nees;  // null if unknown
+  json["nees_expected"] = summary.nees_expected;
+  json["within_two_sigma"] = summary.within_two_sigma;
+  json["certainty"] = summary.certainty == Certainty::unknown ? Json(nullptr) : Json(name_of(summary.certainty));
   json["solve_time_us"] = {{"rhe", json_of(summary.estimator_us)}, {"rhc", json_of(summary.controller_us)}};
   json["statuses"] = {{"rhe", summary.estimator_statuses}, {"rhc", summary.controller_statuses}};
   json["solves"] = summary.solves;

@@ -13,7 +13,8 @@ import tempfile
 import cli
 from cli import FIGURE8, FINE, SHORT, ZIGZAG, Program, assignments
 
-EXACT = {"steps", "completed", "mae", "rmse", "nees", "solve_time_us", "statuses", "fallbacks"}
+EXACT = {"steps", "completed", "mae", "rmse", "nees", "nees_expected", "within_two_sigma", "certainty", "solve_time_us", "statuses",
+         "fallbacks"}
 ERRORS = {"kappa", "mu", "position", "heading", "tracking"}
 TIMES = {"median", "p99", "max"}
 # name: scenario, settings, words that the summary's statuses and error bounds are judged by

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "rhec/core/ocp/solver_decorator.hpp"
 #include "support/linear_case.hpp"

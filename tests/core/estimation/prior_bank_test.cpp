@@ -1,9 +1,12 @@
 #include "rhec/core/estimation/prior_bank.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "rhec/core/base/error.hpp"

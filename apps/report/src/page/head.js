@@ -10,7 +10,8 @@ function highlights(document) {
   const {summary} = document;
   if (document.kind === "run") {
     const errors = Object.keys(summary.mae || {}).map((key) => [`mean error, ${key}`, summary.mae[key] === null ? "–" : `${number(summary.mae[key])}${errorUnits[key] ? ` ${errorUnits[key]}` : ""}`]);
-    return [["samples", count(summary.steps)], ["end of the path", summary.completed ? "reached" : "not reached"], ...errors,
+    const certainty = summary.certainty ? [["NEES", `${number(summary.nees)}, ${count(summary.nees_expected)} expected`], ["the estimator is", summary.certainty === "right" ? "as certain as it should be" : summary.certainty]] : [];
+    return [["samples", count(summary.steps)], ["end of the path", summary.completed ? "reached" : "not reached"], ...errors, ...certainty,
             ["fallbacks", `${count(summary.fallbacks)} of ${count(summary.solves)} solves`]];
   }
   if (document.kind === "sweep") {

@@ -37,6 +37,7 @@ struct RHEC_EXPORT EstimatorParts {
   std::vector<PriorBank::Setup::Knowledge> initial_parameters;  ///< what the section gives of them
   PriorsSection priors;
   BankOptions bank;
+  bool has_bank_beside_blocks;  ///< for their covariance
   BlockingSection blocking;
   std::function<std::shared_ptr<Solver>()> make_solver;  ///< makes the solver that the section names
 

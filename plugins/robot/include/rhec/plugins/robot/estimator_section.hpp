@@ -12,12 +12,16 @@
 
 namespace rhec {
 
+/// Which covariance an estimate by blocks has.
+enum class BlockCovariance { bank, blocks };
+
 /// The keys of the section `estimator`.
 struct RHEC_EXPORT EstimatorOptions {
   std::string name = "rhe";
   int horizon = RheProblem::Setup{}.max_intervals;
   int substeps = RheProblem::Setup{}.substeps;
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
+  BlockCovariance covariance = BlockCovariance::bank;
   Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, initial, robust, solver;
   static OptionTable<EstimatorOptions> table(const EstimatorMakers& makers);
 };

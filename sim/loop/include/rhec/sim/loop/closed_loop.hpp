@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rhec/sim/loop/scenario.hpp"
@@ -45,18 +46,30 @@ struct ErrorSummary {
   double heading = 0.0;                      ///< [rad]
   double tracking = 0.0;                     ///< distance of the true position from the path [m]
 };
+/// How an estimator's covariance compares with its errors.
+enum class Certainty { unknown, too_certain, right, too_cautious };
 struct RunSummary {
   std::int64_t steps = 0;
   bool completed = false;
   std::string ended;
   ErrorSummary mae, rmse;
-  ErrorSummary mae_after_start;        ///< without the first N_e samples
-  double nees = 0.0;                   ///< mean; its expected value is the number of states and parameters
+  ErrorSummary mae_after_start;  ///< without the first N_e samples
+  double nees = 0.0;             ///< mean
+  int nees_expected = 0;         ///< its expected value, the number of states and parameters
+  /// Share of the samples whose truth is within two standard deviations of the estimate, by state and parameter; empty
+  /// without a covariance. .954 is to be expected.
+  std::map<std::string, double> within_two_sigma;
+  Certainty certainty = Certainty::unknown;
   Spread estimator_us, controller_us;  ///< zeros without solves
   std::map<std::string, std::int64_t> estimator_statuses, controller_statuses;
   std::int64_t fallbacks = 0;  ///< solves with unusable results
   std::int64_t solves = 0;
 };
+/// Judges by the mean NEES, which may be from a half to three halves of the number of states and parameters, and by the
+/// shares within two standard deviations, of which none may be below nine tenths.
+RHEC_EXPORT Certainty certainty_of(const RunSummary& summary) noexcept;
+/// "too certain", "right", "too cautious"; empty if unknown.
+RHEC_EXPORT std::string_view name_of(Certainty certainty) noexcept;
 RHEC_EXPORT RunSummary summarise(const RunLog& log, const Scenario& scenario);
 
 }  // namespace rhec::sim

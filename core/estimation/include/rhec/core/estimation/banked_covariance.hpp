@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+
+#include "rhec/core/estimation/bank_estimation.hpp"
+#include "rhec/core/estimation/windowed_estimation.hpp"
+
+namespace rhec {
+
+/// A window of blocks with a covariance that contains what blocks leave out: that slip varies within each of them. A
+/// bank of filters runs beside the window. With its mean xbar and covariance Pbar, the error of the window's estimate x
+/// is that of xbar plus the known difference d = x - xbar, so that its second moment is Pbar + d d'. The block model's
+/// own covariance stays readable in `Estimate::own_covariance`.
+class RHEC_EXPORT BankedCovariance final : public WindowedEstimation {
+ public:
+  /// Throws Error as BankEstimation does.
+  BankedCovariance(std::unique_ptr<WindowedEstimation> blocks, const BankEstimation::Setup& bank);
+
+  const Model& model() const noexcept override { return blocks_->model(); }
+  int substeps() const noexcept override { return blocks_->substeps(); }
+  void start(const double* outputs) noexcept override;
+  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
+  /// False if the node is out of the window's reach. One that only the bank has forgotten is used by the window alone.
+  bool amend(int back, const double* outputs) noexcept override;
+  void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
+  void prepare() noexcept override { blocks_->prepare(); }
+  void reset() noexcept override;
+
+  bool has_window() const noexcept override { return blocks_->has_window(); }
+  const RheProblem& problem() const noexcept override { return blocks_->problem(); }
+  const Iterate& solution() const noexcept override { return blocks_->solution(); }
+  const Window& window() const noexcept override { return blocks_->window(); }
+  bool arrival(double* mean, double* sigma) const noexcept override { return blocks_->arrival(mean, sigma); }
+
+ private:
+  std::unique_ptr<WindowedEstimation> blocks_;
+  BankEstimation bank_;
+  Eigen::VectorXd mean_, difference_;
+  Eigen::MatrixXd covariance_;
+};
+
+}  // namespace rhec
