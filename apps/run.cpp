@@ -51,7 +51,25 @@ void print_certainty(const sim::RunSummary& summary) {
   fmt::print("{:<12} {:>12.1f} {:>12}   {}\n\n", "NEES", summary.nees, summary.nees_expected, words);
 }
 
-void print_table(const sim::RunSummary& summary, const std::filesystem::path& folder) {
+/// What an estimator has learnt of the noise of its sensors.
+void print_noise(const sim::RunSummary& summary, const sim::Scenario& scenario) {
+  if (summary.noise.empty()) return;
+  fmt::print("{:<12} {:>12} {:>12}\n", "NOISE", "LEARNT", "STATED");
+  const std::vector<Variable>& outputs = scenario.robot().model()->description().outputs;
+  for (std::size_t j = 0; j < outputs.size(); ++j) {
+    const auto learnt = summary.noise.find(outputs[j].name);
+    if (learnt == summary.noise.end()) continue;
+    const double stated = scenario.robot().output_sigmas()[j];
+    if (learnt->second.is_identified)
+      fmt::print("{:<12} {:>12.3g} {:>12.3g}\n", outputs[j].name, learnt->second.sigma, stated);
+    else
+      fmt::print("{:<12} {:>12} {:>12.3g}   held: the measurements do not tell it from slip and inputs\n",
+                 outputs[j].name, "-", stated);
+  }
+  fmt::print("\n");
+}
+
+void print_table(const sim::RunSummary& summary, const sim::Scenario& scenario, const std::filesystem::path& folder) {
   fmt::print("{:<12} {:>12} {:>12}\n", "ERROR", "MEAN ABS", "RMS");
   for (const auto& [name, value] : summary.mae.parameters)
     fmt::print("{:<12} {:>12.4f} {:>12.4f}\n", name, value, summary.rmse.parameters.at(name));
@@ -59,6 +77,7 @@ void print_table(const sim::RunSummary& summary, const std::filesystem::path& fo
   fmt::print("{:<12} {:>8.4f} rad {:>8.4f} rad\n", "heading", summary.mae.heading, summary.rmse.heading);
   fmt::print("{:<12} {:>10.3f} m {:>10.3f} m\n\n", "tracking", summary.mae.tracking, summary.rmse.tracking);
   print_certainty(summary);
+  print_noise(summary, scenario);
   fmt::print("{:<12} {:>12} {:>12} {:>12}\n", "SOLVE [us]", "MEDIAN", "P99", "MAX");
   const auto times = [](const char* name, const sim::Spread& t) {
     fmt::print("{:<12} {:>12.1f} {:>12.1f} {:>12.1f}\n", name, t.median, t.p99, t.max);
@@ -92,7 +111,7 @@ int run(const RunArguments& arguments) {
   folder.write("run.svg", sim::run_svg(log, scenario));
   folder.commit();
   dump.commit();
-  print_table(summary, folder.path());
+  print_table(summary, scenario, folder.path());
   dump.tell(arguments.plugin_path);
   return log.completed ? exit_fine : exit_not_solved;
 }

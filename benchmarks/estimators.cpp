@@ -1,6 +1,7 @@
 // Estimators beside each other on the same drives: each closed loop is driven by the estimator of a scenario, and
 // others see the same measurements. One line of JSON per drive and estimator: mean absolute errors, mean NEES, the
-// shares of samples whose truth lies within two standard deviations, and the median time of a sample.
+// shares of samples whose truth lies within two standard deviations, the median time of a sample, and standard
+// deviations of outputs that an estimator has learnt, relative to the true ones (null: not identified).
 //
 //     estimators --scenario scenarios/baseline/ekf.yaml --set speed=5 --set seed=7 --beside 'bank: estimator.name=bank'
 //
@@ -185,7 +186,13 @@ void run(const Arguments& arguments) {
                  other.estimates[i].covariance);
     const auto middle = other.microseconds.begin() + static_cast<std::ptrdiff_t>(other.microseconds.size() / 2);
     std::nth_element(other.microseconds.begin(), middle, other.microseconds.end());
-    fmt::print("{{\"estimator\": \"{}\", {}, \"median_us\": {:.4g}}}\n", other.name, errors.json(), *middle);
+    std::string noise;  // what has been learnt of it, relative to the true one
+    for (std::size_t j = 0; j < about.outputs.size(); ++j)
+      if (const auto learnt = other.estimator->method().output_noise(static_cast<int>(j)))
+        noise += fmt::format(
+            ", \"noise_{}\": {}", about.outputs[j].name,
+            learnt->is_identified ? fmt::format("{:.4g}", learnt->sigma / driver.robot().output_sigmas()[j]) : "null");
+    fmt::print("{{\"estimator\": \"{}\", {}, \"median_us\": {:.4g}{}}}\n", other.name, errors.json(), *middle, noise);
   }
 }
 

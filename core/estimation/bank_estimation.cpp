@@ -88,6 +88,12 @@ bool BankEstimation::amend(int back, const double* outputs) noexcept {
   return true;
 }
 
+std::optional<EstimationMethod::OutputNoise> BankEstimation::output_noise(int output) const noexcept {
+  if (!setup_.bank.adapts_noise) return {};
+  const PriorBank::Noise noise = bank().noise(output);
+  return OutputNoise{std::sqrt(noise.variance), noise.is_identified};
+}
+
 void BankEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   if (searching_) return search_->estimate(result, deadline);
   history_.bank().moments(mean_, covariance_);

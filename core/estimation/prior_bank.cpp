@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/kernels/bank_kernels.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
@@ -16,6 +17,9 @@
 namespace rhec {
 namespace {
 
+/// Variance of an adapted noise variance, relative to its square: before anything is known of it (a standard deviation
+/// that is stated wrongly by a factor of up to three), and from where on it counts as identified.
+constexpr double unknown_noise = 4.0, known_noise = 0.25;
 constexpr int lanes_at_once = 8;
 constexpr int outputs_at_once = 8;
 /// Below this probability a member's weight does not fall, so that it can come back.
@@ -120,7 +124,15 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   work_.assign((2 * n * n + 3 * n) * M, 0.0);
   for (auto* v : {&weights_, &keep_, &take_, &squares_}) v->assign(M, 0.0);
   innovation_variances_.assign(ny_ * M, 0.0);
-  for (const double variance : setup_.output_variances) output_variances_.insert(output_variances_.end(), M, variance);
+  output_variances_.assign(ny_ * M, 0.0);
+  learnt_.assign(2 * static_cast<std::size_t>(ny_), 0.0);
+  const std::vector<Variable>& outputs = model_->description().outputs;
+  for (int j = 0; j < ny_; ++j) {
+    int first = 0;
+    while (outputs[first].unit != outputs[j].unit || setup_.output_variances[first] != setup_.output_variances[j])
+      ++first;
+    sensor_.push_back(first);
+  }
   if (!setup_.robust.empty()) surprises_.assign(ny_ * M, 0.0);
   next_.assign(nx * M, 0.0);
   jacobian_.assign(nx * columns * M, 0.0);
@@ -214,7 +226,54 @@ void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
     for (int j = 0; j < np_; ++j) write_start(j, *setup_.members[member][j], m);
   }
   for (int m = 0; m < members_; ++m) weights_[m] = 1.0 / members_;
+  std::fill(learnt_.begin(), learnt_.end(), unknown_noise);
+  std::copy(setup_.output_variances.begin(), setup_.output_variances.end(), learnt_.begin());
+  spread_variances();
   distance_ = 0.0;
+}
+
+/// To all lanes.
+void PriorBank::spread_variances() noexcept {
+  for (int j = 0; j < ny_; ++j)
+    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, learnt_[j]);
+}
+
+PriorBank::Noise PriorBank::noise(int output) const noexcept {
+  return {learnt_[output], !setup_.adapts_noise || learnt_[ny_ + sensor_[output]] < known_noise};
+}
+
+/// The innovation nu of an output has the variance S = h' P h + R before the update. With i = R / S, the residual r and
+/// the covariance after it, nu^2 - S = (r^2 + h' P h - R) / i^2: a measurement of what R lacks, with the variance 2 S^2
+/// (Mehra 1970). R follows by a scalar Kalman filter in units of itself, whose own variance V says how well R is known;
+/// where S tells little about R, R hardly moves. Residuals are those of the most probable member. Outputs of one unit
+/// and one stated noise, like the coordinates of a position, are one sensor and change together.
+void PriorBank::adapt_noise(const double* y) noexcept {
+  constexpr double steady_gain = 0.015, most_squares = 9.0, least_information = 1e-3, most_change = 2.0;
+  constexpr double drift = 2.0 * steady_gain * steady_gain;
+  const auto best = std::max_element(weights_.begin(), weights_.begin() + members_) - weights_.begin();
+  for (int j = 0; j < ny_; ++j) {
+    if (std::isnan(y[j])) continue;
+    const auto gradient = [&](int c) { return gradient_[(static_cast<std::ptrdiff_t>(j) * nx_ + c) * lanes_ + best]; };
+    double residual = y[j] - predicted_[static_cast<std::ptrdiff_t>(j) * lanes_ + best], spread = 0.0;
+    if (model_->description().outputs[j].is_angle) residual = angle_difference(residual, 0.0);
+    for (int c = 0; c < nx_; ++c) {
+      residual -= gradient(c) * (mean_[static_cast<std::ptrdiff_t>(c) * lanes_ + best] - states_[best * nx_ + c]);
+      for (int r = 0; r < nx_; ++r)
+        spread += gradient(c) * gradient(r) * covariance_[(static_cast<std::ptrdiff_t>(c) * n_ + r) * lanes_ + best];
+    }
+    const int sensor = sensor_[j];
+    double &R = learnt_[sensor], &V = learnt_[ny_ + sensor];
+    const double information = std::max(1.0 - spread / R, least_information);
+    const double surplus = std::min((residual * residual + spread) / R, most_squares) - 1.0;
+    const double gain = V / (V * information * information + 2.0);  // of the surplus, i.e. divided by i^2
+    const double change = 1.0 + gain * surplus;
+    if (!std::isfinite(change)) continue;
+    const double stated = setup_.output_variances[sensor], most = setup_.most_noise_change * setup_.most_noise_change;
+    R = std::clamp(R * std::clamp(change, 1.0 / most_change, most_change), stated / most, stated * most);
+    V = std::min(V * (1.0 - gain * information * information) + drift, unknown_noise);
+  }
+  for (int j = 0; j < ny_; ++j) learnt_[j] = learnt_[sensor_[j]];
+  spread_variances();
 }
 
 void PriorBank::update(const double* y) noexcept {
@@ -243,7 +302,10 @@ void PriorBank::update(const double* y) noexcept {
   if (!setup_.robust.empty()) weigh_outputs(y, taken);
   bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                         innovation_variances_.data());
-  if (members_ == 1) return;
+  if (members_ == 1) {
+    if (setup_.adapts_noise) adapt_noise(y);
+    return;
+  }
   double best = -std::numeric_limits<double>::infinity();
   for (int m = 0; m < members_; ++m) {
     // One logarithm for several outputs; the product of many would leave the range of a double.
@@ -267,6 +329,7 @@ void PriorBank::update(const double* y) noexcept {
     weights_[m] = sum > 0.0 ? std::max(weights_[m] / sum, least_weight) : 1.0 / members_;
   sum = std::accumulate(weights_.begin(), weights_.begin() + members_, 0.0);
   for (int m = 0; m < members_; ++m) weights_[m] /= sum;
+  if (setup_.adapts_noise) adapt_noise(y);
 }
 
 /// Pseudo-Huber losses of the innovations, as weights of the outputs: s = sum of r^2 / S over a group, and the loss
@@ -274,7 +337,7 @@ void PriorBank::update(const double* y) noexcept {
 void PriorBank::weigh_outputs(const double* y, int taken) noexcept {
   const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
   for (int j = 0; j < ny_; ++j)
-    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, setup_.output_variances[j]);
+    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, learnt_[j]);
   bank_kernels().surprise(view, views_->outputs.data(), taken, surprises_.data());
   const auto place = [&](int output) {
     return std::count_if(y, y + output, [](double each) { return !std::isnan(each); });
@@ -418,7 +481,8 @@ void PriorBank::moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noex
 void PriorBank::save(double* state) const noexcept {
   state = std::copy(mean_.begin(), mean_.end(), state);
   state = std::copy(covariance_.begin(), covariance_.end(), state);
-  std::copy(weights_.begin(), weights_.end(), state);
+  state = std::copy(weights_.begin(), weights_.end(), state);
+  std::copy(learnt_.begin(), learnt_.end(), state);
 }
 
 void PriorBank::restore(const double* state) noexcept {
@@ -429,6 +493,8 @@ void PriorBank::restore(const double* state) noexcept {
   take(mean_);
   take(covariance_);
   take(weights_);
+  take(learnt_);
+  spread_variances();
 }
 
 /// Where the states of a member's own prior are among those of its process.

@@ -91,12 +91,21 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
           .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", at_least(0.0))
           .map("weights", &C::weights, WeightOptions::table().schema())
           .map("blocking", &C::blocking, {blocking_row()})
-          .map("solver", &C::solver, {default_solver.row()});
+          .map("solver", &C::solver,
+               {default_solver.row(
+                   "its options stand beside the name; without this section {name: gn_rti, iterations: 5, "
+                   "residual: 0.01}, since one step a sample is too few where slip jumps")});
   return rows;
 }
 
 ControllerSection::ControllerSection(std::shared_ptr<const RobotContext> context, const Settings& section)
-    : context_(std::move(context)), options_(ControllerOptions::table().parse(section, "controller")) {}
+    : context_(std::move(context)), options_(ControllerOptions::table().parse(section, "controller")) {
+  if (!options_.solver.is_null()) return;
+  options_.solver = Settings::map();
+  options_.solver.add("name", Settings::scalar(default_solver.otherwise));
+  options_.solver.add("iterations", Settings::scalar("5"));
+  options_.solver.add("residual", Settings::scalar("0.01"));
+}
 
 OptionSection ControllerSection::documentation() {
   return {"controller", "How the path is followed.", ControllerOptions::table().schema()};

@@ -70,6 +70,7 @@ BankEstimation::Setup bank_setup(const EstimatorParts& parts) {
   setup.bank.substeps = parts.substeps;
   setup.bank.memory = parts.bank.memory;
   setup.bank.robust = parts.robust;
+  setup.bank.adapts_noise = context.noise.adapt;
   setup.bank.initial_parameters = parts.initial_parameters;
   setup.parameter_lower = lower_bounds_of(context.about.parameters);
   setup.parameter_upper = upper_bounds_of(context.about.parameters);

@@ -23,11 +23,16 @@ const NumbersByName& inputs_by_name() {
 
 struct NoiseOptions {
   Settings outputs, inputs;
+  bool adapt = true;
 
   static const OptionTable<NoiseOptions>& table() {
-    static const auto rows = OptionTable<NoiseOptions>()
-                                 .map("outputs", &NoiseOptions::outputs, outputs_by_name().rows())
-                                 .map("inputs", &NoiseOptions::inputs, inputs_by_name().rows());
+    static const auto rows =
+        OptionTable<NoiseOptions>()
+            .map("outputs", &NoiseOptions::outputs, outputs_by_name().rows())
+            .map("inputs", &NoiseOptions::inputs, inputs_by_name().rows())
+            .flag("adapt", &NoiseOptions::adapt,
+                  "bank, and rhe with priors: learn the noise of outputs while driving, from a fifth to five "
+                  "times what is stated");
     return rows;
   }
 };
@@ -38,6 +43,7 @@ NoiseSection::NoiseSection(const Settings& section, const ModelDescription& abou
   const NoiseOptions options = NoiseOptions::table().parse(section, "noise");
   output_sigmas = outputs_by_name().read(options.outputs, about);
   input_sigmas = inputs_by_name().read(options.inputs, about);
+  adapt = options.adapt;
 }
 
 OptionSection NoiseSection::documentation() {

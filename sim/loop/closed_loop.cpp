@@ -219,6 +219,10 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     begin(LoopPart::simulate);
   }
   controller->finish();
+  const std::vector<Variable>& about_outputs = model.description().outputs;
+  for (std::size_t j = 0; j < about_outputs.size(); ++j)
+    if (const auto noise = estimator->method().output_noise(static_cast<int>(j)))
+      log.noise[about_outputs[j].name] = *noise;
   begin(LoopPart::end);
   return log;
 }
@@ -290,6 +294,7 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
     summary.within_two_sigma[variable.name] = static_cast<double>(inside[j]) / static_cast<double>(with_nees);
   }
   summary.certainty = certainty_of(summary);
+  summary.noise = log.noise;
   summary.estimator_us = spread_of_times(std::move(estimator_us));
   summary.controller_us = spread_of_times(std::move(controller_us));
   return summary;

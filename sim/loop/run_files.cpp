@@ -126,6 +126,11 @@ Json json_of(const RunSummary& summary) {
   json["mae_after_start"] = json_of(summary.mae_after_start);
   json["nees"] = summary.nees;  // null if unknown
   json["nees_expected"] = summary.nees_expected;
+  if (!summary.noise.empty()) {
+    Json& noise = json["noise"] = Json::object();
+    for (const auto& [output, learnt] : summary.noise)
+      noise[output] = {{"sigma", learnt.sigma}, {"identified", learnt.is_identified}};
+  }
   json["within_two_sigma"] = summary.within_two_sigma;
   json["certainty"] = summary.certainty == Certainty::unknown ? Json(nullptr) : Json(name_of(summary.certainty));
   json["solve_time_us"] = {{"rhe", json_of(summary.estimator_us)}, {"rhc", json_of(summary.controller_us)}};

@@ -57,7 +57,10 @@ const OptionTable<GnRtiOptions>& GnRtiOptions::table() {
               "hessian", &GnRtiOptions::hessian,
               {{"gauss_newton", Curvature::gauss_newton}, {"exact", Curvature::exact}, {"auto", Curvature::automatic}},
               "curvature of the quadratic programs; auto: Gauss-Newton for estimation, exact for control")
-          .integer("iterations", &GnRtiOptions::iterations, "steps a sample in mode rti", between(1, 1000))
+          .integer("iterations", &GnRtiOptions::iterations, "steps a sample in mode rti, at most", between(1, 1000))
+          .number("residual", &GnRtiOptions::residual,
+                  "KKT residual at which mode rti takes no further step in a sample; 0: it always takes all",
+                  at_least(0.0))
           .integer("max_iterations", &GnRtiOptions::max_iterations, "limit of mode converge", between(1, 100000))
           .number("tolerance", &GnRtiOptions::tolerance, "KKT residual at which mode converge is content",
                   greater_than(0.0));
@@ -229,6 +232,7 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
     is_pending_ = is_last;
     std::swap(iterate, step_);
     ++report.iterations;
+    if (!is_last && report.kkt.largest() <= options_.residual) break;
   }
   if (report.iterations == 0) {
     give_up(iterate, report);

@@ -24,6 +24,7 @@ struct GnRtiOptions {
   Mode mode = Mode::rti;
   Curvature hessian = Curvature::automatic;
   int iterations = 1;
+  double residual = 0.0;
   int max_iterations = 60;
   double tolerance = 1e-8;
 

@@ -71,7 +71,7 @@ class RunReports(Reports):
     def horizons_of_a_run(self):
         size, overlap = 2, 4
         folder = self.make_run("blocks", f"blocking.kappa={{name: structured, size: {size}, overlap: {overlap}}}",
-                               "blocking.mu={name: full_horizon}")
+                               "blocking.mu={name: full_horizon}", "estimator.covariance=blocks")
         document, _ = self.page_of(folder)
         rows = rows_of(folder / "steps.csv")
         horizons = document["horizons"]

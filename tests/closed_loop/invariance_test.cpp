@@ -228,17 +228,25 @@ constexpr Frame frames[] = {{.name = "turned", .turn = 2.0},
                             {.name = "in_kilometres", .unit = 0.001},
                             {.name = "all_at_once", .turn = 1.0, .origin = {-300.0, 200.0}, .unit = 10.0}};
 constexpr Design designs[] = {
-    {"one_block", "{kappa: {name: full_horizon}, mu: {name: full_horizon}}", ""},
-    {"structured", "{kappa: {name: structured, size: 4, overlap: 1}, mu: {name: structured, size: 6}}", ""},
+    {"one_block", "{kappa: {name: full_horizon}, mu: {name: full_horizon}}", "covariance: blocks,"},
+    {"structured", "{kappa: {name: structured, size: 4, overlap: 1}, mu: {name: structured, size: 6}}",
+     "covariance: blocks,"},
     {"robust", "{kappa: {name: full_horizon}, mu: {name: unblocked}}",
-     "robust: {outputs: [x_gps, y_gps], delta: 1.5},"},
-    {"smoothing", "{kappa: {name: full_horizon}, mu: {name: full_horizon}}", "arrival: {name: smoothing},"}};
+     "covariance: blocks, robust: {outputs: [x_gps, y_gps], delta: 1.5},"},
+    {"smoothing", "{kappa: {name: full_horizon}, mu: {name: full_horizon}}",
+     "covariance: blocks, arrival: {name: smoothing},"}};
+// Laws of variation have lengths in metres, so a bank is held to frames alone.
+constexpr Frame frames_in_metres[] = {frames[0], frames[1], frames[2]};
+constexpr Design priors[] = {{"priors", "{}", ""}};
 
 INSTANTIATE_TEST_SUITE_P(ClosedLoop, Invariance,
                          ::testing::Combine(::testing::ValuesIn(frames), ::testing::ValuesIn(designs)),
                          [](const auto& found) {
                            return std::string(std::get<0>(found.param).name) + "_" + std::get<1>(found.param).name;
                          });
+INSTANTIATE_TEST_SUITE_P(Priors, Invariance,
+                         ::testing::Combine(::testing::ValuesIn(frames_in_metres), ::testing::ValuesIn(priors)),
+                         [](const auto& found) { return std::string(std::get<0>(found.param).name); });
 
 }  // namespace
 }  // namespace rhec

@@ -30,6 +30,7 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   bool amend(int back, const double* outputs) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
+  std::optional<OutputNoise> output_noise(int output) const noexcept override;
 
   const PriorBank& bank() const noexcept { return history_.bank(); }
   BankHistory& history() noexcept { return history_; }

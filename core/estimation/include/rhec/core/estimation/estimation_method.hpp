@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "rhec/core/base/clock.hpp"
 #include "rhec/core/estimation/estimate.hpp"
 #include "rhec/core/model/model.hpp"
@@ -27,6 +29,14 @@ class RHEC_EXPORT EstimationMethod {
   /// Does work in advance, before the next node is known; calling it is optional.
   virtual void prepare() noexcept {}
   virtual void reset() noexcept = 0;
+
+  /// What an estimator that adapts its noise has learnt of an output.
+  struct OutputNoise {
+    double sigma = 0.0;         ///< standard deviation at present
+    bool is_identified = true;  ///< false while the residuals say nothing about it, and it is held
+  };
+  /// Empty for one that does not adapt.
+  virtual std::optional<OutputNoise> output_noise(int /*output*/) const noexcept { return {}; }
 };
 
 }  // namespace rhec

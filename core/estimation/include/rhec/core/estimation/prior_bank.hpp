@@ -39,6 +39,10 @@ class RHEC_EXPORT PriorBank {
     double memory = 40.0;  ///< ground after which another law may hold [m]: exp(-d / memory) is the share that stays
     double least_speed = 0.025;      ///< a vehicle that stands counts as creeping at this speed [m/s]
     std::vector<RobustLoss> robust;  ///< as in a window; each weighs its group's outputs by their innovations
+    /// Whether the variances of outputs are learnt from the residuals, and how far standard deviations may go from the
+    /// stated ones, up and down.
+    bool adapts_noise = false;
+    double most_noise_change = 5.0;
     double gate = 16.0;  ///< largest squared innovation, in variances, by which one output changes the weights
   };
   /// Throws Error if sizes do not match.
@@ -68,8 +72,10 @@ class RHEC_EXPORT PriorBank {
   int process_states(int parameter) const noexcept { return processes_[parameter].count; }
   int state_count() const noexcept { return n_; }
 
-  /// All that changes: moments and weights. `state_size` doubles.
-  std::size_t state_size() const noexcept { return mean_.size() + covariance_.size() + weights_.size(); }
+  /// All that changes: moments, weights, and noise learnt. `state_size` doubles.
+  std::size_t state_size() const noexcept {
+    return mean_.size() + covariance_.size() + weights_.size() + learnt_.size();
+  }
   void save(double* state) const noexcept;
   void restore(const double* state) noexcept;
 
@@ -79,6 +85,13 @@ class RHEC_EXPORT PriorBank {
   void saved_moments(const double* state, int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept;
   /// Interval data of a parameter's process, as in ProcessModel: ramp, F, L, over an advance of this time and ground.
   void write_process(int member, int parameter, double duration, double distance, double* data) noexcept;
+
+  /// What has been learnt of an output's noise.
+  struct Noise {
+    double variance = 0.0;      ///< at present
+    bool is_identified = true;  ///< false while the residuals say little about it
+  };
+  Noise noise(int output) const noexcept;
 
   /// Ground covered on the last interval [m].
   double distance() const noexcept { return distance_; }
@@ -101,12 +114,17 @@ class RHEC_EXPORT PriorBank {
   void advance_processes(double duration) noexcept;
   void mix_members() noexcept;
   void weigh_outputs(const double* y, int taken) noexcept;
+  void adapt_noise(const double* y) noexcept;
+  void spread_variances() noexcept;
   int own_places(int member, int parameter, int* places) const noexcept;
 
   std::shared_ptr<const Model> model_;
   Setup setup_;
   int members_, lanes_, nx_, nu_, np_, ny_, n_ = 0;
   std::vector<Process> processes_;
+  std::vector<int> sensor_;  ///< per output: the first output of its sensor
+  /// Per output: its noise variance, and the variance of that, relative to its square.
+  AlignedDoubles learnt_;
   AlignedDoubles mean_, covariance_, work_, weights_, keep_, take_, next_, jacobian_, predicted_, gradient_, squares_,
       innovation_variances_, output_variances_, surprises_;
   // Rows of the model: one per member.

@@ -23,8 +23,8 @@ class NodeCovariance;
 /// window's first node was the newest, so that no measurement counts twice.
 ///
 /// The estimate is the mixture of the bank with the window in place of the filter of the same law. Of a linear problem
-/// without bounds, it is that of the bank; with one member it is that of the window. A window adds bounds, robust losses
-/// over all nodes, and a linearisation at the solution.
+/// without bounds, it is that of the bank; with one member it is that of the window. A window adds bounds, robust
+/// losses over all nodes, and a linearisation at the solution.
 ///
 /// Late measurements are used as if they had come in time, if their node is within the horizon.
 class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
@@ -44,6 +44,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   bool amend(int back, const double* outputs) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
+  std::optional<OutputNoise> output_noise(int output) const noexcept override { return filters_.output_noise(output); }
 
   bool has_window() const noexcept override { return has_window_; }
   /// Its model is a ProcessModel.

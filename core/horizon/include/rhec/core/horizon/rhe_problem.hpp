@@ -60,6 +60,10 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   const double* output(int node) const noexcept { return outputs_.data() + at_output(node); }
   const double* measured_input(int interval) const noexcept { return measured_inputs_.data() + at_input(interval); }
 
+  /// Weight of an output from now on.
+  void set_output_weight(int output, double weight) noexcept {
+    setup_.output_weights[output] = output_weights_[output] = weight;
+  }
   void set_intervals(int intervals) noexcept { changing_structure().set_intervals(intervals); }
   /// Marks where a parameter's blocks start. `begins` has one entry per interval. The first interval uses the value of
   /// node 0, so begins[0] matters only for a ramp that starts there. Ignored for a parameter that was set up as one

@@ -14,6 +14,7 @@ struct RHEC_EXPORT NoiseSection {
   static OptionSection documentation();
 
   std::vector<double> output_sigmas, input_sigmas;
+  bool adapt = true;  ///< whether estimators that can do so learn the noise of outputs
 };
 
 /// Default standard deviations of measured variables: a fraction of their typical magnitudes.

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "rhec/core/estimation/estimation_method.hpp"
 #include "rhec/sim/loop/scenario.hpp"
 #include "rhec/sim/numbers/spread.hpp"
 #include "rhec/sim/problems/recording_solver.hpp"
@@ -33,6 +34,8 @@ struct RunLog {
   std::vector<Sample> samples;
   bool completed = false;  ///< the end of the path was reached
   std::string ended = {};  ///< why the run ended
+  /// By output, what the estimator has learnt of its noise at the end; empty for one that does not adapt.
+  std::map<std::string, EstimationMethod::OutputNoise> noise = {};
 };
 
 /// Runs estimator -> controller -> ground truth until the path ends, the vehicle is lost, or the run takes far too
@@ -60,7 +63,8 @@ struct RunSummary {
   /// without a covariance. .954 is to be expected.
   std::map<std::string, double> within_two_sigma;
   Certainty certainty = Certainty::unknown;
-  Spread estimator_us, controller_us;  ///< zeros without solves
+  std::map<std::string, EstimationMethod::OutputNoise> noise;  ///< as in RunLog
+  Spread estimator_us, controller_us;                          ///< zeros without solves
   std::map<std::string, std::int64_t> estimator_statuses, controller_statuses;
   std::int64_t fallbacks = 0;  ///< solves with unusable results
   std::int64_t solves = 0;
