@@ -251,21 +251,31 @@ void PriorBank::adapt_noise(const double* y) noexcept {
   constexpr double steady_gain = 0.015, most_squares = 9.0, least_information = 1e-3, most_change = 2.0;
   constexpr double drift = 2.0 * steady_gain * steady_gain;
   const auto best = std::max_element(weights_.begin(), weights_.begin() + members_) - weights_.begin();
-  for (int j = 0; j < ny_; ++j) {
-    if (std::isnan(y[j])) continue;
-    const auto gradient = [&](int c) { return gradient_[(static_cast<std::ptrdiff_t>(j) * nx_ + c) * lanes_ + best]; };
-    double residual = y[j] - predicted_[static_cast<std::ptrdiff_t>(j) * lanes_ + best], spread = 0.0;
-    if (model_->description().outputs[j].is_angle) residual = angle_difference(residual, 0.0);
-    for (int c = 0; c < nx_; ++c) {
-      residual -= gradient(c) * (mean_[static_cast<std::ptrdiff_t>(c) * lanes_ + best] - states_[best * nx_ + c]);
-      for (int r = 0; r < nx_; ++r)
-        spread += gradient(c) * gradient(r) * covariance_[(static_cast<std::ptrdiff_t>(c) * n_ + r) * lanes_ + best];
+  for (int sensor = 0; sensor < ny_; ++sensor) {
+    if (sensor_[sensor] != sensor) continue;
+    // Sums over the sensor's outputs, which do not depend on the axes of a position.
+    double squares = 0.0, spread = 0.0;
+    int count = 0;
+    for (int j = sensor; j < ny_; ++j) {
+      if (sensor_[j] != sensor || std::isnan(y[j])) continue;
+      const auto gradient = [&](int c) {
+        return gradient_[(static_cast<std::ptrdiff_t>(j) * nx_ + c) * lanes_ + best];
+      };
+      double residual = y[j] - predicted_[static_cast<std::ptrdiff_t>(j) * lanes_ + best];
+      if (model_->description().outputs[j].is_angle) residual = angle_difference(residual, 0.0);
+      for (int c = 0; c < nx_; ++c) {
+        residual -= gradient(c) * (mean_[static_cast<std::ptrdiff_t>(c) * lanes_ + best] - states_[best * nx_ + c]);
+        for (int r = 0; r < nx_; ++r)
+          spread += gradient(c) * gradient(r) * covariance_[(static_cast<std::ptrdiff_t>(c) * n_ + r) * lanes_ + best];
+      }
+      squares += residual * residual;
+      ++count;
     }
-    const int sensor = sensor_[j];
+    if (count == 0) continue;
     double &R = learnt_[sensor], &V = learnt_[ny_ + sensor];
-    const double information = std::max(1.0 - spread / R, least_information);
-    const double surplus = std::min((residual * residual + spread) / R, most_squares) - 1.0;
-    const double gain = V / (V * information * information + 2.0);  // of the surplus, i.e. divided by i^2
+    const double information = std::max(1.0 - spread / (count * R), least_information);
+    const double surplus = std::min((squares + spread) / (count * R), most_squares) - 1.0;
+    const double gain = V / (V * information * information + 2.0 / count);  // of the surplus, i.e. divided by i^2
     const double change = 1.0 + gain * surplus;
     if (!std::isfinite(change)) continue;
     const double stated = setup_.output_variances[sensor], most = setup_.most_noise_change * setup_.most_noise_change;

@@ -154,6 +154,8 @@ void RheProblem::take_data(const RheProblem& from) noexcept {
   take_horizon(from);
   arrival_mean = from.arrival_mean;
   arrival_information = from.arrival_information;
+  setup_.output_weights = from.setup_.output_weights;
+  output_weights_ = from.output_weights_;
   outputs_ = from.outputs_;
   measured_inputs_ = from.measured_inputs_;
   link_information_ = from.link_information_;

@@ -7,6 +7,7 @@
 
 #include "plugins/robot/robots.hpp"
 #include "rhec/core/estimation/bank_estimation.hpp"
+#include "rhec/core/estimation/banked_covariance.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/core/estimation/prior_horizon_estimation.hpp"
 #include "rhec/plugins/robot/estimator_section.hpp"
@@ -59,7 +60,10 @@ TEST(EstimatorMakers, HaveTheRobotsOwn) {
   EXPECT_NE(dynamic_cast<PriorHorizonEstimation*>(makers.named("rhe").make(parts).get()), nullptr);
   const auto context = context_with();
   const EstimatorSection blocked(context, BlockingSection(context, settings("{kappa: structured}")), settings(""));
-  EXPECT_NE(dynamic_cast<RecedingHorizonEstimation*>(makers.named("rhe").make(blocked.parts()).get()), nullptr);
+  EXPECT_NE(dynamic_cast<BankedCovariance*>(makers.named("rhe").make(blocked.parts()).get()), nullptr);
+  const EstimatorSection alone(context, BlockingSection(context, settings("{kappa: structured}")),
+                               settings("{covariance: blocks}"));
+  EXPECT_NE(dynamic_cast<RecedingHorizonEstimation*>(makers.named("rhe").make(alone.parts()).get()), nullptr);
   EXPECT_NE(dynamic_cast<FilterEstimation*>(makers.named("ekf").make(parts).get()), nullptr);
   const auto bank = makers.named("bank").make(parts);
   ASSERT_NE(dynamic_cast<BankEstimation*>(bank.get()), nullptr);

@@ -51,10 +51,10 @@ smoother: {deadline: 3})");
   EXPECT_EQ(made.smoother_options().deadline, 3.0);
   EXPECT_EQ(made.solver_choice("rhe").options.find("iterations")->as_integer(), 2);
   const PluginChoice plain = made.solver_choice("rhc");
-  EXPECT_TRUE(plain.options.members().empty());
+  EXPECT_EQ(plain.options.find("iterations")->as_integer(), 5) << "of a controller that names no solver";
 
   const auto estimator = made.make_estimator();
-  const auto& window = dynamic_cast<const RecedingHorizonEstimation&>(estimator->method()).problem().setup();
+  const auto& window = dynamic_cast<const WindowedEstimation&>(estimator->method()).problem().setup();
   EXPECT_EQ(window.max_intervals, 6);
   EXPECT_EQ(window.output_weights[0], 0.25);
   EXPECT_EQ(window.parameter_lower[0], 0.25);

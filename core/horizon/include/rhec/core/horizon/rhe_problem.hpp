@@ -75,7 +75,8 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
     return 1.0 / link_information_[interval * np() + parameter];
   }
   void finish() noexcept;
-  /// Copies data and structure of a problem with the same model and set-up, without allocation.
+  /// Copies data, output weights and structure of a problem with the same model and otherwise the same set-up, without
+  /// allocation.
   void take_data(const RheProblem& from) noexcept;
   /// Moves durations, known data, outputs and measured inputs one interval towards the start of the horizon; the last
   /// ones stay until they are overwritten.
