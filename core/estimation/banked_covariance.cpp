@@ -10,7 +10,7 @@ BankedCovariance::BankedCovariance(std::unique_ptr<WindowedEstimation> blocks, c
     : blocks_(std::move(blocks)), bank_(blocks_->problem().shared_model(), bank) {
   const Eigen::Index n = model().state_count() + model().parameter_count();
   mean_ = difference_ = Eigen::VectorXd::Zero(n);
-  covariance_ = Eigen::MatrixXd::Zero(n, n);
+  covariance_ = own_ = Eigen::MatrixXd::Zero(n, n);
 }
 
 void BankedCovariance::start(const double* outputs) noexcept {
@@ -35,7 +35,7 @@ void BankedCovariance::reset() noexcept {
 
 void BankedCovariance::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   blocks_->estimate(result, deadline);
-  result.own_covariance = result.covariance;
+  own_ = result.covariance;
   if (bank_.is_searching()) return;
   bank_.history().bank().moments(mean_, covariance_);
   const Eigen::Index nx = result.state.size();

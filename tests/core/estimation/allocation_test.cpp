@@ -8,9 +8,10 @@
 
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/control/controller.hpp"
-#include "rhec/core/estimation/bank_estimation.hpp"
+#include "rhec/core/estimation/banked_covariance.hpp"
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/core/estimation/prior_horizon_estimation.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -28,7 +29,9 @@ const Host& host() {
 
 struct Options {
   bool filter = false;
-  bool bank = false;  ///< of filters
+  bool bank = false;    ///< of filters
+  bool priors = false;  ///< window with a bank beside it
+  bool banked = false;  ///< window of blocks with a bank beside it
   ArrivalKind arrival = ArrivalKind::ekf;
   const char* blocking = "{size: 5, overlap: 3}";
   const char* solver = "{mode: rti}";
@@ -50,8 +53,10 @@ std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& mode
     setup.heading_starts = options.heading_starts;
     setup.initial_covariance(2, 2) = 10.0;
   }
-  if (options.bank) {
+  if (options.bank || options.priors || options.banked) {
     BankEstimation::Setup bank;
+    bank.bank.adapts_noise = true;
+    bank.bank.robust = {{{0, 1}, 3.0}};
     ModelDescription about = model->description();
     for (Variable& parameter : about.parameters) parameter.lower = 0.0, parameter.upper = 1.0;
     bank.bank.members = standard_bank(about);
@@ -62,6 +67,13 @@ std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& mode
     bank.initial_state = setup.initial_mean.head(4);
     bank.initial_covariance = setup.initial_covariance.topLeftCorner(4, 4);
     bank.heading_starts = setup.heading_starts;
+    const auto solver = [&] { return host().make_solver("gn_rti", parse_yaml(options.solver, "test")); };
+    if (options.priors)
+      return std::make_unique<PriorHorizonEstimation>(model, solver(),
+                                                      PriorHorizonEstimation::Setup{bank, setup.problem});
+    if (options.banked)
+      return std::make_unique<BankedCovariance>(std::make_unique<RecedingHorizonEstimation>(model, solver(), setup),
+                                                bank);
     return std::make_unique<BankEstimation>(model, bank);
   }
   if (!options.filter)
@@ -152,10 +164,17 @@ TEST(EstimationAllocation, NoneInTheClosedLoopOfAFilter) { EXPECT_EQ(allocations
 
 TEST(EstimationAllocation, NoneInTheClosedLoopOfABank) { EXPECT_EQ(allocations_in_the_loop({.bank = true}), 0); }
 
+TEST(EstimationAllocation, NoneInTheClosedLoopOfAWindowWithABank) {
+  EXPECT_EQ(allocations_in_the_loop({.priors = true}), 0);
+  EXPECT_EQ(allocations_in_the_loop({.priors = true, .solver = "{mode: converge}"}), 0);
+  EXPECT_EQ(allocations_in_the_loop({.banked = true}), 0);
+}
+
 TEST(EstimationAllocation, NoneWhereTheHeadingIsSearchedFor) {
   EXPECT_EQ(allocations_in_the_loop({.heading_starts = 8}), 0);
   EXPECT_EQ(allocations_in_the_loop({.filter = true, .heading_starts = 8}), 0);
   EXPECT_EQ(allocations_in_the_loop({.bank = true, .heading_starts = 8}), 0);
+  EXPECT_EQ(allocations_in_the_loop({.priors = true, .heading_starts = 8}), 0);
 }
 
 }  // namespace

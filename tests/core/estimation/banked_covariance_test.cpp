@@ -56,7 +56,7 @@ TEST(BankedCovariance, HoldsWhereABlockDoesNot) {
       bank.estimate(of_bank, Clock::time_point::max());
       ASSERT_EQ(estimate.state, alone.state);
       ASSERT_EQ(estimate.parameters, alone.parameters);
-      ASSERT_EQ(estimate.own_covariance, alone.covariance);
+      ASSERT_EQ(*banked.own_covariance(), alone.covariance);
       Eigen::VectorXd d(4);
       d << estimate.state - of_bank.state, estimate.parameters - of_bank.parameters;
       ASSERT_LT((estimate.covariance - of_bank.covariance - d * d.transpose()).cwiseAbs().maxCoeff(), 1e-12);

@@ -10,7 +10,7 @@ namespace rhec {
 /// A window of blocks with a covariance that contains what blocks leave out: that slip varies within each of them. A
 /// bank of filters runs beside the window. With its mean xbar and covariance Pbar, the error of the window's estimate x
 /// is that of xbar plus the known difference d = x - xbar, so that its second moment is Pbar + d d'. The block model's
-/// own covariance stays readable in `Estimate::own_covariance`.
+/// own covariance stays readable in `own_covariance`.
 class RHEC_EXPORT BankedCovariance final : public WindowedEstimation {
  public:
   /// Throws Error as BankEstimation does.
@@ -26,6 +26,8 @@ class RHEC_EXPORT BankedCovariance final : public WindowedEstimation {
   void prepare() noexcept override { blocks_->prepare(); }
   void reset() noexcept override;
 
+  const Eigen::MatrixXd* own_covariance() const noexcept override { return &own_; }
+
   bool has_window() const noexcept override { return blocks_->has_window(); }
   const RheProblem& problem() const noexcept override { return blocks_->problem(); }
   const Iterate& solution() const noexcept override { return blocks_->solution(); }
@@ -36,7 +38,7 @@ class RHEC_EXPORT BankedCovariance final : public WindowedEstimation {
   std::unique_ptr<WindowedEstimation> blocks_;
   BankEstimation bank_;
   Eigen::VectorXd mean_, difference_;
-  Eigen::MatrixXd covariance_;
+  Eigen::MatrixXd covariance_, own_;
 };
 
 }  // namespace rhec

@@ -13,8 +13,6 @@ struct Estimate {
   Eigen::VectorXd parameters;  ///< the value of the newest interval, n_p
   /// Covariance of [x_k; p], from the information in the measurements and the prior; bounds do not narrow it.
   Eigen::MatrixXd covariance;
-  /// That of the estimator's own model, where the covariance contains what this model leaves out; else empty.
-  Eigen::MatrixXd own_covariance;
   Report report;          ///< of the solver; trivial for a filter
   bool fallback = false;  ///< the solver failed; this is the prediction from earlier samples
   /// The time is beyond the newest node: the state is integrated from there, and the covariance is that node's.

@@ -30,6 +30,10 @@ class RHEC_EXPORT EstimationMethod {
   virtual void prepare() noexcept {}
   virtual void reset() noexcept = 0;
 
+  /// The last estimate's covariance by the method's own model, where what was given out contains what this model leaves
+  /// out; null where the two are the same.
+  virtual const Eigen::MatrixXd* own_covariance() const noexcept { return nullptr; }
+
   /// What an estimator that adapts its noise has learnt of an output.
   struct OutputNoise {
     double sigma = 0.0;         ///< standard deviation at present
