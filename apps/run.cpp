@@ -30,12 +30,17 @@ struct RunArguments {
 
 /// How sure the estimator is, and whether that is right.
 void print_certainty(const sim::RunSummary& summary) {
-  const char* words = "";
+  std::string words;
   switch (summary.certainty) {
     case sim::Certainty::unknown:
       return;
     case sim::Certainty::too_certain:
       words = "errors are larger than the covariance says; do not rely on it";
+      if (summary.nees <= sim::most_nees * summary.nees_expected) {
+        words = "too certain of";
+        for (const auto& [name, share] : summary.within_two_sigma)
+          if (share < sim::least_share) words += " " + name;
+      }
       break;
     case sim::Certainty::right:
       words = "the covariance is about right";

@@ -110,9 +110,6 @@ Spread spread_of_times(std::vector<double> times) {
   return times.empty() ? Spread{0.0, 0.0, 0.0} : spread_of(std::move(times));
 }
 
-// From where on a covariance is called wrong: NEES in units of its expected value, share within two deviations.
-constexpr double most_nees = 1.5, least_nees = 0.5, least_share = 0.9;
-
 /// Counts the states and parameters whose truth is within two standard deviations.
 void count_inside(const Sample& sample, const ModelDescription& about, std::vector<std::int64_t>& inside) {
   const auto states = static_cast<Eigen::Index>(about.states.size());

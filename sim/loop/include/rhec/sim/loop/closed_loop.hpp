@@ -69,8 +69,10 @@ struct RunSummary {
   std::int64_t fallbacks = 0;  ///< solves with unusable results
   std::int64_t solves = 0;
 };
-/// Judges by the mean NEES, which may be from a half to three halves of the number of states and parameters, and by the
-/// shares within two standard deviations, of which none may be below nine tenths.
+/// From where on a covariance is called wrong: mean NEES in units of its expected value, and the share of samples
+/// within two standard deviations.
+inline constexpr double most_nees = 1.5, least_nees = 0.5, least_share = 0.9;
+/// Judges by these.
 RHEC_EXPORT Certainty certainty_of(const RunSummary& summary) noexcept;
 /// "too certain", "right", "too cautious"; empty if unknown.
 RHEC_EXPORT std::string_view name_of(Certainty certainty) noexcept;
