@@ -86,7 +86,7 @@ PriorHorizonEstimation::PriorHorizonEstimation(const std::shared_ptr<const Model
   mixture_ = member_covariance_ = Eigen::MatrixXd::Zero(nx + np, nx + np);
   scale_ = Eigen::VectorXd::Zero(n);
   predicted_ = scaled_ = inverse_ = Eigen::MatrixXd::Zero(n, n);
-  factor_ = Eigen::LLT<Eigen::MatrixXd>(n);
+  factor_.compute(Eigen::MatrixXd::Identity(n, n));  // of its final size
   reset();
 }
 

@@ -82,8 +82,8 @@ bool HorizonLinearisation::is_at(const Iterate& iterate) const noexcept {
 bool HorizonLinearisation::has_structure() const noexcept {
   const HorizonStructure& structure = problem_.structure_;
   const int N = structure.intervals();
-  return known_intervals_ == N && std::memcmp(starts_.data(), structure.block_starts(0),
-                                              static_cast<std::size_t>(N) * structure.lifted_count()) == 0;
+  const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(N) * structure.lifted_count();
+  return known_intervals_ == N && std::equal(starts_.data(), starts_.data() + count, structure.block_starts(0));
 }
 
 /// Whether AB already has the rows of lifted variables for the present structure.
@@ -178,7 +178,7 @@ bool HorizonLinearisation::is_known(int interval, int steps, int count, bool is_
   if (!has_same_data(interval, steps, 1)) return false;
   const int lifted = problem_.structure_.lifted_count();
   const std::uint8_t* known = starts_.data() + static_cast<std::ptrdiff_t>(interval + steps) * lifted;
-  return std::memcmp(problem_.structure_.block_starts(interval), known, lifted) == 0;
+  return std::equal(known, known + lifted, problem_.structure_.block_starts(interval));
 }
 
 /// As `linearise_stages`, but from the cache: only unknown intervals are evaluated. The exact Hessian is then complete,
