@@ -371,58 +371,5 @@ TEST(PriorBank, RefusesWhatDoesNotFit) {
               ::testing::HasSubstr("expected 2"));
 }
 
-/// Stated three times too large and too small, the noise of a sensor is found within 200 samples; the others keep
-/// theirs.
-TEST(PriorBank, LearnsTheNoiseOfASensor) {
-  const auto model = linear_model<Hovercraft>();
-  const auto walk = prior("walk", "{sigma: 0.224, along: time, course: held, mean: 0, mean_sigma: 0.5}");  // 0.1 a step
-  const std::vector<PriorCombination> member = {{walk, walk}};
-  for (const double wrong : {3.0, 1.0, 1.0 / 3.0}) {
-    int close = 0, steady = 0;
-    std::vector<double> medians;
-    constexpr int seeds = 40;
-    for (unsigned seed = 1; seed <= seeds; ++seed) {
-      PriorBank::Setup setup = bank_setup(*model, member);
-      const std::vector<double> truth = setup.output_variances;
-      setup.output_variances[2] *= wrong * wrong;
-      setup.adapts_noise = true;
-      PriorBank bank(model, setup);
-      bank.reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
-      const auto samples = simulate(*model, 200, false, seed);
-      bank.update(samples[0].outputs.data());
-      for (int k = 1; k <= 200; ++k) {
-        bank.predict(samples[k].inputs.data(), samples[k].duration);
-        bank.update(samples[k].outputs.data());
-      }
-      medians.push_back(std::sqrt(bank.noise(2).variance / truth[2]));
-      close += std::abs(std::sqrt(bank.noise(2).variance / truth[2]) - 1.0) < 0.2;
-      steady += std::abs(std::sqrt(bank.noise(1).variance / truth[1]) - 1.0) < 0.3;
-    }
-    std::sort(medians.begin(), medians.end());
-    EXPECT_GE(close, 0.85 * seeds) << wrong << ", median ratio " << medians[seeds / 2];
-    EXPECT_GE(steady, 0.85 * seeds) << wrong;
-  }
-}
-
-TEST(PriorBank, HoldsTheNoiseOfASensorThatSaysNothingAboutIt) {
-  const auto model = linear_model<Hovercraft>();
-  PriorBank::Setup setup = bank_setup(*model, {linear_priors()[0]});
-  setup.adapts_noise = true;
-  // So accurate beside what is predicted that its residual is next to nothing.
-  setup.output_variances[2] = 1e-8;
-  PriorBank bank(model, setup);
-  bank.reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
-  const auto samples = simulate(*model, 300, false, 3);
-  for (int k = 1; k <= 300; ++k) {
-    bank.predict(samples[k].inputs.data(), samples[k].duration);
-    bank.update(samples[k].outputs.data());
-  }
-  EXPECT_FALSE(bank.noise(2).is_identified);
-  EXPECT_NEAR(bank.noise(2).variance, 1e-8, 0.2e-8);
-  EXPECT_TRUE(bank.noise(1).is_identified);
-  setup.adapts_noise = false;
-  EXPECT_EQ(PriorBank(model, setup).noise(0).variance, setup.output_variances[0]);
-}
-
 }  // namespace
 }  // namespace rhec

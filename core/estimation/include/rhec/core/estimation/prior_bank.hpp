@@ -115,6 +115,7 @@ class RHEC_EXPORT PriorBank {
   void mix_members() noexcept;
   void weigh_outputs(const double* y, int taken) noexcept;
   void adapt_noise(const double* y) noexcept;
+  void reset_noise() noexcept;
   void spread_variances() noexcept;
   int own_places(int member, int parameter, int* places) const noexcept;
 
