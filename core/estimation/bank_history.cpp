@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "rhec/core/base/assertion.hpp"
@@ -15,14 +16,22 @@ BankHistory::BankHistory(PriorBank bank, int nodes)
       intervals_(static_cast<std::size_t>(std::max(nodes, 1))),
       inputs_(intervals_.size() * nu_),
       outputs_(intervals_.size() * ny_),
+      given_weights_(outputs_.size()),
+      used_weights_(outputs_.size()),
       predicted_(intervals_.size() * bank_.state_size()) {}
 
 void BankHistory::begin_node(const double* outputs) noexcept {
   const std::size_t at = place(newest_);
   std::copy_n(outputs, ny_, outputs_.data() + at * ny_);
+  std::fill_n(given_weights_.data() + at * ny_, ny_, std::numeric_limits<double>::quiet_NaN());
   bank_.save(predicted_.data() + at * bank_.state_size());
-  bank_.update(outputs);
+  update(at);
   count_ = std::min(count_ + 1, static_cast<int>(intervals_.size()));
+}
+
+void BankHistory::update(std::size_t place) noexcept {
+  bank_.update(outputs_.data() + place * ny_, given_weights_.data() + place * ny_);
+  for (std::size_t j = 0; j < ny_; ++j) used_weights_[place * ny_ + j] = bank_.robust_weight(static_cast<int>(j));
 }
 
 void BankHistory::start(const double* outputs, std::int64_t number) noexcept {
@@ -48,16 +57,35 @@ bool BankHistory::amend(int back, const double* outputs) noexcept {
   double* const known = outputs_.data() + place(amended) * ny_;
   for (std::size_t j = 0; j < ny_; ++j)
     if (!std::isnan(outputs[j])) known[j] = outputs[j];
-  bank_.restore(predicted_.data() + place(amended) * bank_.state_size());
-  bank_.update(known);
-  for (std::int64_t number = amended + 1; number <= newest_; ++number) {
+  filter_from(amended);
+  return true;
+}
+
+void BankHistory::filter_from(std::int64_t number) noexcept {
+  bank_.restore(predicted_.data() + place(number) * bank_.state_size());
+  update(place(number));
+  for (++number; number <= newest_; ++number) {
     const std::size_t at = place(number);
     bank_.predict(inputs_.data() + at * nu_, intervals_[at].duration);
     intervals_[at].distance = bank_.distance();
     bank_.save(predicted_.data() + at * bank_.state_size());
-    bank_.update(outputs_.data() + at * ny_);
+    update(at);
   }
-  return true;
+}
+
+void BankHistory::reweigh(std::int64_t number, const double* robust_weights) noexcept {
+  constexpr double much = 1.25;
+  if (number > newest_ || number <= newest_ - count_) return;
+  const std::size_t first = place(number) * ny_;
+  bool differs = false;
+  for (std::size_t j = 0; j < ny_; ++j) {
+    const double ratio = robust_weights[j] / used_weights_[first + j];
+    if (std::isnan(outputs_[first + j]) || !std::isfinite(ratio)) continue;
+    differs = differs || ratio > much || ratio < 1.0 / much;
+  }
+  if (!differs) return;
+  std::copy_n(robust_weights, ny_, given_weights_.data() + first);
+  filter_from(number);
 }
 
 BankHistory::Node BankHistory::node(std::int64_t number) const noexcept {

@@ -126,7 +126,8 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
       ++first;
     sensor_.push_back(first);
   }
-  if (!setup_.robust.empty()) surprises_.assign(ny_ * M, 0.0);
+  surprises_.assign(setup_.robust.empty() ? 0 : ny_ * M, 0.0);
+  find_loss_scales();
   next_.assign(nx * M, 0.0);
   jacobian_.assign(nx * columns * M, 0.0);
   predicted_.assign(ny_ * M, 0.0);
@@ -223,7 +224,7 @@ void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
   distance_ = 0.0;
 }
 
-void PriorBank::update(const double* y) noexcept {
+void PriorBank::update(const double* y, const double* robust_weights) noexcept {
   for (int m = 0; m < lanes_; ++m)
     for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean_[r * lanes_ + m];
   model_->observe(
@@ -246,7 +247,7 @@ void PriorBank::update(const double* y) noexcept {
                                 .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
   }
   if (taken == 0) return;
-  if (!setup_.robust.empty()) weigh_outputs(y, taken);
+  if (!setup_.robust.empty()) weigh_outputs(y, taken, robust_weights);
   bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                         innovation_variances_.data());
   if (members_ == 1) {

@@ -37,14 +37,17 @@ PriorBank::Noise PriorBank::noise(int output) const noexcept {
 /// (Mehra 1970). R follows by a scalar Kalman filter in units of itself, whose own variance V says how well R is known;
 /// where S tells little about R, R hardly moves. Residuals are those of the most probable member. Outputs of one unit
 /// and one stated noise, like the coordinates of a position, are one sensor and change together.
+///
+/// Where a sensor has a robust loss, a function of nu^2 / S that falls again for outliers takes its place, so that they
+/// do not pass for noise (an M-estimator of scale: Huber 1981, chapter 5).
 void PriorBank::adapt_noise(const double* y) noexcept {
   constexpr double steady_gain = 0.015, most_squares = 9.0, least_information = 1e-3, most_change = 2.0;
   constexpr double drift = 2.0 * steady_gain * steady_gain;
-  const auto best = std::max_element(weights_.begin(), weights_.begin() + members_) - weights_.begin();
+  const int best = most_probable();
   for (int sensor = 0; sensor < ny_; ++sensor) {
     if (sensor_[sensor] != sensor) continue;
     // Sums over the sensor's outputs, which do not depend on the axes of a position.
-    double squares = 0.0, spread = 0.0;
+    double squares = 0.0, spread = 0.0, used = 0.0;
     int count = 0;
     for (int j = sensor; j < ny_; ++j) {
       if (sensor_[j] != sensor || std::isnan(y[j])) continue;
@@ -59,12 +62,18 @@ void PriorBank::adapt_noise(const double* y) noexcept {
           spread += gradient(c) * gradient(r) * covariance_[(static_cast<std::ptrdiff_t>(c) * n_ + r) * lanes_ + best];
       }
       squares += residual * residual;
+      used += output_variances_[static_cast<std::ptrdiff_t>(j) * lanes_ + best];
       ++count;
     }
     if (count == 0) continue;
     double &R = learnt_[sensor], &V = learnt_[ny_ + sensor];
-    const double information = std::max(1.0 - spread / (count * R), least_information);
-    const double surplus = std::min((squares + spread) / (count * R), most_squares) - 1.0;
+    double information = std::max(1.0 - spread / used, least_information);
+    double surplus = std::min((squares + spread) / (count * R), most_squares) - 1.0;
+    if (loss_of_[sensor] >= 0) {
+      // The update was one with the weighted noise: what it found of h' P h holds for R as well.
+      information = R / (R + used / count * (1.0 / information - 1.0));
+      surplus = information * robust_surplus(y, sensor, best);
+    }
     const double gain = V / (V * information * information + 2.0 / count);  // of the surplus, i.e. divided by i^2
     const double change = 1.0 + gain * surplus;
     if (!std::isfinite(change)) continue;
@@ -78,7 +87,7 @@ void PriorBank::adapt_noise(const double* y) noexcept {
 
 /// Pseudo-Huber losses of the innovations, as weights of the outputs: s = sum of r^2 / S over a group, and the loss
 /// 2 delta^2 (sqrt(1 + s / delta^2) - 1) has the slope 1 / sqrt(1 + s / delta^2).
-void PriorBank::weigh_outputs(const double* y, int taken) noexcept {
+void PriorBank::weigh_outputs(const double* y, int taken, const double* given) noexcept {
   const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
   for (int j = 0; j < ny_; ++j)
     std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, learnt_[j]);
@@ -93,9 +102,82 @@ void PriorBank::weigh_outputs(const double* y, int taken) noexcept {
         if (!std::isnan(y[output])) s += surprises_[place(output) * lanes_ + m];
       const double inverse_weight = std::sqrt(1.0 + s / (loss.delta * loss.delta));
       for (const int output : loss.outputs)
-        output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + m] *= inverse_weight;
+        output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + m] *=
+            given && given[output] > 0.0 ? 1.0 / given[output] : inverse_weight;
     }
   }
+}
+
+int PriorBank::most_probable() const noexcept {
+  return static_cast<int>(std::max_element(weights_.begin(), weights_.begin() + members_) - weights_.begin());
+}
+
+double PriorBank::robust_weight(int output) const noexcept {
+  return learnt_[output] / output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + most_probable()];
+}
+
+/// What a group of outputs with s = sum of nu^2 / S says of their noise, relative to s. The threshold does not follow a
+/// loss that is tighter: the noise may be several times what was stated, and must not pass for outliers either.
+double PriorBank::scale_weight(double s, double delta) noexcept {
+  constexpr double least_threshold = 4.0;
+  const double threshold = std::max(delta, least_threshold), root = 1.0 + s / (threshold * threshold);
+  return 1.0 / (root * root);
+}
+
+/// For n outputs without outliers, s has a chi-square distribution: the mean of what they say of their noise, by
+/// Simpson's rule over r = sqrt(s), of which nothing is left at 12 standard deviations.
+void PriorBank::find_loss_scales() {
+  constexpr int steps = 2000;
+  loss_of_.assign(ny_, -1);
+  for (std::size_t k = 0; k < setup_.robust.size(); ++k) {
+    const RobustLoss& loss = setup_.robust[k];
+    std::vector<double> scales(loss.outputs.size() + 1, 1.0);
+    for (std::size_t n = 1; n < scales.size(); ++n) {
+      const double longest = std::sqrt(static_cast<double>(n)) + 12.0;
+      double total = 0.0, mean = 0.0;
+      for (int i = 0; i <= steps; ++i) {
+        const double r = longest * i / steps, s = r * r;
+        const double density = std::pow(r, static_cast<double>(n) - 1.0) * std::exp(-0.5 * s);
+        const double share = (i == 0 || i == steps ? 1.0 : i % 2 == 0 ? 2.0 : 4.0) * density;
+        total += share;
+        mean += share * s * scale_weight(s, loss.delta);
+      }
+      scales[n] = mean / total / static_cast<double>(n);
+    }
+    for (const int output : loss.outputs) loss_of_[output] = static_cast<int>(k);
+    loss_scales_.push_back(std::move(scales));
+  }
+}
+
+/// nu^2 / S - 1 in the mean over the sensor's outputs, without the outliers that a loss finds.
+double PriorBank::robust_surplus(const double* y, int sensor, int lane) const noexcept {
+  double total = 0.0;
+  int count = 0, place = 0;
+  const auto surprise_at = [&](int each) { return surprises_[static_cast<std::ptrdiff_t>(each) * lanes_ + lane]; };
+  for (int j = 0; j < ny_; ++j) {
+    if (std::isnan(y[j])) continue;
+    if (sensor_[j] == sensor) {
+      if (loss_of_[j] < 0) {
+        total += surprise_at(place);
+      } else {
+        const RobustLoss& loss = setup_.robust[loss_of_[j]];
+        double s = 0.0;
+        int present = 0;
+        for (int each = 0, at = 0; each < ny_; ++each) {
+          if (std::isnan(y[each])) continue;
+          if (loss_of_[each] == loss_of_[j]) {
+            s += surprise_at(at);
+            ++present;
+          }
+          ++at;
+        }
+        total += surprise_at(place) * scale_weight(s, loss.delta) / loss_scales_[loss_of_[j]][present];
+      }
+      ++count;
+    }
+    ++place;
+  }
+  return count > 0 ? total / count - 1.0 : 0.0;
 }
 
 }  // namespace rhec

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "node_covariance.hpp"
+#include "prior_restart.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
-#include "rhec/core/qp/kkt.hpp"
 
 namespace rhec {
 namespace {
@@ -54,7 +54,8 @@ RheProblem make_problem(std::shared_ptr<const ProcessModel> model, RheProblem::S
 }
 
 BankEstimation::Setup with_memory(BankEstimation::Setup filters, int horizon) {
-  filters.remembered_nodes = std::max(filters.remembered_nodes, horizon + 1);
+  // Those of the window, and the one that leaves it.
+  filters.remembered_nodes = std::max(filters.remembered_nodes, horizon + 2);
   return filters;
 }
 
@@ -67,10 +68,10 @@ PriorHorizonEstimation::PriorHorizonEstimation(const std::shared_ptr<const Model
       problem_(make_problem(process_model_, setup.problem)),
       solver_(std::move(solver)),
       covariance_(std::make_unique<NodeCovariance>(problem_)),
+      restart_(std::make_unique<PriorRestart>(problem_)),
       shifter_(problem_),
       point_(problem_.capacity()),
-      trial_(problem_.capacity()),
-      best_(problem_.capacity()),
+      prior_(problem_.capacity()),
       parameter_lower_(setup.filters.parameter_lower),
       parameter_upper_(setup.filters.parameter_upper) {
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
@@ -78,6 +79,7 @@ PriorHorizonEstimation::PriorHorizonEstimation(const std::shared_ptr<const Model
   solver_->setup(problem_);
   const int nx = model->state_count(), np = model->parameter_count(), n = process_model_->state_count();
   scratch_.assign(problem_.scratch_size(), 0.0);
+  robust_weights_.assign(model->output_count(), 0.0);
   advances_.resize(setup.problem.max_intervals);
   known_data_.assign(advances_.size() * process_model_->data_count(), 0.0);
   for (int j = 0; j < nx; ++j) entries_.push_back(j);
@@ -97,7 +99,7 @@ void PriorHorizonEstimation::reset() noexcept {
   solver_->reset();
   shifter_.forget();
   window_ = {};
-  has_window_ = false;
+  has_window_ = has_solution_ = false;
   law_ = 0;
   std::fill(advances_.begin(), advances_.end(), Advance{});
 }
@@ -112,6 +114,19 @@ void PriorHorizonEstimation::add_node(double duration, const double* inputs, con
 }
 
 bool PriorHorizonEstimation::amend(int back, const double* outputs) noexcept { return filters_.amend(back, outputs); }
+
+/// What the window has found of the outliers in the nodes that leave it now, which is more than their innovations said,
+/// goes to the bank: the arrival cost shall not bring back what the window had down-weighted.
+void PriorHorizonEstimation::hand_weights_on() noexcept {
+  if (!has_solution_ || problem_.setup().robust.empty()) return;
+  const std::int64_t first = filters_.history().newest() - problem_.capacity().intervals;
+  for (int node = 0; node < window_.intervals && window_.first + node < first; ++node) {
+    problem_.robust_weights(point_, node, robust_weights_.data(), scratch_);
+    for (std::size_t j = 0; j < robust_weights_.size(); ++j)
+      if (std::isnan(problem_.output(node)[j])) robust_weights_[j] = std::numeric_limits<double>::quiet_NaN();
+    filters_.history().reweigh(window_.first + node, robust_weights_.data());
+  }
+}
 
 void PriorHorizonEstimation::choose_law() noexcept {
   const auto weights = bank().weights();
@@ -174,23 +189,23 @@ void PriorHorizonEstimation::fill_window() noexcept {
   for (int j = 0; j < model().output_count(); ++j) problem_.set_output_weight(j, 1.0 / bank().noise(j).variance);
   write_arrival(first.predicted);
   problem_.finish();
-  if (!has_guess || !shifter_.apply(static_cast<int>(steps), problem_, point_)) start_cold();
+  if (!has_guess || !shifter_.apply(static_cast<int>(steps), problem_, point_)) start_cold(point_);
 }
 
 /// Cold start: the arrival's mean, rolled out with the measured inputs and without process noise.
-void PriorHorizonEstimation::start_cold() noexcept {
+void PriorHorizonEstimation::start_cold(Iterate& point) noexcept {
   const int inputs = process_model_->input_count();
   for (int j = 0; j < process_model_->state_count(); ++j)
-    point_.state(0)[j] =
+    point.state(0)[j] =
         std::min(std::max(problem_.arrival_mean[j], problem_.state_lower(0)[j]), problem_.state_upper(0)[j]);
   for (int i = 0; i < window_.intervals; ++i) {
     for (int j = 0; j < inputs; ++j) {
       const double measured = problem_.measured_input(i)[j];
-      point_.control(i)[j] = std::isnan(measured) ? 0.0 : measured;
+      point.control(i)[j] = std::isnan(measured) ? 0.0 : measured;
     }
   }
-  point_.clear_multipliers();
-  problem_.simulate(point_, scratch_);
+  point.clear_multipliers();
+  problem_.simulate(point, scratch_);
 }
 
 bool PriorHorizonEstimation::arrival(double* mean, double* sigma) const noexcept {
@@ -199,30 +214,6 @@ bool PriorHorizonEstimation::arrival(double* mean, double* sigma) const noexcept
     sigma[j] = scale_[entries_[j]];
   }
   return true;
-}
-
-/// The objective with the states simulated from the first one, i.e. without defects.
-double PriorHorizonEstimation::objective_from_start(const Iterate& iterate) noexcept {
-  trial_ = iterate;
-  problem_.simulate(trial_, scratch_);
-  const double objective = problem_.evaluate(trial_, nullptr, scratch_);
-  return std::isnan(objective) ? std::numeric_limits<double>::infinity() : objective;
-}
-
-/// A solve that failed, or that the prior explains better, had a bad guess: solve again from the prior.
-void PriorHorizonEstimation::reconsider(Report& report, Clock::time_point deadline) noexcept {
-  const double found =
-      is_usable(report.status) ? objective_from_start(point_) : std::numeric_limits<double>::infinity();
-  best_ = point_;
-  start_cold();
-  if (!is_usable(report.status)) solver_->reset();
-  if (!(problem_.evaluate(point_, nullptr, scratch_) < found)) {
-    point_ = best_;
-    return;
-  }
-  const int iterations = report.iterations;
-  report = solver_->solve(point_, deadline);
-  report.iterations += iterations;
 }
 
 /// The mixture of the bank, with the window in place of the filter of its law.
@@ -248,15 +239,22 @@ void PriorHorizonEstimation::combine(Estimate& result) noexcept {
 void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   if (filters_.is_searching()) return filters_.estimate(result, deadline);
   const int nx = model().state_count(), np = model().parameter_count();
+  hand_weights_on();
   filters_.history().bank().moments(mean_, mixture_);
   choose_law();
   fill_window();
   result.report = solver_->solve(point_, deadline);
-  if (result.report.status != Status::solved) reconsider(result.report, deadline);
-  result.fallback = !is_usable(result.report.status);
+  has_solution_ = result.report.status == Status::solved;
+  if (!has_solution_) {
+    start_cold(prior_);
+    has_solution_ =
+        restart_->reconsider(problem_, *solver_, prior_, covariance_->qp(), point_, result.report, deadline);
+  }
+  // Where the window knows no better than its prior, the filters do.
+  result.fallback = !has_solution_;
   result.predicted = false;
   if (result.fallback) {
-    start_cold();
+    start_cold(point_);
     solver_->reset();
   } else {
     combine(result);

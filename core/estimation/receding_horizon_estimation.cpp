@@ -10,10 +10,10 @@
 
 #include "block_structure.hpp"
 #include "node_covariance.hpp"
+#include "prior_restart.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/measurement.hpp"
-#include "rhec/core/qp/kkt.hpp"
 
 namespace rhec {
 namespace {
@@ -54,7 +54,8 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
       point_(problem_.capacity()),
       trial_(problem_.capacity()),
       best_(problem_.capacity()),
-      covariance_(std::make_unique<NodeCovariance>(problem_)) {
+      covariance_(std::make_unique<NodeCovariance>(problem_)),
+      restart_(std::make_unique<PriorRestart>(problem_)) {
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
     throw Error("estimator: the solver cannot take this problem: " + reason);
   solver_->setup(problem_);
@@ -91,7 +92,7 @@ void RecedingHorizonEstimation::start(const double* outputs) noexcept {
   take_outputs(0, outputs);
   arrival_.write(problem_);
   problem_.finish();
-  start_cold();
+  start_cold(point_);
 }
 
 void RecedingHorizonEstimation::take_outputs(int node, const double* outputs) noexcept {
@@ -103,24 +104,24 @@ void RecedingHorizonEstimation::take_inputs(int interval, const double* inputs) 
 }
 
 /// Cold start: the prior, rolled out with the measured inputs.
-void RecedingHorizonEstimation::start_cold() noexcept {
+void RecedingHorizonEstimation::start_cold(Iterate& point) noexcept {
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
   const auto& lower = problem_.setup().parameter_lower;
   const auto& upper = problem_.setup().parameter_upper;
-  for (int j = 0; j < nx; ++j) point_.state(0)[j] = problem_.arrival_mean[j];
+  for (int j = 0; j < nx; ++j) point.state(0)[j] = problem_.arrival_mean[j];
   for (int j = 0; j < np; ++j)
-    point_.state(0)[nx + j] = std::min(std::max(problem_.arrival_mean[nx + j], lower[j]), upper[j]);
+    point.state(0)[nx + j] = std::min(std::max(problem_.arrival_mean[nx + j], lower[j]), upper[j]);
   for (int i = 0; i < window_.intervals; ++i) {
-    double* w = point_.control(i);
+    double* w = point.control(i);
     for (std::size_t j = 0; j < inputs_.size(); ++j) {
       const double measured = problem_.measured_input(i)[j];
       w[j] = std::isnan(measured) ? 0.0 : measured;
     }
     for (int j = static_cast<int>(inputs_.size()), c = 0; c < np; ++c)
-      if (problem_.structure().starts_block(i, c)) w[j++] = point_.state(0)[nx + c];
+      if (problem_.structure().starts_block(i, c)) w[j++] = point.state(0)[nx + c];
   }
-  point_.clear_multipliers();
-  problem_.simulate(point_, scratch_);
+  point.clear_multipliers();
+  problem_.simulate(point, scratch_);
 }
 
 /// After a failed solve: leaves a finite guess from which the next solve starts anew.
@@ -135,7 +136,7 @@ void RecedingHorizonEstimation::recover() noexcept {
     }
     return finite;
   };
-  if (!is_finite()) start_cold();
+  if (!is_finite()) start_cold(point_);
   if (!is_finite()) {
     // The simulation from the prior is not finite either: keep the vehicle where it was last.
     for (int i = 0; i <= N; ++i) std::copy_n(last_state_.data(), last_state_.size(), point_.state(i));
@@ -192,7 +193,7 @@ void RecedingHorizonEstimation::advance_window(double duration, const double* in
     point_.clear_multipliers();
     problem_.simulate(point_, scratch_);
   } else if (!shifter_.apply(full ? 1 : 0, problem_, point_)) {
-    start_cold();
+    start_cold(point_);
   }
 }
 
@@ -296,38 +297,6 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
   point_ = best_;
 }
 
-/// The objective with the states simulated from the first one, i.e. without defects.
-double RecedingHorizonEstimation::objective_from_start(const Iterate& iterate) noexcept {
-  trial_ = iterate;
-  problem_.simulate(trial_, scratch_);
-  const double objective = problem_.evaluate(trial_, nullptr, scratch_);
-  return std::isnan(objective) ? std::numeric_limits<double>::infinity() : objective;
-}
-
-/// A solve that did not converge may have a bad guess, which would persist from sample to sample. If the prior explains
-/// the measurements better than the result, solve again from the prior, and keep the best of the three.
-void RecedingHorizonEstimation::reconsider(Report& report, Clock::time_point deadline) noexcept {
-  const double found = objective_from_start(point_);
-  best_ = point_;
-  start_cold();  // already simulated
-  const double prior = problem_.evaluate(point_, nullptr, scratch_);
-  if (!(prior < found)) {
-    point_ = best_;
-    return;
-  }
-  best_ = point_;
-  const Report from_prior = solver_->solve(point_, deadline);
-  const int iterations = report.iterations + from_prior.iterations;
-  report = from_prior;
-  if (!is_usable(from_prior.status) || !(objective_from_start(point_) <= prior)) {
-    point_ = best_;
-    report.status = Status::iteration_limit;
-    report.objective = prior;
-    report.kkt = kkt_residual(problem_, point_, covariance_->qp(), scratch_);
-  }
-  report.iterations = iterations;
-}
-
 void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   const int nx = problem_.model().state_count(), np = problem_.model().parameter_count(), N = window_.intervals;
   const int heading = roles().heading;
@@ -350,8 +319,10 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   if (searching_ && remembers && is_known(arrival_.covariance())) searching_ = false;
   if (searching_) search_heading(deadline);
   result.report = solver_->solve(point_, deadline);
-  if (result.report.status == Status::iteration_limit || result.report.status == Status::stalled)
-    reconsider(result.report, deadline);
+  if (result.report.status == Status::iteration_limit || result.report.status == Status::stalled) {
+    start_cold(trial_);
+    restart_->reconsider(problem_, *solver_, trial_, covariance_->qp(), point_, result.report, deadline);
+  }
   result.fallback = !is_usable(result.report.status);
   result.predicted = false;
   if (result.fallback) recover();

@@ -91,5 +91,32 @@ TEST(BankHistory, BoundsTheInfluenceOfAnOutlier) {
   EXPECT_LT(shift_by(10000.0, robust), 1.5 * bounded);
 }
 
+/// A weight that is next to nothing, given later, makes the node one without that output.
+TEST(BankHistory, TakesBetterWeightsOfARobustLoss) {
+  const auto model = linear_model<Hovercraft>();
+  auto samples = simulate(*model, 30, false, 3);
+  samples[25].outputs = {100.0, 0.2, 0.1};
+  const std::vector<RobustLoss> robust = {{{0}, 3.0}};
+  BankHistory told = history_for(model, 8, robust), without = history_for(model, 8, robust);
+  told.start(samples[0].outputs.data());
+  without.start(samples[0].outputs.data());
+  for (int k = 1; k <= 30; ++k) {
+    told.add(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
+    std::vector<double> outputs = samples[k].outputs;
+    if (k == 25) outputs[0] = nan;
+    without.add(samples[k].duration, samples[k].inputs.data(), outputs.data());
+  }
+  const double before = difference(told, without);
+  EXPECT_GT(before, 1e-3);
+  const std::vector<double> next_to_nothing = {1e-14, 1.0, 1.0};
+  told.reweigh(22, next_to_nothing.data());  // forgotten
+  EXPECT_EQ(difference(told, without), before);
+  told.reweigh(25, next_to_nothing.data());
+  EXPECT_LT(difference(told, without), 1e-9);
+  // A late measurement of another node leaves the weights.
+  ASSERT_TRUE(told.amend(2, samples[28].outputs.data()) && without.amend(2, samples[28].outputs.data()));
+  EXPECT_LT(difference(told, without), 1e-9);
+}
+
 }  // namespace
 }  // namespace rhec

@@ -65,5 +65,39 @@ TEST(PriorBank, HoldsTheNoiseOfASensorThatSaysNothingAboutIt) {
   EXPECT_EQ(PriorBank(model, setup).noise(0).variance, setup.output_variances[0]);
 }
 
+/// One fix in twenty is wrong by thirty standard deviations: with a robust loss it does not pass for noise.
+TEST(PriorBank, LearnsTheNoiseBesideOutliers) {
+  const auto model = linear_model<Hovercraft>();
+  const auto walk = prior("walk", "{sigma: 0.224, along: time, course: held, mean: 0, mean_sigma: 0.5}");
+  const auto share_of_close = [&](double delta, bool has_outliers, std::vector<RobustLoss> robust) {
+    if (!robust.empty()) robust[0].delta = delta;
+    int close = 0;
+    constexpr int seeds = 40;
+    for (unsigned seed = 1; seed <= seeds; ++seed) {
+      PriorBank::Setup setup = bank_setup(*model, {{walk, walk}});
+      const double truth = setup.output_variances[2];
+      setup.output_variances[2] *= 4.0;
+      setup.adapts_noise = true;
+      setup.robust = robust;
+      PriorBank bank(model, setup);
+      bank.reset(initial_mean(*model).head(4), initial_covariance(*model).topLeftCorner(4, 4));
+      auto samples = simulate(*model, 300, false, seed);
+      bank.update(samples[0].outputs.data());
+      for (int k = 1; k <= 300; ++k) {
+        if (has_outliers && k % 20 == 0) samples[k].outputs[2] += (k % 40 == 0 ? 30.0 : -30.0) * std::sqrt(truth);
+        bank.predict(samples[k].inputs.data(), samples[k].duration);
+        bank.update(samples[k].outputs.data());
+      }
+      close += std::abs(std::sqrt(bank.noise(2).variance / truth) - 1.0) < 0.25;
+    }
+    return static_cast<double>(close) / seeds;
+  };
+  const std::vector<RobustLoss> robust = {{{2}, 3.0}};
+  EXPECT_GE(share_of_close(3.0, true, robust), 0.85);
+  EXPECT_LE(share_of_close(0.0, true, {}), 0.15);
+  // Without outliers the loss does not shrink it, however tight it is.
+  for (const double delta : {1.0, 2.0, 4.0}) EXPECT_GE(share_of_close(delta, false, robust), 0.85) << delta;
+}
+
 }  // namespace
 }  // namespace rhec

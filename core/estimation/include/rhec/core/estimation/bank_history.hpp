@@ -28,6 +28,9 @@ class RHEC_EXPORT BankHistory {
   /// Adds outputs to the node `back` before the newest one; where there are some already, they are replaced. Returns
   /// false if that node is forgotten.
   bool amend(int back, const double* outputs) noexcept;
+  /// Weights of a remembered node's outputs (n_y, NaN: none) that are better known than from its innovations, as a
+  /// window knows them when the node leaves it. Where they differ much from those used, it is filtered anew from there.
+  void reweigh(std::int64_t number, const double* robust_weights) noexcept;
 
   std::int64_t newest() const noexcept { return newest_; }
   /// How many nodes are remembered.
@@ -49,11 +52,14 @@ class RHEC_EXPORT BankHistory {
     return static_cast<std::size_t>(number % static_cast<std::int64_t>(intervals_.size()));
   }
   void begin_node(const double* outputs) noexcept;
+  void update(std::size_t place) noexcept;
+  void filter_from(std::int64_t number) noexcept;
 
   PriorBank bank_;
   std::size_t nu_, ny_;
   std::vector<Interval> intervals_;
   std::vector<double> inputs_, outputs_;
+  std::vector<double> given_weights_, used_weights_;  ///< n_y a node
   AlignedDoubles predicted_;
   std::int64_t newest_ = -1;
   int count_ = 0;

@@ -53,8 +53,12 @@ class RHEC_EXPORT PriorBank {
   /// Starts all members at a vehicle state (n_x) and its covariance, and their processes at their own starts.
   void reset(const Eigen::Ref<const Eigen::VectorXd>& state,
              const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
-  /// Measurement update with y (n_y, NaN where missing).
-  void update(const double* y) noexcept;
+  /// Measurement update with y (n_y, NaN where missing). `robust_weights` (n_y, or null) take the place of those that
+  /// the robust losses give to the innovations; NaN: none.
+  void update(const double* y, const double* robust_weights = nullptr) noexcept;
+  /// The weight, above 0 and at most 1, by which the last update scaled an output's information, for the most probable
+  /// member; 1 without a robust loss.
+  double robust_weight(int output) const noexcept;
   /// Time update by `duration` [s] with a measured input (n_u, NaN where missing: 0, with a standard deviation of a
   /// hundred times the variable's typical magnitude).
   void predict(const double* measured_input, double duration) noexcept;
@@ -113,8 +117,12 @@ class RHEC_EXPORT PriorBank {
   void find_distance(const double* input, double duration) noexcept;
   void advance_processes(double duration) noexcept;
   void mix_members() noexcept;
-  void weigh_outputs(const double* y, int taken) noexcept;
+  void find_loss_scales();
+  void weigh_outputs(const double* y, int taken, const double* given) noexcept;
   void adapt_noise(const double* y) noexcept;
+  static double scale_weight(double s, double delta) noexcept;
+  double robust_surplus(const double* y, int sensor, int lane) const noexcept;
+  int most_probable() const noexcept;
   void reset_noise() noexcept;
   void spread_variances() noexcept;
   int own_places(int member, int parameter, int* places) const noexcept;
@@ -123,7 +131,10 @@ class RHEC_EXPORT PriorBank {
   Setup setup_;
   int members_, lanes_, nx_, nu_, np_, ny_, n_ = 0;
   std::vector<Process> processes_;
-  std::vector<int> sensor_;  ///< per output: the first output of its sensor
+  std::vector<int> sensor_;   ///< per output: the first output of its sensor
+  std::vector<int> loss_of_;  ///< per output: its robust loss, or -1
+  /// Per robust loss and number of outputs that are not missing: what an output without outliers says of its noise.
+  std::vector<std::vector<double>> loss_scales_;
   /// Per output: its noise variance, and the variance of that, relative to its square.
   AlignedDoubles learnt_;
   AlignedDoubles mean_, covariance_, work_, weights_, keep_, take_, next_, jacobian_, predicted_, gradient_, squares_,

@@ -16,6 +16,7 @@
 namespace rhec {
 
 class NodeCovariance;
+class PriorRestart;
 
 /// Receding horizon estimation whose parameters follow priors (docs/method.md, section 8). A bank of filters runs
 /// beside the window. Its weights choose the law by which the parameters vary within the window: that of the most
@@ -58,13 +59,12 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
 
  private:
   const ProcessModel& processes() const noexcept { return *process_model_; }
+  void hand_weights_on() noexcept;
   void choose_law() noexcept;
   void fill_window() noexcept;
   void fill_interval(int interval, std::int64_t number) noexcept;
   void write_arrival(const double* saved) noexcept;
-  void start_cold() noexcept;
-  double objective_from_start(const Iterate& iterate) noexcept;
-  void reconsider(Report& report, Clock::time_point deadline) noexcept;
+  void start_cold(Iterate& point) noexcept;
   void combine(Estimate& result) noexcept;
 
   /// What the process data of an interval were computed from.
@@ -80,15 +80,16 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   RheProblem problem_;
   std::shared_ptr<Solver> solver_;
   std::unique_ptr<NodeCovariance> covariance_;
+  std::unique_ptr<PriorRestart> restart_;
   GuessShifter shifter_;
-  Iterate point_, trial_, best_;
-  std::vector<double> scratch_;
+  Iterate point_, prior_;
+  std::vector<double> scratch_, robust_weights_;
   std::vector<Advance> advances_;   ///< by number, as the data
   std::vector<double> known_data_;  ///< of the last intervals
   std::vector<int> entries_;        ///< of [x; p] in [x; z]
   std::vector<double> parameter_lower_, parameter_upper_;
   Window window_;
-  bool has_window_ = false;
+  bool has_window_ = false, has_solution_ = false;
   int law_ = 0;
   Eigen::VectorXd mean_, member_mean_, scale_, shift_;
   Eigen::MatrixXd mixture_, member_covariance_, predicted_, scaled_, inverse_;

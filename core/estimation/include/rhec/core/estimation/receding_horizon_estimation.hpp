@@ -12,6 +12,7 @@
 namespace rhec {
 
 class NodeCovariance;
+class PriorRestart;
 
 /// Receding horizon estimation with structured blocking (docs/method.md, sections 2, 4 and 5). The horizon of at most
 /// `problem.max_intervals` intervals grows from the start of the run and then slides, with an arrival cost before it.
@@ -60,10 +61,8 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   void search_heading(Clock::time_point deadline) noexcept;
   void take_outputs(int node, const double* outputs) noexcept;
   void take_inputs(int interval, const double* inputs) noexcept;
-  void start_cold() noexcept;
+  void start_cold(Iterate& point) noexcept;
   void recover() noexcept;
-  double objective_from_start(const Iterate& iterate) noexcept;
-  void reconsider(Report& report, Clock::time_point deadline) noexcept;
   void write_covariance(int node, Estimate& result) noexcept;
 
   Setup setup_;
@@ -80,6 +79,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   std::vector<ArrivalCost::Border> borders_;
   std::vector<double> scratch_, inputs_, outputs_;
   std::unique_ptr<NodeCovariance> covariance_;
+  std::unique_ptr<PriorRestart> restart_;
   Eigen::VectorXd last_state_;  ///< of the newest node, with the parameters of the interval before it
 };
 
