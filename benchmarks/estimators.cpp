@@ -5,8 +5,9 @@
 //
 //     estimators --scenario scenarios/baseline/ekf.yaml --set speed=5 --set seed=7 --beside 'bank: estimator.name=bank'
 //
-// What stands after --beside is a name and assignments, separated by ';'. scripts/measure/estimators runs the whole
-// grid.
+// What stands after --beside is a name and assignments, separated by ';'. After --smoothed it is the same, and the
+// estimates are those of the smoother over the whole drive; its time is that of an interval. scripts/measure/estimators
+// runs the whole grid.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -34,6 +35,7 @@ struct Beside {
   std::unique_ptr<Estimator> estimator;
   std::vector<Estimate> estimates = {};
   std::vector<double> microseconds = {};  ///< of each sample, without what is prepared for the next
+  std::shared_ptr<NodeLog> nodes = {};    ///< what it has seen, for a smoother; else null
 };
 
 /// Passes on what the driving estimator sees.
@@ -125,9 +127,29 @@ struct Errors {
   std::vector<double> parameters, inside;
 };
 
+/// What a smoother says of the drive, node by node, in place of its estimator's causal estimates.
+void smooth(const sim::Scenario& variant, const Eigen::VectorXd& start, Beside& beside) {
+  const ModelDescription& about = variant.robot().bounded_description();
+  const auto nx = std::ssize(about.states), np = std::ssize(about.parameters), n = nx + np;
+  const auto begin = std::chrono::steady_clock::now();
+  const SmoothedRun run = variant.robot().make_smoother(start)->estimate(*beside.nodes);
+  const std::chrono::duration<double, std::micro> taken = std::chrono::steady_clock::now() - begin;
+  if (run.report.status != Status::solved || run.covariances.empty())
+    throw Error(
+        fmt::format("'{}': {} after {} iterations", beside.name, name_of(run.report.status), run.report.iterations));
+  beside.estimates.assign(static_cast<std::size_t>(run.intervals()) + 1, Estimate{});
+  for (std::ptrdiff_t i = 0; i <= run.intervals(); ++i) {
+    Estimate& estimate = beside.estimates[static_cast<std::size_t>(i)];
+    estimate.state = Eigen::Map<const Eigen::VectorXd>(run.states.data() + i * nx, nx);
+    estimate.parameters = Eigen::Map<const Eigen::VectorXd>(run.node_parameters.data() + i * np, np);
+    estimate.covariance = Eigen::Map<const Eigen::MatrixXd>(run.covariances.data() + i * n * n, n, n);
+  }
+  beside.microseconds.assign(1, taken.count() / static_cast<double>(run.intervals()));
+}
+
 struct Arguments {
   std::string scenario;
-  std::vector<std::string> assignments, beside;
+  std::vector<std::string> assignments, beside, smoothed;
 };
 
 Arguments read(int count, char** words) {
@@ -142,8 +164,10 @@ Arguments read(int count, char** words) {
       arguments.assignments.push_back(value);
     else if (word == "--beside")
       arguments.beside.push_back(value);
+    else if (word == "--smoothed")
+      arguments.smoothed.push_back(value);
     else
-      throw Error("'" + word + "' is none of --scenario, --set, --beside");
+      throw Error("'" + word + "' is none of --scenario, --set, --beside, --smoothed");
   }
   if (arguments.scenario.empty()) throw Error("--scenario FILE is missing");
   return arguments;
@@ -166,17 +190,24 @@ void run(const Arguments& arguments) {
   sim::Scenario driver = scenario_with(host, arguments, "");
   std::vector<sim::Scenario> variants;
   std::vector<Beside> others;
-  variants.reserve(arguments.beside.size());
-  for (const std::string& beside : arguments.beside) {
+  variants.reserve(arguments.beside.size() + arguments.smoothed.size());
+  const auto add = [&](const std::string& beside, std::shared_ptr<NodeLog> nodes) {
     const std::size_t colon = beside.find(':');
-    if (colon == std::string::npos) throw Error("--beside '" + beside + "': expected 'NAME: ASSIGNMENT; ...'");
+    if (colon == std::string::npos) throw Error("'" + beside + "': expected 'NAME: ASSIGNMENT; ...'");
     variants.push_back(scenario_with(host, arguments, beside.substr(colon + 1)));
-    others.push_back({beside.substr(0, colon), variants.back().robot().make_estimator(driver.initial_state())});
-  }
+    Robot robot = variants.back().robot();
+    if (nodes) robot.add_hooks(recording_nodes(nodes));
+    others.push_back({.name = beside.substr(0, colon), .estimator = robot.make_estimator(driver.initial_state())});
+    others.back().nodes = std::move(nodes);
+  };
+  for (const std::string& beside : arguments.beside) add(beside, nullptr);
+  for (const std::string& smoothed : arguments.smoothed) add(smoothed, std::make_shared<NodeLog>());
   const ModelDescription& about = driver.robot().bounded_description();
   sim::LoopHooks hooks;
   hooks.robot = std::make_shared<ForwardingHooks>(others);
   const sim::RunLog log = sim::run_closed_loop(driver, hooks);
+  for (std::size_t i = 0; i < others.size(); ++i)
+    if (others[i].nodes) smooth(variants[i], driver.initial_state(), others[i]);
   for (Beside& other : others) {
     if (other.estimates.size() != log.samples.size())
       throw Error(fmt::format("{} estimates for {} samples", other.estimates.size(), log.samples.size()));

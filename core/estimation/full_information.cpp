@@ -7,60 +7,12 @@
 #include <fmt/format.h>
 
 #include "block_structure.hpp"
+#include "node_log.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/measurement.hpp"
 #include "track_alignment.hpp"
 
 namespace rhec {
-
-void NodeRecorder::append_outputs(const double* outputs) {
-  const int ny = model().output_count();
-  log_->outputs.insert(log_->outputs.end(), outputs, outputs + ny);
-  log_->states.resize(log_->states.size() + static_cast<std::size_t>(model().state_count()), std::nan(""));
-  log_->parameters.resize(log_->parameters.size() + static_cast<std::size_t>(model().parameter_count()), std::nan(""));
-}
-
-void NodeRecorder::start(const double* outputs) noexcept {
-  method_->start(outputs);
-  *log_ = {};
-  append_outputs(outputs);
-  started_ = true;
-}
-
-void NodeRecorder::add_node(double duration, const double* inputs, const double* outputs) noexcept {
-  if (!started_) {
-    start(outputs);
-    return;
-  }
-  method_->add_node(duration, inputs, outputs);
-  if (!(duration > 0.0) || !std::isfinite(duration)) return;
-  log_->durations.push_back(duration);
-  log_->inputs.insert(log_->inputs.end(), inputs, inputs + model().input_count());
-  append_outputs(outputs);
-}
-
-bool NodeRecorder::amend(int back, const double* outputs) noexcept {
-  if (!method_->amend(back, outputs)) return false;
-  const int ny = model().output_count();
-  double* row = log_->outputs.data() + static_cast<std::ptrdiff_t>(log_->intervals() - back) * ny;
-  for (int j = 0; j < ny; ++j)
-    if (!std::isnan(outputs[j])) row[j] = outputs[j];
-  return true;
-}
-
-void NodeRecorder::estimate(Estimate& result, Clock::time_point deadline) noexcept {
-  method_->estimate(result, deadline);
-  const auto node = static_cast<std::ptrdiff_t>(log_->intervals());
-  std::copy_n(result.state.data(), result.state.size(), log_->states.data() + node * result.state.size());
-  std::copy_n(result.parameters.data(), result.parameters.size(),
-              log_->parameters.data() + node * result.parameters.size());
-}
-
-void NodeRecorder::reset() noexcept {
-  method_->reset();
-  *log_ = {};
-  started_ = false;
-}
 
 FullInformationEstimation::FullInformationEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver,
                                                      Setup setup)
@@ -75,29 +27,6 @@ FullInformationEstimation::FullInformationEstimation(std::shared_ptr<const Model
 }
 
 namespace {
-
-/// Rows without an estimate copy the row before them (at the start: the row after them).
-void fill_gaps(std::vector<double>& rows, int width) {
-  const std::ptrdiff_t count = width > 0 ? static_cast<std::ptrdiff_t>(rows.size()) / width : 0;
-  const auto is_known = [&](std::ptrdiff_t i) {
-    return std::all_of(rows.begin() + i * width, rows.begin() + (i + 1) * width,
-                       [](double v) { return std::isfinite(v); });
-  };
-  for (std::ptrdiff_t i = 1; i < count; ++i)
-    if (!is_known(i) && is_known(i - 1)) std::copy_n(rows.begin() + (i - 1) * width, width, rows.begin() + i * width);
-  for (std::ptrdiff_t i = count - 2; i >= 0; --i)
-    if (!is_known(i)) std::copy_n(rows.begin() + (i + 1) * width, width, rows.begin() + i * width);
-}
-
-void fill_data(const NodeLog& log, RheProblem& problem) {
-  const int nu = problem.model().input_count(), ny = problem.model().output_count(), N = log.intervals();
-  for (std::ptrdiff_t i = 0; i <= N; ++i) {
-    std::copy_n(log.outputs.data() + i * ny, ny, problem.output(static_cast<int>(i)));
-    if (i == N) break;
-    std::copy_n(log.inputs.data() + i * nu, nu, problem.measured_input(static_cast<int>(i)));
-    problem.set_duration(static_cast<int>(i), log.durations[i]);
-  }
-}
 
 /// The estimates in the log as an iterate; a block gets the value of its last interval, which is based on most of its
 /// data.
@@ -120,7 +49,7 @@ Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
       parameters[static_cast<std::ptrdiff_t>(i) * np + j] = std::clamp(value, lower, upper);
     }
   }
-  align_track(problem, states, inputs, parameters);
+  align_track(problem, problem.model(), states, inputs, parameters);
   problem.structure().set_decisions(guess, inputs.data(), parameters.data());
   for (std::ptrdiff_t i = 0; i <= N; ++i) std::copy_n(states.data() + i * nx, nx, guess.state(static_cast<int>(i)));
   return guess;
@@ -142,7 +71,7 @@ SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point d
   std::vector<std::int64_t> first_starts(np, 0);
   std::vector<std::uint8_t> begins(N, 0);
   set_block_structure({0, N}, setup_.blockings, setup_.walks, first_starts, begins, problem);
-  fill_data(log, problem);
+  fill_data(log, nu, problem);
   ArrivalCost prior(ArrivalKind::constant, problem, setup_.walks);
   prior.reset(setup_.initial_mean, setup_.initial_covariance);
   prior.write(problem);
@@ -170,40 +99,14 @@ SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point d
       run.start_parameters.push_back(ramp ? iterate.state(node)[nx + j] : run.parameters[i * np + j]);
     }
   }
+  for (std::ptrdiff_t i = 0; i <= N; ++i) {
+    const auto row = run.parameters.begin() + std::max<std::ptrdiff_t>(i - 1, 0) * np;
+    run.node_parameters.insert(run.node_parameters.end(), row, row + np);
+  }
   const std::size_t n = static_cast<std::size_t>(nx) + static_cast<std::size_t>(np);
   run.covariances.resize((static_cast<std::size_t>(N) + 1) * n * n);
   if (!solver_->covariances(iterate, all_stages(problem), run.covariances)) run.covariances.clear();
   return run;
-}
-
-void state_at(const SmoothedRun& run, const Model& model, int substeps, double time, double* state) {
-  const int nx = model.state_count();
-  const auto after = std::upper_bound(run.times.begin(), run.times.end(), time);
-  const std::ptrdiff_t node = std::max<std::ptrdiff_t>(0, after - run.times.begin() - 1);
-  const double* from = run.states.data() + node * nx;
-  const double duration = time - run.times[node];
-  if (node == run.intervals() || !(duration > 0.0)) {
-    std::copy_n(from, nx, state);
-    return;
-  }
-  Model::Intervals request;
-  request.count = 1;
-  request.states = from;
-  request.inputs = run.inputs.data() + node * model.input_count();
-  // On a ramp: the fraction of the interval that has elapsed.
-  const int np = model.parameter_count();
-  const double share = duration / (run.times[node + 1] - run.times[node]);
-  std::vector<double> ends(np);
-  for (int j = 0; j < np; ++j) {
-    const double start = run.start_parameters[node * np + j];
-    ends[j] = start + share * (run.parameters[node * np + j] - start);
-  }
-  request.parameters = run.start_parameters.data() + node * np;
-  request.parameters_end = ends.data();
-  request.durations = &duration;
-  request.substeps = substeps;
-  request.next_states = state;
-  model.integrate(request);
 }
 
 }  // namespace rhec

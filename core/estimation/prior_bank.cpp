@@ -115,7 +115,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   mean_.assign(n * M, 0.0);
   covariance_.assign(n * n * M, 0.0);
   work_.assign((2 * n * n + 3 * n) * M, 0.0);
-  for (auto* v : {&weights_, &keep_, &take_, &squares_}) v->assign(M, 0.0);
+  for (auto* v : {&weights_, &log_likelihoods_, &keep_, &take_, &squares_}) v->assign(M, 0.0);
   innovation_variances_.assign(ny_ * M, 0.0);
   output_variances_.assign(ny_ * M, 0.0);
   learnt_.assign(2 * static_cast<std::size_t>(ny_), 0.0);
@@ -219,6 +219,7 @@ void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
       for (int r = 0; r < nx_; ++r) covariance_[(c * n_ + r) * lanes_ + m] = covariance(r, c);
     for (int j = 0; j < np_; ++j) write_start(j, *setup_.members[member][j], m);
   }
+  std::fill(log_likelihoods_.begin(), log_likelihoods_.end(), 0.0);
   for (int m = 0; m < members_; ++m) weights_[m] = 1.0 / members_;
   reset_noise();
   distance_ = 0.0;
@@ -265,6 +266,7 @@ void PriorBank::update(const double* y, const double* robust_weights) noexcept {
       logarithms += std::log(product);
     }
     squares_[m] = -0.5 * (squares_[m] + logarithms);
+    log_likelihoods_[m] += squares_[m];
     if (squares_[m] > best) best = squares_[m];
   }
   double sum = 0.0;

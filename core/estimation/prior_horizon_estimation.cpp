@@ -7,6 +7,7 @@
 
 #include "node_covariance.hpp"
 #include "prior_restart.hpp"
+#include "process_problem.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
 
@@ -16,42 +17,6 @@ namespace {
 /// A law must be so much more probable than the present one to take its place: the window then needs another
 /// linearisation, and its solution jumps a little.
 constexpr double advantage = 2.0;
-
-std::shared_ptr<const ProcessModel> make_process_model(const std::shared_ptr<const Model>& vehicle,
-                                                       const PriorBank& bank) {
-  std::vector<int> counts(vehicle->parameter_count());
-  for (int j = 0; j < vehicle->parameter_count(); ++j) counts[j] = bank.process_states(j);
-  return std::make_shared<ProcessModel>(vehicle, std::move(counts));
-}
-
-RheProblem make_problem(std::shared_ptr<const ProcessModel> model, RheProblem::Setup setup) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  const ModelDescription& vehicle = model->vehicle().description();
-  const auto fill_up = [](std::vector<double>& bounds, const std::vector<Variable>& variables, auto bound) {
-    if (bounds.empty())
-      for (const Variable& variable : variables) bounds.push_back(bound(variable));
-  };
-  fill_up(setup.state_lower, vehicle.states, [](const Variable& v) { return v.lower; });
-  fill_up(setup.state_upper, vehicle.states, [](const Variable& v) { return v.upper; });
-  fill_up(setup.parameter_lower, vehicle.parameters, [](const Variable& v) { return v.lower; });
-  fill_up(setup.parameter_upper, vehicle.parameters, [](const Variable& v) { return v.upper; });
-  for (std::size_t j = 0; j < vehicle.parameters.size(); ++j) {
-    const auto states = static_cast<std::size_t>(model->process_states(static_cast<int>(j)));
-    setup.state_lower.push_back(setup.parameter_lower[j]);
-    setup.state_upper.push_back(setup.parameter_upper[j]);
-    setup.state_lower.resize(setup.state_lower.size() + states - 1, -infinity);
-    setup.state_upper.resize(setup.state_upper.size() + states - 1, infinity);
-    setup.input_weights.resize(setup.input_weights.size() + states, 1.0);
-    if (!setup.input_lower.empty()) {
-      setup.input_lower.resize(setup.input_lower.size() + states, -infinity);
-      setup.input_upper.resize(setup.input_upper.size() + states, infinity);
-    }
-  }
-  setup.parameter_lower.clear();
-  setup.parameter_upper.clear();
-  setup.one_block.clear();
-  return {std::move(model), std::move(setup)};
-}
 
 BankEstimation::Setup with_memory(BankEstimation::Setup filters, int horizon) {
   // Those of the window, and the one that leaves it.
@@ -65,7 +30,7 @@ PriorHorizonEstimation::PriorHorizonEstimation(const std::shared_ptr<const Model
                                                std::shared_ptr<Solver> solver, Setup setup)
     : filters_(model, with_memory(setup.filters, setup.problem.max_intervals)),
       process_model_(make_process_model(model, filters_.bank())),
-      problem_(make_problem(process_model_, setup.problem)),
+      problem_(make_process_problem(process_model_, setup.problem)),
       solver_(std::move(solver)),
       covariance_(std::make_unique<NodeCovariance>(problem_)),
       restart_(std::make_unique<PriorRestart>(problem_)),
@@ -86,9 +51,8 @@ PriorHorizonEstimation::PriorHorizonEstimation(const std::shared_ptr<const Model
   for (int j = 0; j < np; ++j) entries_.push_back(process_model_->first_state(j));
   mean_ = member_mean_ = shift_ = Eigen::VectorXd::Zero(nx + np);
   mixture_ = member_covariance_ = Eigen::MatrixXd::Zero(nx + np, nx + np);
-  scale_ = Eigen::VectorXd::Zero(n);
-  predicted_ = scaled_ = inverse_ = Eigen::MatrixXd::Zero(n, n);
-  factor_.compute(Eigen::MatrixXd::Identity(n, n));  // of its final size
+  predicted_ = Eigen::MatrixXd::Zero(n, n);
+  information_ = std::make_unique<InformationOf>(n);
   reset();
 }
 
@@ -156,21 +120,7 @@ void PriorHorizonEstimation::fill_interval(int interval, std::int64_t number) no
 /// Mean and information of [x; z] before the first node's outputs, from what the bank has saved there.
 void PriorHorizonEstimation::write_arrival(const double* saved) noexcept {
   filters_.history().bank().saved_moments(saved, law_, problem_.arrival_mean, predicted_);
-  const Eigen::Index n = predicted_.rows();
-  for (Eigen::Index j = 0; j < n; ++j) scale_[j] = std::sqrt(std::max(predicted_(j, j), 1e-30));
-  // A covariance of full rank may lose it in rounding, if its correlations are almost 1.
-  for (const double added : {0.0, 1e-12, 1e-9, 1e-6}) {
-    for (Eigen::Index c = 0; c < n; ++c)
-      for (Eigen::Index r = 0; r < n; ++r)
-        scaled_(r, c) = predicted_(r, c) / (scale_[r] * scale_[c]) + (r == c ? added : 0.0);
-    factor_.compute(scaled_);
-    if (factor_.info() == Eigen::Success) break;
-  }
-  inverse_.setIdentity();
-  factor_.solveInPlace(inverse_);
-  for (Eigen::Index c = 0; c < n; ++c)
-    for (Eigen::Index r = 0; r < n; ++r)
-      problem_.arrival_information(r, c) = 0.5 * (inverse_(r, c) + inverse_(c, r)) / (scale_[r] * scale_[c]);
+  information_->find(predicted_, problem_.arrival_information);
 }
 
 void PriorHorizonEstimation::fill_window() noexcept {
@@ -211,7 +161,7 @@ void PriorHorizonEstimation::start_cold(Iterate& point) noexcept {
 bool PriorHorizonEstimation::arrival(double* mean, double* sigma) const noexcept {
   for (std::size_t j = 0; j < entries_.size(); ++j) {
     mean[j] = problem_.arrival_mean[entries_[j]];
-    sigma[j] = scale_[entries_[j]];
+    sigma[j] = information_->sigmas()[entries_[j]];
   }
   return true;
 }

@@ -31,10 +31,10 @@ Pose chained(const Pose& from, const Pose& motion) {
 
 class Track {
  public:
-  Track(const RheProblem& problem, std::vector<double>& states, std::vector<double>& inputs,
+  Track(const RheProblem& problem, const Model& vehicle, std::vector<double>& states, std::vector<double>& inputs,
         const std::vector<double>& parameters)
       : problem_(problem),
-        model_(problem.model()),
+        model_(vehicle),
         roles_(model_.description().roles),
         states_(states),
         inputs_(inputs),
@@ -231,9 +231,9 @@ class Track {
 
 }  // namespace
 
-void align_track(const RheProblem& problem, std::vector<double>& states, std::vector<double>& inputs,
-                 const std::vector<double>& parameters) {
-  Track(problem, states, inputs, parameters).align();
+void align_track(const RheProblem& problem, const Model& vehicle, std::vector<double>& states,
+                 std::vector<double>& inputs, const std::vector<double>& parameters) {
+  Track(problem, vehicle, states, inputs, parameters).align();
 }
 
 }  // namespace rhec

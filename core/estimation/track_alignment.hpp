@@ -18,8 +18,9 @@ namespace rhec {
 /// start, since a wrong heading there is the usual cause of the gap.
 ///
 /// Writes the poses (`states`, N + 1 rows) and, if a gap was scaled, the speeds (among `inputs`, N rows, or states).
-/// `parameters` are those of the intervals. Does nothing if the model has no pose, or no output that is a position.
-void align_track(const RheProblem& problem, std::vector<double>& states, std::vector<double>& inputs,
-                 const std::vector<double>& parameters);
+/// `parameters` are those of the intervals. `vehicle` is the problem's model, or the one inside of a ProcessModel; data
+/// are taken from the problem. Does nothing if the model has no pose, or no output that is a position.
+void align_track(const RheProblem& problem, const Model& vehicle, std::vector<double>& states,
+                 std::vector<double>& inputs, const std::vector<double>& parameters);
 
 }  // namespace rhec

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
-#include "rhec/core/estimation/bank_estimation.hpp"
 #include "rhec/core/estimation/banked_covariance.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/core/estimation/prior_horizon_estimation.hpp"
@@ -22,13 +21,11 @@ std::vector<double> variances_of(const std::vector<double>& sigmas) {
   return variances;
 }
 
-BankEstimation::Setup bank_setup(const EstimatorParts& parts);
-
 std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& parts) {
   if (!parts.blocking.is_given())
     return std::make_unique<PriorHorizonEstimation>(
         parts.context->model, parts.make_solver(),
-        PriorHorizonEstimation::Setup{.filters = bank_setup(parts), .problem = parts.problem()});
+        PriorHorizonEstimation::Setup{.filters = parts.filters(), .problem = parts.problem()});
   if (parts.priors.is_given())
     throw parts.priors.section().error(
         "a window has either blocks or priors; take out the section 'blocking', or estimator.priors");
@@ -43,7 +40,7 @@ std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& pa
   auto blocks =
       std::make_unique<RecedingHorizonEstimation>(parts.context->model, parts.make_solver(), std::move(setup));
   if (!parts.has_bank_beside_blocks) return blocks;
-  return std::make_unique<BankedCovariance>(std::move(blocks), bank_setup(parts));
+  return std::make_unique<BankedCovariance>(std::move(blocks), parts.filters());
 }
 
 std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts) {
@@ -61,29 +58,8 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
   return std::make_unique<FilterEstimation>(context.model, std::move(setup));
 }
 
-BankEstimation::Setup bank_setup(const EstimatorParts& parts) {
-  const RobotContext& context = *parts.context;
-  BankEstimation::Setup setup;
-  setup.bank.members = parts.priors.combinations();
-  setup.bank.output_variances = variances_of(context.noise.output_sigmas);
-  setup.bank.input_variances = variances_of(context.noise.input_sigmas);
-  setup.bank.substeps = parts.substeps;
-  setup.bank.memory = parts.bank.memory;
-  setup.bank.robust = parts.robust;
-  setup.bank.adapts_noise = context.noise.adapt;
-  setup.bank.initial_parameters = parts.initial_parameters;
-  setup.parameter_lower = lower_bounds_of(context.about.parameters);
-  setup.parameter_upper = upper_bounds_of(context.about.parameters);
-  const int nx = context.model->state_count();
-  setup.initial_state = parts.initial_mean.head(nx);
-  setup.initial_covariance = parts.initial_covariance.topLeftCorner(nx, nx);
-  setup.heading_starts = parts.heading_starts;
-  setup.remembered_nodes = parts.horizon + 1;
-  return setup;
-}
-
 std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
-  return std::make_unique<BankEstimation>(parts.context->model, bank_setup(parts));
+  return std::make_unique<BankEstimation>(parts.context->model, parts.filters());
 }
 
 }  // namespace
@@ -108,6 +84,26 @@ RheProblem::Setup EstimatorParts::problem() const {
   setup.state_upper = upper_bounds_of(context->about.states);
   setup.parameter_lower = lower_bounds_of(context->about.parameters);
   setup.parameter_upper = upper_bounds_of(context->about.parameters);
+  return setup;
+}
+
+BankEstimation::Setup EstimatorParts::filters() const {
+  BankEstimation::Setup setup;
+  setup.bank.members = priors.combinations();
+  setup.bank.output_variances = variances_of(context->noise.output_sigmas);
+  setup.bank.input_variances = variances_of(context->noise.input_sigmas);
+  setup.bank.substeps = substeps;
+  setup.bank.memory = bank.memory;
+  setup.bank.robust = robust;
+  setup.bank.adapts_noise = context->noise.adapt;
+  setup.bank.initial_parameters = initial_parameters;
+  setup.parameter_lower = lower_bounds_of(context->about.parameters);
+  setup.parameter_upper = upper_bounds_of(context->about.parameters);
+  const int nx = context->model->state_count();
+  setup.initial_state = initial_mean.head(nx);
+  setup.initial_covariance = initial_covariance.topLeftCorner(nx, nx);
+  setup.heading_starts = heading_starts;
+  setup.remembered_nodes = horizon + 1;
   return setup;
 }
 

@@ -3,6 +3,24 @@
 #include <utility>
 
 namespace rhec {
+namespace {
+
+class NodeHooks final : public RobotHooks {
+ public:
+  explicit NodeHooks(std::shared_ptr<NodeLog> log) : log_(std::move(log)) {}
+  std::unique_ptr<EstimationMethod> wrap_method(std::unique_ptr<EstimationMethod> method) const override {
+    return std::make_unique<NodeRecorder>(std::move(method), log_);
+  }
+
+ private:
+  std::shared_ptr<NodeLog> log_;
+};
+
+}  // namespace
+
+std::shared_ptr<const RobotHooks> recording_nodes(std::shared_ptr<NodeLog> log) {
+  return std::make_shared<NodeHooks>(std::move(log));
+}
 
 std::shared_ptr<Solver> RobotHooks::wrap_solver(std::string_view, std::shared_ptr<Solver> solver) const {
   return solver;

@@ -62,7 +62,7 @@ std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::Vect
 
 std::unique_ptr<Controller> Robot::make_controller(const Path& path) const { return controller_.make(path, hooks_); }
 
-FullInformationEstimation Robot::make_smoother(const std::optional<Eigen::VectorXd>& initial_state) const {
+std::unique_ptr<Smoother> Robot::make_smoother(const std::optional<Eigen::VectorXd>& initial_state) const {
   return smoother_.make(estimator_.parts(initial_state));
 }
 

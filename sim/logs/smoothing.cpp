@@ -21,18 +21,6 @@ std::ptrdiff_t node_at(const SmoothedRun& run, double time) {
   return std::max<std::ptrdiff_t>(0, after - run.times.begin() - 1);
 }
 
-/// Records an estimator's data and estimates.
-class NodeHooks final : public RobotHooks {
- public:
-  explicit NodeHooks(std::shared_ptr<NodeLog> nodes) : nodes_(std::move(nodes)) {}
-  std::unique_ptr<EstimationMethod> wrap_method(std::unique_ptr<EstimationMethod> method) const override {
-    return std::make_unique<NodeRecorder>(std::move(method), nodes_);
-  }
-
- private:
-  std::shared_ptr<NodeLog> nodes_;
-};
-
 }  // namespace
 
 SmoothedReplay smooth(const std::string& name, const Robot& robot, const RecordedLog& log, const LogOptions& options,
@@ -40,7 +28,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
   SmoothedReplay result;
   const auto nodes = std::make_shared<NodeLog>();
   Robot recorded = robot;
-  recorded.add_hooks(std::make_shared<NodeHooks>(nodes));
+  recorded.add_hooks(recording_nodes(nodes));
   result.causal = replay(recorded, log, options, hold_out, hooks);
   result.causal.name = name + causal_suffix;
   if (result.causal.estimates.empty()) throw Error("the log has no fix that is not withheld: nothing can be estimated");
@@ -52,7 +40,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
   const Clock::time_point deadline = most_seconds < no_limit
                                          ? start + std::chrono::duration_cast<Clock::duration>(Seconds(most_seconds))
                                          : Clock::time_point::max();
-  const SmoothedRun run = robot.make_smoother().estimate(*nodes, deadline);
+  const SmoothedRun run = robot.make_smoother()->estimate(*nodes, deadline);
   result.smoothed.seconds = Seconds(Clock::now() - start).count();
   result.solve_seconds = run.solve_seconds;
   result.report = run.report;
@@ -87,10 +75,11 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
     const std::ptrdiff_t node = node_at(run, time);
     state_at(run, model, robot.estimator_options().substeps, causal.held_out ? time : run.times[node],
              entry.values.data());
-    // At a node, the parameters are those of the preceding interval; between nodes, those of the current interval.
-    const std::ptrdiff_t interval =
-        std::clamp<std::ptrdiff_t>(causal.held_out ? node : node - 1, 0, run.intervals() - 1);
-    std::copy_n(run.parameters.data() + interval * np, np, entry.values.data() + nx);
+    if (causal.held_out) {
+      parameters_at(run, np, time, entry.values.data() + nx);
+    } else {
+      std::copy_n(run.node_parameters.data() + node * np, np, entry.values.data() + nx);
+    }
     if (!causal.held_out && result.has_sigmas)
       for (std::ptrdiff_t j = 0; j < n; ++j)
         entry.sigmas[j] = std::sqrt(std::max(0.0, run.covariances[node * n * n + j * n + j]));

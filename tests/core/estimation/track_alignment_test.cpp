@@ -111,13 +111,13 @@ TEST_F(TrackAlignment, FindsPosesThatTheTrackHadWrong) {
     if (k > 100 && k < 300) of(states_, k, heading_) += 2.7;
     if (k > 250) of(states_, k, heading_) -= 4.0 * std::numbers::pi;
   }
-  align_track(*problem_, states_, inputs_, parameters_);
+  align_track(*problem_, problem_->model(), states_, inputs_, parameters_);
   expect_truth("scrambled");
 }
 
 TEST_F(TrackAlignment, LeavesWhatIsNoPose) {
   const std::vector<double> before = states_;
-  align_track(*problem_, states_, inputs_, parameters_);
+  align_track(*problem_, problem_->model(), states_, inputs_, parameters_);
   expect_truth("right from the start");
   for (int k = 0; k < nodes; ++k)
     for (int j = 0; j < model_->state_count(); ++j)
@@ -130,7 +130,7 @@ TEST_F(TrackAlignment, ChangesNothingWithoutPositions) {
   for (int k = 0; k < nodes; ++k)
     for (int j = 0; j < model_->output_count(); ++j) problem_->output(k)[j] = std::nan("");
   const std::vector<double> before = states_, inputs = inputs_;
-  align_track(*problem_, states_, inputs_, parameters_);
+  align_track(*problem_, problem_->model(), states_, inputs_, parameters_);
   EXPECT_EQ(states_, before);
   EXPECT_EQ(inputs_, inputs);
 }
@@ -144,7 +144,7 @@ TEST_F(TrackAlignment, KeepsAStandingVehicleWhereItIs) {
   }
   std::fill(inputs_.begin(), inputs_.end(), 0.0);
   states_ = truth_;
-  align_track(*problem_, states_, inputs_, parameters_);
+  align_track(*problem_, problem_->model(), states_, inputs_, parameters_);
   EXPECT_EQ(states_, truth_) << "no heading can be told from positions that do not move";
 }
 
@@ -152,7 +152,7 @@ TEST_F(TrackAlignment, StretchesTheSpeedOfALongGapAlone) {
   lose_positions();
   for (int k = 0; k < nodes - 1; ++k) inputs_[2 * static_cast<std::size_t>(k)] *= 0.75;  // an unknown wheel radius
   const std::vector<double> before = inputs_;
-  align_track(*problem_, states_, inputs_, parameters_);
+  align_track(*problem_, problem_->model(), states_, inputs_, parameters_);
   const auto middle = 2 * static_cast<std::size_t>(nodes / 2);
   EXPECT_NEAR(inputs_[middle] / before[middle], 0.95 / 0.75, 0.1);
   for (std::size_t k = 0; k + 1 < nodes; ++k)
@@ -177,7 +177,7 @@ TEST_F(SkidSteeredTrack, StretchesTheSpeedsOfBothSidesInALongGap) {
   lose_positions();
   for (double& wheel : inputs_) wheel *= 0.75;
   const std::vector<double> before = inputs_;
-  align_track(*problem_, states_, inputs_, parameters_);
+  align_track(*problem_, problem_->model(), states_, inputs_, parameters_);
   const auto middle = 2 * static_cast<std::size_t>(nodes / 2);
   EXPECT_NEAR(inputs_[middle] / before[middle], 0.95 / 0.75, 0.1);
   EXPECT_DOUBLE_EQ(inputs_[middle + 1] / before[middle + 1], inputs_[middle] / before[middle]);

@@ -67,6 +67,11 @@ class RHEC_EXPORT PriorBank {
   int member_count() const noexcept { return members_; }
   /// Probability of each member.
   std::span<const double> weights() const noexcept { return {weights_.data(), static_cast<std::size_t>(members_)}; }
+  /// Sum over the updates since `reset` of each member's log likelihood (less a constant common to all), which decides
+  /// between laws that do not change: weights have a floor. Neither `save` nor `restore` touches it.
+  std::span<const double> log_likelihoods() const noexcept {
+    return {log_likelihoods_.data(), static_cast<std::size_t>(members_)};
+  }
   /// Moments of the mixture: [x; p], n_x + n_p.
   void moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept;
   /// Moments of one member: [x; p].
@@ -137,8 +142,8 @@ class RHEC_EXPORT PriorBank {
   std::vector<std::vector<double>> loss_scales_;
   /// Per output: its noise variance, and the variance of that, relative to its square.
   AlignedDoubles learnt_;
-  AlignedDoubles mean_, covariance_, work_, weights_, keep_, take_, next_, jacobian_, predicted_, gradient_, squares_,
-      innovation_variances_, output_variances_, surprises_;
+  AlignedDoubles mean_, covariance_, work_, weights_, log_likelihoods_, keep_, take_, next_, jacobian_, predicted_,
+      gradient_, squares_, innovation_variances_, output_variances_, surprises_;
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;

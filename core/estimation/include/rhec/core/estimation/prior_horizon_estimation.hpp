@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "rhec/core/estimation/bank_estimation.hpp"
@@ -15,6 +14,7 @@
 
 namespace rhec {
 
+class InformationOf;
 class NodeCovariance;
 class PriorRestart;
 
@@ -91,9 +91,9 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   Window window_;
   bool has_window_ = false, has_solution_ = false;
   int law_ = 0;
-  Eigen::VectorXd mean_, member_mean_, scale_, shift_;
-  Eigen::MatrixXd mixture_, member_covariance_, predicted_, scaled_, inverse_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::VectorXd mean_, member_mean_, shift_;
+  Eigen::MatrixXd mixture_, member_covariance_, predicted_;
+  std::unique_ptr<InformationOf> information_;
 };
 
 }  // namespace rhec

@@ -31,6 +31,7 @@ class RHEC_EXPORT ProcessModel final : public Model {
   /// Where a process's part of the interval data is, of `process_data_count(n)` numbers for n states: 1 if the
   /// parameter runs to its next value, 0 if it is held; F; L (column-major, n x n).
   double* process_data(int parameter, double* data) const noexcept { return data + data_first_[parameter]; }
+  const double* process_data(int parameter, const double* data) const noexcept { return data + data_first_[parameter]; }
   static constexpr int process_data_count(int states) noexcept { return 1 + 2 * states * states; }
 
   const ModelDescription& description() const noexcept override { return description_; }

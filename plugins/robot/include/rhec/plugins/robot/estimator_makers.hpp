@@ -9,8 +9,8 @@
 #include <Eigen/Core>
 
 #include "rhec/core/config/options.hpp"
+#include "rhec/core/estimation/bank_estimation.hpp"
 #include "rhec/core/estimation/estimation_method.hpp"
-#include "rhec/core/estimation/prior_bank.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/plugins/robot/blocking_section.hpp"
 #include "rhec/plugins/robot/priors_section.hpp"
@@ -43,6 +43,8 @@ struct RHEC_EXPORT EstimatorParts {
 
   /// The estimation problem of a window.
   RheProblem::Setup problem() const;
+  /// A bank of filters with the priors.
+  BankEstimation::Setup filters() const;
 };
 
 /// An estimator that a configuration can name.

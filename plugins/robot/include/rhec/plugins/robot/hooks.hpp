@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rhec/core/estimation/estimation_method.hpp"
+#include "rhec/core/estimation/smoother.hpp"
 #include "rhec/core/ocp/solver.hpp"
 
 namespace rhec {
@@ -19,6 +19,10 @@ class RHEC_EXPORT RobotHooks {
   /// Called with the method of each estimator.
   virtual std::unique_ptr<EstimationMethod> wrap_method(std::unique_ptr<EstimationMethod> method) const;
 };
+
+/// Hooks that record what the robot's estimators are given and what they say, in `log`: each `start` of one begins the
+/// log anew.
+RHEC_EXPORT std::shared_ptr<const RobotHooks> recording_nodes(std::shared_ptr<NodeLog> log);
 
 /// Nested hooks: the first one added is the innermost.
 class RHEC_EXPORT RobotHookChain final : public RobotHooks {

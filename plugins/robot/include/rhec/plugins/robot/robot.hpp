@@ -78,7 +78,7 @@ class RHEC_EXPORT Robot {
   std::unique_ptr<Estimator> make_estimator(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
   std::unique_ptr<Controller> make_controller(const Path& path) const;
   /// Estimates a whole log at once (sections `smoother` and `estimator`).
-  FullInformationEstimation make_smoother(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
+  std::unique_ptr<Smoother> make_smoother(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
 
  private:
   ModelSection model_;

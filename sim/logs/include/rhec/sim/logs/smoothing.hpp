@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "rhec/core/estimation/full_information.hpp"
+#include "rhec/core/estimation/smoother.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
 
 namespace rhec::sim {
