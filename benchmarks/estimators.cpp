@@ -36,6 +36,8 @@ struct Beside {
   std::vector<Estimate> estimates = {};
   std::vector<double> microseconds = {};  ///< of each sample, without what is prepared for the next
   std::shared_ptr<NodeLog> nodes = {};    ///< what it has seen, for a smoother; else null
+  std::vector<SmoothedRun::Law> laws = {};
+  int iterations = 0;
 };
 
 /// Passes on what the driving estimator sees.
@@ -144,6 +146,8 @@ void smooth(const sim::Scenario& variant, const Eigen::VectorXd& start, Beside& 
     estimate.parameters = Eigen::Map<const Eigen::VectorXd>(run.node_parameters.data() + i * np, np);
     estimate.covariance = Eigen::Map<const Eigen::MatrixXd>(run.covariances.data() + i * n * n, n, n);
   }
+  beside.laws = run.laws;
+  beside.iterations = run.report.iterations;
   beside.microseconds.assign(1, taken.count() / static_cast<double>(run.intervals()));
 }
 
@@ -217,13 +221,18 @@ void run(const Arguments& arguments) {
                  other.estimates[i].covariance);
     const auto middle = other.microseconds.begin() + static_cast<std::ptrdiff_t>(other.microseconds.size() / 2);
     std::nth_element(other.microseconds.begin(), middle, other.microseconds.end());
+    std::string laws;  // of a smoother: members of the bank that it mixes, with their probabilities
+    for (const SmoothedRun::Law& law : other.laws)
+      laws += fmt::format("{}[{}, {:.3g}]", laws.empty() ? "" : ", ", law.member, law.probability);
+    if (!laws.empty()) laws = fmt::format(", \"laws\": [{}], \"iterations\": {}", laws, other.iterations);
     std::string noise;  // what has been learnt of it, relative to the true one
     for (std::size_t j = 0; j < about.outputs.size(); ++j)
       if (const auto learnt = other.estimator->method().output_noise(static_cast<int>(j)))
         noise += fmt::format(
             ", \"noise_{}\": {}", about.outputs[j].name,
             learnt->is_identified ? fmt::format("{:.4g}", learnt->sigma / driver.robot().output_sigmas()[j]) : "null");
-    fmt::print("{{\"estimator\": \"{}\", {}, \"median_us\": {:.4g}{}}}\n", other.name, errors.json(), *middle, noise);
+    fmt::print("{{\"estimator\": \"{}\", {}, \"median_us\": {:.4g}{}{}}}\n", other.name, errors.json(), *middle, laws,
+               noise);
   }
 }
 

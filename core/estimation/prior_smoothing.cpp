@@ -162,31 +162,25 @@ class LawProblem {
     return track;
   }
 
-  /// Adds a solution to a mixture, with a share of it. `covariances` are those of the stage states, or empty.
-  void add_to(SmoothedRun& run, const Iterate& iterate, double share, const std::vector<double>& covariances) const {
+  /// Adds a solution to a mixture, with a share of it.
+  void add_to(SmoothedRun& run, const Iterate& iterate, const std::vector<double>& covariances, double share) const {
     const std::ptrdiff_t nx = vehicle().state_count(), nu = vehicle().input_count(), np = vehicle().parameter_count();
-    const std::ptrdiff_t n = nx + np, ns = model_->state_count();
     const auto add = [share](std::vector<double>& to, std::ptrdiff_t row, const double* values, std::ptrdiff_t count) {
       for (std::ptrdiff_t j = 0; j < count; ++j) to[row * count + j] += share * values[j];
     };
-    std::vector<double> p(np), start(np);
-    for (std::ptrdiff_t i = 0; i <= problem_.intervals(); ++i) {
-      const int node = static_cast<int>(i);
-      const double* const state = iterate.state(node);
-      add(run.states, i, state, nx);
-      for (int j = 0; j < np; ++j) start[j] = state[model_->first_state(j)];
-      add(run.node_parameters, i, start.data(), np);
-      if (!covariances.empty())
-        for (std::ptrdiff_t c = 0; c < n; ++c)
-          for (std::ptrdiff_t r = 0; r < n; ++r)
-            run.covariances[(i * n + c) * n + r] += share * covariances[(i * ns + entry(c)) * ns + entry(r)];
+    Eigen::VectorXd mean, p(np);
+    Eigen::MatrixXd covariance;
+    for (int i = 0; i <= problem_.intervals(); ++i) {
+      find_moments(iterate, covariances, i, mean, covariance);
+      add(run.states, i, mean.data(), nx);
+      add(run.node_parameters, i, mean.data() + nx, np);
+      if (!run.covariances.empty()) add(run.covariances, i, covariance.data(), covariance.size());
       if (i == problem_.intervals()) break;
-      add(run.inputs, i, iterate.control(node), nu);
-      add(run.start_parameters, i, start.data(), np);
-      for (int j = 0; j < np; ++j) {
-        const bool ramp = model_->process_data(j, problem_.interval_data(node))[0] != 0.0;
-        p[j] = ramp ? iterate.state(node + 1)[model_->first_state(j)] : start[j];
-      }
+      add(run.inputs, i, iterate.control(i), nu);
+      for (int j = 0; j < np; ++j) p[j] = value(iterate, i, j);
+      add(run.start_parameters, i, p.data(), np);
+      for (int j = 0; j < np; ++j)
+        if (is_ramp(i, j)) p[j] = value(iterate, i + 1, j);
       add(run.parameters, i, p.data(), np);
     }
   }
@@ -194,14 +188,13 @@ class LawProblem {
   /// Adds how far the solution is from the mixture's mean.
   void add_spread_to(SmoothedRun& run, const Iterate& iterate, double share) const {
     const std::ptrdiff_t nx = vehicle().state_count(), np = vehicle().parameter_count(), n = nx + np;
-    std::vector<double> difference(n);
-    for (std::ptrdiff_t i = 0; i <= problem_.intervals(); ++i) {
-      const double* const state = iterate.state(static_cast<int>(i));
-      for (std::ptrdiff_t k = 0; k < n; ++k)
-        difference[k] = state[entry(k)] - (k < nx ? run.states[i * nx + k] : run.node_parameters[i * np + k - nx]);
-      for (std::ptrdiff_t c = 0; c < n; ++c)
-        for (std::ptrdiff_t r = 0; r < n; ++r)
-          run.covariances[(i * n + c) * n + r] += share * difference[c] * difference[r];
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd none;
+    for (int i = 0; i <= problem_.intervals(); ++i) {
+      find_moments(iterate, {}, i, mean, none);
+      mean.head(nx) -= Eigen::Map<const Eigen::VectorXd>(run.states.data() + i * nx, nx);
+      mean.tail(np) -= Eigen::Map<const Eigen::VectorXd>(run.node_parameters.data() + i * np, np);
+      Eigen::Map<Eigen::MatrixXd>(run.covariances.data() + i * n * n, n, n) += share * mean * mean.transpose();
     }
   }
 
@@ -220,6 +213,45 @@ class LawProblem {
   std::ptrdiff_t entry(std::ptrdiff_t k) const noexcept {
     const std::ptrdiff_t nx = vehicle().state_count();
     return k < nx ? k : model_->first_state(static_cast<int>(k - nx));
+  }
+  double value(const Iterate& iterate, int node, int parameter) const noexcept {
+    return iterate.state(node)[model_->first_state(parameter)];
+  }
+  bool is_ramp(int interval, int parameter) const noexcept {
+    return model_->process_data(parameter, problem_.interval_data(interval))[0] != 0.0;
+  }
+
+  /// Moments of [x; p] at a node. A parameter that is held changes somewhere near the node: it is that of the interval
+  /// before or that of the interval behind, both equally probable. `covariances` may be empty.
+  void find_moments(const Iterate& iterate, const std::vector<double>& covariances, int node, Eigen::VectorXd& mean,
+                    Eigen::MatrixXd& covariance) const {
+    const std::ptrdiff_t nx = vehicle().state_count(), np = vehicle().parameter_count(), n = nx + np;
+    const std::ptrdiff_t ns = model_->state_count();
+    const auto covariance_at = [&](std::ptrdiff_t i, std::ptrdiff_t r, std::ptrdiff_t c) {
+      return covariances[static_cast<std::size_t>((i * ns + entry(c)) * ns + entry(r))];
+    };
+    const auto changes = [&](std::ptrdiff_t k) {
+      return k >= nx && node > 0 && !is_ramp(node - 1, static_cast<int>(k - nx));
+    };
+    mean.resize(n);
+    for (std::ptrdiff_t k = 0; k < n; ++k) mean[k] = iterate.state(node)[entry(k)];
+    if (!covariances.empty()) {
+      covariance.resize(n, n);
+      for (std::ptrdiff_t c = 0; c < n; ++c)
+        for (std::ptrdiff_t r = 0; r < n; ++r) covariance(r, c) = covariance_at(node, r, c);
+      // The parameters before are not correlated with the state here, as far as is known.
+      for (std::ptrdiff_t c = 0; c < n; ++c)
+        for (std::ptrdiff_t r = 0; r < n; ++r)
+          if (changes(r) || changes(c))
+            covariance(r, c) =
+                0.5 * (covariance(r, c) + (changes(r) && changes(c) ? covariance_at(node - 1, r, c) : 0.0));
+    }
+    for (std::ptrdiff_t k = nx; k < n; ++k) {
+      if (!changes(k)) continue;
+      const double half = 0.5 * (mean[k] - iterate.state(node - 1)[entry(k)]);
+      mean[k] -= half;
+      if (!covariances.empty()) covariance(k, k) += half * half;
+    }
   }
 
   PriorBank bank_;  ///< of this law alone: knows its processes
@@ -250,8 +282,8 @@ SmoothedRun mixture(const NodeLog& log, const Model& model, const std::vector<Sm
       std::none_of(solutions.begin(), solutions.end(), [](const Solution& each) { return each.covariances.empty(); });
   if (has_covariances) run.covariances.assign((N + 1) * (nx + np) * (nx + np), 0.0);
   for (std::size_t k = 0; k < solutions.size(); ++k)
-    solutions[k].of->add_to(run, solutions[k].iterate, laws[k].probability,
-                            has_covariances ? solutions[k].covariances : std::vector<double>{});
+    solutions[k].of->add_to(run, solutions[k].iterate,
+                            has_covariances ? solutions[k].covariances : std::vector<double>{}, laws[k].probability);
   if (has_covariances && solutions.size() > 1)
     for (std::size_t k = 0; k < solutions.size(); ++k)
       solutions[k].of->add_spread_to(run, solutions[k].iterate, laws[k].probability);
