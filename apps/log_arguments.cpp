@@ -31,12 +31,19 @@ LogInput::LogInput(const LogArguments& arguments)
       hold_out(read_hold_out(arguments)),
       log(sim::read_recorded_log(arguments.dead_reckoning, arguments.gps, scenario)) {}
 
-void add_log_arguments(Command& command, LogArguments& arguments) {
+void add_log_arguments(Command& command, LogArguments& arguments, bool needs_log) {
   command.add("scenario", arguments.scenario, "a YAML file").required();
-  command.add("--dead-reckoning", arguments.dead_reckoning, "time [s], wheel speed [m/s], steering angle [rad]")
-      .value("FILE")
-      .required();
-  command.add("--gps", arguments.gps, "time [s], x [m], y [m]").value("FILE").required();
+  Argument dead_reckoning =
+      command.add("--dead-reckoning", arguments.dead_reckoning, "time [s], wheel speed [m/s], steering angle [rad]")
+          .value("FILE");
+  Argument gps = command.add("--gps", arguments.gps, "time [s], x [m], y [m]").value("FILE");
+  if (needs_log) {
+    dead_reckoning.required();
+    gps.required();
+  } else {
+    dead_reckoning.needs(gps);
+    gps.needs(dead_reckoning);
+  }
   command.add("--hold-out", arguments.hold_out, "withhold one of so many fixes and predict it; 0: none")
       .within(0, 1000000)
       .shows_default();

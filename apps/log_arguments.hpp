@@ -17,7 +17,8 @@ struct LogArguments {
   std::vector<std::filesystem::path> plugin_path;
 };
 
-void add_log_arguments(Command& command, LogArguments& arguments);
+/// `needs_log`: whether the command cannot do without the log's files.
+void add_log_arguments(Command& command, LogArguments& arguments, bool needs_log = true);
 
 /// The input that these arguments name, read and checked. Throws Error for any mistake.
 struct LogInput {

@@ -1,5 +1,6 @@
 #include "rhec/plugins/robot/smoother_section.hpp"
 
+#include <chrono>
 #include <utility>
 
 #include "rhec/core/estimation/full_information.hpp"
@@ -57,6 +58,13 @@ OptionSection SmootherSection::documentation() {
           "How a whole log is estimated at once. What is not here is as in `estimator`; its own estimates are the "
           "start.",
           SmootherOptions::table().schema()};
+}
+
+Clock::time_point SmootherSection::deadline() const {
+  // A longer time is no limit, and would overflow the clock's type.
+  constexpr double no_limit = 1e9;
+  if (!(options_.deadline < no_limit)) return Clock::time_point::max();
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options_.deadline));
 }
 
 bool SmootherSection::follows_priors(const EstimatorParts& estimator) const {

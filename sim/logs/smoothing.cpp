@@ -34,17 +34,12 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
   if (result.causal.estimates.empty()) throw Error("the log has no fix that is not withheld: nothing can be estimated");
 
   const auto start = Clock::now();
-  const double most_seconds = robot.smoother_options().deadline;
-  // A longer time is no limit, and would overflow the clock's type.
-  constexpr double no_limit = 1e9;
-  const Clock::time_point deadline = most_seconds < no_limit
-                                         ? start + std::chrono::duration_cast<Clock::duration>(Seconds(most_seconds))
-                                         : Clock::time_point::max();
-  const SmoothedRun run = robot.make_smoother()->estimate(*nodes, deadline);
+  const SmoothedRun run = robot.make_smoother()->estimate(*nodes, robot.smoothing_deadline());
   result.smoothed.seconds = Seconds(Clock::now() - start).count();
   result.solve_seconds = run.solve_seconds;
   result.report = run.report;
   result.intervals = run.intervals();
+  result.laws = run.laws;
   result.has_sigmas = !run.covariances.empty();
 
   const Model& model = *robot.model();

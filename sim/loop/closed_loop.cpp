@@ -6,8 +6,7 @@
 #include <map>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
+#include "consistency.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
@@ -17,48 +16,6 @@ namespace {
 
 // A vehicle farther than this from its path is lost [m].
 constexpr double lost = 50.0;
-
-/// error' covariance^-1 error
-class Nees {
- public:
-  explicit Nees(int size) : error(size), factor_(size, size), solved_(size) {}
-
-  Eigen::VectorXd error;
-
-  double with(const Eigen::MatrixXd& covariance) {
-    // Factorises L D L' row by row along with z = L^-1 error; the result is the sum of z_i^2 / d_i.
-    double sum = 0.0;
-    for (Eigen::Index i = 0; i < error.size(); ++i) {
-      double pivot = covariance(i, i), z = error[i];
-      for (Eigen::Index j = 0; j < i; ++j) {
-        double value = covariance(i, j);  // of L D
-        for (Eigen::Index k = 0; k < j; ++k) value -= factor_(k, i) * factor_(j, k);
-        factor_(j, i) = value;
-        const double entry = value / factor_(j, j);  // of L
-        factor_(i, j) = entry;
-        pivot -= entry * value;
-        z -= entry * solved_[j];
-      }
-      if (!(pivot > least_pivot * covariance(i, i))) return with_singular(covariance);
-      factor_(i, i) = pivot;
-      solved_[i] = z;
-      sum += z * z / pivot;
-    }
-    return sum;
-  }
-
- private:
-  static constexpr double least_pivot = 1e-14;  // of a diagonal entry: smaller pivots are rounding errors
-
-  double with_singular(const Eigen::MatrixXd& covariance) const {
-    const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
-    if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
-    return error.dot(factor.solve(error));
-  }
-
-  Eigen::MatrixXd factor_;  // L below the diagonal, D on it, L D above
-  Eigen::VectorXd solved_;
-};
 
 /// Sums of absolute and squared errors.
 class Errors {
@@ -129,7 +86,6 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   Robot robot = with_hooks(scenario.robot(), hooks, [&k] { return k; });
   const Model& model = *robot.model();
   const Roles& roles = model.description().roles;
-  const int nx = model.state_count(), np = model.parameter_count();
   const auto seed = static_cast<std::uint64_t>(scenario.options().seed);
   TruthVehicle truth(model, scenario.terrain(), scenario.initial_state(), scenario.vehicle());
   robot.use_estimators(scenario_estimators(&truth));
@@ -143,7 +99,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   const auto limit =
       static_cast<std::int64_t>(3.0 * scenario.path().length() / (scenario.options().speed * step)) + 100;
   std::vector<double> outputs(model.output_count()), measured(model.input_count());
-  Nees nees(nx + np);
+  Consistency consistency(model.description());
   RunLog log;
   log.samples.reserve(static_cast<std::size_t>(limit));
   const auto begin = [&hooks](LoopPart part) {
@@ -168,15 +124,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.true_parameters = truth.parameters();
     sample.state = estimate.state;
     sample.parameters = estimate.parameters;
-    sample.nees = std::numeric_limits<double>::quiet_NaN();
-    if (estimate.covariance.size() > 0) {
-      sample.sigma = estimate.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-      nees.error << sample.state - sample.true_state, sample.parameters - sample.true_parameters;
-      for (int j = 0; j < nx; ++j)
-        if (model.description().states[j].is_angle)
-          nees.error[j] = angle_difference(sample.state[j], sample.true_state[j]);
-      sample.nees = nees.with(estimate.covariance);
-    }
+    consistency.write(estimate.covariance, sample);
     sample.inputs = command.inputs;
     sample.reference = command.reference;
     sample.tracking = true_follower.lateral();

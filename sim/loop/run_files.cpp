@@ -142,12 +142,13 @@ Json json_of(const RunSummary& summary) {
 
 std::string summary_json(const RunSummary& summary) { return json_of(summary).dump(2) + "\n"; }
 
-std::string run_svg(const RunLog& log, const Scenario& scenario) {
+std::string run_svg(const RunLog& log, const Scenario& scenario, const RunLog* causal) {
   const ModelDescription& about = scenario.robot().model()->description();
   const Roles& roles = about.roles;
   RunPicture picture;
   picture.title = scenario.options().name;
   picture.subtitle = fmt::format("{:g} m/s, seed {}; {}", scenario.options().speed, scenario.options().seed, log.ended);
+  if (causal) picture.subtitle += "; estimated with hindsight";
   for (double s = 0.0; s <= scenario.path().length(); s += 0.5) {
     const PathPoint point = scenario.path().point_at(s);
     picture.path.push_back({point.x, point.y});
@@ -177,8 +178,11 @@ std::string run_svg(const RunLog& log, const Scenario& scenario) {
     const auto index = static_cast<Eigen::Index>(j);
     panel.curves.push_back(
         curve_of(log, "true", CurveRole::truth, [=](const Sample& s) { return s.true_parameters[index]; }));
-    Curve estimate =
-        curve_of(log, "estimated", CurveRole::estimate, [=](const Sample& s) { return s.parameters[index]; });
+    if (causal)
+      panel.curves.push_back(
+          curve_of(*causal, "while driving", CurveRole::other, [=](const Sample& s) { return s.parameters[index]; }));
+    Curve estimate = curve_of(log, causal ? "with hindsight" : "estimated", CurveRole::estimate,
+                              [=](const Sample& s) { return s.parameters[index]; });
     for (const Sample& sample : log.samples)
       if (sample.sigma.size() > 0) estimate.sigmas.push_back(sample.sigma[states + index]);
     panel.curves.push_back(std::move(estimate));

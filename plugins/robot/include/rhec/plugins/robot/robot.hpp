@@ -77,6 +77,8 @@ class RHEC_EXPORT Robot {
   /// The estimator of the section `estimator`; `initial_state`, if given, is used if that section has none.
   std::unique_ptr<Estimator> make_estimator(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
   std::unique_ptr<Controller> make_controller(const Path& path) const;
+  /// When a smoother that begins now has to stop (`smoother.deadline`).
+  Clock::time_point smoothing_deadline() const { return smoother_.deadline(); }
   /// Estimates a whole log at once (sections `smoother` and `estimator`).
   std::unique_ptr<Smoother> make_smoother(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
 

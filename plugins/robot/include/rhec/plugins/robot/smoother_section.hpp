@@ -26,6 +26,8 @@ class RHEC_EXPORT SmootherSection {
   static OptionSection documentation();
 
   const SmootherOptions& options() const noexcept { return options_; }
+  /// When a smoother that begins now has to stop.
+  Clock::time_point deadline() const;
   /// With the blocks or the priors of this section; else with those of the estimator.
   std::unique_ptr<Smoother> make(const EstimatorParts& estimator) const;
 

@@ -13,6 +13,7 @@ RHEC_EXPORT std::string steps_csv(const RunLog& log, const Scenario& scenario);
 RHEC_EXPORT std::string times_csv(const RunLog& log);
 RHEC_EXPORT Json json_of(const RunSummary& summary);
 RHEC_EXPORT std::string summary_json(const RunSummary& summary);
-RHEC_EXPORT std::string run_svg(const RunLog& log, const Scenario& scenario);
+/// `causal`, if given, are the estimates that drove; `log` are then those of a smoother.
+RHEC_EXPORT std::string run_svg(const RunLog& log, const Scenario& scenario, const RunLog* causal = nullptr);
 
 }  // namespace rhec::sim

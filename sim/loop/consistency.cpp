@@ -1,0 +1,65 @@
+#include "consistency.hpp"
+
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+#include "rhec/core/base/angle.hpp"
+
+namespace rhec::sim {
+namespace {
+
+constexpr double least_pivot = 1e-14;  // of a diagonal entry: smaller pivots are rounding errors
+
+}  // namespace
+
+Consistency::Consistency(const ModelDescription& about)
+    : about_(about),
+      error_(static_cast<Eigen::Index>(about.states.size() + about.parameters.size())),
+      factor_(error_.size(), error_.size()),
+      solved_(error_.size()) {}
+
+void Consistency::write(const Eigen::MatrixXd& covariance, Sample& sample) {
+  sample.nees = std::numeric_limits<double>::quiet_NaN();
+  sample.sigma.resize(0);
+  if (covariance.size() == 0) return;
+  sample.sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  error_ << sample.state - sample.true_state, sample.parameters - sample.true_parameters;
+  for (std::size_t j = 0; j < about_.states.size(); ++j)
+    if (about_.states[j].is_angle) {
+      const auto k = static_cast<Eigen::Index>(j);
+      error_[k] = angle_difference(sample.state[k], sample.true_state[k]);
+    }
+  sample.nees = nees_with(covariance);
+}
+
+/// error' covariance^-1 error
+double Consistency::nees_with(const Eigen::MatrixXd& covariance) {
+  // Factorises L D L' row by row along with z = L^-1 error; the result is the sum of z_i^2 / d_i.
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < error_.size(); ++i) {
+    double pivot = covariance(i, i), z = error_[i];
+    for (Eigen::Index j = 0; j < i; ++j) {
+      double value = covariance(i, j);  // of L D
+      for (Eigen::Index k = 0; k < j; ++k) value -= factor_(k, i) * factor_(j, k);
+      factor_(j, i) = value;
+      const double entry = value / factor_(j, j);  // of L
+      factor_(i, j) = entry;
+      pivot -= entry * value;
+      z -= entry * solved_[j];
+    }
+    if (!(pivot > least_pivot * covariance(i, i))) return nees_with_singular(covariance);
+    factor_(i, i) = pivot;
+    solved_[i] = z;
+    sum += z * z / pivot;
+  }
+  return sum;
+}
+
+double Consistency::nees_with_singular(const Eigen::MatrixXd& covariance) const {
+  const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
+  if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
+  return error_.dot(factor.solve(error_));
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "rhec/sim/loop/closed_loop.hpp"
+
+namespace rhec::sim {
+
+/// How an estimate's covariance compares with its error.
+class Consistency {
+ public:
+  explicit Consistency(const ModelDescription& about);
+  /// Writes standard deviations and NEES of a sample whose truth and estimate are known; without a covariance (empty)
+  /// no standard deviations, and NaN.
+  void write(const Eigen::MatrixXd& covariance, Sample& sample);
+
+ private:
+  double nees_with(const Eigen::MatrixXd& covariance);
+  double nees_with_singular(const Eigen::MatrixXd& covariance) const;
+
+  const ModelDescription& about_;
+  Eigen::VectorXd error_;
+  Eigen::MatrixXd factor_;  // L below the diagonal, D on it, L D above
+  Eigen::VectorXd solved_;
+};
+
+}  // namespace rhec::sim
