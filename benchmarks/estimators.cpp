@@ -20,6 +20,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <Eigen/Dense>
 
 #include "rhec/core/base/angle.hpp"
@@ -223,7 +224,7 @@ void run(const Arguments& arguments) {
     std::nth_element(other.microseconds.begin(), middle, other.microseconds.end());
     std::string laws;  // of a smoother: members of the bank that it mixes, with their probabilities
     for (const SmoothedRun::Law& law : other.laws)
-      laws += fmt::format("{}[{}, {:.3g}]", laws.empty() ? "" : ", ", law.member, law.probability);
+      laws += fmt::format("{}\"{:.3g}: {}\"", laws.empty() ? "" : ", ", law.probability, fmt::join(law.texts, "; "));
     if (!laws.empty()) laws = fmt::format(", \"laws\": [{}], \"iterations\": {}", laws, other.iterations);
     std::string noise;  // what has been learnt of it, relative to the true one
     for (std::size_t j = 0; j < about.outputs.size(); ++j)

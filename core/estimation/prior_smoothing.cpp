@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "law_search.hpp"
 #include "node_log.hpp"
 #include "process_problem.hpp"
 #include "rhec/core/base/aligned.hpp"
@@ -17,48 +18,6 @@
 
 namespace rhec {
 namespace {
-
-constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
-
-/// What a bank finds out on its way through a log.
-struct Passage {
-  std::vector<double> distances;  ///< ground covered on each interval [m]; NaN while the heading is searched
-  std::vector<double> log_likelihoods, output_variances;
-};
-
-Passage pass(const std::shared_ptr<const Model>& model, const BankEstimation::Setup& setup, const NodeLog& log) {
-  const std::ptrdiff_t nu = model->input_count(), ny = model->output_count(), N = log.intervals();
-  BankEstimation filters(model, setup);
-  Passage passage;
-  filters.start(log.outputs.data());
-  for (std::ptrdiff_t i = 0; i < N; ++i) {
-    const bool is_searched = filters.is_searching();
-    filters.add_node(log.durations[i], log.inputs.data() + i * nu, log.outputs.data() + (i + 1) * ny);
-    passage.distances.push_back(is_searched ? not_known : filters.bank().distance());
-  }
-  const auto found = filters.bank().log_likelihoods();
-  passage.log_likelihoods.assign(found.begin(), found.end());
-  for (int j = 0; j < ny; ++j) passage.output_variances.push_back(filters.bank().noise(j).variance);
-  return passage;
-}
-
-/// The most probable laws, the first one first, all equally probable before the log.
-std::vector<SmoothedRun::Law> probable_laws(const std::vector<double>& log_likelihoods, int most, double least) {
-  std::vector<SmoothedRun::Law> laws;
-  double best = -std::numeric_limits<double>::infinity(), sum = 0.0;
-  for (const double each : log_likelihoods)
-    if (std::isfinite(each)) best = std::max(best, each);
-  for (std::size_t m = 0; m < log_likelihoods.size(); ++m)
-    if (const double relative = std::exp(log_likelihoods[m] - best); relative >= least)
-      laws.push_back({static_cast<int>(m), relative});
-  if (laws.empty()) laws.push_back({0, 1.0});
-  std::stable_sort(laws.begin(), laws.end(),
-                   [](const auto& a, const auto& b) { return a.probability > b.probability; });
-  laws.resize(std::min(laws.size(), static_cast<std::size_t>(std::max(most, 1))));
-  for (const SmoothedRun::Law& law : laws) sum += law.probability;
-  for (SmoothedRun::Law& law : laws) law.probability /= sum;
-  return laws;
-}
 
 /// An initial guess: rows of the vehicle's states (N+1), inputs (N) and parameters at the nodes (N+1).
 struct Track {
@@ -105,9 +64,9 @@ void fill_distances(const Track& track, const NodeLog& log, const BankEstimation
 /// The problem of a whole log for one law.
 class LawProblem {
  public:
-  LawProblem(const std::shared_ptr<const Model>& model, const PriorSmoothing::Setup& setup, int member,
+  LawProblem(const std::shared_ptr<const Model>& model, const PriorSmoothing::Setup& setup, const PriorCombination& law,
              const NodeLog& log)
-      : bank_(model, bank_setup(setup, member)),
+      : bank_(model, bank_setup(setup, law)),
         model_(make_process_model(model, bank_)),
         problem_(make_process_problem(model_, problem_setup(setup, log))) {
     problem_.set_intervals(log.intervals());
@@ -199,9 +158,9 @@ class LawProblem {
   }
 
  private:
-  static PriorBank::Setup bank_setup(const PriorSmoothing::Setup& setup, int member) {
+  static PriorBank::Setup bank_setup(const PriorSmoothing::Setup& setup, const PriorCombination& law) {
     PriorBank::Setup bank = setup.filters.bank;
-    bank.members = {setup.filters.bank.members[static_cast<std::size_t>(member)]};
+    bank.members = {law};
     return bank;
   }
   static RheProblem::Setup problem_setup(const PriorSmoothing::Setup& setup, const NodeLog& log) {
@@ -294,8 +253,6 @@ SmoothedRun mixture(const NodeLog& log, const Model& model, const std::vector<Sm
 
 PriorSmoothing::PriorSmoothing(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Setup setup)
     : model_(std::move(model)), solver_(std::move(solver)), setup_(std::move(setup)) {
-  setup_.filters.bank.memory = std::numeric_limits<double>::infinity();
-  setup_.filters.remembered_nodes = 1;
   BankEstimation(model_, setup_.filters);  // reports mistakes now
   const auto np = static_cast<std::size_t>(model_->parameter_count());
   if (setup_.filters.parameter_lower.size() != np || setup_.filters.parameter_upper.size() != np)
@@ -307,32 +264,35 @@ SmoothedRun PriorSmoothing::estimate(NodeLog log, Clock::time_point deadline) co
   if (log.intervals() < 1)
     throw Error("smoother: the log has fewer than two nodes; there is nothing between them to estimate");
   Setup setup = setup_;
-  Passage passage = pass(model_, setup.filters, log);
+  const Passage passage = pass(model_, setup.filters, log);
   if (setup.filters.bank.adapts_noise) {
     // Laws are compared with the noise that the whole log tells.
     setup.filters.bank.adapts_noise = false;
     setup.filters.bank.output_variances = passage.output_variances;
     for (std::size_t j = 0; j < passage.output_variances.size(); ++j)
       setup.problem.output_weights[j] = 1.0 / passage.output_variances[j];
-    passage = pass(model_, setup.filters, log);
   }
-  std::vector<SmoothedRun::Law> laws = probable_laws(passage.log_likelihoods, setup.most_laws, setup.least_probability);
+  const std::vector<WeighedLaws> laws =
+      search_laws(model_, setup.filters, setup.priors, log, setup.most_laws, setup.least_probability);
+  // Of the law that the solution follows; all problems have the same.
+  setup.filters.bank.members = {laws.front().priors};
+  std::vector<double> distances = pass(model_, setup.filters, log).distances;
 
   Track track = track_of(log, setup.filters, *model_);
   std::vector<Solution> solutions;
   std::vector<SmoothedRun::Law> solved;
   Report report;
   double seconds = 0.0;
-  for (const SmoothedRun::Law& law : laws) {
-    auto of = std::make_unique<LawProblem>(model_, setup, law.member, log);
+  for (const WeighedLaws& law : laws) {
+    auto of = std::make_unique<LawProblem>(model_, setup, law.priors, log);
     const bool is_first = solutions.empty();
     if (is_first) {
       // Of an interval, what its end says.
       std::vector<double> ends(track.parameters.begin() + model_->parameter_count(), track.parameters.end());
       align_track(of->problem(), *model_, track.states, track.inputs, ends);
-      fill_distances(track, log, setup.filters, *model_, passage.distances);
+      fill_distances(track, log, setup.filters, *model_, distances);
     }
-    of->set_distances(passage.distances);
+    of->set_distances(distances);
     if (const std::string reason = solver_->why_not(of->problem()); !reason.empty())
       throw Error("smoother: the solver cannot take this problem: " + reason);
     solver_->setup(of->problem());
@@ -349,7 +309,7 @@ SmoothedRun PriorSmoothing::estimate(NodeLog log, Clock::time_point deadline) co
     std::vector<double> covariances((static_cast<std::size_t>(log.intervals()) + 1) * ns * ns);
     if (!solver_->covariances(iterate, all_stages(of->problem()), covariances)) covariances.clear();
     track = of->track_of(iterate);
-    solved.push_back(law);
+    solved.push_back({law.texts, law.probability});
     solutions.push_back({std::move(of), std::move(iterate), std::move(covariances)});
     if (of_law.status != Status::solved) break;
   }

@@ -9,18 +9,12 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/model.hpp"
-#include "rhec/core/prior/matern_prior.hpp"
-#include "rhec/core/prior/walk_prior.hpp"
+#include "rhec/core/prior/parameter_law.hpp"
 
 namespace rhec {
 namespace {
 
-/// A law, in fractions of the width of the bounds.
-struct Law {
-  enum class Kind { walk, jumps, matern_3_2, matern_5_2 } kind;
-  double rate_or_length;  ///< of a walk per square root of a metre; else [m]
-  double sigma = 0.15;    ///< standard deviation about the mean
-};
+using Law = ParameterLaw;
 constexpr auto walk = Law::Kind::walk, jumps = Law::Kind::jumps, smooth = Law::Kind::matern_3_2,
                smoother = Law::Kind::matern_5_2;
 
@@ -52,26 +46,6 @@ Laws laws(int count) {
   }
 }
 constexpr int most_laws = 8, usual_laws = 3;
-
-std::shared_ptr<const Prior> make(const Law& law, const Variable& parameter) {
-  const double width = ParameterRange(parameter).width;
-  std::shared_ptr<Prior> prior;
-  if (law.kind == walk) {
-    WalkPrior::Walk with_rate;
-    with_rate.rate = law.rate_or_length * width;
-    prior = std::make_shared<WalkPrior>(with_rate);
-  } else {
-    MaternPrior::Law matern;
-    matern.states = law.kind == jumps ? 1 : law.kind == smooth ? 2 : 3;
-    matern.length = law.rate_or_length;
-    matern.sigma = law.sigma * width;
-    // A level keeps its value until it changes.
-    if (law.kind == jumps) matern.course = Course::held;
-    prior = std::make_shared<MaternPrior>(matern);
-  }
-  prior->set_up(parameter);
-  return prior;
-}
 
 /// How many laws each parameter has: as many as are given, else eight for the richest and three for each other if that
 /// is affordable, else fewer: the one with most gives way, the richest last among equals.
@@ -127,7 +101,7 @@ std::vector<PriorCombination> orthogonal_bank(const ModelDescription& about) {
   for (const Variable& parameter : about.parameters) {
     choices.emplace_back();
     for (const Law& law : laws(parameters <= most_with_four_laws ? 4 : 2))
-      choices.back().push_back(make(law, parameter));
+      choices.back().push_back(law.make(parameter));
   }
   const std::size_t runs = parameters <= most_with_four_laws ? 16 : std::bit_ceil(parameters + 1);
   std::vector<PriorCombination> members(runs);
@@ -148,7 +122,7 @@ std::vector<PriorCombination> standard_bank(const ModelDescription& about, const
   std::vector<PriorCombination> members(1);
   for (std::size_t j = 0; j < choices.size(); ++j) {
     if (choices[j].empty())
-      for (const Law& law : laws(count[j])) choices[j].push_back(make(law, about.parameters[j]));
+      for (const Law& law : laws(count[j])) choices[j].push_back(law.make(about.parameters[j]));
     std::vector<PriorCombination> more;
     for (const std::shared_ptr<const Prior>& prior : choices[j]) {
       for (PriorCombination member : members) {

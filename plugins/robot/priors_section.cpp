@@ -66,14 +66,18 @@ std::string PriorsSection::text(int parameter) const {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-std::vector<PriorCombination> PriorsSection::combinations() const {
+std::vector<PriorCombination> PriorsSection::given() const {
   std::vector<PriorCombination> given;
   for (const Variable& parameter : context_->about.parameters) {
     const Settings* section = section_.find(parameter.name);
     given.push_back(section ? choices(*context_, *section, parameter) : PriorCombination{});
   }
+  return given;
+}
+
+std::vector<PriorCombination> PriorsSection::combinations() const {
   try {
-    return standard_bank(context_->about, given);
+    return standard_bank(context_->about, given());
   } catch (const Error& mistake) {
     throw section_.error(mistake.what());
   }

@@ -78,9 +78,11 @@ std::unique_ptr<Smoother> SmootherSection::make(const EstimatorParts& estimator)
   std::shared_ptr<Solver> solver = smoothing_solver.make(context_->host, options_.solver);
   if (follows_priors(parts)) {
     if (!options_.priors.is_null()) parts.priors = PriorsSection(context_, options_.priors);
-    return std::make_unique<PriorSmoothing>(
-        context_->model, std::move(solver),
-        PriorSmoothing::Setup{.filters = parts.filters(), .problem = parts.problem(), .most_laws = options_.laws});
+    return std::make_unique<PriorSmoothing>(context_->model, std::move(solver),
+                                            PriorSmoothing::Setup{.filters = parts.filters(),
+                                                                  .priors = parts.priors.given(),
+                                                                  .problem = parts.problem(),
+                                                                  .most_laws = options_.laws});
   }
   FullInformationEstimation::Setup setup;
   setup.problem = parts.problem();  // its horizon is set from the log later

@@ -61,7 +61,7 @@ std::string summary_json(const SmoothedDrive& drive, const Scenario& scenario) {
   smoother["kkt_residual"] = drive.report.kkt.largest();
   smoother["laws"] = Json::array();
   for (const SmoothedRun::Law& law : drive.laws)
-    smoother["laws"].push_back({{"member", law.member}, {"probability", law.probability}});
+    smoother["laws"].push_back({{"by_parameter", law.texts}, {"probability", law.probability}});
   return json.dump(2) + "\n";
 }
 

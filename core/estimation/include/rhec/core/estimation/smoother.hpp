@@ -1,6 +1,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "rhec/core/estimation/estimation_method.hpp"
@@ -60,8 +62,8 @@ struct SmoothedRun {
   std::vector<double> covariances;
   /// Laws of variation that the estimates are a mixture of, the most probable first; none for blocks.
   struct Law {
-    int member = 0;            ///< of the bank
-    double probability = 0.0;  ///< given all measurements
+    std::vector<std::string> texts;  ///< in words, by parameter
+    double probability = 0.0;        ///< given all measurements
   };
   std::vector<Law> laws;
   int intervals() const noexcept { return static_cast<int>(times.size()) - 1; }

@@ -17,6 +17,8 @@ class RHEC_EXPORT PriorsSection {
   PriorsSection(std::shared_ptr<const RobotContext> context, const Settings& section);
   static std::vector<OptionRow> rows();
 
+  /// By parameter the priors given; none where that is left open.
+  std::vector<PriorCombination> given() const;
   /// The members of a bank: all combinations.
   std::vector<PriorCombination> combinations() const;
   /// Whether any parameter's prior is given, and not `auto`.
