@@ -16,11 +16,15 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// By what factors the numbers of the best law are changed, round by round.
-constexpr double refinements[] = {1.8, 1.35};
+/// How often each parameter's law is chosen anew, given those of the others.
+constexpr int rounds = 2;
+
+/// No law is quite right, so that innovations are not independent and their likelihood says too much: this power of it
+/// counts.
+constexpr double trust = 0.5;
 
 /// Laws that are less probable by more than this are no part of the combinations that are weighed at last.
-constexpr double most_deficit = 4.0;  // of the logarithm
+constexpr double most_deficit = 8.0;  // of the logarithm
 
 /// A law of one parameter.
 struct Candidate {
@@ -55,12 +59,7 @@ class LawSearch {
 
   std::vector<WeighedLaws> find(int most, double least) {
     if (combinations() > most_bank_members) {
-      improve();
-      for (const double factor : refinements) {
-        for (std::size_t j = 0; j < candidates_.size(); ++j)
-          if (const auto best = candidates_[j].front().law) candidates_[j] = made(laws_near(*best, factor), j);
-        improve();
-      }
+      for (int round = 0; round < rounds; ++round) improve();
       keep_few();
     }
     return weighed(most, least);
@@ -142,7 +141,7 @@ class LawSearch {
     for (const double each : found)
       if (std::isfinite(each)) highest = std::max(highest, each);
     for (std::size_t k = 0; k < all.size(); ++k)
-      all[k].probability = std::isfinite(found[k]) ? std::exp(found[k] - highest) : 0.0;
+      all[k].probability = std::isfinite(found[k]) ? std::exp(trust * (found[k] - highest)) : 0.0;
     std::stable_sort(all.begin(), all.end(),
                      [](const WeighedLaws& a, const WeighedLaws& b) { return a.probability > b.probability; });
     const auto enough =

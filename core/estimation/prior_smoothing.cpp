@@ -121,67 +121,8 @@ class LawProblem {
     return track;
   }
 
-  /// Adds a solution to a mixture, with a share of it.
-  void add_to(SmoothedRun& run, const Iterate& iterate, const std::vector<double>& covariances, double share) const {
-    const std::ptrdiff_t nx = vehicle().state_count(), nu = vehicle().input_count(), np = vehicle().parameter_count();
-    const auto add = [share](std::vector<double>& to, std::ptrdiff_t row, const double* values, std::ptrdiff_t count) {
-      for (std::ptrdiff_t j = 0; j < count; ++j) to[row * count + j] += share * values[j];
-    };
-    Eigen::VectorXd mean, p(np);
-    Eigen::MatrixXd covariance;
-    for (int i = 0; i <= problem_.intervals(); ++i) {
-      find_moments(iterate, covariances, i, mean, covariance);
-      add(run.states, i, mean.data(), nx);
-      add(run.node_parameters, i, mean.data() + nx, np);
-      if (!run.covariances.empty()) add(run.covariances, i, covariance.data(), covariance.size());
-      if (i == problem_.intervals()) break;
-      add(run.inputs, i, iterate.control(i), nu);
-      for (int j = 0; j < np; ++j) p[j] = value(iterate, i, j);
-      add(run.start_parameters, i, p.data(), np);
-      for (int j = 0; j < np; ++j)
-        if (is_ramp(i, j)) p[j] = value(iterate, i + 1, j);
-      add(run.parameters, i, p.data(), np);
-    }
-  }
-
-  /// Adds how far the solution is from the mixture's mean.
-  void add_spread_to(SmoothedRun& run, const Iterate& iterate, double share) const {
-    const std::ptrdiff_t nx = vehicle().state_count(), np = vehicle().parameter_count(), n = nx + np;
-    Eigen::VectorXd mean;
-    Eigen::MatrixXd none;
-    for (int i = 0; i <= problem_.intervals(); ++i) {
-      find_moments(iterate, {}, i, mean, none);
-      mean.head(nx) -= Eigen::Map<const Eigen::VectorXd>(run.states.data() + i * nx, nx);
-      mean.tail(np) -= Eigen::Map<const Eigen::VectorXd>(run.node_parameters.data() + i * np, np);
-      Eigen::Map<Eigen::MatrixXd>(run.covariances.data() + i * n * n, n, n) += share * mean * mean.transpose();
-    }
-  }
-
- private:
-  static PriorBank::Setup bank_setup(const PriorSmoothing::Setup& setup, const PriorCombination& law) {
-    PriorBank::Setup bank = setup.filters.bank;
-    bank.members = {law};
-    return bank;
-  }
-  static RheProblem::Setup problem_setup(const PriorSmoothing::Setup& setup, const NodeLog& log) {
-    RheProblem::Setup problem = setup.problem;
-    problem.max_intervals = log.intervals();
-    return problem;
-  }
-  /// Of [x; p] in the stage state.
-  std::ptrdiff_t entry(std::ptrdiff_t k) const noexcept {
-    const std::ptrdiff_t nx = vehicle().state_count();
-    return k < nx ? k : model_->first_state(static_cast<int>(k - nx));
-  }
-  double value(const Iterate& iterate, int node, int parameter) const noexcept {
-    return iterate.state(node)[model_->first_state(parameter)];
-  }
-  bool is_ramp(int interval, int parameter) const noexcept {
-    return model_->process_data(parameter, problem_.interval_data(interval))[0] != 0.0;
-  }
-
   /// Moments of [x; p] at a node. A parameter that is held changes somewhere near the node: it is that of the interval
-  /// before or that of the interval behind, both equally probable. `covariances` may be empty.
+  /// before or that of the interval behind, both equally probable. `covariances` of the stage states may be empty.
   void find_moments(const Iterate& iterate, const std::vector<double>& covariances, int node, Eigen::VectorXd& mean,
                     Eigen::MatrixXd& covariance) const {
     const std::ptrdiff_t nx = vehicle().state_count(), np = vehicle().parameter_count(), n = nx + np;
@@ -213,41 +154,118 @@ class LawProblem {
     }
   }
 
+  /// Values of the parameters on an interval: at its start, and at its end.
+  void parameters_on(const Iterate& iterate, int interval, double* start, double* end) const {
+    for (int j = 0; j < vehicle().parameter_count(); ++j) {
+      start[j] = value(iterate, interval, j);
+      end[j] = is_ramp(interval, j) ? value(iterate, interval + 1, j) : start[j];
+    }
+  }
+
+ private:
+  static PriorBank::Setup bank_setup(const PriorSmoothing::Setup& setup, const PriorCombination& law) {
+    PriorBank::Setup bank = setup.filters.bank;
+    bank.members = {law};
+    return bank;
+  }
+  static RheProblem::Setup problem_setup(const PriorSmoothing::Setup& setup, const NodeLog& log) {
+    RheProblem::Setup problem = setup.problem;
+    problem.max_intervals = log.intervals();
+    return problem;
+  }
+  /// Of [x; p] in the stage state.
+  std::ptrdiff_t entry(std::ptrdiff_t k) const noexcept {
+    const std::ptrdiff_t nx = vehicle().state_count();
+    return k < nx ? k : model_->first_state(static_cast<int>(k - nx));
+  }
+  double value(const Iterate& iterate, int node, int parameter) const noexcept {
+    return iterate.state(node)[model_->first_state(parameter)];
+  }
+  bool is_ramp(int interval, int parameter) const noexcept {
+    return model_->process_data(parameter, problem_.interval_data(interval))[0] != 0.0;
+  }
+
   PriorBank bank_;  ///< of this law alone: knows its processes
   std::shared_ptr<const ProcessModel> model_;
   RheProblem problem_;
 };
 
-struct Solution {
-  std::unique_ptr<LawProblem> of;
-  Iterate iterate;
-  std::vector<double> covariances;  ///< of the stage states; empty if the solver gives none
-};
+/// Sums up the solutions for single laws. Covariances are summed about the first solution, which is near to all.
+class Mixture {
+ public:
+  Mixture(const NodeLog& log, const Model& model)
+      : nx_(model.state_count()), nu_(model.input_count()), np_(model.parameter_count()), N_(log.intervals()) {
+    run_.times.assign(1, 0.0);
+    for (const double duration : log.durations) run_.times.push_back(run_.times.back() + duration);
+    const auto rows = [](std::ptrdiff_t count, std::ptrdiff_t width) {
+      return std::vector<double>(static_cast<std::size_t>(count * width), 0.0);
+    };
+    run_.states = rows(N_ + 1, nx_);
+    run_.node_parameters = rows(N_ + 1, np_);
+    run_.inputs = rows(N_, nu_);
+    run_.parameters = run_.start_parameters = rows(N_, np_);
+    run_.covariances = rows(N_ + 1, (nx_ + np_) * (nx_ + np_));
+    origin_ = rows(N_ + 1, nx_ + np_);
+  }
+  bool is_empty() const noexcept { return run_.laws.empty(); }
 
-SmoothedRun mixture(const NodeLog& log, const Model& model, const std::vector<SmoothedRun::Law>& laws,
-                    const std::vector<Solution>& solutions) {
-  const auto nx = static_cast<std::size_t>(model.state_count()), nu = static_cast<std::size_t>(model.input_count()),
-             np = static_cast<std::size_t>(model.parameter_count()), N = static_cast<std::size_t>(log.intervals());
-  SmoothedRun run;
-  run.laws = laws;
-  run.times.assign(1, 0.0);
-  for (const double duration : log.durations) run.times.push_back(run.times.back() + duration);
-  run.states.assign((N + 1) * nx, 0.0);
-  run.node_parameters.assign((N + 1) * np, 0.0);
-  run.inputs.assign(N * nu, 0.0);
-  run.parameters.assign(N * np, 0.0);
-  run.start_parameters = run.parameters;
-  const bool has_covariances =
-      std::none_of(solutions.begin(), solutions.end(), [](const Solution& each) { return each.covariances.empty(); });
-  if (has_covariances) run.covariances.assign((N + 1) * (nx + np) * (nx + np), 0.0);
-  for (std::size_t k = 0; k < solutions.size(); ++k)
-    solutions[k].of->add_to(run, solutions[k].iterate,
-                            has_covariances ? solutions[k].covariances : std::vector<double>{}, laws[k].probability);
-  if (has_covariances && solutions.size() > 1)
-    for (std::size_t k = 0; k < solutions.size(); ++k)
-      solutions[k].of->add_spread_to(run, solutions[k].iterate, laws[k].probability);
-  return run;
-}
+  /// `covariances` are those of the stage states; empty if the solver gives none: then the mixture has none.
+  void add(const LawProblem& problem, const Iterate& iterate, const std::vector<double>& covariances,
+           const WeighedLaws& laws) {
+    const double share = laws.probability;
+    const auto sum = [share](std::vector<double>& to, std::ptrdiff_t row, const double* values, std::ptrdiff_t count) {
+      for (std::ptrdiff_t j = 0; j < count; ++j) to[static_cast<std::size_t>(row * count + j)] += share * values[j];
+    };
+    const std::ptrdiff_t n = nx_ + np_;
+    const bool is_first = is_empty();
+    if (covariances.empty()) run_.covariances.clear();
+    Eigen::VectorXd mean(n), start(np_), end(np_);
+    Eigen::MatrixXd covariance;
+    for (std::ptrdiff_t i = 0; i <= N_; ++i) {
+      const int node = static_cast<int>(i);
+      problem.find_moments(iterate, covariances, node, mean, covariance);
+      sum(run_.states, i, mean.data(), nx_);
+      sum(run_.node_parameters, i, mean.data() + nx_, np_);
+      Eigen::Map<Eigen::VectorXd> origin(origin_.data() + i * n, n);
+      if (is_first) origin = mean;
+      mean -= origin;
+      if (!run_.covariances.empty()) {
+        covariance += mean * mean.transpose();
+        sum(run_.covariances, i, covariance.data(), n * n);
+      }
+      if (i == N_) break;
+      sum(run_.inputs, i, iterate.control(node), nu_);
+      problem.parameters_on(iterate, node, start.data(), end.data());
+      sum(run_.start_parameters, i, start.data(), np_);
+      sum(run_.parameters, i, end.data(), np_);
+    }
+    run_.laws.push_back({laws.texts, laws.probability});
+  }
+
+  SmoothedRun finish() {
+    double total = 0.0;
+    for (const SmoothedRun::Law& law : run_.laws) total += law.probability;
+    for (SmoothedRun::Law& law : run_.laws) law.probability /= total;
+    for (auto* rows : {&run_.states, &run_.node_parameters, &run_.inputs, &run_.parameters, &run_.start_parameters,
+                       &run_.covariances})
+      for (double& value : *rows) value /= total;
+    const std::ptrdiff_t n = nx_ + np_;
+    Eigen::VectorXd mean(n);
+    for (std::ptrdiff_t i = 0; i <= N_ && !run_.covariances.empty(); ++i) {
+      for (std::ptrdiff_t k = 0; k < n; ++k)
+        mean[k] = (k < nx_ ? run_.states[static_cast<std::size_t>(i * nx_ + k)]
+                           : run_.node_parameters[static_cast<std::size_t>(i * np_ + k - nx_)]) -
+                  origin_[static_cast<std::size_t>(i * n + k)];
+      Eigen::Map<Eigen::MatrixXd>(run_.covariances.data() + i * n * n, n, n) -= mean * mean.transpose();
+    }
+    return std::move(run_);
+  }
+
+ private:
+  std::ptrdiff_t nx_, nu_, np_, N_;
+  std::vector<double> origin_;  ///< [x; p] of the first solution
+  SmoothedRun run_;
+};
 
 }  // namespace
 
@@ -279,24 +297,23 @@ SmoothedRun PriorSmoothing::estimate(NodeLog log, Clock::time_point deadline) co
   std::vector<double> distances = pass(model_, setup.filters, log).distances;
 
   Track track = track_of(log, setup.filters, *model_);
-  std::vector<Solution> solutions;
-  std::vector<SmoothedRun::Law> solved;
+  Mixture mixture(log, *model_);
   Report report;
   double seconds = 0.0;
   for (const WeighedLaws& law : laws) {
-    auto of = std::make_unique<LawProblem>(model_, setup, law.priors, log);
-    const bool is_first = solutions.empty();
+    LawProblem problem(model_, setup, law.priors, log);
+    const bool is_first = mixture.is_empty();
     if (is_first) {
       // Of an interval, what its end says.
-      std::vector<double> ends(track.parameters.begin() + model_->parameter_count(), track.parameters.end());
-      align_track(of->problem(), *model_, track.states, track.inputs, ends);
+      const std::vector<double> ends(track.parameters.begin() + model_->parameter_count(), track.parameters.end());
+      align_track(problem.problem(), *model_, track.states, track.inputs, ends);
       fill_distances(track, log, setup.filters, *model_, distances);
     }
-    of->set_distances(distances);
-    if (const std::string reason = solver_->why_not(of->problem()); !reason.empty())
+    problem.set_distances(distances);
+    if (const std::string reason = solver_->why_not(problem.problem()); !reason.empty())
       throw Error("smoother: the solver cannot take this problem: " + reason);
-    solver_->setup(of->problem());
-    Iterate iterate = of->guess(track);
+    solver_->setup(problem.problem());
+    Iterate iterate = problem.guess(track);
     const auto start = Clock::now();
     const Report of_law = solver_->solve(iterate, deadline);
     seconds += 1e-6 * microseconds_since(start);
@@ -305,18 +322,14 @@ SmoothedRun PriorSmoothing::estimate(NodeLog log, Clock::time_point deadline) co
     report.iterations = iterations + of_law.iterations;
     report.factorisations = factorisations + of_law.factorisations;
     if (!is_first && of_law.status != Status::solved) continue;
-    const auto ns = static_cast<std::size_t>(of->problem().capacity().states);
+    const auto ns = static_cast<std::size_t>(problem.problem().capacity().states);
     std::vector<double> covariances((static_cast<std::size_t>(log.intervals()) + 1) * ns * ns);
-    if (!solver_->covariances(iterate, all_stages(of->problem()), covariances)) covariances.clear();
-    track = of->track_of(iterate);
-    solved.push_back({law.texts, law.probability});
-    solutions.push_back({std::move(of), std::move(iterate), std::move(covariances)});
+    if (!solver_->covariances(iterate, all_stages(problem.problem()), covariances)) covariances.clear();
+    mixture.add(problem, iterate, covariances, law);
     if (of_law.status != Status::solved) break;
+    track = problem.track_of(iterate);
   }
-  double sum = 0.0;
-  for (const SmoothedRun::Law& law : solved) sum += law.probability;
-  for (SmoothedRun::Law& law : solved) law.probability /= sum;
-  SmoothedRun run = mixture(log, *model_, solved, solutions);
+  SmoothedRun run = mixture.finish();
   run.report = report;
   run.solve_seconds = seconds;
   return run;

@@ -46,24 +46,11 @@ std::string ParameterLaw::text(const Variable& parameter) const {
 std::vector<ParameterLaw> wide_laws() {
   using Kind = ParameterLaw::Kind;
   std::vector<ParameterLaw> laws;
-  for (const double rate : {0.0005, 0.002, 0.006, 0.02, 0.06}) laws.push_back({Kind::walk, rate, 0.0});
+  for (const double rate : {0.0005, 0.006, 0.025}) laws.push_back({Kind::walk, rate, 0.0});
   for (const double sigma : {0.05, 0.16}) {
-    for (const double length : {3.0, 8.0, 20.0}) laws.push_back({Kind::jumps, length, sigma});
+    for (const double length : {1.2, 3.0, 8.0, 20.0}) laws.push_back({Kind::jumps, length, sigma});
     for (const double length : {5.0, 12.0, 30.0}) laws.push_back({Kind::matern_3_2, length, sigma});
     for (const double length : {6.0, 15.0, 40.0}) laws.push_back({Kind::matern_5_2, length, sigma});
-  }
-  return laws;
-}
-
-std::vector<ParameterLaw> laws_near(const ParameterLaw& law, double factor) {
-  std::vector<ParameterLaw> laws{law};
-  for (const double by : {1.0 / factor, 1.0, factor}) {
-    if (law.kind == ParameterLaw::Kind::walk) {
-      if (by != 1.0) laws.push_back({law.kind, law.rate_or_length * by, law.sigma});
-      continue;
-    }
-    for (const double sigma_by : {1.0 / factor, 1.0, factor})
-      if (by != 1.0 || sigma_by != 1.0) laws.push_back({law.kind, law.rate_or_length * by, law.sigma * sigma_by});
   }
   return laws;
 }

@@ -107,6 +107,42 @@ def main():
             expect(done.returncode == 1 and words in done.stderr, f"{key}: {done.returncode} {done.stderr}")
         done = smooth("--hold-out", "5", "--hold-out-phase", "5")
         expect(done.returncode == 1 and "expected a number below it" in done.stderr, f"phase: {done.returncode} {done.stderr}")
+
+        # With priors: where neither the smoother nor the estimator has blocks, or where they are asked for.
+        done = smooth("--variant", "rhe", "--set", "smoother.blocking=null", "--set", "smoother.laws=2")
+        expect(done.returncode == 0 and ": solved after" in done.stdout, f"priors: {done.returncode} {done.stdout}{done.stderr}")
+        done = smooth("--variant", "rhe", "--set", "smoother.priors={kappa: {name: walk, sigma: 0.01}}")
+        expect(done.returncode == 1 and "either blocks or priors" in done.stderr, f"both: {done.returncode} {done.stderr}")
+        done = smooth("--variant", "rhe", "--set", "smoother.blocking=null", "--set", "smoother.priors={kappa: 3}")
+        expect(done.returncode == 1 and "circle.yaml" not in done.stdout, f"no prior: {done.returncode} {done.stderr}")
+
+        # A simulated drive needs no files.
+        figure8 = pathlib.Path(__file__).resolve().parents[2] / "scenarios" / "figure8.yaml"
+
+        def smooth_drive(*more, scenario=str(figure8)):
+            command = [rhec, "smooth", scenario, "--out", "drive", "--set", "path.laps=1", "--set", "path.radius=8", "--set",
+                       "smoother.laws=2", *more]
+            return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+        done = smooth_drive()
+        expect(done.returncode == 0 and "WITH HINDSIGHT" in done.stdout, f"drive: {done.returncode} {done.stdout}{done.stderr}")
+        summary = json.loads((folder / "drive" / "summary.json").read_text())
+        expect(summary["mae"]["kappa"] < summary["causal"]["mae"]["kappa"], f"no better with hindsight: {summary}")
+        expect(summary["smoother"]["laws"] and all(law["by_parameter"] for law in summary["smoother"]["laws"]), "no laws")
+        with open(folder / "drive" / "steps.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        expect(len(rows) == summary["steps"] and all(float(row["sigma_kappa"]) > 0.0 for row in rows), "steps.csv")
+        report = subprocess.run([rhec, "report", "drive", "-o", "drive.html"], cwd=folder, capture_output=True, text=True)
+        expect(report.returncode == 0 or "without the page" in report.stderr, f"report: {report.stderr}")
+        for more, code, words in ((["--hold-out", "5"], 1, "recorded drive"), (["--variant", "x"], 1, "recorded drive"),
+                                  (["--gps", "gps.txt"], 2, "--dead-reckoning"),
+                                  (["--set", "smoother.solver={name: sparse_sqp, max_iterations: 1}"], 3, "iteration_limit"),
+                                  (["--set", "pth.laps=2"], 1, "path")):
+            done = smooth_drive(*more)
+            expect(done.returncode == code and words in done.stdout + done.stderr,
+                   f"{more}: {done.returncode} {done.stdout}{done.stderr}")
+        done = smooth_drive(scenario="circle.yaml")
+        expect(done.returncode == 1 and "--dead-reckoning" in done.stderr, f"a log's scenario: {done.returncode} {done.stderr}")
     for complaint in complaints:
         print("FAILED:", complaint)
     return 1 if complaints else 0

@@ -74,5 +74,21 @@ TEST(RobotHookChain, WrapsWhatTheLinkBeforeReturned) {
   EXPECT_EQ(&inner->inside(), solver.get());
 }
 
+TEST(RecordingNodes, KeepsWhatAnEstimatorIsGiven) {
+  Robot robot = Robot(host(), RobotOptions::table().parse(settings("model: bicycle_slip"), "robot.yaml"));
+  const auto log = std::make_shared<NodeLog>();
+  robot.add_hooks(recording_nodes(log));
+  const auto estimator = robot.make_estimator();
+  const double outputs[] = {1.0, 2.0, 0.0}, inputs[] = {3.0, 0.1};
+  estimator->push_measurement(0.0, outputs);
+  estimator->push_input(0.0, inputs);
+  estimator->push_measurement(0.1, outputs);
+  estimator->estimate(0.1);
+  ASSERT_EQ(log->intervals(), 1);
+  EXPECT_NEAR(log->durations[0], 0.1, 1e-12);
+  EXPECT_THAT(log->inputs, ElementsAre(3.0, 0.1));
+  EXPECT_THAT(log->outputs, ElementsAre(1.0, 2.0, 0.0, 1.0, 2.0, 0.0));
+}
+
 }  // namespace
 }  // namespace rhec

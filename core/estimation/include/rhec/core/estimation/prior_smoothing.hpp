@@ -21,7 +21,7 @@ class RHEC_EXPORT PriorSmoothing final : public Smoother {
     BankEstimation::Setup filters;         ///< its members learn the noise of outputs
     std::vector<PriorCombination> priors;  ///< by parameter, those to choose from; where none are, laws of all kinds
     RheProblem::Setup problem;             ///< of the vehicle; its max_intervals is replaced by the log's
-    int most_laws = 3;
+    int most_laws = 8;
     double least_probability = 0.05;  ///< laws that are less probable, relative to the most probable one, are left out
   };
   /// Throws Error if sizes do not match.

@@ -29,7 +29,5 @@ struct RHEC_EXPORT ParameterLaw {
 
 /// Laws of all kinds, from hardly any change to quick and large ones, for a search of the one that explains a log best.
 RHEC_EXPORT std::vector<ParameterLaw> wide_laws();
-/// The law and those beside it: of the same kind, with each number about `factor` times smaller and larger.
-RHEC_EXPORT std::vector<ParameterLaw> laws_near(const ParameterLaw& law, double factor);
 
 }  // namespace rhec
