@@ -13,7 +13,7 @@ namespace rhec {
 /// The keys of the section `smoother`.
 struct RHEC_EXPORT SmootherOptions {
   double deadline = 600.0;  ///< of the solver [s]
-  int laws = 8;            ///< of priors: at most so many are solved for and mixed
+  int laws = 8;             ///< of priors: at most so many are solved for and mixed
   Settings blocking, priors, robust, solver;
   static const OptionTable<SmootherOptions>& table();
 };

@@ -14,7 +14,7 @@ inline constexpr const char* causal_suffix = " causal";
 struct SmoothedReplay {
   Replay smoothed;  ///< at the same times as `causal`: its nodes and the withheld fixes
   Replay causal;
-  Report report;            ///< of the single large problem
+  Report report;  ///< of the single large problem
   std::vector<SmoothedRun::Law> laws;
   int intervals = 0;        ///< its N
   bool has_sigmas = false;  ///< whether the solver returned covariances
