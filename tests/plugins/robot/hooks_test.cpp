@@ -8,6 +8,7 @@
 
 #include "plugins/robot/robots.hpp"
 #include "rhec/core/ocp/solver_decorator.hpp"
+#include "rhec/plugins/robot/robot.hpp"
 
 namespace rhec {
 namespace {
@@ -75,7 +76,7 @@ TEST(RobotHookChain, WrapsWhatTheLinkBeforeReturned) {
 }
 
 TEST(RecordingNodes, KeepsWhatAnEstimatorIsGiven) {
-  Robot robot = Robot(host(), RobotOptions::table().parse(settings("model: bicycle_slip"), "robot.yaml"));
+  Robot robot(host(), RobotOptions::table().parse(settings("model: {name: bicycle_slip}"), "robot.yaml"));
   const auto log = std::make_shared<NodeLog>();
   robot.add_hooks(recording_nodes(log));
   const auto estimator = robot.make_estimator();
@@ -86,7 +87,7 @@ TEST(RecordingNodes, KeepsWhatAnEstimatorIsGiven) {
   estimator->estimate(0.1);
   ASSERT_EQ(log->intervals(), 1);
   EXPECT_NEAR(log->durations[0], 0.1, 1e-12);
-  EXPECT_THAT(log->inputs, ElementsAre(3.0, 0.1));
+  EXPECT_THAT(log->inputs, ElementsAre(testing::DoubleEq(3.0), testing::DoubleEq(0.1)));
   EXPECT_THAT(log->outputs, ElementsAre(1.0, 2.0, 0.0, 1.0, 2.0, 0.0));
 }
 
