@@ -26,6 +26,7 @@ void add_run(Program& program);
 void add_smooth(Program& program);
 void add_solve(Program& program);
 void add_sweep(Program& program);
+void add_tune(Program& program);
 void add_options(Program& program);
 void add_plugins(Program& program);
 

@@ -8,9 +8,8 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::apps {
-namespace {
 
-sim::LogScenario read_scenario(const LogArguments& arguments) {
+sim::LogScenario read_log_scenario(const LogArguments& arguments) {
   Settings settings = load_yaml(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   return {Host(arguments.plugin_path), settings, arguments.variants};
@@ -24,10 +23,8 @@ sim::HoldOut read_hold_out(const LogArguments& arguments) {
   return {arguments.hold_out, phase};
 }
 
-}  // namespace
-
 LogInput::LogInput(const LogArguments& arguments)
-    : scenario(read_scenario(arguments)),
+    : scenario(read_log_scenario(arguments)),
       hold_out(read_hold_out(arguments)),
       log(sim::read_recorded_log(arguments.dead_reckoning, arguments.gps, scenario)) {}
 

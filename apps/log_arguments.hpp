@@ -20,6 +20,10 @@ struct LogArguments {
 /// `needs_log`: whether the command cannot do without the log's files.
 void add_log_arguments(Command& command, LogArguments& arguments, bool needs_log = true);
 
+/// The scenario that these arguments name; and what they say of fixes to be withheld. Throw Error for any mistake.
+sim::LogScenario read_log_scenario(const LogArguments& arguments);
+sim::HoldOut read_hold_out(const LogArguments& arguments);
+
 /// The input that these arguments name, read and checked. Throws Error for any mistake.
 struct LogInput {
   explicit LogInput(const LogArguments& arguments);

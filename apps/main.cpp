@@ -56,6 +56,7 @@ constexpr const char* examples =
     "  rhec solve problems.jsonl --solver gn_rti --sequence > solutions.jsonl\n"
     "  rhec compare scenarios/figure8.yaml --solvers gn_rti,sparse_sqp\n"
     "  rhec sweep scenarios/sweep_blocks.yaml --out out/blocks.sqlite\n"
+    "  rhec tune scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/tuned\n"
     "  rhec report out/figure8 -o out/figure8.html\n\n"
     "'rhec COMMAND --help' says more of each command.";
 
@@ -67,6 +68,7 @@ int run(int count, char** words) {
   add_solve(program);
   add_compare(program);
   add_sweep(program);
+  add_tune(program);
   add_report(program);
   add_check(program);
   add_options(program);

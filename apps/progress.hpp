@@ -41,6 +41,32 @@ class ProgressBar {
   int shown_ = -1;
 };
 
+/// What is done at present, in words: one line, redrawn, on a terminal; prints nothing elsewhere.
+class StageLine {
+ public:
+  explicit StageLine(std::string title) : title_(std::move(title)), terminal_(isatty(STDERR_FILENO) != 0) {}
+  ~StageLine() {
+    if (shown_) fmt::print(stderr, "\r\033[K");
+  }
+  StageLine(const StageLine&) = delete;
+  StageLine& operator=(const StageLine&) = delete;
+
+  void show(const std::string& text) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!terminal_ || now < next_) return;
+    next_ = now + std::chrono::milliseconds(200);
+    fmt::print(stderr, "\r{}: {}\033[K", title_, text);
+    std::fflush(stderr);
+    shown_ = true;
+  }
+
+ private:
+  std::string title_;
+  bool terminal_;
+  std::chrono::steady_clock::time_point next_{};
+  bool shown_ = false;
+};
+
 /// Progress, rate and remaining time of many runs: one line, redrawn, on a terminal; one line per minute elsewhere.
 class RateLine {
  public:

@@ -3,11 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <cstdint>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -23,6 +20,7 @@
 #include "rhec/sim/store/sweep_store.hpp"
 #include "rhec/sim/study/sweep.hpp"
 #include "rhec/sim/study/sweep_runner.hpp"
+#include "stop_request.hpp"
 #include "sweep_ranks.hpp"
 
 namespace rhec::apps {
@@ -37,49 +35,6 @@ struct SweepArguments {
 
 /// Larger grids need confirmation, and are checked for equal runs only while they run.
 constexpr std::int64_t many_runs = 1'000'000;
-
-/// While an object of this class exists, the first SIGINT or SIGTERM requests a stop; one that comes a second or two
-/// later ends the program as usual. An immediate repetition is ignored, since some programs (e.g. timeout) send the
-/// signal twice.
-class StopRequest {
- public:
-  StopRequest() {
-    asked_ = false;
-    struct sigaction action {};
-    action.sa_handler = [](int number) {
-      struct timespec now {};
-      clock_gettime(CLOCK_MONOTONIC, &now);
-      if (!asked_) {
-        asked_at_ = now.tv_sec;
-        asked_ = true;
-      } else if (now.tv_sec - asked_at_ > 1) {
-        std::signal(number, SIG_DFL);
-        std::raise(number);
-      }
-    };
-    action.sa_flags = SA_RESTART;
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, &interrupt_);
-    sigaction(SIGTERM, &action, &terminate_);
-  }
-  ~StopRequest() {
-    sigaction(SIGINT, &interrupt_, nullptr);
-    sigaction(SIGTERM, &terminate_, nullptr);
-  }
-  StopRequest(const StopRequest&) = delete;
-  StopRequest& operator=(const StopRequest&) = delete;
-
-  static bool asked() { return asked_; }
-
- private:
-  static std::atomic<bool> asked_;             // lock-free, as a signal handler requires
-  static std::atomic<std::int64_t> asked_at_;  // [s]
-  static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<std::int64_t>::is_always_lock_free);
-  struct sigaction interrupt_ {};
-  struct sigaction terminate_ {};
-};
-std::atomic<bool> StopRequest::asked_ = false;
-std::atomic<std::int64_t> StopRequest::asked_at_ = 0;
 
 /// Asks for confirmation on a terminal. Throws Error without a terminal, or if the answer is not yes.
 void confirm(const sim::Sweep& sweep, const std::string& file, bool yes) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -78,6 +79,29 @@ void spread_rows(std::vector<DeadReckoning>& rows) {
         rows[i].time = rows[first].stamp + gap * static_cast<double>(i - first) / static_cast<double>(next - first);
     }
     first = next;
+  }
+}
+
+/// Linear in time between the rows about it; missing before the first row and where one of the two is.
+double reading_at(const std::vector<DeadReckoning>& rows, double DeadReckoning::*reading, double time) {
+  const auto after =
+      std::upper_bound(rows.begin(), rows.end(), time, [](double at, const auto& row) { return at < row.time; });
+  if (after == rows.begin()) return missing;
+  const DeadReckoning& before = *std::prev(after);
+  if (after == rows.end() || before.time == time) return before.*reading;
+  const double share = (time - before.time) / (after->time - before.time);
+  return before.*reading + share * ((*after).*reading - before.*reading);
+}
+
+/// Puts a row's two readings at the time of the one that is read late: a row tells of a time before its stamp, and is
+/// taken for one that was stamped then. So nothing is used before it is known, and fixes wait for the rows about them.
+void align_steering(std::vector<DeadReckoning>& rows, double delay) {
+  const std::vector<DeadReckoning> read = rows;
+  const auto prompt = delay > 0.0 ? &DeadReckoning::speed : &DeadReckoning::steering;
+  for (DeadReckoning& row : rows) {
+    row.time -= std::abs(delay);
+    row.stamp -= std::abs(delay);
+    row.*prompt = reading_at(read, prompt, row.time);
   }
 }
 
@@ -272,8 +296,15 @@ const OptionTable<LogOptions>& LogOptions::table() {
       OptionTable<LogOptions>()
           .number("wheel_offset", &LogOptions::wheel_offset,
                   "the speed was measured at a wheel this far left of the axle's middle [m]; negative: right of it")
+          .number("speed_bias", &LogOptions::speed_bias, "the speed's reading when standing [m/s]")
+          .number("speed_scale", &LogOptions::speed_scale, "speed by metre of the reading, once the bias is taken off",
+                  greater_than(0.0))
           .number("steering_bias", &LogOptions::steering_bias, "the steering's reading when driving straight [rad]")
+          .number("steering_scale", &LogOptions::steering_scale,
+                  "steering angle by radian of the reading, once the bias is taken off", greater_than(0.0))
           .number("fix_delay", &LogOptions::fix_delay, "how much later than the dead reckoning a fix is stamped [s]")
+          .number("steering_delay", &LogOptions::steering_delay,
+                  "how much later than the speed the steering is read, in one row [s]", between(-10.0, 10.0))
           .number("agreement", &LogOptions::agreement,
                   "a fix agrees with its neighbours where it is this near to the line between them [m]",
                   greater_than(0.0))
@@ -313,7 +344,8 @@ LogScenario::LogScenario(const Host& host, const Settings& settings, const std::
   log_ = LogOptions::table().parse(base.log, "log");
   const auto add = [&](const std::string& name, const Settings& with) {
     const LogScenarioOptions options = LogScenarioOptions::table().parse(with, "scenario");
-    variants_.push_back({name, Robot(host, options, scenario_estimators())});
+    variants_.push_back({name, Robot(host, options, scenario_estimators()), with});
+    if (!options.variants.is_null()) variants_.back().settings.set("variants", Settings::null());
     check_names(log_, variants_.back().robot.model()->description(), base.log);
     const Settings* wheelbase = options.model.find("wheelbase");
     wheelbase_ = wheelbase ? wheelbase->as_number() : 0.0;
@@ -344,42 +376,54 @@ LogScenario::LogScenario(const Host& host, const Settings& settings, const std::
   if (variants_.empty()) throw base.variants.mismatch("at least one variant");
 }
 
-RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const std::filesystem::path& gps,
-                              const LogScenario& scenario) {
-  const LogOptions& options = scenario.log();
-  const CsvTable rows = read_csv(dead_reckoning, {.columns = 3});
-  const CsvTable fixes = read_csv(gps, {.columns = 3});
+LogTables read_log_tables(const std::filesystem::path& dead_reckoning, const std::filesystem::path& gps) {
+  LogTables tables{read_csv(dead_reckoning, {.columns = 3}), read_csv(gps, {.columns = 3})};
+  const CsvTable &rows = tables.rows, &fixes = tables.fixes;
   check_times(rows);
   check_times(fixes);
   if (fixes.at(fixes.rows() - 1, 0) < rows.at(0, 0) || fixes.at(0, 0) > rows.at(rows.rows() - 1, 0))
     throw Error(fmt::format("{}: from {} s to {} s, but {}: from {} s to {} s; expected logs of one drive by one clock",
                             rows.name, rows.at(0, 0), rows.at(rows.rows() - 1, 0), fixes.name, fixes.at(0, 0),
                             fixes.at(fixes.rows() - 1, 0)));
+  return tables;
+}
+
+RecordedLog recorded_log(const LogTables& tables, const LogScenario& scenario) {
+  const LogOptions& options = scenario.log();
+  const CsvTable &rows = tables.rows, &fixes = tables.fixes;
   RecordedLog log;
   log.missing_speeds = rows.missing[1];
   log.missing_steerings = rows.missing[2];
   log.missing_coordinates = fixes.missing[1] + fixes.missing[2];
-  double steering = 0.0;  // last known
-  for (std::int64_t i = 0; i < rows.rows(); ++i) {
-    DeadReckoning row{rows.at(i, 0), rows.at(i, 0), rows.at(i, 1), rows.at(i, 2) - options.steering_bias};
-    if (!std::isnan(row.steering)) steering = row.steering;
-    if (options.wheel_offset != 0.0) {
-      // In a bend an off-centre wheel runs on a circle of a different radius.
-      const double factor = 1.0 - std::tan(steering) * options.wheel_offset / scenario.wheelbase();
-      if (!(factor > 0.1))
-        throw Error(
-            fmt::format("{}:{}: with a steering angle of {} rad the wheel would stand still or run backwards; "
-                        "expected an angle in radians; check the column and log.wheel_offset",
-                        rows.name, rows.line_of(i), steering));
-      row.speed /= factor;
-    }
-    log.rows.push_back(row);
-  }
+  log.rows.reserve(static_cast<std::size_t>(rows.rows()));
+  for (std::int64_t i = 0; i < rows.rows(); ++i)
+    log.rows.push_back({rows.at(i, 0), rows.at(i, 0), options.speed_scale * (rows.at(i, 1) - options.speed_bias),
+                        options.steering_scale * (rows.at(i, 2) - options.steering_bias)});
   spread_rows(log.rows);
+  if (options.steering_delay != 0.0) align_steering(log.rows, options.steering_delay);
+  double steering = 0.0;  // last known
+  for (std::size_t i = 0; i < log.rows.size() && options.wheel_offset != 0.0; ++i) {
+    DeadReckoning& row = log.rows[i];
+    if (!std::isnan(row.steering)) steering = row.steering;
+    // In a bend an off-centre wheel runs on a circle of a different radius.
+    const double factor = 1.0 - std::tan(steering) * options.wheel_offset / scenario.wheelbase();
+    if (!(factor > 0.1))
+      throw Error(
+          fmt::format("{}:{}: with a steering angle of {} rad the wheel would stand still or run backwards; "
+                      "expected an angle in radians; check the column and log.wheel_offset",
+                      rows.name, rows.line_of(static_cast<std::int64_t>(i)), steering));
+    row.speed /= factor;
+  }
+  log.fixes.reserve(static_cast<std::size_t>(fixes.rows()));
   for (std::int64_t i = 0; i < fixes.rows(); ++i)
     log.fixes.push_back({fixes.at(i, 0) - options.fix_delay, fixes.at(i, 1), fixes.at(i, 2), fixes.line_of(i)});
   mark_agreement(log.fixes, options);
   return log;
+}
+
+RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const std::filesystem::path& gps,
+                              const LogScenario& scenario) {
+  return recorded_log(read_log_tables(dead_reckoning, gps), scenario);
 }
 
 Replay replay(const Robot& robot, const RecordedLog& log, const LogOptions& options, const HoldOut& hold_out,

@@ -8,6 +8,7 @@
 
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/plugins/robot/robot.hpp"
+#include "rhec/sim/files/csv.hpp"
 #include "rhec/sim/problems/recording_solver.hpp"
 
 namespace rhec::sim {
@@ -15,8 +16,12 @@ namespace rhec::sim {
 /// The section `log` of a scenario: how a drive was recorded and how its columns map to the model.
 struct LogOptions {
   double wheel_offset = 0.0;    ///< lateral offset of the speed-measuring wheel, left of the axle's centre [m]
+  double speed_bias = 0.0;      ///< speed reading when standing [m/s]
+  double speed_scale = 1.0;     ///< speed by metre of reading, without bias
   double steering_bias = 0.0;   ///< steering reading when driving straight [rad]
-  double fix_delay = 0.0;       ///< delay of the fixes' time stamps relative to dead reckoning [s]
+  double steering_scale = 1.0;  ///< steering angle by radian of reading, without bias
+  double fix_delay = 0.0;       ///< delay of the fixes' time stamps relative to the speed's [s]
+  double steering_delay = 0.0;  ///< delay of the steering's readings relative to the speed's [s]
   double agreement = 1.0;       ///< a fix agrees with its neighbours if it is this close to the line between them [m]
   double neighbour_time = 1.0;  ///< and they are this close in time [s]
   std::vector<std::string> position{"x_gps", "y_gps"};  ///< outputs measured by a fix
@@ -40,6 +45,7 @@ RHEC_EXPORT std::vector<OptionSection> log_sections();
 struct LogVariant {
   std::string name;
   Robot robot;
+  Settings settings;  ///< the scenario with the variant's keys put over it, without `variants`
 };
 
 /// A scenario for recorded data with all its objects constructed. Throws Error, naming file, line and key, if it is
@@ -62,8 +68,8 @@ class RHEC_EXPORT LogScenario {
 
 /// A row of dead reckoning; NaN where a reading is missing.
 struct DeadReckoning {
-  double time = 0.0;                   ///< [s]; rows with equal stamps are spread evenly up to the next stamp
-  double stamp = 0.0;                  ///< as recorded: when the row becomes available
+  double time = 0.0;   ///< of the readings, by the fixes' clock [s]; rows with equal stamps are spread evenly
+  double stamp = 0.0;  ///< when the row becomes available, by the same clock
   double speed = 0.0, steering = 0.0;  ///< at the axle's centre [m/s]; without bias [rad]
 };
 /// A measured position; NaN where a coordinate is missing.
@@ -79,8 +85,16 @@ struct RecordedLog {
   std::vector<Fix> fixes;
   std::int64_t missing_speeds = 0, missing_steerings = 0, missing_coordinates = 0;
 };
+/// The files of a drive as they are, before anything of a scenario is applied to them.
+struct LogTables {
+  CsvTable rows, fixes;
+};
 /// Reads dead reckoning (time, wheel speed, steering angle) and fixes (time, x, y), comma-separated, without a header.
 /// Missing readings are masked and counted. Throws Error, naming file and line, if a file is not such a log.
+RHEC_EXPORT LogTables read_log_tables(const std::filesystem::path& dead_reckoning, const std::filesystem::path& gps);
+/// What the tables mean to a scenario: its biases, scales and delays taken out.
+RHEC_EXPORT RecordedLog recorded_log(const LogTables& tables, const LogScenario& scenario);
+/// Both.
 RHEC_EXPORT RecordedLog read_recorded_log(const std::filesystem::path& dead_reckoning, const std::filesystem::path& gps,
                                           const LogScenario& scenario);
 

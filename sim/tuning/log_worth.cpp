@@ -1,0 +1,284 @@
+// What was found is worth: its precision, what the log does not tell, and how it does on fixes that it was not tuned
+// on.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "rhec/sim/logs/smoothing.hpp"
+
+#include "judgement.hpp"
+#include "log_tuner.hpp"
+
+namespace rhec::sim {
+namespace {
+
+// A coordinate whose standard error is not below this share of its doubt is not told by the log.
+constexpr double told_below = 0.5;
+// A log likelihood that is lower by no more than this is as good.
+constexpr double as_good = 2.0;
+constexpr int evaluations_per_number = 30;
+constexpr std::size_t most_named = 6;  // confounded pairs
+constexpr int written_digits = 4;
+constexpr int fewest_blocks = 10, most_blocks = 60, fixes_of_a_block = 10;
+constexpr double block_seconds = 30.0;
+// Estimators are chosen by these many rests of so many, at least.
+constexpr int rests_tried = 2, fewest_rests = 4;
+
+}  // namespace
+
+int LogTuner::block_count() const { return std::clamp(result_.fixes / fixes_of_a_block, fewest_blocks, most_blocks); }
+
+Precision LogTuner::precision_of(const Filter& filter, const Eigen::VectorXd& at) const {
+  const SearchOptions bounds = search_options(filter, 1.0, 1);
+  return precision_at([&](const Eigen::VectorXd& to) { return terms_at(filter, to).terms; }, at,
+                      {.lower = bounds.lower,
+                       .upper = bounds.upper,
+                       .blocks = block_count(),
+                       .threads = options_.threads,
+                       .stop = [this] { return stopped(); }});
+}
+
+void LogTuner::find_precision() {
+  if (stopped()) return;
+  const Precision found = precision_of(filter_, at_);
+  if (stopped()) return;
+  precision_ = found;
+  is_told_.clear();
+  for (int i = 0; i < size(); ++i) is_told_.push_back(!found.is_free[i] || found.error(i) < told_below);
+  if (std::find(is_told_.begin(), is_told_.end(), false) != is_told_.end()) hold_what_is_not_told();
+}
+
+/// What the log does not tell goes back to what the scenario says, if that costs nothing.
+void LogTuner::hold_what_is_not_told() {
+  begin("holding what is not told");
+  Filter told;
+  Eigen::VectorXd all = at_, at(size());
+  Eigen::Index count = 0;
+  for (int i = 0; i < size(); ++i) {
+    if (is_told_[i]) {
+      told.tunables.push_back(filter_.tunables[i]);
+      at[count++] = at_[i];
+    } else {
+      all[i] = 0.0;
+    }
+  }
+  at.conservativeResize(count);
+  told.settings = with_values(filter_.settings, filter_.tunables, all);
+  if (count > 0) {
+    const SearchOptions options = search_options(told, 0.1, evaluations_per_number * static_cast<int>(count));
+    at = maximise([&](const Eigen::VectorXd& to) { return value_at(told, to); }, {at}, options).at;
+  }
+  count = 0;
+  for (int i = 0; i < size(); ++i)
+    if (is_told_[i]) all[i] = at[count++];
+  const double value = terms_at(filter_, at_).likelihood.total, held = terms_at(filter_, all).likelihood.total;
+  is_held_ = held > value - as_good;
+  if (is_held_) at_ = all;
+}
+
+void LogTuner::take_values() {
+  for (int i = 0; i < size(); ++i) {
+    const Tunable& tunable = filter_.tunables[i];
+    TunedNumber number;
+    number.tunable = tunable;
+    number.error = number.hessian_error = std::nan("");
+    number.value = tunable.value_at(at_[i]);
+    number.value = *Settings::scalar(fmt::format("{:.{}g}", number.value, written_digits)).number();
+    if (std::abs(at_[i]) < 1e-9) number.value = tunable.start;
+    if (precision_) {
+      number.is_told = is_told_[i];
+      number.is_at_bound = !precision_->is_free[i];
+      number.error = tunable.error_of(precision_->error(i), number.value);
+      number.hessian_error = tunable.error_of(precision_->hessian_errors[i], number.value);
+    }
+    result_.numbers.push_back(number);
+  }
+  note_what_is_not_told();
+
+  Settings& to = result_.settings = settings_;
+  if (result_.filter == "bank") {
+    to.set("noise.adapt", Settings::scalar("false"));  // the noise was found from all of the log
+    if (const Settings* priors = filter_.settings.find_path("estimator.priors")) to.set("estimator.priors", *priors);
+  }
+  to = with_values(std::move(to), filter_.tunables, at_, written_digits);
+  const Terms after = terms_at(filter_, at_);
+  result_.log_likelihood_after = after.likelihood.total;
+  result_.degrees_after = after.likelihood.degrees;
+}
+
+/// The likelihood is that of a filter. Which estimator predicts best with what was found is seen by withholding fixes
+/// that it was found from: the scenario's, the filter itself, or the scenario's as it was.
+void LogTuner::choose_estimator() {
+  struct Candidate {
+    std::string name;
+    Settings settings;
+    std::vector<double> errors = {};
+  };
+  std::vector<Candidate> candidates{{estimator_ + ", tuned", result_.settings}};
+  if (estimator_ != result_.filter) {
+    Settings filter = result_.settings;
+    filter.set("estimator.name", Settings::scalar(result_.filter));
+    if (filter.find_path("estimator.robust")) filter.set("estimator.robust", Settings::null());
+    candidates.push_back({result_.filter + ", tuned", filter});
+  }
+  candidates.push_back({estimator_ + ", as it was", settings_});
+  // Fixes that judge are masked; of the others, those of two rests are withheld in turn.
+  const int every = std::max(options_.hold_out.every, fewest_rests);
+  std::vector<HoldOut> rests;
+  for (int phase = 0; phase < every && std::ssize(rests) < rests_tried; ++phase)
+    if (every != options_.hold_out.every || phase != options_.hold_out.phase) rests.push_back({every, phase});
+  std::mutex mutex;
+  const auto count = static_cast<int>(candidates.size() * rests.size());
+  in_parallel(count, options_.threads, [&](int k) {
+    Candidate& candidate = candidates[static_cast<std::size_t>(k) / rests.size()];
+    const HoldOut& rest = rests[static_cast<std::size_t>(k) % rests.size()];
+    const LogScenario scenario(host_, candidate.settings);
+    RecordedLog log = recorded_log(tables_, scenario);
+    for (std::size_t i = 0; i < log.fixes.size(); ++i)
+      if (options_.hold_out.holds(i)) log.fixes[i].x = log.fixes[i].y = std::nan("");
+    const Replay replayed = replay(scenario.variants().front().robot, log, scenario.log(), rest);
+    const std::lock_guard lock(mutex);
+    for (const LoggedEstimate& entry : replayed.estimates)
+      if (entry.held_out && counts_[static_cast<std::size_t>(entry.fix)] && !std::isnan(entry.residual))
+        candidate.errors.push_back(entry.residual);
+  });
+  const Candidate* best = nullptr;
+  double least = 0.0;
+  for (const Candidate& candidate : candidates) {
+    if (candidate.errors.empty()) continue;
+    const TriedEstimator tried{candidate.name, median_of(candidate.errors), capped_rmse_of(candidate.errors)};
+    result_.estimators.push_back(tried);
+    const double score = std::log(tried.median) + std::log(tried.rmse);
+    if (best && score >= least) continue;
+    best = &candidate;
+    least = score;
+  }
+  if (!best) return;
+  for (TriedEstimator& tried : result_.estimators) tried.is_taken = tried.name == best->name;
+  result_.settings = best->settings;
+  if (best == &candidates.back())
+    result_.remarks.emplace_back(
+        "The scenario as it was predicts the fixes better than what is most likely by its filter: it is left as it "
+        "was.");
+}
+
+void LogTuner::note_what_is_not_told() {
+  std::vector<std::string> untold;
+  for (const TunedNumber& number : result_.numbers) {
+    if (number.is_at_bound)
+      result_.remarks.push_back(
+          fmt::format("{} is at the end of its range, {:.4g}: the log would have it beyond, or "
+                      "does not bound it on that side.",
+                      number.tunable.name, number.value));
+    if (!number.is_told) untold.push_back(number.tunable.name);
+  }
+  if (!untold.empty())
+    result_.remarks.push_back(
+        fmt::format("This log tells little of {}: whatever their values (within a few times what "
+                    "the scenario says), the fixes are about as likely. {}.",
+                    fmt::join(untold, "; "),
+                    is_held_ ? "They are as the scenario has them"
+                             : "They have their best values all the same, since together they matter"));
+  if (precision_ && precision_->roughness > as_good)
+    result_.remarks.push_back(fmt::format(
+        "The likelihood is rough by {:.0f}: the filter loses its way somewhere, and finds it again by chance. "
+        "Standard errors are those of a coarser look; numbers that differ by less are as good.",
+        precision_->roughness));
+  if (!precision_) {
+    result_.remarks.emplace_back("Stopped before standard errors were known.");
+    return;
+  }
+  for (int i = 0; i < size(); ++i) {
+    for (int j = 0; j < i; ++j) {
+      const double correlation = precision_->correlation(i, j);
+      if (std::abs(correlation) >= confounded_from && precision_->is_free[i] && precision_->is_free[j])
+        result_.confounded.push_back({filter_.tunables[j].name, filter_.tunables[i].name, correlation});
+    }
+  }
+  std::sort(result_.confounded.begin(), result_.confounded.end(),
+            [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
+  for (std::size_t i = 0; i < std::min(result_.confounded.size(), most_named); ++i) {
+    const ConfoundedPair& pair = result_.confounded[i];
+    result_.remarks.push_back(
+        fmt::format("{} and {} are confounded (correlation {:.2f}): an error of one hides in the other; measure one of "
+                    "them, and give --keep for it.",
+                    pair.first, pair.second, pair.correlation));
+  }
+  if (result_.confounded.size() > most_named)
+    result_.remarks.push_back(
+        fmt::format("So are {} more pairs; summary.json has all.", result_.confounded.size() - most_named));
+}
+
+void LogTuner::find_slices() {
+  if (stopped() || !precision_) return;
+  constexpr double points[] = {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0};
+  const SearchOptions bounds = search_options(filter_, 1.0, 1);
+  const double top = terms_at(filter_, at_).likelihood.total;
+  in_parallel(size(), options_.threads, [&](int i) {
+    auto& slice = result_.numbers[i].slice;
+    slice.emplace_back(filter_.tunables[i].value_at(at_[i]), 0.0);
+    for (const double point : points) {
+      Eigen::VectorXd to = at_;
+      to[i] = std::clamp(at_[i] + point * precision_->widths[i], bounds.lower[i], bounds.upper[i]);
+      if (stopped() || to[i] == at_[i]) continue;
+      slice.emplace_back(filter_.tunables[i].value_at(to[i]), terms_at(filter_, to).likelihood.total - top);
+    }
+    std::sort(slice.begin(), slice.end());
+  });
+}
+
+void LogTuner::judge() {
+  if (options_.hold_out.every == 0) return;
+  const bool smooths = options_.smooths && !stopped();  // it takes long
+  const Settings* const scenarios[] = {&settings_, &result_.settings};
+  const Settings filters[] = {before_.settings, with_values(filter_.settings, filter_.tunables, at_, written_digits)};
+  std::vector<double> predicted[2], smoothed[2], densities[2], squares[2];
+  in_parallel(2, options_.threads, [&](int k) {
+    const LogScenario scenario(host_, *scenarios[k]);
+    const RecordedLog log = recorded_log(tables_, scenario);
+    const Robot& robot = scenario.variants().front().robot;
+    predicted[k] = residuals_of(replay(robot, log, scenario.log(), options_.hold_out));
+    if (smooths)
+      smoothed[k] = residuals_of(smooth(scenario.name(), robot, log, scenario.log(), options_.hold_out).smoothed);
+    // The filter expects a fix that nothing was tuned on from all before it.
+    const LogScenario filter(host_, filters[k]);
+    const RecordedLog own = recorded_log(tables_, filter);
+    const std::vector<Innovation> found = innovations(filter.variants().front().robot, own, filter.log(), {});
+    const double degrees = k == 0 ? result_.degrees_before : result_.degrees_after;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const bool counts = judges_[i] && found[i].size == 2;
+      densities[k].push_back(counts ? log_density(found[i], degrees) : std::nan(""));
+      squares[k].push_back(counts ? found[i].squared : std::nan(""));
+    }
+  });
+  Pairs pairs;
+  for (const Fix& fix : log_.fixes) pairs.times.push_back(fix.time);
+  const auto add = [&](const char* name, const char* unit, std::vector<double>* of, const Statistic& statistic) {
+    pairs.before = of[0];
+    pairs.after = of[1];
+    result_.judged.push_back(compare(name, unit, pairs, statistic, block_seconds));
+  };
+  add("withheld fixes: median", "m", predicted, median_of);
+  add("withheld fixes: RMSE (5 m)", "m", predicted, capped_rmse_of);
+  if (smooths) {
+    add("smoothed: median", "m", smoothed, median_of);
+    add("smoothed: RMSE (5 m)", "m", smoothed, capped_rmse_of);
+  }
+  add("log likelihood of a fix", "", densities, mean_of);
+  add("NIS: median (1.39 if right)", "", squares, median_of);
+  add("NIS: mean (2 if normal)", "", squares, mean_of);
+}
+
+/// Distances of withheld fixes, by their index.
+std::vector<double> LogTuner::residuals_of(const Replay& replayed) const {
+  std::vector<double> residuals(log_.fixes.size(), std::nan(""));
+  for (const LoggedEstimate& entry : replayed.estimates)
+    if (entry.held_out) residuals[static_cast<std::size_t>(entry.fix)] = entry.residual;
+  std::int64_t unpredicted = replayed.unpredicted;  // the first ones
+  for (std::size_t i = 0; i < residuals.size() && unpredicted > 0; ++i)
+    if (options_.hold_out.holds(i)) residuals[i] = error_cap, --unpredicted;
+  return residuals;
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,271 @@
+#include "rhec/sim/tuning/tunable.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/config/options.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+
+namespace rhec::sim {
+namespace {
+
+/// How far off what a scenario says may well be.
+struct Doubts {
+  static constexpr double factor = std::numbers::ln10;  ///< of noise: ten times
+  static constexpr double length_factor = 1.4;          ///< of a prior's length: four times
+  static constexpr double speed = 0.1;                  ///< [m/s]
+  static constexpr double angle = 0.05;                 ///< [rad]
+  static constexpr double delay = 0.2;                  ///< [s]
+  static constexpr double length = 1.0;                 ///< of a lever arm [m]
+};
+// The search keeps to this many doubts about its start.
+constexpr double widest = 3.0;
+
+Tunable scale_of(std::vector<std::string> keys, double start, std::string unit, double doubt) {
+  Tunable tunable{
+      .name = keys.front(), .keys = std::move(keys), .unit = std::move(unit), .start = start, .doubt = doubt};
+  for (std::size_t i = 1; i < tunable.keys.size(); ++i)
+    tunable.name += ", " + tunable.keys[i].substr(tunable.keys[i].rfind('.') + 1);
+  tunable.lower = tunable.value_at(-widest);
+  tunable.upper = tunable.value_at(widest);
+  return tunable;
+}
+
+Tunable offset_of(std::string key, double start, std::string unit, double doubt) {
+  Tunable tunable{.name = key,
+                  .keys = {std::move(key)},
+                  .unit = std::move(unit),
+                  .kind = Tunable::Kind::offset,
+                  .start = start,
+                  .doubt = doubt};
+  tunable.lower = tunable.value_at(-widest);
+  tunable.upper = tunable.value_at(widest);
+  return tunable;
+}
+
+/// Collects what can be tuned.
+class Finder {
+ public:
+  Finder(const Host& host, const LogScenario& scenario)
+      : host_(host), scenario_(scenario), robot_(scenario.variants().front().robot) {}
+
+  std::vector<Tunable> find() {
+    add_noise();
+    add_estimator();
+    add_log();
+    add_model();
+    return std::move(all_);
+  }
+
+ private:
+  const ModelDescription& about() const { return robot_.model()->description(); }
+
+  void add_noise() {
+    const LogOptions& log = scenario_.log();
+    const auto at = [](const std::vector<Variable>& variables, const std::string& name) {
+      return std::find_if(variables.begin(), variables.end(), [&](const Variable& v) { return v.name == name; }) -
+             variables.begin();
+    };
+    const auto sensor = [&](const char* kind, const std::vector<Variable>& variables, const std::vector<double>& sigmas,
+                            const std::vector<std::string>& names) {
+      std::vector<std::string> keys;
+      for (const std::string& name : names) keys.push_back(fmt::format("noise.{}.{}", kind, name));
+      const auto first = at(variables, names.front());
+      all_.push_back(scale_of(std::move(keys), sigmas[first], variables[first].unit, Doubts::factor));
+    };
+    const std::vector<double>& outputs = robot_.output_sigmas();
+    if (outputs[at(about().outputs, log.position[0])] == outputs[at(about().outputs, log.position[1])]) {
+      sensor("outputs", about().outputs, outputs, log.position);
+    } else {
+      for (const std::string& name : log.position) sensor("outputs", about().outputs, outputs, {name});
+    }
+    sensor("outputs", about().outputs, outputs, {log.steering});
+    sensor("inputs", about().inputs, robot_.input_sigmas(), {log.speed});
+    sensor("inputs", about().inputs, robot_.input_sigmas(), {log.steering_rate});
+  }
+
+  void add_estimator() {
+    const EstimatorOptions& options = robot_.estimator_options();
+    for (const Variable& parameter : about().parameters) {
+      if (options.name == "ekf") {
+        const Settings* given = options.process_noise.find(parameter.name);
+        const double start = given ? given->as_number() : ParameterWalk{}.process_noise;
+        if (start > 0.0)
+          all_.push_back(
+              scale_of({"estimator.process_noise." + parameter.name}, start, "per root of a step", Doubts::factor));
+        continue;
+      }
+      const Settings* prior = options.priors.find(parameter.name);
+      if (!prior || prior->kind() != Settings::Kind::map) continue;
+      for (const auto& [key, value] : prior->members()) {
+        if (!value.number() || !(*value.number() > 0.0) || key == "mean" || key == "mean_sigma") continue;
+        all_.push_back(scale_of({fmt::format("estimator.priors.{}.{}", parameter.name, key)}, *value.number(), "",
+                                key == "length" ? Doubts::length_factor : Doubts::factor));
+      }
+    }
+    if (const Settings* delta = options.robust.find("delta"))
+      all_.push_back(scale_of({"estimator.robust.delta"}, delta->as_number(), "sigma", Doubts::length_factor));
+  }
+
+  void add_log() {
+    const LogOptions& log = scenario_.log();
+    all_.push_back(offset_of("log.speed_bias", log.speed_bias, "m/s", Doubts::speed));
+    all_.push_back(offset_of("log.steering_bias", log.steering_bias, "rad", Doubts::angle));
+    all_.push_back(offset_of("log.fix_delay", log.fix_delay, "s", Doubts::delay));
+    all_.push_back(offset_of("log.steering_delay", log.steering_delay, "s", Doubts::delay));
+    if (scenario_.wheelbase() > 0.0)
+      all_.push_back(offset_of("log.wheel_offset", log.wheel_offset, "m", Doubts::length));
+  }
+
+  void add_model() {
+    const PluginChoice model = robot_.model_choice();
+    for (const OptionRow& row : host_.options(PluginKind::model, model.name)) {
+      // A number without a constraint has a sign.
+      if (row.type != "number" || !row.constraint.empty()) continue;
+      const Settings* given = model.options.find(row.name);
+      const double start = given ? given->as_number() : Settings::scalar(row.default_value).number().value_or(0.0);
+      all_.push_back(offset_of("model." + row.name, start, "m", Doubts::length));
+    }
+  }
+
+  const Host& host_;
+  const LogScenario& scenario_;
+  const Robot& robot_;
+  std::vector<Tunable> all_;
+};
+
+bool begins(const std::string& key, const std::string& with) {
+  return key == with || (key.starts_with(with) && key[with.size()] == '.');
+}
+
+bool is_meant(const Tunable& tunable, const std::string& wish) {
+  return std::any_of(tunable.keys.begin(), tunable.keys.end(), [&](const auto& key) { return begins(key, wish); });
+}
+
+/// A number that the settings name, of which nothing is known but what they say.
+Tunable asked_for(const Settings& settings, const std::string& key, std::optional<std::pair<double, double>> range,
+                  const std::string& where) {
+  const Settings* at = settings.find_path(key);
+  if (!at || !at->number() || !std::isfinite(*at->number()))
+    throw Error(
+        fmt::format("{}: the scenario has no number '{}'; write it there first, with a first guess", where, key));
+  const double start = *at->number();
+  Tunable tunable = start > 0.0 ? scale_of({key}, start, "", std::numbers::ln2)
+                                : offset_of(key, start, "", std::max(0.5 * std::abs(start), 1.0));
+  if (range) {
+    const auto [lower, upper] = *range;
+    if (!(lower < upper) || start < lower || start > upper)
+      throw Error(fmt::format("{}: found [{}, {}]; expected [lower, upper] about the scenario's {}", where, lower,
+                              upper, start));
+    if (lower <= 0.0) tunable.kind = Tunable::Kind::offset;
+    tunable.doubt = tunable.kind == Tunable::Kind::offset ? 0.25 * (upper - lower) : 0.25 * std::log(upper / lower);
+    tunable.lower = lower;
+    tunable.upper = upper;
+  }
+  return tunable;
+}
+
+}  // namespace
+
+double Tunable::value_at(double coordinate) const noexcept {
+  const double value = kind == Kind::scale ? start * std::exp(doubt * coordinate) : start + doubt * coordinate;
+  return is_whole ? std::round(value) : value;
+}
+
+double Tunable::coordinate_of(double value) const noexcept {
+  return (kind == Kind::scale ? std::log(value / start) : value - start) / doubt;
+}
+
+double Tunable::error_of(double coordinate_error, double value) const noexcept {
+  return doubt * coordinate_error * (kind == Kind::scale ? value : 1.0);
+}
+
+Settings with_values(Settings settings, const std::vector<Tunable>& tunables, const Eigen::VectorXd& at, int digits) {
+  for (std::size_t i = 0; i < tunables.size(); ++i) {
+    const double value = tunables[i].value_at(at[static_cast<Eigen::Index>(i)]);
+    for (const std::string& key : tunables[i].keys)
+      settings.set(key, Settings::scalar(fmt::format("{:.{}g}", value, digits)));
+  }
+  return settings;
+}
+
+std::vector<Tunable> tunables_of(const Host& host, const LogScenario& scenario, const TuningWishes& wishes) {
+  const Settings& settings = scenario.variants().front().settings;
+  std::vector<Tunable> all = Finder(host, scenario).find();
+  for (const std::string& wish : wishes.tune) {
+    const std::string where = "--tune " + wish, key = wish.substr(0, wish.find('='));
+    std::optional<std::pair<double, double>> range;
+    if (key.size() < wish.size()) {
+      const std::vector<double> ends = parse_yaml(wish.substr(key.size() + 1), where).as_numbers();
+      if (ends.size() != 2) throw Error(fmt::format("{}: expected KEY, or KEY=[lower, upper]", where));
+      range = {ends[0], ends[1]};
+    }
+    std::erase_if(all,
+                  [&](const Tunable& tunable) { return tunable.keys.size() == 1 && tunable.keys[0] == key && range; });
+    if (std::none_of(all.begin(), all.end(), [&](const Tunable& tunable) { return is_meant(tunable, key); }))
+      all.push_back(asked_for(settings, key, range, where));
+  }
+  for (const std::string& wish : wishes.keep) {
+    const std::size_t before = all.size();
+    std::erase_if(all, [&](const Tunable& tunable) { return is_meant(tunable, wish); });
+    if (all.size() == before) {
+      std::vector<std::string> keys;
+      for (const Tunable& tunable : all) keys.insert(keys.end(), tunable.keys.begin(), tunable.keys.end());
+      throw Error(fmt::format("--keep {}: nothing of that name would be tuned; expected the start of one of {}", wish,
+                              fmt::join(keys, ", ")));
+    }
+  }
+  return all;
+}
+
+std::vector<Tunable> controller_tunables(const Robot& robot, const Settings& settings) {
+  const ModelDescription& about = robot.model()->description();
+  std::vector<Tunable> all;
+  for (const std::string section : {"controller.weights.stage", "controller.weights.terminal"}) {
+    const Settings* weights = settings.find_path(section);
+    if (!weights) continue;
+    for (const auto* variables : {&about.states, &about.inputs}) {
+      // By value and unit.
+      std::vector<std::pair<const Variable*, double>> seen;
+      for (std::size_t j = 0; j < variables->size(); ++j) {
+        const Variable& variable = (*variables)[j];
+        const Settings* weight = weights->find(variable.name);
+        if (!weight || !(weight->as_number() > 0.0)) continue;
+        const int state = variables == &about.states ? static_cast<int>(j) : -1;
+        const bool is_position = state >= 0 && (state == about.roles.position_x || state == about.roles.position_y);
+        if (is_position && section.ends_with("stage")) continue;
+        const std::string key = section + "." + variable.name;
+        const double value = weight->as_number();
+        const auto same = std::find_if(seen.begin(), seen.end(), [&](const auto& other) {
+          return other.second == value && other.first->unit == variable.unit;
+        });
+        if (same == seen.end()) {
+          all.push_back(scale_of({key}, value, "", std::numbers::ln10));
+        } else {
+          Tunable& with = *(all.end() - (seen.end() - same));
+          with.keys.push_back(key);
+          with.name += ", " + variable.name;
+          continue;
+        }
+        seen.emplace_back(&variable, value);
+      }
+    }
+  }
+  if (all.empty())
+    throw settings.error("controller.weights: found no positive weight to tune; expected e.g. stage: {u2: 1}");
+  const Settings* horizon = settings.find_path("controller.horizon");
+  Tunable length = scale_of({"controller.horizon"}, horizon ? horizon->as_integer() : RhcProblem::Setup{}.max_intervals,
+                            "intervals", std::numbers::ln2);
+  length.is_whole = true;
+  length.lower = std::max(2.0, std::round(length.value_at(-1.0)));
+  length.upper = length.value_at(1.0);
+  all.push_back(length);
+  return all;
+}
+
+}  // namespace rhec::sim
