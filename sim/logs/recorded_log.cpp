@@ -354,6 +354,8 @@ LogScenario::LogScenario(const Host& host, const Settings& settings, const std::
     variants_.back().robot.make_estimator();  // reports errors before anything runs
   };
   if (base.variants.is_null()) {
+    if (!chosen.empty())
+      throw settings.error(fmt::format("the scenario has no variants, so none is called '{}'", chosen.front()));
     add(base.name, settings);
     return;
   }

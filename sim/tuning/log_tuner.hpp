@@ -62,6 +62,9 @@ class LogTuner {
   void try_laws(const Variable& parameter);
 
   // What that is worth.
+  std::vector<HoldOut> rests() const;
+  std::vector<double> errors_of(const Settings& settings, const HoldOut& rest) const;
+  void settle();
   int block_count() const;
   Precision precision_of(const Filter& filter, const Eigen::VectorXd& at) const;
   void find_precision();
@@ -93,6 +96,7 @@ class LogTuner {
   mutable std::mutex mutex_;  ///< of what follows
   mutable std::atomic<bool> stopped_ = false;
   mutable int evaluations_ = 0;
+  mutable std::vector<std::pair<double, Eigen::VectorXd>> tried_;  ///< by the search, and how likely they are
   std::string stage_;
   double start_value_ = 0.0, best_value_ = 0.0;
 };

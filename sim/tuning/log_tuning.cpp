@@ -80,6 +80,8 @@ LogTuning LogTuner::run() {
     begin("searching on");
     if (!stopped()) search(0.2);
   }
+  begin("settling");
+  settle();
   begin("precision");
   find_precision();
   take_values();
@@ -180,7 +182,10 @@ LogTuner::Terms LogTuner::terms_at(const Filter& filter, const Eigen::VectorXd& 
 double LogTuner::value_at(const Filter& filter, const Eigen::VectorXd& at) const {
   try {
     const double value = terms_at(filter, at).likelihood.total - 0.5 * at.squaredNorm();
-    return std::isfinite(value) ? value : start_value_ - hopeless;
+    if (!std::isfinite(value)) return start_value_ - hopeless;
+    const std::lock_guard lock(mutex_);
+    if (&filter == &filter_) tried_.emplace_back(value, at);
+    return value;
   } catch (const Error&) {  // the scenario at the start has been tried, and is fine
     return start_value_ - hopeless;
   }
@@ -270,6 +275,7 @@ void LogTuner::take(const Trial& trial) {
   for (const Settings::Member& section : trial.filter.settings.members())
     filter_.settings.set(section.first, section.second);
   filter_.tunables = tunables_of(host_, LogScenario(host_, filter_.settings), options_.wishes);
+  tried_.clear();
   at_ = Eigen::VectorXd::Zero(size());
   for (int i = 0; i < size(); ++i) {
     for (std::size_t j = 0; j < before.tunables.size(); ++j) {

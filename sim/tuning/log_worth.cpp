@@ -2,10 +2,12 @@
 // on.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
 #include "rhec/sim/logs/smoothing.hpp"
+#include "rhec/sim/numbers/random.hpp"
 
 #include "judgement.hpp"
 #include "log_tuner.hpp"
@@ -24,6 +26,15 @@ constexpr int fewest_blocks = 10, most_blocks = 60, fixes_of_a_block = 10;
 constexpr double block_seconds = 30.0;
 // Estimators are chosen by these many rests of so many, at least.
 constexpr int rests_tried = 2, fewest_rests = 4;
+// Roughness is looked for at so many points, this far away in the coordinates; and so many points are told apart.
+constexpr int looks_about = 15;
+constexpr double nearby = 0.01;
+constexpr std::size_t most_settled = 100;
+
+/// Half of it is how it is usually, half how it is where it is bad.
+double score_of(const std::vector<double>& errors) {
+  return std::log(median_of(errors)) + std::log(capped_rmse_of(errors));
+}
 
 }  // namespace
 
@@ -37,6 +48,67 @@ Precision LogTuner::precision_of(const Filter& filter, const Eigen::VectorXd& at
                        .blocks = block_count(),
                        .threads = options_.threads,
                        .stop = [this] { return stopped(); }});
+}
+
+/// Rests of the fixes that were tuned on, to be withheld in turn.
+std::vector<HoldOut> LogTuner::rests() const {
+  const int every = std::max(options_.hold_out.every, fewest_rests);
+  std::vector<HoldOut> rests;
+  for (int phase = 0; phase < every && std::ssize(rests) < rests_tried; ++phase)
+    if (every != options_.hold_out.every || phase != options_.hold_out.phase) rests.push_back({every, phase});
+  return rests;
+}
+
+/// Errors of the predictions of such a rest. Fixes that are to judge are masked.
+std::vector<double> LogTuner::errors_of(const Settings& settings, const HoldOut& rest) const {
+  const LogScenario scenario(host_, settings);
+  RecordedLog log = recorded_log(tables_, scenario);
+  for (std::size_t i = 0; i < log.fixes.size(); ++i)
+    if (options_.hold_out.holds(i)) log.fixes[i].x = log.fixes[i].y = std::nan("");
+  std::vector<double> errors;
+  for (const LoggedEstimate& entry : replay(scenario.variants().front().robot, log, scenario.log(), rest).estimates)
+    if (entry.held_out && counts_[static_cast<std::size_t>(entry.fix)] && !std::isnan(entry.residual))
+      errors.push_back(entry.residual);
+  return errors;
+}
+
+/// Where the likelihood is rough, many points are as likely as the best, which is so by chance. Of these the one is
+/// taken that predicts withheld fixes best.
+void LogTuner::settle() {
+  if (stopped() || tried_.empty()) return;
+  RandomStream random(2, "settling");
+  std::vector<Eigen::VectorXd> near(looks_about, at_);
+  for (Eigen::VectorXd& at : near)
+    for (double& coordinate : at) coordinate += nearby * random.normal();
+  const double best = terms_at(filter_, at_).likelihood.total;
+  std::vector<double> squares(near.size());
+  in_parallel(looks_about, options_.threads, [&](int i) {
+    const double difference = terms_at(filter_, near[i]).likelihood.total - best;
+    squares[i] = difference * difference;
+  });
+  // The median: a point beside it where the filter is lost for good is no measure.
+  const double roughness = std::sqrt(median_of(squares));
+  if (roughness < as_good) return;
+  std::vector<std::pair<double, Eigen::VectorXd>> points;
+  {
+    const std::lock_guard lock(mutex_);
+    points = tried_;
+  }
+  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  const double least = points.front().first - 2.0 * roughness;
+  const auto end = std::find_if(points.begin(), points.end(), [&](const auto& point) { return point.first < least; });
+  points.resize(std::min<std::size_t>(static_cast<std::size_t>(end - points.begin()), most_settled));
+  std::vector<double> scores(points.size(), std::numeric_limits<double>::infinity());
+  in_parallel(static_cast<int>(points.size()), options_.threads, [&](int i) {
+    if (stopped()) return;
+    std::vector<double> errors;
+    for (const HoldOut& rest : rests())
+      for (const double error : errors_of(with_values(filter_.settings, filter_.tunables, points[i].second), rest))
+        errors.push_back(error);
+    if (!errors.empty()) scores[i] = score_of(errors);
+  });
+  const auto chosen = std::min_element(scores.begin(), scores.end());
+  if (std::isfinite(*chosen)) at_ = points[static_cast<std::size_t>(chosen - scores.begin())].second;
 }
 
 void LogTuner::find_precision() {
@@ -123,25 +195,14 @@ void LogTuner::choose_estimator() {
     candidates.push_back({result_.filter + ", tuned", filter});
   }
   candidates.push_back({estimator_ + ", as it was", settings_});
-  // Fixes that judge are masked; of the others, those of two rests are withheld in turn.
-  const int every = std::max(options_.hold_out.every, fewest_rests);
-  std::vector<HoldOut> rests;
-  for (int phase = 0; phase < every && std::ssize(rests) < rests_tried; ++phase)
-    if (every != options_.hold_out.every || phase != options_.hold_out.phase) rests.push_back({every, phase});
+  const std::vector<HoldOut> withheld = rests();
   std::mutex mutex;
-  const auto count = static_cast<int>(candidates.size() * rests.size());
-  in_parallel(count, options_.threads, [&](int k) {
-    Candidate& candidate = candidates[static_cast<std::size_t>(k) / rests.size()];
-    const HoldOut& rest = rests[static_cast<std::size_t>(k) % rests.size()];
-    const LogScenario scenario(host_, candidate.settings);
-    RecordedLog log = recorded_log(tables_, scenario);
-    for (std::size_t i = 0; i < log.fixes.size(); ++i)
-      if (options_.hold_out.holds(i)) log.fixes[i].x = log.fixes[i].y = std::nan("");
-    const Replay replayed = replay(scenario.variants().front().robot, log, scenario.log(), rest);
+  in_parallel(static_cast<int>(candidates.size() * withheld.size()), options_.threads, [&](int k) {
+    Candidate& candidate = candidates[static_cast<std::size_t>(k) / withheld.size()];
+    const std::vector<double> errors =
+        errors_of(candidate.settings, withheld[static_cast<std::size_t>(k) % withheld.size()]);
     const std::lock_guard lock(mutex);
-    for (const LoggedEstimate& entry : replayed.estimates)
-      if (entry.held_out && counts_[static_cast<std::size_t>(entry.fix)] && !std::isnan(entry.residual))
-        candidate.errors.push_back(entry.residual);
+    candidate.errors.insert(candidate.errors.end(), errors.begin(), errors.end());
   });
   const Candidate* best = nullptr;
   double least = 0.0;
@@ -149,7 +210,7 @@ void LogTuner::choose_estimator() {
     if (candidate.errors.empty()) continue;
     const TriedEstimator tried{candidate.name, median_of(candidate.errors), capped_rmse_of(candidate.errors)};
     result_.estimators.push_back(tried);
-    const double score = std::log(tried.median) + std::log(tried.rmse);
+    const double score = score_of(candidate.errors);
     if (best && score >= least) continue;
     best = &candidate;
     least = score;
