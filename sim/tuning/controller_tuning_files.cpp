@@ -125,12 +125,12 @@ std::string pareto_svg(const ControllerTuning& tuning) {
   std::sort(front.begin(), front.end(), [](const auto& a, const auto& b) { return a.effort < b.effort; });
   std::vector<Point> line;
   for (const TriedController& tried : front) line.push_back(at(tried));
-  svg.dots(others, R"(stroke="#b8c0cc" stroke-width="4.5" stroke-linecap="round")");
-  svg.polyline(line, R"(fill="none" stroke="#2563c4" stroke-width="1.5")");
-  svg.dots(line, R"(stroke="#2563c4" stroke-width="6" stroke-linecap="round")");
+  svg.dots(others, R"(stroke="#b8c0cc" stroke-width="4.5")");
+  svg.polyline(line, R"(stroke="#2563c4" stroke-width="1.5")");
+  svg.dots(line, R"(stroke="#2563c4" stroke-width="6")");
   const Point own = at(tuning.tried.front()), chosen = at(tuning.tried[static_cast<std::size_t>(tuning.chosen)]);
-  svg.dots({&own, 1}, R"(stroke="#222222" stroke-width="9" stroke-linecap="round")");
-  if (tuning.chosen > 0) svg.dots({&chosen, 1}, R"(stroke="#d1341f" stroke-width="9" stroke-linecap="round")");
+  svg.dots({&own, 1}, R"(stroke="#222222" stroke-width="9")");
+  if (tuning.chosen > 0) svg.dots({&chosen, 1}, R"(stroke="#d1341f" stroke-width="9")");
   svg.rectangle({left, top}, inner_width, inner_height, R"(fill="none" stroke="#9aa0a6" stroke-width="1")");
   svg.text({left + 0.5 * inner_width, height - 14.0}, "root mean square change of the inputs, ratio",
            R"(font-size="12" fill="#222" text-anchor="middle")");

@@ -23,10 +23,19 @@ constexpr int columns = 4;
 constexpr const char* small_text = R"(font-size="11" fill="#5f6368")";
 constexpr const char* head_text = R"(font-size="12" font-weight="bold" fill="#222")";
 
-// A log likelihood this far below its maximum is the lower end of a panel.
-constexpr double deepest = 8.0;
+// A log likelihood this far below its maximum is the lower end of a panel, or farther where the likelihood is rough.
+constexpr double least_depth = 8.0;
+
+/// So deep that half of a slice's points are seen.
+double depth_of(const TunedNumber& number) {
+  std::vector<double> drops;
+  for (const auto& [value, drop] : number.slice) drops.push_back(-drop);
+  std::sort(drops.begin(), drops.end());
+  return drops.empty() ? least_depth : std::max(least_depth, 1.2 * drops[drops.size() / 2]);
+}
 
 void draw_slice(Svg& svg, const TunedNumber& number, Point corner, double panel_width) {
+  const double deepest = depth_of(number);
   const double left = corner.x, top = corner.y, bottom = top + panel_height;
   double lower = number.value, upper = number.value;
   for (const auto& [value, drop] : number.slice) {
@@ -34,7 +43,7 @@ void draw_slice(Svg& svg, const TunedNumber& number, Point corner, double panel_
     lower = std::min(lower, value);
     upper = std::max(upper, value);
   }
-  const bool shows_error = std::isfinite(number.error);
+  const bool shows_error = std::isfinite(number.error) && number.is_told && !number.is_at_bound;
   if (shows_error) {
     lower = std::min(lower, std::max(number.value - 2.0 * number.error, number.tunable.lower));
     upper = std::max(upper, std::min(number.value + 2.0 * number.error, number.tunable.upper));
@@ -50,6 +59,7 @@ void draw_slice(Svg& svg, const TunedNumber& number, Point corner, double panel_
   if (shows_error) line += fmt::format(" +- {:.2g}", number.error);
   if (!number.tunable.unit.empty()) line += " " + number.tunable.unit;
   line += fmt::format(", was {:.4g}", number.tunable.start);
+  if (deepest > least_depth) line += fmt::format("; height {:.0f}", deepest);
   if (!number.is_told) line += "; not told";
   if (number.is_at_bound) line += "; at its bound";
   svg.text({left, top - 6.0}, line, small_text);
@@ -62,8 +72,8 @@ void draw_slice(Svg& svg, const TunedNumber& number, Point corner, double panel_
   svg.line({x(number.value), top}, {x(number.value), bottom}, R"(stroke="#d1341f" stroke-width="1")");
   std::vector<Point> curve;
   for (const auto& [value, drop] : number.slice) curve.push_back({x(value), y(drop)});
-  svg.polyline(curve, R"(fill="none" stroke="#2563c4" stroke-width="1.6")");
-  svg.dots(curve, R"(stroke="#2563c4" stroke-width="4.5" stroke-linecap="round")");
+  svg.polyline(curve, R"(stroke="#2563c4" stroke-width="1.6")");
+  svg.dots(curve, R"(stroke="#2563c4" stroke-width="4.5")");
   svg.end_group();
   svg.rectangle({left, top}, panel_width, panel_height, R"(fill="none" stroke="#9aa0a6" stroke-width="1")");
   const Ticks ticks = nice_ticks(lower, upper, 4);
@@ -167,8 +177,8 @@ std::string tuning_svg(const LogTuning& tuning) {
   svg.text(
       {margin, 42.0},
       fmt::format("one number at a time, the others held; red: found, grey: its standard error with the others free, "
-                  "dashed: before; the height of a panel is {:g}",
-                  deepest),
+                  "dashed: before; a panel is {:g} high where it says nothing else",
+                  least_depth),
       small_text);
   for (int i = 0; i < count; ++i)
     draw_slice(

@@ -108,7 +108,15 @@ Precision precision_at(const LikelihoodTerms& terms, const Eigen::VectorXd& at, 
       width = next;
     }
   });
-  for (const Slice& slice : slices) result.roughness = std::max(result.roughness, slice.roughness);
+  // The median: where a filter is lost for good, one coordinate's slice leaves no scale.
+  std::vector<double> roughness;
+  for (const Slice& slice : slices)
+    if (slice.width > 0.0) roughness.push_back(slice.roughness);
+  if (!roughness.empty()) {
+    const auto middle = roughness.begin() + std::ssize(roughness) / 2;
+    std::nth_element(roughness.begin(), middle, roughness.end());
+    result.roughness = *middle;
+  }
   std::vector<std::pair<int, int>> pairs;
   for (int i = 0; i < n; ++i) {
     if (slices[i].width == 0.0) continue;

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import xml.etree.ElementTree
 
 from cli import CLEAN, ERROR, FIGURE8, FINE, NOT_SOLVED, ROOT, SHORT, USAGE, Findings, Program, assignments
 
@@ -33,7 +34,9 @@ def check_log(rhec, folder, findings):
         number = summary["numbers"][name]
         findings.expect(abs(number["after"] - truth) < 3.0 * number["standard_error"] and number["told"], name, number)
         findings.expect(name in done.stdout, f"{name} is not in the table", done.stdout)
-    findings.expect((folder / "out" / "tuning.svg").read_text().rstrip().endswith("</svg>"), "tuning.svg")
+    picture = xml.etree.ElementTree.parse(folder / "out" / "tuning.svg")  # throws where it is not well-formed
+    texts = [element.text for element in picture.iter() if element.tag.endswith("text")]
+    findings.expect(all(name in texts for name in TRUTH), "tuning.svg", texts)
     # The scenario that is written can be used, and predicts what the table says.
     judged = {figure["name"]: figure for figure in summary["judged"]}
     used = rhec("estimate", "out/tuned.yaml", *LOG, "--hold-out", "5", "--out", "used", cwd=folder)
@@ -96,6 +99,7 @@ def check_controller(rhec, folder, findings):
         findings.expect(float(tried[0]["tracking_ratio"]) == 1.0, "the first is the scenario's", tried[0])
         chosen = next(row for row in tried if row["chosen"] == "1")
         findings.expect(float(chosen["tracking_ratio"]) < 1.0 and float(chosen["effort_ratio"]) <= 2.0, "chosen", chosen)
+        xml.etree.ElementTree.parse(folder / "controller" / "pareto.svg")
         used = rhec("run", folder / "controller" / "tuned.yaml", "--out", folder / "driven")
         findings.expect(used.returncode == FINE, "run with tuned.yaml", used.stderr)
     done = rhec("tune", FIGURE8, "--controller", "--case", "speeed=4", "--out", folder / "mistake")

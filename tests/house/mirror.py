@@ -43,7 +43,7 @@ UNTESTED = {
     "apps/report/svg_engine.cpp": "tests/report/figures.py: each figure of each kind of report",
     "apps/run.cpp": "tests/cli/runs.py: every choice of a scenario, and what a run leaves behind",
     "apps/solve.cpp": "tests/cli/dump.py: problems that were saved are solved again; tests/cli/bad_input.py has mistakes",
-    "apps/stop_request.cpp": "tests/cli/tune.py and tests/cli/sweep.py: a command that is stopped",
+    "apps/stop_request.cpp": "tests/cli/tune.py: a command that is stopped",
     "apps/sweep_ranks.cpp": "tests/cli/sweep_mpi.py: sweeps under mpirun, and of a build without MPI",
     "sim/comparison/bench.cpp": "tests/sim/comparison/comparison_test.cpp: every answer is of a bench; refusals, too",
     "sim/problems/problem_dump.cpp": "tests/cli/dump.py: what a loop saves, attempts and failures, and its replay",

@@ -135,6 +135,41 @@ TEST_F(RecordedLogTest, NamesFileLineAndWhatIsWrong) {
               HasSubstr("none.txt: cannot be read"));
 }
 
+TEST_F(RecordedLogTest, TakesErrorsOfTheDeadReckoningOut) {
+  std::string text = scenario_text;
+  text.replace(text.find("wheel_offset: 0.5"), std::string("wheel_offset: 0.5").size(),
+               "speed_bias: 0.5, speed_scale: 2, steering_bias: 0.1, steering_scale: 0.5, fix_delay: 0.25");
+  const RecordedLog drive = log(scenario_of(text), "0,1.5,0.3\n1,2.5,-0.1\n2,2.5,nan\n", "0.5,1,2\n1.5,3,4\n");
+  EXPECT_DOUBLE_EQ(drive.rows[0].speed, 2.0);
+  EXPECT_DOUBLE_EQ(drive.rows[1].speed, 4.0);
+  EXPECT_DOUBLE_EQ(drive.rows[0].steering, 0.1);
+  EXPECT_DOUBLE_EQ(drive.rows[1].steering, -0.1);
+  EXPECT_TRUE(std::isnan(drive.rows[2].steering));
+  EXPECT_DOUBLE_EQ(drive.fixes[0].time, 0.25);
+}
+
+TEST_F(RecordedLogTest, PutsReadingsThatAreLateWhereTheyBelong) {
+  const auto drive_with = [&](const char* delay) {
+    std::string text = scenario_text;
+    text.replace(text.find("wheel_offset: 0.5"), std::string("wheel_offset: 0.5").size(),
+                 std::string("steering_delay: ") + delay);
+    // Both readings grow by one a second: 10 + t and t.
+    return log(scenario_of(text), "0,10,0\n1,11,1\n2,12,2\n3,13,3\n", "0.5,1,2\n1.5,3,4\n");
+  };
+  for (const char* delay : {"0.25", "-0.25"}) {
+    const RecordedLog drive = drive_with(delay);
+    const bool steering_is_late = delay[0] != '-';
+    for (std::size_t i = 1; i < 4; ++i) {
+      const double stamp = static_cast<double>(i);
+      EXPECT_DOUBLE_EQ(drive.rows[i].time, stamp - 0.25) << delay;
+      EXPECT_DOUBLE_EQ(drive.rows[i].stamp, stamp - 0.25) << delay;
+      EXPECT_DOUBLE_EQ(drive.rows[i].steering, steering_is_late ? stamp : stamp - 0.25) << delay;
+      EXPECT_DOUBLE_EQ(drive.rows[i].speed, 10.0 + (steering_is_late ? stamp - 0.25 : stamp)) << delay;
+    }
+    EXPECT_TRUE(std::isnan(steering_is_late ? drive.rows[0].speed : drive.rows[0].steering)) << delay;
+  }
+}
+
 TEST(LogScenario, RefusesWhatDoesNotFit) {
   const auto message = [](const std::string& from, const std::string& to) {
     std::string text = scenario_text;
@@ -150,6 +185,9 @@ TEST(LogScenario, RefusesWhatDoesNotFit) {
   EXPECT_THAT(message("rhe: {}", "rhe: {log: {}}"), HasSubstr("shared by all variants"));
   EXPECT_THAT(error_of([] { scenario_of(scenario_text, {"best"}); }),
               AllOf(HasSubstr("'best'"), HasSubstr("rhe, robust, ekf")));
+  const std::string whole = scenario_text;
+  EXPECT_THAT(error_of([&] { scenario_of(whole.substr(0, whole.find("variants:")), {"rhe"}); }),
+              HasSubstr("no variants"));
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ struct Precision {
   Eigen::MatrixXd covariance;      ///< of the coordinates, robust: see below
   Eigen::VectorXd hessian_errors;  ///< standard errors by the inverse Hessian alone
   Eigen::VectorXd widths;          ///< over which differences were taken; 0 for those that are not free
-  /// Root mean square distance of the log likelihood from its parabolas, the largest of all coordinates: where a filter
+  /// Root mean square distance of the log likelihood from its parabolas, the median of all coordinates: where a filter
   /// finds its way again or not by chance, smaller differences mean nothing.
   double roughness = 0.0;
   double error(int coordinate) const noexcept;
