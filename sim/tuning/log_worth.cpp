@@ -30,6 +30,8 @@ constexpr int rests_tried = 2, fewest_rests = 4;
 constexpr int looks_about = 15;
 constexpr double nearby = 0.01;
 constexpr std::size_t most_settled = 100;
+// Another estimator than the scenario's must have errors that are smaller by so much, relative to each other.
+constexpr double clearly_better = 0.02;
 
 /// Half of it is how it is usually, half how it is where it is bad.
 double score_of(const std::vector<double>& errors) {
@@ -211,7 +213,7 @@ void LogTuner::choose_estimator() {
     const TriedEstimator tried{candidate.name, median_of(candidate.errors), capped_rmse_of(candidate.errors)};
     result_.estimators.push_back(tried);
     const double score = score_of(candidate.errors);
-    if (best && score >= least) continue;
+    if (best && score > least - clearly_better) continue;
     best = &candidate;
     least = score;
   }
