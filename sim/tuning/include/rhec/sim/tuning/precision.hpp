@@ -24,8 +24,8 @@ struct Precision {
   /// Root mean square distance of the log likelihood from its parabolas, the median of all coordinates: where a filter
   /// finds its way again or not by chance, smaller differences mean nothing.
   double roughness = 0.0;
-  double error(int coordinate) const noexcept;
-  double correlation(int a, int b) const noexcept;
+  RHEC_EXPORT double error(int coordinate) const noexcept;
+  RHEC_EXPORT double correlation(int a, int b) const noexcept;
 };
 
 struct PrecisionOptions {
