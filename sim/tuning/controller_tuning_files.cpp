@@ -124,6 +124,7 @@ std::string pareto_svg(const ControllerTuning& tuning) {
   }
   std::sort(front.begin(), front.end(), [](const auto& a, const auto& b) { return a.effort < b.effort; });
   std::vector<Point> line;
+  line.reserve(front.size());
   for (const TriedController& tried : front) line.push_back(at(tried));
   svg.dots(others, R"(stroke="#b8c0cc" stroke-width="4.5")");
   svg.polyline(line, R"(stroke="#2563c4" stroke-width="1.5")");

@@ -180,11 +180,12 @@ std::string tuning_svg(const LogTuning& tuning) {
                   "dashed: before; a panel is {:g} high where it says nothing else",
                   least_depth),
       small_text);
-  for (int i = 0; i < count; ++i)
-    draw_slice(
-        svg, tuning.numbers[static_cast<std::size_t>(i)],
-        {margin + (i % columns) * (panel_width + 0.5 * gap), head + 24.0 + (i / columns) * (panel_height + gap + 22.0)},
-        panel_width);
+  for (int i = 0; i < count; ++i) {
+    const int row = i / columns, column = i % columns;
+    draw_slice(svg, tuning.numbers[static_cast<std::size_t>(i)],
+               {margin + column * (panel_width + 0.5 * gap), head + 24.0 + row * (panel_height + gap + 22.0)},
+               panel_width);
+  }
   return svg.document();
 }
 

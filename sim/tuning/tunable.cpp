@@ -26,23 +26,27 @@ struct Doubts {
 // The search keeps to this many doubts about its start.
 constexpr double widest = 3.0;
 
-Tunable scale_of(std::vector<std::string> keys, double start, std::string unit, double doubt) {
-  Tunable tunable{
-      .name = keys.front(), .keys = std::move(keys), .unit = std::move(unit), .start = start, .doubt = doubt};
-  for (std::size_t i = 1; i < tunable.keys.size(); ++i)
-    tunable.name += ", " + tunable.keys[i].substr(tunable.keys[i].rfind('.') + 1);
+Tunable scale_of(const std::vector<std::string>& keys, double start, const std::string& unit, double doubt) {
+  Tunable tunable;
+  tunable.keys = keys;
+  tunable.unit = unit;
+  tunable.start = start;
+  tunable.doubt = doubt;
+  for (const std::string& key : keys)
+    tunable.name += tunable.name.empty() ? key : ", " + key.substr(key.rfind('.') + 1);
   tunable.lower = tunable.value_at(-widest);
   tunable.upper = tunable.value_at(widest);
   return tunable;
 }
 
-Tunable offset_of(std::string key, double start, std::string unit, double doubt) {
-  Tunable tunable{.name = key,
-                  .keys = {std::move(key)},
-                  .unit = std::move(unit),
-                  .kind = Tunable::Kind::offset,
-                  .start = start,
-                  .doubt = doubt};
+Tunable offset_of(const std::string& key, double start, const std::string& unit, double doubt) {
+  Tunable tunable;
+  tunable.name = key;
+  tunable.keys = {key};
+  tunable.unit = unit;
+  tunable.kind = Tunable::Kind::offset;
+  tunable.start = start;
+  tunable.doubt = doubt;
   tunable.lower = tunable.value_at(-widest);
   tunable.upper = tunable.value_at(widest);
   return tunable;
@@ -74,9 +78,10 @@ class Finder {
     const auto sensor = [&](const char* kind, const std::vector<Variable>& variables, const std::vector<double>& sigmas,
                             const std::vector<std::string>& names) {
       std::vector<std::string> keys;
+      keys.reserve(names.size());
       for (const std::string& name : names) keys.push_back(fmt::format("noise.{}.{}", kind, name));
       const auto first = at(variables, names.front());
-      all_.push_back(scale_of(std::move(keys), sigmas[first], variables[first].unit, Doubts::factor));
+      all_.push_back(scale_of(keys, sigmas[first], variables[first].unit, Doubts::factor));
     };
     const std::vector<double>& outputs = robot_.output_sigmas();
     if (outputs[at(about().outputs, log.position[0])] == outputs[at(about().outputs, log.position[1])]) {
