@@ -3,8 +3,7 @@
 #include <concepts>
 #include <utility>
 
-/// For functions and lambdas that must always be inlined.
-#define RHEC_INLINE __attribute__((always_inline))
+#include "rhec/core/base/unrolled.hpp"
 
 namespace rhec {
 
@@ -16,17 +15,7 @@ inline constexpr int longest_triangle = 91;
 /// Array length for `size` entries; at least 1, since `size` may be 0.
 constexpr int room_for(int size) { return size > 0 ? size : 1; }
 
-/// Calls function(0), ..., function(count - 1) with compile-time indices. No loop remains, so the compiler keeps what
-/// it knows of single entries (e.g. that a derivative is always 0 or 1).
-template <int count, class Function>
-RHEC_INLINE constexpr void for_indices(const Function& function) {
-  [&]<int... index>(std::integer_sequence<int, index...>) RHEC_INLINE {
-    (function(std::integral_constant<int, index>()), ...);
-  }
-  (std::make_integer_sequence<int, count>());
-}
-
-/// The same, but a loop if `count` is large.
+/// As for_indices, but a loop if `count` is large.
 template <int count, class Function>
 RHEC_INLINE constexpr void for_each_index(const Function& function) {
   if constexpr (count <= longest_list) {

@@ -1,76 +1,9 @@
 #pragma once
 
-// Packs of doubles for SIMD across stages. Included only by translation units that are compiled for one instruction set
-// (rhec_add_model_kernels in CMake generates them), each of which defines its own RHEC_PACK_NAMESPACE. xsimd has
-// helpers that are neither templates nor tied to an instruction set. Of several compiled copies the linker would keep
-// one for all units, and a machine without its instructions would crash. So each unit renames xsimd.
+// What a unit of a model's kernels for one instruction set includes (rhec_add_model_kernels in CMake generates it): packs
+// first, since they rename xsimd.
 
-#if defined(RHEC_PACK_NAMESPACE)
-#define xsimd RHEC_PACK_NAMESPACE
-#endif
-
-#include <utility>
-#include <xsimd/xsimd.hpp>
+#include "rhec/core/packs/pack.hpp"
 
 #include "rhec/core/model/kernel_tables.hpp"
-#include "rhec/core/model/pack_functions.hpp"
-
-namespace rhec {
-
-/// The doubles of one register. Arithmetic is the compiler's own on vector types: a kernel has thousands of operations,
-/// and through xsimd's layers of functions it takes twice as long to compile. Elementary functions are xsimd's.
-template <class Arch>
-struct Pack {
-  using Batch = xsimd::batch<double, Arch>;
-  using Register = typename Batch::register_type;
-  static constexpr int width = static_cast<int>(Batch::size);
-  using InMemory [[gnu::aligned(sizeof(double)), gnu::may_alias]] = Register;  ///< at any address of a double
-  Register values;
-
-  Pack() = default;
-  RHEC_INLINE Pack(Register given) : values(given) {}             // NOLINT(google-explicit-constructor)
-  RHEC_INLINE Pack(const Batch& given) : values(given) {}         // NOLINT(google-explicit-constructor)
-  RHEC_INLINE Pack(double value) : values(value - Register{}) {}  // NOLINT(google-explicit-constructor)
-  RHEC_INLINE static Pack load(const double* from) { return *reinterpret_cast<const InMemory*>(from); }
-  RHEC_INLINE void store(double* to) const { *reinterpret_cast<InMemory*>(to) = values; }
-
-  RHEC_INLINE friend Pack operator+(Pack a, Pack b) { return a.values + b.values; }
-  RHEC_INLINE friend Pack operator-(Pack a, Pack b) { return a.values - b.values; }
-  RHEC_INLINE friend Pack operator*(Pack a, Pack b) { return a.values * b.values; }
-  RHEC_INLINE friend Pack operator/(Pack a, Pack b) { return a.values / b.values; }
-  RHEC_INLINE friend Pack operator-(Pack a) { return -Batch(a.values); }
-  RHEC_INLINE friend Pack& operator+=(Pack& a, Pack b) { return a = a + b; }
-  RHEC_INLINE friend Pack& operator-=(Pack& a, Pack b) { return a = a - b; }
-  RHEC_INLINE friend Pack& operator*=(Pack& a, Pack b) { return a = a * b; }
-  RHEC_INLINE friend Pack& operator/=(Pack& a, Pack b) { return a = a / b; }
-
-  RHEC_INLINE friend std::pair<Pack, Pack> sincos(Pack angle) {
-    const auto [sine, cosine] = pack_functions::sine_cosine(Batch(angle.values));
-    return {sine, cosine};
-  }
-  RHEC_INLINE friend Pack sin(Pack angle) { return sincos(angle).first; }
-  RHEC_INLINE friend Pack cos(Pack angle) { return sincos(angle).second; }
-  RHEC_INLINE friend Pack tan(Pack angle) {
-    const auto [sine, cosine] = sincos(angle);
-    return sine / cosine;
-  }
-  RHEC_INLINE friend Pack sqrt(Pack a) { return xsimd::sqrt(Batch(a.values)); }
-  RHEC_INLINE friend Pack exp(Pack a) { return xsimd::exp(Batch(a.values)); }
-  RHEC_INLINE friend Pack log(Pack a) { return xsimd::log(Batch(a.values)); }
-  RHEC_INLINE friend Pack tanh(Pack a) { return xsimd::tanh(Batch(a.values)); }
-  RHEC_INLINE friend Pack asin(Pack a) { return xsimd::asin(Batch(a.values)); }
-  RHEC_INLINE friend Pack acos(Pack a) { return xsimd::acos(Batch(a.values)); }
-  RHEC_INLINE friend Pack atan(Pack a) { return xsimd::atan(Batch(a.values)); }
-  RHEC_INLINE friend Pack atan2(Pack y, Pack x) { return xsimd::atan2(Batch(y.values), Batch(x.values)); }
-};
-
-/// The widest pack of the instruction set for which this unit is compiled.
-#if defined(__AVX512F__)
-using WidestPack = Pack<xsimd::avx512dq>;
-#elif defined(__AVX2__)
-using WidestPack = Pack<xsimd::fma3<xsimd::avx2> >;
-#endif
-
-}  // namespace rhec
-
 #include "rhec/core/model/pack_lanes.hpp"

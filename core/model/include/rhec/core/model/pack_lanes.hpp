@@ -9,40 +9,7 @@
 
 namespace rhec {
 
-#if defined(__AVX2__)
-/// Transposes four packs of four, taken as a matrix.
-RHEC_INLINE inline void transpose(Pack<xsimd::fma3<xsimd::avx2>>* a) {
-  const __m256d low01 = _mm256_unpacklo_pd(a[0].values, a[1].values),
-                high01 = _mm256_unpackhi_pd(a[0].values, a[1].values);
-  const __m256d low23 = _mm256_unpacklo_pd(a[2].values, a[3].values),
-                high23 = _mm256_unpackhi_pd(a[2].values, a[3].values);
-  a[0] = _mm256_permute2f128_pd(low01, low23, 0x20);
-  a[1] = _mm256_permute2f128_pd(high01, high23, 0x20);
-  a[2] = _mm256_permute2f128_pd(low01, low23, 0x31);
-  a[3] = _mm256_permute2f128_pd(high01, high23, 0x31);
-}
-#endif
-
 #if defined(__AVX512F__)
-/// Transposes eight packs of eight, taken as a matrix: pairs of columns, then quarters of the pack, then its halves.
-RHEC_INLINE inline void transpose(Pack<xsimd::avx512dq>* a) {
-  __m512d pairs[8], quads[8];
-  for (int i = 0; i < 8; i += 2) {
-    pairs[i] = _mm512_unpacklo_pd(a[i].values, a[i + 1].values);
-    pairs[i + 1] = _mm512_unpackhi_pd(a[i].values, a[i + 1].values);
-  }
-  for (int i = 0; i < 8; i += 4) {
-    for (int j = 0; j < 2; ++j) {
-      quads[i + j] = _mm512_shuffle_f64x2(pairs[i + j], pairs[i + j + 2], 0x88);      // columns 0, 4 (1, 5)
-      quads[i + j + 2] = _mm512_shuffle_f64x2(pairs[i + j], pairs[i + j + 2], 0xdd);  // columns 2, 6 (3, 7)
-    }
-  }
-  for (int j = 0; j < 4; ++j) {
-    a[j] = _mm512_shuffle_f64x2(quads[j], quads[j + 4], 0x88);
-    a[j + 4] = _mm512_shuffle_f64x2(quads[j], quads[j + 4], 0xdd);
-  }
-}
-
 /// Transposes four packs of eight and four of zeros, taken as a matrix.
 RHEC_INLINE inline void transpose_half(Pack<xsimd::avx512dq>* a) {
   // Rows 0, 2, 4, 6 and rows 1, 3, 5, 7, the first two columns and the others.

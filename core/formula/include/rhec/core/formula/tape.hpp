@@ -1,0 +1,122 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/formula/graph.hpp"
+
+namespace rhec {
+
+/// What an instruction of a tape computes. The letters are its operands: r a register, u a uniform.
+enum class TapeCode : std::uint32_t {
+  fill,  ///< u
+  add_rr,
+  add_ru,
+  subtract_rr,
+  subtract_ur,
+  multiply_rr,
+  multiply_ru,
+  negate,
+  reciprocal,
+  power,  ///< r to the integer b
+  square_root,
+  exponential,
+  logarithm,
+  sine,
+  cosine,
+  sine_cosine,  ///< to `out` and to register b
+  tangent,
+  arc_sine,
+  arc_cosine,
+  arc_tangent,
+  arc_tangent_2,
+  hyperbolic_tangent,
+  multiply_add_rrr,  ///< a b + c
+  multiply_add_rur,
+  multiply_add_rru,
+  multiply_add_ruu,
+  multiply_subtract_rrr,  ///< a b - c
+  multiply_subtract_rur,
+  subtract_product_rrr,  ///< c - a b
+  subtract_product_rru,
+  count
+};
+
+/// Result and operands of an instruction: numbers of registers or of uniforms.
+struct TapeOperands {
+  std::uint32_t out = 0, a = 0, b = 0, c = 0;
+};
+
+/// Instructions of one kind that follow each other: the interpreter decides once for all of them.
+struct TapeRun {
+  TapeCode code;
+  std::uint32_t length;
+};
+
+/// How a tape is run on one instruction set. A register is an array of `lanes` doubles, one for each row (stage) that is
+/// evaluated; lanes is 8, 16 or 32. Registers are aligned to 64 bytes. Rows beyond `count` repeat the last one.
+struct TapeKernels {
+  const char* name;
+  void (*run)(std::span<const TapeRun> runs, const TapeOperands* operands, const double* uniforms, double* registers,
+              int lanes);
+  /// Columns 0, 1, ... of rows that are padded to multiples of eight become registers 0, 1, ...
+  void (*load_rows)(const double* rows, std::ptrdiff_t step, int count, int columns, double* registers, int lanes);
+  /// Eight columns of rows, each a register or (~source) a uniform.
+  void (*store_eight)(const int* sources, const double* uniforms, const double* registers, int lanes, double* rows,
+                      std::ptrdiff_t step, int count);
+};
+
+/// Those that this machine can run, slowest first.
+RHEC_EXPORT std::span<const TapeKernels* const> runnable_tape_kernels() noexcept;
+/// The number of lanes for the next of `count` rows: few are left empty.
+constexpr int lanes_for(int count) { return count <= 8 ? 8 : count <= 24 ? 16 : 32; }
+
+/// A graph as a linear program: operations in an order in which many of a kind follow each other, products fused with
+/// sums, and registers given anew once a value is no longer needed. What depends on constants and on known inputs alone
+/// is computed once, when the tape is made: a uniform.
+class RHEC_EXPORT Tape {
+ public:
+  /// An input whose value is known.
+  struct Known {
+    int node;
+    double value;
+  };
+
+  Tape() = default;
+  /// `inputs` become registers 0, 1, ...; throws Error if another input is needed.
+  Tape(const Graph& graph, std::span<const int> inputs, std::span<const int> results,
+       std::span<const Known> known = {});
+
+  /// Where the results are: a register or (~source) a uniform.
+  const std::vector<int>& results() const noexcept { return results_; }
+  const std::vector<double>& uniforms() const noexcept { return uniforms_; }
+  /// The source of zeros.
+  static constexpr int zero = ~0;
+  int register_count() const noexcept { return register_count_; }
+  int instruction_count() const noexcept { return static_cast<int>(operands_.size()); }
+  int run_count() const noexcept { return static_cast<int>(runs_.size()); }
+  /// Number of doubles of scratch for its registers.
+  std::size_t scratch(int lanes) const noexcept { return static_cast<std::size_t>(register_count_) * lanes; }
+
+  void run(const TapeKernels& kernels, double* registers, int lanes) const noexcept {
+    kernels.run(runs_, operands_.data(), uniforms_.data(), registers, lanes);
+  }
+  /// Value of a result in one lane.
+  double result(std::size_t which, const double* registers, int lanes, int lane) const noexcept {
+    const int source = results_[which];
+    return source >= 0 ? registers[static_cast<std::ptrdiff_t>(source) * lanes + lane]
+                       : uniforms_[static_cast<std::size_t>(~source)];
+  }
+
+ private:
+  std::vector<TapeRun> runs_;
+  std::vector<TapeOperands> operands_;
+  std::vector<double> uniforms_{0.0};
+  std::vector<int> results_;
+  int register_count_ = 0;
+};
+
+}  // namespace rhec
