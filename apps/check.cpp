@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/plugins/equations/equations.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/check/model_check.hpp"
@@ -32,6 +33,11 @@ struct CheckArguments {
 
 bool is_file(const std::string& name) {
   return name.ends_with(".yaml") || name.ends_with(".yml") || name.find('/') != std::string::npos;
+}
+
+/// A vehicle's equations are a file, too, but no scenario.
+bool is_vehicle(const std::string& name) {
+  return is_equations_file(name) && load_yaml(name).find("equations") != nullptr;
 }
 
 /// A robot with nothing but its model configured.
@@ -121,8 +127,8 @@ int check(const CheckArguments& arguments) {
   sim::ModelCheckOptions options;
   options.seed = static_cast<std::uint64_t>(arguments.seed);
   options.speed = arguments.speed;
-  const RobotOptions robot =
-      is_file(arguments.model) ? robot_of_scenario(arguments, options.speed) : robot_of_model(arguments);
+  const bool is_scenario = is_file(arguments.model) && !is_vehicle(arguments.model);
+  const RobotOptions robot = is_scenario ? robot_of_scenario(arguments, options.speed) : robot_of_model(arguments);
   const sim::ModelCheck found = sim::check_model(host, Robot(host, robot, sim::scenario_estimators()), options);
   if (arguments.json) {
     fmt::print("{}\n", sim::check_json(found));
@@ -145,13 +151,14 @@ void add_check(Program& program) {
       "Examples:\n"
       "  rhec check bicycle_slip\n"
       "  rhec check bicycle_slip --set wheelbase=2.8 --set gps_offset=0\n"
+      "  rhec check my_vehicle.yaml\n"
       "  rhec check scenarios/figure8.yaml --set bounds.delta='[-1.5, 1.5]'\n"
       "  rhec check my_model --plugin-path build/my_model --json",
       [arguments] { return check(*arguments); });
   command
       .add("model", arguments->model,
-           "a model plugin, or a scenario (*.yaml), whose model is looked at with its noise, bounds, step, "
-           "horizon and blocking")
+           "a model plugin, a vehicle's equations (*.yaml), or a scenario (*.yaml), whose model is looked at with its "
+           "noise, bounds, step, horizon and blocking")
       .value("MODEL")
       .required();
   add_assignments(command, arguments->assignments, "an option of the model, or a key of the scenario");

@@ -16,6 +16,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
 #include "rhec/core/model/model.hpp"
+#include "rhec/plugins/equations/equations.hpp"
 #include "rhec/sim/files/json.hpp"
 
 namespace rhec::apps {
@@ -128,6 +129,19 @@ void add_variables(const ModelDescription& about, sim::Json& all) {
   }
 }
 
+void print_options(const std::vector<OptionRow>& options) {
+  if (options.empty()) {
+    fmt::print("\nIt has no options.\n");
+    return;
+  }
+  Table table{{"OPTION", "TYPE", "DEFAULT", "VALUES", "MEANING"}};
+  for (const OptionRow& option : options)
+    table.push_back(
+        {option.name, option.type, or_dash(option.default_value), or_dash(option.constraint), option.meaning});
+  fmt::print("\n");
+  print_table(table, "");
+}
+
 void describe(const Host& host, const PluginRecord& plugin) {
   Table about{{"kind", std::string(word_of(plugin.kind))},
               {"name", plugin.name},
@@ -139,17 +153,40 @@ void describe(const Host& host, const PluginRecord& plugin) {
               {"path", plugin.path.string()}};
   print_table(about, "");
   if (plugin.kind == PluginKind::model) print_variables(model_with_all_outputs(host, plugin.name)->description());
-  const std::vector<OptionRow> options = host.options(plugin.kind, plugin.name);
-  if (options.empty()) {
-    fmt::print("\nIt has no options.\n");
-    return;
-  }
-  Table table{{"OPTION", "TYPE", "DEFAULT", "VALUES", "MEANING"}};
+  print_options(host.options(plugin.kind, plugin.name));
+}
+
+/// A vehicle whose equations are a file.
+void describe_vehicle(const Host& host, const std::string& file) {
+  const std::shared_ptr<Model> model = model_with_all_outputs(host, file);
+  const ModelDescription& about = model->description();
+  print_table({{"kind", "model, of equations"},
+               {"name", about.name},
+               {"source", or_dash(about.source)},
+               {"evaluated", "by the interpreter, " + model->instruction_sets().back()},
+               {"path", file}},
+              "");
+  print_variables(about);
+  print_options(host.options(PluginKind::model, file));
+}
+
+void add_options(const std::vector<OptionRow>& options, sim::Json& all) {
+  all["options"] = sim::Json::array();
   for (const OptionRow& option : options)
-    table.push_back(
-        {option.name, option.type, or_dash(option.default_value), or_dash(option.constraint), option.meaning});
-  fmt::print("\n");
-  print_table(table, "");
+    all["options"].push_back({{"name", option.name},
+                              {"type", option.type},
+                              {"default", option.default_value},
+                              {"constraint", option.constraint},
+                              {"meaning", option.meaning}});
+}
+
+sim::Json vehicle_json(const Host& host, const std::string& file) {
+  const std::shared_ptr<Model> model = model_with_all_outputs(host, file);
+  const ModelDescription& about = model->description();
+  sim::Json all{{"kind", "model"}, {"name", about.name}, {"source", about.source}, {"path", file}};
+  add_options(host.options(PluginKind::model, file), all);
+  add_variables(about, all);
+  return all;
 }
 
 sim::Json as_json(const Host& host, const PluginRecord& plugin) {
@@ -164,13 +201,7 @@ sim::Json as_json(const Host& host, const PluginRecord& plugin) {
   all["backend_version"] = plugin.backend_version;
   all["capabilities"] = plugin.capabilities;
   all["path"] = plugin.path.string();
-  all["options"] = sim::Json::array();
-  for (const OptionRow& option : host.options(plugin.kind, plugin.name))
-    all["options"].push_back({{"name", option.name},
-                              {"type", option.type},
-                              {"default", option.default_value},
-                              {"constraint", option.constraint},
-                              {"meaning", option.meaning}});
+  add_options(host.options(plugin.kind, plugin.name), all);
   if (plugin.kind == PluginKind::model) add_variables(model_with_all_outputs(host, plugin.name)->description(), all);
   return all;
 }
@@ -192,6 +223,16 @@ std::vector<PluginRecord> named(const Host& host, const std::string& name) {
 int show(const PluginsArguments& arguments) {
   const Host host(arguments.plugin_path);
   if (arguments.doctor) return examine_plugins(host, arguments.name, arguments.json);
+  if (is_equations_file(arguments.name)) {
+    if (arguments.json) {
+      auto all = sim::Json::array();
+      all.push_back(vehicle_json(host, arguments.name));
+      fmt::print("{}\n", all.dump(2));
+    } else {
+      describe_vehicle(host, arguments.name);
+    }
+    return exit_fine;
+  }
   const std::vector<PluginRecord> wanted = arguments.name.empty() ? host.discover() : named(host, arguments.name);
   if (arguments.json) {
     auto all = sim::Json::array();
@@ -217,12 +258,14 @@ void add_plugins(Program& program) {
                   "Examples:\n"
                   "  rhec plugins\n"
                   "  rhec plugins gn_rti\n"
+                  "  rhec plugins my_vehicle.yaml       a vehicle's equations\n"
                   "  rhec plugins --doctor              why each file was or was not accepted\n"
                   "  rhec plugins --json --plugin-path my/plugins",
                   [arguments] { return show(*arguments); });
   command
       .add("name", arguments->name,
-           "show this plugin, its options, and what a model has; a plugin or a file with --doctor")
+           "show this plugin, its options, and what a model has; or a vehicle's equations (*.yaml); a plugin or a file "
+           "with --doctor")
       .value("NAME");
   command.add_flag("--json", arguments->json, "print JSON, options included");
   command.add_flag("--doctor", arguments->doctor,

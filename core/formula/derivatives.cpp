@@ -104,8 +104,7 @@ class Differentiation {
       if (is_variable_[node] || !depends_[node]) continue;
       const Graph::Node of = graph_[node];
       const auto add = [&](int operand, int partial) {
-        if (partial >= 0 && slopes.has(operand))
-          slopes.add(graph_, node, graph_.multiply(partial, slopes.of(operand)));
+        if (partial >= 0 && slopes.has(operand)) slopes.add(graph_, node, graph_.multiply(partial, slopes.of(operand)));
       };
       if (operand_count(of.operation) > 0) add(of.a, partials_[node].a);
       if (operand_count(of.operation) > 1) add(of.b, partials_[node].b);

@@ -5,7 +5,8 @@
 namespace rhec {
 
 int Expression::node_in(Graph& graph) const {
-  if (!is_set_) throw Error("a formula uses a number that it has not set; let it write each variable before it is read");
+  if (!is_set_)
+    throw Error("a formula uses a number that it has not set; let it write each variable before it is read");
   if (!graph_) return graph.constant(value_);
   if (graph_ != &graph) throw Error("a formula mixes numbers of two graphs; let it use its arguments alone");
   return node_;

@@ -17,8 +17,8 @@ struct OperationInfo {
   int operands;
 };
 constexpr OperationInfo operations[] = {
-    {"constant", 0}, {"input", 0}, {"+", 2},    {"-", 2},    {"*", 2},    {"negate", 1}, {"1/", 1},
-    {"power", 1},    {"sqrt", 1},  {"exp", 1},  {"log", 1},  {"sin", 1},  {"cos", 1},    {"tan", 1},
+    {"constant", 0}, {"input", 0}, {"+", 2},    {"-", 2},     {"*", 2},    {"negate", 1}, {"1/", 1},
+    {"power", 1},    {"sqrt", 1},  {"exp", 1},  {"log", 1},   {"sin", 1},  {"cos", 1},    {"tan", 1},
     {"asin", 1},     {"acos", 1},  {"atan", 1}, {"atan2", 2}, {"tanh", 1},
 };
 
@@ -181,8 +181,7 @@ int Graph::negate(int a) {
   if (negated(a) >= 0) return negated(a);
   const Node node = (*this)[a];
   if (node.operation == Operation::subtract) return subtract(node.b, node.a);
-  if (node.operation == Operation::multiply && is_constant(node.a))
-    return multiply(constant(-value(node.a)), node.b);
+  if (node.operation == Operation::multiply && is_constant(node.a)) return multiply(constant(-value(node.a)), node.b);
   return intern({Operation::negate, a});
 }
 
@@ -266,9 +265,8 @@ std::vector<int> Graph::reach(std::span<const int> targets, std::span<const int>
 
 int Graph::count_operations(std::span<const int> targets) const {
   const std::vector<int> reached = reach(targets);
-  return static_cast<int>(std::count_if(reached.begin(), reached.end(), [&](int node) {
-    return operand_count((*this)[node].operation) > 0;
-  }));
+  return static_cast<int>(std::count_if(reached.begin(), reached.end(),
+                                        [&](int node) { return operand_count((*this)[node].operation) > 0; }));
 }
 
 std::vector<int> Graph::substitute(std::span<const int> targets, std::span<const int> from, std::span<const int> to) {

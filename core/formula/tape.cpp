@@ -15,8 +15,8 @@ namespace {
 /// An instruction between nodes, before it has registers. Operands are nodes, or (of a uniform) numbers of uniforms.
 struct Step {
   TapeCode code = TapeCode::fill;
-  int out = -1, second_out = -1;           ///< nodes that it computes
-  std::array<int, 3> reads{-1, -1, -1};    ///< nodes in registers
+  int out = -1, second_out = -1;         ///< nodes that it computes
+  std::array<int, 3> reads{-1, -1, -1};  ///< nodes in registers
   std::array<int, 3> uniforms{-1, -1, -1};
   int exponent = 0;
 };
@@ -104,7 +104,8 @@ class Selection {
     if (operands > 1) function(of.b);
   }
   int new_uniform(double value) {
-    const auto found = std::find(uniforms_.begin(), uniforms_.begin() + std::min<std::ptrdiff_t>(32, std::ssize(uniforms_)), value);
+    const auto found =
+        std::find(uniforms_.begin(), uniforms_.begin() + std::min<std::ptrdiff_t>(32, std::ssize(uniforms_)), value);
     if (found != uniforms_.begin() + std::min<std::ptrdiff_t>(32, std::ssize(uniforms_)))
       return static_cast<int>(found - uniforms_.begin());
     uniforms_.push_back(value);

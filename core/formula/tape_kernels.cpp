@@ -98,11 +98,12 @@ void run_packs(std::span<const TapeRun> runs, const TapeOperands* operands, cons
     const TapeOperands* const first = operands;
     const std::uint32_t length = run.length;
     operands += length;
-#define RHEC_RUN(A, B, C, FORMULA)                                                                       \
-  for_run<packs, A, B, C>(first, length, memory, [](auto a, [[maybe_unused]] auto b, [[maybe_unused]] auto c) \
-                                                     RHEC_INLINE { return Lane(FORMULA); });                  \
+#define RHEC_RUN(A, B, C, FORMULA)                                                     \
+  for_run<packs, A, B, C>(first, length, memory,                                       \
+                          [](auto a, [[maybe_unused]] auto b, [[maybe_unused]] auto c) \
+                              RHEC_INLINE { return Lane(FORMULA); });                  \
   break
-#define RHEC_RUN_CALLS(FORMULA)                                                                                    \
+#define RHEC_RUN_CALLS(FORMULA)                                                                                        \
   for_run_of_calls<packs>(first, length, memory, [](Lane a, [[maybe_unused]] Lane b) RHEC_INLINE { return FORMULA; }); \
   break
     switch (run.code) {

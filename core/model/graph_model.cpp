@@ -109,9 +109,10 @@ GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description
     registers = std::max(registers, each->scratch(GraphSteps::lanes));
   stack_ = registers + GraphSteps::memory(n_.x, n_.z(true));
   if (stack_ > most_stack)
-    throw Error(fmt::format("model '{}': its step of {} states with second derivatives takes {} numbers for {} rows; "
-                            "expected at most {}; write it with fewer states or terms",
-                            description_.name, n_.x, stack_, GraphSteps::lanes, most_stack));
+    throw Error(
+        fmt::format("model '{}': its step of {} states with second derivatives takes {} numbers for {} rows; "
+                    "expected at most {}; write it with fewer states or terms",
+                    description_.name, n_.x, stack_, GraphSteps::lanes, most_stack));
 }
 
 void GraphModel::integrate(const Intervals& q) const noexcept {
@@ -129,7 +130,9 @@ void GraphModel::integrate_rows(const IntervalRows& q) const noexcept {
   const StepTapes& of = tapes(q.ramp);
   const int nz = n_.z(q.ramp);
   const Tape& tape = q.hessians ? of.hessians : q.jacobians ? of.jacobians : of.values;
-  const std::vector<int>& next = q.hessians ? of.next_of_hessians : q.jacobians ? of.next_of_jacobians : of.next_of_values;
+  const std::vector<int>& next = q.hessians    ? of.next_of_hessians
+                                 : q.jacobians ? of.next_of_jacobians
+                                               : of.next_of_values;
   const std::vector<int>& rows = q.hessians ? of.jacobian_of_hessians : of.rows_of_jacobians;
   double* const registers = Scratch(q.scratch).take(0);
   for_each_block(q.count, [&](int first, int count, int lanes) {
@@ -143,7 +146,8 @@ void GraphModel::integrate_rows(const IntervalRows& q) const noexcept {
       std::fill_n(at(argument++), lanes, 1.0);
     }
     if (q.hessians)
-      kernels_->load_rows(q.multipliers + first * q.multiplier_step, q.multiplier_step, count, n_.x, at(argument), lanes);
+      kernels_->load_rows(q.multipliers + first * q.multiplier_step, q.multiplier_step, count, n_.x, at(argument),
+                          lanes);
     tape.run(*kernels_, registers, lanes);
     const auto store_row = [&](const int* sources, int columns, double* row, std::ptrdiff_t step) {
       for (int c = 0; c < padded(columns); c += 8)
@@ -262,7 +266,8 @@ void GraphModel::store_outputs(const NodeRows& q, int first, int count, const Ta
     store(sources, q.outputs + first * q.output_step + from, q.output_step);
   }
   for (int j = 0; q.jacobians && j < chosen_count; ++j) {
-    const int* const row = tape.results().data() + n_.y + static_cast<std::ptrdiff_t>(q.chosen ? q.chosen[j] : j) * n_.x;
+    const int* const row =
+        tape.results().data() + n_.y + static_cast<std::ptrdiff_t>(q.chosen ? q.chosen[j] : j) * n_.x;
     double* const out = q.jacobians + (static_cast<std::ptrdiff_t>(first) * chosen_count + j) * q.jacobian_row;
     for (int from = 0; from < n_.x; from += 8) {
       for (int k = 0; k < 8; ++k) sources[k] = from + k < n_.x ? row[from + k] : Tape::zero;

@@ -30,12 +30,13 @@ GraphSteps::GraphSteps(const Parts& parts, const Model::Intervals& request, doub
 }
 
 void GraphSteps::load(int first, int count) noexcept {
-  const auto rows = [&](const double* array, int columns) { return array + static_cast<std::ptrdiff_t>(first) * columns; };
+  const auto rows = [&](const double* array, int columns) {
+    return array + static_cast<std::ptrdiff_t>(first) * columns;
+  };
   load_columns(rows(q_.states, p_.nx), p_.nx, count, z_);
   if (p_.np) load_columns(rows(q_.parameters, p_.np), p_.np, count, z_ + p_.nx * lanes);
   if (p_.nu) load_columns(rows(q_.inputs, p_.nu), p_.nu, count, z_ + (p_.nx + p_.np) * lanes);
-  if (ramp_ && p_.np)
-    load_columns(rows(q_.parameters_end, p_.np), p_.np, count, z_ + (p_.nx + p_.np + p_.nu) * lanes);
+  if (ramp_ && p_.np) load_columns(rows(q_.parameters_end, p_.np), p_.np, count, z_ + (p_.nx + p_.np + p_.nu) * lanes);
   load_columns(rows(q_.durations, 1), 1, count, h_);
   for (int i = 0; i < lanes; ++i) h_[i] *= 1.0 / q_.substeps;
 }
@@ -110,8 +111,7 @@ void GraphSteps::add_curvature(const Tape& tape) noexcept {
     }
     const auto add = [&](int i, const double* factors) {
       for (int j = 0; j < nz_; ++j)
-        for (int lane = 0; lane < lanes; ++lane)
-          entry(H_, i, j)[lane] += factors[lane] * product_[j * lanes + lane];
+        for (int lane = 0; lane < lanes; ++lane) entry(H_, i, j)[lane] += factors[lane] * product_[j * lanes + lane];
     };
     if (b >= p_.nx)
       add(b, ones);

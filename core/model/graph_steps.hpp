@@ -11,9 +11,9 @@ namespace rhec {
 /// Rows of `columns` doubles become registers of eight lanes; lanes beyond `count` repeat the last row.
 void load_columns(const double* rows, int columns, int count, double* registers) noexcept;
 
-/// Several Runge-Kutta steps in each interval, for eight intervals at a time, with the sensitivities of the last state to
-/// z = [x; p; u] (or [x; p; u; p_end]) and the Hessian of its weighted sum. With M_k = d x_k / dz, Z_k = [M_k; 0 I], and
-/// a step's derivatives A_k by its state, B_k by the rest:
+/// Several Runge-Kutta steps in each interval, for eight intervals at a time, with the sensitivities of the last state
+/// to z = [x; p; u] (or [x; p; u; p_end]) and the Hessian of its weighted sum. With M_k = d x_k / dz, Z_k = [M_k; 0 I],
+/// and a step's derivatives A_k by its state, B_k by the rest:
 ///
 ///     M_{k+1} = A_k M_k + [0 B_k],      lambda_k = A_k' lambda_{k+1},      H = sum_k Z_k' H_k(lambda_{k+1}) Z_k
 ///

@@ -61,7 +61,8 @@ class StepBuilder {
     std::vector<int> rates;
     for (int k = 0; k < 4; ++k) {
       std::vector<int> at = arguments_;
-      for (int j = 0; j < nx() && k > 0; ++j) at[j] = graph_.add(at[j], graph_.multiply(scaled(reach[k], step_.h), rates[j]));
+      for (int j = 0; j < nx() && k > 0; ++j)
+        at[j] = graph_.add(at[j], graph_.multiply(scaled(reach[k], step_.h), rates[j]));
       for (int j = 0; j < np() && ramp_; ++j) {
         const int moved = graph_.add(step_.fraction, scaled(reach[k], step_.share));
         const int range = graph_.subtract(step_.z[arguments_.size() + j], at[nx() + j]);
@@ -105,8 +106,8 @@ class StepBuilder {
         now.push_back(node);
       }
       adjoint = now;
-      const std::vector<int> curvature = graph_.substitute(bend.nodes, joined(arguments_, mu),
-                                                           joined(stages_[k].arguments, adjoint));
+      const std::vector<int> curvature =
+          graph_.substitute(bend.nodes, joined(arguments_, mu), joined(stages_[k].arguments, adjoint));
       const NodeMatrix S = jacobian(graph_, stages_[k].arguments, step_.z, Accumulation::forward);
       add_product(curvature, S, hessian);
     }

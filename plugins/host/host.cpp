@@ -13,6 +13,7 @@
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/model/chosen_outputs.hpp"
 #include "rhec/core/prior/prior.hpp"
+#include "rhec/plugins/equations/equations.hpp"
 
 namespace rhec {
 namespace {
@@ -283,6 +284,7 @@ std::string Host::diagnosis() const {
 }
 
 std::vector<OptionRow> Host::options(PluginKind kind, std::string_view name) const {
+  if (kind == PluginKind::model && is_equations_file(name)) return vehicle_options(name);
   const Library& library = search_->require(kind, name, {}, *this);
   std::vector<OptionRow> rows;
   ErrorText error{};
@@ -321,6 +323,7 @@ PluginTrial Host::try_out(const PluginRecord& plugin) const {
 }
 
 std::shared_ptr<Model> Host::make_model(std::string_view name, const Settings& settings) const {
+  if (is_equations_file(name)) return choose_outputs(load_vehicle(name, settings), settings);
   return choose_outputs(search_->make<Model>(PluginKind::model, name, settings, *this), settings);
 }
 

@@ -1,14 +1,20 @@
 #include "rhec/plugins/robot/plugin_option.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <string_view>
+#include <system_error>
+#include <type_traits>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/prior/prior.hpp"
+#include "rhec/plugins/equations/equations.hpp"
 
 namespace rhec {
 namespace {
@@ -38,12 +44,34 @@ struct Maker<Prior> {
   static constexpr const char* word = "a prior plugin";
 };
 
+/// The file with a vehicle's equations that a section names. If it is named in a file, it is relative to that file.
+std::string equations_file(const Settings& named) {
+  const std::filesystem::path given(named.as_text());
+  if (!is_equations_file(given.string()))
+    throw named.mismatch("a file with a vehicle's equations, whose name ends in .yaml");
+  const bool in_a_file = named.origin().line > 0;
+  const std::filesystem::path file =
+      in_a_file ? std::filesystem::path(named.origin().file).parent_path() / given : given;
+  std::error_code problem;
+  if (!std::filesystem::is_regular_file(file, problem))
+    throw named.error(fmt::format("found '{}', expected a file with a vehicle's equations; there is no {}",
+                                  given.string(), file.string()));
+  return file.string();
+}
+
+template <class Product>
 std::string name_in(const Settings& section, const char* otherwise) {
   if (section.is_null()) return otherwise;
   if (section.kind() == Settings::Kind::scalar) return section.text();
   if (section.kind() != Settings::Kind::map)
     throw section.mismatch("the name of a plugin, or a map with the key 'name' and the plugin's options");
   const Settings* name = section.find("name");
+  if constexpr (std::is_same_v<Product, Model>) {
+    const Settings* equations = section.find("equations");
+    if (equations && name)
+      throw equations->error("found a file with equations and a plugin's name; expected one of the keys");
+    if (equations) return equations_file(*equations);
+  }
   return name ? name->as_text() : otherwise;
 }
 
@@ -63,7 +91,7 @@ template <class Product>
 std::shared_ptr<Product> PluginOption<Product>::make(const Host& host, const Settings& section) const {
   try {
     const bool is_name = section.kind() == Settings::Kind::scalar;
-    return (host.*Maker<Product>::make)(name_in(section, otherwise),
+    return (host.*Maker<Product>::make)(name_in<Product>(section, otherwise),
                                         is_name ? Settings::map(section.origin()) : section);
   } catch (const Error& mistake) {
     // A plugin that finds its options inconsistent does not know where they are written.
@@ -74,9 +102,9 @@ std::shared_ptr<Product> PluginOption<Product>::make(const Host& host, const Set
 
 template <class Product>
 PluginChoice PluginOption<Product>::choice(const Settings& section) const {
-  PluginChoice choice{name_in(section, otherwise), Settings::map(section.origin())};
+  PluginChoice choice{name_in<Product>(section, otherwise), Settings::map(section.origin())};
   for (const auto& [key, value] : section.members())
-    if (key != "name") choice.options.add(key, value);
+    if (key != "name" && !(std::is_same_v<Product, Model> && key == "equations")) choice.options.add(key, value);
   return choice;
 }
 

@@ -1,6 +1,8 @@
-// Every model plugin that is found: `rhec check`, instruction sets, and no allocation in evaluation.
+// Every model plugin that is found, and vehicles of equations: `rhec check`, instruction sets, and no allocation in
+// evaluation.
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <memory>
 
 #include "model_checks.hpp"
@@ -26,6 +28,9 @@ class EveryModel : public testing::TestWithParam<std::string> {
 };
 INSTANTIATE_TEST_SUITE_P(Found, EveryModel, testing::ValuesIn(Host().names(PluginKind::model)),
                          [](const auto& found) { return found.param; });
+INSTANTIATE_TEST_SUITE_P(OfEquations, EveryModel,
+                         testing::Values(RHEC_VEHICLES "/bicycle.yaml", RHEC_VEHICLES "/skid_steer.yaml"),
+                         [](const auto& file) { return std::filesystem::path(file.param).stem().string(); });
 
 TEST(Models, TheBicycleIsFound) {
   EXPECT_THAT(Host().names(PluginKind::model), testing::Contains("bicycle_slip")) << Host().diagnosis();

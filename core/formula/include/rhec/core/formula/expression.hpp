@@ -23,8 +23,8 @@ class RHEC_EXPORT Expression {
  public:
   Expression() = default;  ///< not set
   template <class Number>
-    requires std::is_arithmetic_v<Number>
-  Expression(Number constant) : value_(static_cast<double>(constant)), is_set_(true) {}  // NOLINT
+  requires std::is_arithmetic_v<Number> Expression(Number constant)
+      : value_(static_cast<double>(constant)), is_set_(true) {}  // NOLINT
   Expression(Graph& graph, int node) : graph_(&graph), node_(node), is_set_(true) {}
   static Expression input(Graph& graph, std::string name) { return {graph, graph.input(std::move(name))}; }
 
@@ -34,7 +34,7 @@ class RHEC_EXPORT Expression {
 
   /// A formula has no values to decide by.
   template <class Number>
-    requires std::same_as<Number, double> || std::same_as<Number, bool>
+  requires std::same_as<Number, double> || std::same_as<Number, bool>
   operator Number() const {  // NOLINT(google-explicit-constructor)
     static_assert(!std::same_as<Number, Number>,
                   "a formula's numbers have no value here: do not branch on them or convert them. Let all variables be "
@@ -62,29 +62,24 @@ class RHEC_EXPORT Expression {
 
 /// Two operands of which one is an Expression and the other one, too, or an ordinary number.
 template <class A, class B>
-concept ExpressionOperands = (std::same_as<A, Expression> && (std::same_as<B, Expression> || std::is_arithmetic_v<B>)) ||
+concept ExpressionOperands = (std::same_as<A, Expression> &&
+                              (std::same_as<B, Expression> || std::is_arithmetic_v<B>)) ||
                              (std::is_arithmetic_v<A> && std::same_as<B, Expression>);
 
 template <class A, class B>
-  requires ExpressionOperands<A, B>
-Expression operator+(const A& a, const B& b) {
+requires ExpressionOperands<A, B> Expression operator+(const A& a, const B& b) {
   return Expression::of(Operation::add, a, b);
 }
 template <class A, class B>
-  requires ExpressionOperands<A, B>
-Expression operator-(const A& a, const B& b) {
+requires ExpressionOperands<A, B> Expression operator-(const A& a, const B& b) {
   return Expression::of(Operation::subtract, a, b);
 }
 template <class A, class B>
-  requires ExpressionOperands<A, B>
-Expression operator*(const A& a, const B& b) {
+requires ExpressionOperands<A, B> Expression operator*(const A& a, const B& b) {
   return Expression::of(Operation::multiply, a, b);
 }
 template <class A, class B>
-  requires ExpressionOperands<A, B>
-Expression operator/(const A& a, const B& b) {
-  return Expression::quotient(a, b);
-}
+requires ExpressionOperands<A, B> Expression operator/(const A& a, const B& b) { return Expression::quotient(a, b); }
 inline Expression operator-(const Expression& a) { return Expression::of(Operation::negate, a); }
 inline Expression operator+(const Expression& a) { return a; }
 template <class B>
@@ -104,14 +99,14 @@ Expression& operator/=(Expression& a, const B& b) {
   return a = a / b;
 }
 
-#define RHEC_NO_COMPARISON(SIGN)                                                                            \
-  template <class A, class B>                                                                               \
-    requires ExpressionOperands<A, B>                                                                       \
-  bool operator SIGN(const A&, const B&) {                                                                  \
-    static_assert(!std::same_as<A, A>,                                                                      \
+#define RHEC_NO_COMPARISON(SIGN)                                                                              \
+  template <class A, class B>                                                                                 \
+  requires ExpressionOperands<A, B>                                                                           \
+  bool operator SIGN(const A&, const B&) {                                                                    \
+    static_assert(!std::same_as<A, A>,                                                                        \
                   "a formula does not compare its numbers, whose values are not known here; use smooth_min, " \
-                  "smooth_max or smooth_abs, which have derivatives");                                      \
-    return false;                                                                                           \
+                  "smooth_max or smooth_abs, which have derivatives");                                        \
+    return false;                                                                                             \
   }
 RHEC_NO_COMPARISON(<)
 RHEC_NO_COMPARISON(<=)

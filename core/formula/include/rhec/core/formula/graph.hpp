@@ -39,16 +39,16 @@ RHEC_EXPORT std::string_view name_of(Operation operation) noexcept;
 RHEC_EXPORT int operand_count(Operation operation) noexcept;
 
 /// A formula as a graph of scalar operations. A node is named by its number; operands have smaller numbers than what is
-/// computed of them. Equal nodes are one node, so that common parts are computed once, and each is simplified when it is
-/// made: constants are folded, and
+/// computed of them. Equal nodes are one node, so that common parts are computed once, and each is simplified when it
+/// is made: constants are folded, and
 ///
 ///     x + 0, x - 0, x * 1, -(-x), 1/(1/x)  become  x        x * 0, x - x     become  0
 ///     x + (-y)                             becomes x - y    (-x) * y         becomes -(x * y)
 ///     x / y                                becomes x * (1/y)
 ///
 /// These hold for real numbers, not for all of IEEE 754: 0 * x is 0, and x - x is 0, also where x is infinite or NaN (a
-/// derivative that is zero by its structure must be zero for every point), the sign of a zero is not kept, and x / y may
-/// differ from the rounded quotient in the last place. What is not finite otherwise stays so: 1 / 0 is infinite.
+/// derivative that is zero by its structure must be zero for every point), the sign of a zero is not kept, and x / y
+/// may differ from the rounded quotient in the last place. What is not finite otherwise stays so: 1 / 0 is infinite.
 class RHEC_EXPORT Graph {
  public:
   struct Node {

@@ -56,8 +56,8 @@ struct TapeRun {
   std::uint32_t length;
 };
 
-/// How a tape is run on one instruction set. A register is an array of `lanes` doubles, one for each row (stage) that is
-/// evaluated; lanes is 8, 16 or 32. Registers are aligned to 64 bytes. Rows beyond `count` repeat the last one.
+/// How a tape is run on one instruction set. A register is an array of `lanes` doubles, one for each row (stage) that
+/// is evaluated; lanes is 8, 16 or 32. Registers are aligned to 64 bytes. Rows beyond `count` repeat the last one.
 struct TapeKernels {
   const char* name;
   void (*run)(std::span<const TapeRun> runs, const TapeOperands* operands, const double* uniforms, double* registers,

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a unit of a model's kernels for one instruction set includes (rhec_add_model_kernels in CMake generates it): packs
-// first, since they rename xsimd.
+// What a unit of a model's kernels for one instruction set includes (rhec_add_model_kernels in CMake generates it):
+// packs first, since they rename xsimd.
 
 #include "rhec/core/packs/pack.hpp"
 

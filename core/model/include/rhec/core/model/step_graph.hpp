@@ -20,9 +20,9 @@ enum class StepCurvature { stages, whole, by_count };
 /// with its Jacobian and the Hessian of sum_r weights_r F_r.
 struct RHEC_EXPORT StepGraph {
   std::vector<int> z, weights;
-  int h = -1;                         ///< length of the step [s]
-  int fraction = -1, share = -1;      ///< of a ramp: where the step begins, and its part of the interval
-  std::vector<int> next;              ///< F
+  int h = -1;                     ///< length of the step [s]
+  int fraction = -1, share = -1;  ///< of a ramp: where the step begins, and its part of the interval
+  std::vector<int> next;          ///< F
   NodeMatrix jacobian, hessian;
 
   /// The independent variables in the order in which a tape takes them: z, then h, the ramp's two, and the weights.

@@ -1,9 +1,9 @@
 #pragma once
 
 // Packs of doubles for SIMD across stages. Included only by translation units that are compiled for one instruction set
-// (rhec_add_model_kernels in CMake generates those of models), each of which defines its own RHEC_PACK_NAMESPACE. xsimd has
-// helpers that are neither templates nor tied to an instruction set. Of several compiled copies the linker would keep
-// one for all units, and a machine without its instructions would crash. So each unit renames xsimd.
+// (rhec_add_model_kernels in CMake generates those of models), each of which defines its own RHEC_PACK_NAMESPACE. xsimd
+// has helpers that are neither templates nor tied to an instruction set. Of several compiled copies the linker would
+// keep one for all units, and a machine without its instructions would crash. So each unit renames xsimd.
 
 #if defined(RHEC_PACK_NAMESPACE)
 #define xsimd RHEC_PACK_NAMESPACE
@@ -68,7 +68,7 @@ struct Pack {
 #if defined(__AVX512F__)
 using WidestPack = Pack<xsimd::avx512dq>;
 #elif defined(__AVX2__)
-using WidestPack = Pack<xsimd::fma3<xsimd::avx2> >;
+using WidestPack = Pack<xsimd::fma3<xsimd::avx2>>;
 #endif
 
 #if defined(__AVX2__)

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rhec/core/base/error.hpp"
+
+namespace rhec::equations {
+
+/// A text of a file: each line with its place there, so that an error can name line and column.
+struct SourceText {
+  struct Line {
+    std::string_view text;
+    int number = 0;  ///< in the file, from 1
+    int column = 0;  ///< of the line's first character, from 1; 0 if it is not known
+  };
+  std::string file;
+  std::vector<Line> lines;
+};
+
+/// A place in a file.
+struct Place {
+  int line = 0, column = 0;
+};
+/// "vehicle.yaml:12:8: " and the text.
+Error error_at(const std::string& file, Place place, const std::string& text);
+
+/// What a term is computed by, in the order of the computation: operands first.
+struct Item {
+  enum class Kind { number, name, negate, add, subtract, multiply, divide, power, function };
+  Kind kind = Kind::number;
+  Place place;
+  double value = 0.0;  ///< of a number
+  std::string name{};  ///< of a name (with its prime, "x'"), or a function
+};
+
+/// One equation: name = term, or name' = term.
+struct Statement {
+  std::string target;  ///< with its prime
+  Place place;
+  std::vector<Item> term;
+};
+
+/// The functions that a term may call.
+struct FunctionInfo {
+  const char* name;
+  int arguments;
+};
+const std::vector<FunctionInfo>& known_functions();
+/// True for functions and constants, which no variable may be named as.
+bool is_reserved(std::string_view name);
+/// True for a letter or underscore, followed by letters, digits and underscores.
+bool is_name(std::string_view text);
+
+/// The equations of a text, one a line (docs/equations.md has the grammar). Throws Error with the place of the first
+/// mistake, what was found there and what was expected.
+std::vector<Statement> parse_statements(const SourceText& source);
+/// A single term that fills the text.
+std::vector<Item> parse_term(const SourceText& source);
+
+}  // namespace rhec::equations

@@ -1,0 +1,116 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "rhec/core/base/aligned.hpp"
+#include "rhec/core/formula/tape.hpp"
+
+namespace rhec {
+namespace {
+
+struct RowsTest : testing::TestWithParam<const TapeKernels*> {};
+INSTANTIATE_TEST_SUITE_P(Sets, RowsTest, testing::ValuesIn(runnable_tape_kernels()),
+                         [](const auto& set) { return std::string(set.param->name); });
+
+TEST_P(RowsTest, ColumnsBecomeRegistersAndTheLastRowIsRepeated) {
+  for (const int lanes : {8, 16, 32}) {
+    for (int count = 1; count <= lanes; ++count) {
+      for (const int columns : {1, 3, 8, 11}) {
+        const int step = 24;
+        std::vector<double> rows(static_cast<std::size_t>(count) * step);
+        for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = static_cast<double>(k);
+        AlignedDoubles registers(static_cast<std::size_t>(columns + 1) * lanes);
+        std::fill_n(registers.data(), registers.size(), -1.0);
+        GetParam()->load_rows(rows.data(), step, count, columns, registers.data(), lanes);
+        for (int c = 0; c < columns; ++c)
+          for (int i = 0; i < lanes; ++i)
+            ASSERT_EQ(registers.data()[c * lanes + i], rows[static_cast<std::size_t>(std::min(i, count - 1)) * step + c]);
+        for (int i = 0; i < lanes; ++i) ASSERT_EQ(registers.data()[columns * lanes + i], -1.0);  // and no others
+      }
+    }
+  }
+}
+
+TEST_P(RowsTest, StoresRegistersAndUniformsToTheRowsThatThereAre) {
+  const std::vector<double> uniforms{0.0, 42.0};
+  const int sources[8] = {2, ~0, 0, ~1, 1, 1, ~0, 2};
+  for (const int lanes : {8, 16, 32}) {
+    AlignedDoubles registers(static_cast<std::size_t>(3) * lanes);
+    for (int k = 0; k < 3 * lanes; ++k) registers.data()[k] = 100.0 + k;
+    for (int count = 1; count <= lanes; ++count) {
+      const int step = 16;
+      std::vector<double> rows(static_cast<std::size_t>(count + 1) * step, -1.0);
+      GetParam()->store_eight(sources, uniforms.data(), registers.data(), lanes, rows.data(), step, count);
+      for (int i = 0; i <= count; ++i) {
+        for (int c = 0; c < step; ++c) {
+          const bool is_written = i < count && c < 8;
+          const double expected = !is_written            ? -1.0
+                                  : sources[c % 8] < 0   ? uniforms[static_cast<std::size_t>(~sources[c % 8])]
+                                                         : registers.data()[sources[c % 8] * lanes + i];
+          ASSERT_EQ(rows[static_cast<std::size_t>(i) * step + c], expected) << i << ", " << c;
+        }
+      }
+    }
+  }
+}
+
+// Each instruction by itself, of ordinary numbers and of those at the edge.
+TEST_P(RowsTest, EveryInstruction) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const std::vector<double> numbers{0.3, -0.7, 0.9, 1e-9, -2.5, 0.0, 17.0, infinity};
+  struct Expected {
+    TapeCode code;
+    double (*value)(double a, double b, double c);
+  };
+  const Expected all[] = {
+      {TapeCode::add_rr, [](double a, double b, double) { return a + b; }},
+      {TapeCode::subtract_rr, [](double a, double b, double) { return a - b; }},
+      {TapeCode::multiply_rr, [](double a, double b, double) { return a * b; }},
+      {TapeCode::negate, [](double a, double, double) { return -a; }},
+      {TapeCode::reciprocal, [](double a, double, double) { return 1.0 / a; }},
+      {TapeCode::square_root, [](double a, double, double) { return std::sqrt(a); }},
+      {TapeCode::exponential, [](double a, double, double) { return std::exp(a); }},
+      {TapeCode::logarithm, [](double a, double, double) { return std::log(a); }},
+      {TapeCode::sine, [](double a, double, double) { return std::sin(a); }},
+      {TapeCode::cosine, [](double a, double, double) { return std::cos(a); }},
+      {TapeCode::tangent, [](double a, double, double) { return std::tan(a); }},
+      {TapeCode::arc_sine, [](double a, double, double) { return std::asin(a); }},
+      {TapeCode::arc_cosine, [](double a, double, double) { return std::acos(a); }},
+      {TapeCode::arc_tangent, [](double a, double, double) { return std::atan(a); }},
+      {TapeCode::arc_tangent_2, [](double a, double b, double) { return std::atan2(a, b); }},
+      {TapeCode::hyperbolic_tangent, [](double a, double, double) { return std::tanh(a); }},
+      {TapeCode::multiply_add_rrr, [](double a, double b, double c) { return a * b + c; }},
+      {TapeCode::multiply_subtract_rrr, [](double a, double b, double c) { return a * b - c; }},
+      {TapeCode::subtract_product_rrr, [](double a, double b, double c) { return c - a * b; }},
+  };
+  const double none = 0.0;
+  for (const auto& [code, value] : all) {
+    for (const int lanes : {8, 16, 32}) {
+      AlignedDoubles registers(static_cast<std::size_t>(4) * lanes);
+      const auto operand = [&](int which, int lane) {
+        return numbers[static_cast<std::size_t>(lane * (which + 1) + which) % numbers.size()];
+      };
+      for (int which = 0; which < 3; ++which)
+        for (int lane = 0; lane < lanes; ++lane) registers.data()[which * lanes + lane] = operand(which, lane);
+      const TapeRun run{code, 1};
+      const TapeOperands operands{3, 0, 1, 2};
+      GetParam()->run({&run, 1}, &operands, &none, registers.data(), lanes);
+      for (int lane = 0; lane < lanes; ++lane) {
+        const double expected = value(operand(0, lane), operand(1, lane), operand(2, lane));
+        const double found = registers.data()[3 * lanes + lane];
+        if (std::isnan(expected))
+          EXPECT_TRUE(std::isnan(found)) << static_cast<int>(code) << " of " << operand(0, lane);
+        else if (std::isinf(expected))
+          EXPECT_EQ(found, expected) << static_cast<int>(code) << " of " << operand(0, lane);
+        else
+          EXPECT_NEAR(found, expected, 4e-15 * (1.0 + std::abs(expected)))
+              << static_cast<int>(code) << " of " << operand(0, lane);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,176 @@
+#include "rhec/core/model/graph_model.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "models/bicycle_sideslip/bicycle_sideslip.hpp"
+#include "models/bicycle_slip/bicycle_slip.hpp"
+#include "models/model_checks.hpp"
+#include "models/skid_steer/skid_steer.hpp"
+#include "models/tractor_trailer/tractor_trailer.hpp"
+#include "models/unicycle_traction/unicycle_traction.hpp"
+#include "plugins/template/articulated.hpp"
+#include "rhec/core/model/formula_model.hpp"
+#include "support/allocations.hpp"
+#include "support/error_of.hpp"
+#include "support/every_function.hpp"
+#include "support/test_models.hpp"
+
+namespace rhec {
+namespace {
+
+std::vector<Variable> variables(const char* letter, int count) {
+  std::vector<Variable> all;
+  for (int k = 0; k < count; ++k)
+    all.push_back({.name = letter + std::to_string(k), .unit = "1", .lower = -0.8, .upper = 0.8, .scale = 0.5});
+  return all;
+}
+
+template <class Formula>
+ModelDescription describe() {
+  ModelDescription about;
+  about.name = "traced";
+  about.states = variables("x", Formula::state_count);
+  about.inputs = variables("u", Formula::input_count);
+  about.parameters = variables("p", Formula::parameter_count);
+  about.outputs = variables("y", Formula::output_count);
+  return about;
+}
+
+template <class Formula>
+class Traced : public testing::Test {
+ protected:
+  FormulaModel<Formula> compiled_{Formula{}, describe<Formula>()};
+  GraphModel interpreted_{trace(Formula{}), describe<Formula>()};
+};
+using Formulas = testing::Types<BicycleSlip, UnicycleTraction, TractorTrailer, BicycleSideslip, SkidSteer, Articulated,
+                                EveryFunction, testing::Integrator>;
+TYPED_TEST_SUITE(Traced, Formulas);
+
+/// To 1e-12 of the largest entry of the same stage.
+void expect_close(const std::vector<double>& found, const std::vector<double>& expected, int count, const char* what) {
+  const std::size_t size = (expected.size() - checks::Stages::behind) / static_cast<std::size_t>(count);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    double largest = 1.0;
+    for (std::size_t k = 0; k < size; ++k) largest = std::max(largest, std::abs(expected[i * size + k]));
+    for (std::size_t k = 0; k < size; ++k)
+      EXPECT_NEAR(found[i * size + k], expected[i * size + k], 1e-12 * largest) << what << ", stage " << i << ", " << k;
+  }
+}
+
+// The derivatives of nested number types, and those of graphs.
+TYPED_TEST(Traced, HasTheDerivativesOfTheCompiledModel) {
+  for (const std::string& set : this->interpreted_.instruction_sets()) {
+    SCOPED_TRACE(set);
+    ASSERT_TRUE(this->interpreted_.use_instruction_set(set));
+    for (const bool ramp : {false, true}) {
+      for (const int substeps : {1, 3}) {
+        checks::Stages one = checks::random_stages(this->compiled_, 19, ramp, 23), other = one;
+        one.substeps = other.substeps = substeps;
+        this->compiled_.integrate(one.intervals(true, true, true));
+        this->interpreted_.integrate(other.intervals(true, true, true));
+        this->compiled_.observe(one.nodes(true, true, true));
+        this->interpreted_.observe(other.nodes(true, true, true));
+        expect_close(other.next, one.next, one.count, "F");
+        expect_close(other.jacobians, one.jacobians, one.count, "dF");
+        expect_close(other.hessians, one.hessians, one.count, "d2F");
+        expect_close(other.outputs, one.outputs, one.count, "h");
+        expect_close(other.output_jacobians, one.output_jacobians, one.count, "dh");
+        expect_close(other.output_hessians, one.output_hessians, one.count, "d2h");
+      }
+    }
+  }
+}
+
+TYPED_TEST(Traced, PassesTheSuiteOfModels) {
+  GraphModel generic(trace(TypeParam{}), describe<TypeParam>());
+  ASSERT_TRUE(generic.use_instruction_set("generic"));
+  GraphModel& model = this->interpreted_;
+  for (const std::string& set : model.instruction_sets()) {
+    SCOPED_TRACE(set);
+    ASSERT_TRUE(model.use_instruction_set(set));
+    checks::same_as_generic(model, generic);
+    for (const int count : {0, 1, 7, 8, 9, 16, 17, 24, 25, 33, 41})
+      checks::same_by_rows(model, count, [&](const NodeRows& request) { model.observe_rows(request); });
+    for (const bool ramp : {false, true}) {
+      for (const int substeps : {1, 2}) checks::expect_runge_kutta(model, ramp, substeps);
+      for (const int count : {0, 1, 8, 17, 41})
+        for (const int substeps : {1, 2})
+          checks::same_steps_by_rows(model, count, ramp, substeps,
+                                     [&](const IntervalRows& request) { model.integrate_rows(request); });
+    }
+  }
+}
+
+TYPED_TEST(Traced, EvaluatesWithoutAllocation) {
+  GraphModel& model = this->interpreted_;
+  checks::Stages s = checks::random_stages(model, 15, true, 5);
+  s.substeps = 2;
+  const auto intervals = s.intervals(true, true, true);
+  const auto nodes = s.nodes(true, true, true);
+  std::vector<double> rates(TypeParam::state_count);
+  const long before = allocation_count();
+  model.integrate(intervals);
+  model.observe(nodes);
+  model.rates(s.x.data(), s.u.data(), s.p.data(), rates.data());
+  EXPECT_EQ(allocation_count(), before);
+}
+
+TEST(GraphModel, RefusesADescriptionOfAnotherVehicle) {
+  EXPECT_CONTAINS(error_of([] { GraphModel(trace(BicycleSlip{}), describe<TractorTrailer>()); }),
+                  "its formula has 4 states and its description 5");
+}
+
+/// A chain of oscillators, of as many states as wanted, each of which moves all others.
+template <int states>
+struct Coupled {
+  static constexpr int state_count = states, input_count = 1, parameter_count = 1, output_count = 1;
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::sin;
+    for (int i = 0; i < states; ++i) {
+      dxdt[i] = u[0] * p[0];
+      for (int j = 0; j < states; ++j) dxdt[i] += sin(x[i] * x[j]);
+    }
+  }
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    y[0] = x[0];
+  }
+};
+
+TEST(GraphModel, RefusesWhatDoesNotFitOnTheStack) {
+  EXPECT_CONTAINS(error_of([] { GraphModel(trace(Coupled<60>{}), describe<Coupled<60>>()); }),
+                  "write it with fewer states or terms");
+}
+
+TEST(GraphModel, StraightMotionIsAGraphToo) {
+  const VehicleGraph vehicle = trace(SkidSteer{});
+  Graph& graph = *vehicle.graph;
+  const Expression speed = Expression::input(graph, "ground_speed"), slip(graph, vehicle.parameters[0]);
+  const GraphModel::StraightMotion straight{
+      speed.node_in(graph),
+      {-1, (0.5 * speed).node_in(graph), -1},
+      {(speed / (1 - slip)).node_in(graph), (2 * speed).node_in(graph)}};
+  const GraphModel model(vehicle, describe<SkidSteer>(), &straight);
+  double state[3] = {7, 7, 7}, inputs[2] = {};
+  const double slips[3] = {0.5, 0.0, 0.0};
+  model.straight_motion(3.0, slips, state, inputs);
+  EXPECT_THAT(inputs, testing::ElementsAre(6.0, 6.0));
+  EXPECT_THAT(state, testing::ElementsAre(7.0, 1.5, 7.0));
+}
+
+TEST(GraphModel, SaysWhatItCosts) {
+  const GraphModel model(trace(BicycleSlip{}), describe<BicycleSlip>());
+  EXPECT_GT(model.cost_of_values().instructions, 20);
+  EXPECT_GT(model.cost_of_jacobians().instructions, model.cost_of_values().instructions);
+  EXPECT_GT(model.cost_of_hessians().instructions, model.cost_of_jacobians().instructions);
+  EXPECT_LT(model.cost_of_hessians().runs, model.cost_of_hessians().instructions);
+}
+
+}  // namespace
+}  // namespace rhec

@@ -1,0 +1,187 @@
+#include "rhec/plugins/equations/equations.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "models/drive.hpp"
+#include "support/error_of.hpp"
+
+namespace rhec {
+namespace {
+
+using ::testing::ElementsAre;
+
+const std::string vehicles = RHEC_SOURCE "/examples/vehicles/";
+
+/// A file that is there for a test.
+class TextFile {
+ public:
+  explicit TextFile(const std::string& text) { std::ofstream(path_) << text; }
+  ~TextFile() { std::remove(path_.c_str()); }
+  TextFile(const TextFile&) = delete;
+  TextFile& operator=(const TextFile&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_ = std::filesystem::path(::testing::TempDir()) / "written.yaml";
+};
+
+std::shared_ptr<Model> load(const std::string& text, const std::string& options = "{}") {
+  const TextFile file(text);
+  return load_vehicle(file.path(), parse_yaml(options, "scenario.yaml"));
+}
+/// Without the folder of the file.
+std::string why_not(const std::string& text, const std::string& options = "{}") {
+  const std::string message = error_of([&] { load(text, options); });
+  const std::size_t at = message.find("written.yaml");
+  return at == std::string::npos ? message : message.substr(at);
+}
+
+const std::string cart = R"(
+options:
+  gain: {default: 2, unit: 1/s, above: 0, meaning: of the motor}
+  limit: gain * 3
+states:
+  x: {unit: m, bounds: [-limit, limit]}
+inputs:
+  u: {unit: m/s}
+parameters:
+  k:
+outputs:
+  x: {unit: m}
+  far: {unit: m, usual: false}
+equations: |
+  x' = gain * k * u
+  far = x + limit
+)";
+
+std::string with(const std::string& part, const std::string& other) {
+  std::string text = cart;
+  return text.replace(text.find(part), part.size(), other);
+}
+
+// The same numbers as the plugin whose equations they are, also at other lengths: two vehicles in one process.
+TEST(Equations, AreTheVehicleOfTheirPlugin) {
+  const ::rhec::testing::Numbers state{1.0, 2.0, 0.3, 0.2}, inputs{3.0, 0.4}, slip{0.8, 0.7};
+  const auto same = [&](const Model& one, const Model& other) {
+    ::rhec::testing::expect_near(::rhec::testing::rates(one, state, inputs, slip),
+                                 ::rhec::testing::rates(other, state, inputs, slip), 1e-14);
+    ::rhec::testing::expect_near(::rhec::testing::seen(one, state), ::rhec::testing::seen(other, state), 1e-14);
+    ::rhec::testing::expect_near(::rhec::testing::drive(one, state, inputs, slip, 2.0),
+                                 ::rhec::testing::drive(other, state, inputs, slip, 2.0), 1e-11);
+  };
+  const std::string long_one = "{wheelbase: 2.8, gps_offset: -0.3, outputs: all}";
+  const auto here = ::rhec::testing::vehicle(vehicles + "bicycle.yaml"),
+             longer = ::rhec::testing::vehicle(vehicles + "bicycle.yaml", long_one);
+  same(*here, *::rhec::testing::vehicle("bicycle_slip"));
+  same(*longer, *::rhec::testing::vehicle("bicycle_slip", long_one));
+  EXPECT_GT(std::abs(::rhec::testing::rates(*here, state, inputs, slip)[2] -
+                     ::rhec::testing::rates(*longer, state, inputs, slip)[2]),
+            0.1);
+}
+
+TEST(Equations, HaveTheDescriptionOfTheirPlugin) {
+  for (const char* name : {"bicycle", "skid_steer"}) {
+    const std::string plugin = name == std::string("bicycle") ? "bicycle_slip" : name;
+    const auto one = ::rhec::testing::vehicle(vehicles + name + ".yaml"), other = ::rhec::testing::vehicle(plugin);
+    const ModelDescription &found = one->description(), &expected = other->description();
+    for (auto kind : {&ModelDescription::states, &ModelDescription::inputs, &ModelDescription::parameters,
+                      &ModelDescription::outputs}) {
+      ASSERT_EQ(names_of(found.*kind), names_of(expected.*kind));
+      for (std::size_t j = 0; j < (found.*kind).size(); ++j) {
+        const Variable &a = (found.*kind)[j], &b = (expected.*kind)[j];
+        EXPECT_EQ(a.unit, b.unit) << a.name;
+        EXPECT_EQ(a.scale, b.scale) << a.name;
+        EXPECT_EQ(a.is_angle, b.is_angle) << a.name;
+        EXPECT_EQ(a.nominal, b.nominal) << a.name;
+        EXPECT_EQ(a.lower, b.lower) << a.name;
+        EXPECT_EQ(a.upper, b.upper) << a.name;
+      }
+    }
+    EXPECT_EQ(found.roles.position_y, expected.roles.position_y);
+    EXPECT_EQ(found.roles.heading, expected.roles.heading);
+    EXPECT_EQ(found.roles.speed, expected.roles.speed);
+    EXPECT_EQ(found.roles.speed_factor, expected.roles.speed_factor);
+  }
+}
+
+TEST(Equations, SayHowTheVehicleGoesStraight) {
+  const auto one = ::rhec::testing::vehicle(vehicles + "skid_steer.yaml"), other = ::rhec::testing::vehicle("skid_steer");
+  const auto found = ::rhec::testing::straight(*one, 2.0, {0.1, 0.3, 0.0}),
+             expected = ::rhec::testing::straight(*other, 2.0, {0.1, 0.3, 0.0});
+  ::rhec::testing::expect_near(found.inputs, expected.inputs, 1e-13);
+  ::rhec::testing::expect_near(found.state, expected.state);
+}
+
+TEST(Equations, OptionsSetBoundsAndEquations) {
+  const auto usual = load(cart), other = load(cart, "{gain: 5}"), limited = load(cart, "{limit: 1.5, outputs: all}");
+  EXPECT_EQ(usual->description().states[0].upper, 6.0);
+  EXPECT_EQ(other->description().states[0].lower, -15.0);
+  EXPECT_EQ(limited->description().states[0].upper, 1.5);
+  EXPECT_THAT(::rhec::testing::rates(*other, {0.0}, {3.0}, {0.5}), ElementsAre(::testing::DoubleEq(7.5)));
+  EXPECT_THAT(::rhec::testing::seen(*limited, {1.0}), ElementsAre(1.0, 2.5));
+}
+
+TEST(Equations, OptionsAreDescribed) {
+  const TextFile file(cart);
+  const std::vector<OptionRow> rows = vehicle_options(file.path());
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[0].name, "gain");
+  EXPECT_EQ(rows[0].default_value, "2");
+  EXPECT_EQ(rows[0].constraint, "greater than 0");
+  EXPECT_EQ(rows[0].meaning, "of the motor [1/s]");
+  EXPECT_EQ(rows[1].default_value, "6");
+  EXPECT_EQ(rows[2].name, "outputs");
+}
+
+TEST(Equations, RefuseWrongOptionsWithThePlaceInTheScenario) {
+  EXPECT_CONTAINS(why_not(cart, "gian: 2"), "scenario.yaml:1: gian: unknown key");
+  EXPECT_CONTAINS(why_not(cart, "gain: 0"), "scenario.yaml:1: gain: found '0', expected a number, greater than 0");
+  EXPECT_CONTAINS(why_not(with("default: 2, ", ""), "{}"), "gain: the vehicle has no default for it");
+  EXPECT_CONTAINS(why_not(with("default: 2", "default: -2")), "the default -2 of 'gain' is not greater than 0");
+}
+
+TEST(Equations, RefuseAVehicleThatIsNotWhole) {
+  EXPECT_EQ(why_not(with("  x' = gain * k * u\n", "")),
+            "written.yaml:6: the state 'x' has no equation; expected x' = ... in 'equations'");
+  EXPECT_EQ(why_not(with("  far = x + limit\n", "")),
+            "written.yaml:13: the output 'far' has no equation; expected far = ... in 'equations'");
+  EXPECT_EQ(why_not(with("far = x + limit", "far = x + k")),
+            "written.yaml:13: the output 'far' depends on 'k'; expected states and options alone");
+  EXPECT_CONTAINS(why_not(with("far = x", "v' = x\n  far = x")), "written.yaml:16:3: 'v' is no state");
+  EXPECT_CONTAINS(why_not(with("[-limit, limit]", "[limit, -limit]")),
+                  "the bounds of 'x' are [6, -6], expected lower <= upper");
+  EXPECT_CONTAINS(why_not(with("[-limit, limit]", "[-k, k]")), "written.yaml:6:26: 'k' is not known");
+  EXPECT_CONTAINS(why_not(cart + "straight_motion: |\n  k = 1\n"), "written.yaml:18:3: 'k' is a variable");
+  EXPECT_CONTAINS(why_not(cart + "straight_motion: |\n  x = ground_speed\n"),
+                  "written.yaml:17: straight motion has no equation for the input 'u'");
+}
+
+TEST(Equations, KnowTheirFiles) {
+  EXPECT_TRUE(is_equations_file("a/b.yaml"));
+  EXPECT_TRUE(is_equations_file("b.yml"));
+  EXPECT_FALSE(is_equations_file("bicycle_slip"));
+  EXPECT_CONTAINS(error_of([] { load_vehicle("nowhere/v.yaml"); }), "nowhere/v.yaml: no such file");
+}
+
+// A term as long as a book is refused or taken, but in a moment, and by a message.
+TEST(Equations, ManyTerms) {
+  std::string same = "x' = u", other = "x' = u";
+  for (int k = 0; k < 100000; ++k) {
+    same += " + x";
+    other += " + sin(" + std::to_string(k) + " * x)";
+  }
+  const auto cart_of = [](const std::string& equation) { return with("x' = gain * k * u", equation); };
+  const auto model = load(cart_of(same));
+  EXPECT_NEAR(::rhec::testing::rates(*model, {0.5}, {1.0}, {1.0})[0], 50001.0, 1e-8);
+  EXPECT_CONTAINS(why_not(cart_of(other)), "operations; expected at most");
+}
+
+}  // namespace
+}  // namespace rhec
