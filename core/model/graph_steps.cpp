@@ -45,6 +45,7 @@ void GraphSteps::start() noexcept {
   std::copy_n(z_, p_.nx * lanes, x_);
   std::fill_n(M_, p_.nx * nz_ * lanes, 0.0);
   for (int r = 0; r < p_.nx; ++r) std::fill_n(entry(M_, r, r), lanes, 1.0);
+  at_start_ = true;
 }
 
 /// Evaluates a tape at x_k; its weights are the multipliers as they are.
@@ -81,11 +82,13 @@ void GraphSteps::advance(const Tape& tape, bool with_jacobian) noexcept {
   if (!with_jacobian) return;
   std::fill_n(M_next_, p_.nx * nz_ * lanes, 0.0);
   for (int r = 0; r < p_.nx; ++r) {
-    for (int a = 0; a < p_.nx; ++a)
+    for (int a = 0; a < p_.nx && !at_start_; ++a)
       for (int j = 0; j < nz_; ++j) add_product(tape, jacobian_result(r, a), entry(M_, a, j), entry(M_next_, r, j));
-    for (int j = p_.nx; j < nz_; ++j) add_product(tape, jacobian_result(r, j), ones, entry(M_next_, r, j));
+    for (int j = at_start_ ? 0 : p_.nx; j < nz_; ++j)
+      add_product(tape, jacobian_result(r, j), ones, entry(M_next_, r, j));
   }
   std::swap(M_, M_next_);
+  at_start_ = false;
 }
 
 void GraphSteps::take(int steps, bool with_jacobian) noexcept {
@@ -104,7 +107,7 @@ void GraphSteps::add_curvature(const Tape& tape) noexcept {
     std::fill_n(product_, nz_ * lanes, 0.0);  // row b of H_k Z
     for (int a = 0; a < nz_; ++a) {
       if (tape.results()[static_cast<std::size_t>(hessian_result(b, a))] == Tape::zero) continue;
-      if (a >= p_.nx)
+      if (a >= p_.nx || at_start_)
         add_product(tape, hessian_result(b, a), ones, product_ + a * lanes);
       else
         for (int j = 0; j < nz_; ++j) add_product(tape, hessian_result(b, a), entry(M_, a, j), product_ + j * lanes);
@@ -113,7 +116,7 @@ void GraphSteps::add_curvature(const Tape& tape) noexcept {
       for (int j = 0; j < nz_; ++j)
         for (int lane = 0; lane < lanes; ++lane) entry(H_, i, j)[lane] += factors[lane] * product_[j * lanes + lane];
     };
-    if (b >= p_.nx)
+    if (b >= p_.nx || at_start_)
       add(b, ones);
     else
       for (int i = 0; i < nz_; ++i) add(i, entry(M_, b, i));

@@ -62,6 +62,7 @@ class GraphSteps {
   int hessian_result(int row, int column) const noexcept { return p_.nx + p_.nx * nz_ + row * nz_ + column; }
 
   Parts p_;
+  bool at_start_ = true;  ///< M is [I 0]
   const Model::Intervals& q_;
   bool ramp_;
   int nz_;

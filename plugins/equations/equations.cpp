@@ -17,6 +17,9 @@ namespace rhec {
 namespace equations {
 namespace {
 
+/// Of equations with so many operations, derivatives are made in a moment; no vehicle known to us has a tenth of it.
+constexpr int most_operations = 10000;
+
 std::string meaning_of(const Option& option) {
   if (option.unit.empty()) return option.meaning;
   return option.meaning.empty() ? fmt::format("[{}]", option.unit)
@@ -78,6 +81,12 @@ class VehicleBuilder {
   }
 
   std::shared_ptr<Model> make() {
+    std::vector<int> results = vehicle_.rates;
+    results.insert(results.end(), vehicle_.outputs.begin(), vehicle_.outputs.end());
+    const int operations = graph().count_operations(results);
+    if (operations > most_operations)
+      throw error_at(file_.name(), file_.place("equations", ""),
+                     fmt::format("the equations have {} operations; expected at most {}", operations, most_operations));
     return std::make_shared<GraphModel>(vehicle_, description_, file_.has_straight_motion() ? &straight_ : nullptr);
   }
 

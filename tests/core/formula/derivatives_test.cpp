@@ -33,7 +33,11 @@ const std::vector<Case>& cases() {
       {"atan", [](const auto& x, const auto& y) { return atan(4 * x * y); }},
       {"atan2", [](const auto& x, const auto& y) { return atan2(x + 0.2, y - 0.4); }},
       {"tanh", [](const auto& x, const auto& y) { return tanh(3 * x) * y; }},
-      {"shared", [](const auto& x, const auto& y) { const auto s = sin(x) + y; return s * s / (1 + s * s); }},
+      {"shared",
+       [](const auto& x, const auto& y) {
+         const auto s = sin(x) + y;
+         return s * s / (1 + s * s);
+       }},
       {"smooth", [](const auto& x, const auto& y) { return smooth_max(x, y, 0.2) + smooth_abs(x, 0.1); }},
   };
   return all;

@@ -84,22 +84,22 @@ TEST_F(GraphTest, ZeroTimesAnythingIsZero) {
 TEST_F(GraphTest, EvaluatesEveryOperation) {
   const double x = 0.7, y = -0.3;
   const auto of = [&](Operation operation) { return value(g_.function(operation, x_)); };
-  EXPECT_EQ(value(g_.add(x_, y_)), x + y);
-  EXPECT_EQ(value(g_.subtract(x_, y_)), x - y);
-  EXPECT_EQ(value(g_.multiply(x_, y_)), x * y);
-  EXPECT_EQ(value(g_.negate(x_)), -x);
-  EXPECT_EQ(value(g_.reciprocal(x_)), 1.0 / x);
-  EXPECT_EQ(of(Operation::square_root), std::sqrt(x));
-  EXPECT_EQ(of(Operation::exponential), std::exp(x));
-  EXPECT_EQ(of(Operation::logarithm), std::log(x));
-  EXPECT_EQ(of(Operation::sine), std::sin(x));
-  EXPECT_EQ(of(Operation::cosine), std::cos(x));
-  EXPECT_EQ(of(Operation::tangent), std::tan(x));
-  EXPECT_EQ(of(Operation::arc_sine), std::asin(x));
-  EXPECT_EQ(of(Operation::arc_cosine), std::acos(x));
-  EXPECT_EQ(of(Operation::arc_tangent), std::atan(x));
-  EXPECT_EQ(of(Operation::hyperbolic_tangent), std::tanh(x));
-  EXPECT_EQ(value(g_.function(Operation::arc_tangent_2, x_, y_)), std::atan2(x, y));
+  EXPECT_DOUBLE_EQ(value(g_.add(x_, y_)), x + y);
+  EXPECT_DOUBLE_EQ(value(g_.subtract(x_, y_)), x - y);
+  EXPECT_DOUBLE_EQ(value(g_.multiply(x_, y_)), x * y);
+  EXPECT_DOUBLE_EQ(value(g_.negate(x_)), -x);
+  EXPECT_DOUBLE_EQ(value(g_.reciprocal(x_)), 1.0 / x);
+  EXPECT_DOUBLE_EQ(of(Operation::square_root), std::sqrt(x));
+  EXPECT_DOUBLE_EQ(of(Operation::exponential), std::exp(x));
+  EXPECT_DOUBLE_EQ(of(Operation::logarithm), std::log(x));
+  EXPECT_DOUBLE_EQ(of(Operation::sine), std::sin(x));
+  EXPECT_DOUBLE_EQ(of(Operation::cosine), std::cos(x));
+  EXPECT_DOUBLE_EQ(of(Operation::tangent), std::tan(x));
+  EXPECT_DOUBLE_EQ(of(Operation::arc_sine), std::asin(x));
+  EXPECT_DOUBLE_EQ(of(Operation::arc_cosine), std::acos(x));
+  EXPECT_DOUBLE_EQ(of(Operation::arc_tangent), std::atan(x));
+  EXPECT_DOUBLE_EQ(of(Operation::hyperbolic_tangent), std::tanh(x));
+  EXPECT_DOUBLE_EQ(value(g_.function(Operation::arc_tangent_2, x_, y_)), std::atan2(x, y));
 }
 
 TEST_F(GraphTest, ReachesWhatIsNeeded) {
@@ -129,7 +129,9 @@ TEST_F(GraphTest, KeepsNames) {
 TEST_F(GraphTest, SaysWhichInputHasNoValue) {
   const int sum = g_.add(x_, y_);
   const double one = 1.0;
-  EXPECT_EQ(error_of([&] { g_.evaluate({&sum, 1}, {&x_, 1}, {&one, 1}); }),
+  EXPECT_EQ(error_of([&] {
+              g_.evaluate({&sum, 1}, {&x_, 1}, {&one, 1});
+            }),
             "the input 'y' has no value; give one for each input that is needed");
 }
 

@@ -128,8 +128,8 @@ TEST(Tape, FusesProductsWithSumsAndSineWithCosine) {
 TEST(Tape, ComputesWhatIsKnownOnce) {
   Graph g;
   const Expression x = Expression::input(g, "x"), length = Expression::input(g, "length");
-  const int input = x.node_in(g), option = length.node_in(g),
-            result = (x / (sqrt(length) + 1)).node_in(g), known = exp(length).node_in(g);
+  const int input = x.node_in(g), option = length.node_in(g), result = (x / (sqrt(length) + 1)).node_in(g),
+            known = exp(length).node_in(g);
   const std::vector<int> results{result, known};
   const Tape tape(g, {&input, 1}, results, std::vector<Tape::Known>{{option, 4.0}});
   EXPECT_EQ(tape.instruction_count(), 1);
@@ -143,7 +143,9 @@ TEST(Tape, RefusesAnInputThatItIsNotGiven) {
   Graph g;
   const Expression x = Expression::input(g, "x"), speed = Expression::input(g, "speed");
   const int input = x.node_in(g), result = (x * speed).node_in(g);
-  EXPECT_EQ(error_of([&] { const Tape tape(g, {&input, 1}, {&result, 1}); }),
+  EXPECT_EQ(error_of([&] {
+              const Tape tape(g, {&input, 1}, {&result, 1});
+            }),
             "the formula reads 'speed', which is none of its arguments");
 }
 

@@ -24,7 +24,8 @@ std::vector<double> evaluate(const VehicleGraph& vehicle, const StepGraph& step,
 
 template <class Formula>
 void expect_same_curvature(bool ramp) {
-  const VehicleGraph staged_vehicle = trace(Formula{}), whole_vehicle = trace(Formula{}), best_vehicle = trace(Formula{});
+  const VehicleGraph staged_vehicle = trace(Formula{}), whole_vehicle = trace(Formula{}),
+                     best_vehicle = trace(Formula{});
   const StepGraph staged = StepGraph::make(staged_vehicle, ramp, StepCurvature::stages),
                   whole = StepGraph::make(whole_vehicle, ramp, StepCurvature::whole),
                   best = StepGraph::make(best_vehicle, ramp, StepCurvature::by_count);
@@ -34,7 +35,8 @@ void expect_same_curvature(bool ramp) {
   for (std::size_t k = 0; k < one.size(); ++k) EXPECT_NEAR(one[k], other[k], 1e-12 * (1.0 + std::abs(one[k]))) << k;
   const auto operations = [](const VehicleGraph& vehicle, const StepGraph& step) {
     std::vector<int> all = step.next;
-    for (const auto* nodes : {&step.jacobian.nodes, &step.hessian.nodes}) all.insert(all.end(), nodes->begin(), nodes->end());
+    for (const auto* nodes : {&step.jacobian.nodes, &step.hessian.nodes})
+      all.insert(all.end(), nodes->begin(), nodes->end());
     return vehicle.graph->count_operations(all);
   };
   EXPECT_LE(operations(best_vehicle, best), operations(staged_vehicle, staged));

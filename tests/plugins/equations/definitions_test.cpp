@@ -76,8 +76,9 @@ TEST(Definitions, RefuseWhatIsNotKnownNotOnceOrNotWithoutItself) {
   EXPECT_CONTAINS(why_not("a = somewhere_else"), "'somewhere_else' is not known; expected a state, an input");
   EXPECT_EQ(why_not("a = x\n\na = y"),
             "vehicle.yaml:3:1: there is an equation for 'a' in line 1 already; remove one of them");
-  EXPECT_CONTAINS(why_not("x = 2"), "'x' is a variable, whose value is given; an equation for a state is one for its "
-                                    "derivative, x' = ...");
+  EXPECT_CONTAINS(why_not("x = 2"),
+                  "'x' is a variable, whose value is given; an equation for a state is one for its "
+                  "derivative, x' = ...");
   EXPECT_EQ(why_not("a = b + 1\nb = sin(c)\nc = a"),
             "vehicle.yaml:3:5: 'a' needs itself: a -> b -> c -> a; write one of them without the others");
   EXPECT_CONTAINS(why_not("a = a"), "vehicle.yaml:1:5: 'a' needs itself: a -> a");
@@ -86,7 +87,8 @@ TEST(Definitions, RefuseWhatIsNotKnownNotOnceOrNotWithoutItself) {
 TEST(Definitions, RefuseWhatIsFiniteForNoValues) {
   EXPECT_EQ(why_not("a = x / 0"), "vehicle.yaml:1:7: this divides by 0");
   EXPECT_CONTAINS(why_not("a = x / (1 - 1)"), "this divides by 0");
-  EXPECT_CONTAINS(why_not("a = x + sqrt(-1)"), "vehicle.yaml:1:9: sqrt(...) is not a finite number, whatever the values");
+  EXPECT_CONTAINS(why_not("a = x + sqrt(-1)"),
+                  "vehicle.yaml:1:9: sqrt(...) is not a finite number, whatever the values");
   EXPECT_CONTAINS(why_not("a = log(0)"), "log(...) is not a finite number");
   EXPECT_CONTAINS(why_not("a = x * 10^400"), "this power is not a finite number");
 }

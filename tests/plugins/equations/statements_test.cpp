@@ -83,8 +83,9 @@ struct Mistake {
 };
 TEST(Statements, MistakesNamePlaceExpectationAndRemedy) {
   for (const auto& [text, message] : {
-           Mistake{"x = 2 y", "vehicle.yaml:10:11: found 'y', expected an operator or the end of the line; a product "
-                              "is written with '*'"},
+           Mistake{"x = 2 y",
+                   "vehicle.yaml:10:11: found 'y', expected an operator or the end of the line; a product "
+                   "is written with '*'"},
            {"x = (1 + y", "found the end, expected an operator or ')'"},
            {"x = 1 +", "vehicle.yaml:10:12: found the end of the line, expected a number, a name or '('"},
            {"x", "found the end of the line, expected '=' after the name"},

@@ -76,7 +76,7 @@ TEST_F(VehicleFileTest, SaysWhatAVehicleIs) {
   EXPECT_EQ(vehicle.options()[0].range.text(), "greater than 0");
   EXPECT_EQ(vehicle.options()[0].otherwise.size(), 3u);
   EXPECT_EQ(vehicle.equations().size(), 4u);
-  EXPECT_EQ(vehicle.equations()[0].place.line, 18);
+  EXPECT_EQ(vehicle.equations()[0].place.line, 17);
   EXPECT_EQ(vehicle.equations()[0].place.column, 3);
   EXPECT_EQ(vehicle.bounds().size(), 5u);
   EXPECT_TRUE(vehicle.bounds()[0].lower.empty());
@@ -85,7 +85,7 @@ TEST_F(VehicleFileTest, SaysWhatAVehicleIs) {
 
 TEST_F(VehicleFileTest, MistakesNameFileAndLine) {
   EXPECT_CONTAINS(why_not("unit: m, typical", "units: m, typical"),
-                  "a_vehicle.yaml:3: states.x.units: unknown key");
+                  "a_vehicle.yaml:3: states.x.units: 'x' of states has no option 'units'; did you mean 'unit'?");
   EXPECT_CONTAINS(why_not("typical: 10", "typical: -1"), "found '-1', expected a typical magnitude, greater than 0");
   EXPECT_CONTAINS(why_not("role: heading", "role: heding"), "heading");
   EXPECT_CONTAINS(why_not("role: other_heading", "role: heading"), "two of the states have the role 'heading'");
@@ -97,8 +97,8 @@ TEST_F(VehicleFileTest, MistakesNameFileAndLine) {
   EXPECT_CONTAINS(why_not("  width: 3", "  2w: 3"), "'2w' is no name");
   EXPECT_CONTAINS(why_not("  width: 3", "  sin: 3"), "'sin' is a function or a constant");
   EXPECT_CONTAINS(why_not("above: 0", "above: 0, at_least: 1"), "expected one of them");
-  EXPECT_CONTAINS(why_not("kappa * v", "kappa v"), "a_vehicle.yaml:18:14: found 'v', expected an operator");
-  EXPECT_CONTAINS(why_not("equations: |", "equation: |"), "unknown key");
+  EXPECT_CONTAINS(why_not("kappa * v", "kappa v"), "a_vehicle.yaml:17:14: found 'v', expected an operator");
+  EXPECT_CONTAINS(why_not("equations: |", "equation: |"), "did you mean 'equations'?");
   EXPECT_CONTAINS(error_of([&] { read("states: {x: }\noutputs: {x: }\n"); }), "it has no equations");
   EXPECT_CONTAINS(error_of([&] { read("outputs: {x: }\nequations: x' = 1\n"); }), "it has no states");
   EXPECT_CONTAINS(error_of([&] { read("states: {x: }\nequations: x' = 1\n"); }), "it has no outputs");
@@ -109,7 +109,8 @@ TEST_F(VehicleFileTest, MistakesNameFileAndLine) {
 
 // However a text is written in YAML, a mistake in it is found in its line.
 TEST_F(VehicleFileTest, PlacesAreThoseOfTheFile) {
-  EXPECT_CONTAINS(error_of([&] { read("states: {x: }\noutputs: {x: }\nequations: x' = 1 +\n"); }), "a_vehicle.yaml:3:19:");
+  EXPECT_CONTAINS(error_of([&] { read("states: {x: }\noutputs: {x: }\nequations: x' = 1 +\n"); }),
+                  "a_vehicle.yaml:3:20:");
   EXPECT_CONTAINS(error_of([&] { read("states: {x: }\noutputs: {x: }\nequations: |2\n    x' = 1 +\n"); }),
                   "a_vehicle.yaml:4:13:");
   EXPECT_CONTAINS(error_of([&] { read("states: {x: }\noutputs: {x: }\nequations: |\n\n\n   x' = 1\n   y = $\n"); }),
