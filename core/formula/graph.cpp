@@ -84,31 +84,46 @@ double value_of(Operation operation, double a, double b) noexcept {
   return a;
 }
 
-std::size_t Graph::NodeHash::operator()(const Node& node) const noexcept {
+namespace {
+
+std::uint64_t hash_of(const Graph::Node& node) noexcept {
   std::uint64_t hash = static_cast<std::uint64_t>(node.operation) * 0x9e3779b97f4a7c15u;
   const auto mix = [&](std::uint64_t part) {
     hash = (hash ^ part) * 0xff51afd7ed558ccdu;
     hash ^= hash >> 32;
   };
-  mix(static_cast<std::uint32_t>(node.a));
-  mix(static_cast<std::uint32_t>(node.b));
+  mix(static_cast<std::uint32_t>(node.a) | static_cast<std::uint64_t>(static_cast<std::uint32_t>(node.b)) << 32);
   mix(std::bit_cast<std::uint64_t>(node.value));
   return hash;
 }
 
-bool Graph::SameNode::operator()(const Node& left, const Node& right) const noexcept {
+bool is_same(const Graph::Node& left, const Graph::Node& right) noexcept {
   return left.operation == right.operation && left.a == right.a && left.b == right.b &&
          std::bit_cast<std::uint64_t>(left.value) == std::bit_cast<std::uint64_t>(right.value);
 }
 
+}  // namespace
+
+/// Where a node is in the table, or would be.
+std::size_t Graph::slot_of(const Node& node) const noexcept {
+  std::size_t slot = hash_of(node) & (slots_.size() - 1);
+  while (slots_[slot] >= 0 && !is_same((*this)[slots_[slot]], node)) slot = (slot + 1) & (slots_.size() - 1);
+  return slot;
+}
+
 int Graph::intern(const Node& node) {
-  const auto [place, is_new] = known_.try_emplace(node, size());
-  if (!is_new) return place->second;
+  if (2 * nodes_.size() >= slots_.size()) {
+    slots_.assign(std::max<std::size_t>(2 * slots_.size(), 1024), -1);
+    for (int known = 0; known < size(); ++known) slots_[slot_of((*this)[known])] = known;
+  }
+  const std::size_t slot = slot_of(node);
+  if (slots_[slot] >= 0) return slots_[slot];
   if (size() >= most_nodes)
     throw Error(fmt::format("a formula with its derivatives has more than {} operations; write it with fewer terms",
                             most_nodes));
+  slots_[slot] = size();
   nodes_.push_back(node);
-  return place->second;
+  return slots_[slot];
 }
 
 int Graph::constant(double value) {
@@ -116,8 +131,7 @@ int Graph::constant(double value) {
 }
 
 int Graph::input(std::string name) {
-  const int node = size();
-  nodes_.push_back({Operation::input, node});
+  const int node = intern({Operation::input, size()});  // its own number tells it from others
   this->name(node, std::move(name));
   return node;
 }

@@ -72,7 +72,7 @@ GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description
       kernels_(runnable_tape_kernels().back()) {
   check_description(description_, {.states = n_.x, .inputs = n_.u, .parameters = n_.p, .outputs = n_.y});
   steady_ = StepTapes(vehicle, false);
-  ramped_ = StepTapes(vehicle, true);
+  if (n_.p > 0) ramped_ = StepTapes(vehicle, true);
   Graph& graph = *vehicle.graph;
   const auto tape = [&](const std::vector<int>& inputs, const std::vector<int>& results) {
     return Tape(graph, inputs, results, vehicle.options);
@@ -119,16 +119,46 @@ void GraphModel::integrate(const Intervals& q) const noexcept {
   RHEC_ASSERT(q.count >= 0 && q.substeps >= 1, "whole intervals and Runge-Kutta steps");
   RHEC_ASSERT(q.count == 0 || (q.states && q.durations), "where to integrate");
   RHEC_ASSERT(q.count == 0 || !q.hessians || q.multipliers, "second derivatives are weighted by multipliers");
-  const StepTapes& of = tapes(q.parameters_end != nullptr);
+  if (q.substeps == 1 && !q.parameters_end && !q.jacobians && !q.hessians) return integrate_values(q);
+  const StepTapes& of = tapes(GraphSteps::is_ramp(q, n_.p));
   GraphSteps steps({&of.values, &of.jacobians, &of.hessians, kernels_, n_.x, n_.u, n_.p}, q, RHEC_STACK(stack_));
   for (int first = 0; first < q.count; first += GraphSteps::lanes)
     steps.integrate(first, std::min(GraphSteps::lanes, q.count - first));
 }
 
+/// One step without derivatives, as the defects of each iterate need it: as many rows at once as the stack holds.
+void GraphModel::integrate_values(const Intervals& q) const noexcept {
+  const Tape& tape = steady_.values;
+  double* const registers = RHEC_STACK(stack_);
+  const int most = tape.scratch(32) <= stack_ ? 32 : tape.scratch(16) <= stack_ ? 16 : 8;
+  for (int first = 0, count = 0; first < q.count; first += count) {
+    const int lanes = std::min(lanes_for(q.count - first), most);
+    count = std::min(lanes, q.count - first);
+    double* next = registers;
+    const auto load = [&](const double* rows, int columns) {
+      rows += static_cast<std::ptrdiff_t>(first) * columns;
+      for (int c = 0; c < columns; ++c, next += lanes) {
+        for (int i = 0; i < count; ++i) next[i] = rows[i * columns + c];
+        std::fill(next + count, next + lanes, next[count - 1]);
+      }
+    };
+    load(q.states, n_.x);
+    load(q.parameters, n_.p);
+    load(q.inputs, n_.u);
+    load(q.durations, 1);
+    tape.run(*kernels_, registers, lanes);
+    for (int j = 0; q.next_states && j < n_.x; ++j) {
+      double* const out = q.next_states + static_cast<std::ptrdiff_t>(first) * n_.x + j;
+      for (int i = 0; i < count; ++i) out[i * n_.x] = tape.result(j, registers, lanes, i);
+    }
+  }
+}
+
 void GraphModel::integrate_rows(const IntervalRows& q) const noexcept {
   if (q.substeps != 1) return Model::integrate_rows(q);
-  const StepTapes& of = tapes(q.ramp);
-  const int nz = n_.z(q.ramp);
+  const bool ramp = q.ramp && n_.p > 0;
+  const StepTapes& of = tapes(ramp);
+  const int nz = n_.z(ramp);
   const Tape& tape = q.hessians ? of.hessians : q.jacobians ? of.jacobians : of.values;
   const std::vector<int>& next = q.hessians    ? of.next_of_hessians
                                  : q.jacobians ? of.next_of_jacobians
@@ -141,7 +171,7 @@ void GraphModel::integrate_rows(const IntervalRows& q) const noexcept {
     int argument = nz;
     for (int i = 0; i < lanes; ++i) at(argument)[i] = q.durations[first + std::min(i, count - 1)];
     ++argument;
-    if (q.ramp) {
+    if (ramp) {
       std::fill_n(at(argument++), lanes, 0.0);
       std::fill_n(at(argument++), lanes, 1.0);
     }

@@ -13,7 +13,7 @@ void load_columns(const double* rows, int columns, int count, double* registers)
 GraphSteps::GraphSteps(const Parts& parts, const Model::Intervals& request, double* memory) noexcept
     : p_(parts),
       q_(request),
-      ramp_(request.parameters_end != nullptr),
+      ramp_(is_ramp(request, parts.np)),
       nz_(parts.nx + parts.nu + parts.np + (ramp_ ? parts.np : 0)) {
   const auto take = [&](int size) { return std::exchange(memory, memory + static_cast<std::ptrdiff_t>(size) * lanes); };
   const int nx = p_.nx;

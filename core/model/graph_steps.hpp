@@ -22,6 +22,8 @@ void load_columns(const double* rows, int columns, int count, double* registers)
 class GraphSteps {
  public:
   static constexpr int lanes = 8;
+  /// Without parameters there is nothing that could run along an interval.
+  static bool is_ramp(const Model::Intervals& request, int np) noexcept { return request.parameters_end && np > 0; }
   struct Parts {
     const Tape *values, *jacobians, *hessians;
     const TapeKernels* kernels;

@@ -26,7 +26,8 @@ namespace {
 std::vector<Variable> variables(const char* letter, int count) {
   std::vector<Variable> all;
   for (int k = 0; k < count; ++k)
-    all.push_back({.name = letter + std::to_string(k), .unit = "1", .lower = -0.8, .upper = 0.8, .scale = 0.5});
+    all.push_back(
+        {.name = letter + std::to_string(k), .unit = "1", .meaning = "any", .lower = -0.8, .upper = 0.8, .scale = 0.5});
   return all;
 }
 
@@ -42,13 +43,13 @@ ModelDescription describe() {
 }
 
 template <class Formula>
-class Traced : public testing::Test {
+class Traced : public ::testing::Test {
  protected:
   FormulaModel<Formula> compiled_{Formula{}, describe<Formula>()};
   GraphModel interpreted_{trace(Formula{}), describe<Formula>()};
 };
-using Formulas = testing::Types<BicycleSlip, UnicycleTraction, TractorTrailer, BicycleSideslip, SkidSteer, Articulated,
-                                EveryFunction, testing::Integrator>;
+using Formulas = ::testing::Types<BicycleSlip, UnicycleTraction, TractorTrailer, BicycleSideslip, SkidSteer,
+                                  Articulated, EveryFunction, testing::Integrator>;
 TYPED_TEST_SUITE(Traced, Formulas);
 
 /// To 1e-12 of the largest entry of the same stage.
@@ -148,6 +149,69 @@ TEST(GraphModel, RefusesWhatDoesNotFitOnTheStack) {
                   "write it with fewer states or terms");
 }
 
+/// Masses on springs in a row, whose last one is driven (Wirsching, Bock and Diehl 2006): 39 states with six masses.
+struct MassesOnSprings {
+  static constexpr int masses = 6, state_count = 6 * masses + 3, input_count = 3, parameter_count = 0, output_count = 3;
+  template <class Scalar>
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar*, Scalar* dxdt) const {
+    using std::sqrt;
+    constexpr int ends = 3 * (masses + 1);  // positions; velocities stand behind them
+    Scalar force[ends];
+    for (int i = 0; i <= masses; ++i) {
+      Scalar stretch[3];
+      for (int k = 0; k < 3; ++k) stretch[k] = i == 0 ? x[k] + 0.3 : x[3 * i + k] - x[3 * i - 3 + k] + 0.3;
+      const Scalar length = sqrt(stretch[0] * stretch[0] + stretch[1] * stretch[1] + stretch[2] * stretch[2] + 0.01);
+      for (int k = 0; k < 3; ++k) force[3 * i + k] = 30.0 * (1.0 - 0.03 / length) * stretch[k];
+    }
+    for (int j = 0; j < 3 * masses; ++j) {
+      dxdt[j] = x[ends + j];
+      dxdt[ends + j] = force[j + 3] - force[j] - (j % 3 == 2 ? 9.81 : 0.0);
+    }
+    for (int k = 0; k < 3; ++k) dxdt[3 * masses + k] = u[k];
+  }
+  template <class Scalar>
+  void outputs(const Scalar* x, Scalar* y) const {
+    for (int k = 0; k < 3; ++k) y[k] = x[3 * masses + k];
+  }
+};
+
+TEST(GraphModel, TakesManyStates) {
+  const GraphModel model(trace(MassesOnSprings{}), describe<MassesOnSprings>());
+  const checks::Stages at = checks::random_stages(model, 8, false, 3);
+  checks::Stages here = at;
+  here.substeps = 2;
+  here.durations.assign(8, 0.05);
+  model.integrate(here.intervals(true, true, true));
+  // Along a random direction: values by first derivatives, and these by second ones.
+  constexpr int nx = MassesOnSprings::state_count, nz = nx + 3;
+  std::vector<double> direction(nz);
+  for (int c = 0; c < nz; ++c) direction[c] = std::sin(1.7 * c + 0.4);
+  const double h = 1e-5;
+  std::vector<checks::Stages> moved(2, here);
+  for (int side = 0; side < 2; ++side) {
+    for (int i = 0; i < 8; ++i) {
+      for (int c = 0; c < nx; ++c) moved[side].x[i * nx + c] += (side ? -h : h) * direction[c];
+      for (int c = 0; c < 3; ++c) moved[side].u[i * 3 + c] += (side ? -h : h) * direction[nx + c];
+    }
+    model.integrate(moved[side].intervals(true, true, true));
+  }
+  for (int i = 0; i < 8; ++i) {
+    for (int r = 0; r < nx; ++r) {
+      double slope = 0.0;
+      for (int c = 0; c < nz; ++c) slope += here.jacobians[(i * nz + c) * nx + r] * direction[c];
+      EXPECT_NEAR(slope, (moved[0].next[i * nx + r] - moved[1].next[i * nx + r]) / (2 * h), 1e-7);
+    }
+    for (int d = 0; d < nz; ++d) {
+      double bend = 0.0, expected = 0.0;
+      for (int c = 0; c < nz; ++c) bend += here.hessians[(i * nz + d) * nz + c] * direction[c];
+      for (int r = 0; r < nx; ++r)
+        expected += here.weights[i * nx + r] *
+                    (moved[0].jacobians[(i * nz + d) * nx + r] - moved[1].jacobians[(i * nz + d) * nx + r]) / (2 * h);
+      EXPECT_NEAR(bend, expected, 1e-6);
+    }
+  }
+}
+
 TEST(GraphModel, StraightMotionIsAGraphToo) {
   const VehicleGraph vehicle = trace(SkidSteer{});
   Graph& graph = *vehicle.graph;
@@ -159,8 +223,8 @@ TEST(GraphModel, StraightMotionIsAGraphToo) {
   double state[3] = {7, 7, 7}, inputs[2] = {};
   const double slips[3] = {0.5, 0.0, 0.0};
   model.straight_motion(3.0, slips, state, inputs);
-  EXPECT_THAT(inputs, testing::ElementsAre(6.0, 6.0));
-  EXPECT_THAT(state, testing::ElementsAre(7.0, 1.5, 7.0));
+  EXPECT_THAT(inputs, ::testing::ElementsAre(6.0, 6.0));
+  EXPECT_THAT(state, ::testing::ElementsAre(7.0, 1.5, 7.0));
 }
 
 TEST(GraphModel, SaysWhatItCosts) {

@@ -101,20 +101,14 @@ class RHEC_EXPORT Graph {
                                std::span<const double> values) const;
 
  private:
-  struct NodeHash {
-    std::size_t operator()(const Node& node) const noexcept;
-  };
-  struct SameNode {
-    bool operator()(const Node& left, const Node& right) const noexcept;
-  };
-
+  std::size_t slot_of(const Node& node) const noexcept;
   int intern(const Node& node);
   double value(int node) const noexcept { return (*this)[node].value; }
   /// The operand of a negation; -1 of any other node.
   int negated(int node) const noexcept;
 
   std::vector<Node> nodes_;
-  std::unordered_map<Node, int, NodeHash, SameNode> known_;
+  std::vector<int> slots_;  ///< a hash table of nodes, of a power of two; -1 where it is free
   std::unordered_map<int, std::string> names_;
 };
 

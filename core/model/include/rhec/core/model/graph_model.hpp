@@ -67,6 +67,7 @@ class RHEC_EXPORT GraphModel : public Model {
   static Cost cost_of(const Tape& tape) noexcept {
     return {tape.instruction_count(), tape.run_count(), tape.register_count()};
   }
+  void integrate_values(const Intervals& request) const noexcept;
   const StepTapes& tapes(bool ramp) const noexcept { return ramp ? ramped_ : steady_; }
   void set_weights(const NodeRows& request, int first, int count, double* registers, int lanes) const noexcept;
   void store_outputs(const NodeRows& request, int first, int count, const Tape& tape, const double* registers,
