@@ -52,6 +52,7 @@ template Argument Command::add(const std::string&, double&, const std::string&);
 template Argument Command::add(const std::string&, std::optional<double>&, const std::string&);
 template Argument Command::add(const std::string&, std::string&, const std::string&);
 template Argument Command::add(const std::string&, std::optional<std::string>&, const std::string&);
+template Argument Command::add(const std::string&, std::vector<std::string>&, const std::string&);
 
 namespace {
 CLI::Option* one_value_each_time(CLI::Option* option) {

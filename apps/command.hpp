@@ -42,7 +42,8 @@ class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
 
-  /// An argument that is read into `variable`: an int, a double, a std::string, or a std::optional of the latter two.
+  /// An argument that is read into `variable`: an int, a double, a std::string, a std::optional of the
+  /// latter two, or a vector of texts, which takes several words.
   /// `names` are "-o,--out" for an option, "scenario" for what is given by its place.
   template <class Variable>
   Argument add(const std::string& names, Variable& variable, const std::string& meaning);

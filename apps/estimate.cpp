@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/horizons/horizon_log.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
+#include "rhec/sim/maps/map_keeper.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -48,6 +50,18 @@ void print_table(const sim::RecordedLog& log, const std::vector<sim::Replay>& re
   fmt::print("\npictures and numbers: {}\n", folder.string());
 }
 
+/// Variants replay the same drive: what one has found is no earlier visit for another.
+void refuse_shared_maps(const sim::LogScenario& scenario) {
+  std::set<std::string> files;
+  for (const sim::LogVariant& variant : scenario.variants()) {
+    const MemorySection& memory = variant.robot.memory();
+    if (memory.is_given() && !memory.options().file.empty() && !files.insert(memory.options().file).second)
+      throw memory.section().error(fmt::format(
+          "the variant '{}' names the map '{}' of another variant; expected a file of its own, or '--variant'",
+          variant.name, memory.options().file));
+  }
+}
+
 int estimate(const EstimateArguments& arguments) {
   const LogInput input(arguments);
   const auto& [scenario, hold_out, log] = input;
@@ -55,6 +69,8 @@ int estimate(const EstimateArguments& arguments) {
   Dump dump(arguments.dump, {"rhe"});
   std::vector<sim::Replay> replays;
   std::vector<sim::HorizonLog> horizons;
+  refuse_shared_maps(scenario);
+  std::vector<std::shared_ptr<sim::MapKeeper>> keepers;
   // Limits the number of nodes: one per fix, and one per step between fixes.
   const double seconds = log.rows.back().time - log.rows.front().time;
   bool all_usable = true;
@@ -64,10 +80,13 @@ int estimate(const EstimateArguments& arguments) {
         variant.name == scenario.name() ? variant.name : fmt::format("{}/{}", scenario.name(), variant.name);
     const auto nodes = static_cast<std::int64_t>(seconds / variant.robot.step()) + std::ssize(log.fixes);
     horizons.emplace_back(variant.robot, nodes, most_windows / std::ssize(scenario.variants()));
+    const auto keeper = std::make_shared<sim::MapKeeper>();
     replays.push_back(sim::replay(variant.robot, log, scenario.log(), hold_out,
                                   {.progress = [&](double share) { bar.show(share); },
                                    .solved = dump.watch(run, variant.robot),
-                                   .sampled = [&](const sim::LoopSample& sample) { horizons.back().take(sample); }}));
+                                   .sampled = [&](const sim::LoopSample& sample) { horizons.back().take(sample); },
+                                   .robot = keeper}));
+    keepers.push_back(keeper);
     replays.back().name = variant.name;
     all_usable = all_usable && replays.back().counts.fallbacks == 0;
   }
@@ -76,6 +95,7 @@ int estimate(const EstimateArguments& arguments) {
   folder.write("times.csv", sim::times_csv(replays));
   folder.write("horizons.jsonl", sim::horizons_text(horizons, log, scenario, hold_out));
   folder.write("run.svg", sim::replay_svg(replays.front(), log, scenario));
+  for (const auto& keeper : keepers) keeper->save();
   folder.commit();
   dump.commit();
   print_table(log, replays, hold_out, folder.path());

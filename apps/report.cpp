@@ -63,7 +63,7 @@ int report(const ReportArguments& arguments) {
 void add_report(Program& program) {
   auto arguments = std::make_shared<ReportArguments>();
   Command command = program.add(
-      "report", "Makes a page to look at of a run, an estimation, a sweep or a comparison of solvers.",
+      "report", "Makes a page to look at of a run, an estimation, a sweep, a comparison of solvers or a map of slip.",
       "The page is one HTML file that needs no network: open it in a browser. It has every figure with its numbers, "
       "and a\n"
       "window that can be moved through a run: blocks, measurements, the plan.\n\n"
@@ -74,7 +74,7 @@ void add_report(Program& program) {
       [arguments] { return report(*arguments); });
   command
       .add("source", arguments->source,
-           "the folder of 'rhec run' or 'rhec estimate', the database of 'rhec sweep', or compare.json")
+           "the folder of 'rhec run' or 'rhec estimate', the database of 'rhec sweep', compare.json, or a map of slip")
       .value("RUN_OR_DB_OR_COMPARISON")
       .required();
   command.add("-o,--out", arguments->page, "the page").value("FILE").shows_default();

@@ -11,12 +11,14 @@
 #include "commands.hpp"
 #include "dump.hpp"
 #include "progress.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/horizons/horizon_log.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
 #include "rhec/sim/loop/run_files.hpp"
+#include "rhec/sim/maps/map_keeper.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -94,19 +96,33 @@ void print_table(const sim::RunSummary& summary, const sim::Scenario& scenario, 
   fmt::print("pictures and numbers: {}\n", folder.string());
 }
 
+/// What is remembered of places now.
+void print_map(const sim::MapKeeper& keeper) {
+  if (keeper.cells() == 0) return;
+  fmt::print("map: {} cells{}\n", keeper.cells(),
+             keeper.file().empty() ? ", kept in no file" : " in " + keeper.file().string());
+  if (keeper.dropped() > 0)
+    fmt::print("{} values found no room on the map; give estimator.memory.cells a larger number\n", keeper.dropped());
+}
+
 int run(const RunArguments& arguments) {
   Settings settings = load_yaml(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   const sim::Scenario scenario(Host(arguments.plugin_path), settings);
+  if (scenario.robot().memory().is_given() && arguments.dump.folder)
+    throw Error(
+        "--dump: problems of a controller that knows the slip ahead cannot be saved yet; give estimator.memory=none");
   sim::OutputFolder folder(arguments.out);
   Dump dump(arguments.dump, {"rhe", "rhc"});
   ProgressBar bar(scenario.options().name);
   const double samples = scenario.path().length() / (scenario.options().speed * scenario.robot().step());
   sim::HorizonLog horizons(scenario.robot(), static_cast<std::int64_t>(samples) + 1);
+  const auto keeper = std::make_shared<sim::MapKeeper>();
   const sim::RunLog log =
       sim::run_closed_loop(scenario, {.progress = [&](double share) { bar.show(share); },
                                       .solved = dump.watch(scenario.options().name, scenario.robot()),
-                                      .sampled = [&](const sim::LoopSample& sample) { horizons.take(sample); }});
+                                      .sampled = [&](const sim::LoopSample& sample) { horizons.take(sample); },
+                                      .robot = keeper});
   bar.finish();
   const sim::RunSummary summary = sim::summarise(log, scenario);
   folder.write("steps.csv", sim::steps_csv(log, scenario));
@@ -114,9 +130,11 @@ int run(const RunArguments& arguments) {
   folder.write("summary.json", sim::summary_json(summary));
   folder.write("horizons.jsonl", sim::horizons_text(horizons, log, scenario));
   folder.write("run.svg", sim::run_svg(log, scenario));
+  keeper->save();
   folder.commit();
   dump.commit();
   print_table(summary, scenario, folder.path());
+  print_map(*keeper);
   dump.tell(arguments.plugin_path);
   return log.completed ? exit_fine : exit_not_solved;
 }

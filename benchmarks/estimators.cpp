@@ -7,7 +7,9 @@
 //
 // What stands after --beside is a name and assignments, separated by ';'. After --smoothed it is the same, and the
 // estimates are those of the smoother over the whole drive; its time is that of an interval. scripts/measure/estimators
-// runs the whole grid.
+// runs the whole grid. --first 'ASSIGNMENT; ...' makes another drive before, of which nothing is printed,
+// with these assignments in addition; estimators that remember places keep their maps. scripts/measure/second-lap uses
+// that.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -75,11 +77,27 @@ class Forwarding final : public EstimationMethod {
   }
   void prepare() noexcept override { inner_->prepare(); }
   void reset() noexcept override { inner_->reset(); }
+  void end_drive() noexcept override { inner_->end_drive(); }
+  std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return inner_->slip_ahead(); }
 
  private:
   std::unique_ptr<EstimationMethod> inner_;
   std::vector<Beside>& others_;
   double time_ = 0.0;
+};
+
+/// Keeps the map of an estimator from drive to drive.
+class KeepingHooks final : public RobotHooks {
+ public:
+  explicit KeepingHooks(std::shared_ptr<SlipMap>& kept) : kept_(kept) {}
+  std::shared_ptr<SlipMap> provide_map(const MemorySection&, std::shared_ptr<SlipMap> map) const override {
+    if (!kept_) kept_ = std::move(map);
+    kept_->begin_drive(kept_->time());
+    return kept_;
+  }
+
+ private:
+  std::shared_ptr<SlipMap>& kept_;
 };
 
 class ForwardingHooks final : public RobotHooks {
@@ -153,7 +171,7 @@ void smooth(const sim::Scenario& variant, const Eigen::VectorXd& start, Beside& 
 }
 
 struct Arguments {
-  std::string scenario;
+  std::string scenario, first;
   std::vector<std::string> assignments, beside, smoothed;
 };
 
@@ -171,8 +189,10 @@ Arguments read(int count, char** words) {
       arguments.beside.push_back(value);
     else if (word == "--smoothed")
       arguments.smoothed.push_back(value);
+    else if (word == "--first")
+      arguments.first = value;
     else
-      throw Error("'" + word + "' is none of --scenario, --set, --beside, --smoothed");
+      throw Error("'" + word + "' is none of --scenario, --set, --beside, --smoothed, --first");
   }
   if (arguments.scenario.empty()) throw Error("--scenario FILE is missing");
   return arguments;
@@ -190,17 +210,19 @@ sim::Scenario scenario_with(const Host& host, const Arguments& arguments, const 
   return {host, settings};
 }
 
-void run(const Arguments& arguments) {
-  const Host host;
-  sim::Scenario driver = scenario_with(host, arguments, "");
+/// One drive; `maps` are those of the estimators, in their order.
+void drive(const Host& host, const Arguments& arguments, const std::string& more,
+           std::vector<std::shared_ptr<SlipMap>>& maps, bool is_printed) {
+  sim::Scenario driver = scenario_with(host, arguments, more);
   std::vector<sim::Scenario> variants;
   std::vector<Beside> others;
   variants.reserve(arguments.beside.size() + arguments.smoothed.size());
   const auto add = [&](const std::string& beside, std::shared_ptr<NodeLog> nodes) {
     const std::size_t colon = beside.find(':');
     if (colon == std::string::npos) throw Error("'" + beside + "': expected 'NAME: ASSIGNMENT; ...'");
-    variants.push_back(scenario_with(host, arguments, beside.substr(colon + 1)));
+    variants.push_back(scenario_with(host, arguments, more + ";" + beside.substr(colon + 1)));
     Robot robot = variants.back().robot();
+    robot.add_hooks(std::make_shared<KeepingHooks>(maps[others.size()]));
     if (nodes) robot.add_hooks(recording_nodes(nodes));
     others.push_back({.name = beside.substr(0, colon), .estimator = robot.make_estimator(driver.initial_state())});
     others.back().nodes = std::move(nodes);
@@ -211,6 +233,8 @@ void run(const Arguments& arguments) {
   sim::LoopHooks hooks;
   hooks.robot = std::make_shared<ForwardingHooks>(others);
   const sim::RunLog log = sim::run_closed_loop(driver, hooks);
+  for (Beside& other : others) other.estimator->end_drive();
+  if (!is_printed) return;
   for (std::size_t i = 0; i < others.size(); ++i)
     if (others[i].nodes) smooth(variants[i], driver.initial_state(), others[i]);
   for (Beside& other : others) {
@@ -235,6 +259,13 @@ void run(const Arguments& arguments) {
     fmt::print("{{\"estimator\": \"{}\", {}, \"median_us\": {:.4g}{}{}}}\n", other.name, errors.json(), *middle, laws,
                noise);
   }
+}
+
+void run(const Arguments& arguments) {
+  const Host host;
+  std::vector<std::shared_ptr<SlipMap>> maps(arguments.beside.size() + arguments.smoothed.size());
+  if (!arguments.first.empty()) drive(host, arguments, arguments.first, maps, false);
+  drive(host, arguments, "", maps, true);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "rhec/core/control/controller.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -8,6 +9,7 @@
 
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/control/slip_ahead_model.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 
 namespace rhec {
@@ -27,6 +29,7 @@ RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Se
       throw Error("controller: blocking: " + reason);
   if (!(setup.interval > 0.0))
     throw Error(fmt::format("controller: interval {} s; expected a positive number", setup.interval));
+  if (setup.ahead) model = std::make_shared<SlipAheadModel>(std::move(model));
   return {std::move(model), setup.problem};
 }
 
@@ -59,7 +62,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count());
   for (std::vector<double>* motion : {&straight_, &slipless_, &largest_}) motion->assign(nx + nu, 0.0);
   nominal_parameters_ = nominal_values(vehicle.description().parameters);
-  reference_parameters_ = nominal_parameters_;
+  reference_parameters_ = ahead_parameters_ = nominal_parameters_;
   go_straight(1.0, nominal_parameters_.data(), slipless_);
   if (std::all_of(slipless_.begin(), slipless_.end(), [](double value) { return value == 0.0; }))
     throw Error(
@@ -106,15 +109,36 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
   reference_segment_ = segment;
   const double ground_speed = command_.reference.speed, distance = setup_.interval * std::abs(ground_speed);
   bound_speed(setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset);
-  choose_straight_motion(ground_speed, parameters);
-  for (int j = 0; j < nu; ++j)
-    straight_[nx + j] = std::min(std::max(straight_[nx + j], problem_.input_lower(0, j)), problem_.input_upper(0, j));
   for (int i = 0; i <= N; ++i) {
+    if (i == 0 || (setup_.ahead && i < N)) {
+      const int np = vehicle.parameter_count();
+      for (int j = 0; j < np; ++j)
+        ahead_parameters_[j] = parameters[j] + (setup_.ahead ? problem_.interval_data(i)[j] : 0.0);
+      choose_straight_motion(ground_speed, ahead_parameters_.data());
+      for (int j = 0; j < nu; ++j)
+        straight_[nx + j] =
+            std::min(std::max(straight_[nx + j], problem_.input_lower(0, j)), problem_.input_upper(0, j));
+    }
     const PathPoint target = path_.point_at(arc_length + i * distance, segment);
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
     if (i < N) std::copy_n(straight_.data() + nx, nu, problem_.input_reference(i));
+  }
+}
+
+/// Writes how slip changes from where the vehicle is to the intervals of the horizon, at the places where it shall be.
+void Controller::look_ahead(double arc_length, const double* parameters) noexcept {
+  if (!setup_.ahead) return;
+  int segment = reference_segment_;
+  const PathPoint start = path_.point_at(arc_length, segment);
+  const std::array here{start.x, start.y};
+  const double distance = setup_.interval * std::abs(start.speed);
+  for (int i = 0; i < problem_.intervals(); ++i) {
+    const double way = (i + 0.5) * distance;  // to the middle of the interval, for which the slip holds
+    const PathPoint point = path_.point_at(arc_length + way, segment);
+    const std::array there{point.x, point.y};
+    setup_.ahead->change(here.data(), there.data(), way, parameters, problem_.interval_data(i));
   }
 }
 
@@ -163,6 +187,8 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   follower_.advance(estimate.state[roles.position_x], estimate.state[roles.position_y]);
   std::copy_n(estimate.state.data(), nx, problem_.given_state());
   std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
+  // What is prepared is linearised with the slip that was expected then.
+  if (!prepared_) look_ahead(follower_.arc_length(), estimate.parameters.data());
   set_reference(follower_.arc_length(), estimate.parameters.data());
   command_.relaxed = problem_.finish(scratch_) > 0;
   bool from_plan = has_plan_;
@@ -214,7 +240,9 @@ void Controller::prepare() noexcept {
   std::copy_n(point_.state(1), nx, problem_.given_state());
   std::copy_n(problem_.given_parameters(), np, reference_parameters_.data());
   const PathPoint reference = command_.reference;
-  set_reference(follower_.arc_length() + setup_.interval * std::abs(reference.speed), reference_parameters_.data());
+  const double next = follower_.arc_length() + setup_.interval * std::abs(reference.speed);
+  look_ahead(next, reference_parameters_.data());
+  set_reference(next, reference_parameters_.data());
   command_.reference = reference;
   problem_.finish(scratch_);
   if (!shifter_.apply(1, problem_, point_)) return;

@@ -12,7 +12,9 @@
 namespace rhec {
 
 BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup setup)
-    : setup_(std::move(setup)), history_(PriorBank(model, setup_.bank), setup_.remembered_nodes) {
+    : setup_(std::move(setup)),
+      history_(PriorBank(model, setup_.bank), setup_.remembered_nodes,
+               setup_.place.map ? PlaceMemory::remembered_nodes(setup_.place, setup_.remembered_nodes) : 0) {
   const Eigen::Index nx = model->state_count(), np = model->parameter_count();
   if (setup_.initial_state.size() != nx || setup_.initial_covariance.rows() != nx ||
       setup_.initial_covariance.cols() != nx)
@@ -41,12 +43,15 @@ BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup 
     found_.parameters = mean_.tail(np);
     found_.covariance = covariance_;
   }
+  if (setup_.place.map)
+    place_ = std::make_shared<PlaceMemory>(model, history_.bank(), setup_.bank, setup_.remembered_nodes, setup_.place);
   nothing_.assign(model->output_count(), std::numeric_limits<double>::quiet_NaN());
   reset();
 }
 
 void BankEstimation::reset() noexcept {
   history_.bank().reset(setup_.initial_state, setup_.initial_covariance);
+  if (place_) place_->reset();
   if (search_) search_->reset();
   searching_ = search_ != nullptr;
   searched_ = 0;
@@ -54,7 +59,11 @@ void BankEstimation::reset() noexcept {
 
 void BankEstimation::start(const double* outputs) noexcept {
   reset();
-  if (!searching_) return history_.start(outputs);
+  if (!searching_) {
+    history_.start(outputs);
+    if (place_) place_->add_node(history_);
+    return;
+  }
   search_->start(outputs);
   start_bank_if_found();
 }
@@ -66,6 +75,7 @@ void BankEstimation::start_bank_if_found() noexcept {
   const Eigen::Index nx = setup_.initial_state.size();
   history_.bank().reset(found_.state, found_.covariance.topLeftCorner(nx, nx));
   history_.start(nothing_.data(), searched_);
+  if (place_) place_->add_node(history_);
   searching_ = false;
 }
 
@@ -75,17 +85,27 @@ void BankEstimation::add_node(double duration, const double* inputs, const doubl
     if (duration > 0.0 && std::isfinite(duration)) ++searched_;
     return start_bank_if_found();
   }
-  if (duration > 0.0 && std::isfinite(duration))
-    history_.add(duration, inputs, outputs);
-  else
-    history_.amend(0, outputs);
+  if (!(duration > 0.0 && std::isfinite(duration))) {
+    amend(0, outputs);
+    return;
+  }
+  history_.add(duration, inputs, outputs);
+  if (place_) place_->add_node(history_);
 }
 
 bool BankEstimation::amend(int back, const double* outputs) noexcept {
-  if (!searching_) return history_.amend(back, outputs);
+  if (!searching_) {
+    if (!history_.amend(back, outputs)) return false;
+    if (place_) place_->amend(history_, history_.newest() - back);
+    return true;
+  }
   if (!search_->amend(back, outputs)) return false;
   start_bank_if_found();
   return true;
+}
+
+void BankEstimation::end_drive() noexcept {
+  if (place_ && !searching_) place_->finish(history_);
 }
 
 std::optional<EstimationMethod::OutputNoise> BankEstimation::output_noise(int output) const noexcept {
@@ -97,6 +117,7 @@ std::optional<EstimationMethod::OutputNoise> BankEstimation::output_noise(int ou
 void BankEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   if (searching_) return search_->estimate(result, deadline);
   history_.bank().moments(mean_, covariance_);
+  fuse_place(mean_, covariance_);
   const Eigen::Index nx = setup_.initial_state.size(), np = mean_.size() - nx;
   result.state = mean_.head(nx);
   result.parameters = mean_.tail(np);

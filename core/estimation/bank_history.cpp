@@ -9,16 +9,25 @@
 
 namespace rhec {
 
-BankHistory::BankHistory(PriorBank bank, int nodes)
+BankHistory::BankHistory(PriorBank bank, int nodes, int filtered)
     : bank_(std::move(bank)),
+      late_nodes_(std::max(nodes, 1)),
+      keeps_filtered_(filtered > 0),
       nu_(static_cast<std::size_t>(bank_.model().input_count())),
       ny_(static_cast<std::size_t>(bank_.model().output_count())),
-      intervals_(static_cast<std::size_t>(std::max(nodes, 1))),
+      np_(static_cast<std::size_t>(bank_.model().state_count() + bank_.model().parameter_count())),
+      intervals_(static_cast<std::size_t>(std::max(late_nodes_, filtered))),
       inputs_(intervals_.size() * nu_),
       outputs_(intervals_.size() * ny_),
       given_weights_(outputs_.size()),
       used_weights_(outputs_.size()),
-      predicted_(intervals_.size() * bank_.state_size()) {}
+      predicted_(intervals_.size() * bank_.state_size()) {
+  if (!keeps_filtered_) return;
+  filtered_.assign(predicted_.size(), 0.0);
+  means_.assign(intervals_.size() * np_, 0.0);
+  covariances_.assign(intervals_.size() * np_ * np_, 0.0);
+  bank_.moments(mean_, covariance_);  // takes on their sizes
+}
 
 void BankHistory::begin_node(const double* outputs) noexcept {
   const std::size_t at = place(newest_);
@@ -32,6 +41,12 @@ void BankHistory::begin_node(const double* outputs) noexcept {
 void BankHistory::update(std::size_t place) noexcept {
   bank_.update(outputs_.data() + place * ny_, given_weights_.data() + place * ny_);
   for (std::size_t j = 0; j < ny_; ++j) used_weights_[place * ny_ + j] = bank_.robust_weight(static_cast<int>(j));
+  intervals_[place].log_likelihood = bank_.log_likelihood();
+  if (!keeps_filtered_) return;
+  bank_.save(filtered_.data() + place * bank_.state_size());
+  bank_.moments(mean_, covariance_);
+  std::copy_n(mean_.data(), np_, means_.data() + place * np_);
+  std::copy_n(covariance_.data(), np_ * np_, covariances_.data() + place * np_ * np_);
 }
 
 void BankHistory::start(const double* outputs, std::int64_t number) noexcept {
@@ -52,7 +67,7 @@ void BankHistory::add(double duration, const double* inputs, const double* outpu
 }
 
 bool BankHistory::amend(int back, const double* outputs) noexcept {
-  if (back < 0 || back >= count_) return false;
+  if (back < 0 || back >= std::min(count_, late_nodes_)) return false;
   const std::int64_t amended = newest_ - back;
   double* const known = outputs_.data() + place(amended) * ny_;
   for (std::size_t j = 0; j < ny_; ++j)
@@ -73,9 +88,9 @@ void BankHistory::filter_from(std::int64_t number) noexcept {
   }
 }
 
-void BankHistory::reweigh(std::int64_t number, const double* robust_weights) noexcept {
+bool BankHistory::reweigh(std::int64_t number, const double* robust_weights) noexcept {
   constexpr double much = 1.25;
-  if (number > newest_ || number <= newest_ - count_) return;
+  if (number > newest_ || number <= newest_ - count_) return false;
   const std::size_t first = place(number) * ny_;
   bool differs = false;
   for (std::size_t j = 0; j < ny_; ++j) {
@@ -83,9 +98,10 @@ void BankHistory::reweigh(std::int64_t number, const double* robust_weights) noe
     if (std::isnan(outputs_[first + j]) || !std::isfinite(ratio)) continue;
     differs = differs || ratio > much || ratio < 1.0 / much;
   }
-  if (!differs) return;
+  if (!differs) return false;
   std::copy_n(robust_weights, ny_, given_weights_.data() + first);
   filter_from(number);
+  return true;
 }
 
 BankHistory::Node BankHistory::node(std::int64_t number) const noexcept {
@@ -95,7 +111,12 @@ BankHistory::Node BankHistory::node(std::int64_t number) const noexcept {
           .distance = intervals_[at].distance,
           .inputs = inputs_.data() + at * nu_,
           .outputs = outputs_.data() + at * ny_,
-          .predicted = predicted_.data() + at * bank_.state_size()};
+          .predicted = predicted_.data() + at * bank_.state_size(),
+          .robust_weights = used_weights_.data() + at * ny_,
+          .log_likelihood = intervals_[at].log_likelihood,
+          .filtered = keeps_filtered_ ? filtered_.data() + at * bank_.state_size() : nullptr,
+          .mean = keeps_filtered_ ? means_.data() + at * np_ : nullptr,
+          .covariance = keeps_filtered_ ? covariances_.data() + at * np_ * np_ : nullptr};
 }
 
 }  // namespace rhec

@@ -91,6 +91,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     throw Error("bank: expected one variance for every output and every input");
   if (!setup_.initial_parameters.empty() && static_cast<int>(setup_.initial_parameters.size()) != np_)
     throw Error("bank: expected initial knowledge of every parameter, or of none");
+  if (setup_.map) check_map();
   n_ = nx_;
   for (int j = 0; j < np_; ++j) {
     Process process;
@@ -106,6 +107,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     process.F.assign(size * lanes_, 0.0);
     process.Q.assign(size * lanes_, 0.0);
     process.ramp.assign(lanes_, 0.0);
+    process.offset.assign(setup_.map ? lanes_ : 0, 0.0);
     for (int m = 0; m < members_; ++m) process.ramp[m] = setup_.members[m][j]->course() == Course::ramp ? 1.0 : 0.0;
     n_ += process.count;
     processes_.push_back(std::move(process));
@@ -141,6 +143,8 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   jacobian_rows_.assign(M * nx * columns, 0.0);
   output_rows_.assign(M * ny_, 0.0);
   gradient_rows_.assign(M * ny_ * nx, 0.0);
+  map_means_.assign(2 * static_cast<std::size_t>(np_), 0.0);
+  map_variances_ = map_means_;
   input_.assign(nu_, 0.0);
   variances_.assign(nu_, 0.0);
   for (auto* v : {&start_, &own_, &own_covariance_, &filled_, &filled_covariance_})
@@ -247,14 +251,11 @@ void PriorBank::update(const double* y, const double* robust_weights) noexcept {
                                 .measured = y[j],
                                 .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
   }
+  log_likelihood_ = 0.0;
   if (taken == 0) return;
   if (!setup_.robust.empty()) weigh_outputs(y, taken, robust_weights);
   bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                         innovation_variances_.data());
-  if (members_ == 1) {
-    if (setup_.adapts_noise) adapt_noise(y);
-    return;
-  }
   double best = -std::numeric_limits<double>::infinity();
   for (int m = 0; m < members_; ++m) {
     // One logarithm for several outputs; the product of many would leave the range of a double.
@@ -275,6 +276,7 @@ void PriorBank::update(const double* y, const double* robust_weights) noexcept {
     weights_[m] *= std::isfinite(likelihood) ? likelihood : 0.0;
     sum += weights_[m];
   }
+  log_likelihood_ = best + std::log(sum);
   for (int m = 0; m < members_; ++m)
     weights_[m] = sum > 0.0 ? std::max(weights_[m] / sum, least_weight) : 1.0 / members_;
   sum = std::accumulate(weights_.begin(), weights_.begin() + members_, 0.0);
@@ -349,6 +351,7 @@ void PriorBank::predict(const double* measured_input, double duration) noexcept 
   }
   find_distance(input_.data(), duration);
   advance_processes(duration);
+  if (setup_.map) follow_map();
   if (members_ > 1) mix_members();
   take_step(input_.data(), duration);
 }
@@ -367,6 +370,7 @@ void PriorBank::take_step(const double* input, double duration) noexcept {
         end = 0.0;
         for (int k = 0; k < process.count; ++k)
           end += process.F[k * process.count * lanes_ + m] * mean_[(process.first + k) * lanes_ + m];
+        if (setup_.map) end += process.offset[m];
       }
       parameters_[m * np_ + j] = start;
       ends_[m * np_ + j] = end;
@@ -392,6 +396,7 @@ void PriorBank::take_step(const double* input, double duration) noexcept {
                                 .next_states = next_.data(),
                                 .jacobian = jacobian_.data(),
                                 .input_variances = variances_.data()});
+  if (setup_.map) add_offsets();
 }
 
 void PriorBank::moments(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept {

@@ -84,12 +84,15 @@ bool PriorHorizonEstimation::amend(int back, const double* outputs) noexcept { r
 void PriorHorizonEstimation::hand_weights_on() noexcept {
   if (!has_solution_ || problem_.setup().robust.empty()) return;
   const std::int64_t first = filters_.history().newest() - problem_.capacity().intervals;
+  std::int64_t changed = -1;
   for (int node = 0; node < window_.intervals && window_.first + node < first; ++node) {
     problem_.robust_weights(point_, node, robust_weights_.data(), scratch_);
     for (std::size_t j = 0; j < robust_weights_.size(); ++j)
       if (std::isnan(problem_.output(node)[j])) robust_weights_[j] = std::numeric_limits<double>::quiet_NaN();
-    filters_.history().reweigh(window_.first + node, robust_weights_.data());
+    if (filters_.history().reweigh(window_.first + node, robust_weights_.data()) && changed < 0)
+      changed = window_.first + node;
   }
+  if (changed >= 0) filters_.follow_place(changed);
 }
 
 void PriorHorizonEstimation::choose_law() noexcept {
@@ -209,6 +212,7 @@ void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadli
   } else {
     combine(result);
   }
+  filters_.fuse_place(mean_, mixture_);
   result.state = mean_.head(nx);
   result.parameters = mean_.tail(np);
   for (int j = 0; j < np; ++j)

@@ -148,7 +148,8 @@ void ControllerSection::add_blockings(Controller::Setup& setup) const {
   }
 }
 
-std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks) const {
+std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks,
+                                                    std::shared_ptr<const SlipAhead> ahead) const {
   Controller::Setup setup;
   setup.problem = problem();
   setup.interval = context_->step;
@@ -156,6 +157,7 @@ std::unique_ptr<Controller> ControllerSection::make(const Path& path, const Robo
   setup.least_speed_factor = options_.least_speed_factor;
   setup.speed_bound_factor = options_.speed_bound_factor;
   setup.speed_bound_offset = options_.speed_bound_offset;
+  setup.ahead = std::move(ahead);
   add_blockings(setup);
   auto solver = hooks.wrap_solver("rhc", default_solver.make(context_->host, options_.solver));
   return std::make_unique<Controller>(context_->model, std::move(solver), path, std::move(setup));

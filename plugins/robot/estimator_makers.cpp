@@ -21,14 +21,28 @@ std::vector<double> variances_of(const std::vector<double>& sigmas) {
   return variances;
 }
 
+/// The bank, with its memory of places.
+BankEstimation::Setup remembering_filters(const EstimatorParts& parts) {
+  BankEstimation::Setup setup = parts.filters();
+  if (parts.memory.is_given()) setup.place = parts.memory.setup(parts.make_map());
+  return setup;
+}
+
+void refuse_memory(const EstimatorParts& parts, std::string_view owner) {
+  if (parts.memory.is_given())
+    throw parts.memory.section().error(fmt::format(
+        "{} remember no places; expected estimator.name: bank, or rhe without a section 'blocking'", owner));
+}
+
 std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& parts) {
   if (!parts.blocking.is_given())
     return std::make_unique<PriorHorizonEstimation>(
         parts.context->model, parts.make_solver(),
-        PriorHorizonEstimation::Setup{.filters = parts.filters(), .problem = parts.problem()});
+        PriorHorizonEstimation::Setup{.filters = remembering_filters(parts), .problem = parts.problem()});
   if (parts.priors.is_given())
     throw parts.priors.section().error(
         "a window has either blocks or priors; take out the section 'blocking', or estimator.priors");
+  refuse_memory(parts, "blocks");
   RecedingHorizonEstimation::Setup setup;
   setup.problem = parts.problem();
   setup.arrival = parts.arrival;
@@ -44,6 +58,7 @@ std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& pa
 }
 
 std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts) {
+  refuse_memory(parts, "ekf's random walks");
   const RobotContext& context = *parts.context;
   FilterEstimation::Setup setup;
   setup.noise.output_variances = variances_of(context.noise.output_sigmas);
@@ -59,7 +74,7 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
 }
 
 std::unique_ptr<EstimationMethod> make_bank(const EstimatorParts& parts) {
-  return std::make_unique<BankEstimation>(parts.context->model, parts.filters());
+  return std::make_unique<BankEstimation>(parts.context->model, remembering_filters(parts));
 }
 
 }  // namespace

@@ -129,6 +129,7 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
       .map("block_sigma", &E::block_sigma, block_sigma_by_name().rows())
       .map("priors", &E::priors, PriorsSection::rows())
       .map("bank", &E::bank, BankOptions::table().schema())
+      .map("memory", &E::memory, MemorySection::rows())
       .map("initial", &E::initial, InitialOptions::table().schema())
       .map("robust", &E::robust, robust_rows("[]"))
       .map("solver", &E::solver, {default_solver.row()})
@@ -152,9 +153,11 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
              .initial_parameters = {},
              .priors = PriorsSection(parts_.context, options_.priors),
              .bank = BankOptions::table().parse(options_.bank, "estimator: bank"),
+             .memory = MemorySection(parts_.context, options_.memory),
              .has_bank_beside_blocks = options_.covariance == BlockCovariance::bank,
              .blocking = std::move(blocking),
-             .make_solver = {}} {
+             .make_solver = {},
+             .make_map = {}} {
   const ModelDescription& about = parts_.context->about;
   parts_.robust = robust_losses(options_.robust, about, "estimator");
   const auto process_noise = process_noise_by_name().read(options_.process_noise, about);
@@ -183,6 +186,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
   parts_.make_solver = [host = parts_.context->host, named = options_.solver] {
     return default_solver.make(host, named);
   };
+  parts_.make_map = [memory = parts_.memory] { return memory.make_map(); };
 }
 
 OptionSection EstimatorSection::documentation(const EstimatorMakers& makers) {
@@ -202,6 +206,7 @@ std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::Vec
                                                   const RobotHooks& hooks) const {
   EstimatorParts with_hooks = parts(initial_state);
   with_hooks.make_solver = [&] { return hooks.wrap_solver("rhe", parts_.make_solver()); };
+  with_hooks.make_map = [&] { return hooks.provide_map(parts_.memory, parts_.make_map()); };
   Estimator::Timeline timeline;
   timeline.longest_interval = parts_.context->step;
   return std::make_unique<Estimator>(hooks.wrap_method(makers_.named(options_.name).make(with_hooks)), timeline);

@@ -30,6 +30,10 @@ std::unique_ptr<EstimationMethod> RobotHooks::wrap_method(std::unique_ptr<Estima
   return method;
 }
 
+std::shared_ptr<SlipMap> RobotHooks::provide_map(const MemorySection&, std::shared_ptr<SlipMap> map) const {
+  return map;
+}
+
 void RobotHookChain::add(std::shared_ptr<const RobotHooks> hooks) { links_.push_back(std::move(hooks)); }
 
 std::shared_ptr<Solver> RobotHookChain::wrap_solver(std::string_view kind, std::shared_ptr<Solver> solver) const {
@@ -40,6 +44,11 @@ std::shared_ptr<Solver> RobotHookChain::wrap_solver(std::string_view kind, std::
 std::unique_ptr<EstimationMethod> RobotHookChain::wrap_method(std::unique_ptr<EstimationMethod> method) const {
   for (const auto& link : links_) method = link->wrap_method(std::move(method));
   return method;
+}
+
+std::shared_ptr<SlipMap> RobotHookChain::provide_map(const MemorySection& memory, std::shared_ptr<SlipMap> map) const {
+  for (const auto& link : links_) map = link->provide_map(memory, std::move(map));
+  return map;
 }
 
 }  // namespace rhec

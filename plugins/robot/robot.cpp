@@ -60,7 +60,9 @@ std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::Vect
   return estimator_.make(initial_state, hooks_);
 }
 
-std::unique_ptr<Controller> Robot::make_controller(const Path& path) const { return controller_.make(path, hooks_); }
+std::unique_ptr<Controller> Robot::make_controller(const Path& path, std::shared_ptr<const SlipAhead> ahead) const {
+  return controller_.make(path, hooks_, std::move(ahead));
+}
 
 std::unique_ptr<Smoother> Robot::make_smoother(const std::optional<Eigen::VectorXd>& initial_state) const {
   return smoother_.make(estimator_.parts(initial_state));

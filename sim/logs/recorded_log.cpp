@@ -158,6 +158,7 @@ class Driver {
       if (hooks_.progress) hooks_.progress(static_cast<double>(i + 1) / static_cast<double>(log_.fixes.size()));
     }
     take_rows_until(std::numeric_limits<double>::infinity());
+    estimator_->end_drive();
     result_.counts = estimator_->counts();
     result_.seconds = std::chrono::duration<double>(Clock::now() - start).count();
     return std::move(result_);

@@ -91,7 +91,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   robot.use_estimators(scenario_estimators(&truth));
   Sensors sensors(model, {robot.output_sigmas(), robot.input_sigmas()}, seed);
   const auto estimator = robot.make_estimator(scenario.initial_state());
-  const auto controller = robot.make_controller(scenario.path());
+  const auto controller = robot.make_controller(scenario.path(), estimator->slip_ahead());
   PathFollower true_follower(scenario.path());
 
   const double step = robot.step();
@@ -164,6 +164,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     begin(LoopPart::simulate);
   }
   controller->finish();
+  estimator->end_drive();
   const std::vector<Variable>& about_outputs = model.description().outputs;
   for (std::size_t j = 0; j < about_outputs.size(); ++j)
     if (const auto noise = estimator->method().output_noise(static_cast<int>(j)))

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -29,6 +30,7 @@ struct TerrainOptions {
   Name name = Name::gaussian;
   double correlation_length = 10.0, period = 500.0, patch_size = 10.0;
   double lower = 0.5, upper = 1.0;
+  std::optional<int> seed;
   Settings ranges, values;
   std::vector<std::string> files;
   RasterField::Interpolation interpolation = RasterField::Interpolation::bilinear;
@@ -76,6 +78,7 @@ const OptionTable<TerrainOptions>& terrain_table() {
           .number("patch_size", &T::patch_size, "of patches [m]", greater_than(0.0))
           .number("lower", &T::lower, "least value of gaussian and patches, of ratios (1 where nothing slips)")
           .number("upper", &T::upper, "largest value of gaussian and patches, of ratios")
+          .optional_integer("seed", &T::seed, "of gaussian and patches; none: the scenario's", between(0, 2147483647))
           .map("ranges", &T::ranges,
                {{"PARAMETER", "[lower, upper]", "", "", "of gaussian and patches, in place of lower and upper"}})
           .map("values", &T::values, values_by_name().rows())
@@ -173,7 +176,7 @@ std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, co
         .error(fmt::format("lower is {} and upper is {}; expected lower <= upper", terrain.lower, terrain.upper));
   const std::vector<double> constant = values_by_name().read(terrain.values, about);
   const std::vector<SlipRange> ranges = slip_ranges(terrain, about, options.terrain);
-  const auto seed = static_cast<std::uint64_t>(options.seed);
+  const auto seed = static_cast<std::uint64_t>(terrain.seed.value_or(options.seed));
   switch (terrain.name) {
     case TerrainOptions::Name::gaussian:
       return gaussian_random_field({seed, ranges, terrain.correlation_length, terrain.period});

@@ -17,7 +17,7 @@ constexpr int document_version = 1;
 constexpr const char* what_there_is =
     "expected the folder of a run (steps.csv, times.csv, summary.json: 'rhec run' makes it) or of an estimation "
     "(estimates.csv, summary.json: 'rhec estimate'), the database of a sweep ('rhec sweep'), or compare.json ('rhec "
-    "compare')";
+    "compare'), or a map of slip (estimator.memory.file)";
 
 [[noreturn]] void missing(const fs::path& folder, const char* file, const char* beside, const char* maker) {
   throw Error(
@@ -59,12 +59,14 @@ Json folder_report(const fs::path& folder) {
 
 Json file_report(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  std::string start(16, '\0');
+  std::string start(72, '\0');
   stream.read(start.data(), std::ssize(start));
   start.resize(static_cast<std::size_t>(stream.gcount()));
   if (!stream.is_open()) throw Error(fmt::format("{}: cannot be read; mend its permissions", file.string()));
   if (start.empty()) throw Error(fmt::format("{}: is empty; {}", file.string(), what_there_is));
-  if (start.starts_with("SQLite format 3")) return sweep_report(file);
+  // A database says at byte 68 whose it is (SQLite's "application id").
+  if (start.starts_with("SQLite format 3"))
+    return start.size() == 72 && start.substr(68) == "rhmp" ? map_report(file) : sweep_report(file);
   const std::string name = file.filename().string();
   if (name == "summary.json" || name == "steps.csv" || name == "times.csv" || name == "horizons.jsonl" ||
       name == "estimates.csv")

@@ -21,6 +21,9 @@ void make_parts(const Host& host, const Settings& settings) {
   Robot robot = scenario.robot();
   const TruthVehicle truth(*robot.model(), scenario.terrain(), scenario.initial_state(), scenario.vehicle());
   robot.use_estimators(scenario_estimators(&truth));
+  const MemorySection& memory = robot.memory();
+  if (memory.is_given() && !memory.options().file.empty())
+    throw memory.section().error("a map in a file is for single drives; runs of a sweep remember places without one");
   robot.make_estimator(scenario.initial_state());
   robot.make_controller(scenario.path());
 }

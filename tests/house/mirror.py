@@ -50,6 +50,7 @@ UNTESTED = {
     "sim/report/report_comparison.cpp": "tests/cli/report_study.py: needs a comparison's files, which that test makes",
     "sim/report/report_horizons.cpp": "tests/cli/report_run.py: needs a run's horizons.jsonl, which that test makes",
     "sim/report/report_log.cpp": "tests/cli/report_log.py: needs an estimation's files, which that test makes",
+    "sim/report/report_map.cpp": "tests/cli/map.py: needs the map of a drive, which that test makes",
     "sim/report/report_run.cpp": "tests/cli/report_run.py: needs a run's files, which that test makes",
     "sim/report/report_sweep.cpp": "tests/cli/report_study.py: needs a sweep's database, which that test makes",
     "sim/tuning/controller_tuning_files.cpp": "tests/sim/tuning/controller_tuning_test.cpp: needs a tuning, which takes a while",

@@ -1,6 +1,7 @@
 // Which figures a document has, in sections, in the order of the page; --svg draws the same.
 import {comparisonFigures} from "./comparison.js";
 import {mapFigures} from "./map.js";
+import {placeFigures} from "./place.js";
 import {columnFigure, errorFigures, estimateFigures, inputFigures, statusFigure} from "./series.js";
 import {startState, sweepFigures} from "./sweep.js";
 import {solveTimeFigure} from "./times.js";
@@ -10,7 +11,7 @@ import {stem} from "../text.js";
 
 /// [{id, title, figures}], without sections that have nothing to show.
 export function sectionsOf(document) {
-  const sections = {run: runSections, log: logSections, sweep: sweepSections, comparison: comparisonSections}[document.kind](document);
+  const sections = {run: runSections, log: logSections, sweep: sweepSections, comparison: comparisonSections, place: placeSections}[document.kind](document);
   return sections.map((section) => ({...section, figures: section.figures.filter(Boolean)})).filter((section) => section.figures.length);
 }
 
@@ -90,6 +91,10 @@ function sweepSections(document) {
     {id: "speed", title: "By speed", figures: speed},
     {id: "times", title: "Solve times", figures: times, hasTime: true},
   ];
+}
+
+function placeSections(document) {
+  return [{id: "place", title: "Slip of the ground", figures: placeFigures(document), inPairs: true}];
 }
 
 function comparisonSections(document) {

@@ -25,6 +25,8 @@ function highlights(document) {
             ...["rhe", "rhc"].filter((kind) => same[kind]).map((kind) => [`problems, ${kind.toUpperCase()}`, count(same[kind].problems)]),
             ["all answers usable", comparison.all_usable ? "yes" : "no"]];
   }
+  if (document.kind === "place")
+    return [["cells", count(document.cells)], ["visits a cell", number(document.visits)], ["observations a cell", number(document.observations)], ["first to last visit", `${number(document.seconds)} s`]];
   const variants = document.variants.map((variant) => variant.name);
   return [["fixes", document.fixes ? count(document.fixes.total) : "–"], ["gaps without a fix", document.gaps ? count(document.gaps.length) : "–"], ["estimators", variants.join(", ")]];
 }

@@ -10,6 +10,7 @@
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/shift.hpp"
+#include "rhec/core/place/slip_ahead.hpp"
 
 namespace rhec {
 
@@ -23,7 +24,8 @@ enum class ReferenceSpeed {
 /// At each call the closest point of the path is searched for ahead of the last one. The local reference is that point
 /// and the next N_c, each dt * u1ref metres further on. If the solver fails, and fails again from a simulation, the
 /// plan of the last sample is continued and the failure is counted: its inputs one after the other, then the last of
-/// them. Without a plan the vehicle goes straight ahead. Allocates in its constructor only.
+/// them. Without a plan the vehicle goes straight ahead. Where a map knows the slip that is ahead, the plan and its
+/// reference count with it. Allocates in its constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {
@@ -37,6 +39,8 @@ class RHEC_EXPORT Controller {
     double speed_bound_factor = 2.5, speed_bound_offset = 1.0;
     std::vector<std::shared_ptr<const Blocking>> blockings;  ///< one for each of problem.blocked_inputs
     PathFollower::Window search;
+    /// What slip to expect ahead; null: that of the estimate, everywhere.
+    std::shared_ptr<const SlipAhead> ahead = nullptr;
   };
   /// Throws Error if the model has no position or speed to follow a path with, or sizes do not match.
   Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Path path, Setup setup);
@@ -72,6 +76,7 @@ class RHEC_EXPORT Controller {
   void choose_straight_motion(double ground_speed, const double* parameters) noexcept;
   void bound_speed(double most) noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
+  void look_ahead(double arc_length, const double* parameters) noexcept;
   void start_cold() noexcept;
   bool find_plan(Clock::time_point deadline) noexcept;
 
@@ -89,7 +94,7 @@ class RHEC_EXPORT Controller {
   int reference_segment_ = 0;  ///< segment of the path where the last reference began
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_;
-  std::vector<double> nominal_parameters_, reference_parameters_;
+  std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
   std::vector<std::uint8_t> begins_;
 };
 

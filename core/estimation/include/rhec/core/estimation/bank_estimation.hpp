@@ -5,12 +5,14 @@
 #include "rhec/core/estimation/bank_history.hpp"
 #include "rhec/core/estimation/estimation_method.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
+#include "rhec/core/estimation/place_memory.hpp"
 
 namespace rhec {
 
 /// A bank of Kalman filters with different priors for the Estimator (docs/method.md, section 8). If the initial heading
 /// is unknown, filters with constant parameters search it first, as in FilterEstimation; the bank starts from what they
 /// find. Late measurements are used as if they had come in time.
+/// With a map, what earlier visits have found at a place is weighed against the bank, and the map is written.
 class RHEC_EXPORT BankEstimation final : public EstimationMethod {
  public:
   struct Setup {
@@ -20,6 +22,8 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
     std::vector<double> parameter_lower, parameter_upper;  ///< bounds of the estimate's mean
     int heading_starts = 1;
     int remembered_nodes = 16;  ///< late measurements of these are used
+    /// With a map: places are remembered.
+    PlaceMemory::Setup place = {};
   };
   BankEstimation(const std::shared_ptr<const Model>& model, Setup setup);
 
@@ -31,7 +35,19 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override;
+  void end_drive() noexcept override;
+  std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return place_; }
 
+  /// Null without a map.
+  const PlaceMemory* place() const noexcept { return place_.get(); }
+  /// Adds to moments of [x; p], the bank's or better ones, what is known of the place.
+  void fuse_place(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept {
+    if (place_ && !searching_) place_->fuse(mean, covariance);
+  }
+  /// The history's nodes from this number on have been filtered anew.
+  void follow_place(std::int64_t from) noexcept {
+    if (place_) place_->amend(history_, from);
+  }
   const PriorBank& bank() const noexcept { return history_.bank(); }
   BankHistory& history() noexcept { return history_; }
   /// Whether the bank does not work yet, since the heading is unknown.
@@ -42,6 +58,7 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
 
   Setup setup_;
   BankHistory history_;
+  std::shared_ptr<PlaceMemory> place_;        ///< null without a map
   std::unique_ptr<FilterEstimation> search_;  ///< null if the heading is known
   bool searching_ = false;
   std::int64_t searched_ = 0;    ///< number of the newest node while searching

@@ -15,8 +15,9 @@ namespace rhec {
 /// Nodes count from 0, the start of the run. Allocates in its constructor only.
 class RHEC_EXPORT BankHistory {
  public:
-  /// Remembers the last `nodes` nodes (at least 1).
-  BankHistory(PriorBank bank, int nodes);
+  /// Remembers the last `nodes` nodes (at least 1). With `filtered` nodes above 0 it remembers as many
+  /// if these are more, and what was known after each one's measurement; late measurements reach back by `nodes` still.
+  BankHistory(PriorBank bank, int nodes, int filtered = 0);
 
   PriorBank& bank() noexcept { return bank_; }
   const PriorBank& bank() const noexcept { return bank_; }
@@ -30,23 +31,29 @@ class RHEC_EXPORT BankHistory {
   bool amend(int back, const double* outputs) noexcept;
   /// Weights of a remembered node's outputs (n_y, NaN: none) that are better known than from its innovations, as a
   /// window knows them when the node leaves it. Where they differ much from those used, it is filtered anew from there.
-  void reweigh(std::int64_t number, const double* robust_weights) noexcept;
+  bool reweigh(std::int64_t number, const double* robust_weights) noexcept;
 
   std::int64_t newest() const noexcept { return newest_; }
   /// How many nodes are remembered.
   int count() const noexcept { return count_; }
+  /// How many can be.
+  int capacity() const noexcept { return static_cast<int>(intervals_.size()); }
 
   struct Node {
-    double duration = 0.0, distance = 0.0;  ///< of the interval before the node [s, m]
-    const double *inputs, *outputs;         ///< n_u on that interval, n_y
-    const double* predicted;                ///< PriorBank::save before the outputs were used
+    double duration = 0.0, distance = 0.0;                ///< of the interval before the node [s, m]
+    const double *inputs, *outputs;                       ///< n_u on that interval, n_y
+    const double* predicted;                              ///< PriorBank::save before the outputs were used
+    const double* robust_weights = nullptr;               ///< n_y, that the outputs had
+    double log_likelihood = 0.0;                          ///< of these outputs
+    const double* filtered = nullptr;                     ///< PriorBank::save after that; null if it is not kept
+    const double *mean = nullptr, *covariance = nullptr;  ///< of [x; p], the mixture's after that; likewise
   };
   /// A node that is remembered.
   Node node(std::int64_t number) const noexcept;
 
  private:
   struct Interval {
-    double duration = 0.0, distance = 0.0;
+    double duration = 0.0, distance = 0.0, log_likelihood = 0.0;
   };
   std::size_t place(std::int64_t number) const noexcept {
     return static_cast<std::size_t>(number % static_cast<std::int64_t>(intervals_.size()));
@@ -56,11 +63,16 @@ class RHEC_EXPORT BankHistory {
   void filter_from(std::int64_t number) noexcept;
 
   PriorBank bank_;
-  std::size_t nu_, ny_;
+  int late_nodes_;
+  bool keeps_filtered_;
+  std::size_t nu_, ny_, np_;
   std::vector<Interval> intervals_;
   std::vector<double> inputs_, outputs_;
   std::vector<double> given_weights_, used_weights_;  ///< n_y a node
-  AlignedDoubles predicted_;
+  AlignedDoubles predicted_, filtered_;
+  std::vector<double> means_, covariances_;
+  Eigen::VectorXd mean_;
+  Eigen::MatrixXd covariance_;
   std::int64_t newest_ = -1;
   int count_ = 0;
 };

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "rhec/core/base/clock.hpp"
 #include "rhec/core/estimation/estimate.hpp"
 #include "rhec/core/model/model.hpp"
+#include "rhec/core/place/slip_ahead.hpp"
 
 namespace rhec {
 
@@ -29,6 +31,10 @@ class RHEC_EXPORT EstimationMethod {
   /// Does work in advance, before the next node is known; calling it is optional.
   virtual void prepare() noexcept {}
   virtual void reset() noexcept = 0;
+  /// The drive has ended: completes what the method keeps beyond it, such as a map.
+  virtual void end_drive() noexcept {}
+  /// What slip to expect ahead, of a method that remembers places; else null.
+  virtual std::shared_ptr<const SlipAhead> slip_ahead() const noexcept { return nullptr; }
 
   /// The last estimate's covariance by the method's own model, where what was given out contains what this model leaves
   /// out; null where the two are the same.

@@ -41,6 +41,10 @@ class RHEC_EXPORT Estimator {
   /// Does work for the next sample in advance; optional, but always saves time later.
   void prepare() noexcept { method_->prepare(); }
   void reset() noexcept;
+  /// The drive has ended: completes what is kept beyond it, such as a map of slip.
+  void end_drive() noexcept { method_->end_drive(); }
+  /// What slip to expect ahead, of an estimator that remembers places; else null.
+  std::shared_ptr<const SlipAhead> slip_ahead() const noexcept { return method_->slip_ahead(); }
 
   struct Counts {
     std::int64_t nodes = 0;      ///< including those that fill gaps

@@ -13,9 +13,17 @@
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/model/model.hpp"
+#include "rhec/core/place/slip_map.hpp"
 #include "rhec/core/prior/standard_bank.hpp"
 
 namespace rhec {
+
+/// How a parameter differs from what a map says of a place: an Ornstein-Uhlenbeck process along the way.
+struct MapDeviation {
+  double length = 5.0;     ///< over which the difference is forgotten [m]
+  double inflation = 1.0;  ///< of the map's standard deviation
+  double least = 0.0;      ///< standard deviation that the map has at least
+};
 
 /// Extended Kalman filters with different priors of the parameters, side by side in the processor's lanes and mixed as
 /// interacting multiple models (Blom and Bar-Shalom 1988; docs/method.md, section 8). Each works on [x; z], where z are
@@ -43,6 +51,10 @@ class RHEC_EXPORT PriorBank {
     /// stated ones, up and down.
     bool adapts_noise = false;
     double most_noise_change = 5.0;
+    /// Of a bank that follows a map, where that knows something: how far a parameter is from the map, by member and
+    /// parameter. Elsewhere the members' priors hold. See `follow_map`.
+    std::shared_ptr<const SlipMap> map;
+    std::vector<std::vector<MapDeviation>> deviations;
     double gate = 16.0;  ///< largest squared innovation, in variances, by which one output changes the weights
   };
   /// Throws Error if sizes do not match.
@@ -92,8 +104,22 @@ class RHEC_EXPORT PriorBank {
   /// 0, and nothing depends on them.
   /// Moments of [x; z] (n, n x n) in what `save` has written; the others have the variance 1.
   void saved_moments(const double* state, int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept;
+  /// Adds the probabilities of the members in what `save` has written.
+  void add_saved_weights(const double* state, double* sums) const noexcept;
   /// Interval data of a parameter's process, as in ProcessModel: ramp, F, L, over an advance of this time and ground.
   void write_process(int member, int parameter, double duration, double distance, double* data) noexcept;
+
+  /// Logarithm of the last update's likelihood, but for a constant that is the same for all banks.
+  double log_likelihood() const noexcept { return log_likelihood_; }
+  /// Of a bank that follows a map: whether that knew the place where the last interval ended.
+  bool knows_place() const noexcept { return knows_place_; }
+  /// Every member becomes the mixture of itself with the share 1 - s, and of these moments of [x; p] with the share s.
+  /// For priors without further states.
+  void take_share(double share, const double* mean, const double* covariance) noexcept;
+  /// Members become equally probable.
+  void forget_weights() noexcept;
+  /// Takes over what another bank of the same outputs has learnt of their noise.
+  void take_noise(const PriorBank& other) noexcept;
 
   /// What has been learnt of an output's noise.
   struct Noise {
@@ -114,6 +140,7 @@ class RHEC_EXPORT PriorBank {
     std::vector<const Prior*> kinds;  ///< the different priors of this parameter
     std::vector<int> kind_of;         ///< per member
     AlignedDoubles F, Q, ramp;        ///< lanes
+    AlignedDoubles offset;            ///< lanes; of the value, where a map is followed
   };
   void find_places(Process& process) const;
   void write_start(int parameter, const Prior& prior, int lane) noexcept;
@@ -124,6 +151,9 @@ class RHEC_EXPORT PriorBank {
   void mix_members() noexcept;
   void find_loss_scales();
   void weigh_outputs(const double* y, int taken, const double* given) noexcept;
+  void check_map() const;
+  void follow_map() noexcept;
+  void add_offsets() noexcept;
   void adapt_noise(const double* y) noexcept;
   static double scale_weight(double s, double delta) noexcept;
   double robust_surplus(const double* y, int sensor, int lane) const noexcept;
@@ -152,7 +182,9 @@ class RHEC_EXPORT PriorBank {
   std::vector<double> start_, own_, own_covariance_, filled_, filled_covariance_;  ///< moments of one process
   Eigen::VectorXd full_mean_;
   Eigen::MatrixXd full_covariance_;
-  double distance_ = 0.0;
+  double distance_ = 0.0, log_likelihood_ = 0.0;
+  bool knows_place_ = false;
+  std::vector<double> map_means_, map_variances_;  ///< at the interval's start, then at its end
   std::unique_ptr<Views> views_;
 };
 

@@ -46,6 +46,8 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override { return filters_.output_noise(output); }
+  void end_drive() noexcept override { filters_.end_drive(); }
+  std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return filters_.slip_ahead(); }
 
   bool has_window() const noexcept override { return has_window_; }
   /// Its model is a ProcessModel.

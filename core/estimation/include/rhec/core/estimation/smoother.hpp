@@ -36,6 +36,8 @@ class RHEC_EXPORT NodeRecorder final : public EstimationMethod {
   void prepare() noexcept override { method_->prepare(); }
   void reset() noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override { return method_->output_noise(output); }
+  void end_drive() noexcept override { method_->end_drive(); }
+  std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return method_->slip_ahead(); }
 
  private:
   void append_outputs(const double* outputs);

@@ -32,7 +32,8 @@ class RHEC_EXPORT ControllerSection {
   const ControllerOptions& options() const noexcept { return options_; }
   PluginChoice solver_choice() const;
   /// Weights and blocking are read only here, since they may not fit the vehicle of a robot that only estimates.
-  std::unique_ptr<Controller> make(const Path& path, const RobotHooks& hooks = {}) const;
+  std::unique_ptr<Controller> make(const Path& path, const RobotHooks& hooks = {},
+                                   std::shared_ptr<const SlipAhead> ahead = nullptr) const;
 
  private:
   RhcProblem::Setup problem() const;

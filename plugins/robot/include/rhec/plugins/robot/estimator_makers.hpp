@@ -13,6 +13,7 @@
 #include "rhec/core/estimation/estimation_method.hpp"
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "rhec/plugins/robot/blocking_section.hpp"
+#include "rhec/plugins/robot/memory_section.hpp"
 #include "rhec/plugins/robot/priors_section.hpp"
 #include "rhec/plugins/robot/robot_context.hpp"
 
@@ -37,9 +38,11 @@ struct RHEC_EXPORT EstimatorParts {
   std::vector<PriorBank::Setup::Knowledge> initial_parameters;  ///< what the section gives of them
   PriorsSection priors;
   BankOptions bank;
+  MemorySection memory;
   bool has_bank_beside_blocks;  ///< for their covariance
   BlockingSection blocking;
   std::function<std::shared_ptr<Solver>()> make_solver;  ///< makes the solver that the section names
+  std::function<std::shared_ptr<SlipMap>()> make_map;    ///< the map of an estimator that remembers places
 
   /// The estimation problem of a window.
   RheProblem::Setup problem() const;

@@ -22,7 +22,7 @@ struct RHEC_EXPORT EstimatorOptions {
   int substeps = RheProblem::Setup{}.substeps;
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
   BlockCovariance covariance = BlockCovariance::bank;
-  Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, initial, robust, solver;
+  Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, memory, initial, robust, solver;
   static OptionTable<EstimatorOptions> table(const EstimatorMakers& makers);
 };
 
@@ -39,6 +39,8 @@ class RHEC_EXPORT EstimatorSection {
   PluginChoice solver_choice() const;
   /// The priors of a parameter as written, e.g. "auto" or "walk, matern".
   std::string priors_text(int parameter) const { return parts_.priors.text(parameter); }
+  /// What it remembers of places.
+  const MemorySection& memory() const noexcept { return parts_.memory; }
   /// Replaces the makers.
   void use(EstimatorMakers makers) { makers_ = std::move(makers); }
 

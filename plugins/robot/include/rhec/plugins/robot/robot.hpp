@@ -66,6 +66,8 @@ class RHEC_EXPORT Robot {
   bool has_blockings() const noexcept { return blocking_.is_given(); }
   /// The priors of a parameter as written, e.g. "auto".
   std::string priors_text(int parameter) const { return estimator_.priors_text(parameter); }
+  /// What its estimators remember of places.
+  const MemorySection& memory() const noexcept { return estimator_.memory(); }
   /// Of the section `blocking`, by parameter.
   std::vector<std::shared_ptr<const Blocking>> make_blockings() const { return blocking_.make(); }
 
@@ -76,7 +78,8 @@ class RHEC_EXPORT Robot {
 
   /// The estimator of the section `estimator`; `initial_state`, if given, is used if that section has none.
   std::unique_ptr<Estimator> make_estimator(const std::optional<Eigen::VectorXd>& initial_state = {}) const;
-  std::unique_ptr<Controller> make_controller(const Path& path) const;
+  /// `ahead`: Estimator::slip_ahead, for a controller that plans with the slip of a map.
+  std::unique_ptr<Controller> make_controller(const Path& path, std::shared_ptr<const SlipAhead> ahead = nullptr) const;
   /// When a smoother that begins now has to stop (`smoother.deadline`).
   Clock::time_point smoothing_deadline() const { return smoother_.deadline(); }
   /// Estimates a whole log at once (sections `smoother` and `estimator`).
