@@ -32,6 +32,7 @@ struct Options {
   bool bank = false;    ///< of filters
   bool priors = false;  ///< window with a bank beside it
   bool banked = false;  ///< window of blocks with a bank beside it
+  bool place = false;   ///< a memory of places, too
   ArrivalKind arrival = ArrivalKind::ekf;
   const char* blocking = "{size: 5, overlap: 3}";
   const char* solver = "{mode: rti}";
@@ -67,6 +68,15 @@ std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& mode
     bank.initial_state = setup.initial_mean.head(4);
     bank.initial_covariance = setup.initial_covariance.topLeftCorner(4, 4);
     bank.heading_starts = setup.heading_starts;
+    if (options.place) {
+      SlipMap::Setup map;
+      map.parameters = 2;
+      map.capacity = 2000;
+      map.visit = 5.0;
+      bank.place.map = std::make_shared<SlipMap>(map);
+      bank.place.least = {0.01, 0.01};
+      bank.place.lag = 6;
+    }
     const auto solver = [&] { return host().make_solver("gn_rti", parse_yaml(options.solver, "test")); };
     if (options.priors)
       return std::make_unique<PriorHorizonEstimation>(model, solver(),
@@ -101,6 +111,7 @@ long allocations_in_the_loop(const Options& options) {
   setup.problem.terminal_weights = {10.0, 10.0, 0.0, 0.0};
   sim::FigureEight path;
   path.speed = 4.0;
+  setup.ahead = estimator.slip_ahead();
   Controller controller(model, host().make_solver("gn_rti"), Path(sim::figure_eight(path)), setup);
   const auto field = sim::gaussian_random_field({});
   sim::TruthVehicle vehicle(*model, *field, Eigen::Vector4d::Zero());
@@ -168,6 +179,11 @@ TEST(EstimationAllocation, NoneInTheClosedLoopOfAWindowWithABank) {
   EXPECT_EQ(allocations_in_the_loop({.priors = true}), 0);
   EXPECT_EQ(allocations_in_the_loop({.priors = true, .solver = "{mode: converge}"}), 0);
   EXPECT_EQ(allocations_in_the_loop({.banked = true}), 0);
+}
+
+TEST(EstimationAllocation, NoneWherePlacesAreRemembered) {
+  EXPECT_EQ(allocations_in_the_loop({.bank = true, .place = true}), 0);
+  EXPECT_EQ(allocations_in_the_loop({.priors = true, .place = true}), 0);
 }
 
 TEST(EstimationAllocation, NoneWhereTheHeadingIsSearchedFor) {
