@@ -69,7 +69,9 @@ Drive drive(BankEstimation& bank, Field field, unsigned seed, bool late = false)
     std::vector<double> outputs{state[0] + offset + 0.03 * normal(random), 0.03 * normal(random),
                                 0.0174 * normal(random)};
     const double kappa = field(state[0]);
-    std::vector<double> inputs{4.0 / kappa + 0.1 * normal(random), 0.1 * normal(random)};
+    // Wheel speed on the interval before, for the slip in its middle.
+    const double middle = field(state[0] - 0.5 * 4.0 * step);
+    std::vector<double> inputs{4.0 / middle + 0.1 * normal(random), 0.1 * normal(random)};
     if (late && k % 4 == 1) {
       pending.push_back(outputs);
       outputs.assign(3, nan);
