@@ -135,6 +135,7 @@ class LawSearch {
       all = std::move(more);
     }
     std::vector<PriorCombination> members;
+    members.reserve(all.size());
     for (const WeighedLaws& each : all) members.push_back(each.priors);
     const std::vector<double> found = log_likelihoods(std::move(members));
     double highest = -infinity, sum = 0.0;

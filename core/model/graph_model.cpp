@@ -15,7 +15,7 @@
 #include "rhec/core/model/formula_model.hpp"
 
 // Memory of a size that is known at run time only, without an allocation.
-#define RHEC_STACK(size) static_cast<double*>(__builtin_alloca_with_align((size) * sizeof(double), 512))
+#define RHEC_STACK(size) (static_cast<double*>(__builtin_alloca_with_align((size) * sizeof(double), 512)))
 
 namespace rhec {
 namespace {
@@ -82,6 +82,7 @@ GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description
   const NodeMatrix slopes = jacobian(graph, vehicle.outputs, vehicle.states);
   output_jacobians_ = tape(vehicle.states, joined(vehicle.outputs, slopes.nodes));
   std::vector<int> weights;
+  weights.reserve(static_cast<std::size_t>(n_.y));
   for (int j = 0; j < n_.y; ++j) weights.push_back(graph.input("weight"));
   const NodeMatrix bends = weighted_hessian(graph, vehicle.outputs, weights, vehicle.states);
   std::vector<int> curvature;

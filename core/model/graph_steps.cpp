@@ -68,7 +68,7 @@ void GraphSteps::add_product(const Tape& tape, int which, const double* values, 
     const double* factors = registers_ + static_cast<std::ptrdiff_t>(source) * lanes;
     for (int i = 0; i < lanes; ++i) out[i] += factors[i] * values[i];
   } else {
-    const double factor = tape.uniforms()[static_cast<std::size_t>(~source)];
+    const double factor = tape.uniforms()[static_cast<std::size_t>(~std::ptrdiff_t{source})];
     for (int i = 0; i < lanes; ++i) out[i] += factor * values[i];
   }
 }

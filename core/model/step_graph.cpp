@@ -84,6 +84,7 @@ class StepBuilder {
   NodeMatrix by_stages() {
     const std::vector<int>& rates = vehicle_.rates;
     std::vector<int> mu;
+    mu.reserve(static_cast<std::size_t>(nx()));
     for (int r = 0; r < nx(); ++r) mu.push_back(graph_.input("mu"));
     const NodeMatrix slope = jacobian(graph_, rates, arguments_);
     const NodeMatrix bend = weighted_hessian(graph_, rates, mu, arguments_);

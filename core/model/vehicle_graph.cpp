@@ -20,6 +20,7 @@ std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& resu
 
 std::vector<Expression> new_variables(Graph& graph, const char* letter, int count) {
   std::vector<Expression> variables;
+  variables.reserve(static_cast<std::size_t>(count));
   for (int k = 0; k < count; ++k) variables.push_back(Expression::input(graph, fmt::format("{}{}", letter, k)));
   return variables;
 }

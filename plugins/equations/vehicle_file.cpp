@@ -113,9 +113,10 @@ void VehicleFile::read_variables(const char* section, std::vector<Variable>& var
   if (given->kind() != Settings::Kind::map)
     throw given->mismatch(fmt::format("a map of {} with what is known of each, e.g. v: {{unit: m/s}}", section));
   const bool is_output = std::string_view(section) == "outputs";
-  for (const auto& [name, about] : given->members()) {
+  for (const auto& member : given->members()) {
+    const auto& [name, about] = member;
     // A measured state has the state's name.
-    const auto is_state = [&](const Variable& state) { return state.name == name; };
+    const auto is_state = [&](const Variable& state) { return state.name == member.first; };
     if (!is_output || std::none_of(description_.states.begin(), description_.states.end(), is_state))
       check_name(about, name);
     Variable variable{.name = name, .unit = "1", .meaning = {}};

@@ -106,9 +106,8 @@ class RHEC_EXPORT Tape {
   }
   /// Value of a result in one lane.
   double result(std::size_t which, const double* registers, int lanes, int lane) const noexcept {
-    const int source = results_[which];
-    return source >= 0 ? registers[static_cast<std::ptrdiff_t>(source) * lanes + lane]
-                       : uniforms_[static_cast<std::size_t>(~source)];
+    const std::ptrdiff_t source = results_[which];
+    return source >= 0 ? registers[source * lanes + lane] : uniforms_[static_cast<std::size_t>(~source)];
   }
 
  private:
