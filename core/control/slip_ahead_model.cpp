@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/padded.hpp"
+#include "rhec/core/base/scratch.hpp"
 
 namespace rhec {
 namespace {
@@ -25,7 +27,32 @@ SlipAheadModel::SlipAheadModel(std::shared_ptr<const Model> vehicle) : vehicle_(
 }
 
 std::size_t SlipAheadModel::rows_scratch(int count) const noexcept {
-  return std::max(Model::rows_scratch(count), vehicle_->rows_scratch(count));
+  const int nz = padded(state_count() + input_count() + 2 * parameter_count());
+  return std::max(Model::rows_scratch(count), vehicle_->rows_scratch(count)) + static_cast<std::size_t>(count) * nz + 7;
+}
+
+/// With the vehicle's own rows, which are the fast way of a solver.
+void SlipAheadModel::integrate_rows(const IntervalRows& request) const noexcept {
+  const int nx = state_count(), nu = input_count(), np = parameter_count();
+  const std::ptrdiff_t row = padded(nx + nu + (request.ramp ? 2 : 1) * np);
+  IntervalRows changed = request;
+  if (request.data) {
+    Scratch memory(request.scratch);
+    double* const z = memory.take(request.count * row);
+    for (std::ptrdiff_t i = 0; i < request.count; ++i) {
+      std::copy_n(request.z + i * request.z_step, row, z + i * row);
+      for (int j = 0; j < np; ++j) {
+        const double change = request.data[i * np + j];
+        z[i * row + nx + j] += change;
+        if (request.ramp) z[i * row + nx + np + nu + j] += change;
+      }
+    }
+    changed.z = z;
+    changed.z_step = row;
+    changed.scratch = memory.rest();
+  }
+  changed.data = nullptr;
+  vehicle_->integrate_rows(changed);
 }
 
 void SlipAheadModel::integrate(const Intervals& request) const noexcept {

@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
+#include "rhec/core/base/aligned.hpp"
+#include "rhec/core/base/padded.hpp"
 #include "rhec/core/control/controller.hpp"
 #include "rhec/plugins/robot/robot.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -42,6 +46,49 @@ TEST(SlipAheadModel, AddsTheDataOfAnIntervalToItsParameters) {
                       .jacobians = expected_jacobians.data()});
   for (std::size_t i = 0; i < next.size(); ++i) EXPECT_NEAR(next[i], expected[i], 1e-12);
   for (std::size_t i = 0; i < jacobians.size(); ++i) EXPECT_NEAR(jacobians[i], expected_jacobians[i], 1e-12);
+}
+
+/// The vehicle's own rows say the same as rows that are put together from the dense form, on ramps too.
+TEST(SlipAheadModel, HasTheRowsOfItsDenseForm) {
+  for (const char* name : {"bicycle_slip", "tractor_trailer", "skid_steer"}) {
+    const SlipAheadModel model(host().make_model(name));
+    const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count();
+    constexpr int count = 11;
+    for (const bool ramp : {false, true}) {
+      const int nz = nx + nu + (ramp ? 2 : 1) * np, row = padded(nz), next_row = padded(nx);
+      AlignedDoubles z(static_cast<std::size_t>(count) * row), data(static_cast<std::size_t>(count) * np),
+          durations(count, 0.2), costates(static_cast<std::size_t>(count) * next_row, 0.3),
+          scratch(model.rows_scratch(count));
+      for (std::size_t k = 0; k < z.size(); ++k) z[k] = 0.5 + 0.3 * std::sin(static_cast<double>(k));
+      for (std::size_t k = 0; k < data.size(); ++k) data[k] = 0.2 * std::cos(static_cast<double>(k));
+      const auto results = [&](bool own) {
+        AlignedDoubles all(static_cast<std::size_t>(count) * (next_row + nx * row + nz * row));
+        const IntervalRows request{.count = count,
+                                   .z = z.data(),
+                                   .z_step = row,
+                                   .ramp = ramp,
+                                   .durations = durations.data(),
+                                   .data = data.data(),
+                                   .next_states = all.data(),
+                                   .next_step = next_row,
+                                   .jacobians = all.data() + count * next_row,
+                                   .jacobian_step = nx * row,
+                                   .jacobian_row = row,
+                                   .multipliers = costates.data(),
+                                   .multiplier_step = next_row,
+                                   .hessians = all.data() + count * (next_row + nx * row),
+                                   .hessian_step = nz * row,
+                                   .hessian_row = row,
+                                   .scratch = scratch.data()};
+        own ? model.integrate_rows(request) : model.Model::integrate_rows(request);
+        return all;
+      };
+      const AlignedDoubles own = results(true), dense = results(false);
+      for (std::size_t k = 0; k < own.size(); ++k)
+        ASSERT_NEAR(own[k], dense[k], 1e-11) << name << ' ' << ramp << ' ' << k;
+      EXPECT_GT(*std::max_element(own.begin(), own.end()), 0.1);
+    }
+  }
 }
 
 /// Along x; the ground is .8 up to 10 m, and .5 behind.

@@ -19,6 +19,7 @@ class RHEC_EXPORT SlipAheadModel final : public Model {
   const ModelDescription& description() const noexcept override { return vehicle_->description(); }
   int data_count() const noexcept override { return vehicle_->parameter_count(); }
   void integrate(const Intervals& request) const noexcept override;
+  void integrate_rows(const IntervalRows& request) const noexcept override;
   void observe(const Nodes& request) const noexcept override { vehicle_->observe(request); }
   void observe_rows(const NodeRows& request) const noexcept override { vehicle_->observe_rows(request); }
   std::size_t rows_scratch(int count) const noexcept override;
