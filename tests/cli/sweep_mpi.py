@@ -56,7 +56,8 @@ class Test(cli.Findings):
 
     def good(self):
         """As many rows, and the same, whatever the number of ranks and threads; a run that is refused is one of them."""
-        text = self.sweep(SHORT + "grid: {seed: {from: 1, to: 15}, estimator.horizon: [3, 12], blocking.kappa.overlap: [0, 4]}\n")
+        text = self.sweep(SHORT + "grid: {seed: {from: 1, to: 15}, estimator.horizon: [3, 12],\n"
+                          "  'blocking.kappa': [{name: structured, size: 2}, {name: structured, size: 2, overlap: 4}]}\n")
         alone = self.work / "alone.sqlite"
         self.rhec("sweep", text, "--out", alone)
         expected = rows(alone)
