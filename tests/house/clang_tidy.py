@@ -80,10 +80,10 @@ def main():
     wanted = [(root / name).resolve() for name in (arguments.only or house.FOLDERS)]
     passed = build / "clang-tidy"
     passed.mkdir(exist_ok=True)
-    # What is compiled for several instruction sets is looked at in its first, generic form: clang does not take all that
-    # the compiler's headers of the wide ones are made of.
-    commands = list({entry["file"]: entry for entry in
-                     reversed(json.loads((build / "compile_commands.json").read_text()))}.values())[::-1]
+    # clang does not take xsimd's functions of two results under another name: what uses it for wide instruction sets is
+    # looked at in its generic form. All other files are looked at in each of their forms.
+    commands = [entry for entry in json.loads((build / "compile_commands.json").read_text())
+                if "-DRHEC_PACK_NAMESPACE=" not in entry["command"]]
     for entry in commands:
         command = PRECOMPILED.sub("", entry["command"])
         entry["command"] = " ".join(word for word in command.split(" ") if word not in UNKNOWN_TO_CLANG)
@@ -94,7 +94,7 @@ def main():
     for entry in commands:
         file = pathlib.Path(entry["directory"], entry["file"]).resolve()
         if any(file.is_relative_to(place) for place in wanted):
-            entries[file] = entry["command"]
+            entries.setdefault(file, entry["command"])
 
     version = subprocess.run(["clang-tidy", "--version"], check=True, capture_output=True, text=True).stdout
     common = version + (root / ".clang-tidy").read_text() + " ".join(EXTRA + ([] if arguments.thorough else SLOW + QUICK))
