@@ -5,7 +5,7 @@
 #include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
-ModelKernelSets two_axle_steering_kernels();  // defined by rhec_add_model_kernels
+const StraightCode& two_axle_steering_kernels();  // defined by rhec_add_model_kernels
 }
 
 namespace {
@@ -32,19 +32,10 @@ rhec::ModelDescription describe() {
   return model;
 }
 
-struct TwoAxleSteeringOptions : TwoAxleSteering {
-  static const rhec::OptionTable<TwoAxleSteeringOptions>& table() {
-    static const auto rows = rhec::OptionTable<TwoAxleSteeringOptions>().number(
-        "length", &TwoAxleSteeringOptions::length, "between the axles [m]", rhec::greater_than(0.0));
-    return rows;
-  }
-};
-
 class TwoAxleSteeringModel : public rhec::FormulaModel<TwoAxleSteering> {
  public:
-  using Options = TwoAxleSteeringOptions;
   explicit TwoAxleSteeringModel(const Options& options)
-      : FormulaModel(static_cast<const TwoAxleSteering&>(options), describe(), rhec::two_axle_steering_kernels()) {}
+      : FormulaModel(options, describe(), rhec::two_axle_steering_kernels()) {}
 };
 
 }  // namespace

@@ -13,13 +13,29 @@ namespace rhec {
 namespace {
 
 struct OperationInfo {
-  const char* name;
+  const char *name, *identifier;
   int operands;
 };
 constexpr OperationInfo operations[] = {
-    {"constant", 0}, {"input", 0}, {"+", 2},    {"-", 2},     {"*", 2},    {"negate", 1}, {"1/", 1},
-    {"power", 1},    {"sqrt", 1},  {"exp", 1},  {"log", 1},   {"sin", 1},  {"cos", 1},    {"tan", 1},
-    {"asin", 1},     {"acos", 1},  {"atan", 1}, {"atan2", 2}, {"tanh", 1},
+    {"constant", "constant", 0},
+    {"input", "input", 0},
+    {"+", "add", 2},
+    {"-", "subtract", 2},
+    {"*", "multiply", 2},
+    {"negate", "negate", 1},
+    {"1/", "reciprocal", 1},
+    {"power", "power", 1},
+    {"sqrt", "square_root", 1},
+    {"exp", "exponential", 1},
+    {"log", "logarithm", 1},
+    {"sin", "sine", 1},
+    {"cos", "cosine", 1},
+    {"tan", "tangent", 1},
+    {"asin", "arc_sine", 1},
+    {"acos", "arc_cosine", 1},
+    {"atan", "arc_tangent", 1},
+    {"atan2", "arc_tangent_2", 2},
+    {"tanh", "hyperbolic_tangent", 1},
 };
 
 const OperationInfo& info(Operation operation) noexcept { return operations[static_cast<std::size_t>(operation)]; }
@@ -39,6 +55,7 @@ double integer_power(double base, int exponent) noexcept {
 }  // namespace
 
 std::string_view name_of(Operation operation) noexcept { return info(operation).name; }
+std::string_view identifier_of(Operation operation) noexcept { return info(operation).identifier; }
 int operand_count(Operation operation) noexcept { return info(operation).operands; }
 
 double value_of(Operation operation, double a, double b) noexcept {

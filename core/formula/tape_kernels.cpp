@@ -1,12 +1,9 @@
 // The interpreter of tapes, compiled once for every instruction set. RHEC_TAPE_SET is its name; for the wide ones
 // RHEC_PACK_NAMESPACE is defined, too.
-#include <cmath>
+#include <algorithm>
+#include <cstddef>
 
-#if defined(RHEC_PACK_NAMESPACE)
-#include "rhec/core/packs/pack.hpp"
-#endif
-
-#include "rhec/core/base/unrolled.hpp"
+#include "rhec/core/formula/lane.hpp"
 #include "rhec/core/formula/tape.hpp"
 
 #define RHEC_JOINED(a, b) a##b
@@ -17,25 +14,7 @@
 namespace rhec {
 namespace {
 
-#if defined(RHEC_PACK_NAMESPACE)
-using Lane = WidestPack;
-constexpr int width = Lane::width;
-RHEC_INLINE inline Lane load(const double* from) { return Lane::load(from); }
-RHEC_INLINE inline void store(Lane value, double* to) { value.store(to); }
-#else
-using Lane = double;
-constexpr int width = 1;
-RHEC_INLINE inline Lane load(const double* from) { return *from; }
-RHEC_INLINE inline void store(Lane value, double* to) { *to = value; }
-inline std::pair<double, double> sincos(double angle) { return {std::sin(angle), std::cos(angle)}; }
-#endif
-
-RHEC_INLINE inline Lane to_power(Lane base, std::uint32_t exponent) {
-  Lane result(1.0);
-  for (; exponent > 0; exponent >>= 1, base = base * base)
-    if (exponent & 1) result = result * base;
-  return result;
-}
+constexpr int width = lane_width;
 
 /// Where the operands of an instruction are read.
 struct Memory {
@@ -48,7 +27,7 @@ struct Register {
   const double* at;
   RHEC_INLINE Register(const Memory& memory, std::uint32_t number)
       : at(memory.registers + static_cast<std::size_t>(number) * (packs * width)) {}
-  RHEC_INLINE Lane operator[](int pack) const { return load(at + pack * width); }
+  RHEC_INLINE Lane operator[](int pack) const { return load_lane(at + pack * width); }
 };
 struct Uniform {
   Lane value;
@@ -67,7 +46,7 @@ RHEC_INLINE inline void for_run(const TapeOperands* first, std::uint32_t length,
     double* out = memory.registers + static_cast<std::size_t>(at->out) * (packs * width);
     Lane results[packs];
     for (int pack = 0; pack < packs; ++pack) results[pack] = function(a[pack], b[pack], c[pack]);
-    for (int pack = 0; pack < packs; ++pack) store(results[pack], out + pack * width);
+    for (int pack = 0; pack < packs; ++pack) store_lane(results[pack], out + pack * width);
   }
 }
 struct Unused {
@@ -83,7 +62,7 @@ RHEC_INLINE inline void for_run_of_calls(const TapeOperands* first, std::uint32_
     const Register<packs> a(memory, at->a), b(memory, at->b);
     double* out = memory.registers + static_cast<std::size_t>(at->out) * (packs * width);
 #pragma GCC unroll 1
-    for (int pack = 0; pack < packs; ++pack) store(function(a[pack], b[pack]), out + pack * width);
+    for (int pack = 0; pack < packs; ++pack) store_lane(function(a[pack], b[pack]), out + pack * width);
   }
 }
 
@@ -124,25 +103,25 @@ void run_packs(std::span<const TapeRun> runs, const TapeOperands* operands, cons
       case TapeCode::negate:
         RHEC_RUN(R, N, N, -a);
       case TapeCode::reciprocal:
-        RHEC_RUN(R, N, N, Lane(1.0) / a);
+        RHEC_RUN(R, N, N, reciprocal(a));
       case TapeCode::square_root:
         RHEC_RUN(R, N, N, sqrt(a));
       case TapeCode::multiply_add_rrr:
-        RHEC_RUN(R, R, R, a * b + c);
+        RHEC_RUN(R, R, R, multiply_add(a, b, c));
       case TapeCode::multiply_add_rur:
-        RHEC_RUN(R, U, R, a * b + c);
+        RHEC_RUN(R, U, R, multiply_add(a, b, c));
       case TapeCode::multiply_add_rru:
-        RHEC_RUN(R, R, U, a * b + c);
+        RHEC_RUN(R, R, U, multiply_add(a, b, c));
       case TapeCode::multiply_add_ruu:
-        RHEC_RUN(R, U, U, a * b + c);
+        RHEC_RUN(R, U, U, multiply_add(a, b, c));
       case TapeCode::multiply_subtract_rrr:
-        RHEC_RUN(R, R, R, a * b - c);
+        RHEC_RUN(R, R, R, multiply_subtract(a, b, c));
       case TapeCode::multiply_subtract_rur:
-        RHEC_RUN(R, U, R, a * b - c);
+        RHEC_RUN(R, U, R, multiply_subtract(a, b, c));
       case TapeCode::subtract_product_rrr:
-        RHEC_RUN(R, R, R, c - a * b);
+        RHEC_RUN(R, R, R, subtract_product(c, a, b));
       case TapeCode::subtract_product_rru:
-        RHEC_RUN(R, R, U, c - a * b);
+        RHEC_RUN(R, R, U, subtract_product(c, a, b));
       case TapeCode::exponential:
         RHEC_RUN_CALLS(exp(a));
       case TapeCode::logarithm:
@@ -167,7 +146,7 @@ void run_packs(std::span<const TapeRun> runs, const TapeOperands* operands, cons
         for (const TapeOperands* at = first; at != first + length; ++at) {
           const R a(memory, at->a);
           double* out = memory.registers + static_cast<std::size_t>(at->out) * (packs * width);
-          for (int pack = 0; pack < packs; ++pack) store(to_power(a[pack], at->b), out + pack * width);
+          for (int pack = 0; pack < packs; ++pack) store_lane(to_power(a[pack], at->b), out + pack * width);
         }
         break;
       case TapeCode::sine_cosine:
@@ -178,8 +157,8 @@ void run_packs(std::span<const TapeRun> runs, const TapeOperands* operands, cons
 #pragma GCC unroll 1
           for (int pack = 0; pack < packs; ++pack) {
             const auto [sine, cosine] = sincos(a[pack]);
-            store(sine, sines + pack * width);
-            store(cosine, cosines + pack * width);
+            store_lane(sine, sines + pack * width);
+            store_lane(cosine, cosines + pack * width);
           }
         }
         break;
@@ -199,49 +178,164 @@ void run(std::span<const TapeRun> runs, const TapeOperands* operands, const doub
   run_packs<32 / width>(runs, operands, memory);
 }
 
-void load_rows(const double* rows, std::ptrdiff_t step, int count, int columns, double* registers, int lanes) {
-  for (int first = 0; first < lanes; first += width) {
-    const auto row = [&](int i) { return rows + (first + i < count ? first + i : count - 1) * step; };
+#if defined(RHEC_PACK_NAMESPACE)
+/// `width` rows, some of which may be the same one, as packs: one for each of at most `width` columns.
+template <class Row>
+RHEC_INLINE inline void load_block(const Row& row, int columns, double* out, int lanes) {
+  Lane block[width];
+  for_indices<width>([&](auto i) RHEC_INLINE { block[i] = load_lane(row(i)); });
+  transpose(block);
+  if (columns >= width) {
+    for_indices<width>([&](auto i) RHEC_INLINE { store_lane(block[i], out + i * lanes); });
+    return;
+  }
+  for (int i = 0; i < columns; ++i) store_lane(block[i], out + i * lanes);
+}
+#endif
+
+void load_rows(const double* rows, std::ptrdiff_t step, int count, int columns, double* registers, int lanes,
+               int filled) {
+  if (count == 1) {
+    for (int column = 0; column < columns; ++column)
+      for (int first = 0; first < filled; first += width)
+        store_lane(Lane(rows[column]), registers + column * lanes + first);
+    return;
+  }
+  for (int first = 0; first < filled; first += width) {
 #if defined(RHEC_PACK_NAMESPACE)
     for (int column = 0; column < columns; column += width) {
-      Lane block[width];
-      for (int i = 0; i < width; ++i) block[i] = load(row(i) + column);
-      transpose(block);
-      double* out = registers + static_cast<std::ptrdiff_t>(column) * lanes + first;
-      for (int i = 0; i < width && column + i < columns; ++i) store(block[i], out + i * lanes);
+      double* const out = registers + static_cast<std::ptrdiff_t>(column) * lanes + first;
+      if (first + width <= count) {
+        const double* const at = rows + first * step + column;
+        load_block([&](int i) RHEC_INLINE { return at + i * step; }, columns - column, out, lanes);
+      } else {
+        load_block([&](int i) RHEC_INLINE { return rows + std::min(first + i, count - 1) * step + column; },
+                   columns - column, out, lanes);
+      }
     }
 #else
+    const double* const row = rows + std::min(first, count - 1) * step;
     for (int column = 0; column < columns; ++column)
-      registers[static_cast<std::ptrdiff_t>(column) * lanes + first] = row(0)[column];
+      registers[static_cast<std::ptrdiff_t>(column) * lanes + first] = row[column];
 #endif
   }
 }
 
-void store_eight(const int* sources, const double* uniforms, const double* registers, int lanes, double* rows,
-                 std::ptrdiff_t step, int count) {
-  for (int first = 0; first < count; first += width) {
-    const auto value = [&](int source) {
-      return source >= 0 ? load(registers + static_cast<std::ptrdiff_t>(source) * lanes + first)
-                         : Lane(uniforms[~source]);
-    };
-    double* const row = rows + first * step;
 #if defined(RHEC_PACK_NAMESPACE)
-    for (int column = 0; column < 8; column += width) {
-      Lane block[width];
-      for (int i = 0; i < width; ++i) block[i] = value(sources[column + i]);
-      transpose(block);
-      for (int i = 0; i < width && first + i < count; ++i) store(block[i], row + i * step + column);
-    }
+/// Eight doubles from anywhere.
+RHEC_INLINE inline void gather_eight(const double* from, const std::int32_t* offsets, double* to) {
+#if defined(__AVX512F__)
+  _mm512_storeu_pd(to, _mm512_i32gather_pd(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(offsets)), from, 8));
 #else
-    for (int column = 0; column < 8; ++column) row[column] = value(sources[column]);
+  for_indices<2>([&](auto half) RHEC_INLINE {
+    const __m128i four = _mm_loadu_si128(reinterpret_cast<const __m128i*>(offsets + 4 * half));
+    _mm256_storeu_pd(to + 4 * half, _mm256_i32gather_pd(from, four, 8));
+  });
 #endif
+}
+#endif
+
+#if defined(RHEC_PACK_NAMESPACE)
+/// Where eight rows begin: multiples of the distance that an address takes as they are.
+struct EightRows {
+  std::ptrdiff_t one, three, five, seven;
+  explicit EightRows(std::ptrdiff_t step) : one(step), three(3 * step), five(5 * step), seven(7 * step) {}
+  template <int i>
+  RHEC_INLINE double* row(double* to) const {
+    static_assert(i >= 0 && i < 8);
+    if constexpr (i == 3 || i == 6) return to + (i / 3) * three;
+    if constexpr (i == 5) return to + five;
+    if constexpr (i == 7) return to + seven;
+    return to + i * one;
   }
+};
+
+/// One group of eight columns of eight stages, or of the first `count`.
+template <int lanes, bool full>
+RHEC_INLINE inline void store_group(const StoredEight& group, const double* registers, double* to,
+                                    const EightRows& rows, [[maybe_unused]] int count) {
+  const bool is_half = group.kind == StoredEight::Kind::first_4;
+  for_indices<8 / width>([&](auto part) RHEC_INLINE {
+    constexpr int column = part * width;
+    const auto store = [&](const Lane* block, auto first) RHEC_INLINE {
+      for_indices<width>([&](auto i) RHEC_INLINE {
+        if (full || first + i < count) store_lane(block[i], rows.template row<first + i>(to) + column);
+      });
+    };
+    // One column after the other: its register, and the stages in it.
+    const auto from = [&](auto i)
+                          RHEC_INLINE { return registers + std::ptrdiff_t{group.sources[column + i]} * (lanes / 8); };
+    Lane block[width];
+    if (is_half && (part > 0 || width > 4)) {  // zero from column 4 on
+      for_indices<8 / width>([&](auto packs) RHEC_INLINE {
+        for_indices<width>([&](auto i) RHEC_INLINE {
+          if constexpr (column + i < 4)
+            block[i] = load_lane(from(i) + packs * width);
+          else
+            block[i] = Lane(0.0);
+        });
+#if defined(__AVX512F__)
+        transpose_half(block);
+#endif
+        store(block, std::integral_constant<int, packs * width>());
+      });
+      return;
+    }
+    for_indices<8 / width>([&](auto packs) RHEC_INLINE {
+      for_indices<width>([&](auto i) RHEC_INLINE { block[i] = load_lane(from(i) + packs * width); });
+      transpose(block);
+      store(block, std::integral_constant<int, packs * width>());
+    });
+  });
+}
+#endif
+
+template <int lanes>
+void store_rows_of(const StoredEight* groups, int rows, int eights, const double* registers, const RowPlaces& places,
+                   int count) {
+#if defined(RHEC_PACK_NAMESPACE)
+  const EightRows eight_rows(places.step);
+#endif
+  for (int r = 0; r < rows; ++r) {
+    for (int e = 0; e < eights; ++e, ++groups) {
+      double* to = places.to + r * places.row_step + 8 * e;
+      if (groups->kind == StoredEight::Kind::constant) {
+        Lane values[8 / width];
+        for (int k = 0; k < 8 / width; ++k) values[k] = load_lane(groups->values.data() + k * width);
+        for (int i = 0; i < count; ++i, to += places.step)
+          for (int k = 0; k < 8 / width; ++k) store_lane(values[k], to + k * width);
+        continue;
+      }
+#if defined(RHEC_PACK_NAMESPACE)
+      if constexpr (lanes == 8) {
+        if (count == 1) {  // a single stage needs no transposition
+          gather_eight(registers, groups->sources.data(), to);
+          continue;
+        }
+      }
+      int first = 0;
+      for (; first + 8 <= count; first += 8, to += 8 * places.step)
+        store_group<lanes, true>(*groups, registers + first, to, eight_rows, 8);
+      if (first < count) store_group<lanes, false>(*groups, registers + first, to, eight_rows, count - first);
+#else
+      for (int i = 0; i < count; ++i, to += places.step)
+        for (int k = 0; k < 8; ++k) to[k] = registers[std::ptrdiff_t{groups->sources[k]} * (lanes / 8) + i];
+#endif
+    }
+  }
+}
+
+void store_rows(const StoredEight* groups, int rows, int eights, const double* registers, int lanes,
+                const RowPlaces& places, int count) {
+  if (lanes == 8) return store_rows_of<8>(groups, rows, eights, registers, places, count);
+  if (lanes == 16) return store_rows_of<16>(groups, rows, eights, registers, places, count);
+  store_rows_of<32>(groups, rows, eights, registers, places, count);
 }
 
 }  // namespace
 
 extern const TapeKernels RHEC_JOIN(tape_kernels_, RHEC_TAPE_SET);
 constinit const TapeKernels RHEC_JOIN(tape_kernels_, RHEC_TAPE_SET) = {RHEC_TEXT(RHEC_TAPE_SET), &run, &load_rows,
-                                                                       &store_eight};
+                                                                       &store_rows};
 
 }  // namespace rhec

@@ -1,5 +1,7 @@
 #include "rhec/core/kernels/kernel_sets.hpp"
 
+#include "rhec/core/base/instruction_sets.hpp"
+
 namespace rhec {
 
 extern const BankKernels bank_kernels_generic;
@@ -23,22 +25,10 @@ constexpr KernelSet kernel_sets[] = {
 #endif
 };
 
-std::size_t count_runnable() noexcept {
-#if defined(RHEC_WIDE_KERNELS)
-  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) return 1;
-  const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
-                          __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
-                          __builtin_cpu_supports("avx512vl");
-  return has_avx512 ? 3 : 2;
-#else
-  return 1;
-#endif
-}
-
 }  // namespace
 
 std::span<const KernelSet> runnable_kernels() noexcept {
-  static const std::size_t count = count_runnable();
+  static const std::size_t count = runnable_sets(kernel_sets, &KernelSet::instruction_set);
   return {kernel_sets, count};
 }
 

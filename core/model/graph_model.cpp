@@ -12,7 +12,7 @@
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/scratch.hpp"
 #include "rhec/core/formula/derivatives.hpp"
-#include "rhec/core/model/formula_model.hpp"
+#include "rhec/core/model/model_functions.hpp"
 
 // Memory of a size that is known at run time only, without an allocation.
 #define RHEC_STACK(size) (static_cast<double*>(__builtin_alloca_with_align((size) * sizeof(double), 512)))
@@ -27,19 +27,11 @@ std::vector<int> joined(const Lists&... lists) {
   return all;
 }
 
-/// The sources of `rows` rows of `columns` results each, padded.
-std::vector<int> padded_rows(const Tape& tape, int first, int rows, int columns) {
-  std::vector<int> sources(static_cast<std::size_t>(rows) * padded(columns), Tape::zero);
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < columns; ++c) sources[r * padded(columns) + c] = tape.results()[first + r * columns + c];
-  return sources;
-}
-
-/// Calls evaluate(first, count, lanes) for the rows that are evaluated together.
+/// Calls evaluate(first, count, lanes) for the rows that a tape evaluates together.
 template <class Evaluate>
-void for_each_block(int rows, Evaluate evaluate) {
+void for_each_block(const Tape& tape, int rows, Evaluate evaluate) {
   for (int first = 0; first < rows;) {
-    const int lanes = lanes_for(rows - first), count = std::min(lanes, rows - first);
+    const int lanes = tape.lanes(rows - first), count = std::min(lanes, rows - first);
     evaluate(first, count, lanes);
     first += count;
   }
@@ -47,53 +39,70 @@ void for_each_block(int rows, Evaluate evaluate) {
 
 }  // namespace
 
-GraphModel::StepTapes::StepTapes(const VehicleGraph& vehicle, bool ramp) {
-  const StepGraph step = StepGraph::make(vehicle, ramp);
-  const std::vector<int> arguments = step.arguments();
-  const auto tape = [&](const std::vector<int>& results) {
-    return Tape(*vehicle.graph, arguments, results, vehicle.options);
-  };
-  values = tape(step.next);
-  jacobians = tape(joined(step.next, step.jacobian.nodes));
-  hessians = tape(joined(step.next, step.jacobian.nodes, step.hessian.nodes));
-  const int nx = step.jacobian.rows, nz = step.jacobian.columns;
-  next_of_values = padded_rows(values, 0, 1, nx);
-  next_of_jacobians = padded_rows(jacobians, 0, 1, nx);
-  next_of_hessians = padded_rows(hessians, 0, 1, nx);
-  rows_of_jacobians = padded_rows(jacobians, nx, nx, nz);
-  jacobian_of_hessians = padded_rows(hessians, nx, nx, nz);
-  hessian_of_hessians = padded_rows(hessians, nx + nx * nz, nz, nz);
+/// Makes tapes: of compiled functions, as far as there are some, else for the interpreter.
+class GraphModel::TapeMaker {
+ public:
+  TapeMaker(const VehicleGraph& vehicle, const StraightCode* code, const StraightSet* set)
+      : vehicle_(vehicle), functions_(vehicle), code_(set ? code : nullptr), set_(set) {
+    if (!code_) return;
+    std::vector<double> values;
+    for (const auto& [node, value] : vehicle.options) values.push_back(value);
+    uniforms_ = code_->uniforms(values);
+  }
+  Tape make(ModelFunction function) {
+    const auto which = static_cast<std::size_t>(function);
+    if (code_ && set_->runs[which]) return {code_->functions[which], set_->runs[which], uniforms_};
+    return {*vehicle_.graph, functions_.inputs(function), functions_.results(function), vehicle_.options};
+  }
+
+ private:
+  const VehicleGraph& vehicle_;
+  ModelFunctions functions_;
+  const StraightCode* code_;
+  const StraightSet* set_;
+  std::vector<double> uniforms_;
+};
+
+GraphModel::StepTapes::StepTapes(TapeMaker& maker, int nx, int nz, bool ramp)
+    : values(maker.make(ramp ? ModelFunction::ramp : ModelFunction::step)),
+      jacobians(maker.make(ramp ? ModelFunction::ramp_jacobian : ModelFunction::step_jacobian)),
+      hessians(maker.make(ramp ? ModelFunction::ramp_hessian : ModelFunction::step_hessian)),
+      next_of_values(values.rows(0, 1, nx)),
+      next_of_jacobians(jacobians.rows(0, 1, nx)),
+      next_of_hessians(hessians.rows(0, 1, nx)),
+      rows_of_jacobians(jacobians.rows(nx, nx, nz)),
+      jacobian_of_hessians(hessians.rows(nx, nx, nz)),
+      hessian_of_hessians(hessians.rows(nx + nx * nz, nz, nz)) {}
+
+GraphModel::Tapes::Tapes(TapeMaker& maker, const Counts& n)
+    : steady(maker, n.x, n.z(false), false),
+      outputs(maker.make(ModelFunction::outputs)),
+      output_jacobians(maker.make(ModelFunction::output_jacobian)),
+      output_hessians(maker.make(ModelFunction::output_hessian)),
+      output_values(outputs.rows(0, 1, n.y)),
+      values_of_output_jacobians(output_jacobians.rows(0, 1, n.y)),
+      output_slopes(output_jacobians.rows(n.y, n.y, n.x)) {
+  if (n.p > 0) ramped = StepTapes(maker, n.x, n.z(true), true);
+  for (int entry = 0; entry < n.x * n.x; ++entry)
+    if (output_hessians.results()[static_cast<std::size_t>(entry)] != Tape::zero) curved.push_back(entry);
+  for (const Tape* each : {&steady.values, &steady.jacobians, &steady.hessians, &ramped.values, &ramped.jacobians,
+                           &ramped.hessians, &outputs, &output_jacobians, &output_hessians})
+    most_registers = std::max(most_registers, each->register_count());
 }
 
-GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description, const StraightMotion* straight)
-    : description_(std::move(description)),
+GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description, const StraightMotion* straight,
+                       const StraightCode* code)
+    : vehicle_(vehicle),
+      description_(std::move(description)),
       n_{static_cast<int>(vehicle.states.size()), static_cast<int>(vehicle.inputs.size()),
          static_cast<int>(vehicle.parameters.size()), static_cast<int>(vehicle.outputs.size())},
-      kernels_(runnable_tape_kernels().back()) {
+      code_(code && code->fingerprint == fingerprint_of(vehicle) ? code : nullptr) {
   check_description(description_, {.states = n_.x, .inputs = n_.u, .parameters = n_.p, .outputs = n_.y});
-  steady_ = StepTapes(vehicle, false);
-  if (n_.p > 0) ramped_ = StepTapes(vehicle, true);
-  Graph& graph = *vehicle.graph;
+  Graph& graph = *vehicle_.graph;
   const auto tape = [&](const std::vector<int>& inputs, const std::vector<int>& results) {
-    return Tape(graph, inputs, results, vehicle.options);
+    return Tape(graph, inputs, results, vehicle_.options);
   };
-  rates_ = tape(joined(vehicle.states, vehicle.parameters, vehicle.inputs), vehicle.rates);
-  outputs_ = tape(vehicle.states, vehicle.outputs);
-  const NodeMatrix slopes = jacobian(graph, vehicle.outputs, vehicle.states);
-  output_jacobians_ = tape(vehicle.states, joined(vehicle.outputs, slopes.nodes));
-  std::vector<int> weights;
-  weights.reserve(static_cast<std::size_t>(n_.y));
-  for (int j = 0; j < n_.y; ++j) weights.push_back(graph.input("weight"));
-  const NodeMatrix bends = weighted_hessian(graph, vehicle.outputs, weights, vehicle.states);
-  std::vector<int> curvature;
-  for (int r = 0; r < n_.x; ++r) {
-    for (int c = 0; c <= r; ++c) {
-      if (graph.is_constant(bends.at(r, c), 0.0)) continue;
-      curved_.push_back(r * n_.x + c);
-      curvature.push_back(bends.at(r, c));
-    }
-  }
-  output_hessians_ = tape(joined(vehicle.states, weights), curvature);
+  rates_ = tape(joined(vehicle_.states, vehicle_.parameters, vehicle_.inputs), vehicle_.rates);
   if (straight) {
     std::vector<int> results = straight->inputs;
     for (int j = 0; j < n_.x; ++j) {
@@ -101,19 +110,26 @@ GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description
       straight_states_.push_back(j);
       results.push_back(straight->states[j]);
     }
-    straight_ = tape(joined(std::vector<int>{straight->ground_speed}, vehicle.parameters), results);
+    straight_ = tape(joined(std::vector<int>{straight->ground_speed}, vehicle_.parameters), results);
   }
+  GraphModel::use_instruction_set(GraphModel::instruction_sets().back());
+}
 
-  std::size_t registers = 0;
-  for (const Tape* each : {&steady_.hessians, &ramped_.hessians, &steady_.jacobians, &ramped_.jacobians, &rates_,
-                           &outputs_, &output_jacobians_, &output_hessians_, &straight_})
-    registers = std::max(registers, each->scratch(GraphSteps::lanes));
-  stack_ = registers + GraphSteps::memory(n_.x, n_.z(true));
-  if (stack_ > most_stack)
+/// Makes the tapes of an instruction set, and finds out what memory they need.
+void GraphModel::use(const TapeKernels& kernels, const StraightSet* set) {
+  TapeMaker maker(vehicle_, code_, set);
+  Tapes made(maker, n_);
+  const std::size_t registers =
+      static_cast<std::size_t>(std::max({made.most_registers, rates_.register_count(), straight_.register_count()}));
+  const std::size_t stack = registers * GraphSteps::lanes + GraphSteps::memory(n_.x, n_.z(true));
+  if (stack > most_stack)
     throw Error(
         fmt::format("model '{}': its step of {} states with second derivatives takes {} numbers for {} rows; "
                     "expected at most {}; write it with fewer states or terms",
-                    description_.name, n_.x, stack_, GraphSteps::lanes, most_stack));
+                    description_.name, n_.x, stack, GraphSteps::lanes, most_stack));
+  tapes_ = std::move(made);
+  stack_ = stack;
+  kernels_ = &kernels;
 }
 
 void GraphModel::integrate(const Intervals& q) const noexcept {
@@ -121,7 +137,7 @@ void GraphModel::integrate(const Intervals& q) const noexcept {
   RHEC_ASSERT(q.count == 0 || (q.states && q.durations), "where to integrate");
   RHEC_ASSERT(q.count == 0 || !q.hessians || q.multipliers, "second derivatives are weighted by multipliers");
   if (q.substeps == 1 && !q.parameters_end && !q.jacobians && !q.hessians) return integrate_values(q);
-  const StepTapes& of = tapes(GraphSteps::is_ramp(q, n_.p));
+  const StepTapes& of = steps(GraphSteps::is_ramp(q, n_.p));
   GraphSteps steps({&of.values, &of.jacobians, &of.hessians, kernels_, n_.x, n_.u, n_.p}, q, RHEC_STACK(stack_));
   for (int first = 0; first < q.count; first += GraphSteps::lanes)
     steps.integrate(first, std::min(GraphSteps::lanes, q.count - first));
@@ -129,11 +145,11 @@ void GraphModel::integrate(const Intervals& q) const noexcept {
 
 /// One step without derivatives, as the defects of each iterate need it: as many rows at once as the stack holds.
 void GraphModel::integrate_values(const Intervals& q) const noexcept {
-  const Tape& tape = steady_.values;
+  const Tape& tape = tapes_.steady.values;
   double* const registers = RHEC_STACK(stack_);
   const int most = tape.scratch(32) <= stack_ ? 32 : tape.scratch(16) <= stack_ ? 16 : 8;
   for (int first = 0, count = 0; first < q.count; first += count) {
-    const int lanes = std::min(lanes_for(q.count - first), most);
+    const int lanes = std::min(tape.lanes(q.count - first), most);
     count = std::min(lanes, q.count - first);
     double* next = registers;
     const auto load = [&](const double* rows, int columns) {
@@ -147,7 +163,7 @@ void GraphModel::integrate_values(const Intervals& q) const noexcept {
     load(q.parameters, n_.p);
     load(q.inputs, n_.u);
     load(q.durations, 1);
-    tape.run(*kernels_, registers, lanes);
+    tape.run(*kernels_, registers, lanes, count);
     for (int j = 0; q.next_states && j < n_.x; ++j) {
       double* const out = q.next_states + static_cast<std::ptrdiff_t>(first) * n_.x + j;
       for (int i = 0; i < count; ++i) out[i * n_.x] = tape.result(j, registers, lanes, i);
@@ -158,19 +174,20 @@ void GraphModel::integrate_values(const Intervals& q) const noexcept {
 void GraphModel::integrate_rows(const IntervalRows& q) const noexcept {
   if (q.substeps != 1) return Model::integrate_rows(q);
   const bool ramp = q.ramp && n_.p > 0;
-  const StepTapes& of = tapes(ramp);
+  const StepTapes& of = steps(ramp);
   const int nz = n_.z(ramp);
   const Tape& tape = q.hessians ? of.hessians : q.jacobians ? of.jacobians : of.values;
-  const std::vector<int>& next = q.hessians    ? of.next_of_hessians
-                                 : q.jacobians ? of.next_of_jacobians
-                                               : of.next_of_values;
-  const std::vector<int>& rows = q.hessians ? of.jacobian_of_hessians : of.rows_of_jacobians;
+  const StoredRows& next = q.hessians ? of.next_of_hessians : q.jacobians ? of.next_of_jacobians : of.next_of_values;
+  const StoredRows& rows = q.hessians ? of.jacobian_of_hessians : of.rows_of_jacobians;
   double* const registers = Scratch(q.scratch).take(0);
-  for_each_block(q.count, [&](int first, int count, int lanes) {
+  for_each_block(tape, q.count, [&](int first, int count, int lanes) {
     const auto at = [&](int which) { return registers + static_cast<std::ptrdiff_t>(which) * lanes; };
-    kernels_->load_rows(q.z + first * q.z_step, q.z_step, count, nz, registers, lanes);
+    const int filled = tape.filled(lanes, count);
+    kernels_->load_rows(q.z + first * q.z_step, q.z_step, count, nz, registers, lanes, filled);
     int argument = nz;
-    for (int i = 0; i < lanes; ++i) at(argument)[i] = q.durations[first + std::min(i, count - 1)];
+    double* const durations = at(argument);
+    std::copy_n(q.durations + first, count, durations);
+    std::fill(durations + count, durations + lanes, durations[count - 1]);
     ++argument;
     if (ramp) {
       std::fill_n(at(argument++), lanes, 0.0);
@@ -178,29 +195,20 @@ void GraphModel::integrate_rows(const IntervalRows& q) const noexcept {
     }
     if (q.hessians)
       kernels_->load_rows(q.multipliers + first * q.multiplier_step, q.multiplier_step, count, n_.x, at(argument),
-                          lanes);
-    tape.run(*kernels_, registers, lanes);
-    const auto store_row = [&](const int* sources, int columns, double* row, std::ptrdiff_t step) {
-      for (int c = 0; c < padded(columns); c += 8)
-        kernels_->store_eight(sources + c, tape.uniforms().data(), registers, lanes, row + c, step, count);
+                          lanes, filled);
+    tape.run(*kernels_, registers, lanes, count);
+    const auto store = [&](const StoredRows& what, const RowPlaces& places) {
+      kernels_->store_rows(what.all.data(), what.rows, what.eights, registers, lanes, places, count);
     };
-    if (q.next_states) store_row(next.data(), n_.x, q.next_states + first * q.next_step, q.next_step);
-    for (int r = 0; q.jacobians && r < n_.x; ++r)
-      store_row(rows.data() + static_cast<std::ptrdiff_t>(r) * padded(nz), nz,
-                q.jacobians + first * q.jacobian_step + r * q.jacobian_row, q.jacobian_step);
-    for (int r = 0; q.hessians && r < nz; ++r)
-      store_row(of.hessian_of_hessians.data() + static_cast<std::ptrdiff_t>(r) * padded(nz), nz,
-                q.hessians + first * q.hessian_step + r * q.hessian_row, q.hessian_step);
+    if (q.next_states) store(next, {q.next_states + first * q.next_step, q.next_step, 0});
+    if (q.jacobians) store(rows, {q.jacobians + first * q.jacobian_step, q.jacobian_step, q.jacobian_row});
+    if (q.hessians) store(of.hessian_of_hessians, {q.hessians + first * q.hessian_step, q.hessian_step, q.hessian_row});
   });
 }
 
 std::size_t GraphModel::rows_scratch(int count) const noexcept {
-  const int lanes = lanes_for(count);
-  std::size_t registers = 0;
-  for (const Tape* tape : {&steady_.hessians, &ramped_.hessians, &steady_.jacobians, &ramped_.jacobians,
-                           &steady_.values, &ramped_.values, &outputs_, &output_jacobians_, &output_hessians_})
-    registers = std::max(registers, tape->scratch(lanes));
-  return std::max(registers + 7, Model::rows_scratch(count));
+  const int lanes = std::max(tapes_.outputs.lanes(count), tapes_.steady.hessians.lanes(count));
+  return std::max(static_cast<std::size_t>(tapes_.most_registers) * lanes + 7, Model::rows_scratch(count));
 }
 
 void GraphModel::rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept {
@@ -213,7 +221,7 @@ void GraphModel::rates(const double* x, const double* u, const double* p, double
   load(x, n_.x);
   load(p, n_.p);
   load(u, n_.u);
-  rates_.run(*kernels_, registers, lanes);
+  rates_.run(*kernels_, registers, lanes, 1);
   for (int j = 0; j < n_.x; ++j) dxdt[j] = rates_.result(j, registers, lanes, 0);
 }
 
@@ -223,7 +231,7 @@ void GraphModel::straight_motion(double ground_speed, const double* p, double* s
   double* const registers = RHEC_STACK(stack_);
   std::fill_n(registers, lanes, ground_speed);
   for (int j = 0; j < n_.p; ++j) std::fill_n(registers + (1 + j) * lanes, lanes, p[j]);
-  straight_.run(*kernels_, registers, lanes);
+  straight_.run(*kernels_, registers, lanes, 1);
   for (int j = 0; j < n_.u; ++j) inputs[j] = straight_.result(j, registers, lanes, 0);
   for (std::size_t k = 0; k < straight_states_.size(); ++k)
     state[straight_states_[k]] = straight_.result(n_.u + k, registers, lanes, 0);
@@ -242,8 +250,8 @@ void GraphModel::observe(const Nodes& q) const noexcept {
         out[static_cast<std::ptrdiff_t>(first + i) * size + entry] = tape.result(result, registers, lanes, i);
     };
     if (q.outputs || q.jacobians) {
-      const Tape& tape = q.jacobians ? output_jacobians_ : outputs_;
-      tape.run(*kernels_, registers, lanes);
+      const Tape& tape = q.jacobians ? tapes_.output_jacobians : tapes_.outputs;
+      tape.run(*kernels_, registers, lanes, count);
       for (int j = 0; q.outputs && j < n_.y; ++j) store(tape, j, q.outputs, n_.y, j);
       for (int j = 0; q.jacobians && j < n_.y; ++j)
         for (int c = 0; c < n_.x; ++c) store(tape, n_.y + j * n_.x + c, q.jacobians, n_.y * n_.x, c * n_.y + j);
@@ -253,57 +261,67 @@ void GraphModel::observe(const Nodes& q) const noexcept {
     std::fill_n(q.hessians + static_cast<std::ptrdiff_t>(first) * size, static_cast<std::ptrdiff_t>(count) * size, 0.0);
     load_columns(q.states + static_cast<std::ptrdiff_t>(first) * n_.x, n_.x, count, registers);
     load_columns(q.multipliers + static_cast<std::ptrdiff_t>(first) * n_.y, n_.y, count, registers + n_.x * lanes);
-    output_hessians_.run(*kernels_, registers, lanes);
-    for (std::size_t k = 0; k < curved_.size(); ++k) {
-      const int r = curved_[k] / n_.x, c = curved_[k] % n_.x;
-      store(output_hessians_, static_cast<int>(k), q.hessians, size, r * n_.x + c);
-      store(output_hessians_, static_cast<int>(k), q.hessians, size, c * n_.x + r);
+    tapes_.output_hessians.run(*kernels_, registers, lanes, count);
+    for (const int entry : tapes_.curved) {
+      const int r = entry / n_.x, c = entry % n_.x;
+      store(tapes_.output_hessians, entry, q.hessians, size, r * n_.x + c);
+      store(tapes_.output_hessians, entry, q.hessians, size, c * n_.x + r);
     }
   }
 }
 
 void GraphModel::observe_rows(const NodeRows& q) const noexcept {
   double* const registers = Scratch(q.scratch).take(0);
-  for_each_block(q.count, [&](int first, int count, int lanes) {
+  for_each_block(tapes_.outputs, q.count, [&](int first, int count, int lanes) {
     const auto load_states = [&] {
-      kernels_->load_rows(q.states + first * q.state_step, q.state_step, count, n_.x, registers, lanes);
+      kernels_->load_rows(q.states + first * q.state_step, q.state_step, count, n_.x, registers, lanes,
+                          tapes_.outputs.filled(lanes, count));
     };
     if (q.outputs || q.jacobians) {
-      const Tape& tape = q.jacobians ? output_jacobians_ : outputs_;
+      const Tape& tape = q.jacobians ? tapes_.output_jacobians : tapes_.outputs;
       load_states();
-      tape.run(*kernels_, registers, lanes);
-      store_outputs(q, first, count, tape, registers, lanes);
+      tape.run(*kernels_, registers, lanes, count);
+      store_outputs(q, first, count, q.jacobians != nullptr, registers, lanes);
     }
-    if (!q.hessians || curved_.empty()) return;
+    if (!q.hessians || tapes_.curved.empty()) return;
     load_states();
     set_weights(q, first, count, registers, lanes);
-    output_hessians_.run(*kernels_, registers, lanes);
+    tapes_.output_hessians.run(*kernels_, registers, lanes, count);
     add_curvature(q, first, count, registers, lanes);
   });
 }
 
-void GraphModel::store_outputs(const NodeRows& q, int first, int count, const Tape& tape, const double* registers,
+void GraphModel::store_outputs(const NodeRows& q, int first, int count, bool with_jacobians, const double* registers,
                                int lanes) const noexcept {
   const int chosen_count = q.chosen ? q.chosen_count : n_.y;
-  const auto store = [&](const std::array<int, 8>& sources, double* rows, std::ptrdiff_t step) {
-    kernels_->store_eight(sources.data(), tape.uniforms().data(), registers, lanes, rows, step, count);
+  const auto store = [&](const StoredEight* groups, int rows, int eights, const RowPlaces& places) {
+    kernels_->store_rows(groups, rows, eights, registers, lanes, places, count);
   };
-  std::array<int, 8> sources;
-  for (int from = 0; q.outputs && from < chosen_count; from += 8) {
-    for (int k = 0; k < 8; ++k) {
-      const int j = from + k;
-      sources[k] = j < chosen_count ? tape.results()[q.chosen ? q.chosen[j] : j] : Tape::zero;
+  if (q.outputs) {
+    double* const to = q.outputs + first * q.output_step;
+    const StoredRows& all = with_jacobians ? tapes_.values_of_output_jacobians : tapes_.output_values;
+    if (!q.chosen) {
+      store(all.row(0), 1, all.eights, {to, q.output_step, 0});
+    } else {
+      const Tape& tape = with_jacobians ? tapes_.output_jacobians : tapes_.outputs;
+      for (int from = 0; from < chosen_count; from += 8) {
+        const int here = std::min(8, chosen_count - from);
+        StoredEight eight;
+        eight.kind = here <= 4 ? StoredEight::Kind::first_4 : StoredEight::Kind::all;
+        eight.sources.fill(tape.stored_zero());
+        for (int k = 0; k < here; ++k) eight.sources[k] = tape.stored(q.chosen[from + k]);
+        store(&eight, 1, 1, {to + from, q.output_step, 0});
+      }
     }
-    store(sources, q.outputs + first * q.output_step + from, q.output_step);
   }
-  for (int j = 0; q.jacobians && j < chosen_count; ++j) {
-    const int* const row =
-        tape.results().data() + n_.y + static_cast<std::ptrdiff_t>(q.chosen ? q.chosen[j] : j) * n_.x;
-    double* const out = q.jacobians + (static_cast<std::ptrdiff_t>(first) * chosen_count + j) * q.jacobian_row;
-    for (int from = 0; from < n_.x; from += 8) {
-      for (int k = 0; k < 8; ++k) sources[k] = from + k < n_.x ? row[from + k] : Tape::zero;
-      store(sources, out + from, chosen_count * q.jacobian_row);
-    }
+  if (!with_jacobians) return;
+  for (int j = 0, next = 0; j < chosen_count; j = next) {
+    const int from = q.chosen ? q.chosen[j] : j;
+    // Outputs that follow each other are stored together.
+    for (next = j + 1; next < chosen_count && (q.chosen ? q.chosen[next] : next) == from + next - j;) ++next;
+    store(tapes_.output_slopes.row(from), next - j, tapes_.output_slopes.eights,
+          {q.jacobians + (static_cast<std::ptrdiff_t>(first) * chosen_count + j) * q.jacobian_row,
+           chosen_count * q.jacobian_row, q.jacobian_row});
   }
 }
 
@@ -320,10 +338,10 @@ void GraphModel::set_weights(const NodeRows& q, int first, int count, double* re
 
 void GraphModel::add_curvature(const NodeRows& q, int first, int count, const double* registers,
                                int lanes) const noexcept {
-  for (std::size_t k = 0; k < curved_.size(); ++k) {
-    const int r = curved_[k] / n_.x, c = curved_[k] % n_.x;
+  for (const int entry : tapes_.curved) {
+    const int r = entry / n_.x, c = entry % n_.x;
     for (int i = 0; i < count; ++i) {
-      const double bend = output_hessians_.result(k, registers, lanes, i);
+      const double bend = tapes_.output_hessians.result(static_cast<std::size_t>(entry), registers, lanes, i);
       double* const hessian = q.hessians + (first + i) * q.hessian_step;
       hessian[r * q.hessian_row + c] += bend;
       if (r != c) hessian[c * q.hessian_row + r] += bend;
@@ -333,17 +351,34 @@ void GraphModel::add_curvature(const NodeRows& q, int first, int count, const do
 
 std::vector<std::string> GraphModel::instruction_sets() const {
   std::vector<std::string> names;
-  for (const TapeKernels* kernels : runnable_tape_kernels()) names.emplace_back(kernels->name);
+  if (code_) {
+    names.emplace_back("interpreted");
+    for (const StraightSet& set : code_->sets) names.emplace_back(set.name);
+  } else {
+    for (const TapeKernels* kernels : runnable_tape_kernels()) names.emplace_back(kernels->name);
+  }
   return names;
 }
 
 bool GraphModel::use_instruction_set(const std::string& wanted) {
-  for (const TapeKernels* kernels : runnable_tape_kernels()) {
-    if (kernels->name != wanted) continue;
-    kernels_ = kernels;
+  const auto kernels = [](std::string_view name) -> const TapeKernels* {
+    for (const TapeKernels* each : runnable_tape_kernels())
+      if (each->name == name) return each;
+    return nullptr;
+  };
+  if (code_) {
+    for (const StraightSet& set : code_->sets) {
+      if (set.name != wanted) continue;
+      use(*kernels(set.name), &set);
+      return true;
+    }
+    if (wanted != "interpreted") return false;
+    use(*runnable_tape_kernels().back(), nullptr);
     return true;
   }
-  return false;
+  const TapeKernels* const found = kernels(wanted);
+  if (found) use(*found, nullptr);
+  return found != nullptr;
 }
 
 }  // namespace rhec

@@ -30,6 +30,7 @@ GraphSteps::GraphSteps(const Parts& parts, const Model::Intervals& request, doub
 }
 
 void GraphSteps::load(int first, int count) noexcept {
+  count_ = count;
   const auto rows = [&](const double* array, int columns) {
     return array + static_cast<std::ptrdiff_t>(first) * columns;
   };
@@ -58,7 +59,7 @@ void GraphSteps::run(const Tape& tape, int step) noexcept {
     at = std::fill_n(at, lanes, 1.0 / q_.substeps);
   }
   if (&tape == p_.hessians) std::copy_n(lambda_, p_.nx * lanes, at);
-  tape.run(*p_.kernels, registers_, lanes);
+  tape.run(*p_.kernels, registers_, lanes, count_);
 }
 
 void GraphSteps::add_product(const Tape& tape, int which, const double* values, double* out) const noexcept {

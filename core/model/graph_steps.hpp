@@ -67,7 +67,7 @@ class GraphSteps {
   bool at_start_ = true;  ///< M is [I 0]
   const Model::Intervals& q_;
   bool ramp_;
-  int nz_;
+  int nz_, count_ = 0;
   double *z_, *h_, *x_, *lambda_, *next_, *M_, *M_next_, *H_, *product_, *registers_;
 };
 

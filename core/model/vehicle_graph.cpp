@@ -5,16 +5,29 @@
 #include "rhec/core/base/error.hpp"
 
 namespace rhec {
+namespace {
+constexpr int guard = 8;  ///< results behind the last one
+}
 
-std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& results, const char* function) {
+std::vector<Expression> room_for_results(int count) {
+  return std::vector<Expression>(static_cast<std::size_t>(count + guard));
+}
+
+std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& results, int count, const char* function) {
   std::vector<int> nodes;
   nodes.reserve(results.size());
   for (const Expression& result : results) {
+    const auto at = static_cast<int>(nodes.size());
+    if (at == count) break;
     if (!result.is_set())
-      throw Error(fmt::format("the formula's {} leaves out number {}; let it write all {}, from 0 on", function,
-                              nodes.size(), results.size()));
+      throw Error(
+          fmt::format("the formula's {} leaves out number {}; let it write all {}, from 0 on", function, at, count));
     nodes.push_back(result.node_in(graph));
   }
+  for (std::size_t k = nodes.size(); k < results.size(); ++k)
+    if (results[k].is_set())
+      throw Error(fmt::format("the formula's {} writes number {}, and it has but {}, counted from 0; mend its counts",
+                              function, k, count));
   return nodes;
 }
 
@@ -23,6 +36,14 @@ std::vector<Expression> new_variables(Graph& graph, const char* letter, int coun
   variables.reserve(static_cast<std::size_t>(count));
   for (int k = 0; k < count; ++k) variables.push_back(Expression::input(graph, fmt::format("{}{}", letter, k)));
   return variables;
+}
+
+void formula_options::check_shown(std::size_t size, std::size_t shown, std::size_t alignment) {
+  if (shown + alignment <= size)
+    throw Error(
+        fmt::format("a formula has {} bytes of members, and its options show {}; show each member to the visitor, or "
+                    "make it static constexpr: a member that is not shown would keep its default",
+                    size, shown));
 }
 
 }  // namespace rhec

@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-ModelKernelSets bicycle_sideslip_kernels();  // defined by rhec_add_model
+const StraightCode& bicycle_sideslip_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -66,24 +66,10 @@ ModelDescription describe() {
   return model;
 }
 
-struct BicycleSideslipOptions : BicycleSideslip {
-  static const OptionTable<BicycleSideslipOptions>& table() {
-    using Options = BicycleSideslipOptions;
-    static const auto options =
-        OptionTable<Options>()
-            .number("wheelbase", &Options::wheelbase, "distance of the axles [m]", greater_than(0.0))
-            .number("antenna_x", &Options::antenna_x,
-                    "how far the GPS antenna is before the rear axle [m]; negative: behind it")
-            .number("antenna_y", &Options::antenna_y, "how far it is to the left [m]; negative: to the right");
-    return options;
-  }
-};
-
 class BicycleSideslipModel : public FormulaModel<BicycleSideslip> {
  public:
-  using Options = BicycleSideslipOptions;
   explicit BicycleSideslipModel(const Options& options)
-      : FormulaModel(static_cast<const BicycleSideslip&>(options), describe(), bicycle_sideslip_kernels()) {}
+      : FormulaModel(options, describe(), bicycle_sideslip_kernels()) {}
 };
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rhec/core/config/option_values.hpp"
+
 namespace rhec {
 
 /// Kinematic bicycle with additive side-slip angles (Lenain et al. 2006), in earth coordinates:
@@ -12,15 +14,22 @@ namespace rhec {
 /// with state [x, y, psi, delta], u = [v, delta_rate], p = [beta_front, beta_rear]. v is the speed of the rear axle's
 /// centre; each axle's velocity points beta_front or beta_rear to the left of its wheels. The source gives the same
 /// model in path coordinates. Outputs: the position of an antenna with lever arm (a_x, a_y), delta, psi.
+template <class Scalar>
 struct BicycleSideslip {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 4;
 
-  double wheelbase = 2.8;  ///< L [m]
-  double antenna_x = 0.0;  ///< a_x: distance of the GPS antenna ahead of the rear axle [m]
-  double antenna_y = 0.0;  ///< a_y: its distance to the left [m]
+  Scalar wheelbase{2.8};  ///< L [m]
+  Scalar antenna_x{0.0};  ///< a_x: distance of the GPS antenna ahead of the rear axle [m]
+  Scalar antenna_y{0.0};  ///< a_y: its distance to the left [m]
 
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  template <class Visitor>
+  void options(Visitor&& option) {
+    option("wheelbase", wheelbase, "distance of the axles [m]", greater_than(0.0));
+    option("antenna_x", antenna_x, "how far the GPS antenna is before the rear axle [m]; negative: behind it");
+    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right");
+  }
+
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin, std::tan;
     const Scalar &psi = x[2], &delta = x[3], &v = u[0], &front = p[0], &rear = p[1];
     dxdt[0] = v * cos(psi + rear);
@@ -29,8 +38,7 @@ struct BicycleSideslip {
     dxdt[3] = u[1];
   }
 
-  template <class Scalar>
-  constexpr void outputs(const Scalar* x, Scalar* y) const {
+  void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar cosine = cos(x[2]), sine = sin(x[2]);
     y[0] = x[0] + antenna_x * cosine - antenna_y * sine;

@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-ModelKernelSets bicycle_slip_kernels();  // defined by rhec_add_model
+const StraightCode& bicycle_slip_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -66,22 +66,9 @@ ModelDescription describe() {
   return model;
 }
 
-struct BicycleSlipOptions : BicycleSlip {
-  static const OptionTable<BicycleSlipOptions>& table() {
-    static const auto options =
-        OptionTable<BicycleSlipOptions>()
-            .number("wheelbase", &BicycleSlipOptions::wheelbase, "distance of the axles [m]", greater_than(0.0))
-            .number("gps_offset", &BicycleSlipOptions::gps_offset,
-                    "how far the GPS antenna is behind the rear axle [m]; negative: before it");
-    return options;
-  }
-};
-
 class BicycleSlipModel : public FormulaModel<BicycleSlip> {
  public:
-  using Options = BicycleSlipOptions;
-  explicit BicycleSlipModel(const Options& options)
-      : FormulaModel(static_cast<const BicycleSlip&>(options), describe(), bicycle_slip_kernels()) {}
+  explicit BicycleSlipModel(const Options& options) : FormulaModel(options, describe(), bicycle_slip_kernels()) {}
 };
 
 }  // namespace

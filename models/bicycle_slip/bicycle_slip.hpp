@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rhec/core/config/option_values.hpp"
+
 namespace rhec {
 
 /// Kinematic bicycle with multiplicative slip (Kraus et al. 2013):
@@ -11,14 +13,20 @@ namespace rhec {
 ///     h(x)   = [x_pos - d cos(beta), y_pos - d sin(beta), delta, beta]
 ///
 /// with x = [x_pos, y_pos, beta, delta], u = [u1, u2], p = [kappa, mu].
+template <class Scalar>
 struct BicycleSlip {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 4;
 
-  double wheelbase = 1.4;   ///< l [m]
-  double gps_offset = 0.4;  ///< d: distance of the GPS antenna behind the rear axle [m]
+  Scalar wheelbase{1.4};   ///< l [m]
+  Scalar gps_offset{0.4};  ///< d: distance of the GPS antenna behind the rear axle [m]
 
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  template <class Visitor>
+  void options(Visitor&& option) {
+    option("wheelbase", wheelbase, "distance of the axles [m]", greater_than(0.0));
+    option("gps_offset", gps_offset, "how far the GPS antenna is behind the rear axle [m]; negative: before it");
+  }
+
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin, std::tan;
     const Scalar &beta = x[2], &delta = x[3], &kappa = p[0], &mu = p[1];
     const Scalar speed = kappa * u[0];
@@ -28,8 +36,7 @@ struct BicycleSlip {
     dxdt[3] = u[1];
   }
 
-  template <class Scalar>
-  constexpr void outputs(const Scalar* x, Scalar* y) const {
+  void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar& beta = x[2];
     y[0] = x[0] - gps_offset * cos(beta);

@@ -6,7 +6,7 @@
 
 namespace rhec {
 
-ModelKernelSets skid_steer_kernels();  // defined by rhec_add_model
+const StraightCode& skid_steer_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -52,26 +52,10 @@ ModelDescription describe() {
   return model;
 }
 
-struct SkidSteerOptions : SkidSteer {
-  static const OptionTable<SkidSteerOptions>& table() {
-    using Options = SkidSteerOptions;
-    static const auto options =
-        OptionTable<Options>()
-            .number("wheel_radius", &Options::wheel_radius, "of the wheels [m]", greater_than(0.0))
-            .number("track_width", &Options::track_width, "between the wheels of both sides [m]", greater_than(0.0))
-            .number("antenna_x", &Options::antenna_x,
-                    "how far the GPS antenna is before the centre [m]; negative: behind it")
-            .number("antenna_y", &Options::antenna_y, "how far it is to the left [m]; negative: to the right");
-    return options;
-  }
-};
-
 class SkidSteerModel : public FormulaModel<SkidSteer> {
  public:
-  using Options = SkidSteerOptions;
   explicit SkidSteerModel(const Options& options)
-      : FormulaModel(static_cast<const SkidSteer&>(options), describe(), skid_steer_kernels()),
-        wheel_radius_(options.wheel_radius) {}
+      : FormulaModel(options, describe(), skid_steer_kernels()), wheel_radius_(options.wheel_radius) {}
 
   // No single input is the speed: each side has its own wheel speed and slip.
   void straight_motion(double ground_speed, const double* p, double*, double* inputs) const noexcept override {

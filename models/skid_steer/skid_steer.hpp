@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rhec/core/config/option_values.hpp"
+
 namespace rhec {
 
 /// A skid-steered vehicle (Yi et al. 2009). The wheels of each side turn together, and each side has its own
@@ -12,16 +14,24 @@ namespace rhec {
 ///
 /// with state [x, y, psi], u = [omega_l, omega_r], p = [lambda_l, lambda_r, s]. Outputs: the position of an antenna
 /// with lever arm (a_x, a_y) from the centre, and psi.
+template <class Scalar>
 struct SkidSteer {
   static constexpr int state_count = 3, input_count = 2, parameter_count = 3, output_count = 3;
 
-  double wheel_radius = 0.14;  ///< r [m]
-  double track_width = 0.6;    ///< W: between the left and right wheels [m]
-  double antenna_x = 0.0;      ///< a_x: distance of the GPS antenna ahead of the centre [m]
-  double antenna_y = 0.0;      ///< a_y: its distance to the left [m]
+  Scalar wheel_radius{0.14};  ///< r [m]
+  Scalar track_width{0.6};    ///< W: between the left and right wheels [m]
+  Scalar antenna_x{0.0};      ///< a_x: distance of the GPS antenna ahead of the centre [m]
+  Scalar antenna_y{0.0};      ///< a_y: its distance to the left [m]
 
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  template <class Visitor>
+  void options(Visitor&& option) {
+    option("wheel_radius", wheel_radius, "of the wheels [m]", greater_than(0.0));
+    option("track_width", track_width, "between the wheels of both sides [m]", greater_than(0.0));
+    option("antenna_x", antenna_x, "how far the GPS antenna is before the centre [m]; negative: behind it");
+    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right");
+  }
+
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin;
     const Scalar left = wheel_radius * u[0] * (1.0 - p[0]), right = wheel_radius * u[1] * (1.0 - p[1]);
     const Scalar speed = 0.5 * (left + right), yaw_rate = (right - left) / track_width;
@@ -32,8 +42,7 @@ struct SkidSteer {
     dxdt[2] = yaw_rate;
   }
 
-  template <class Scalar>
-  constexpr void outputs(const Scalar* x, Scalar* y) const {
+  void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar cosine = cos(x[2]), sine = sin(x[2]);
     y[0] = x[0] + antenna_x * cosine - antenna_y * sine;

@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-ModelKernelSets tractor_trailer_kernels();  // defined by rhec_add_model
+const StraightCode& tractor_trailer_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -73,31 +73,9 @@ ModelDescription describe() {
   return model;
 }
 
-struct TractorTrailerOptions : TractorTrailer {
-  static const OptionTable<TractorTrailerOptions>& table() {
-    using Options = TractorTrailerOptions;
-    static const auto options =
-        OptionTable<Options>()
-            .number("wheelbase", &Options::wheelbase, "distance of the tractor's axles [m]", greater_than(0.0))
-            .number("trailer_length", &Options::trailer_length, "from the hitch to the trailer's axle [m]",
-                    greater_than(0.0))
-            .number("hitch", &Options::hitch,
-                    "how far the hitch is behind the tractor's rear axle [m]; negative: before it")
-            .number("tractor_antenna_x", &Options::tractor_antenna_x,
-                    "how far the tractor's antenna is before its rear axle [m]")
-            .number("tractor_antenna_y", &Options::tractor_antenna_y, "how far it is to the left [m]")
-            .number("trailer_antenna_x", &Options::trailer_antenna_x,
-                    "how far the trailer's antenna is before its axle [m]")
-            .number("trailer_antenna_y", &Options::trailer_antenna_y, "how far it is to the left [m]");
-    return options;
-  }
-};
-
 class TractorTrailerModel : public FormulaModel<TractorTrailer> {
  public:
-  using Options = TractorTrailerOptions;
-  explicit TractorTrailerModel(const Options& options)
-      : FormulaModel(static_cast<const TractorTrailer&>(options), describe(), tractor_trailer_kernels()) {}
+  explicit TractorTrailerModel(const Options& options) : FormulaModel(options, describe(), tractor_trailer_kernels()) {}
 };
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rhec/core/config/option_values.hpp"
+
 namespace rhec {
 
 /// A tractor with a passive trailer and three slip factors (Kayacan et al. 2014). The hitch is l behind the tractor's
@@ -21,19 +23,30 @@ namespace rhec {
 ///
 /// With state [x_i, y_i, psi_i, psi_t, delta], u = [v, delta_rate], p = [mu, kappa, eta]. Outputs: the positions of
 /// antennas on the trailer and on the tractor (each with a lever arm from its axle), delta, beta, and both headings.
+template <class Scalar>
 struct TractorTrailer {
   static constexpr int state_count = 5, input_count = 2, parameter_count = 3, output_count = 8;
 
-  double wheelbase = 1.4;          ///< L_t [m]
-  double trailer_length = 1.3;     ///< L_i: distance from the hitch to the trailer's axle [m]
-  double hitch = 1.1;              ///< l: distance of the hitch behind the tractor's rear axle [m]
-  double tractor_antenna_x = 0.0;  ///< distance of the antenna ahead of the tractor's rear axle [m]
-  double tractor_antenna_y = 0.0;  ///< its distance to the left [m]
-  double trailer_antenna_x = 0.0;  ///< distance of the antenna ahead of the trailer's axle [m]
-  double trailer_antenna_y = 0.0;  ///< its distance to the left [m]
+  Scalar wheelbase{1.4};          ///< L_t [m]
+  Scalar trailer_length{1.3};     ///< L_i: distance from the hitch to the trailer's axle [m]
+  Scalar hitch{1.1};              ///< l: distance of the hitch behind the tractor's rear axle [m]
+  Scalar tractor_antenna_x{0.0};  ///< distance of the antenna ahead of the tractor's rear axle [m]
+  Scalar tractor_antenna_y{0.0};  ///< its distance to the left [m]
+  Scalar trailer_antenna_x{0.0};  ///< distance of the antenna ahead of the trailer's axle [m]
+  Scalar trailer_antenna_y{0.0};  ///< its distance to the left [m]
 
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  template <class Visitor>
+  void options(Visitor&& option) {
+    option("wheelbase", wheelbase, "distance of the tractor's axles [m]", greater_than(0.0));
+    option("trailer_length", trailer_length, "from the hitch to the trailer's axle [m]", greater_than(0.0));
+    option("hitch", hitch, "how far the hitch is behind the tractor's rear axle [m]; negative: before it");
+    option("tractor_antenna_x", tractor_antenna_x, "how far the tractor's antenna is before its rear axle [m]");
+    option("tractor_antenna_y", tractor_antenna_y, "how far it is to the left [m]");
+    option("trailer_antenna_x", trailer_antenna_x, "how far the trailer's antenna is before its axle [m]");
+    option("trailer_antenna_y", trailer_antenna_y, "how far it is to the left [m]");
+  }
+
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin, std::tan;
     const Scalar &psi_i = x[2], &psi_t = x[3], &delta = x[4], &mu = p[0], &kappa = p[1], &eta = p[2];
     const Scalar speed = mu * u[0], slipping = eta * (psi_t - psi_i);
@@ -47,12 +60,11 @@ struct TractorTrailer {
     dxdt[4] = u[1];
   }
 
-  template <class Scalar>
-  constexpr void outputs(const Scalar* x, Scalar* y) const {
+  void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar &psi_i = x[2], &psi_t = x[3];
     const Scalar sine_i = sin(psi_i), cosine_i = cos(psi_i), sine_t = sin(psi_t), cosine_t = cos(psi_t);
-    const double tractor_x = hitch + tractor_antenna_x;
+    const Scalar tractor_x = hitch + tractor_antenna_x;
     y[0] = x[0] + trailer_antenna_x * cosine_i - trailer_antenna_y * sine_i;
     y[1] = x[1] + trailer_antenna_x * sine_i + trailer_antenna_y * cosine_i;
     y[2] = x[0] + trailer_length * cosine_i + tractor_x * cosine_t - tractor_antenna_y * sine_t;

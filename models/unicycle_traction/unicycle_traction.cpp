@@ -7,7 +7,7 @@
 
 namespace rhec {
 
-ModelKernelSets unicycle_traction_kernels();  // defined by rhec_add_model
+const StraightCode& unicycle_traction_kernels();  // defined by rhec_add_model
 
 namespace {
 
@@ -51,23 +51,10 @@ ModelDescription describe() {
   return model;
 }
 
-struct UnicycleTractionOptions : UnicycleTraction {
-  static const OptionTable<UnicycleTractionOptions>& table() {
-    using Options = UnicycleTractionOptions;
-    static const auto options =
-        OptionTable<Options>()
-            .number("antenna_x", &Options::antenna_x,
-                    "how far the GPS antenna is before the centre [m]; negative: behind it")
-            .number("antenna_y", &Options::antenna_y, "how far it is to the left [m]; negative: to the right");
-    return options;
-  }
-};
-
 class UnicycleTractionModel : public FormulaModel<UnicycleTraction> {
  public:
-  using Options = UnicycleTractionOptions;
   explicit UnicycleTractionModel(const Options& options)
-      : FormulaModel(static_cast<const UnicycleTraction&>(options), describe(), unicycle_traction_kernels()) {}
+      : FormulaModel(options, describe(), unicycle_traction_kernels()) {}
 };
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rhec/core/config/option_values.hpp"
+
 namespace rhec {
 
 /// A tracked or differential-drive robot with traction coefficients (Kayacan et al. 2018):
@@ -10,14 +12,20 @@ namespace rhec {
 ///     y' = mu v sin(psi)      h    = [x + a_x cos(psi) - a_y sin(psi), y + a_x sin(psi) + a_y cos(psi), psi]
 ///
 /// with state [x, y, psi], u = [v, omega], p = [mu, kappa].
+template <class Scalar>
 struct UnicycleTraction {
   static constexpr int state_count = 3, input_count = 2, parameter_count = 2, output_count = 3;
 
-  double antenna_x = 0.0;  ///< a_x: distance of the GPS antenna ahead of the centre [m]
-  double antenna_y = 0.0;  ///< a_y: its distance to the left [m]
+  Scalar antenna_x{0.0};  ///< a_x: distance of the GPS antenna ahead of the centre [m]
+  Scalar antenna_y{0.0};  ///< a_y: its distance to the left [m]
 
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  template <class Visitor>
+  void options(Visitor&& option) {
+    option("antenna_x", antenna_x, "how far the GPS antenna is before the centre [m]; negative: behind it");
+    option("antenna_y", antenna_y, "how far it is to the left [m]; negative: to the right");
+  }
+
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin;
     const Scalar &psi = x[2], &mu = p[0], &kappa = p[1];
     const Scalar speed = mu * u[0];
@@ -26,8 +34,7 @@ struct UnicycleTraction {
     dxdt[2] = kappa * u[1];
   }
 
-  template <class Scalar>
-  constexpr void outputs(const Scalar* x, Scalar* y) const {
+  void outputs(const Scalar* x, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar cosine = cos(x[2]), sine = sin(x[2]);
     y[0] = x[0] + antenna_x * cosine - antenna_y * sine;

@@ -1,12 +1,12 @@
-// A model: names, units, bounds and scales of the variables of the formula in articulated.hpp, the options of the
-// vehicle, and the line that makes it a plugin. Try it with: rhec plugins articulated
+// A model: names, units, bounds and scales of the variables of the formula in articulated.hpp, and the line that makes
+// it a plugin. Try it with: rhec plugins articulated
 #include "articulated.hpp"
 
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
-ModelKernelSets articulated_kernels();  // rhec_add_model(articulated ...) in CMakeLists.txt defines it
+const StraightCode& articulated_kernels();  // rhec_add_model(articulated ...) in CMakeLists.txt defines it
 }
 
 namespace {
@@ -39,24 +39,10 @@ rhec::ModelDescription describe() {
   return model;
 }
 
-// Constants that differ from vehicle to vehicle are options: `model: {name: articulated, front: 1.5}`.
-struct ArticulatedOptions : Articulated {
-  static const rhec::OptionTable<ArticulatedOptions>& table() {
-    static const auto rows =
-        rhec::OptionTable<ArticulatedOptions>()
-            .number("front", &ArticulatedOptions::front, "from the hinge to the front axle [m]",
-                    rhec::greater_than(0.0))
-            .number("rear", &ArticulatedOptions::rear, "from the hinge to the rear axle [m]", rhec::greater_than(0.0))
-            .number("antenna", &ArticulatedOptions::antenna, "how far the GPS antenna is before the front axle [m]");
-    return rows;
-  }
-};
-
+// The formula's options are those of the plugin: `model: {name: articulated, front: 1.5}`.
 class ArticulatedModel : public rhec::FormulaModel<Articulated> {
  public:
-  using Options = ArticulatedOptions;
-  explicit ArticulatedModel(const Options& options)
-      : FormulaModel(static_cast<const Articulated&>(options), describe(), rhec::articulated_kernels()) {}
+  explicit ArticulatedModel(const Options& options) : FormulaModel(options, describe(), rhec::articulated_kernels()) {}
 };
 
 }  // namespace

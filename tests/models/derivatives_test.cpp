@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "model_checks.hpp"
+#include "rhec/core/model/graph_model.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/check/model_check.hpp"
 #include "support/allocations.hpp"
@@ -61,6 +62,20 @@ TEST_P(EveryModel, AllInstructionSetsAgreeAndWriteWhatIsAskedFor) {
   const std::shared_ptr<Model> generic = Host().make_model(GetParam());
   ASSERT_TRUE(generic->use_instruction_set(generic->instruction_sets().front()));
   for_each_instruction_set([&] { checks::same_as_generic(*model_, *generic); });
+}
+
+// Compiled kernels and the interpreter have the same bits on the same instruction set.
+TEST_P(EveryModel, IsCompiledToWhatIsInterpreted) {
+  auto* const compiled = dynamic_cast<GraphModel*>(model_.get());
+  if (!compiled || !compiled->is_compiled()) GTEST_SKIP() << "is not compiled";
+  GraphModel interpreted(compiled->vehicle(), compiled->description());
+  for (const std::string& set : compiled->instruction_sets()) {
+    if (set == "interpreted") continue;
+    SCOPED_TRACE(set);
+    ASSERT_TRUE(compiled->use_instruction_set(set));
+    ASSERT_TRUE(interpreted.use_instruction_set(set));
+    checks::expect_same_bits(*compiled, interpreted);
+  }
 }
 
 TEST_P(EveryModel, ObservesByRowsWhatItObserves) {

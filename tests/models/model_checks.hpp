@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <utility>
@@ -129,6 +131,34 @@ inline void expect_same(const std::vector<double>& found, const std::vector<doub
     }
   }
   for (int k = 0; k < Stages::behind; ++k) EXPECT_TRUE(std::isnan(found[count * size + k])) << what << ": past its end";
+}
+
+/// Bit by bit the same results of both, for counts that fill packs and that do not.
+inline void expect_same_bits(const Model& one, const Model& other) {
+  const auto compare = [](const std::vector<double>& found, const std::vector<double>& expected, const char* what) {
+    ASSERT_EQ(found.size(), expected.size());
+    for (std::size_t k = 0; k < found.size(); ++k)
+      EXPECT_EQ(std::bit_cast<std::uint64_t>(found[k]), std::bit_cast<std::uint64_t>(expected[k]))
+          << what << ", entry " << k << ": " << found[k] << " and " << expected[k];
+  };
+  for (const int count : {1, 8, 13}) {
+    for (const bool ramp : {false, true}) {
+      for (const int substeps : {1, 2}) {
+        Stages found = random_stages(one, count, ramp, 40 + count), expected = found;
+        found.substeps = expected.substeps = substeps;
+        one.integrate(found.intervals(true, true, true));
+        other.integrate(expected.intervals(true, true, true));
+        compare(found.next, expected.next, "F");
+        compare(found.jacobians, expected.jacobians, "dF");
+        compare(found.hessians, expected.hessians, "d2F");
+        one.observe(found.nodes(true, true, true));
+        other.observe(expected.nodes(true, true, true));
+        compare(found.outputs, expected.outputs, "h");
+        compare(found.output_jacobians, expected.output_jacobians, "dh");
+        compare(found.output_hessians, expected.output_hessians, "d2h");
+      }
+    }
+  }
 }
 
 /// For counts that fill packs and that do not, and for every choice of what is asked for: the results of `model` are

@@ -8,14 +8,13 @@
 namespace rhec::testing {
 namespace {
 
+template <class Scalar>
 struct Cart {
   static constexpr int state_count = 2, input_count = 1, parameter_count = 2, output_count = 2;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     dxdt[0] = x[1];
     dxdt[1] = p[1] * u[0] - p[0] * x[1] * x[1];
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
     y[1] = x[1] * x[1];
@@ -34,7 +33,7 @@ std::shared_ptr<const Model> cart() {
                       {.name = "gain", .unit = "1", .meaning = "gain of the motor", .lower = 0.2, .upper = 2.0}};
   about.outputs = {{.name = "x", .unit = "m", .meaning = "position"}, {.name = "w", .unit = "m2/s2", .meaning = "v^2"}};
   about.roles = {.position_x = 0};
-  return std::make_shared<FormulaModel<Cart>>(Cart{}, about);
+  return std::make_shared<FormulaModel<Cart>>(Cart<double>{}, about);
 }
 
 std::unique_ptr<RhcProblem> cart_control(int intervals, std::vector<int> blocked_inputs) {

@@ -5,10 +5,10 @@
 namespace rhec {
 
 /// Not a vehicle, but every operation and function that a formula may use, with constants of every kind on either side.
+template <class Scalar>
 struct EveryFunction {
   static constexpr int state_count = 3, input_count = 1, parameter_count = 2, output_count = 11;
 
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::sqrt, std::exp, std::log, std::sin, std::cos, std::tan, std::tanh, std::asin, std::acos, std::atan,
         std::atan2;
@@ -23,7 +23,6 @@ struct EveryFunction {
     dxdt[2] *= positive;
   }
 
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     using std::sqrt, std::exp, std::log, std::sin, std::cos, std::tan, std::tanh, std::asin, std::acos, std::atan,
         std::atan2;

@@ -8,7 +8,7 @@
 
 namespace rhec::testing {
 
-template <class Formula>
+template <template <class> class Formula>
 std::shared_ptr<const Model> linear_model() {
   ModelDescription about;
   about.name = "linear";
@@ -19,11 +19,11 @@ std::shared_ptr<const Model> linear_model() {
       variables.push_back(variable);
     }
   };
-  name_all(about.states, "x", Formula::state_count);
-  name_all(about.inputs, "u", Formula::input_count);
-  name_all(about.parameters, "p", Formula::parameter_count);
-  name_all(about.outputs, "y", Formula::output_count);
-  return std::make_shared<FormulaModel<Formula>>(Formula{}, about);
+  name_all(about.states, "x", Formula<double>::state_count);
+  name_all(about.inputs, "u", Formula<double>::input_count);
+  name_all(about.parameters, "p", Formula<double>::parameter_count);
+  name_all(about.outputs, "y", Formula<double>::output_count);
+  return std::make_shared<FormulaModel<Formula>>(Formula<double>{}, about);
 }
 template std::shared_ptr<const Model> linear_model<Trolley>();
 template std::shared_ptr<const Model> linear_model<Boat>();

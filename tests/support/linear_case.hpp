@@ -20,14 +20,13 @@ namespace rhec::testing {
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// A trolley with drift. Measured are its position, and a combination of position and speed.
+template <class Scalar>
 struct Trolley {
   static constexpr int state_count = 2, input_count = 1, parameter_count = 0, output_count = 2;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar*, Scalar* dxdt) const {
     dxdt[0] = x[1] + 0.3;
     dxdt[1] = u[0] - 0.4 * x[0] - 0.2 * x[1];
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
     y[1] = x[0] + 0.5 * x[1];
@@ -35,15 +34,14 @@ struct Trolley {
 };
 
 /// Three states, the last one without process noise; one parameter.
+template <class Scalar>
 struct Boat {
   static constexpr int state_count = 3, input_count = 1, parameter_count = 1, output_count = 2;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     dxdt[0] = x[1] + 0.5 * p[0];
     dxdt[1] = u[0] - 0.1 * x[1] + x[2];
     dxdt[2] = -0.05 * x[2] + 0.1;
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
     y[1] = x[1] - 0.2 * x[2] + 1.0;
@@ -51,16 +49,15 @@ struct Boat {
 };
 
 /// Four states, two inputs and two parameters, each of which enters in a different place.
+template <class Scalar>
 struct Hovercraft {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 3;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     dxdt[0] = x[2] + p[0] + 0.2;
     dxdt[1] = x[3] - 0.3 * p[1];
     dxdt[2] = u[0] - 0.2 * x[2] + 0.1 * x[1];
     dxdt[3] = u[1] + p[1] - 0.4 * x[3];
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
     y[1] = x[1] + 0.1 * x[0];
@@ -69,7 +66,7 @@ struct Hovercraft {
 };
 
 /// Of the formulas above.
-template <class Formula>
+template <template <class> class Formula>
 std::shared_ptr<const Model> linear_model();
 
 inline const Host& host() {

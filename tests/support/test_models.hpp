@@ -5,16 +5,11 @@
 namespace rhec::testing {
 
 /// x' = u: a linear model whose optima are known.
+template <class Scalar>
 struct Integrator {
   static constexpr int state_count = 1, input_count = 1, parameter_count = 0, output_count = 1;
-  template <class Scalar>
-  void dynamics(const Scalar*, const Scalar* u, const Scalar*, Scalar* dxdt) const {
-    dxdt[0] = u[0];
-  }
-  template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
-    y[0] = x[0];
-  }
+  void dynamics(const Scalar*, const Scalar* u, const Scalar*, Scalar* dxdt) const { dxdt[0] = u[0]; }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
 /// Wraps another model, without its second derivatives.

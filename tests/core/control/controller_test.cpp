@@ -75,9 +75,9 @@ TEST(ControllerReference, KnowsVehiclesWhoseSpeedIsNotOneInput) {
 }
 
 /// x' = kappa s cos(psi), y' = kappa s sin(psi), psi' = omega, s' = a.
+template <class Scalar>
 struct Accelerated {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 1, output_count = 2;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::sin;
     dxdt[0] = p[0] * x[3] * cos(x[2]);
@@ -85,7 +85,6 @@ struct Accelerated {
     dxdt[2] = u[1];
     dxdt[3] = u[0];
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
     y[1] = x[1];
@@ -104,7 +103,7 @@ TEST(ControllerReference, KnowsVehiclesWhoseInputIsAnAcceleration) {
   about.parameters = {{.name = "kappa", .unit = "1", .meaning = "slip", .lower = 0.0, .upper = 1.0}};
   about.outputs = {{.name = "x_gps", .unit = "m", .meaning = "x"}, {.name = "y_gps", .unit = "m", .meaning = "y"}};
   about.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed_state = 3, .speed_factor = 0};
-  const auto model = std::make_shared<FormulaModel<Accelerated>>(Accelerated{}, about);
+  const auto model = std::make_shared<FormulaModel<Accelerated>>(Accelerated<double>{}, about);
   Controller::Setup setup;
   setup.problem.state_weights = {1.0, 1.0, 0.0, 1.0};
   setup.problem.terminal_weights = {1.0, 1.0, 0.0, 0.0};

@@ -328,13 +328,10 @@ TEST(PriorBank, MeasuresTheGroundAndFindsTheLaw) {
 }
 
 /// Two hundred sensors of a micrometre: the product of their variances is no double any more.
+template <class Scalar>
 struct ManySensors {
   static constexpr int state_count = 1, input_count = 1, parameter_count = 1, output_count = 200;
-  template <class Scalar>
-  void dynamics(const Scalar*, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    dxdt[0] = p[0] * u[0];
-  }
-  template <class Scalar>
+  void dynamics(const Scalar*, const Scalar* u, const Scalar* p, Scalar* dxdt) const { dxdt[0] = p[0] * u[0]; }
   void outputs(const Scalar* x, Scalar* y) const {
     for (int j = 0; j < output_count; ++j) y[j] = 1.0 * x[0];
   }
@@ -346,18 +343,18 @@ TEST(PriorBank, WeighsItsMembersByAnyNumberOfOutputs) {
   about.states.resize(1);
   about.inputs.resize(1);
   about.parameters.resize(1);
-  about.outputs.resize(ManySensors::output_count);
-  const auto model = std::make_shared<FormulaModel<ManySensors>>(ManySensors{}, about);
+  about.outputs.resize(ManySensors<double>::output_count);
+  const auto model = std::make_shared<FormulaModel<ManySensors>>(ManySensors<double>{}, about);
   PriorBank::Setup setup;
   setup.members = {{prior("constant", "{mean: 0.8, mean_sigma: 0.001}")},
                    {prior("constant", "{mean: 0.5, mean_sigma: 0.001}")}};
-  setup.output_variances.assign(ManySensors::output_count, 1e-12);
+  setup.output_variances.assign(ManySensors<double>::output_count, 1e-12);
   setup.input_variances = {1e-8};
   PriorBank bank(model, setup);
   bank.reset(Eigen::VectorXd::Zero(1), Eigen::MatrixXd::Identity(1, 1) * 1e-12);
   const double u[] = {1.0};
   for (int k = 1; k <= 5; ++k) {
-    const std::vector<double> y(ManySensors::output_count, 0.8 * 0.2 * k);
+    const std::vector<double> y(ManySensors<double>::output_count, 0.8 * 0.2 * k);
     bank.predict(u, 0.2);
     bank.update(y.data());
   }

@@ -26,13 +26,14 @@ TEST(Expression, RecordsAFormulaThatIsWrittenForAnyNumber) {
       inputs.push_back(list->back().node_in(graph));
     }
   const std::vector<double> at{0.3, -0.2, 0.6, 1.1, 0.0, 0.0, 0.4, -0.7, 0.0};
-  const EveryFunction formula;
+  const EveryFunction<double> of_doubles;
+  const EveryFunction<Expression> formula;
   std::vector<Expression> rates(3), outputs(11);
   formula.dynamics(x.data(), u.data(), p.data(), rates.data());
   formula.outputs(x.data(), outputs.data());
   double expected_rates[3], expected_outputs[11];
-  formula.dynamics(at.data(), at.data() + 3, at.data() + 6, expected_rates);
-  formula.outputs(at.data(), expected_outputs);
+  of_doubles.dynamics(at.data(), at.data() + 3, at.data() + 6, expected_rates);
+  of_doubles.outputs(at.data(), expected_outputs);
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(value(graph, rates[k], inputs, at), expected_rates[k], 1e-14) << k;
   for (int k = 0; k < 11; ++k) EXPECT_NEAR(value(graph, outputs[k], inputs, at), expected_outputs[k], 1e-14) << k;
 }

@@ -23,7 +23,7 @@ TEST_P(RowsTest, ColumnsBecomeRegistersAndTheLastRowIsRepeated) {
         for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = static_cast<double>(k);
         AlignedDoubles registers(static_cast<std::size_t>(columns + 1) * lanes);
         std::fill_n(registers.data(), registers.size(), -1.0);
-        GetParam()->load_rows(rows.data(), step, count, columns, registers.data(), lanes);
+        GetParam()->load_rows(rows.data(), step, count, columns, registers.data(), lanes, lanes);
         for (int c = 0; c < columns; ++c)
           for (int i = 0; i < lanes; ++i)
             ASSERT_EQ(registers.data()[c * lanes + i],
@@ -34,23 +34,34 @@ TEST_P(RowsTest, ColumnsBecomeRegistersAndTheLastRowIsRepeated) {
   }
 }
 
-TEST_P(RowsTest, StoresRegistersAndUniformsToTheRowsThatThereAre) {
-  const std::vector<double> uniforms{0.0, 42.0};
-  const int sources[8] = {2, ~0, 0, ~1, 1, 1, ~0, 2};
+TEST_P(RowsTest, StoresGroupsOfEveryKindToTheRowsThatThereAre) {
+  using Kind = StoredEight::Kind;
+  const StoredEight groups[] = {{Kind::all, {16, 8, 0, 8, 8, 8, 16, 0}, {}},
+                                {Kind::first_4, {8, 0, 16, 16, 24, 24, 24, 24}, {}},
+                                {Kind::constant, {}, {0, 1, 0, 42, 0, 0, 5, 0}},
+                                {Kind::all, {0, 0, 8, 16, 0, 8, 16, 16}, {}}};
+  constexpr int row_step = 24, step = 56;  // two rows of two groups, with something behind them
   for (const int lanes : {8, 16, 32}) {
-    AlignedDoubles registers(static_cast<std::size_t>(3) * lanes);
-    for (int k = 0; k < 3 * lanes; ++k) registers.data()[k] = 100.0 + k;
+    AlignedDoubles registers(static_cast<std::size_t>(4) * lanes);  // the last one of zeros
+    for (int k = 0; k < 4 * lanes; ++k) registers.data()[k] = k < 3 * lanes ? 100.0 + k : 0.0;
     for (int count = 1; count <= lanes; ++count) {
-      const int step = 16;
-      std::vector<double> rows(static_cast<std::size_t>(count + 1) * step, -1.0);
-      GetParam()->store_eight(sources, uniforms.data(), registers.data(), lanes, rows.data(), step, count);
+      std::vector<double> to(static_cast<std::size_t>(count + 1) * step, -1.0);
+      GetParam()->store_rows(groups, 2, 2, registers.data(), lanes, {to.data(), step, row_step}, count);
       for (int i = 0; i <= count; ++i) {
         for (int c = 0; c < step; ++c) {
-          const bool is_written = i < count && c < 8;
-          const double expected = !is_written          ? -1.0
-                                  : sources[c % 8] < 0 ? uniforms[static_cast<std::size_t>(~sources[c % 8])]
-                                                       : registers.data()[sources[c % 8] * lanes + i];
-          ASSERT_EQ(rows[static_cast<std::size_t>(i) * step + c], expected) << i << ", " << c;
+          const int row = c / row_step, column = c % row_step;
+          double expected = -1.0;
+          if (i < count && row < 2 && column < 16) {
+            const StoredEight& group = groups[2 * row + column / 8];
+            const int k = column % 8;
+            if (group.kind == Kind::constant)
+              expected = group.values[k];
+            else if (group.kind == Kind::first_4 && k >= 4)
+              expected = 0.0;
+            else
+              expected = registers.data()[group.sources[k] / 8 * lanes + i];
+          }
+          ASSERT_EQ(to[static_cast<std::size_t>(i) * step + c], expected) << i << ", " << c << " of " << count;
         }
       }
     }

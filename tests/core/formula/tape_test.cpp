@@ -82,8 +82,8 @@ TEST(Tape, ComputesWhatTheGraphDoes) {
         std::uniform_real_distribution<double> uniform(-1.0, 1.0);
         std::vector<double> rows(static_cast<std::size_t>(lanes) * 8);
         std::generate(rows.begin(), rows.end(), [&] { return uniform(random); });
-        kernels->load_rows(rows.data(), 8, lanes, 5, registers.data(), lanes);
-        tape.run(*kernels, registers.data(), lanes);
+        kernels->load_rows(rows.data(), 8, lanes, 5, registers.data(), lanes, lanes);
+        tape.run(*kernels, registers.data(), lanes, lanes);
         for (int lane = 0; lane < lanes; ++lane) {
           const std::vector<double> expected =
               f.graph.evaluate(f.results, f.inputs, {rows.data() + static_cast<std::ptrdiff_t>(lane) * 8, 5});
@@ -134,7 +134,7 @@ TEST(Tape, ComputesWhatIsKnownOnce) {
   const Tape tape(g, {&input, 1}, results, std::vector<Tape::Known>{{option, 4.0}});
   EXPECT_EQ(tape.instruction_count(), 1);
   alignas(64) double registers[8] = {6, 6, 6, 6, 6, 6, 6, 6};
-  tape.run(*runnable_tape_kernels().back(), registers, 8);
+  tape.run(*runnable_tape_kernels().back(), registers, 8, 8);
   EXPECT_DOUBLE_EQ(tape.result(0, registers, 8, 3), 2.0);
   EXPECT_DOUBLE_EQ(tape.result(1, registers, 8, 0), std::exp(4.0));
 }

@@ -22,17 +22,14 @@ namespace {
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 /// A cart: position and speed; acceleration and a second input without effect on the speed; drag as parameter.
+template <class Scalar>
 struct Cart {
   static constexpr int state_count = 2, input_count = 2, parameter_count = 2, output_count = 1;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     dxdt[0] = x[1] + u[1];
     dxdt[1] = u[0] * p[1] - p[0] * x[1];
   }
-  template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
-    y[0] = x[0];
-  }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
 std::shared_ptr<const Model> cart() {
@@ -42,7 +39,7 @@ std::shared_ptr<const Model> cart() {
   about.inputs = {{"a", "m/s^2", "", -2.0, 2.0}, {"w", "m/s", "", -2.0, 2.0}};
   about.parameters = {{"drag", "1/s", "", 0.0, 1.0}, {"gain", "1", "", 0.0, 2.0}};
   about.outputs = {{"x", "m", ""}};
-  return std::make_shared<FormulaModel<Cart>>(Cart{}, about);
+  return std::make_shared<FormulaModel<Cart>>(Cart<double>{}, about);
 }
 
 RheProblem estimator(int intervals) {

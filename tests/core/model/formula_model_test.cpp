@@ -8,7 +8,7 @@
 
 namespace rhec {
 
-ModelKernelSets every_function_kernels();  // defined by rhec_add_model_kernels
+const StraightCode& every_function_kernels();  // defined by rhec_add_model_kernels
 
 namespace {
 
@@ -64,20 +64,21 @@ template <class Scalar>
 }
 
 /// A formula that writes other results than it declares.
+template <class Scalar>
 struct Forgetful {
   static constexpr int state_count = 2, input_count = 0, parameter_count = 0, output_count = 1;
   int rates = 2, measured = 1;
-  template <class Scalar>
-  void dynamics(const Scalar* x, const Scalar*, const Scalar*, Scalar* dxdt) const {
-    write(x[0], rates, dxdt);
+
+  template <class Visitor>
+  void options(Visitor&& option) {
+    option("rates", rates, "how many it writes");
+    option("measured", measured, "how many it writes");
   }
-  template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
-    write(x[0], measured, y);
-  }
+  void dynamics(const Scalar* x, const Scalar*, const Scalar*, Scalar* dxdt) const { write(x[0], rates, dxdt); }
+  void outputs(const Scalar* x, Scalar* y) const { write(x[0], measured, y); }
 };
 
-std::string why_refused(const Forgetful& formula) {
+std::string why_refused(const Forgetful<double>& formula) {
   ModelDescription description;
   description.name = "forgetful";
   description.states = variables({"a", "b"});
@@ -86,15 +87,14 @@ std::string why_refused(const Forgetful& formula) {
 }
 
 TEST(FormulaModel, RefusesAFormulaThatForgetsAResultOrWritesOneTooMany) {
-  EXPECT_EQ(why_refused(Forgetful{}), "");
-  EXPECT_EQ(why_refused(Forgetful{.rates = 1}),
-            "model 'forgetful': the formula's dynamics leaves out number 1, 'b'; let it write all 2, from 0 on");
-  EXPECT_EQ(why_refused(Forgetful{.measured = 0}),
-            "model 'forgetful': the formula's outputs leaves out number 0, 'y'; let it write all 1, from 0 on");
+  EXPECT_EQ(why_refused(Forgetful<double>{}), "");
+  EXPECT_EQ(why_refused(Forgetful<double>{.rates = 1}),
+            "model 'forgetful': the formula's dynamics leaves out number 1; let it write all 2, from 0 on");
+  EXPECT_EQ(why_refused(Forgetful<double>{.measured = 0}),
+            "model 'forgetful': the formula's outputs leaves out number 0; let it write all 1, from 0 on");
   EXPECT_EQ(
-      why_refused(Forgetful{.measured = 2}),
-      "model 'forgetful': the formula's outputs writes number 1, and it has but 1, counted from 0; mend its counts "
-      "and the description");
+      why_refused(Forgetful<double>{.measured = 2}),
+      "model 'forgetful': the formula's outputs writes number 1, and it has but 1, counted from 0; mend its counts");
 }
 
 TEST(EveryFunction, HasTheDerivativesOfItsValues) {
@@ -117,6 +117,21 @@ TEST(EveryFunction, IsTheSameOnEveryInstructionSet) {
     checks::same_as_generic(model, generic);
     for (const int count : {1, 8, 13})
       checks::same_by_rows(model, count, [&](const NodeRows& request) { model.observe_rows(request); });
+  }
+}
+
+// What is compiled and what is interpreted has the same bits on the same instruction set.
+TEST(EveryFunction, IsCompiledToWhatIsInterpreted) {
+  auto compiled = make_model();
+  GraphModel interpreted(compiled.vehicle(), describe());
+  ASSERT_TRUE(compiled.is_compiled());
+  ASSERT_FALSE(interpreted.is_compiled());
+  for (const std::string& set : compiled.instruction_sets()) {
+    if (set == "interpreted") continue;
+    SCOPED_TRACE(set);
+    ASSERT_TRUE(compiled.use_instruction_set(set));
+    ASSERT_TRUE(interpreted.use_instruction_set(set));
+    checks::expect_same_bits(compiled, interpreted);
   }
 }
 

@@ -31,64 +31,44 @@ std::vector<Variable> variables(const char* letter, int count) {
   return all;
 }
 
-template <class Formula>
+template <template <class> class Formula>
 ModelDescription describe() {
   ModelDescription about;
   about.name = "traced";
-  about.states = variables("x", Formula::state_count);
-  about.inputs = variables("u", Formula::input_count);
-  about.parameters = variables("p", Formula::parameter_count);
-  about.outputs = variables("y", Formula::output_count);
+  about.states = variables("x", Formula<double>::state_count);
+  about.inputs = variables("u", Formula<double>::input_count);
+  about.parameters = variables("p", Formula<double>::parameter_count);
+  about.outputs = variables("y", Formula<double>::output_count);
   return about;
 }
 
-template <class Formula>
+/// A class template as a type.
+template <template <class> class Template>
+struct Of {
+  template <class Scalar>
+  using Formula = Template<Scalar>;
+  static GraphModel make() { return {trace<Template>(), describe<Template>()}; }
+};
+template <class Each>
 class Traced : public ::testing::Test {
  protected:
-  FormulaModel<Formula> compiled_{Formula{}, describe<Formula>()};
-  GraphModel interpreted_{trace(Formula{}), describe<Formula>()};
+  GraphModel interpreted_ = Each::make();
 };
-using Formulas = ::testing::Types<BicycleSlip, UnicycleTraction, TractorTrailer, BicycleSideslip, SkidSteer,
-                                  Articulated, EveryFunction, testing::Integrator>;
+using Formulas = ::testing::Types<Of<BicycleSlip>, Of<UnicycleTraction>, Of<TractorTrailer>, Of<BicycleSideslip>,
+                                  Of<SkidSteer>, Of<Articulated>, Of<EveryFunction>, Of<testing::Integrator>>;
 TYPED_TEST_SUITE(Traced, Formulas);
 
-/// To 1e-12 of the largest entry of the same stage.
-void expect_close(const std::vector<double>& found, const std::vector<double>& expected, int count, const char* what) {
-  const std::size_t size = (expected.size() - checks::Stages::behind) / static_cast<std::size_t>(count);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-    double largest = 1.0;
-    for (std::size_t k = 0; k < size; ++k) largest = std::max(largest, std::abs(expected[i * size + k]));
-    for (std::size_t k = 0; k < size; ++k)
-      EXPECT_NEAR(found[i * size + k], expected[i * size + k], 1e-12 * largest) << what << ", stage " << i << ", " << k;
-  }
-}
-
-// The derivatives of nested number types, and those of graphs.
-TYPED_TEST(Traced, HasTheDerivativesOfTheCompiledModel) {
+TYPED_TEST(Traced, HasTheDerivativesOfItsValues) {
   for (const std::string& set : this->interpreted_.instruction_sets()) {
     SCOPED_TRACE(set);
     ASSERT_TRUE(this->interpreted_.use_instruction_set(set));
-    for (const bool ramp : {false, true}) {
-      for (const int substeps : {1, 3}) {
-        checks::Stages one = checks::random_stages(this->compiled_, 19, ramp, 23), other = one;
-        one.substeps = other.substeps = substeps;
-        this->compiled_.integrate(one.intervals(true, true, true));
-        this->interpreted_.integrate(other.intervals(true, true, true));
-        this->compiled_.observe(one.nodes(true, true, true));
-        this->interpreted_.observe(other.nodes(true, true, true));
-        expect_close(other.next, one.next, one.count, "F");
-        expect_close(other.jacobians, one.jacobians, one.count, "dF");
-        expect_close(other.hessians, one.hessians, one.count, "d2F");
-        expect_close(other.outputs, one.outputs, one.count, "h");
-        expect_close(other.output_jacobians, one.output_jacobians, one.count, "dh");
-        expect_close(other.output_hessians, one.output_hessians, one.count, "d2h");
-      }
-    }
+    for (const bool ramp : {false, true})
+      for (const int substeps : {1, 3}) checks::expect_derivatives(this->interpreted_, ramp, substeps, 23);
   }
 }
 
 TYPED_TEST(Traced, PassesTheSuiteOfModels) {
-  GraphModel generic(trace(TypeParam{}), describe<TypeParam>());
+  GraphModel generic = TypeParam::make();
   ASSERT_TRUE(generic.use_instruction_set("generic"));
   GraphModel& model = this->interpreted_;
   for (const std::string& set : model.instruction_sets()) {
@@ -113,7 +93,7 @@ TYPED_TEST(Traced, EvaluatesWithoutAllocation) {
   s.substeps = 2;
   const auto intervals = s.intervals(true, true, true);
   const auto nodes = s.nodes(true, true, true);
-  std::vector<double> rates(TypeParam::state_count);
+  std::vector<double> rates(TypeParam::template Formula<double>::state_count);
   const long before = allocation_count();
   model.integrate(intervals);
   model.observe(nodes);
@@ -122,32 +102,29 @@ TYPED_TEST(Traced, EvaluatesWithoutAllocation) {
 }
 
 TEST(GraphModel, RefusesADescriptionOfAnotherVehicle) {
-  EXPECT_CONTAINS(error_of([] { GraphModel(trace(BicycleSlip{}), describe<TractorTrailer>()); }),
+  EXPECT_CONTAINS(error_of([] { GraphModel(trace<BicycleSlip>(), describe<TractorTrailer>()); }),
                   "its formula has 4 states and its description 5");
 }
 
 /// So many states that their derivatives alone are too much for a stack.
+template <class Scalar>
 struct Wide {
   static constexpr int state_count = 80, input_count = 1, parameter_count = 1, output_count = 1;
-  template <class Scalar>
   void dynamics(const Scalar*, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     for (int i = 0; i < state_count; ++i) dxdt[i] = u[0] * p[0];
   }
-  template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
-    y[0] = x[0];
-  }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
 TEST(GraphModel, RefusesWhatDoesNotFitOnTheStack) {
-  EXPECT_CONTAINS(error_of([] { GraphModel(trace(Wide{}), describe<Wide>()); }),
+  EXPECT_CONTAINS(error_of([] { GraphModel(trace<Wide>(), describe<Wide>()); }),
                   "its step of 80 states with second derivatives takes");
 }
 
 /// Masses on springs in a row, whose last one is driven (Wirsching, Bock and Diehl 2006): 39 states with six masses.
+template <class Scalar>
 struct MassesOnSprings {
   static constexpr int masses = 6, state_count = 6 * masses + 3, input_count = 3, parameter_count = 0, output_count = 3;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar*, Scalar* dxdt) const {
     using std::sqrt;
     constexpr int ends = 3 * (masses + 1);  // positions; velocities stand behind them
@@ -164,21 +141,20 @@ struct MassesOnSprings {
     }
     for (int k = 0; k < 3; ++k) dxdt[3 * masses + k] = u[k];
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     for (int k = 0; k < 3; ++k) y[k] = x[3 * masses + k];
   }
 };
 
 TEST(GraphModel, TakesManyStates) {
-  const GraphModel model(trace(MassesOnSprings{}), describe<MassesOnSprings>());
+  const GraphModel model(trace<MassesOnSprings>(), describe<MassesOnSprings>());
   const checks::Stages at = checks::random_stages(model, 8, false, 3);
   checks::Stages here = at;
   here.substeps = 2;
   here.durations.assign(8, 0.05);
   model.integrate(here.intervals(true, true, true));
   // Along a random direction: values by first derivatives, and these by second ones.
-  constexpr int nx = MassesOnSprings::state_count, nz = nx + 3;
+  constexpr int nx = MassesOnSprings<double>::state_count, nz = nx + 3;
   std::vector<double> direction(nz);
   for (int c = 0; c < nz; ++c) direction[c] = std::sin(1.7 * c + 0.4);
   const double h = 1e-5;
@@ -208,7 +184,7 @@ TEST(GraphModel, TakesManyStates) {
 }
 
 TEST(GraphModel, StraightMotionIsAGraphToo) {
-  const VehicleGraph vehicle = trace(SkidSteer{});
+  const VehicleGraph vehicle = trace<SkidSteer>();
   Graph& graph = *vehicle.graph;
   const Expression speed = Expression::input(graph, "ground_speed"), slip(graph, vehicle.parameters[0]);
   const GraphModel::StraightMotion straight{speed.node_in(graph),
@@ -223,7 +199,7 @@ TEST(GraphModel, StraightMotionIsAGraphToo) {
 }
 
 TEST(GraphModel, SaysWhatItCosts) {
-  const GraphModel model(trace(BicycleSlip{}), describe<BicycleSlip>());
+  const GraphModel model(trace<BicycleSlip>(), describe<BicycleSlip>());
   EXPECT_GT(model.cost_of_values().instructions, 20);
   EXPECT_GT(model.cost_of_jacobians().instructions, model.cost_of_values().instructions);
   EXPECT_GT(model.cost_of_hessians().instructions, model.cost_of_jacobians().instructions);

@@ -24,14 +24,15 @@ TEST(LoadColumns, RepeatsTheLastRow) {
 
 // With many short steps the derivatives of an interval are those of its differences, whatever the number of steps.
 TEST(GraphSteps, DerivativesOfManyStepsAreThoseOfTheirValues) {
-  const VehicleGraph vehicle = trace(BicycleSlip{});
+  const VehicleGraph vehicle = trace<BicycleSlip>();
   const StepGraph step = StepGraph::make(vehicle, false);
   std::vector<int> slopes = step.next, bends;
   slopes.insert(slopes.end(), step.jacobian.nodes.begin(), step.jacobian.nodes.end());
   bends = slopes;
   bends.insert(bends.end(), step.hessian.nodes.begin(), step.hessian.nodes.end());
-  const Tape values(*vehicle.graph, step.arguments(), step.next), jacobians(*vehicle.graph, step.arguments(), slopes),
-      hessians(*vehicle.graph, step.arguments(), bends);
+  const Tape values(*vehicle.graph, step.arguments(), step.next, vehicle.options),
+      jacobians(*vehicle.graph, step.arguments(), slopes, vehicle.options),
+      hessians(*vehicle.graph, step.arguments(), bends, vehicle.options);
   constexpr int nx = 4, nu = 2, np = 2, nz = 8;
   const std::size_t registers = std::max({values.scratch(8), jacobians.scratch(8), hessians.scratch(8)});
   std::vector<double> x{1.0, 2.0, 0.3, 0.2}, u{3.0, 0.4}, p{0.8, 0.7}, weights{0.5, -1.0, 2.0, 0.3};

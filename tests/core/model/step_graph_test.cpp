@@ -19,13 +19,18 @@ std::vector<double> evaluate(const VehicleGraph& vehicle, const StepGraph& step,
   const std::vector<int> arguments = step.arguments();
   std::vector<double> values(arguments.size());
   std::generate(values.begin(), values.end(), [&] { return uniform(random); });
-  return vehicle.graph->evaluate(of, arguments, values);
+  std::vector<int> known = arguments;
+  for (const auto& [node, value] : vehicle.options) {
+    known.push_back(node);
+    values.push_back(value);
+  }
+  return vehicle.graph->evaluate(of, known, values);
 }
 
-template <class Formula>
+template <template <class> class Formula>
 void expect_same_curvature(bool ramp) {
-  const VehicleGraph staged_vehicle = trace(Formula{}), whole_vehicle = trace(Formula{}),
-                     best_vehicle = trace(Formula{});
+  const VehicleGraph staged_vehicle = trace<Formula>(), whole_vehicle = trace<Formula>(),
+                     best_vehicle = trace<Formula>();
   const StepGraph staged = StepGraph::make(staged_vehicle, ramp, StepCurvature::stages),
                   whole = StepGraph::make(whole_vehicle, ramp, StepCurvature::whole),
                   best = StepGraph::make(best_vehicle, ramp, StepCurvature::by_count);
@@ -53,7 +58,7 @@ TEST(StepGraph, BothCurvaturesAgreeAndTheShorterIsTaken) {
 
 // A ramp that does not rise is a constant parameter.
 TEST(StepGraph, ARampWithoutARiseIsAStep) {
-  const VehicleGraph vehicle = trace(BicycleSideslip{});
+  const VehicleGraph vehicle = trace<BicycleSideslip>();
   const StepGraph steady = StepGraph::make(vehicle, false), ramped = StepGraph::make(vehicle, true);
   const std::size_t nx = vehicle.states.size(), np = vehicle.parameters.size(), nu = vehicle.inputs.size();
   std::vector<int> from(ramped.z.begin() + static_cast<std::ptrdiff_t>(nx + np + nu), ramped.z.end());

@@ -16,9 +16,9 @@ namespace rhec {
 namespace {
 
 /// Not linear in anything.
+template <class Scalar>
 struct Cart {
   static constexpr int state_count = 3, input_count = 2, parameter_count = 2, output_count = 2;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos;
     using std::sin;
@@ -26,7 +26,6 @@ struct Cart {
     dxdt[1] = u[0] * p[0] * sin(x[2]);
     dxdt[2] = p[1] * u[1] * p[0];
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     using std::sin;
     y[0] = x[0] * x[1];
@@ -45,7 +44,7 @@ std::shared_ptr<const Model> cart() {
   about.parameters[0].upper = 1.0;
   about.parameters[1].name = "mu";
   about.roles.speed_factor = 0;
-  return std::make_shared<FormulaModel<Cart>>(Cart{}, about);
+  return std::make_shared<FormulaModel<Cart>>(Cart<double>{}, about);
 }
 
 /// Three states for kappa, which runs to its next value, and one for mu, which is held.

@@ -16,13 +16,12 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 /// Nothing to steer, learn or place: a tank that runs empty.
+template <class Scalar>
 struct Tank {
   static constexpr int state_count = 1, input_count = 0, parameter_count = 0, output_count = 1;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar*, const Scalar*, Scalar* dxdt) const {
     dxdt[0] = x[0] * -0.5;
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
   }

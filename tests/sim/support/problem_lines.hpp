@@ -14,17 +14,14 @@
 namespace rhec::sim {
 
 /// A cart whose speed is the input times a grip.
+template <class Scalar>
 struct Cart {
   static constexpr int state_count = 2, input_count = 2, parameter_count = 1, output_count = 1;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     dxdt[0] = u[0] * p[0];
     dxdt[1] = u[1] - x[1];
   }
-  template <class Scalar>
-  void outputs(const Scalar* x, Scalar* y) const {
-    y[0] = x[0];
-  }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
 inline std::shared_ptr<const Model> cart() {
@@ -34,7 +31,7 @@ inline std::shared_ptr<const Model> cart() {
   about.inputs = {{"speed", "m/s", "", -1.0, 1.0}, {"push", "rad/s", ""}};
   about.parameters = {{"grip", "1", "", 0.0, 1.0}};
   about.outputs = {{"gps", "m", ""}};
-  return std::make_shared<FormulaModel<Cart>>(Cart{}, about);
+  return std::make_shared<FormulaModel<Cart>>(Cart<double>{}, about);
 }
 
 inline const std::string rhe_line = R"({"id": "run/rhe/sb/7", "problem": "rhe", "model": {"name": "cart", "mass": 2.5},

@@ -7,32 +7,35 @@
 namespace rhec::sim {
 namespace {
 
+template <class Scalar>
 struct Unicycle {
   static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 2;
-  template <class Scalar>
-  constexpr void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::sin, std::cos;
     dxdt[0] = p[0] * u[0] * cos(x[2]);
     dxdt[1] = p[0] * u[0] * sin(x[2]);
     dxdt[2] = p[1] * x[3];
     dxdt[3] = 5.0 * (u[1] - x[3]);  // the yaw rate follows its command
   }
-  template <class Scalar>
-  constexpr void outputs(const Scalar* x, Scalar* y) const {
+  void outputs(const Scalar* x, Scalar* y) const {
     y[0] = x[0];
     y[1] = x[1];
   }
 };
 
-/// Not constexpr: which derivatives are zero depends on the fault.
-struct FaultyUnicycle : Unicycle {
-  Fault fault = Fault::none;
+template <class Scalar>
+struct FaultyUnicycle : Unicycle<Scalar> {
+  int fault = static_cast<int>(Fault::none);
 
-  template <class Scalar>
+  template <class Visitor>
+  void options(Visitor&& option) {
+    option("fault", fault, "what is wrong with it");
+  }
+
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     using std::cos, std::tanh, std::sqrt, std::tan;
-    Unicycle::dynamics(x, u, p, dxdt);
-    switch (fault) {
+    Unicycle<Scalar>::dynamics(x, u, p, dxdt);
+    switch (static_cast<Fault>(fault)) {
       case Fault::none:
       case Fault::log_of_an_output:
         break;
@@ -50,7 +53,7 @@ struct FaultyUnicycle : Unicycle {
         break;
       case Fault::product_of_parameters: {
         const Scalar both[2] = {p[0] * p[1], p[0]};
-        Unicycle::dynamics(x, u, both, dxdt);
+        Unicycle<Scalar>::dynamics(x, u, both, dxdt);
         dxdt[2] = x[3];
         break;
       }
@@ -65,11 +68,10 @@ struct FaultyUnicycle : Unicycle {
         break;
     }
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     using std::log;
-    Unicycle::outputs(x, y);
-    if (fault == Fault::log_of_an_output) y[1] = x[1] + 0.01 * log(0.9 - x[3]);
+    Unicycle<Scalar>::outputs(x, y);
+    if (static_cast<Fault>(fault) == Fault::log_of_an_output) y[1] = x[1] + 0.01 * log(0.9 - x[3]);
   }
 };
 
@@ -95,9 +97,9 @@ ModelDescription unicycle_description() {
 }
 
 std::unique_ptr<Model> unicycle(Fault fault) {
-  if (fault == Fault::none) return std::make_unique<FormulaModel<Unicycle>>(Unicycle(), unicycle_description());
-  FaultyUnicycle formula;
-  formula.fault = fault;
+  if (fault == Fault::none) return std::make_unique<FormulaModel<Unicycle>>(Unicycle<double>(), unicycle_description());
+  FaultyUnicycle<double> formula;
+  formula.fault = static_cast<int>(fault);
   return std::make_unique<FormulaModel<FaultyUnicycle>>(formula, unicycle_description());
 }
 

@@ -21,14 +21,13 @@ bool has_parameters(const Model& model) { return model.parameter_count() > 0; }
 // --- models of the suite --------------------------------------------------------------------------------------------
 
 /// Carts in a row, each drawn by the one before; the first one is pushed. The rate at which they follow is unknown.
+template <class Scalar>
 struct WideChain {
   static constexpr int state_count = 40, input_count = 1, parameter_count = 1, output_count = 40;
-  template <class Scalar>
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
     dxdt[0] = u[0] - p[0] * x[0];
     for (int j = 1; j < state_count; ++j) dxdt[j] = p[0] * (x[j - 1] - x[j]);
   }
-  template <class Scalar>
   void outputs(const Scalar* x, Scalar* y) const {
     for (int j = 0; j < output_count; ++j) y[j] = x[j];
   }
@@ -46,7 +45,7 @@ ModelDescription about_integrator() {
 ModelDescription about_wide_chain() {
   ModelDescription about;
   about.name = "wide_chain";
-  for (int j = 0; j < WideChain::state_count; ++j) {
+  for (int j = 0; j < WideChain<double>::state_count; ++j) {
     const std::string number = std::to_string(j);
     about.states.push_back({.name = "x" + number, .unit = "m", .meaning = "place of cart " + number});
     about.outputs.push_back({.name = "y" + number, .unit = "m", .meaning = "place of cart " + number});
@@ -324,8 +323,8 @@ std::vector<std::string> model_names() {
 }
 
 std::shared_ptr<const Model> make_model(const std::string& name) {
-  if (name == "integrator") return std::make_shared<FormulaModel<Integrator>>(Integrator{}, about_integrator());
-  if (name == "wide_chain") return std::make_shared<FormulaModel<WideChain>>(WideChain{}, about_wide_chain());
+  if (name == "integrator") return std::make_shared<FormulaModel<Integrator>>(Integrator<double>{}, about_integrator());
+  if (name == "wide_chain") return std::make_shared<FormulaModel<WideChain>>(WideChain<double>{}, about_wide_chain());
   return host().make_model(name);
 }
 

@@ -14,8 +14,8 @@ namespace {
 using namespace testing;
 
 /// x' = x^3 + u, which leaves the numbers within seconds where u is large.
-struct Runaway : Integrator {
-  template <class Scalar>
+template <class Scalar>
+struct Runaway : Integrator<Scalar> {
   void dynamics(const Scalar* x, const Scalar* u, const Scalar*, Scalar* dxdt) const {
     dxdt[0] = x[0] * x[0] * x[0] + u[0];
   }

@@ -63,7 +63,7 @@ inline int bounds_held(const Ocp& ocp, const Iterate& point) {
 struct Limits {
   std::vector<double> state_lower, state_upper, input_lower, input_upper;
 };
-template <class Formula = Integrator>
+template <template <class> class Formula = Integrator>
 std::unique_ptr<RheProblem> integrator(int intervals, const Limits& limits) {
   ModelDescription about;
   about.name = "integrator";
@@ -78,7 +78,7 @@ std::unique_ptr<RheProblem> integrator(int intervals, const Limits& limits) {
   setup.state_upper = limits.state_upper;
   setup.input_lower = limits.input_lower;
   setup.input_upper = limits.input_upper;
-  auto problem = std::make_unique<RheProblem>(std::make_shared<FormulaModel<Formula>>(Formula{}, about), setup);
+  auto problem = std::make_unique<RheProblem>(std::make_shared<FormulaModel<Formula>>(Formula<double>{}, about), setup);
   problem->set_intervals(intervals);
   problem->finish();
   problem->arrival_information(0, 0) = 1.0;

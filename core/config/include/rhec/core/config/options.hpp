@@ -1,5 +1,6 @@
 #pragma once
 
+#include <concepts>
 #include <functional>
 #include <initializer_list>
 #include <memory>
@@ -14,8 +15,8 @@
 
 namespace rhec {
 
-/// The options of a struct T: a name, a member, a meaning and the allowed values for each. The table reads T from
-/// Settings and documents itself; the defaults are those of a default-constructed T.
+/// The options of a struct T: a name, a member (or a function that returns it), a meaning and the allowed values for
+/// each. The table reads T from Settings and documents itself; the defaults are those of a default-constructed T.
 ///
 ///     struct StructuredOptions {
 ///       int size = 5;
@@ -31,13 +32,16 @@ namespace rhec {
 template <class T>
 class OptionTable {
  public:
-  OptionTable& number(std::string name, double T::*member, std::string meaning, Range range = any()) {
+  template <std::invocable<T&> Member>
+  OptionTable& number(std::string name, Member member, std::string meaning, Range range = any()) {
     return leaf(std::move(name), member, NumberValue{range}, std::move(meaning));
   }
-  OptionTable& integer(std::string name, int T::*member, std::string meaning, Range range = any()) {
+  template <std::invocable<T&> Member>
+  OptionTable& integer(std::string name, Member member, std::string meaning, Range range = any()) {
     return leaf(std::move(name), member, IntegerValue{range}, std::move(meaning));
   }
-  OptionTable& flag(std::string name, bool T::*member, std::string meaning) {
+  template <std::invocable<T&> Member>
+  OptionTable& flag(std::string name, Member member, std::string meaning) {
     return leaf(std::move(name), member, FlagValue{}, std::move(meaning));
   }
   OptionTable& text(std::string name, std::string T::*member, std::string meaning) {
@@ -139,12 +143,13 @@ class OptionTable {
   };
 
   template <class Member, class Value>
-  OptionTable& leaf(std::string name, Member T::*member, Value value, std::string meaning) {
+  OptionTable& leaf(std::string name, Member member, Value value, std::string meaning) {
     auto read = [=](T& into, const Settings& from, std::string_view context) {
-      into.*member = value.read(from, OptionContext{context, meaning});
+      std::invoke(member, into) = value.read(from, OptionContext{context, meaning});
     };
     auto describe = [=](const T& defaults, const std::string& full_name, std::vector<OptionRow>& rows) {
-      rows.push_back({full_name, value.type(), value.print(defaults.*member), value.constraint(), meaning});
+      rows.push_back(
+          {full_name, value.type(), value.print(std::invoke(member, defaults)), value.constraint(), meaning});
     };
     return entry({std::move(name), std::move(read), std::move(describe)});
   }

@@ -35,6 +35,8 @@ enum class Operation : std::uint8_t {
   hyperbolic_tangent
 };
 RHEC_EXPORT std::string_view name_of(Operation operation) noexcept;
+/// The enumerator as it is written in C++.
+RHEC_EXPORT std::string_view identifier_of(Operation operation) noexcept;
 /// How many operands it has: 0, 1 or 2.
 RHEC_EXPORT int operand_count(Operation operation) noexcept;
 

@@ -2,12 +2,15 @@
 
 #include <memory>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "rhec/core/base/export.hpp"
 #include "rhec/core/formula/expression.hpp"
 #include "rhec/core/formula/graph.hpp"
 #include "rhec/core/formula/tape.hpp"
+#include "rhec/core/model/formula_options.hpp"
 
 namespace rhec {
 
@@ -19,28 +22,51 @@ struct RHEC_EXPORT VehicleGraph {
   std::vector<int> rates, outputs;              ///< f and h
 };
 
-/// The nodes of results that a formula ("dynamics" or "outputs") has written; throws Error if it left one out.
-RHEC_EXPORT std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& results, const char* function);
+/// Numbers of variables of a formula.
+struct FormulaCounts {
+  int states, inputs, parameters, outputs;
+};
+/// Those of a formula whose options decide them (`FormulaCounts counts() const`), or its constants.
+template <class Formula>
+FormulaCounts counts_of(const Formula& formula) {
+  if constexpr (requires { formula.counts(); })
+    return formula.counts();
+  else
+    return {.states = Formula::state_count,
+            .inputs = Formula::input_count,
+            .parameters = Formula::parameter_count,
+            .outputs = Formula::output_count};
+}
+
+/// Room for results of a formula, with more behind them, so that one that writes too many is found out.
+RHEC_EXPORT std::vector<Expression> room_for_results(int count);
+/// The nodes of the `count` results that a formula ("dynamics" or "outputs") has written; throws Error if it left one
+/// out, or wrote one too many.
+RHEC_EXPORT std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& results, int count,
+                                           const char* function);
 /// `count` new independent variables x0, x1, ...
 RHEC_EXPORT std::vector<Expression> new_variables(Graph& graph, const char* letter, int count);
 
-/// Records a formula (see FormulaModel) by calling it once with Expression for its number type.
-template <class Formula>
-VehicleGraph trace(const Formula& formula) {
+/// Records a formula (FormulaModel says what that is) by calling it once with Expression for its number type. Its
+/// options become inputs of the graph; what they are, and the structure, is taken from `values`. Throws Error if it
+/// leaves out a result, or has members that are not among its options.
+template <template <class> class Formula>
+VehicleGraph trace(const Formula<double>& values = {}) {
   VehicleGraph made;
   Graph& graph = *made.graph;
-  const auto nodes = [&](const std::vector<Expression>& variables) { return written_nodes(graph, variables, ""); };
-  const std::vector<Expression> x = new_variables(graph, "x", Formula::state_count),
-                                u = new_variables(graph, "u", Formula::input_count),
-                                p = new_variables(graph, "p", Formula::parameter_count);
-  std::vector<Expression> rates(Formula::state_count), outputs(Formula::output_count);
-  formula.dynamics(x.data(), u.data(), p.data(), rates.data());
-  formula.outputs(x.data(), outputs.data());
-  made.states = nodes(x);
-  made.inputs = nodes(u);
-  made.parameters = nodes(p);
-  made.rates = written_nodes(graph, rates, "dynamics");
-  made.outputs = written_nodes(graph, outputs, "outputs");
+  const FormulaCounts n = counts_of(values);
+  const std::vector<Expression> x = new_variables(graph, "x", n.states), u = new_variables(graph, "u", n.inputs),
+                                p = new_variables(graph, "p", n.parameters);
+  Formula<Expression> formula;
+  made.options = trace_options(graph, values, formula);
+  std::vector<Expression> rates = room_for_results(n.states), outputs = room_for_results(n.outputs);
+  std::as_const(formula).dynamics(x.data(), u.data(), p.data(), rates.data());
+  std::as_const(formula).outputs(x.data(), outputs.data());
+  made.states = written_nodes(graph, x, n.states, "");
+  made.inputs = written_nodes(graph, u, n.inputs, "");
+  made.parameters = written_nodes(graph, p, n.parameters, "");
+  made.rates = written_nodes(graph, rates, n.states, "dynamics");
+  made.outputs = written_nodes(graph, outputs, n.outputs, "outputs");
   return made;
 }
 

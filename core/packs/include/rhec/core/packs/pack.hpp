@@ -44,6 +44,17 @@ struct Pack {
   RHEC_INLINE friend Pack& operator*=(Pack& a, Pack b) { return a = a * b; }
   RHEC_INLINE friend Pack& operator/=(Pack& a, Pack b) { return a = a / b; }
 
+  /// a b + c, a b - c and c - a b, rounded once.
+  RHEC_INLINE friend Pack multiply_add(Pack a, Pack b, Pack c) {
+    return fused_multiply_add(a.values, b.values, c.values);
+  }
+  RHEC_INLINE friend Pack multiply_subtract(Pack a, Pack b, Pack c) {
+    return fused_multiply_subtract(a.values, b.values, c.values);
+  }
+  RHEC_INLINE friend Pack subtract_product(Pack c, Pack a, Pack b) {
+    return fused_subtract_product(c.values, a.values, b.values);
+  }
+
   RHEC_INLINE friend std::pair<Pack, Pack> sincos(Pack angle) {
     const auto [sine, cosine] = pack_functions::sine_cosine(Batch(angle.values));
     return {sine, cosine};
@@ -103,6 +114,19 @@ RHEC_INLINE inline void transpose(Pack<xsimd::avx512dq>* a) {
     a[j] = _mm512_shuffle_f64x2(quads[j], quads[j + 4], 0x88);
     a[j + 4] = _mm512_shuffle_f64x2(quads[j], quads[j + 4], 0xdd);
   }
+}
+
+/// Transposes four packs of eight and four of zeros, taken as a matrix.
+RHEC_INLINE inline void transpose_half(Pack<xsimd::avx512dq>* a) {
+  // Rows 0, 2, 4, 6 and rows 1, 3, 5, 7, the first two columns and the others.
+  const __m512d pairs[2] = {_mm512_unpacklo_pd(a[0].values, a[1].values), _mm512_unpackhi_pd(a[0].values, a[1].values)};
+  const __m512d others[2] = {_mm512_unpacklo_pd(a[2].values, a[3].values),
+                             _mm512_unpackhi_pd(a[2].values, a[3].values)};
+  for_indices<4>([&](auto i) RHEC_INLINE {
+    constexpr int at = 2 * i;
+    const __m512i row = _mm512_setr_epi64(at, at + 1, at + 8, at + 9, 0, 0, 0, 0);
+    for (int odd = 0; odd < 2; ++odd) a[at + odd] = _mm512_maskz_permutex2var_pd(0x0f, pairs[odd], row, others[odd]);
+  });
 }
 #endif
 

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rhec/core/base/export.hpp"
+#include "rhec/core/model/step_graph.hpp"
+#include "rhec/core/model/vehicle_graph.hpp"
+
+namespace rhec {
+
+/// What is evaluated of a vehicle: one Runge-Kutta step, one on which parameters run to other values, and the outputs.
+/// A Jacobian comes with the values, a Hessian with both.
+enum class ModelFunction {
+  step,
+  step_jacobian,
+  step_hessian,
+  ramp,
+  ramp_jacobian,
+  ramp_hessian,
+  outputs,
+  output_jacobian,
+  output_hessian,  ///< alone
+  count
+};
+RHEC_EXPORT std::string_view name_of(ModelFunction function) noexcept;
+
+/// These functions as nodes of the vehicle's graph, each made when it is first asked for, since derivatives take time.
+/// The results stand in this order, matrices row by row:
+///
+///     step, ramp          F (n_x), dF/dz (n_x x n_z), sum_r weights_r d2F_r/dz2 (n_z x n_z)
+///     outputs             h (n_y), dh/dx (n_y x n_x)
+///     output_hessian      sum_r weights_r d2h_r/dx2 (n_x x n_x), its lower half; zero above
+class RHEC_EXPORT ModelFunctions {
+ public:
+  explicit ModelFunctions(const VehicleGraph& vehicle) : vehicle_(vehicle) {}
+
+  std::vector<int> inputs(ModelFunction function);
+  std::vector<int> results(ModelFunction function);
+
+ private:
+  const StepGraph& step(bool ramp);
+  struct Outputs {
+    NodeMatrix jacobian, hessian;
+    std::vector<int> weights;
+  };
+  const Outputs& outputs();
+
+  const VehicleGraph& vehicle_;
+  std::optional<StepGraph> steady_, ramped_;
+  std::optional<Outputs> outputs_;
+};
+
+/// A number that two formulas share only if they are the same, operation by operation, whatever the values of their
+/// options (64-bit FNV-1a).
+RHEC_EXPORT std::uint64_t fingerprint_of(const VehicleGraph& vehicle);
+
+/// A formula's functions as C++: `kernels` is compiled for each instruction set, `table` once.
+struct ModelCode {
+  std::string kernels, table;
+};
+/// Of a formula called `formula`; the table defines `const rhec::StraightCode& rhec::<prefix>_kernels()`. What would be
+/// longer than `most` instructions is left to the interpreter.
+RHEC_EXPORT ModelCode write_model_code(const VehicleGraph& vehicle, const std::string& prefix,
+                                       const std::string& formula, const std::vector<std::string>& sets,
+                                       int most = 8000);
+
+}  // namespace rhec
