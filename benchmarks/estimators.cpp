@@ -9,13 +9,19 @@
 // estimates are those of the smoother over the whole drive; its time is that of an interval. scripts/measure/estimators
 // runs the whole grid. --first 'ASSIGNMENT; ...' makes another drive before, of which nothing is printed,
 // with these assignments in addition; estimators that remember places keep their maps. scripts/measure/second-lap uses
-// that.
+// that. What stands beside sees `--outliers SHARE` of its fixes shifted by metres (5 m standard deviation), and all
+// fixes `--late SAMPLES` late; the driving estimator does not. --series FILE takes the parameters, true and estimated,
+// of every sample. scripts/measure/conditions uses these.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <deque>
 #include <exception>
+#include <fstream>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -29,6 +35,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
+#include "rhec/sim/numbers/random.hpp"
 
 namespace rhec::bench {
 namespace {
@@ -43,11 +50,22 @@ struct Beside {
   int iterations = 0;
 };
 
+/// What happens to fixes, the outputs in metres, on their way to the estimators beside.
+struct Trouble {
+  double outliers = 0.0;  ///< share of the samples
+  int late = 0;           ///< samples
+  int seed = 1;
+};
+constexpr double outlier_sigma = 5.0;  // [m]
+
 /// Passes on what the driving estimator sees.
 class Forwarding final : public EstimationMethod {
  public:
-  Forwarding(std::unique_ptr<EstimationMethod> inner, std::vector<Beside>& others)
-      : inner_(std::move(inner)), others_(others) {}
+  Forwarding(std::unique_ptr<EstimationMethod> inner, std::vector<Beside>& others, const Trouble& trouble)
+      : inner_(std::move(inner)),
+        others_(others),
+        trouble_(trouble),
+        random_(static_cast<std::uint64_t>(trouble.seed), "outliers") {}
   const Model& model() const noexcept override { return inner_->model(); }
   int substeps() const noexcept override { return inner_->substeps(); }
   void start(const double* outputs) noexcept override {
@@ -57,11 +75,24 @@ class Forwarding final : public EstimationMethod {
   }
   void add_node(double duration, const double* inputs, const double* outputs) noexcept override {
     inner_->add_node(duration, inputs, outputs);
+    const double now = time_ + duration;
+    Late sample{now, std::vector<double>(outputs, outputs + model().output_count()), {}};
+    sample.fixes.assign(sample.others.size(), std::numeric_limits<double>::quiet_NaN());
+    const bool is_outlier = trouble_.outliers > 0.0 && random_.uniform() < trouble_.outliers;
+    for (std::size_t j = 0; j < sample.fixes.size(); ++j) {
+      if (model().description().outputs[j].unit != "m") continue;
+      std::swap(sample.fixes[j], sample.others[j]);
+      if (is_outlier) sample.fixes[j] += outlier_sigma * random_.normal();
+    }
+    waiting_.push_back(std::move(sample));
     for (Beside& other : others_) {
       other.estimator->push_input(time_, inputs);
-      other.estimator->push_measurement(time_ + duration, outputs);
+      other.estimator->push_measurement(now, waiting_.back().others.data());
+      if (std::ssize(waiting_) > trouble_.late)
+        other.estimator->push_measurement(waiting_.front().time, waiting_.front().fixes.data());
     }
-    time_ += duration;
+    if (std::ssize(waiting_) > trouble_.late) waiting_.pop_front();
+    time_ = now;
   }
   bool amend(int back, const double* outputs) noexcept override { return inner_->amend(back, outputs); }
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override {
@@ -81,8 +112,15 @@ class Forwarding final : public EstimationMethod {
   std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return inner_->slip_ahead(); }
 
  private:
+  struct Late {
+    double time;
+    std::vector<double> others, fixes;  ///< NaN where the other has the number
+  };
   std::unique_ptr<EstimationMethod> inner_;
   std::vector<Beside>& others_;
+  Trouble trouble_;
+  sim::RandomStream random_;
+  std::deque<Late> waiting_;
   double time_ = 0.0;
 };
 
@@ -102,13 +140,14 @@ class KeepingHooks final : public RobotHooks {
 
 class ForwardingHooks final : public RobotHooks {
  public:
-  explicit ForwardingHooks(std::vector<Beside>& others) : others_(others) {}
+  ForwardingHooks(std::vector<Beside>& others, const Trouble& trouble) : others_(others), trouble_(trouble) {}
   std::unique_ptr<EstimationMethod> wrap_method(std::unique_ptr<EstimationMethod> method) const override {
-    return std::make_unique<Forwarding>(std::move(method), others_);
+    return std::make_unique<Forwarding>(std::move(method), others_, trouble_);
   }
 
  private:
   std::vector<Beside>& others_;
+  Trouble trouble_;
 };
 
 /// Errors of one estimator over a drive.
@@ -171,7 +210,8 @@ void smooth(const sim::Scenario& variant, const Eigen::VectorXd& start, Beside& 
 }
 
 struct Arguments {
-  std::string scenario, first;
+  std::string scenario, first, series;
+  Trouble trouble;
   std::vector<std::string> assignments, beside, smoothed;
 };
 
@@ -191,8 +231,15 @@ Arguments read(int count, char** words) {
       arguments.smoothed.push_back(value);
     else if (word == "--first")
       arguments.first = value;
+    else if (word == "--series")
+      arguments.series = value;
+    else if (word == "--outliers")
+      arguments.trouble.outliers = std::stod(value);
+    else if (word == "--late")
+      arguments.trouble.late = std::stoi(value);
     else
-      throw Error("'" + word + "' is none of --scenario, --set, --beside, --smoothed, --first");
+      throw Error("'" + word +
+                  "' is none of --scenario, --set, --beside, --smoothed, --first, --series, --outliers, --late");
   }
   if (arguments.scenario.empty()) throw Error("--scenario FILE is missing");
   return arguments;
@@ -208,6 +255,21 @@ sim::Scenario scenario_with(const Host& host, const Arguments& arguments, const 
     at = end + 1;
   }
   return {host, settings};
+}
+
+/// One line a sample and parameter, for each estimator.
+void write_series(const std::string& file, const ModelDescription& about, const sim::RunLog& log,
+                  const std::vector<Beside>& others) {
+  std::ofstream out(file);
+  out << "estimator;sample;parameter;true;estimated\n";
+  for (const Beside& other : others)
+    for (std::size_t i = 0; i < std::min(log.samples.size(), other.estimates.size()); ++i)
+      for (std::size_t j = 0; j < about.parameters.size(); ++j) {
+        const auto at = static_cast<Eigen::Index>(j);
+        out << fmt::format("{};{};{};{:.6g};{:.6g}\n", other.name, i, about.parameters[j].name,
+                           log.samples[i].true_parameters[at], other.estimates[i].parameters[at]);
+      }
+  if (!out.flush()) throw Error(file + ": cannot be written");
 }
 
 /// One drive; `maps` are those of the estimators, in their order.
@@ -231,12 +293,15 @@ void drive(const Host& host, const Arguments& arguments, const std::string& more
   for (const std::string& smoothed : arguments.smoothed) add(smoothed, std::make_shared<NodeLog>());
   const ModelDescription& about = driver.robot().bounded_description();
   sim::LoopHooks hooks;
-  hooks.robot = std::make_shared<ForwardingHooks>(others);
+  Trouble trouble = arguments.trouble;
+  trouble.seed = driver.options().seed;
+  hooks.robot = std::make_shared<ForwardingHooks>(others, trouble);
   const sim::RunLog log = sim::run_closed_loop(driver, hooks);
   for (Beside& other : others) other.estimator->end_drive();
   if (!is_printed) return;
   for (std::size_t i = 0; i < others.size(); ++i)
     if (others[i].nodes) smooth(variants[i], driver.initial_state(), others[i]);
+  if (!arguments.series.empty()) write_series(arguments.series, about, log, others);
   for (Beside& other : others) {
     if (other.estimates.size() != log.samples.size())
       throw Error(fmt::format("{} estimates for {} samples", other.estimates.size(), log.samples.size()));

@@ -135,7 +135,8 @@ void predict(const BankView& bank, const BankStep& step) {
       for (int r = 0; r < n; ++r) {
         const Lanes start = W[static_cast<long>(first) * n + r];
         Lanes end = start;
-        for (int c = 0; c < count; ++c) {
+        // The value (c = 0) in every row, since the vehicle feels it; else the lower half alone.
+        for (int c = 0; c < count && (c == 0 || first + c <= r); ++c) {
           Lanes sum{};
           for (int k = 0; k < count; ++k) sum += F[k * count + c] * W[static_cast<long>(first + k) * n + r];
           if (c == 0) end = ramp[0] * sum + (1.0 - ramp[0]) * start;
@@ -247,32 +248,29 @@ void update(const BankView& bank, const BankOutput* outputs, int count, double g
         innovation -= h[c] * correction[c];
         total += h[c] * image[c];
       }
-      for (int r = 0; r < n; ++r) gain.set(r, image[r] / total);
-      // Joseph's form, factor by factor: (I - k h') P, then (..) (I - k h')' + k R k'.
-      for (int c = 0; c < n; ++c) {
-        const Lanes by = image[c];
-        for (int r = 0; r < n; ++r)
-          next.set(static_cast<long>(c) * n + r, P[static_cast<long>(c) * n + r] - gain[r] * by);
-      }
-      for (int r = 0; r < n; ++r) {
-        Lanes sum{};
-        for (int c = 0; c < nx; ++c) sum += next[static_cast<long>(c) * n + r] * h[c];
-        image.set(r, variance * gain[r] - sum);
-      }
+      const Lanes inverse = 1.0 / total;
+      for (int r = 0; r < n; ++r) gain.set(r, image[r] * inverse);
+      // Joseph's form (I - k h') P (I - k h')' + k R k', multiplied out with b = P h and s = h' b + R:
+      // P - k b' - b k' + s k k', which a rounding error of k changes in second order only. The lower half.
       Lanes zeros = 0.0 * innovation;
       for (int c = 0; c < n; ++c) {
-        const Lanes by_gain = gain[c], by_image = image[c];
+        const Lanes by_gain = gain[c], rest = image[c] - total * by_gain;
         for (int r = c; r < n; ++r) {
-          // The mean of the two halves, which rounding makes differ.
-          const long lower = static_cast<long>(c) * n + r, upper = static_cast<long>(r) * n + c;
-          const Lanes value = 0.5 * (next[lower] + image[r] * by_gain + next[upper] + by_image * gain[r]);
+          const long lower = static_cast<long>(c) * n + r;
+          const Lanes value = P[lower] - image[r] * by_gain - gain[r] * rest;
           zeros += 0.0 * value;
           next.set(lower, value);
-          next.set(upper, value);
         }
       }
       const LaneMask is_finite = zeros == 0.0;
-      commit(next, static_cast<long>(n) * n, P, zeros);
+      for (int c = 0; c < n; ++c) {
+        for (int r = c; r < n; ++r) {
+          const long lower = static_cast<long>(c) * n + r, upper = static_cast<long>(r) * n + c;
+          const Lanes before = P[lower], after = next[lower], value = is_finite ? after : before;
+          P.set(lower, value);
+          P.set(upper, value);
+        }
+      }
       for (int r = 0; r < n; ++r) correction.add(r, is_finite ? gain[r] * innovation : Lanes{});
       const Lanes square = is_finite ? smaller(innovation * innovation / total, all(gate)) : all(gate);
       store(load(squares + m) + square, squares + m);

@@ -26,7 +26,7 @@ struct PathOptions {
 };
 
 struct TerrainOptions {
-  enum class Name { gaussian, constant, patches, raster };
+  enum class Name { gaussian, constant, patches, raster, split };
   Name name = Name::gaussian;
   double correlation_length = 10.0, period = 500.0, patch_size = 10.0;
   double lower = 0.5, upper = 1.0;
@@ -34,6 +34,9 @@ struct TerrainOptions {
   Settings ranges, values;
   std::vector<std::string> files;
   RasterField::Interpolation interpolation = RasterField::Interpolation::bilinear;
+  SplitField::Across across = SplitField::Across::x;
+  double border = 0.0;
+  Settings below, above;
 };
 
 const OptionTable<PathOptions>& path_table() {
@@ -71,7 +74,8 @@ const OptionTable<TerrainOptions>& terrain_table() {
                   {{"gaussian", T::Name::gaussian},
                    {"constant", T::Name::constant},
                    {"patches", T::Name::patches},
-                   {"raster", T::Name::raster}},
+                   {"raster", T::Name::raster},
+                   {"split", T::Name::split}},
                   "how the true parameters vary over the ground")
           .number("correlation_length", &T::correlation_length, "L of the gaussian field [m]", greater_than(0.0))
           .number("period", &T::period, "after which the gaussian field repeats itself [m]", greater_than(0.0))
@@ -86,7 +90,12 @@ const OptionTable<TerrainOptions>& terrain_table() {
           .choice(
               "interpolation", &T::interpolation,
               {{"bilinear", RasterField::Interpolation::bilinear}, {"nearest", RasterField::Interpolation::nearest}},
-              "of raster");
+              "of raster")
+          .choice("across", &T::across, {{"x", SplitField::Across::x}, {"y", SplitField::Across::y}},
+                  "of split: the coordinate that decides")
+          .number("border", &T::border, "of split: below is where that coordinate is less [m]", between(-1e9, 1e9))
+          .subtree("below", &T::below, "of split: one of its two grounds, as a section terrain of its own")
+          .subtree("above", &T::above, "of split: the other");
   return rows;
 }
 
@@ -169,14 +178,29 @@ std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDes
   return ranges;
 }
 
-std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, const ModelDescription& about) {
-  const TerrainOptions terrain = terrain_table().parse(options.terrain, "terrain");
+std::unique_ptr<const SlipField> make_terrain(const Settings& section, int scenario_seed,
+                                              const ModelDescription& about);
+
+/// One of the grounds of a split one.
+std::unique_ptr<const SlipField> make_side(const Settings& section, const char* key, int scenario_seed,
+                                           const ModelDescription& about) {
+  const Settings* const side = section.find(key);
+  if (!side || side->is_null())
+    throw key_or_section(section, "name")
+        .error(fmt::format("found 'split', but no '{}' beside it; expected there the name and the options of a ground",
+                           key));
+  return make_terrain(*side, scenario_seed, about);
+}
+
+std::unique_ptr<const SlipField> make_terrain(const Settings& section, int scenario_seed,
+                                              const ModelDescription& about) {
+  const TerrainOptions terrain = terrain_table().parse(section, "terrain");
   if (!(terrain.lower <= terrain.upper))
-    throw key_or_section(options.terrain, "lower")
+    throw key_or_section(section, "lower")
         .error(fmt::format("lower is {} and upper is {}; expected lower <= upper", terrain.lower, terrain.upper));
   const std::vector<double> constant = values_by_name().read(terrain.values, about);
-  const std::vector<SlipRange> ranges = slip_ranges(terrain, about, options.terrain);
-  const auto seed = static_cast<std::uint64_t>(terrain.seed.value_or(options.seed));
+  const std::vector<SlipRange> ranges = slip_ranges(terrain, about, section);
+  const auto seed = static_cast<std::uint64_t>(terrain.seed.value_or(scenario_seed));
   switch (terrain.name) {
     case TerrainOptions::Name::gaussian:
       return gaussian_random_field({seed, ranges, terrain.correlation_length, terrain.period});
@@ -186,16 +210,18 @@ std::unique_ptr<const SlipField> make_terrain(const ScenarioOptions& options, co
       return constant_field(constant);
     case TerrainOptions::Name::raster: {
       if (terrain.files.size() != about.parameters.size())
-        throw key_or_section(options.terrain, "files")
+        throw key_or_section(section, "files")
             .error(fmt::format("{} raster files given; expected {}, one a parameter of the model", terrain.files.size(),
                                about.parameters.size()));
       RasterField raster;
-      if (terrain.files.empty())
-        throw options.terrain.error("the model has no parameters; a raster has nothing to say");
-      for (const Settings& file : options.terrain.find("files")->items()) raster.files.push_back(file_at(file));
+      if (terrain.files.empty()) throw section.error("the model has no parameters; a raster has nothing to say");
+      for (const Settings& file : section.find("files")->items()) raster.files.push_back(file_at(file));
       raster.interpolation = terrain.interpolation;
       return raster_field(raster);
     }
+    case TerrainOptions::Name::split:
+      return split_field({terrain.across, terrain.border, make_side(section, "below", scenario_seed, about),
+                          make_side(section, "above", scenario_seed, about)});
   }
   return nullptr;
 }
@@ -209,7 +235,8 @@ const OptionTable<ScenarioOptions>& ScenarioOptions::table() {
         .number("speed", &ScenarioOptions::speed, "reference ground speed [m/s]", between(0.01, 100.0))
         .integer("seed", &ScenarioOptions::seed, "of terrain and noise", between(0, 2147483647))
         .subtree("path", &ScenarioOptions::path, "name: figure8 | zigzag | file, and its options")
-        .subtree("terrain", &ScenarioOptions::terrain, "name: gaussian | constant | patches | raster, and its options")
+        .subtree("terrain", &ScenarioOptions::terrain,
+                 "name: gaussian | constant | patches | raster | split, and its options")
         .subtree("vehicle", &ScenarioOptions::vehicle, "the true vehicle: step, mechanical_stops");
     RobotOptions::add_to(table);
     return table;
@@ -232,7 +259,7 @@ Scenario::Scenario(const Host& host, const Settings& settings)
     : options_(ScenarioOptions::table().parse(settings, "scenario")),
       robot_(host, options_, scenario_estimators()),
       path_(make_waypoints(options_)),
-      terrain_(make_terrain(options_, robot_.model()->description())) {
+      terrain_(make_terrain(options_.terrain, options_.seed, robot_.model()->description())) {
   vehicle_ = vehicle_table().parse(options_.vehicle, "vehicle");
   const double samples = path_.length() / (options_.speed * options_.step);
   if (!(samples >= 1.0 && samples <= most_samples))

@@ -106,6 +106,19 @@ class Raster final : public SlipField {
   bool bilinear_;
 };
 
+class Split final : public SlipField {
+ public:
+  explicit Split(SplitField options) : sides_(std::move(options)) {}
+  int channels() const noexcept override { return sides_.below->channels(); }
+  void look_up(double x, double y, double* values) const noexcept override {
+    const bool is_below = (sides_.across == SplitField::Across::x ? x : y) < sides_.border;
+    (is_below ? sides_.below : sides_.above)->sample(x, y, values);
+  }
+
+ private:
+  SplitField sides_;
+};
+
 }  // namespace
 
 void SlipField::sample(double x, double y, double* values) const noexcept {
@@ -129,6 +142,18 @@ std::unique_ptr<const SlipField> raster_field(const RasterField& options) {
   std::vector<Grid> grids;
   for (const std::filesystem::path& file : options.files) grids.push_back(load_grid(file));
   return std::make_unique<Raster>(std::move(grids), options.interpolation);
+}
+
+std::unique_ptr<const SlipField> split_field(SplitField options) {
+  if (!options.below || !options.above) throw Error("split slip field: expected a field on each side of the border");
+  if (options.below->channels() != options.above->channels()) {
+    throw Error(fmt::format("split slip field: {} channel(s) below the border and {} above; expected as many",
+                            options.below->channels(), options.above->channels()));
+  }
+  if (!std::isfinite(options.border)) {
+    throw Error(fmt::format("split slip field: border is {}; expected a finite coordinate [m]", options.border));
+  }
+  return std::make_unique<Split>(std::move(options));
 }
 
 }  // namespace rhec::sim

@@ -30,6 +30,8 @@ CHOICES = {
     "terrain constant": (FIGURE8, ["terrain={name: constant, values: {kappa: 0.8, mu: 0.9}}"]),
     "terrain patches": (FIGURE8, ["terrain={name: patches, patch_size: 5, lower: 0.6}"]),
     "terrain raster": (FIGURE8, ["terrain={name: raster, files: [kappa.csv, mu.csv], interpolation: nearest}"]),
+    "terrain split": (FIGURE8, ["terrain={name: split, border: 5, below: {name: constant, values: {kappa: 0.8}}, "
+                                "above: {name: gaussian, correlation_length: 4}}"]),
     "path zigzag": (ZIGZAG, []),
     "path file": (FIGURE8, ["path={name: file, file: path.csv}"]),
     "path file with speeds": (FIGURE8, ["path={name: file, file: speeds.csv}"]),

@@ -56,6 +56,15 @@ TEST(Scenario, TheGroundIsAsItIsNamed) {
   EXPECT_NE(slip_at(figure8_with(same), 1.0, 2.0), slip_at(figure8_with(other), 1.0, 2.0));
 }
 
+TEST(Scenario, TheGroundMayBeSplit) {
+  const std::string constant = "{name: constant, values: {kappa: 0.75}}", below = "{name: patches, upper: 0.7}";
+  const Scenario split = figure8_with(
+      {"terrain={name: split, across: y, border: 4, below: " + below + ", above: " + constant + "}", "seed=5"});
+  const Scenario patches = figure8_with({"terrain=" + below, "seed=5"});
+  EXPECT_EQ(slip_at(split, 1.0, 4.1), (std::array{0.75, 1.0}));
+  EXPECT_EQ(slip_at(split, 1.0, 3.9), slip_at(patches, 1.0, 3.9)) << "the scenario's seed is its grounds'";
+}
+
 TEST(Scenario, TheVehicleIsTheTruth) {
   const Scenario scenario = figure8_with({"vehicle={step: 0.005, mechanical_stops: false}"});
   EXPECT_EQ(scenario.vehicle().step, 0.005);
@@ -96,6 +105,8 @@ TEST(Scenario, MistakesAreToldWithTheirKey) {
       {{"terrain.ranges.kappa=[0, .inf]"}, "terrain.ranges.kappa", "two finite numbers"},
       {{"terrain={name: constant, values: {kapa: 1}}"}, "terrain", "did you mean 'kappa'"},
       {{"terrain={name: swamp}"}, "terrain.name", "gaussian"},
+      {{"terrain={name: split, below: {name: constant}}"}, "terrain.name", "no 'above'"},
+      {{"terrain={name: split, below: {name: constant}, above: {name: swamp}}"}, "terrain.above.name", "gaussian"},
       {{"path={name: figure9}"}, "path.name", "did you mean 'figure8'"},
       {{"vehicle.stp=1"}, "vehicle", "did you mean 'step'"},
       {{"spede=4"}, "spede", "did you mean 'speed'"},

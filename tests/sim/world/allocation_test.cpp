@@ -28,6 +28,7 @@ TEST(Allocation, NoneInALoopOfTruthSensorsFieldsAndFollower) {
   fields.push_back(gaussian_random_field({}));
   fields.push_back(patch_field({}));
   fields.push_back(constant_field({0.8, 0.9}));
+  fields.push_back(split_field({.border = 2.0, .below = patch_field({}), .above = gaussian_random_field({})}));
   for (const auto& field : fields) {
     TruthVehicle vehicle(model, *field, Eigen::Vector4d(0, 0, 0, 0.1));
     Sensors sensors(model, {.outputs = {0.03, 0.03, 0.02}, .inputs = {0.1, 0.1}}, 1);

@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "support/error_of.hpp"
 
@@ -64,6 +66,36 @@ TEST(RasterField, NamesFileAndLineOfAMistake) {
   EXPECT_CONTAINS(message_for("1,2\n"), "no values");
   EXPECT_CONTAINS(error_of([] { raster_field({.files = {"no/such/file.csv"}}); }), "no/such/file.csv: cannot be read");
   EXPECT_CONTAINS(error_of([] { raster_field({}); }), "no files");
+}
+
+TEST(SplitField, HasAGroundOnEachSideOfItsBorders) {
+  const auto constant = [](double kappa, double mu) { return constant_field({kappa, mu}); };
+  const auto field = split_field({.border = 10.0,
+                                  .below = constant(0.5, 0.6),
+                                  .above = split_field({.across = SplitField::Across::y,
+                                                        .border = -5.0,
+                                                        .below = constant(0.7, 0.8),
+                                                        .above = constant(0.9, 1.0)})});
+  const auto at = [&](double x, double y) {
+    std::array<double, 2> values{};
+    field->sample(x, y, values.data());
+    return values;
+  };
+  EXPECT_EQ(field->channels(), 2);
+  EXPECT_FALSE(field->is_smooth()) << "there is an edge";
+  EXPECT_EQ(at(9.999, 100.0), (std::array{0.5, 0.6}));
+  EXPECT_EQ(at(10.0, -5.001), (std::array{0.7, 0.8})) << "the border is above";
+  EXPECT_EQ(at(1e6, -5.0), (std::array{0.9, 1.0}));
+}
+
+TEST(SplitField, RefusesSidesThatDoNotFit) {
+  const auto message_for = [](std::unique_ptr<const SlipField> below, std::unique_ptr<const SlipField> above,
+                              double at) {
+    return error_of([&] { split_field({.border = at, .below = std::move(below), .above = std::move(above)}); });
+  };
+  EXPECT_CONTAINS(message_for(constant_field({1}), nullptr, 0.0), "on each side");
+  EXPECT_CONTAINS(message_for(constant_field({1}), constant_field({1, 2}), 0.0), "1 channel(s) below the border and 2");
+  EXPECT_CONTAINS(message_for(constant_field({1}), constant_field({1}), NAN), "border is nan");
 }
 
 }  // namespace

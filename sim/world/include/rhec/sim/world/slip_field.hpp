@@ -80,4 +80,15 @@ struct RasterField {
 /// cell size that is not positive, and a file without values.
 RHEC_EXPORT std::unique_ptr<const SlipField> raster_field(const RasterField& options);
 
+/// Two grounds with a straight border: `below` where the coordinate is less than `border`, else `above`. A side may be
+/// split again.
+struct SplitField {
+  enum class Across { x, y };
+  Across across = Across::x;  ///< the coordinate that decides
+  double border = 0.0;        ///< [m]
+  std::unique_ptr<const SlipField> below, above;
+};
+/// Throws Error for a side that is missing, different numbers of channels, or a border that is not finite.
+RHEC_EXPORT std::unique_ptr<const SlipField> split_field(SplitField options);
+
 }  // namespace rhec::sim
