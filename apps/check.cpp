@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "formula_views.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 #include "rhec/plugins/host/host.hpp"
@@ -28,7 +29,9 @@ struct CheckArguments {
   std::vector<std::filesystem::path> plugin_path;
   int seed = 1;
   std::optional<double> speed;
-  bool json = false;
+  bool json = false, trace = false;
+  std::vector<std::string> values;  ///< of a traced point
+  GraphFile graph;
 };
 
 bool is_file(const std::string& name) {
@@ -122,14 +125,40 @@ void print_times(const sim::ModelCheck& check) {
                text(times.hessians), text(times.outputs));
 }
 
+/// Where a formula is looked at: where a simulated drive starts, or at the origin; straight ahead at the speed.
+sim::FormulaPoint start_of(const Host& host, const CheckArguments& arguments, bool is_scenario, const Robot& robot,
+                           Model& model, std::optional<double> speed) {
+  const ModelDescription about = robot.bounded_description();
+  sim::FormulaPoint point = sim::straight_point(model, about, speed);
+  if (is_scenario) {
+    Settings settings = load_yaml(arguments.model);
+    apply_assignments(settings, arguments.assignments);
+    if (settings.find("path")) {
+      const Path path = sim::Scenario(host, settings).path();
+      const PathPoint start = path.point_at(0.0);
+      about.roles.place(start.x, start.y, start.heading, point.states.data());
+    }
+  }
+  apply_values(arguments.values, about, point);
+  return point;
+}
+
 int check(const CheckArguments& arguments) {
   const Host host(arguments.plugin_path);
   sim::ModelCheckOptions options;
   options.seed = static_cast<std::uint64_t>(arguments.seed);
   options.speed = arguments.speed;
   const bool is_scenario = is_file(arguments.model) && !is_vehicle(arguments.model);
-  const RobotOptions robot = is_scenario ? robot_of_scenario(arguments, options.speed) : robot_of_model(arguments);
-  const sim::ModelCheck found = sim::check_model(host, Robot(host, robot, sim::scenario_estimators()), options);
+  const RobotOptions robot_options =
+      is_scenario ? robot_of_scenario(arguments, options.speed) : robot_of_model(arguments);
+  const Robot robot(host, robot_options, sim::scenario_estimators());
+  if (arguments.graph) return show_graph(*robot.model(), *arguments.graph, arguments.json);
+  if (arguments.trace) {
+    const PluginChoice choice = robot.model_choice();
+    const std::shared_ptr<Model> model = host.make_model(choice.name, choice.options);
+    return show_trace(*model, start_of(host, arguments, is_scenario, robot, *model, options.speed), arguments.json);
+  }
+  const sim::ModelCheck found = sim::check_model(host, robot, options);
   if (arguments.json) {
     fmt::print("{}\n", sim::check_json(found));
   } else {
@@ -147,13 +176,17 @@ void add_check(Program& program) {
   auto arguments = std::make_shared<CheckArguments>();
   Command command = program.add(
       "check", "Looks at a model before its first run: derivatives, scales, NaN, what can be estimated, time.",
-      "The exit code is 3 where a check fails; warnings are no failure. docs/check.md explains each check.\n\n"
+      "The exit code is 3 where a check fails, or a traced number is not finite; warnings are no failure. "
+      "docs/check.md\n"
+      "explains each check.\n\n"
       "Examples:\n"
       "  rhec check bicycle_slip\n"
       "  rhec check bicycle_slip --set wheelbase=2.8 --set gps_offset=0\n"
       "  rhec check my_vehicle.yaml\n"
       "  rhec check scenarios/figure8.yaml --set bounds.delta='[-1.5, 1.5]'\n"
-      "  rhec check my_model --plugin-path build/my_model --json",
+      "  rhec check my_model --plugin-path build/my_model --json\n"
+      "  rhec check my_vehicle.yaml --trace --at v=0 --at delta=0.3\n"
+      "  rhec check scenarios/figure8.yaml --graph",
       [arguments] { return check(*arguments); });
   command
       .add("model", arguments->model,
@@ -168,6 +201,21 @@ void add_check(Program& program) {
            "ground speed of the drives [m/s]; else the scenario's, or what the inputs' scales make")
       .positive();
   command.add_flag("--json", arguments->json, "print JSON");
+  const Argument trace = command.add_flag(
+      "--trace", arguments->trace,
+      "instead of the checks, print every node of the model's formula at the start of the drive, and the first that is "
+      "not finite");
+  command
+      .add_list("--at", arguments->values,
+                "with --trace: the value of a state, an input or a parameter; may be given several times")
+      .value("VARIABLE=NUMBER")
+      .needs(trace);
+  command
+      .add_optional(
+          "--graph", arguments->graph,
+          "instead of the checks, print operations, depth and sparsity of the model's formula, and draw it if a "
+          "file is named")
+      .value("[FILE.svg]");
   add_plugin_path(command, arguments->plugin_path);
 }
 

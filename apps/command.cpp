@@ -67,8 +67,14 @@ Argument Command::add_list(const std::string& name, const std::function<void(con
                            const std::string& meaning) {
   return Argument(one_value_each_time(app_->add_option_function<std::vector<std::string>>(name, take, meaning)));
 }
-void Command::add_flag(const std::string& name, bool& variable, const std::string& meaning) {
-  app_->add_flag(name, variable, meaning);
+Argument Command::add_flag(const std::string& name, bool& variable, const std::string& meaning) {
+  return Argument(app_->add_flag(name, variable, meaning));
+}
+Argument Command::add_optional(const std::string& name, std::optional<std::string>& value, const std::string& meaning) {
+  const auto take = [&value](const std::vector<std::string>& given) {
+    value = given.empty() ? std::string() : given.front();
+  };
+  return Argument(app_->add_option_function<std::vector<std::string>>(name, take, meaning)->expected(0, 1));
 }
 
 Program::Program(const std::string& about, const std::string& examples)

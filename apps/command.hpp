@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,7 +53,9 @@ class Command {
   /// The same; `take` is called with all of them, and throws Error for a wrong one.
   Argument add_list(const std::string& name, const std::function<void(const std::vector<std::string>&)>& take,
                     const std::string& meaning);
-  void add_flag(const std::string& name, bool& variable, const std::string& meaning);
+  Argument add_flag(const std::string& name, bool& variable, const std::string& meaning);
+  /// An option whose value may be left out; it is empty then.
+  Argument add_optional(const std::string& name, std::optional<std::string>& value, const std::string& meaning);
 
  private:
   CLI::App* app_;

@@ -22,6 +22,7 @@ void add_check(Program& program);
 void add_compare(Program& program);
 void add_estimate(Program& program);
 void add_map(Program& program);
+void add_model(Program& program);
 void add_report(Program& program);
 void add_run(Program& program);
 void add_smooth(Program& program);

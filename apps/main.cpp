@@ -52,6 +52,7 @@ constexpr const char* examples =
     "  rhec plugins                       what is installed\n"
     "  rhec plugins gn_rti                the options of one plugin\n"
     "  rhec check bicycle_slip            a model before its first run\n"
+    "  rhec model my_vehicle.yaml --cpp   a vehicle's equations as a plugin in C++\n"
     "  rhec solve problems.jsonl --solver gn_rti --set mode=converge --out solutions.jsonl\n"
     "  rhec solve problems.jsonl --solver gn_rti --sequence > solutions.jsonl\n"
     "  rhec compare scenarios/figure8.yaml --solvers gn_rti,sparse_sqp\n"
@@ -73,6 +74,7 @@ int run(int count, char** words) {
   add_report(program);
   add_map(program);
   add_check(program);
+  add_model(program);
   add_options(program);
   add_plugins(program);
   return program.run(count, words);

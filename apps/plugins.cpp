@@ -13,6 +13,7 @@
 
 #include "commands.hpp"
 #include "doctor.hpp"
+#include "formula_views.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
 #include "rhec/core/model/model.hpp"
@@ -26,6 +27,7 @@ struct PluginsArguments {
   std::string name;
   bool json = false;
   bool doctor = false;
+  GraphFile graph;
   std::vector<std::filesystem::path> plugin_path;
 };
 
@@ -223,6 +225,11 @@ std::vector<PluginRecord> named(const Host& host, const std::string& name) {
 int show(const PluginsArguments& arguments) {
   const Host host(arguments.plugin_path);
   if (arguments.doctor) return examine_plugins(host, arguments.name, arguments.json);
+  if (arguments.graph) {
+    if (arguments.name.empty())
+      throw Error("--graph: it is the graph of a model, which is not named; name it before --graph");
+    return show_graph(*model_with_all_outputs(host, arguments.name), *arguments.graph, arguments.json);
+  }
   if (is_equations_file(arguments.name)) {
     if (arguments.json) {
       auto all = sim::Json::array();
@@ -259,6 +266,7 @@ void add_plugins(Program& program) {
                   "  rhec plugins\n"
                   "  rhec plugins gn_rti\n"
                   "  rhec plugins my_vehicle.yaml       a vehicle's equations\n"
+                  "  rhec plugins my_vehicle.yaml --graph vehicle.svg\n"
                   "  rhec plugins --doctor              why each file was or was not accepted\n"
                   "  rhec plugins --json --plugin-path my/plugins",
                   [arguments] { return show(*arguments); });
@@ -268,6 +276,10 @@ void add_plugins(Program& program) {
            "with --doctor")
       .value("NAME");
   command.add_flag("--json", arguments->json, "print JSON, options included");
+  command
+      .add_optional("--graph", arguments->graph,
+                    "of a model: print operations, depth and sparsity of its formula, and draw it if a file is named")
+      .value("[FILE.svg]");
   command.add_flag("--doctor", arguments->doctor,
                    "say of every file that could be a plugin if it is accepted, or why not and what to do, and try the "
                    "accepted ones; the exit code is 3 if one is refused, not used, or fails");

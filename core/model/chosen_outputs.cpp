@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/model/formula_copy.hpp"
 
 namespace rhec {
 namespace {
@@ -27,6 +29,7 @@ class ChosenOutputs final : public Model {
     nodes_at_once_ = static_cast<int>(room / std::max<std::size_t>(a_node, 1));
     description_.outputs.clear();
     for (const int output : chosen_) description_.outputs.push_back(model_->description().outputs[output]);
+    if (const VehicleGraph* all = model_->graph()) graph_ = formula_copy(*all, chosen_);
   }
 
   const ModelDescription& description() const noexcept override { return description_; }
@@ -47,6 +50,7 @@ class ChosenOutputs final : public Model {
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   std::vector<std::string> instruction_sets() const override { return model_->instruction_sets(); }
   bool use_instruction_set(const std::string& name) override { return model_->use_instruction_set(name); }
+  const VehicleGraph* graph() const noexcept override { return graph_ ? &*graph_ : nullptr; }
 
   void observe(const Nodes& request) const noexcept override {
     const std::ptrdiff_t nx = state_count(), ny = output_count();
@@ -113,6 +117,7 @@ class ChosenOutputs final : public Model {
   std::shared_ptr<Model> model_;
   std::vector<int> chosen_;
   ModelDescription description_;
+  std::optional<VehicleGraph> graph_;
   int all_ = 0, nodes_at_once_ = 1;
 };
 

@@ -14,22 +14,6 @@
 namespace rhec::equations {
 namespace {
 
-int operands_of(const Item& item) {
-  switch (item.kind) {
-    case Item::Kind::number:
-    case Item::Kind::name:
-      return 0;
-    case Item::Kind::negate:
-      return 1;
-    case Item::Kind::function:
-      for (const FunctionInfo& known : known_functions())
-        if (item.name == known.name) return known.arguments;
-      return 1;
-    default:
-      return 2;
-  }
-}
-
 /// What the user wrote, for messages.
 std::string sign_of(const Item& item) {
   switch (item.kind) {
@@ -46,16 +30,17 @@ std::string sign_of(const Item& item) {
 
 }  // namespace
 
-Definitions::Definitions(Graph& graph, std::string file, std::map<std::string, int> variables)
-    : graph_(graph), file_(std::move(file)), variables_(std::move(variables)) {}
+Definitions::Definitions(Graph& graph, std::string file, std::map<std::string, int> variables, std::string expected)
+    : graph_(graph), file_(std::move(file)), expected_(std::move(expected)), variables_(std::move(variables)) {}
 
 void Definitions::add(std::vector<Statement> statements) {
   for (Statement& statement : statements) {
     if (variables_.contains(statement.target))
-      throw error_at(file_, statement.place,
-                     fmt::format("'{0}' is a variable, whose value is given; an equation for a state is one for its "
-                                 "derivative, {0}' = ...",
-                                 statement.target));
+      throw error_at(
+          file_, statement.place,
+          fmt::format("the value of '{0}' is given; expected an equation for the derivative of a state ({0}' = "
+                      "..., if it is one), for an output, or for a new name",
+                      statement.target));
     const auto [known, is_new] = statement_of_.try_emplace(statement.target, static_cast<int>(statements_.size()));
     if (!is_new)
       throw error_at(file_, statement.place,
@@ -79,7 +64,7 @@ void Definitions::check_names() const {
         resolve(item);  // throws
 }
 
-/// The statements so that each comes after those that it needs, found without recursion.
+/// Without recursion.
 std::vector<int> Definitions::order() const {
   enum class Mark : char { unseen, open, done };
   std::vector<Mark> marks(statements_.size(), Mark::unseen);
@@ -145,24 +130,25 @@ int Definitions::resolve(const Item& name) const {
   for (const auto& [known_name, node] : variables_) known.push_back(known_name);
   for (const Statement& statement : statements_) known.push_back(statement.target);
   const std::string near = nearest(name.name, known);
-  throw error_at(file_, name.place,
-                 fmt::format("'{}' is not known{}", name.name,
-                             near.empty() ? "; expected a state, an input, a parameter, an option, or a name that has "
-                                            "an equation"
-                                          : fmt::format("; did you mean '{}'?", near)));
+  std::string advice = near.empty() ? "; expected " + expected_ : fmt::format("; did you mean '{}'?", near);
+  if (name.name == "t" || name.name == "time") advice = "; equations do not depend on time. Expected " + expected_;
+  if (name.name == "nan" || name.name == "inf") advice = "; expected a finite number";
+  throw error_at(file_, name.place, fmt::format("'{}' is not known{}", name.name, advice));
 }
 
-int Definitions::build_term(const std::vector<Item>& term) {
-  std::vector<int> operands;
+std::vector<int> Definitions::build_items(const std::vector<Item>& term) {
+  std::vector<int> operands, nodes;
   for (const Item& item : term) {
     const int made = apply(item, operands);
     if (graph_.is_constant(made) && !std::isfinite(graph_[made].value))
       throw error_at(
           file_, item.place,
-          fmt::format("{} is not a finite number, whatever the values: it is {}", sign_of(item), graph_[made].value));
+          fmt::format("{} is not a finite number, whatever the values: it is {}; expected a term that has a value",
+                      sign_of(item), std::isnan(graph_[made].value) ? "undefined" : "infinite"));
     operands.push_back(made);
+    nodes.push_back(made);
   }
-  return operands.back();
+  return nodes;
 }
 
 int Definitions::apply(const Item& item, std::vector<int>& operands) {
@@ -219,6 +205,12 @@ int Definitions::apply_function(const Item& item, const std::vector<int>& argume
                                               {"atan", Operation::arc_tangent},
                                               {"atan2", Operation::arc_tangent_2},
                                               {"tanh", Operation::hyperbolic_tangent}};
+  const auto is_of = [&](std::size_t k, Operation operation) { return graph_[arguments[k]].operation == operation; };
+  if (item.name == "atan2" && is_of(0, Operation::sine) && is_of(1, Operation::cosine) &&
+      graph_[arguments[0]].a == graph_[arguments[1]].a)
+    throw error_at(file_, item.place,
+                   "this wraps an angle, which equations never do; write the angle itself, and give the variable "
+                   "'angle: true', so that differences are taken on the circle");
   for (const Elementary& known : elementary)
     if (item.name == known.name)
       return graph_.function(known.operation, arguments[0], arguments.size() > 1 ? arguments[1] : -1);

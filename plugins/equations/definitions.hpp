@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,10 +14,11 @@ namespace rhec::equations {
 /// itself.
 class Definitions {
  public:
-  /// `variables`: the nodes of names that no equation is for. Throws Error for a name that is defined twice or is a
-  /// variable's.
-  Definitions(Graph& graph, std::string file, std::map<std::string, int> variables);
+  /// `variables`: the nodes of names that no equation is for; `expected`: what names there are, in words.
+  Definitions(Graph& graph, std::string file, std::map<std::string, int> variables,
+              std::string expected = "a state, an input, a parameter, an option, or a name that has an equation");
 
+  /// Throws Error for a name that is defined twice or is a variable's.
   void add(std::vector<Statement> statements);
   bool has(const std::string& target) const { return statement_of_.contains(target); }
   const std::vector<Statement>& statements() const { return statements_; }
@@ -28,7 +30,15 @@ class Definitions {
   Place place(const std::string& target) const;
 
   /// The node of a single term of the variables.
-  int build_term(const std::vector<Item>& term);
+  int build_term(const std::vector<Item>& term) { return build_items(term).back(); }
+  /// The node of each of its parts.
+  std::vector<int> build_items(const std::vector<Item>& term);
+  /// The value of a node that depends on nothing.
+  std::optional<double> constant_value(int node) const {
+    return graph_.is_constant(node) ? std::optional<double>(graph_[node].value) : std::nullopt;
+  }
+  /// The statements so that each comes after those that it needs. Throws Error if one needs itself.
+  std::vector<int> order() const;
 
  private:
   int resolve(const Item& name) const;
@@ -36,10 +46,9 @@ class Definitions {
   int apply_function(const Item& item, const std::vector<int>& arguments);
   int apply_power(int base, int exponent);
   void check_names() const;
-  std::vector<int> order() const;
 
   Graph& graph_;
-  std::string file_;
+  std::string file_, expected_;
   std::map<std::string, int> variables_;
   std::vector<Statement> statements_;
   std::map<std::string, int> statement_of_;

@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "definitions.hpp"
+#include "rhec/core/model/formula_copy.hpp"
 #include "rhec/core/model/graph_model.hpp"
 #include "vehicle_file.hpp"
 
@@ -19,12 +20,6 @@ namespace {
 
 /// Of equations with so many operations, derivatives are made in a moment; no vehicle known to us has a tenth of it.
 constexpr int most_operations = 10000;
-
-std::string meaning_of(const Option& option) {
-  if (option.unit.empty()) return option.meaning;
-  return option.meaning.empty() ? fmt::format("[{}]", option.unit)
-                                : fmt::format("{} [{}]", option.meaning, option.unit);
-}
 
 /// The options of a file as inputs of a graph, with their values.
 class OptionValues {
@@ -41,7 +36,8 @@ class OptionValues {
 
   /// The value of a term of numbers and of the options so far.
   double value_of(const std::vector<Item>& term) const {
-    const int node = Definitions(graph_, file_, nodes_).build_term(term);
+    const int node =
+        Definitions(graph_, file_, nodes_, "a number, pi, or an option that is declared above").build_term(term);
     std::vector<int> inputs;
     std::vector<double> values;
     for (const auto& [option, value] : known_) {
@@ -66,6 +62,17 @@ class OptionValues {
   std::map<std::string, int> nodes_;
 };
 
+/// A vehicle that keeps its equations, to be looked at.
+class EquationsModel final : public GraphModel {
+ public:
+  EquationsModel(const VehicleGraph& vehicle, ModelDescription description, const StraightMotion* straight)
+      : GraphModel(vehicle, std::move(description), straight), formula_(formula_copy(vehicle)) {}
+  const VehicleGraph* graph() const noexcept override { return &formula_; }
+
+ private:
+  VehicleGraph formula_;
+};
+
 /// Makes the graph of a file's vehicle for some values of its options.
 class VehicleBuilder {
  public:
@@ -87,7 +94,7 @@ class VehicleBuilder {
     if (operations > most_operations)
       throw error_at(file_.name(), file_.place("equations", ""),
                      fmt::format("the equations have {} operations; expected at most {}", operations, most_operations));
-    return std::make_shared<GraphModel>(vehicle_, description_, file_.has_straight_motion() ? &straight_ : nullptr);
+    return std::make_shared<EquationsModel>(vehicle_, description_, file_.has_straight_motion() ? &straight_ : nullptr);
   }
 
  private:
@@ -109,10 +116,10 @@ class VehicleBuilder {
     check_keys(settings, names, owner, {"name", "equations", "outputs"});
     for (const Option& option : file_.options()) {
       if (const Settings* given = settings.find(option.name))
-        options_.add(option, NumberValue{option.range}.read(*given, OptionContext{owner, meaning_of(option)}));
+        options_.add(option, NumberValue{option.range}.read(*given, OptionContext{owner, option.described()}));
       else if (option.otherwise.empty())
         throw settings.error(fmt::format("{}: the vehicle has no default for it; set it in the section 'model' ({})",
-                                         option.name, meaning_of(option)));
+                                         option.name, option.described()));
       else
         options_.add(option, options_.default_of(option));
     }
@@ -191,7 +198,8 @@ class VehicleBuilder {
     known.emplace("ground_speed", straight_.ground_speed);
     for (const Variable& parameter : description_.parameters)
       known.emplace(parameter.name, variables_.at(parameter.name));
-    Definitions definitions(graph(), file_.name(), std::move(known));
+    Definitions definitions(graph(), file_.name(), std::move(known),
+                            "ground_speed, a parameter, an option, or a name that has an equation");
     definitions.add(file_.straight_motion());
     definitions.build();
     for (const Variable& state : description_.states) straight_.states.push_back(definitions.node(state.name));
@@ -222,6 +230,13 @@ std::shared_ptr<Model> load_vehicle(const std::filesystem::path& file, const Set
   return equations::VehicleBuilder(read, settings).make();
 }
 
+std::shared_ptr<Model> load_inline_vehicle(const Settings& settings) {
+  const Settings* section = settings.find("equations");
+  if (!section) throw settings.error("it has no equations; expected the key 'equations' with a vehicle");
+  const equations::VehicleFile read(*section);
+  return equations::VehicleBuilder(read, settings).make();
+}
+
 std::vector<OptionRow> vehicle_options(const std::filesystem::path& file) {
   const equations::VehicleFile read(file);
   Graph graph;
@@ -235,7 +250,7 @@ std::vector<OptionRow> vehicle_options(const std::filesystem::path& file) {
       values.add(option, value);
       otherwise = kind.print(value);
     }
-    rows.push_back({option.name, kind.type(), otherwise, kind.constraint(), equations::meaning_of(option)});
+    rows.push_back({option.name, kind.type(), otherwise, kind.constraint(), option.described()});
   }
   rows.push_back({"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"});
   return rows;

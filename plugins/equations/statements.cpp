@@ -43,6 +43,25 @@ constexpr Remedy remedies[] = {
     {"ln", "the natural logarithm is log(x)"},
     {"arctan", "it is called atan here"},
     {"arctan2", "it is called atan2 here"},
+    {"fmod",
+     "angles never wrap in equations; give the variable 'angle: true', and differences are taken on the circle"},
+    {"mod", "angles never wrap in equations; give the variable 'angle: true', and differences are taken on the circle"},
+    {"%", "angles never wrap in equations; give the variable 'angle: true', and differences are taken on the circle"},
+    {"?", "there are no cases; use smooth_min, smooth_max or smooth_abs, with a width"},
+    {"|", "the absolute value is smooth_abs(x, width)"},
+    {";", "an equation ends with its line"},
+    {":", "an equation is written name = term"},
+    {"[", "there are no vectors; each component has a name of its own"},
+    {"'", "a second derivative is the first one of another state: x' = v, v' = ..."},
+    {"\u2212", "minus is written '-'"},
+    {"\u2013", "minus is written '-'"},
+    {"\u00b7", "a product is written with '*'"},
+    {"\u22c5", "a product is written with '*'"},
+    {"\u00d7", "a product is written with '*'"},
+    {"\u00f7", "a quotient is written with '/'"},
+    {"\u00b2", "a power is written x^2"},
+    {"\u00b3", "a power is written x^3"},
+    {"\u00a0", "this blank is another character than the usual one; type it anew"},
 };
 std::string advice_for(std::string_view found) {
   for (const Remedy& remedy : remedies)
@@ -86,10 +105,7 @@ class Lexer {
         if (c == '(') ++open_;
         if (c == ')') --open_;
         if (std::string_view("+-*/^(),=<>").find(c) == std::string_view::npos)
-          throw error_at(source_.file, place(from),
-                         fmt::format("found '{}', which means nothing here; expected a number, a name, an operator "
-                                     "+ - * / ^, or a parenthesis",
-                                     printable(text.substr(from, 1))));
+          throw unknown_character(text.substr(from), place(from));
         add(Token::Kind::sign, from, at);
       }
     }
@@ -100,9 +116,23 @@ class Lexer {
     }
   }
 
-  static std::string printable(std::string_view c) {
-    const auto code = static_cast<unsigned char>(c[0]);
-    return code < 32 || code > 126 ? fmt::format("\\x{:02x}", code) : std::string(c);
+  Error unknown_character(std::string_view rest, Place at) const {
+    const std::string found = printable(rest);
+    std::string advice = advice_for(found);
+    if (advice.empty() && (static_cast<unsigned char>(rest[0]) & 0x80))
+      advice = "; names have the letters a to z and A to Z, e.g. mu";
+    if (advice.empty()) advice = "; expected a number, a name, an operator + - * / ^, or a parenthesis";
+    return error_at(source_.file, at, fmt::format("found '{}', which means nothing here{}", found, advice));
+  }
+  /// The first character, of one byte or, in UTF-8, of several.
+  static std::string printable(std::string_view text) {
+    const auto code = static_cast<unsigned char>(text[0]);
+    const std::size_t bytes = code >= 0xf0 ? 4 : code >= 0xe0 ? 3 : code >= 0xc2 ? 2 : 1;
+    const auto goes_on = [&](char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; };
+    const bool is_whole = bytes > 1 && text.size() >= bytes &&
+                          std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(bytes), goes_on);
+    if (is_whole) return std::string(text.substr(0, bytes));
+    return code < 32 || code > 126 ? fmt::format("\\x{:02x}", code) : std::string(1, text[0]);
   }
   static std::size_t number_end(std::string_view text, std::size_t at) {
     const auto skip_digits = [&] {
@@ -208,9 +238,17 @@ class Parser {
     if (next().kind == Token::Kind::number) return number(take());
     if (next().kind == Token::Kind::name) return name(take());
     if (!is_sign('(')) throw unexpected("a number, a name or '('");
-    ++at_;
+    const Token opened = take();
     sum();
-    expect(')', "an operator or ')'");
+    close(opened);
+  }
+  void close(const Token& opened) {
+    if (is_sign(')'))
+      ++at_;
+    else
+      throw unexpected("an operator or ')'", opened.place.line != next().place.line
+                                                 ? fmt::format("; the '(' in line {} is not closed", opened.place.line)
+                                                 : "");
   }
   void number(const Token& token) {
     double value = 0.0;
@@ -221,6 +259,9 @@ class Parser {
     items_.push_back({Item::Kind::number, token.place, value});
   }
   void name(const Token& token) {
+    if (!is_sign('(') && is_reserved(token.text) && token.text != "pi")
+      throw error_at(file_, token.place,
+                     fmt::format("'{0}' is a function; expected its argument in parentheses, {0}(...)", token.text));
     if (!is_sign('(')) {
       items_.push_back({Item::Kind::name, token.place, 0.0, std::string(token.text)});
       return;
@@ -229,7 +270,7 @@ class Parser {
     const auto found =
         std::find_if(functions.begin(), functions.end(), [&](const auto& known) { return known.name == token.text; });
     if (found == functions.end()) throw unknown_function(token);
-    ++at_;
+    const Token opened = take();
     for (int k = 0; k < found->arguments; ++k) {
       if (k > 0) expect(',', fmt::format("',': {} has {} arguments", found->name, found->arguments));
       sum();
@@ -238,7 +279,7 @@ class Parser {
       throw error_at(file_, next().place,
                      fmt::format("found ',', expected ')': {} has {} argument{}", found->name, found->arguments,
                                  found->arguments == 1 ? "" : "s"));
-    expect(')', "an operator or ')'");
+    close(opened);
     items_.push_back({Item::Kind::function, token.place, 0.0, std::string(token.text)});
   }
   Error unknown_function(const Token& token) const {
@@ -277,12 +318,14 @@ class Parser {
     if (!is_sign(sign)) throw unexpected(expected);
     ++at_;
   }
-  Error unexpected(const std::string& expected) const {
+  Error unexpected(const std::string& expected, const std::string& more = {}) const {
     const Token& token = next();
     std::string found = fmt::format("'{}'", token.text);
     if (token.kind == Token::Kind::end_of_line) found = "the end of the line";
     if (token.kind == Token::Kind::end) found = "the end";
-    std::string advice = advice_for(token.text);
+    std::string advice = more.empty() ? advice_for(token.text) : more;
+    if (advice.empty() && is_sign(')') && expected.starts_with("an operator")) advice = "; there is no '(' for it";
+    if (advice.empty() && is_sign(',')) advice = "; decimals have a point, as 0.5";
     const bool is_factor = token.kind == Token::Kind::name || token.kind == Token::Kind::number || is_sign('(');
     if (advice.empty() && is_factor && expected.starts_with("an operator")) advice = "; a product is written with '*'";
     return error_at(file_, token.place, fmt::format("found {}, expected {}{}", found, expected, advice));
@@ -309,6 +352,22 @@ const std::vector<FunctionInfo>& known_functions() {
       {"tan", 1},   {"asin", 1},  {"acos", 1},       {"atan", 1},       {"tanh", 1},
       {"atan2", 2}, {"hypot", 2}, {"smooth_abs", 2}, {"smooth_min", 3}, {"smooth_max", 3}};
   return functions;
+}
+
+int operands_of(const Item& item) {
+  switch (item.kind) {
+    case Item::Kind::number:
+    case Item::Kind::name:
+      return 0;
+    case Item::Kind::negate:
+      return 1;
+    case Item::Kind::function:
+      for (const FunctionInfo& known : known_functions())
+        if (item.name == known.name) return known.arguments;
+      return 1;
+    default:
+      return 2;
+  }
 }
 
 bool is_reserved(std::string_view name) {

@@ -48,6 +48,8 @@ struct FunctionInfo {
   int arguments;
 };
 const std::vector<FunctionInfo>& known_functions();
+/// How many parts before it an item combines: 0, 1, 2 or 3.
+int operands_of(const Item& item);
 /// True for functions and constants, which no variable may be named as.
 bool is_reserved(std::string_view name);
 /// True for a letter or underscore, followed by letters, digits and underscores.

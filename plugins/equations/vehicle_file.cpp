@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "rhec/plugins/equations/equations.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::equations {
@@ -42,11 +43,36 @@ double number_of(const Settings& from, std::string_view meaning) {
   return NumberValue{}.read(from, OptionContext{"vehicle", meaning});
 }
 
+/// In YAML a comma ends a value between braces, also one between parentheses.
+void check_commas(const Settings& about) {
+  for (const auto& [key, value] : about.members())
+    if (key.ends_with(')'))
+      throw value.error(fmt::format("found '{}' after a comma; write a term that has a comma in quotes", key));
+}
+
 }  // namespace
 
+std::string Option::described() const {
+  if (unit.empty()) return meaning;
+  return meaning.empty() ? fmt::format("[{}]", unit) : fmt::format("{} [{}]", meaning, unit);
+}
+
 VehicleFile::VehicleFile(const std::filesystem::path& file) : file_(file.string()), settings_(load_yaml(file)) {
-  std::ifstream stream(file, std::ios::binary);
-  text_.assign(std::istreambuf_iterator<char>(stream), {});
+  description_.name = file.stem().string();
+  read();
+}
+
+VehicleFile::VehicleFile(const Settings& section) : file_(section.origin().file), settings_(section) {
+  description_.name = "vehicle";
+  read();
+}
+
+void VehicleFile::read() {
+  // Columns are looked up where the text was written; elsewhere (--set) there are none.
+  if (is_equations_file(file_)) {
+    std::ifstream stream(file_, std::ios::binary);
+    text_.assign(std::istreambuf_iterator<char>(stream), {});
+  }
   lines_ = lines_of(text_);
   if (settings_.kind() != Settings::Kind::map)
     throw settings_.mismatch("a vehicle: a map with the keys states, inputs, parameters, outputs and equations");
@@ -54,7 +80,7 @@ VehicleFile::VehicleFile(const std::filesystem::path& file) : file_(file.string(
              {"name", "source", "options", "states", "inputs", "parameters", "outputs", "equations", "straight_motion"},
              "a vehicle's file");
   const Settings *name = settings_.find("name"), *source = settings_.find("source");
-  description_.name = name ? name->as_text() : file.stem().string();
+  if (name) description_.name = name->as_text();
   if (source) description_.source = source->as_text();
   read_options();
   read_variables("states", description_.states);
@@ -91,6 +117,7 @@ void VehicleFile::read_options() {
     if (about.kind() == Settings::Kind::scalar) {
       option.otherwise = term_of(about);
     } else {
+      check_commas(about);
       check_keys(about, {"default", "unit", "meaning", "above", "at_least", "at_most"},
                  fmt::format("option '{}'", name));
       const Settings *above = about.find("above"), *at_least = about.find("at_least"), *at_most = about.find("at_most");
@@ -146,7 +173,7 @@ void VehicleFile::read_variable(std::string_view section, Variable& variable, co
   Bounds bounds;
   if (const Settings* given = about.find("bounds")) {
     if (given->kind() != Settings::Kind::list || given->items().size() != 2)
-      throw given->mismatch("a list [lower, upper]; null for no bound");
+      throw given->mismatch("a list [lower, upper]; null for no bound, and a term with a comma in quotes");
     if (!given->items()[0].is_null()) bounds.lower = term_of(given->items()[0]);
     if (!given->items()[1].is_null()) bounds.upper = term_of(given->items()[1]);
   }
@@ -180,15 +207,16 @@ Place VehicleFile::place(std::string_view section, const std::string& variable) 
 /// Where the lines of a scalar are in the file. A literal block begins below its key; anything else is looked for in
 /// the key's own line, and has no columns if it is not written there as it is read.
 SourceText VehicleFile::text_of(const Settings& scalar) const {
-  SourceText source{file_, {}};
+  const bool is_elsewhere = scalar.origin().file != file_;  // --set replaced a part of it
+  SourceText source{scalar.origin().file, {}};
   const std::vector<std::string_view> lines = lines_of(scalar.as_text());
   const int key = scalar.origin().line;
   const auto column_in = [&](int number, std::string_view text) {
-    if (number < 1 || number > static_cast<int>(lines_.size())) return 0;
+    if (is_elsewhere || number < 1 || number > static_cast<int>(lines_.size())) return 0;
     const std::size_t at = lines_[static_cast<std::size_t>(number) - 1].rfind(text);
     return at == std::string_view::npos ? 0 : static_cast<int>(at) + 1;
   };
-  const bool is_block = lines.size() > 1;
+  const bool is_block = lines.size() > 1 || column_in(key, lines[0]) == 0;
   for (std::size_t k = 0; k < lines.size(); ++k) {
     const int number = is_block ? key + 1 + static_cast<int>(k) : key;
     const int column = column_in(number, lines[k]);
@@ -199,8 +227,8 @@ SourceText VehicleFile::text_of(const Settings& scalar) const {
 
 std::vector<Item> VehicleFile::term_of(const Settings& scalar) const {
   if (scalar.kind() != Settings::Kind::scalar) throw scalar.mismatch("a number, or a term such as 35 * pi / 180");
-  if (scalar.text() == ".inf" || scalar.text() == "inf" || scalar.text() == "-.inf" || scalar.text() == "-inf")
-    throw scalar.error("found an infinite number; write null for no bound");
+  for (const char* not_finite : {".inf", "inf", "-.inf", "-inf", ".nan", "nan", ".NaN", "NaN"})
+    if (scalar.text() == not_finite) throw scalar.mismatch("a finite number; a bound that there is not is null");
   return parse_term(text_of(scalar));
 }
 
@@ -209,7 +237,15 @@ std::vector<Statement> VehicleFile::statements_of(const char* section) const {
   if (!given) return {};
   if (given->kind() != Settings::Kind::scalar)
     throw given->mismatch(fmt::format("equations as text, one a line, below '{}: |'", section));
-  return parse_statements(text_of(*given));
+  const SourceText source = text_of(*given);
+  const auto is_joined = [](const SourceText::Line& line) { return !line.text.empty() && line.column == 0; };
+  try {
+    return parse_statements(source);
+  } catch (const Error& mistake) {
+    if (lines_.size() < 2 || std::none_of(source.lines.begin(), source.lines.end(), is_joined)) throw;
+    throw Error(fmt::format("{}. YAML has joined lines of '{}': write '{}: |', with one equation on each line below it",
+                            mistake.what(), section, section));
+  }
 }
 
 }  // namespace rhec::equations

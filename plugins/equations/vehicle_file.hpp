@@ -18,6 +18,8 @@ struct Option {
   std::vector<Item> otherwise;  ///< default, a term of numbers; empty if there is none
   Range range;
   std::string unit, meaning;
+
+  std::string described() const;  ///< "distance of the axles [m]"
 };
 
 /// A bound of a variable: a term of numbers and options; empty for none.
@@ -25,11 +27,13 @@ struct Bounds {
   std::vector<Item> lower, upper;
 };
 
-/// A file with a vehicle's equations, as it is written: docs/equations.md describes it. Its constructor reads the file
-/// and throws Error with the place of the first mistake that can be told without values.
+/// A vehicle's equations, as they are written: docs/equations.md describes it. Its constructors throw Error with the
+/// place of the first mistake that can be told without values.
 class VehicleFile {
  public:
   explicit VehicleFile(const std::filesystem::path& file);
+  /// The same in a part of another file, e.g. of a scenario.
+  explicit VehicleFile(const Settings& section);
 
   const std::string& name() const { return file_; }
   /// All but the bounds, which depend on options.
@@ -39,11 +43,14 @@ class VehicleFile {
   const std::vector<Option>& options() const { return options_; }
   const std::vector<Statement>& equations() const { return equations_; }
   const std::vector<Statement>& straight_motion() const { return straight_motion_; }
+  /// The text of the equations, as it is written.
+  const std::string& equations_text() const { return settings_.find("equations")->text(); }
   bool has_straight_motion() const { return settings_.find("straight_motion") != nullptr; }
   /// The place of a variable, e.g. "states", "delta".
   Place place(std::string_view section, const std::string& variable) const;
 
  private:
+  void read();
   void read_options();
   void read_variables(const char* section, std::vector<Variable>& variables);
   void read_variable(std::string_view section, Variable& variable, const Settings& about, int index);

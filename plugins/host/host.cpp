@@ -323,6 +323,9 @@ PluginTrial Host::try_out(const PluginRecord& plugin) const {
 }
 
 std::shared_ptr<Model> Host::make_model(std::string_view name, const Settings& settings) const {
+  const Settings* equations = settings.find("equations");
+  if (equations && equations->kind() == Settings::Kind::map)
+    return choose_outputs(load_inline_vehicle(settings), settings);
   if (is_equations_file(name)) return choose_outputs(load_vehicle(name, settings), settings);
   return choose_outputs(search_->make<Model>(PluginKind::model, name, settings, *this), settings);
 }

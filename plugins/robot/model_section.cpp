@@ -15,7 +15,7 @@ OptionSection ModelSection::documentation() {
   return {"model",
           "The vehicle.",
           {vehicle.row(),
-           {"equations", "text", "", "a file, *.yaml",
+           {"equations", "text or map", "", "a file, *.yaml, or what it has",
             "in the place of a name: the vehicle's equations, which need no compiler (docs/equations.md); its options "
             "stand beside it"},
            {"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"}}};

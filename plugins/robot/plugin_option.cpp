@@ -44,6 +44,9 @@ struct Maker<Prior> {
   static constexpr const char* word = "a prior plugin";
 };
 
+/// The name of a model whose equations stand in the configuration, among its options.
+constexpr const char* inline_equations = "equations";
+
 /// The file with a vehicle's equations that a section names. If it is named in a file, it is relative to that file.
 std::string equations_file(const Settings& named) {
   const std::filesystem::path given(named.as_text());
@@ -70,6 +73,7 @@ std::string name_in(const Settings& section, const char* otherwise) {
     const Settings* equations = section.find("equations");
     if (equations && name)
       throw equations->error("found a file with equations and a plugin's name; expected one of the keys");
+    if (equations && equations->kind() == Settings::Kind::map) return inline_equations;
     if (equations) return equations_file(*equations);
   }
   return name ? name->as_text() : otherwise;
@@ -104,7 +108,8 @@ template <class Product>
 PluginChoice PluginOption<Product>::choice(const Settings& section) const {
   PluginChoice choice{name_in<Product>(section, otherwise), Settings::map(section.origin())};
   for (const auto& [key, value] : section.members())
-    if (key != "name" && !(std::is_same_v<Product, Model> && key == "equations")) choice.options.add(key, value);
+    if (key != "name" && !(std::is_same_v<Product, Model> && key == "equations" && choice.name != inline_equations))
+      choice.options.add(key, value);
   return choice;
 }
 

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <string_view>
 
 namespace rhec {
 namespace {
@@ -15,6 +17,9 @@ struct Source {
   bool has_lines;
 
   Origin at(const YAML::Mark& mark) const { return {name, has_lines && !mark.is_null() ? mark.line + 1 : 0}; }
+  std::string column_of(const YAML::Mark& mark) const {
+    return has_lines && !mark.is_null() ? fmt::format(" in column {}", mark.column + 1) : std::string();
+  }
   Error error(const YAML::Mark& mark, const std::string& what) const { return Settings::null(at(mark)).error(what); }
 };
 
@@ -93,12 +98,30 @@ class Converter {
   int levels_ = 0;
 };
 
+/// What to do about a mistake that yaml-cpp finds; it names the place where it gives up, often a line too late.
+std::string remedy_for(const std::string& text, const YAML::Exception& problem) {
+  std::string_view line = text;
+  for (int k = 0; k < problem.mark.line && !line.empty(); ++k)
+    line.remove_prefix(std::min(line.find('\n'), line.size() - 1) + 1);
+  line = line.substr(0, line.find('\n'));
+  if (line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string_view::npos)
+    return "; indent with blanks, not with tabs";
+  const std::string& what = problem.msg;
+  if (what.find("end of map flow") != std::string::npos) return "; a '{' is not closed, here or above";
+  if (what.find("end of sequence flow") != std::string::npos) return "; a '[' is not closed, here or above";
+  if (what.find("end of map") != std::string::npos || what.find("end of sequence") != std::string::npos)
+    return "; expected a key and ':', as far from the left as the keys beside it";
+  if (what.find("bad file") != std::string::npos) return "; it is nested too deep";
+  return {};
+}
+
 Settings parse(const std::string& text, const Source& source) {
   std::vector<YAML::Node> documents;
   try {
     documents = YAML::LoadAll(text);
   } catch (const YAML::Exception& problem) {
-    throw source.error(problem.mark, fmt::format("not valid YAML: {}", problem.msg));
+    throw source.error(problem.mark, fmt::format("not valid YAML{}: {}{}", source.column_of(problem.mark), problem.msg,
+                                                 remedy_for(text, problem)));
   }
   if (documents.size() > 1) {
     throw source.error(documents[1].Mark(),

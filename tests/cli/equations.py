@@ -87,6 +87,46 @@ class Test(cli.Findings):
         result = self.rhec("run", folder / "figure8.yaml", *assignments(*SHORT), "--out", self.work / "beside")
         self.expect(result.returncode == FINE, "a file beside the scenario", result.stderr)
 
+    def inline(self):
+        """Equations in the scenario itself: the same drive as with the file; problems that are saved have them, too."""
+        scenario = self.work / "inline.yaml"
+
+        def write(vehicle):
+            vehicle = vehicle[vehicle.index("name: bicycle"):]
+            section = "".join(f"    {line}\n" if line else "\n" for line in vehicle.splitlines())
+            text = FIGURE8.read_text(encoding="utf-8")
+            scenario.write_text(text.replace("  name: bicycle_slip\n", f"  equations:\n{section}"), encoding="utf-8")
+            return scenario.read_text(encoding="utf-8")
+
+        good = BICYCLE.read_text(encoding="utf-8")
+        write(good)
+        drives = []
+        for name, words in (("inline", [scenario]), ("by_file", [FIGURE8, *assignments(f"model={{equations: {BICYCLE}}}")])):
+            problems = self.work / f"problems_{name}"
+            result = self.rhec("run", *words, *assignments(*SHORT, "blocking.kappa={name: full_horizon}"), "--out", self.work / name,
+                               "--dump", problems, "--dump-every", "20")
+            if not self.expect(result.returncode == FINE, f"a drive {name}", result.stderr):
+                return
+            drives.append((self.work / name / "steps.csv").read_text(encoding="utf-8").splitlines())
+            for file in sorted(problems.glob("*.jsonl")):
+                result = self.rhec("solve", file, "--solver", "gn_rti", *assignments("mode=converge"), "--out", self.work / "s.jsonl")
+                self.expect(result.returncode == FINE, f"{file} again", result.stderr)
+        # All but the times of computing.
+        columns = [k for k, name in enumerate(drives[0][0].split(",")) if "time" not in name and "_us" not in name and "_ms" not in name]
+        same = all([one.split(",")[k] for k in columns] == [other.split(",")[k] for k in columns] for one, other in zip(*drives))
+        self.expect(len(drives[0]) == len(drives[1]) and same, "the same drive inline")
+        result = self.rhec("check", scenario, *assignments("model.wheelbase=2.5"), "--trace")
+        self.expect(result.returncode == FINE and "2.5" in result.stdout, "check --trace of inline equations", result.stderr)
+        text = write(good.replace("mu * delta", "mu * detla", 1))
+        line = text[:text.index("detla")].count("\n") + 1
+        column = text.splitlines()[line - 1].index("detla") + 1
+        result = self.rhec("run", scenario, "--out", self.work / "none")
+        self.expect(result.returncode == ERROR and f"{scenario}:{line}:{column}: 'detla' is not known" in result.stderr,
+                    "a mistake inline", result.stderr)
+        result = self.rhec("run", FIGURE8, *assignments("model={equations: {states: {x: {}}}}"), "--out", self.work / "none")
+        self.expect(result.returncode == ERROR and "it has no outputs; expected the key 'outputs'" in result.stderr, "inline by --set",
+                    result.stderr)
+
     def mistakes(self):
         wrong = self.work / "wrong.yaml"
         good = BICYCLE.read_text(encoding="utf-8")
@@ -121,6 +161,7 @@ def main():
         test.same_drive()
         test.every_solver()
         test.commands()
+        test.inline()
         test.mistakes()
         test.tell()
 

@@ -77,8 +77,9 @@ TEST(Definitions, RefuseWhatIsNotKnownNotOnceOrNotWithoutItself) {
   EXPECT_EQ(why_not("a = x\n\na = y"),
             "vehicle.yaml:3:1: there is an equation for 'a' in line 1 already; remove one of them");
   EXPECT_CONTAINS(why_not("x = 2"),
-                  "'x' is a variable, whose value is given; an equation for a state is one for its "
-                  "derivative, x' = ...");
+                  "the value of 'x' is given; expected an equation for the derivative of a state (x' = ..., if it is "
+                  "one)");
+  EXPECT_CONTAINS(why_not("a = 2 * t"), "equations do not depend on time");
   EXPECT_EQ(why_not("a = b + 1\nb = sin(c)\nc = a"),
             "vehicle.yaml:3:5: 'a' needs itself: a -> b -> c -> a; write one of them without the others");
   EXPECT_CONTAINS(why_not("a = a"), "vehicle.yaml:1:5: 'a' needs itself: a -> a");
@@ -91,6 +92,21 @@ TEST(Definitions, RefuseWhatIsFiniteForNoValues) {
                   "vehicle.yaml:1:9: sqrt(...) is not a finite number, whatever the values");
   EXPECT_CONTAINS(why_not("a = log(0)"), "log(...) is not a finite number");
   EXPECT_CONTAINS(why_not("a = x * 10^400"), "this power is not a finite number");
+}
+
+TEST(Definitions, RefuseAnglesThatAreWrappedByHand) {
+  EXPECT_CONTAINS(why_not("a = 2 + atan2(sin(x + y), cos(x + y))"), "vehicle.yaml:1:9: this wraps an angle");
+  EXPECT_EQ(why_not("a = atan2(sin(x), cos(y))"), "");
+}
+
+TEST(Definitions, TellTheNodeOfEachPart) {
+  Equations of("two = 1 + 1");
+  const std::vector<int> nodes = of.definitions_.build_items(parse_term(source_of("x * two + 0 * y")));
+  ASSERT_EQ(nodes.size(), 7u);
+  EXPECT_EQ(nodes[0], of.x_);
+  EXPECT_EQ(of.definitions_.constant_value(nodes[1]), 2.0);
+  EXPECT_EQ(of.definitions_.constant_value(nodes[5]), 0.0);  // by its structure
+  EXPECT_FALSE(of.definitions_.constant_value(nodes[6]).has_value());
 }
 
 TEST(Definitions, LongChainsTakeNoStack) {

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "models/drive.hpp"
+#include "rhec/core/model/chosen_outputs.hpp"
+#include "rhec/core/model/vehicle_graph.hpp"
 #include "support/error_of.hpp"
 
 namespace rhec {
@@ -64,6 +66,22 @@ equations: |
 std::string with(const std::string& part, const std::string& other) {
   std::string text = cart;
   return text.replace(text.find(part), part.size(), other);
+}
+
+// For those who look at a vehicle: names of definitions, no derivatives, and the outputs that were chosen.
+TEST(Equations, KeepTheirGraph) {
+  const std::shared_ptr<Model> model = load(with("x' = gain * k * u", "push = gain * k\n  x' = push * u"));
+  const VehicleGraph* graph = model->graph();
+  ASSERT_NE(graph, nullptr);
+  EXPECT_LT(graph->graph->size(), 10);
+  EXPECT_EQ(graph->graph->name_of(graph->rates[0]), "x'");
+  const Graph::Node& product = (*graph->graph)[graph->rates[0]];
+  EXPECT_TRUE(graph->graph->name_of(product.a) == "push" || graph->graph->name_of(product.b) == "push");
+  EXPECT_EQ(graph->outputs.size(), 2u);
+  const std::shared_ptr<Model> chosen = with_outputs(model, {1});
+  ASSERT_NE(chosen->graph(), nullptr);
+  EXPECT_EQ(chosen->graph()->outputs.size(), 1u);
+  EXPECT_EQ(chosen->graph()->graph->name_of(chosen->graph()->outputs[0]), "far");
 }
 
 // The same numbers as the plugin whose equations they are, also at other lengths: two vehicles in one process.
@@ -160,7 +178,7 @@ TEST(Equations, RefuseAVehicleThatIsNotWhole) {
   EXPECT_CONTAINS(why_not(with("[-limit, limit]", "[limit, -limit]")),
                   "the bounds of 'x' are [6, -6], expected lower <= upper");
   EXPECT_CONTAINS(why_not(with("[-limit, limit]", "[-k, k]")), "written.yaml:6:26: 'k' is not known");
-  EXPECT_CONTAINS(why_not(cart + "straight_motion: |\n  k = 1\n"), "written.yaml:18:3: 'k' is a variable");
+  EXPECT_CONTAINS(why_not(cart + "straight_motion: |\n  k = 1\n"), "written.yaml:18:3: the value of 'k' is given");
   EXPECT_CONTAINS(why_not(cart + "straight_motion: |\n  x = ground_speed\n"),
                   "written.yaml:17: straight motion has no equation for the input 'u'");
 }

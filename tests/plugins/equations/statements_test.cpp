@@ -102,7 +102,20 @@ TEST(Statements, MistakesNamePlaceExpectationAndRemedy) {
            {"x = \x01", "found '\\x01'"},
            {"sin = 2", "'sin' is a function or a constant; choose another name"},
            {"pi = 3", "'pi' is a function or a constant"},
-           {"x = 1)", "found ')', expected an operator or the end of the line"},
+           {"x = 1)", "found ')', expected an operator or the end of the line; there is no '(' for it"},
+           {"x = (1 + y\nz = 2",
+            "vehicle.yaml:11:5: found 'z', expected an operator or ')'; the '(' in line 10 is not closed"},
+           {"x = sin y", "'sin' is a function; expected its argument in parentheses, sin(...)"},
+           {"x = 0,5", "decimals have a point, as 0.5"},
+           {"x'' = y", "a second derivative is the first one of another state"},
+           {"x = y % 2", "angles never wrap in equations"},
+           {"x = fmod(y, 2)", "angles never wrap in equations"},
+           {"x = |y|", "smooth_abs(x, width)"},
+           {"x = y;", "an equation ends with its line"},
+           {"x = y[2]", "there are no vectors"},
+           {"x = \u03bc * y", "found '\u03bc', which means nothing here; names have the letters a to z"},
+           {"x = y \u00b7 2", "found '\u00b7', which means nothing here; a product is written with '*'"},
+           {"x = \xce", "found '\\xce'"},
        })
     EXPECT_CONTAINS(error_of([&] { parse_statements(source_of(text)); }), message) << text;
 }

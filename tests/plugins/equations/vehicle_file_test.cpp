@@ -7,6 +7,7 @@
 #include <fstream>
 #include <string>
 
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "support/error_of.hpp"
 
 namespace rhec::equations {
@@ -91,7 +92,7 @@ TEST_F(VehicleFileTest, MistakesNameFileAndLine) {
   EXPECT_CONTAINS(why_not("role: other_heading", "role: heading"), "two of the states have the role 'heading'");
   EXPECT_CONTAINS(why_not("[-1, 2 * pi]", "[-1]"), "expected a list [lower, upper]; null for no bound");
   EXPECT_CONTAINS(why_not("2 * pi", "2 * * pi"), "a_vehicle.yaml:7:");
-  EXPECT_CONTAINS(why_not("2 * pi", ".inf"), "write null for no bound");
+  EXPECT_CONTAINS(why_not("2 * pi", ".inf"), "a bound that there is not is null");
   EXPECT_CONTAINS(why_not("  width: 3", "  x: 3"), "'x' is a variable or an option already");
   EXPECT_CONTAINS(why_not("  width: 3", "  outputs: 3"), "'outputs' is a key of the section 'model'");
   EXPECT_CONTAINS(why_not("  width: 3", "  2w: 3"), "'2w' is no name");
@@ -120,6 +121,47 @@ TEST_F(VehicleFileTest, PlacesAreThoseOfTheFile) {
 TEST_F(VehicleFileTest, APlaceOfAVariable) {
   EXPECT_EQ(read(good).place("outputs", "psi").line, 15);
   EXPECT_EQ(read(good).place("outputs", "").line, 13);
+}
+
+// A part of a scenario is a vehicle, too; lines and columns are the scenario's.
+TEST_F(VehicleFileTest, MayStandInAnotherFile) {
+  const auto inside = [&](const std::string& vehicle) {
+    std::string text = "speed: 3\nmodel:\n  equations:\n";
+    for (std::size_t at = 0, end = 0; at < vehicle.size(); at = end + 1) {
+      end = std::min(vehicle.find('\n', at), vehicle.size());
+      text += "    " + vehicle.substr(at, end - at) + "\n";
+    }
+    std::ofstream(file_) << text;
+    return load_yaml(file_);
+  };
+  const Settings settings = inside(good);
+  const VehicleFile vehicle(*settings.find_path("model.equations"));
+  EXPECT_EQ(vehicle.description().name, "vehicle");
+  EXPECT_EQ(vehicle.description().states.size(), 3u);
+  EXPECT_EQ(vehicle.equations()[0].place.line, 20);
+  EXPECT_EQ(vehicle.equations()[0].place.column, 7);
+  std::string wrong = good;
+  wrong.replace(wrong.find("kappa * v"), 9, "kappa ** v");
+  const Settings mistaken = inside(wrong);
+  const std::string message = error_of([&] { VehicleFile(*mistaken.find_path("model.equations")); });
+  EXPECT_CONTAINS(message, "a_vehicle.yaml:20:18: found '**'");
+}
+
+TEST_F(VehicleFileTest, NeedsNoFile) {
+  Settings settings = parse_yaml(good, "--set model");
+  const VehicleFile vehicle(settings);
+  EXPECT_EQ(vehicle.description().outputs.size(), 2u);
+  EXPECT_EQ(vehicle.equations()[0].place.column, 0);
+}
+
+TEST_F(VehicleFileTest, TellsWhatYamlMadeOfTheText) {
+  EXPECT_CONTAINS(why_not("equations: |", "equations: >"),
+                  "write 'equations: |', with one equation on each line below it");
+  EXPECT_CONTAINS(why_not("equations: |", "equations:"), "write 'equations: |'");
+  EXPECT_EQ(why_not("equations: |", "equations: |-"), "");
+  EXPECT_CONTAINS(why_not("default: 1 + 1", "default: hypot(3, 4)"), "write a term that has a comma in quotes");
+  EXPECT_CONTAINS(why_not("[-1, 2 * pi]", "[atan2(1, 2), 3]"), "a term with a comma in quotes");
+  EXPECT_CONTAINS(why_not("width: 3", "width: .nan"), "found '.nan', expected a finite number");
 }
 
 }  // namespace

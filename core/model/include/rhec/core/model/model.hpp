@@ -10,6 +10,8 @@
 
 namespace rhec {
 
+struct VehicleGraph;
+
 /// One component of a model's state, input, parameter or output.
 struct Variable {
   std::string name;                                         ///< as spelt in configuration and in result files
@@ -135,6 +137,10 @@ class RHEC_EXPORT Model {
   /// used. Tests select each of them by `use_instruction_set`, which returns false for an unknown name.
   virtual std::vector<std::string> instruction_sets() const { return {"generic"}; }
   virtual bool use_instruction_set(const std::string& name) { return name == "generic"; }
+
+  /// The formula as a graph (rhec/core/model/vehicle_graph.hpp), with names and nothing but what rates and outputs are
+  /// computed of: for those who look at a model, not for its evaluation. Null if the model has none.
+  virtual const VehicleGraph* graph() const noexcept { return nullptr; }
 };
 
 }  // namespace rhec

@@ -79,7 +79,8 @@ class RHEC_EXPORT Host {
   /// A new object of the plugin `name`, with the options in `settings` (a map whose key "name" is ignored, or null for
   /// defaults). Throws Error if there is no such plugin, with every place searched, why files there were refused and
   /// which plugins exist; if options are wrong, with the place of the mistake; if the plugin failed, with its message.
-  /// A model's name may also be that of a file with its equations (rhec/plugins/equations/equations.hpp).
+  /// A model's name may also be that of a file with its equations (rhec/plugins/equations/equations.hpp), and of no
+  /// account where the settings have a map of equations themselves.
   std::shared_ptr<Model> make_model(std::string_view name, const Settings& settings = {}) const;
   std::shared_ptr<Blocking> make_blocking(std::string_view name, const Settings& settings = {}) const;
   std::shared_ptr<Solver> make_solver(std::string_view name, const Settings& settings = {}) const;
