@@ -26,6 +26,7 @@ struct ModelArguments {
 
 std::string listed(const std::vector<Variable>& variables) {
   std::vector<std::string> names;
+  names.reserve(variables.size());
   for (const Variable& variable : variables) names.push_back(fmt::format("{} [{}]", variable.name, variable.unit));
   return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }

@@ -307,7 +307,7 @@ std::string cpp_wrapped(const std::string& text, const std::string& more) {
     }
     if (at == std::string::npos) break;
     all += line.substr(0, at) + (splits ? " \"\n" : "\n");
-    line = more + (splits ? "\"" : "") + line.substr(at + 1);
+    line = fmt::format("{}{}{}", more, splits ? "\"" : "", line.substr(at + 1));
   }
   return all + line;
 }

@@ -220,6 +220,7 @@ class Writer {
   std::string function(bool is_dynamics, bool& uses_pi) {
     const std::vector<Variable>& results = is_dynamics ? description_.states : description_.outputs;
     std::vector<std::string> targets;
+    targets.reserve(results.size());
     for (const Variable& result : results) targets.push_back(result.name + (is_dynamics ? "'" : ""));
     const std::set<std::string> needed = needed_by(targets);
     std::set<std::string> used;  // names in terms
@@ -260,7 +261,7 @@ class Writer {
     std::set<std::string> calls;
     for (std::size_t k = definitions.size(); k-- > 0;) {
       if (!cpp_mentions(lines, definitions[k].identifier)) continue;
-      lines = definitions[k].text + lines;
+      lines.insert(0, definitions[k].text);
       if (definitions[k].is_named) calls.insert("named");
     }
     for (const std::string& function : terms.called())
