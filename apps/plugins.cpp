@@ -1,6 +1,7 @@
 #include "rhec/plugins/host/host.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -93,6 +94,14 @@ std::shared_ptr<Model> model_with_all_outputs(const Host& host, const std::strin
   return host.make_model(name, options);
 }
 
+/// Of a model: what computes it on this machine.
+std::string how_evaluated(const Model& model) {
+  const std::vector<std::string> sets = model.instruction_sets();
+  if (!model.graph()) return "by code of its own, " + sets.back();
+  if (sets.front() != "interpreted") return "by the interpreter, " + sets.back();
+  return fmt::format("by compiled kernels, {} (of {})", sets.back(), fmt::join(sets.begin() + 1, sets.end(), ", "));
+}
+
 /// The variables that a configuration can name.
 void print_variables(const ModelDescription& about) {
   Table table{{"VARIABLE", "UNIT", "BOUNDS", "MEANING"}};
@@ -153,8 +162,13 @@ void describe(const Host& host, const PluginRecord& plugin) {
               {"backend", backend_of(plugin)},
               {"can", or_dash(plugin.capabilities)},
               {"path", plugin.path.string()}};
+  std::shared_ptr<Model> model;
+  if (plugin.kind == PluginKind::model) {
+    model = model_with_all_outputs(host, plugin.name);
+    about.insert(about.end() - 1, {"evaluated", how_evaluated(*model)});
+  }
   print_table(about, "");
-  if (plugin.kind == PluginKind::model) print_variables(model_with_all_outputs(host, plugin.name)->description());
+  if (model) print_variables(model->description());
   print_options(host.options(plugin.kind, plugin.name));
 }
 
@@ -165,7 +179,7 @@ void describe_vehicle(const Host& host, const std::string& file) {
   print_table({{"kind", "model, of equations"},
                {"name", about.name},
                {"source", or_dash(about.source)},
-               {"evaluated", "by the interpreter, " + model->instruction_sets().back()},
+               {"evaluated", how_evaluated(*model)},
                {"path", file}},
               "");
   print_variables(about);

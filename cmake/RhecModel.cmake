@@ -43,11 +43,18 @@ function(rhec_add_model_kernels TARGET PREFIX)
   file(CONFIGURE OUTPUT "${FOLDER}/write.cpp" CONTENT "\
 #include \"rhec/core/model/write_model_code.hpp\"
 
+#include <cstdio>
+#include <exception>
+
 #include \"${HEADER}\"
 
-int main(int count, char** arguments) {
-  return rhec::write_model_code_to([] { return rhec::trace<${ARG_FORMULA}>(); }, \"${PREFIX}\", \"${ARG_FORMULA}\",
-                                   {arguments + 1, arguments + count});
+int main(int count, char** arguments) try {
+  rhec::write_model_code_to(rhec::trace<${ARG_FORMULA}>(), \"${PREFIX}\", \"${ARG_FORMULA}\",
+                            {arguments + 1, arguments + count});
+  return 0;
+} catch (const std::exception& mistake) {
+  std::fprintf(stderr, \"error: the formula ${ARG_FORMULA}: %s\\n\", mistake.what());
+  return 1;
 }
 ")
   add_executable(${PREFIX}_write "${FOLDER}/write.cpp")

@@ -12,6 +12,7 @@
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/scratch.hpp"
 #include "rhec/core/formula/derivatives.hpp"
+#include "rhec/core/model/formula_copy.hpp"
 #include "rhec/core/model/model_functions.hpp"
 
 // Memory of a size that is known at run time only, without an allocation.
@@ -43,7 +44,7 @@ void for_each_block(const Tape& tape, int rows, Evaluate evaluate) {
 class GraphModel::TapeMaker {
  public:
   TapeMaker(const VehicleGraph& vehicle, const StraightCode* code, const StraightSet* set)
-      : vehicle_(vehicle), functions_(vehicle), code_(set ? code : nullptr), set_(set) {
+      : vehicle_(formula_copy(vehicle)), functions_(vehicle_), code_(set ? code : nullptr), set_(set) {
     if (!code_) return;
     std::vector<double> values;
     for (const auto& [node, value] : vehicle.options) values.push_back(value);
@@ -56,7 +57,7 @@ class GraphModel::TapeMaker {
   }
 
  private:
-  const VehicleGraph& vehicle_;
+  VehicleGraph vehicle_;  ///< derivatives are made in a copy, which goes with them
   ModelFunctions functions_;
   const StraightCode* code_;
   const StraightSet* set_;
@@ -92,17 +93,17 @@ GraphModel::Tapes::Tapes(TapeMaker& maker, const Counts& n)
 
 GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description, const StraightMotion* straight,
                        const StraightCode* code)
-    : vehicle_(vehicle),
+    : vehicle_(formula_copy(vehicle)),
       description_(std::move(description)),
       n_{static_cast<int>(vehicle.states.size()), static_cast<int>(vehicle.inputs.size()),
          static_cast<int>(vehicle.parameters.size()), static_cast<int>(vehicle.outputs.size())},
-      code_(code && code->fingerprint == fingerprint_of(vehicle) ? code : nullptr) {
+      code_(code && code->fingerprint == fingerprint_of(vehicle_) ? code : nullptr) {
   check_description(description_, {.states = n_.x, .inputs = n_.u, .parameters = n_.p, .outputs = n_.y});
-  Graph& graph = *vehicle_.graph;
+  const Graph& graph = *vehicle.graph;
   const auto tape = [&](const std::vector<int>& inputs, const std::vector<int>& results) {
-    return Tape(graph, inputs, results, vehicle_.options);
+    return Tape(graph, inputs, results, vehicle.options);
   };
-  rates_ = tape(joined(vehicle_.states, vehicle_.parameters, vehicle_.inputs), vehicle_.rates);
+  rates_ = tape(joined(vehicle.states, vehicle.parameters, vehicle.inputs), vehicle.rates);
   if (straight) {
     std::vector<int> results = straight->inputs;
     for (int j = 0; j < n_.x; ++j) {
@@ -110,7 +111,7 @@ GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description
       straight_states_.push_back(j);
       results.push_back(straight->states[j]);
     }
-    straight_ = tape(joined(std::vector<int>{straight->ground_speed}, vehicle_.parameters), results);
+    straight_ = tape(joined(std::vector<int>{straight->ground_speed}, vehicle.parameters), results);
   }
   GraphModel::use_instruction_set(GraphModel::instruction_sets().back());
 }

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "rhec/core/formula/straight_code.hpp"
+#include "rhec/core/model/formula_copy.hpp"
 
 namespace rhec {
 namespace {
@@ -127,8 +128,9 @@ std::uint64_t fingerprint_of(const VehicleGraph& vehicle) {
   return hash.value();
 }
 
-ModelCode write_model_code(const VehicleGraph& vehicle, const std::string& prefix, const std::string& formula,
+ModelCode write_model_code(const VehicleGraph& given, const std::string& prefix, const std::string& formula,
                            const std::vector<std::string>& sets, int most) {
+  const VehicleGraph vehicle = formula_copy(given);  // as a model has it, so that the same is made of it
   ModelFunctions functions(vehicle);
   StraightWriter writer(*vehicle.graph, option_nodes(vehicle), most);
   for (int k = 0; k < static_cast<int>(ModelFunction::count); ++k) {

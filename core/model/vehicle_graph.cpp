@@ -31,10 +31,12 @@ std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& resu
   return nodes;
 }
 
-std::vector<Expression> new_variables(Graph& graph, const char* letter, int count) {
+std::vector<Expression> new_variables(Graph& graph, const char* letter, int count,
+                                      const std::vector<std::string>& names) {
   std::vector<Expression> variables;
   variables.reserve(static_cast<std::size_t>(count));
-  for (int k = 0; k < count; ++k) variables.push_back(Expression::input(graph, fmt::format("{}{}", letter, k)));
+  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k)
+    variables.push_back(Expression::input(graph, k < names.size() ? names[k] : fmt::format("{}{}", letter, k)));
   return variables;
 }
 

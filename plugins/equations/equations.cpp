@@ -10,7 +10,6 @@
 #include <fmt/ranges.h>
 
 #include "definitions.hpp"
-#include "rhec/core/model/formula_copy.hpp"
 #include "rhec/core/model/graph_model.hpp"
 #include "vehicle_file.hpp"
 
@@ -62,17 +61,6 @@ class OptionValues {
   std::map<std::string, int> nodes_;
 };
 
-/// A vehicle that keeps its equations, to be looked at.
-class EquationsModel final : public GraphModel {
- public:
-  EquationsModel(const VehicleGraph& vehicle, ModelDescription description, const StraightMotion* straight)
-      : GraphModel(vehicle, std::move(description), straight), formula_(formula_copy(vehicle)) {}
-  const VehicleGraph* graph() const noexcept override { return &formula_; }
-
- private:
-  VehicleGraph formula_;
-};
-
 /// Makes the graph of a file's vehicle for some values of its options.
 class VehicleBuilder {
  public:
@@ -94,7 +82,7 @@ class VehicleBuilder {
     if (operations > most_operations)
       throw error_at(file_.name(), file_.place("equations", ""),
                      fmt::format("the equations have {} operations; expected at most {}", operations, most_operations));
-    return std::make_shared<EquationsModel>(vehicle_, description_, file_.has_straight_motion() ? &straight_ : nullptr);
+    return std::make_shared<GraphModel>(vehicle_, description_, file_.has_straight_motion() ? &straight_ : nullptr);
   }
 
  private:

@@ -36,7 +36,7 @@ inline constexpr std::string_view source_template =
 @INCLUDE@ "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec {
-ModelKernelSets @PLUGIN@_kernels();  // defined by rhec_add_model
+const StraightCode& @PLUGIN@_kernels();  // defined by rhec_add_model
 }
 
 namespace {
@@ -51,7 +51,6 @@ rhec::ModelDescription describe(@DESCRIBE_ARGUMENT@) {
 
 class @CLASS@Model : public rhec::FormulaModel<@CLASS@> {
  public:
-  using Options = @CLASS@<double>;
   explicit @CLASS@Model(const Options& options)
       : FormulaModel(options, @DESCRIBE_CALL@, rhec::@PLUGIN@_kernels())@KEEP@ {@REQUIRED@
 @STRAIGHT_MOTION@@KEPT@};

@@ -104,8 +104,8 @@ class Test(cli.Findings):
 
     def others(self):
         one, other = (self.check("seed", "bicycle_slip", "--seed", seed) for seed in (1, 2))
-        derivatives = [found["findings"][CHECKS.index("derivatives")]["numbers"] for found in (one, other)]
-        self.expect(derivatives[0] != derivatives[1], "--seed", f"{derivatives}")
+        errors = [found["findings"][CHECKS.index("symmetry")]["numbers"] for found in (one, other)]
+        self.expect(errors[0] != errors[1], "--seed", f"{errors}")
         slow = self.check("speed", "bicycle_slip", "--speed", "0.5")
         self.expect("0.5 m/s" in slow["drives"][0]["meaning"], "--speed", slow["drives"][0]["meaning"])
         result = self.rhec("check", "--help")

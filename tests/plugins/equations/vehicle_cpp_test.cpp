@@ -25,34 +25,6 @@
 namespace rhec {
 namespace {
 
-/// A formula template as a graph, its options as inputs.
-template <template <class> class Formula>
-VehicleGraph traced() {
-  VehicleGraph made;
-  Graph& graph = *made.graph;
-  Formula<Expression> formula;
-  Formula<double> defaults;
-  std::vector<double> values;
-  defaults.options([&](const char*, double& value, const char*, const auto&...) { values.push_back(value); });
-  std::size_t k = 0;
-  formula.options([&](const char* name, Expression& option, const char*, const auto&...) {
-    option = Expression::input(graph, name);
-    made.options.push_back({option.node_in(graph), values[k++]});
-  });
-  const auto x = new_variables(graph, "x", Formula<double>::state_count),
-             u = new_variables(graph, "u", Formula<double>::input_count),
-             p = new_variables(graph, "p", Formula<double>::parameter_count);
-  std::vector<Expression> rates(Formula<double>::state_count), outputs(Formula<double>::output_count);
-  formula.dynamics(x.data(), u.data(), p.data(), rates.data());
-  formula.outputs(x.data(), outputs.data());
-  made.states = written_nodes(graph, x, "x");
-  made.inputs = written_nodes(graph, u, "u");
-  made.parameters = written_nodes(graph, p, "p");
-  made.rates = written_nodes(graph, rates, "dynamics");
-  made.outputs = written_nodes(graph, outputs, "outputs");
-  return made;
-}
-
 std::vector<double> values_of(const VehicleGraph& vehicle, const std::vector<double>& options,
                               const std::vector<double>& z) {
   std::vector<int> inputs, targets = vehicle.rates;
@@ -69,7 +41,7 @@ std::vector<double> values_of(const VehicleGraph& vehicle, const std::vector<dou
 template <template <class> class Formula>
 void expect_same(const std::string& file) {
   const std::shared_ptr<Model> model = load_vehicle(file);
-  const VehicleGraph made = traced<Formula>();
+  const VehicleGraph made = trace<Formula>();
   ASSERT_NE(model->graph(), nullptr);
   const VehicleGraph& graph = *model->graph();
   ASSERT_EQ(made.options.size(), graph.options.size());

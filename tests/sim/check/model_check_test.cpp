@@ -19,12 +19,8 @@ using testing::HasSubstr;
 template <class Scalar>
 struct Tank {
   static constexpr int state_count = 1, input_count = 0, parameter_count = 0, output_count = 1;
-  void dynamics(const Scalar* x, const Scalar*, const Scalar*, Scalar* dxdt) const {
-    dxdt[0] = x[0] * -0.5;
-  }
-  void outputs(const Scalar* x, Scalar* y) const {
-    y[0] = x[0];
-  }
+  void dynamics(const Scalar* x, const Scalar*, const Scalar*, Scalar* dxdt) const { dxdt[0] = x[0] * -0.5; }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
 TEST(ModelCheck, FindsNothingWrongWithAGoodModel) {

@@ -42,7 +42,8 @@ class FormulaModel : public GraphModel {
  private:
   static VehicleGraph traced(const Formula<double>& formula, const ModelDescription& description) {
     try {
-      return trace<Formula>(formula);
+      return trace<Formula>(
+          formula, {names_of(description.states), names_of(description.inputs), names_of(description.parameters)});
     } catch (const Error& mistake) {
       throw Error("model '" + description.name + "': " + mistake.what());
     }

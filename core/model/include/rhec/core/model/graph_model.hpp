@@ -49,6 +49,7 @@ class RHEC_EXPORT GraphModel : public Model {
   bool use_instruction_set(const std::string& name) override;
 
   bool is_compiled() const noexcept { return tapes_.steady.values.is_compiled(); }
+  const VehicleGraph* graph() const noexcept override { return &vehicle_; }
   const VehicleGraph& vehicle() const noexcept { return vehicle_; }
 
   /// Instructions that one evaluation takes, and registers: what it costs.
@@ -95,7 +96,7 @@ class RHEC_EXPORT GraphModel : public Model {
                      int lanes) const noexcept;
   void add_curvature(const NodeRows& request, int first, int count, const double* registers, int lanes) const noexcept;
 
-  VehicleGraph vehicle_;
+  VehicleGraph vehicle_;  ///< alone, without what was made of it
   ModelDescription description_;
   Counts n_;
   const StraightCode* code_;  ///< null: none that belongs to this formula

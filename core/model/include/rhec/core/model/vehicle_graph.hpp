@@ -44,19 +44,25 @@ RHEC_EXPORT std::vector<Expression> room_for_results(int count);
 /// out, or wrote one too many.
 RHEC_EXPORT std::vector<int> written_nodes(Graph& graph, const std::vector<Expression>& results, int count,
                                            const char* function);
-/// `count` new independent variables x0, x1, ...
-RHEC_EXPORT std::vector<Expression> new_variables(Graph& graph, const char* letter, int count);
+/// `count` new independent variables with these names, or x0, x1, ... where there are not so many names.
+RHEC_EXPORT std::vector<Expression> new_variables(Graph& graph, const char* letter, int count,
+                                                  const std::vector<std::string>& names);
+/// What the independent variables of a formula are called in messages and drawings.
+struct VariableNames {
+  std::vector<std::string> states, inputs, parameters;
+};
 
 /// Records a formula (FormulaModel says what that is) by calling it once with Expression for its number type. Its
 /// options become inputs of the graph; what they are, and the structure, is taken from `values`. Throws Error if it
 /// leaves out a result, or has members that are not among its options.
 template <template <class> class Formula>
-VehicleGraph trace(const Formula<double>& values = {}) {
+VehicleGraph trace(const Formula<double>& values = {}, const VariableNames& names = {}) {
   VehicleGraph made;
   Graph& graph = *made.graph;
   const FormulaCounts n = counts_of(values);
-  const std::vector<Expression> x = new_variables(graph, "x", n.states), u = new_variables(graph, "u", n.inputs),
-                                p = new_variables(graph, "p", n.parameters);
+  const std::vector<Expression> x = new_variables(graph, "x", n.states, names.states),
+                                u = new_variables(graph, "u", n.inputs, names.inputs),
+                                p = new_variables(graph, "p", n.parameters, names.parameters);
   Formula<Expression> formula;
   made.options = trace_options(graph, values, formula);
   std::vector<Expression> rates = room_for_results(n.states), outputs = room_for_results(n.outputs);

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -24,23 +22,16 @@ inline void write_text(const std::filesystem::path& file, const std::string& tex
   std::filesystem::rename(aside, file);
 }
 
-/// The main function of a program that writes a formula's kernels: `arguments` are a folder and instruction sets. What
-/// `make_vehicle` throws is told on standard error. Returns the exit code.
-template <class MakeVehicle>
-int write_model_code_to(const MakeVehicle& make_vehicle, const char* prefix, const char* formula,
-                        const std::vector<std::string>& arguments) {
-  try {
-    if (arguments.size() < 2) throw Error("expected a folder and instruction sets");
-    const std::filesystem::path folder = arguments[0];
-    std::filesystem::create_directories(folder);
-    const ModelCode code = write_model_code(make_vehicle(), prefix, formula, {arguments.begin() + 1, arguments.end()});
-    write_text(folder / "kernels.cpp", code.kernels);
-    write_text(folder / "table.cpp", code.table);
-    return 0;
-  } catch (const std::exception& mistake) {
-    std::fprintf(stderr, "error: the formula %s: %s\n", formula, mistake.what());
-    return 1;
-  }
+/// What a program that writes a formula's kernels does: `arguments` are a folder and instruction sets. Throws Error,
+/// and what the file system throws.
+inline void write_model_code_to(const VehicleGraph& vehicle, const char* prefix, const char* formula,
+                                const std::vector<std::string>& arguments) {
+  if (arguments.size() < 2) throw Error("expected a folder and instruction sets");
+  const std::filesystem::path folder = arguments[0];
+  std::filesystem::create_directories(folder);
+  const ModelCode code = write_model_code(vehicle, prefix, formula, {arguments.begin() + 1, arguments.end()});
+  write_text(folder / "kernels.cpp", code.kernels);
+  write_text(folder / "table.cpp", code.table);
 }
 
 }  // namespace rhec
