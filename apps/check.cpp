@@ -128,7 +128,7 @@ void print_times(const sim::ModelCheck& check) {
 /// Where a formula is looked at: where a simulated drive starts, or at the origin; straight ahead at the speed.
 sim::FormulaPoint start_of(const Host& host, const CheckArguments& arguments, bool is_scenario, const Robot& robot,
                            Model& model, std::optional<double> speed) {
-  const ModelDescription about = robot.bounded_description();
+  const ModelDescription& about = robot.bounded_description();
   sim::FormulaPoint point = sim::straight_point(model, about, speed);
   if (is_scenario) {
     Settings settings = load_yaml(arguments.model);

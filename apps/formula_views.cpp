@@ -22,9 +22,10 @@ namespace {
 const VehicleGraph& graph_of(const Model& model, const char* option) {
   const VehicleGraph* graph = model.graph();
   if (graph) return *graph;
-  throw Error(fmt::format(
-      "model '{}' has no graph of its formula, which {} needs; a vehicle as equations has one (docs/equations.md)",
-      model.description().name, option));
+  throw Error(
+      fmt::format("model '{}' has no graph of its formula, which {} needs; vehicles as equations (docs/equations.md) "
+                  "and models made of a formula in C++ have one",
+                  model.description().name, option));
 }
 
 std::string text_of(double value) {

@@ -150,24 +150,26 @@ StoredRows Tape::rows(int first, int rows, int columns) {
   stored_.resize(results_.size(), -1);
   filled_register(0.0);
   StoredRows made{.rows = rows, .eights = padded(columns) / 8, .all = {}};
-  for (int r = 0; r < rows; ++r) {
-    for (int from = 0; from < columns; from += 8) {
+  std::size_t row = static_cast<std::size_t>(first);  // its first result
+  for (int r = 0; r < rows; ++r, row += static_cast<std::size_t>(columns)) {
+    for (std::size_t from = 0; from < static_cast<std::size_t>(columns); from += 8) {
+      const int here = std::min(8, columns - static_cast<int>(from));
       StoredEight eight;
       int varying = 0;
-      for (int k = 0; k < std::min(8, columns - from); ++k) {
-        const int source = results_[static_cast<std::size_t>(first + r * columns + from + k)];
+      for (int k = 0; k < here; ++k) {
+        const int source = results_[row + from + static_cast<std::size_t>(k)];
         if (source >= 0)
           varying = k + 1;
         else
-          eight.values[k] = uniforms_[static_cast<std::size_t>(~source)];
+          eight.values[k] = uniforms_[static_cast<std::size_t>(~std::ptrdiff_t{source})];
       }
       const bool is_half = std::all_of(eight.values.begin() + 4, eight.values.end(), [](double v) { return v == 0.0; });
       eight.kind = varying == 0              ? StoredEight::Kind::constant
                    : varying <= 4 && is_half ? StoredEight::Kind::first_4
                                              : StoredEight::Kind::all;
       for (int k = 0; k < 8; ++k) {
-        const auto which = static_cast<std::size_t>(first + r * columns + from + k);
-        const bool is_result = k < columns - from;
+        const std::size_t which = row + from + static_cast<std::size_t>(k);
+        const bool is_result = k < here;
         const int source = is_result && results_[which] >= 0 ? results_[which] : filled_register(eight.values[k]);
         eight.sources[k] = source * 8;
         if (is_result) stored_[which] = source;

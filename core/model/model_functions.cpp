@@ -95,9 +95,9 @@ std::vector<int> ModelFunctions::results(ModelFunction function) {
   }
   const StepGraph& of = step(is_ramp(function));
   if (function == ModelFunction::step || function == ModelFunction::ramp) return of.next;
-  const std::vector<int> first = joined(of.next, of.jacobian.nodes);
+  std::vector<int> first = joined(of.next, of.jacobian.nodes);
   if (function == ModelFunction::step_jacobian || function == ModelFunction::ramp_jacobian) return first;
-  return joined(first, of.hessian.nodes);
+  return joined(std::move(first), of.hessian.nodes);
 }
 
 std::uint64_t fingerprint_of(const VehicleGraph& vehicle) {
