@@ -8,6 +8,7 @@
 
 #include "commands.hpp"
 #include "dump.hpp"
+#include "integration_note.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
 #include "rhec/sim/files/output_folder.hpp"
@@ -25,8 +26,8 @@ struct EstimateArguments : LogArguments {
   DumpArguments dump;
 };
 
-void print_table(const sim::RecordedLog& log, const std::vector<sim::Replay>& replays, const sim::HoldOut& hold_out,
-                 const std::filesystem::path& folder) {
+void print_table(const sim::RecordedLog& log, const Model& model, const std::vector<sim::Replay>& replays,
+                 const sim::HoldOut& hold_out, const std::filesystem::path& folder) {
   const double seconds = log.rows.back().time - log.rows.front().time;
   fmt::print("{} rows of dead reckoning, {} fixes, {:.1f} min\n", log.rows.size(), log.fixes.size(), seconds / 60.0);
   if (log.missing_speeds + log.missing_steerings + log.missing_coordinates > 0)
@@ -47,6 +48,7 @@ void print_table(const sim::RecordedLog& log, const std::vector<sim::Replay>& re
                  summary.consistent.rmse_capped);
     fmt::print("{:>8} {:>9} {:>6.2f} s\n", replays[i].counts.nodes, replays[i].counts.fallbacks, replays[i].seconds);
   }
+  for (const sim::Replay& replay : replays) print_integration(replay.counts, model, replay.name + ": ");
   fmt::print("\npictures and numbers: {}\n", folder.string());
 }
 
@@ -98,7 +100,7 @@ int estimate(const EstimateArguments& arguments) {
   for (const auto& keeper : keepers) keeper->save();
   folder.commit();
   dump.commit();
-  print_table(log, replays, hold_out, folder.path());
+  print_table(log, *scenario.variants().front().robot.model(), replays, hold_out, folder.path());
   dump.tell(arguments.plugin_path);
   return all_usable ? exit_fine : exit_not_solved;
 }

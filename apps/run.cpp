@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "dump.hpp"
+#include "integration_note.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
@@ -93,6 +94,7 @@ void print_table(const sim::RunSummary& summary, const sim::Scenario& scenario, 
   times("rhc", summary.controller_us);
   fmt::print("\n{} steps: {}; {} of {} solves fell back\n", summary.steps, summary.ended, summary.fallbacks,
              summary.solves);
+  print_integration(summary.counts, *scenario.robot().model());
   fmt::print("pictures and numbers: {}\n", folder.string());
 }
 

@@ -72,13 +72,30 @@ function(rhec_set_up_shared_library NAME)
   install(TARGETS ${TARGET} EXPORT rhecTargets LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 endfunction()
 
-# rhec_add_room(FLOOR ROOM [INTERNAL] [SHARED] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
+# rhec_unite(TARGET): with RHEC_UNITY, several of the target's sources are compiled as one. Those with a private header
+# beside them are not: tests link their objects (rhec_objects_of).
+function(rhec_unite TARGET)
+  if(NOT RHEC_UNITY)
+    return()
+  endif()
+  get_target_property(SOURCES ${TARGET} SOURCES)
+  foreach(SOURCE IN LISTS SOURCES)
+    cmake_path(REPLACE_EXTENSION SOURCE hpp OUTPUT_VARIABLE HEADER)
+    if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${HEADER}")
+      set_source_files_properties("${SOURCE}" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endforeach()
+  set_target_properties(${TARGET} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+endfunction()
+
+# rhec_add_room(FLOOR ROOM [INTERNAL] [SHARED] [APART] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
 #   A room of a floor, in its own folder: the target `rhec_<FLOOR>_<ROOM>`. It sees the public headers of the rooms of the same
 #   floor that it comes AFTER, and of those that they come after, and no others. The headers in <folder>/include are
-#   installed, those of an INTERNAL room are not. What is compiled is a part of the floor's library, or of a SHARED room a
+#   installed, those of an INTERNAL room are not. Sources of a room that is APART are never compiled as one: it has names
+#   that are used in several of them. What is compiled is a part of the floor's library, or of a SHARED room a
 #   library of its own, `rhec::<FLOOR>_<ROOM>`, which is linked to those of the rooms before it that it needs.
 function(rhec_add_room FLOOR ROOM)
-  cmake_parse_arguments(PARSE_ARGV 2 ARG "INTERNAL;SHARED" "" "AFTER;SOURCES;PUBLIC;PRIVATE")
+  cmake_parse_arguments(PARSE_ARGV 2 ARG "APART;INTERNAL;SHARED" "" "AFTER;SOURCES;PUBLIC;PRIVATE")
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "rhec_add_room(${FLOOR} ${ROOM}): what is '${ARG_UNPARSED_ARGUMENTS}'?")
   endif()
@@ -105,6 +122,9 @@ function(rhec_add_room FLOOR ROOM)
     target_include_directories(${TARGET} INTERFACE "${HEADERS}")
     target_link_libraries(${TARGET} INTERFACE ${ARG_AFTER} ${ARG_PUBLIC})
     target_compile_features(${TARGET} INTERFACE cxx_std_20)
+  endif()
+  if(ARG_SOURCES AND NOT ARG_APART)
+    rhec_unite(${TARGET})
   endif()
   if(NOT ARG_INTERNAL)
     set_property(GLOBAL APPEND PROPERTY RHEC_HEADERS_${FLOOR} "${CMAKE_CURRENT_SOURCE_DIR}/include")

@@ -77,6 +77,8 @@ PathPoint Path::point_on(int i, double arc_length) const noexcept {
           .speed = (1.0 - fraction) * speeds_[i] + fraction * speeds_[i + 1]};
 }
 
+double Path::top_speed() const noexcept { return *std::max_element(speeds_.begin(), speeds_.end()); }
+
 PathPoint Path::point_at(double arc_length) const noexcept { return point_on(segment_at(arc_length), arc_length); }
 
 PathPoint Path::point_at(double arc_length, int& segment) const noexcept {

@@ -1,6 +1,7 @@
 #include "rhec/core/model/model.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/scratch.hpp"
 
@@ -11,6 +12,11 @@ std::vector<std::string> names_of(const std::vector<Variable>& variables) {
   names.reserve(variables.size());
   for (const Variable& variable : variables) names.push_back(variable.name);
   return names;
+}
+
+double middle_value(const Variable& parameter) {
+  const double middle = 0.5 * (parameter.lower + parameter.upper);
+  return std::isfinite(middle) ? middle : parameter.nominal;
 }
 
 std::vector<double> nominal_values(const std::vector<Variable>& parameters) {

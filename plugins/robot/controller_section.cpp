@@ -9,6 +9,7 @@
 
 #include "rhec/plugins/robot/bounds_section.hpp"
 #include "rhec/plugins/robot/by_name.hpp"
+#include "rhec/plugins/robot/integration.hpp"
 
 #include "default_solver.hpp"
 
@@ -79,7 +80,11 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
   static const auto rows =
       OptionTable<C>()
           .integer("horizon", &C::horizon, "N_c, intervals", between(1, 100000))
-          .integer("substeps", &C::substeps, "Runge-Kutta steps per interval", between(1, 1000))
+          .automatic_integer(
+              "substeps", &C::substeps,
+              "Runge-Kutta steps per interval; auto: as many as the model's time constants ask for at the "
+              "path's speed",
+              between(1, 1000))
           .choice("reference_speed", &C::reference_speed,
                   {{"ground", ReferenceSpeed::ground}, {"literal", ReferenceSpeed::literal}},
                   "ground: wheels turn faster by the estimated slip; literal: the path's speed is the wheels'")
@@ -99,7 +104,9 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
 }
 
 ControllerSection::ControllerSection(std::shared_ptr<const RobotContext> context, const Settings& section)
-    : context_(std::move(context)), options_(ControllerOptions::table().parse(section, "controller")) {
+    : context_(std::move(context)),
+      section_(section),
+      options_(ControllerOptions::table().parse(section, "controller")) {
   if (!options_.solver.is_null()) return;
   options_.solver = Settings::map();
   options_.solver.add("name", Settings::scalar(default_solver.otherwise));
@@ -113,11 +120,13 @@ OptionSection ControllerSection::documentation() {
 
 PluginChoice ControllerSection::solver_choice() const { return default_solver.choice(options_.solver); }
 
-RhcProblem::Setup ControllerSection::problem() const {
+RhcProblem::Setup ControllerSection::problem(double top_speed) const {
   const ModelDescription& about = context_->about;
   RhcProblem::Setup problem;
   problem.max_intervals = options_.horizon;
-  problem.substeps = options_.substeps;
+  std::vector<double> parameters;
+  for (const Variable& parameter : about.parameters) parameters.push_back(middle_value(parameter));
+  problem.substeps = substeps_of(options_.substeps, section_, *context_, parameters, top_speed);
   const WeightOptions weights = WeightOptions::table().parse(options_.weights, "controller: weights");
   const std::vector<double> stage = stage_by_name().read(weights.stage, about);
   const auto first_input = stage.begin() + static_cast<std::ptrdiff_t>(about.states.size());
@@ -151,7 +160,7 @@ void ControllerSection::add_blockings(Controller::Setup& setup) const {
 std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks,
                                                     std::shared_ptr<const SlipAhead> ahead) const {
   Controller::Setup setup;
-  setup.problem = problem();
+  setup.problem = problem(path.top_speed());
   setup.interval = context_->step;
   setup.reference_speed = options_.reference_speed;
   setup.least_speed_factor = options_.least_speed_factor;

@@ -2,11 +2,13 @@
 
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "rhec/plugins/robot/by_name.hpp"
+#include "rhec/plugins/robot/integration.hpp"
 #include "rhec/plugins/robot/plugin_option.hpp"
 #include "rhec/plugins/robot/robust_losses.hpp"
 
@@ -70,10 +72,7 @@ const NumbersByName& initial_state_by_name() {
 
 DefaultByName<double> middle_of_bounds() {
   return {"the middle of its bounds, else where nothing slips",
-          [](const ModelDescription&, const Variable& parameter, std::size_t) {
-            const double middle = 0.5 * (parameter.lower + parameter.upper);
-            return std::isfinite(middle) ? middle : parameter.nominal;
-          }};
+          [](const ModelDescription&, const Variable& parameter, std::size_t) { return middle_value(parameter); }};
 }
 
 const NumbersByName& initial_parameters_by_name() {
@@ -117,7 +116,9 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
   return OptionTable<E>()
       .choice("name", &E::name, std::move(names), std::move(meanings))
       .integer("horizon", &E::horizon, "N_e, intervals", between(1, 100000))
-      .integer("substeps", &E::substeps, "Runge-Kutta steps per interval", between(1, 1000))
+      .automatic_integer("substeps", &E::substeps,
+                         "Runge-Kutta steps per interval; auto: as many as the model's time constants ask for",
+                         between(1, 1000))
       .integer("heading_starts", &E::heading_starts,
                "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
       .choice("covariance", &E::covariance, {{"bank", BlockCovariance::bank}, {"blocks", BlockCovariance::blocks}},
@@ -143,7 +144,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
       parts_{.context = std::move(context),
              .section = section,
              .horizon = options_.horizon,
-             .substeps = options_.substeps,
+             .substeps = 1,  // until the parameters at the start are known
              .heading_starts = options_.heading_starts,
              .arrival = ArrivalOptions::table().parse(options_.arrival, "estimator: arrival").name,
              .robust = {},
@@ -170,6 +171,8 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
   has_initial_state_ = options_.initial.find("state") != nullptr;
   std::vector<double> mean = initial_state_by_name().read(initial.state, about);
   for (const double value : initial_parameters_by_name().read(initial.parameters, about)) mean.push_back(value);
+  parts_.substeps =
+      substeps_of(options_.substeps, section, *parts_.context, std::span(mean).subspan(about.states.size()));
   const std::vector<double> sigma = initial_sigma_by_name().read(initial.sigma, about);
   const auto size = static_cast<Eigen::Index>(mean.size());
   parts_.initial_mean = Eigen::Map<const Eigen::VectorXd>(mean.data(), size);

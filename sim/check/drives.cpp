@@ -111,7 +111,7 @@ Eigen::VectorXd Drives::moved(const Vector& x, const Vector& u) const {
                             .inputs = u.data(),
                             .parameters = parameters_.data(),
                             .durations = &checked_.options.interval,
-                            .substeps = checked_.options.substeps,
+                            .substeps = checked_.substeps,
                             .next_states = next.data()});
   return next;
 }
@@ -173,7 +173,7 @@ Eigen::MatrixXd Drives::jacobian(const Vector& x, const Vector& u, int interval)
                             .parameters = parameters_.data(),
                             .parameters_end = ramp ? parameters_.data() : nullptr,
                             .durations = &checked_.options.interval,
-                            .substeps = checked_.options.substeps,
+                            .substeps = checked_.substeps,
                             .jacobians = found.data()});
   return found;
 }

@@ -71,8 +71,8 @@ void require_fitting(const Model& model, const ModelDescription& within, const M
   if (names_of(own.states) != names_of(within.states) || names_of(own.inputs) != names_of(within.inputs) ||
       names_of(own.parameters) != names_of(within.parameters) || names_of(own.outputs) != names_of(within.outputs))
     throw Error(fmt::format("check of model '{}': the bounds to keep to are those of other variables", own.name));
-  if (!(options.interval > 0.0 && std::isfinite(options.interval)) || options.horizon < 1 || options.substeps < 1 ||
-      options.samples < 1)
+  if (!(options.interval > 0.0 && std::isfinite(options.interval)) || options.horizon < 1 ||
+      options.substeps.value_or(1) < 1 || options.samples < 1)
     throw Error("check of a model: interval, horizon, substeps and samples are to be greater than 0");
   if (options.speed && !(*options.speed > 0.0 && std::isfinite(*options.speed)))
     throw Error("check of a model: the speed is to be greater than 0");
@@ -187,7 +187,7 @@ std::vector<Finding> measure_times(const CheckedModel& checked, std::vector<Eval
                              .inputs = stages.inputs.data(),
                              .parameters = stages.parameters.data(),
                              .durations = stages.durations.data(),
-                             .substeps = checked.options.substeps,
+                             .substeps = checked.substeps,
                              .next_states = next.data()};
     EvaluationTimes found;
     found.instruction_set = set;
@@ -233,17 +233,20 @@ ModelCheck check_model(Model& model, const ModelDescription& within, const Model
   add(check_description(within, can_go_on));
   if (!can_go_on) {
     for (const char* skipped :
-         {"symmetry", "straight_motion", "derivatives", "numbers", "scaling", "observability", "time"}) {
+         {"symmetry", "straight_motion", "integration", "derivatives", "numbers", "scaling", "observability", "time"}) {
       FindingList findings(skipped);
       findings.skip("the description has to be mended first");
       add(findings.take());
     }
     return check;
   }
-  const CheckedModel checked{model, within, options, sigmas_or_default(options.output_sigmas, within.outputs, "output"),
-                             sigmas_or_default(options.input_sigmas, within.inputs, "input")};
+  CheckedModel checked{model, within, options, sigmas_or_default(options.output_sigmas, within.outputs, "output"),
+                       sigmas_or_default(options.input_sigmas, within.inputs, "input")};
   add(check_symmetry(checked));
   add(check_straight_motion(checked));
+  const StepRequirement needed = required_steps(checked);
+  checked.substeps = options.substeps.value_or(std::max(1, needed.substeps));
+  add(check_integration(checked, needed));
   add(check_derivatives(checked));
   add(check_numbers(checked));
   add(check_drives(checked, check.drives));
@@ -258,7 +261,7 @@ ModelCheck check_model(Model& model, const ModelCheckOptions& options) {
 ModelCheck check_model(const Host& host, const Robot& robot, ModelCheckOptions options) {
   options.interval = robot.step();
   options.horizon = robot.estimator_options().horizon;
-  options.substeps = robot.estimator_options().substeps;
+  options.substeps = robot.substeps();
   options.output_sigmas = robot.output_sigmas();
   options.input_sigmas = robot.input_sigmas();
   options.blockings = robot.make_blockings();

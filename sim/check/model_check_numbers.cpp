@@ -41,6 +41,7 @@ class Explorer {
   explicit Explorer(const CheckedModel& checked)
       : model_(checked.model),
         options_(checked.options),
+        substeps_(checked.substeps),
         nx_(checked.model.state_count()),
         nu_(checked.model.input_count()),
         np_(checked.model.parameter_count()),
@@ -74,7 +75,7 @@ class Explorer {
                           .inputs = z.data() + nx_,
                           .parameters = z.data() + nx_ + nu_,
                           .durations = &options_.interval,
-                          .substeps = options_.substeps,
+                          .substeps = substeps_,
                           .next_states = next_.data(),
                           .jacobians = jacobian_.data()};
     Model::Nodes node{.count = 1, .states = z.data(), .outputs = outputs_.data(), .jacobians = output_jacobian_.data()};
@@ -148,6 +149,7 @@ class Explorer {
  private:
   const Model& model_;
   const ModelCheckOptions& options_;
+  const int substeps_;
   int nx_, nu_, np_, ny_, nz_;
   RandomStream random_;
   std::vector<double> step_multipliers_, output_multipliers_;

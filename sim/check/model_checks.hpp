@@ -4,10 +4,14 @@
 #include <utility>
 #include <vector>
 
+#include "rhec/core/model/step_requirement.hpp"
 #include "rhec/sim/check/model_check.hpp"
 
 // The individual checks of `check_model`. Each returns at least one finding.
 namespace rhec::sim {
+
+/// More Runge-Kutta steps in an interval than this are worth a word.
+inline constexpr int costly_substeps = 8;
 
 /// Input of every check.
 struct CheckedModel {
@@ -15,6 +19,7 @@ struct CheckedModel {
   const ModelDescription& about;  ///< with the bounds to respect
   const ModelCheckOptions& options;
   std::vector<double> output_sigmas, input_sigmas;
+  int substeps = 1;  ///< of the options, or those that the model needs
 };
 
 /// Findings of one check.
@@ -49,6 +54,9 @@ class FindingList {
 std::vector<Finding> check_description(const ModelDescription& about, bool& can_go_on);
 std::vector<Finding> check_symmetry(const CheckedModel& checked);
 std::vector<Finding> check_straight_motion(const CheckedModel& checked);
+/// At its speed, or where the inputs have their typical magnitudes.
+StepRequirement required_steps(const CheckedModel& checked);
+std::vector<Finding> check_integration(const CheckedModel& checked, const StepRequirement& needed);
 std::vector<Finding> check_derivatives(const CheckedModel& checked);
 std::vector<Finding> check_numbers(const CheckedModel& checked);
 /// Checks "scaling" and "observability", which use the same drives.

@@ -68,8 +68,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
     entry.sigmas = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
     const double time = causal.time - first_time;
     const std::ptrdiff_t node = node_at(run, time);
-    state_at(run, model, robot.estimator_options().substeps, causal.held_out ? time : run.times[node],
-             entry.values.data());
+    state_at(run, model, robot.substeps(), causal.held_out ? time : run.times[node], entry.values.data());
     if (causal.held_out) {
       parameters_at(run, np, time, entry.values.data() + nx);
     } else {

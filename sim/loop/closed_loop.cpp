@@ -169,6 +169,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   for (std::size_t j = 0; j < about_outputs.size(); ++j)
     if (const auto noise = estimator->method().output_noise(static_cast<int>(j)))
       log.noise[about_outputs[j].name] = *noise;
+  log.counts = estimator->counts();
   begin(LoopPart::end);
   return log;
 }
@@ -241,6 +242,7 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
   }
   summary.certainty = certainty_of(summary);
   summary.noise = log.noise;
+  summary.counts = log.counts;
   summary.estimator_us = spread_of_times(std::move(estimator_us));
   summary.controller_us = spread_of_times(std::move(controller_us));
   return summary;

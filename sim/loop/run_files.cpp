@@ -137,6 +137,7 @@ Json json_of(const RunSummary& summary) {
   json["statuses"] = {{"rhe", summary.estimator_statuses}, {"rhc", summary.controller_statuses}};
   json["solves"] = summary.solves;
   json["fallbacks"] = summary.fallbacks;
+  json["integration"] = {{"checked", summary.counts.integrated}, {"coarse", summary.counts.coarse}};
   return json;
 }
 

@@ -9,10 +9,10 @@ namespace {
 /// Reads the vehicle's true state and no measurements. There is no covariance.
 class TruthEstimation final : public EstimationMethod {
  public:
-  TruthEstimation(std::shared_ptr<const Model> model, const TruthVehicle& vehicle)
-      : model_(std::move(model)), vehicle_(vehicle) {}
+  TruthEstimation(std::shared_ptr<const Model> model, int substeps, const TruthVehicle& vehicle)
+      : model_(std::move(model)), substeps_(substeps), vehicle_(vehicle) {}
   const Model& model() const noexcept override { return *model_; }
-  int substeps() const noexcept override { return 1; }
+  int substeps() const noexcept override { return substeps_; }
   void start(const double*) noexcept override {}
   void add_node(double, const double*, const double*) noexcept override {}
   bool amend(int, const double*) noexcept override { return true; }
@@ -28,6 +28,7 @@ class TruthEstimation final : public EstimationMethod {
 
  private:
   std::shared_ptr<const Model> model_;
+  int substeps_;
   const TruthVehicle& vehicle_;
 };
 
@@ -39,7 +40,7 @@ EstimatorMakers scenario_estimators(const TruthVehicle* vehicle) {
               [vehicle](const EstimatorParts& parts) -> std::unique_ptr<EstimationMethod> {
                 if (!vehicle)
                   throw parts.section.error("name: 'truth' is known to a simulation only; choose rhe or ekf");
-                return std::make_unique<TruthEstimation>(parts.context->model, *vehicle);
+                return std::make_unique<TruthEstimation>(parts.context->model, parts.substeps, *vehicle);
               }});
   return makers;
 }

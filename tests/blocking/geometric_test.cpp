@@ -3,7 +3,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace geometric_test {
 
 using namespace testing;
 
@@ -49,5 +49,5 @@ TEST(Geometric, RefusesWhatItCannotDo) {
   EXPECT_THAT(make("geometric", "{now: end, first: 15}")->why_not(15), HasSubstr("as long as the horizon"));
 }
 
-}  // namespace
+}  // namespace geometric_test
 }  // namespace rhec

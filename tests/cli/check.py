@@ -10,7 +10,7 @@ import sys
 import cli
 from cli import ERROR, FIGURE8, FINE, NOT_SOLVED, PAPER, USAGE, Program, assignments
 
-CHECKS = ["description", "symmetry", "straight_motion", "derivatives", "numbers", "scaling", "observability", "time"]
+CHECKS = ["description", "symmetry", "straight_motion", "integration", "derivatives", "numbers", "scaling", "observability", "time"]
 DRIVES = ["straight", "turn", "slalom", "standing"]
 # Words, exit code, and what the one line of the error must say.
 BAD = [

@@ -14,9 +14,36 @@ import cli
 from cli import FIGURE8, FINE, SHORT, ZIGZAG, Program, assignments
 
 EXACT = {"steps", "completed", "mae", "rmse", "nees", "nees_expected", "within_two_sigma", "certainty", "solve_time_us", "statuses",
-         "fallbacks"}
+         "fallbacks", "integration"}
 ERRORS = {"kappa", "mu", "position", "heading", "tracking"}
 TIMES = {"median", "p99", "max"}
+# The bicycle with slip, whose steering motor follows the wanted rate with a lag of 10 ms.
+LAG = """
+states:
+  x_pos: {unit: m, typical: 10, role: position_x}
+  y_pos: {unit: m, typical: 10, role: position_y}
+  beta: {unit: rad, angle: true, role: heading}
+  delta: {unit: rad, typical: 0.3}
+  rate: {unit: rad/s, typical: 0.03}
+inputs:
+  u1: {unit: m/s, typical: 5, role: speed}
+  u2: {unit: rad/s, typical: 0.3}
+parameters:
+  kappa: {typical: 0.5, bounds: [0, 1], role: speed_factor}
+  mu: {typical: 0.5, bounds: [0, 1]}
+outputs:
+  x_gps: {unit: m, typical: 10}
+  y_gps: {unit: m, typical: 10}
+  delta: {unit: rad, typical: 0.3, angle: true}
+equations: |
+  x_pos' = kappa * u1 * cos(beta)
+  y_pos' = kappa * u1 * sin(beta)
+  beta'  = kappa * u1 / 1.4 * tan(mu * delta)
+  delta' = rate
+  rate'  = (u2 - rate) / 0.01
+  x_gps  = x_pos - 0.4 * cos(beta)
+  y_gps  = y_pos - 0.4 * sin(beta)
+"""
 # name: scenario, settings, words that the summary's statuses and error bounds are judged by
 CHOICES = {
     "estimator rhe": (FIGURE8, ["estimator.name=rhe"]),
@@ -155,6 +182,28 @@ class Test(cli.Findings):
         for solver in ("sparse_sqp", "ipopt", "nlopt"):
             self.run(solver, [f"estimator.solver={solver}", f"controller.solver={solver}"], scenario)
 
+    def fast_lag(self):
+        """A vehicle with a lag that is far shorter than an interval."""
+        (self.work / "lag.yaml").write_text(LAG)
+        vehicle = "model={equations: lag.yaml}"
+        out = self.run("a fast lag", [vehicle])
+        summary = json.loads((out / "summary.json").read_text())
+        self.expect(summary["completed"] is True and summary["mae"]["tracking"] < 1.5, "a fast lag", f"{summary}")
+        self.expect(summary["integration"]["checked"] > 0 and summary["integration"]["coarse"] == 0, "a fast lag",
+                    f"{summary['integration']}")
+        for section in ("estimator", "controller"):
+            result = self.rhec("run", FIGURE8, "--out", self.work / "refused",
+                               *assignments(*SHORT, vehicle, f"{section}.substeps=2"), cwd=self.work)
+            self.expect(result.returncode != FINE, section, "a step that is unstable was taken")
+            for words in ("substeps", "unstable", "0.01 s", "'rate'", "expected at least", "auto"):
+                self.expect(words in result.stderr, section, f"no '{words}' in: {result.stderr}")
+            self.expect(not (self.work / "refused").exists(), section, "files of a run that was refused")
+        self.count_of_runs += 1
+        result = self.rhec("run", FIGURE8, "--out", self.work / "coarse",
+                           *assignments(*SHORT, vehicle, "estimator.substeps=8"), cwd=self.work)
+        self.expect(result.returncode == FINE and "the integration was too coarse" in result.stdout, "substeps 8",
+                    result.stdout + result.stderr)
+
     def others(self):
         result = self.rhec("plugins", "--json")
         self.expect(result.returncode == FINE, "plugins --json", result.stderr)
@@ -177,7 +226,7 @@ class Test(cli.Findings):
 def main():
     with tempfile.TemporaryDirectory(prefix="rhec-cli-") as work:
         test = Test(Program(sys.argv[1]), pathlib.Path(work).resolve())
-        for part in (test.choices, test.repeats, test.overrides, test.others):
+        for part in (test.choices, test.repeats, test.overrides, test.fast_lag, test.others):
             part()
         test.tell()
 

@@ -20,7 +20,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
-namespace {
+namespace invariance_test {
 
 using Point = std::complex<double>;
 
@@ -248,5 +248,5 @@ INSTANTIATE_TEST_SUITE_P(Priors, Invariance,
                          ::testing::Combine(::testing::ValuesIn(frames_in_metres), ::testing::ValuesIn(priors)),
                          [](const auto& found) { return std::string(std::get<0>(found.param).name); });
 
-}  // namespace
+}  // namespace invariance_test
 }  // namespace rhec

@@ -34,6 +34,7 @@ SUITES = {
 UNTESTED = {
     "apps/command.cpp": "tests/cli/bad_input.py: wrong commands and arguments; tests/cli/runs.py: the help",
     "apps/estimate.cpp": "tests/cli/report_log.py: the files of an estimation are those that its report is held against",
+    "apps/integration_note.cpp": "tests/cli/runs.py: a vehicle with a fast lag",
     "apps/log_arguments.cpp": "tests/cli/smooth.py: `rhec smooth` has the arguments that `rhec estimate` has",
     "apps/main.cpp": "tests/cli/bad_input.py: commands, usage and exit codes",
     "apps/options.cpp": "tests/cli/configuration.py: docs/configuration.md is what it prints",

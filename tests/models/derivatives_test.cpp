@@ -12,7 +12,7 @@
 #include "support/allocations.hpp"
 
 namespace rhec {
-namespace {
+namespace derivatives_test {
 
 class EveryModel : public testing::TestWithParam<std::string> {
  protected:
@@ -123,5 +123,5 @@ TEST_P(EveryModel, EvaluatesWithoutAllocation) {
   });
 }
 
-}  // namespace
+}  // namespace derivatives_test
 }  // namespace rhec

@@ -7,7 +7,7 @@
 #include "view.hpp"
 
 namespace rhec {
-namespace {
+namespace conformance_test {
 
 using namespace testing;
 
@@ -129,5 +129,5 @@ TEST(Priors, AreRefusedInWords) {
   EXPECT_THAT(error_of([] { make("mattern"); }), HasSubstr("did you mean 'matern'"));
 }
 
-}  // namespace
+}  // namespace conformance_test
 }  // namespace rhec

@@ -18,7 +18,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec {
-namespace {
+namespace threads_test {
 
 using testing::RandomProblem;
 using Numbers = std::vector<double>;
@@ -239,5 +239,5 @@ TEST(Threads, DriveVehiclesOfTheirOwnWithOneRobot) {
   expect_the_same_on_all(drive, "closed loop");
 }
 
-}  // namespace
+}  // namespace threads_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::apps {
-namespace {
+namespace no_report_page_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -20,5 +20,5 @@ TEST(NoReportPage, SaysHowToBuildRhecWithIt) {
   EXPECT_THAT(error_of([] { report_figures("{}"); }), remedy);
 }
 
-}  // namespace
+}  // namespace no_report_page_test
 }  // namespace rhec::apps

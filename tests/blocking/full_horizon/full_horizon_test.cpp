@@ -1,7 +1,7 @@
 #include "blocking/view.hpp"
 
 namespace rhec {
-namespace {
+namespace full_horizon_test {
 
 using namespace testing;
 
@@ -22,5 +22,5 @@ TEST(FullHorizon, HasNoOptions) {
   EXPECT_THAT(mistake("full_horizon", "size: 3"), HasSubstr("'full_horizon' has no options; remove 'size'"));
 }
 
-}  // namespace
+}  // namespace full_horizon_test
 }  // namespace rhec

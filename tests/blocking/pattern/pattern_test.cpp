@@ -1,7 +1,7 @@
 #include "blocking/view.hpp"
 
 namespace rhec {
-namespace {
+namespace pattern_test {
 
 using namespace testing;
 
@@ -29,5 +29,5 @@ TEST(Pattern, TellsMistakesWithPlaceAndRemedy) {
   EXPECT_THAT(mistake("pattern", "lengths: [2, 0]"), HasSubstr("lengths[1]: found '0'"));
 }
 
-}  // namespace
+}  // namespace pattern_test
 }  // namespace rhec

@@ -1,7 +1,7 @@
 #include "blocking/view.hpp"
 
 namespace rhec {
-namespace {
+namespace structured_test {
 
 using namespace testing;
 
@@ -139,5 +139,5 @@ TEST(Structured, TellsMistakesWithPlaceAndRemedy) {
   EXPECT_THAT(mistake("structured", "neighbour_sigma: 0"), HasSubstr("greater than 0"));
 }
 
-}  // namespace
+}  // namespace structured_test
 }  // namespace rhec

@@ -1,7 +1,7 @@
 #include "blocking/view.hpp"
 
 namespace rhec {
-namespace {
+namespace unblocked_test {
 
 using namespace testing;
 
@@ -17,5 +17,5 @@ TEST(Unblocked, JumpsOrGoesByRamps) {
   EXPECT_THAT(mistake("unblocked", "transition: jump"), HasSubstr("one of step, ramp"));
 }
 
-}  // namespace
+}  // namespace unblocked_test
 }  // namespace rhec

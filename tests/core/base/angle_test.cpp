@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace rhec {
-namespace {
+namespace angle_test {
 
 TEST(AngleDifference, IsTakenOnTheCircle) {
   EXPECT_NEAR(angle_difference(3.1, -3.1), 6.2 - 2.0 * M_PI, 1e-15);
@@ -13,5 +13,5 @@ TEST(AngleDifference, IsTakenOnTheCircle) {
   EXPECT_EQ(angle_difference(1.0, 0.25), 0.75);
 }
 
-}  // namespace
+}  // namespace angle_test
 }  // namespace rhec

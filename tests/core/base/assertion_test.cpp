@@ -14,7 +14,7 @@
 #include "rhec/core/qp/stage_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace assertion_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -64,5 +64,5 @@ TEST(AssertionDeathTest, EndsWhatMustNotThrowWithItsMessage) {
 }
 #endif
 
-}  // namespace
+}  // namespace assertion_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace options_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -33,6 +33,7 @@ struct Options {
   Order order = Order::second;
   std::optional<double> sigma;
   std::optional<int> limit = 3;
+  std::optional<int> parts;
   std::vector<double> weights = {1, 0.5};
   std::vector<int> starts;
   std::vector<std::string> outputs = {"x", "y"};
@@ -49,6 +50,7 @@ struct Options {
             .choice("order", &Options::order, {{"first", Order::first}, {"second", Order::second}}, "of the hold")
             .optional_number("sigma", &Options::sigma, "spread [m]", greater_than(0))
             .optional_integer("limit", &Options::limit, "iterations at most", at_least(1))
+            .automatic_integer("parts", &Options::parts, "of an interval", between(1, 9))
             .numbers("weights", &Options::weights, "of the outputs", at_least(0))
             .integers("starts", &Options::starts, "of the blocks")
             .names("outputs", &Options::outputs, "measured")
@@ -141,6 +143,18 @@ TEST(Options, AnEmptyValueIsNoValue) {
   EXPECT_EQ(parse(optional).limit, std::nullopt);
 }
 
+TEST(Options, AutoLeavesTheChoiceToTheProgram) {
+  EXPECT_EQ(parse({}).parts, std::nullopt);
+  Settings root;
+  root.set("parts", line(3, "4"));
+  EXPECT_EQ(parse(root).parts, 4);
+  root.set("parts", line(3, "auto"));
+  EXPECT_EQ(parse(root).parts, std::nullopt);
+  EXPECT_THAT(message("parts", "automatic"),
+              HasSubstr("parts: found 'automatic', expected an integer or auto, between 1 and 9"));
+  EXPECT_THAT(message("parts", "10"), HasSubstr("found '10', expected an integer or auto, between 1 and 9"));
+}
+
 TEST(Options, AWrongChoiceNamesTheChoices) {
   EXPECT_EQ(
       message("order", "frist"),
@@ -193,10 +207,10 @@ TEST(Options, TheSchemaShowsDefaultsAndConstraints) {
       ElementsAre("tolerance | number | 1e-06 | greater than 0", "size | integer | 5 | at least 1",
                   "verbose | flag | false | true or false", "label | text | plain | ",
                   "order | choice | second | one of first, second", "sigma | number or none | none | greater than 0",
-                  "limit | integer or none | 3 | at least 1", "weights | list of numbers | [1, 0.5] | each at least 0",
-                  "starts | list of integers | [] | ", "outputs | list of texts | [x, y] | ",
-                  "native | map | {} | passed through as it is", "search.steps | integer | 7 | at least 0",
-                  "search.shrink | number | 0.5 | between 0.1 and 0.9"));
+                  "limit | integer or none | 3 | at least 1", "parts | integer or auto | auto | between 1 and 9",
+                  "weights | list of numbers | [1, 0.5] | each at least 0", "starts | list of integers | [] | ",
+                  "outputs | list of texts | [x, y] | ", "native | map | {} | passed through as it is",
+                  "search.steps | integer | 7 | at least 0", "search.shrink | number | 0.5 | between 0.1 and 0.9"));
   EXPECT_EQ(Options::table().schema()[1].meaning, "block length [intervals]");
 }
 
@@ -235,5 +249,5 @@ TEST(Nearest, FindsSlipsOfTheHand) {
   EXPECT_EQ(nearest("size", {}), "");
 }
 
-}  // namespace
+}  // namespace options_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace settings_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -137,5 +137,5 @@ TEST(Settings, ListErrorsNameTheItem) {
   EXPECT_EQ(error_of([&] { list.as_numbers(); }), "field.yaml:3: sigma[1]: found 'x', expected a number");
 }
 
-}  // namespace
+}  // namespace settings_test
 }  // namespace rhec

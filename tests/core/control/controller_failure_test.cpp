@@ -21,7 +21,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
-namespace {
+namespace controller_failure_test {
 
 using ::testing::Combine;
 using ::testing::HasSubstr;
@@ -438,5 +438,5 @@ TEST(ControllerSetup, TellsWhyASolverCannotTakeItsProblem) {
   EXPECT_THAT(what_it_throws(), HasSubstr("no licence for this machine"));
 }
 
-}  // namespace
+}  // namespace controller_failure_test
 }  // namespace rhec

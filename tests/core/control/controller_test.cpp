@@ -11,7 +11,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
-namespace {
+namespace controller_test {
 
 using ::testing::DoubleNear;
 using ::testing::ElementsAre;
@@ -161,5 +161,5 @@ TEST(ControllerReference, PutsAllBodiesInLineAlongThePath) {
   EXPECT_NEAR(third[3], angle, 1e-12);
 }
 
-}  // namespace
+}  // namespace controller_test
 }  // namespace rhec

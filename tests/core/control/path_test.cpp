@@ -12,7 +12,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace path_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -240,5 +240,5 @@ TEST(PathFollower, ResultDoesNotDependOnResolution) {
   }
 }
 
-}  // namespace
+}  // namespace path_test
 }  // namespace rhec

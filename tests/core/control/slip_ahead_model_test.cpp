@@ -14,7 +14,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
-namespace {
+namespace slip_ahead_model_test {
 
 const Host& host() {
   static const Host found;
@@ -156,5 +156,5 @@ TEST(Controller, HasNoSteadyOffsetWhereSlipIsConstant) {
   }
 }
 
-}  // namespace
+}  // namespace slip_ahead_model_test
 }  // namespace rhec

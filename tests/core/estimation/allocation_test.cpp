@@ -20,7 +20,7 @@
 #include "support/allocations.hpp"
 
 namespace rhec {
-namespace {
+namespace allocation_test {
 
 const Host& host() {
   static const Host instance;
@@ -193,5 +193,5 @@ TEST(EstimationAllocation, NoneWhereTheHeadingIsSearchedFor) {
   EXPECT_EQ(allocations_in_the_loop({.priors = true, .heading_starts = 8}), 0);
 }
 
-}  // namespace
+}  // namespace allocation_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace arrival_cost_test {
 
 using namespace rhec::testing;
 
@@ -253,5 +253,5 @@ TEST(ArrivalCost, ASolutionThatIsNoneLeavesItFinite) {
   }
 }
 
-}  // namespace
+}  // namespace arrival_cost_test
 }  // namespace rhec

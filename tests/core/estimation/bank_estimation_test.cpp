@@ -10,7 +10,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace bank_estimation_test {
 
 using namespace testing;
 
@@ -82,5 +82,5 @@ TEST(BankEstimation, KeepsItsParametersWithinTheirBounds) {
   EXPECT_EQ(drive(bank, 0.0, 40).parameters[model->description().roles.speed_factor], 0.5);
 }
 
-}  // namespace
+}  // namespace bank_estimation_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/bank_case.hpp"
 
 namespace rhec {
-namespace {
+namespace bank_history_test {
 
 using namespace testing;
 
@@ -118,5 +118,5 @@ TEST(BankHistory, TakesBetterWeightsOfARobustLoss) {
   EXPECT_LT(difference(told, without), 1e-9);
 }
 
-}  // namespace
+}  // namespace bank_history_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/bank_case.hpp"
 
 namespace rhec {
-namespace {
+namespace banked_covariance_test {
 
 using namespace testing;
 
@@ -90,5 +90,5 @@ TEST(BankedCovariance, TakesLateMeasurementsAndStartsAnew) {
   EXPECT_EQ(banked.window().intervals, 8);
 }
 
-}  // namespace
+}  // namespace banked_covariance_test
 }  // namespace rhec

@@ -10,7 +10,7 @@
 #include "support/cart.hpp"
 
 namespace rhec {
-namespace {
+namespace block_structure_test {
 
 using testing::cart_estimation;
 using ::testing::ElementsAre;
@@ -102,5 +102,5 @@ TEST(OneBlockParameters, AreThoseWhoseBlockingSaysSo) {
   EXPECT_TRUE(one_block_parameters({}).empty());
 }
 
-}  // namespace
+}  // namespace block_structure_test
 }  // namespace rhec

@@ -11,7 +11,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace estimation_method_test {
 
 using namespace rhec::testing;
 
@@ -347,5 +347,5 @@ TEST(EstimationMethods, WhatIsInfiniteOrAbsurdCountsAsMissing) {
   }
 }
 
-}  // namespace
+}  // namespace estimation_method_test
 }  // namespace rhec

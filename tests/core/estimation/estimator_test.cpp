@@ -12,7 +12,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace estimator_test {
 
 using namespace rhec::testing;
 using ::testing::DoubleEq;
@@ -296,5 +296,23 @@ TEST_F(Timeline, RefusesNumbersThatMakeNoSense) {
   EXPECT_THAT(message({.capacity = 0}), HasSubstr("capacity"));
 }
 
-}  // namespace
+TEST(Integration, IsHeldAgainstTwiceAsManySteps) {
+  // A trolley that swings with 0.63 rad/s: steps of 0.2 s are exact, those of 5 s are not.
+  for (const double interval : {0.2, 5.0}) {
+    Estimator estimator(std::make_unique<Recorder>(), {.longest_interval = 10.0});
+    const double outputs[] = {1.0, 2.0};
+    for (int k = 0; k < 64; ++k) {
+      estimator.push_measurement(interval * k, outputs);
+      estimator.estimate(interval * k);
+    }
+    EXPECT_EQ(estimator.counts().integrated, 4) << interval;
+    EXPECT_EQ(estimator.counts().coarse, interval > 1.0 ? 4 : 0) << interval;
+    EXPECT_EQ(estimator.counts().coarse_state >= 0, interval > 1.0) << interval;
+    estimator.reset();
+    EXPECT_EQ(estimator.counts().integrated, 0);
+    EXPECT_EQ(estimator.counts().coarse_state, -1);
+  }
+}
+
+}  // namespace estimator_test
 }  // namespace rhec

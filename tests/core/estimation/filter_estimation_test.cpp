@@ -11,7 +11,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace filter_estimation_test {
 
 using namespace testing;
 
@@ -96,5 +96,5 @@ TEST(FilterEstimation, RefusesASetUpThatDoesNotFit) {
   EXPECT_THROW(FilterEstimation(model, setup), Error);
 }
 
-}  // namespace
+}  // namespace filter_estimation_test
 }  // namespace rhec

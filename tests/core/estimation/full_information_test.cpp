@@ -15,7 +15,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace full_information_test {
 
 using namespace rhec::testing;
 using ::testing::HasSubstr;
@@ -167,5 +167,5 @@ TEST(FullInformation, SaysWhatIsWrong) {
   EXPECT_THAT(with([](auto& setup) { setup.initial_mean.conservativeResize(3); }, log), HasSubstr("size 4"));
 }
 
-}  // namespace
+}  // namespace full_information_test
 }  // namespace rhec

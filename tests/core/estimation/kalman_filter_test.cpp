@@ -10,7 +10,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace kalman_filter_test {
 
 using namespace testing;
 
@@ -126,5 +126,5 @@ TEST(KalmanFilter, KeepsItsParametersWithinTheirBounds) {
   EXPECT_EQ(filter.mean[2], 0.0);
 }
 
-}  // namespace
+}  // namespace kalman_filter_test
 }  // namespace rhec

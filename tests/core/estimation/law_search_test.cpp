@@ -11,7 +11,7 @@
 #include "support/bank_case.hpp"
 
 namespace rhec {
-namespace {
+namespace law_search_test {
 
 using namespace testing;
 using ::testing::HasSubstr;
@@ -146,5 +146,5 @@ TEST_F(LawSearch, SearchesParameterByParameterWhereThereAreManyCombinations) {
   EXPECT_EQ(laws.front().priors, expected);
 }
 
-}  // namespace
+}  // namespace law_search_test
 }  // namespace rhec

@@ -12,7 +12,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace node_covariance_test {
 
 using namespace testing;
 
@@ -61,5 +61,5 @@ TEST(NodeCovariance, DoesNotDependOnWhereItComesFrom) {
   EXPECT_EQ(covariance.find(problem, secretive, point, 6), nullptr) << "not finite";
 }
 
-}  // namespace
+}  // namespace node_covariance_test
 }  // namespace rhec

@@ -7,7 +7,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace node_log_test {
 
 using ::testing::ElementsAre;
 using testing::linear_model;
@@ -41,5 +41,5 @@ TEST(FillData, MeasuresFurtherInputsAsZero) {
   EXPECT_TRUE(std::isnan(problem.output(1)[1]));
 }
 
-}  // namespace
+}  // namespace node_log_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace place_bank_test {
 
 using namespace testing;
 
@@ -130,5 +130,5 @@ TEST_F(PlaceBankTest, RefusesWhatDoesNotFit) {
   refused([&](PlaceBank::Setup& s) { s.bank.members = filters().members; });
 }
 
-}  // namespace
+}  // namespace place_bank_test
 }  // namespace rhec

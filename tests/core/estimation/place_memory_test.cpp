@@ -10,7 +10,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace place_memory_test {
 
 using namespace testing;
 
@@ -177,5 +177,5 @@ TEST(PlaceMemory, TellsWhatIsAhead) {
   EXPECT_EQ(change[0], 0.0);
 }
 
-}  // namespace
+}  // namespace place_memory_test
 }  // namespace rhec

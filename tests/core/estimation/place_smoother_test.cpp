@@ -8,7 +8,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace place_smoother_test {
 
 using namespace testing;
 
@@ -64,5 +64,5 @@ TEST(PlaceSmoother, BringsTheLastMomentsOfAConstantBackOverTheWay) {
   }
 }
 
-}  // namespace
+}  // namespace place_smoother_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace prior_bank_map_test {
 
 using namespace testing;
 
@@ -164,5 +164,5 @@ TEST(PriorBankMap, RefusesWhatDoesNotFit) {
   EXPECT_THROW(PriorBank(model, following(*model, std::make_shared<SlipMap>(one))), Error);
 }
 
-}  // namespace
+}  // namespace prior_bank_map_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/bank_case.hpp"
 
 namespace rhec {
-namespace {
+namespace prior_bank_noise_test {
 
 using namespace testing;
 
@@ -99,5 +99,5 @@ TEST(PriorBank, LearnsTheNoiseBesideOutliers) {
   for (const double delta : {1.0, 2.0, 4.0}) EXPECT_GE(share_of_close(delta, false, robust), 0.85) << delta;
 }
 
-}  // namespace
+}  // namespace prior_bank_noise_test
 }  // namespace rhec

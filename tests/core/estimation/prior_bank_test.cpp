@@ -17,7 +17,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace prior_bank_test {
 
 using namespace testing;
 
@@ -368,5 +368,5 @@ TEST(PriorBank, RefusesWhatDoesNotFit) {
               ::testing::HasSubstr("expected 2"));
 }
 
-}  // namespace
+}  // namespace prior_bank_test
 }  // namespace rhec

@@ -11,7 +11,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace prior_horizon_estimation_test {
 
 using namespace testing;
 
@@ -274,5 +274,5 @@ TEST(PriorHorizonEstimation, SurvivesMeasurementsThatAreNoNumbers) {
   EXPECT_TRUE(estimate.state.allFinite() && estimate.covariance.allFinite());
 }
 
-}  // namespace
+}  // namespace prior_horizon_estimation_test
 }  // namespace rhec

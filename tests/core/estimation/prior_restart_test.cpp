@@ -10,7 +10,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace prior_restart_test {
 
 using namespace testing;
 
@@ -126,5 +126,5 @@ TEST_F(PriorRestartTest, TakesThePriorWhereNothingIsBetter) {
   EXPECT_EQ(found_, prior_.state(0)[0]);
 }
 
-}  // namespace
+}  // namespace prior_restart_test
 }  // namespace rhec

@@ -16,7 +16,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace prior_smoothing_test {
 
 using namespace testing;
 using ::testing::HasSubstr;
@@ -359,5 +359,5 @@ TEST(PriorSmoothing, SaysWhatIsWrong) {
               HasSubstr("expected 1 lower and upper bounds"));
 }
 
-}  // namespace
+}  // namespace prior_smoothing_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/bank_case.hpp"
 
 namespace rhec {
-namespace {
+namespace process_problem_test {
 
 using namespace testing;
 
@@ -54,5 +54,5 @@ TEST(InformationOf, IsFiniteWhereACovarianceIsSingular) {
   EXPECT_EQ(information, information.transpose());
 }
 
-}  // namespace
+}  // namespace process_problem_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace receding_horizon_estimation_test {
 
 using namespace rhec::testing;
 
@@ -185,5 +185,5 @@ TEST(Kalman, RampsThatTheWindowsEdgePasses) {
   expect_kalman({linear_model<Hovercraft>(), {full_horizon(), ramped(unblocked())}});
 }
 
-}  // namespace
+}  // namespace receding_horizon_estimation_test
 }  // namespace rhec

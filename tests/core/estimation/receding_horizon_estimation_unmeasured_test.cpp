@@ -11,7 +11,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace receding_horizon_estimation_unmeasured_test {
 
 using namespace rhec::testing;
 
@@ -182,5 +182,5 @@ TEST(UnmeasuredBlock, WithNoHoldAtAllNothingIsNaN) {
   }
 }
 
-}  // namespace
+}  // namespace receding_horizon_estimation_unmeasured_test
 }  // namespace rhec

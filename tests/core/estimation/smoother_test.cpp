@@ -10,7 +10,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace smoother_test {
 
 using namespace rhec::testing;
 
@@ -108,5 +108,5 @@ TEST(ParametersAt, AreThoseOfTheIntervalAndOfTheRampsCourse) {
   EXPECT_EQ(at(7.0), (std::vector<double>{0.6, 2.0}));
 }
 
-}  // namespace
+}  // namespace smoother_test
 }  // namespace rhec

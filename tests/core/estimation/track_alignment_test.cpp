@@ -13,7 +13,7 @@
 #include "rhec/plugins/host/host.hpp"
 
 namespace rhec {
-namespace {
+namespace track_alignment_test {
 
 constexpr int nodes = 401, gap_start = 200, gap_end = 230;
 
@@ -183,5 +183,5 @@ TEST_F(SkidSteeredTrack, StretchesTheSpeedsOfBothSidesInALongGap) {
   EXPECT_DOUBLE_EQ(inputs_[middle + 1] / before[middle + 1], inputs_[middle] / before[middle]);
 }
 
-}  // namespace
+}  // namespace track_alignment_test
 }  // namespace rhec

@@ -11,7 +11,7 @@
 #include "rhec/core/formula/expression.hpp"
 
 namespace rhec {
-namespace {
+namespace derivatives_test {
 
 using Formula = std::function<Expression(const Expression&, const Expression&)>;
 struct Case {
@@ -147,5 +147,5 @@ TEST(Jacobian, TakesTheAccumulationOfFewerOperations) {
   EXPECT_EQ(count(Accumulation::by_count), count(Accumulation::forward));
 }
 
-}  // namespace
+}  // namespace derivatives_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/every_function.hpp"
 
 namespace rhec {
-namespace {
+namespace expression_test {
 
 double value(Graph& graph, const Expression& of, const std::vector<int>& inputs, const std::vector<double>& values) {
   const int node = of.node_in(graph);
@@ -103,5 +103,5 @@ TEST(Smooth, IsAsFarAsTheWidthSays) {
   EXPECT_EQ(smooth_min(2.0, 2.0, 0.4), 1.8);
 }
 
-}  // namespace
+}  // namespace expression_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include "rhec/core/formula/expression.hpp"
 
 namespace rhec {
-namespace {
+namespace graph_copy_test {
 
 TEST(GraphCopy, HasWhatIsAskedForAndNothingElse) {
   Graph from, to;
@@ -38,5 +38,5 @@ TEST(GraphCopy, UsesWhatIsThereAlready) {
   EXPECT_EQ(to.evaluate({&copy, 1}, {&there, 1}, {&value, 1})[0], 10.0);
 }
 
-}  // namespace
+}  // namespace graph_copy_test
 }  // namespace rhec

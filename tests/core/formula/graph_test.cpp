@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace graph_test {
 
 using testing::ElementsAre;
 
@@ -135,5 +135,5 @@ TEST_F(GraphTest, SaysWhichInputHasNoValue) {
             "the input 'y' has no value; give one for each input that is needed");
 }
 
-}  // namespace
+}  // namespace graph_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace instructions_test {
 
 struct Selected {
   Graph graph;
@@ -65,5 +65,5 @@ TEST(Instructions, RefusesAnInputThatIsNotGiven) {
   EXPECT_EQ(error_of([&] { select({select.x * other}); }), "the formula reads 'speed', which is none of its arguments");
 }
 
-}  // namespace
+}  // namespace instructions_test
 }  // namespace rhec

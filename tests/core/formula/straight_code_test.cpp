@@ -10,7 +10,7 @@
 #include "rhec/core/formula/expression.hpp"
 
 namespace rhec {
-namespace {
+namespace straight_code_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -90,5 +90,5 @@ TEST(StraightWriter, ALongFunctionIsWrittenInPieces) {
   EXPECT_TRUE(has(" = get(carried, 0);"));
 }
 
-}  // namespace
+}  // namespace straight_code_test
 }  // namespace rhec

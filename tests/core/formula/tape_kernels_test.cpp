@@ -8,7 +8,7 @@
 #include "rhec/core/formula/tape.hpp"
 
 namespace rhec {
-namespace {
+namespace tape_kernels_test {
 
 struct RowsTest : testing::TestWithParam<const TapeKernels*> {};
 INSTANTIATE_TEST_SUITE_P(Sets, RowsTest, testing::ValuesIn(runnable_tape_kernels()),
@@ -126,5 +126,5 @@ TEST_P(RowsTest, EveryInstruction) {
   }
 }
 
-}  // namespace
+}  // namespace tape_kernels_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include "rhec/core/formula/tape.hpp"
 
 namespace rhec {
-namespace {
+namespace tape_sets_test {
 
 TEST(TapeSets, TheGenericOneIsAlwaysThereAndFirst) {
   std::vector<std::string> names;
@@ -29,5 +29,5 @@ TEST(TapeSets, LanesHoldTheRowsWithoutManyToSpare) {
   }
 }
 
-}  // namespace
+}  // namespace tape_sets_test
 }  // namespace rhec

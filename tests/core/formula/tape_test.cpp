@@ -12,7 +12,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace tape_test {
 
 /// A random formula of many operations of every kind, some of which are needed twice and some of which are results.
 struct RandomFormula {
@@ -149,5 +149,5 @@ TEST(Tape, RefusesAnInputThatItIsNotGiven) {
             "the formula reads 'speed', which is none of its arguments");
 }
 
-}  // namespace
+}  // namespace tape_test
 }  // namespace rhec

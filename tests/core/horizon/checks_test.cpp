@@ -10,7 +10,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace checks_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -60,5 +60,5 @@ TEST(DefaultBounds, MustFit) {
   EXPECT_THAT(said({2.5, 0.0}, {}), HasSubstr("[2.5, 2] for 'x'")) << "against the variable's own";
 }
 
-}  // namespace
+}  // namespace checks_test
 }  // namespace rhec

@@ -13,7 +13,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec {
-namespace {
+namespace horizon_linearisation_test {
 
 using testing::RandomProblem;
 
@@ -271,5 +271,5 @@ TEST(LinearisationCache, OfAHorizonWithoutIntervals) {
   }
 }
 
-}  // namespace
+}  // namespace horizon_linearisation_test
 }  // namespace rhec

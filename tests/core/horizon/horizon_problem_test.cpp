@@ -8,7 +8,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec {
-namespace {
+namespace horizon_problem_test {
 
 using testing::RandomProblem;
 
@@ -199,5 +199,5 @@ TEST_P(OcpTest, WhatIsMissingIsLeftOut) {
 std::vector<std::string> all_models() { return Host().names(PluginKind::model); }
 INSTANTIATE_TEST_SUITE_P(Models, OcpTest, ::testing::ValuesIn(all_models()));
 
-}  // namespace
+}  // namespace horizon_problem_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/cart.hpp"
 
 namespace rhec {
-namespace {
+namespace horizon_structure_test {
 
 using testing::cart;
 using ::testing::ElementsAre;
@@ -113,5 +113,5 @@ TEST_F(Structure, KnowsItsRamps) {
   EXPECT_FALSE(structure.any_ramp());
 }
 
-}  // namespace
+}  // namespace horizon_structure_test
 }  // namespace rhec

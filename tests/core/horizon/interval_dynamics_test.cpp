@@ -7,7 +7,7 @@
 #include "support/cart.hpp"
 
 namespace rhec {
-namespace {
+namespace interval_dynamics_test {
 
 using testing::cart;
 using testing::cart_control;
@@ -128,5 +128,5 @@ TEST_P(Intervals, HaveTheCurvatureOfTheirDerivatives) {
   }
 }
 
-}  // namespace
+}  // namespace interval_dynamics_test
 }  // namespace rhec

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace rhec {
-namespace {
+namespace output_cache_test {
 
 constexpr int nodes = 5, outputs = 2, jacobians = 3;
 
@@ -96,5 +96,5 @@ TEST(OutputCache, MovesTheMarksOfCleanStages) {
   for (int node = 0; node < nodes; ++node) EXPECT_EQ(filled.cache.is_clean()[node], expected[node]) << node;
 }
 
-}  // namespace
+}  // namespace output_cache_test
 }  // namespace rhec

@@ -12,7 +12,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
-namespace {
+namespace own_problem_test {
 
 const Host& host() {
   static const Host one;
@@ -110,5 +110,5 @@ TEST(OwnProblem, EverySolverTakesIt) {
   }
 }
 
-}  // namespace
+}  // namespace own_problem_test
 }  // namespace rhec

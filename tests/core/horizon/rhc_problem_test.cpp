@@ -12,7 +12,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace rhc_problem_test {
 
 using testing::cart;
 using testing::cart_control;
@@ -137,5 +137,5 @@ TEST(RhcProblem, TakesOnTheDataOfAnother) {
   EXPECT_EQ(to->evaluate(point, nullptr, scratch), from->evaluate(point, nullptr, scratch));
 }
 
-}  // namespace
+}  // namespace rhc_problem_test
 }  // namespace rhec

@@ -10,7 +10,7 @@
 #include "support/other_model.hpp"
 
 namespace rhec {
-namespace {
+namespace rhe_linearisation_test {
 
 using testing::cart;
 using testing::cart_estimation;
@@ -123,5 +123,5 @@ TEST_F(RheLinearisationTest, ForgetsAll) {
   expect_as_anew();
 }
 
-}  // namespace
+}  // namespace rhe_linearisation_test
 }  // namespace rhec

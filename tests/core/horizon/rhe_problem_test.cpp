@@ -9,7 +9,7 @@
 #include "support/cart.hpp"
 
 namespace rhec {
-namespace {
+namespace rhe_problem_test {
 
 using testing::cart;
 using testing::cart_estimation;
@@ -172,5 +172,5 @@ TEST(RheProblem, RefusesASetUpThatDoesNotFit) {
   EXPECT_THROW(RheProblem(cart(), setup), Error);
 }
 
-}  // namespace
+}  // namespace rhe_problem_test
 }  // namespace rhec

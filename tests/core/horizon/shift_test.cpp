@@ -17,7 +17,7 @@
 #include "support/allocations.hpp"
 
 namespace rhec {
-namespace {
+namespace shift_test {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
@@ -340,5 +340,5 @@ TEST(Shift, CostatesOfCarriedParametersFitTheNewStructure) {
   EXPECT_NEAR(guess.costate(2)[2], expected, 1e-9 * (1.0 + std::abs(expected)));
 }
 
-}  // namespace
+}  // namespace shift_test
 }  // namespace rhec

@@ -11,7 +11,7 @@
 #include "support/random_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace bank_kernels_test {
 
 using testing::RandomQp;
 
@@ -237,5 +237,5 @@ TEST(BankKernels, LeaveAMemberAsItWasWhereNoNumberComesOut) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, BankKernelsTest, ::testing::Range(1, 25));
 
-}  // namespace
+}  // namespace bank_kernels_test
 }  // namespace rhec

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace rhec {
-namespace {
+namespace kernel_sets_test {
 
 TEST(KernelSets, AreThereForEverySetThatThisMachineRuns) {
   ASSERT_FALSE(runnable_kernels().empty());
@@ -13,5 +13,5 @@ TEST(KernelSets, AreThereForEverySetThatThisMachineRuns) {
 #endif
 }
 
-}  // namespace
+}  // namespace kernel_sets_test
 }  // namespace rhec

@@ -10,7 +10,7 @@
 #include "support/random_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace qp_kernels_test {
 
 using testing::RandomQp;
 
@@ -123,5 +123,5 @@ TEST(QpKernels, ComputeWhatTheySay) {
   }
 }
 
-}  // namespace
+}  // namespace qp_kernels_test
 }  // namespace rhec

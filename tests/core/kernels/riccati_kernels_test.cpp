@@ -10,7 +10,7 @@
 #include "support/random_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace riccati_kernels_test {
 
 using testing::DenseQp;
 using testing::RandomQp;
@@ -251,5 +251,5 @@ TEST(RiccatiKernels, CombineABatchByItsWeights) {
   }
 }
 
-}  // namespace
+}  // namespace riccati_kernels_test
 }  // namespace rhec

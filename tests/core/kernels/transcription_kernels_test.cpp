@@ -10,7 +10,7 @@
 #include "support/random_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace transcription_kernels_test {
 
 using testing::RandomQp;
 
@@ -320,5 +320,5 @@ TEST(TranscriptionKernels, AdoptWhatBoundsAllowAndMatchRows) {
   }
 }
 
-}  // namespace
+}  // namespace transcription_kernels_test
 }  // namespace rhec

@@ -10,7 +10,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec {
-namespace {
+namespace chosen_outputs_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -128,5 +128,5 @@ TEST(ChosenOutputs, MistakesAreNamedWithTheirPlace) {
   EXPECT_THROW(with_outputs(host().make_model("bicycle_slip"), {0, 0}), Error);
 }
 
-}  // namespace
+}  // namespace chosen_outputs_test
 }  // namespace rhec

@@ -7,7 +7,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace description_checks_test {
 
 ModelDescription description() {
   ModelDescription about;
@@ -50,5 +50,5 @@ TEST(CheckDescription, LooksAtEveryRole) {
   EXPECT_NE(why_refused(about).find("other_headings"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace description_checks_test
 }  // namespace rhec

@@ -5,7 +5,7 @@
 #include "rhec/core/model/step_graph.hpp"
 
 namespace rhec {
-namespace {
+namespace formula_copy_test {
 
 VehicleGraph cart() {
   VehicleGraph made;
@@ -46,5 +46,5 @@ TEST(FormulaCopy, TakesSomeOutputs) {
   EXPECT_EQ(copy.outputs[1], copy.states[0]);
 }
 
-}  // namespace
+}  // namespace formula_copy_test
 }  // namespace rhec

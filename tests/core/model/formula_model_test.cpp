@@ -10,7 +10,7 @@ namespace rhec {
 
 const StraightCode& every_function_kernels();  // defined by rhec_add_model_kernels
 
-namespace {
+namespace formula_model_test {
 
 std::vector<Variable> variables(const std::vector<std::string>& names) {
   std::vector<Variable> all;
@@ -152,5 +152,5 @@ TEST(EveryFunction, KnowsLargeAngles) {
   }
 }
 
-}  // namespace
+}  // namespace formula_model_test
 }  // namespace rhec

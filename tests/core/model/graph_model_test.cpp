@@ -21,7 +21,7 @@
 #include "support/test_models.hpp"
 
 namespace rhec {
-namespace {
+namespace graph_model_test {
 
 std::vector<Variable> variables(const char* letter, int count) {
   std::vector<Variable> all;
@@ -206,5 +206,5 @@ TEST(GraphModel, SaysWhatItCosts) {
   EXPECT_LT(model.cost_of_hessians().runs, model.cost_of_hessians().instructions);
 }
 
-}  // namespace
+}  // namespace graph_model_test
 }  // namespace rhec

@@ -10,7 +10,7 @@
 #include "rhec/core/model/step_graph.hpp"
 
 namespace rhec {
-namespace {
+namespace graph_steps_test {
 
 TEST(LoadColumns, RepeatsTheLastRow) {
   const double rows[] = {1, 2, 3, 4};
@@ -79,5 +79,5 @@ TEST(GraphSteps, DerivativesOfManyStepsAreThoseOfTheirValues) {
   }
 }
 
-}  // namespace
+}  // namespace graph_steps_test
 }  // namespace rhec

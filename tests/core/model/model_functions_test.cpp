@@ -13,7 +13,7 @@
 #include "support/linear_case.hpp"
 
 namespace rhec {
-namespace {
+namespace model_functions_test {
 
 TEST(ModelFunctions, ResultsStandInTheirOrder) {
   const VehicleGraph vehicle = trace<BicycleSlip>();
@@ -161,5 +161,5 @@ TEST(WriteModelCode, GivesTheSameTextAndLeavesOutRampsWithoutParameters) {
   EXPECT_NE(train.kernels.find("&step_hessian, nullptr, nullptr, nullptr, &outputs"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace model_functions_test
 }  // namespace rhec

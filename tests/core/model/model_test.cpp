@@ -10,7 +10,7 @@
 #include "support/other_model.hpp"
 
 namespace rhec {
-namespace {
+namespace model_test {
 
 using testing::cart;
 using ::testing::ElementsAre;
@@ -182,5 +182,5 @@ TEST(Model, GoesStraightOnByItsWheelSpeedWhereverThatIs) {
   EXPECT_THAT(inputs, ElementsAre(2.0)) << "a model without such a parameter does not slip";
 }
 
-}  // namespace
+}  // namespace model_test
 }  // namespace rhec

@@ -11,7 +11,7 @@
 #include "models/tractor_trailer/tractor_trailer.hpp"
 
 namespace rhec {
-namespace {
+namespace step_graph_test {
 
 std::vector<double> evaluate(const VehicleGraph& vehicle, const StepGraph& step, const std::vector<int>& of) {
   std::mt19937 random(5);
@@ -68,5 +68,5 @@ TEST(StepGraph, ARampWithoutARiseIsAStep) {
   EXPECT_EQ(vehicle.graph->substitute(ramped.next, from, to), steady.next);
 }
 
-}  // namespace
+}  // namespace step_graph_test
 }  // namespace rhec

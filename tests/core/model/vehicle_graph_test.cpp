@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace vehicle_graph_test {
 
 TEST(Trace, RecordsAFormula) {
   const TractorTrailer<double> formula;
@@ -47,5 +47,5 @@ TEST(Trace, SaysWhichResultIsLeftOut) {
             "the formula's dynamics leaves out number 1; let it write all 2, from 0 on");
 }
 
-}  // namespace
+}  // namespace vehicle_graph_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/cart.hpp"
 
 namespace rhec {
-namespace {
+namespace iterate_checks_test {
 
 using testing::cart_control;
 using testing::scattered_point;
@@ -86,5 +86,5 @@ TEST_F(PointTest, SumsWhatBoundsAreViolatedBy) {
   EXPECT_DOUBLE_EQ(total_violation(*problem, point), 0.5 + 1.0 + 0.25);
 }
 
-}  // namespace
+}  // namespace iterate_checks_test
 }  // namespace rhec

@@ -7,7 +7,7 @@
 #include "support/cart.hpp"
 
 namespace rhec {
-namespace {
+namespace linearisation_test {
 
 using testing::cart_control;
 using testing::scattered_point;
@@ -89,5 +89,5 @@ TEST(PlainLinearisationOfBlocks, KnowsThatAStageHasAnotherSize) {
   EXPECT_FALSE(linearisation.is_at(point));
 }
 
-}  // namespace
+}  // namespace linearisation_test
 }  // namespace rhec

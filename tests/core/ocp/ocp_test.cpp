@@ -11,7 +11,7 @@
 #include "support/test_models.hpp"
 
 namespace rhec {
-namespace {
+namespace ocp_test {
 
 using testing::cart_control;
 using testing::cart_estimation;
@@ -126,5 +126,5 @@ TEST(Ocp, RefreshesByLinearisingAnewUnlessItKnowsBetter) {
   EXPECT_EQ(&linearisation->ocp(), &plain);
 }
 
-}  // namespace
+}  // namespace ocp_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include "rhec/core/ocp/ocp.hpp"
 
 namespace rhec {
-namespace {
+namespace solver_decorator_test {
 
 /// Records its calls, and returns values that differ from the defaults.
 class Witness final : public Solver {
@@ -107,5 +107,5 @@ TEST(SolverDecorator, HandsOnEveryCallAndItsAnswer) {
                                                      "covariances", "reset"));
 }
 
-}  // namespace
+}  // namespace solver_decorator_test
 }  // namespace rhec

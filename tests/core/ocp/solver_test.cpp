@@ -9,7 +9,7 @@
 #include "support/cart.hpp"
 
 namespace rhec {
-namespace {
+namespace solver_test {
 
 using testing::cart_control;
 using testing::cart_estimation;
@@ -94,5 +94,5 @@ TEST(Solver, SolvesWithoutADeadlineAndAnswersAllAtOnceUnlessItSaysOtherwise) {
   EXPECT_EQ(blocks[0], 7.0);
 }
 
-}  // namespace
+}  // namespace solver_test
 }  // namespace rhec

@@ -17,7 +17,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec {
-namespace {
+namespace sparse_nlp_test {
 
 using testing::RandomProblem;
 
@@ -357,5 +357,5 @@ TEST(SparseNlp, TellsStructuresApart) {
   EXPECT_NE(nlp.signature(), before);
 }
 
-}  // namespace
+}  // namespace sparse_nlp_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "rhec/core/horizon/rhe_problem.hpp"
 
 namespace rhec {
-namespace {
+namespace timed_solver_test {
 
 using std::chrono::microseconds;
 
@@ -102,5 +102,5 @@ TEST(TimedSolver, SaysWhatTookTheTime) {
   EXPECT_TRUE(solver.covariances(point, {0, 0}, {}));
 }
 
-}  // namespace
+}  // namespace timed_solver_test
 }  // namespace rhec

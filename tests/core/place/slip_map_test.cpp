@@ -9,7 +9,7 @@
 #include "rhec/core/base/error.hpp"
 
 namespace rhec {
-namespace {
+namespace slip_map_test {
 
 constexpr double day = 86400.0;
 
@@ -164,5 +164,5 @@ TEST(SlipMap, RefusesNumbersOutOfRange) {
   refused([](SlipMap::Setup& s) { s.spread = {0.1, 0.1}; });
 }
 
-}  // namespace
+}  // namespace slip_map_test
 }  // namespace rhec

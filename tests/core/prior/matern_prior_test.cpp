@@ -7,7 +7,7 @@
 #include "rhec/core/model/model.hpp"
 
 namespace rhec {
-namespace {
+namespace matern_prior_test {
 
 /// The parameter is the sum of a deviation and of a mean: the moments are those of the two, each on its own.
 TEST(MaternPrior, IsADeviationAndAMeanThatWalks) {
@@ -42,5 +42,5 @@ TEST(MaternPrior, IsADeviationAndAMeanThatWalks) {
   EXPECT_EQ(mean, Eigen::Vector4d(0.3, 0.0, 0.0, 0.3));
 }
 
-}  // namespace
+}  // namespace matern_prior_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace rhec {
-namespace {
+namespace matern_test {
 
 struct Moments {
   Eigen::MatrixXd F, Q, P;
@@ -59,5 +59,5 @@ TEST(Matern, LeavesOtherRowsAlone) {
   }
 }
 
-}  // namespace
+}  // namespace matern_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "rhec/core/prior/standard_bank.hpp"
 
 namespace rhec {
-namespace {
+namespace parameter_law_test {
 
 using Kind = ParameterLaw::Kind;
 
@@ -54,5 +54,5 @@ TEST(WideLaws, FitInABankAndDiffer) {
   EXPECT_EQ(kinds.size(), 4u);
 }
 
-}  // namespace
+}  // namespace parameter_law_test
 }  // namespace rhec

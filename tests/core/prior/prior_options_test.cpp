@@ -5,7 +5,7 @@
 #include "rhec/core/model/model.hpp"
 
 namespace rhec {
-namespace {
+namespace prior_options_test {
 
 TEST(ParameterRange, IsHalfWayToNoSlipWithinTheBounds) {
   Variable slip;
@@ -29,5 +29,5 @@ TEST(ParameterRange, IsAboutNoSlipWithoutBounds) {
   EXPECT_DOUBLE_EQ(ParameterRange(offset).mean, 0.1);
 }
 
-}  // namespace
+}  // namespace prior_options_test
 }  // namespace rhec

@@ -13,7 +13,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace process_model_test {
 
 /// Not linear in anything.
 template <class Scalar>
@@ -201,5 +201,5 @@ TEST(ProcessModel, RefusesWhatItCannotHold) {
   EXPECT_THAT(error_of([&] { ProcessModel(inner, {}); }), ::testing::HasSubstr("depends on data of the interval"));
 }
 
-}  // namespace
+}  // namespace process_model_test
 }  // namespace rhec

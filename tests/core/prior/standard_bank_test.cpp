@@ -11,7 +11,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace standard_bank_test {
 
 ModelDescription vehicle(int parameters) {
   ModelDescription about;
@@ -68,5 +68,5 @@ TEST(StandardBank, TakesWhatIsGivenAndFillsTheRoomThatIsLeft) {
               ::testing::HasSubstr("make 36 combinations; a bank has 24 members at most"));
 }
 
-}  // namespace
+}  // namespace standard_bank_test
 }  // namespace rhec

@@ -5,7 +5,7 @@
 #include "rhec/core/model/model.hpp"
 
 namespace rhec {
-namespace {
+namespace walk_prior_test {
 
 TEST(WalkPrior, StartsFromTheBoundsUnlessToldOtherwise) {
   Variable slip;
@@ -28,5 +28,5 @@ TEST(WalkPrior, StartsFromTheBoundsUnlessToldOtherwise) {
   EXPECT_DOUBLE_EQ(Q, 0.04);
 }
 
-}  // namespace
+}  // namespace walk_prior_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/active_set_attempt.hpp"
 
 namespace rhec {
-namespace {
+namespace active_columns_test {
 
 using namespace testing;
 
@@ -76,5 +76,5 @@ TEST(ActiveColumns, LeavesMoreBoundsThanItProvidesForToOthers) {
   EXPECT_LT(distance(qp, step, again), 1e-9);
 }
 
-}  // namespace
+}  // namespace active_columns_test
 }  // namespace rhec

@@ -7,7 +7,7 @@
 #include "support/active_set_attempt.hpp"
 
 namespace rhec {
-namespace {
+namespace dual_active_set_test {
 
 using namespace rhec::testing;
 
@@ -164,5 +164,5 @@ TEST(DualActiveSet, FollowsBoundsThatAreNoLongerThere) {
   EXPECT_LT(kkt_violation(qp, step), 1e-9);
 }
 
-}  // namespace
+}  // namespace dual_active_set_test
 }  // namespace rhec

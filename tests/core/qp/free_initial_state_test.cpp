@@ -8,7 +8,7 @@
 #include "support/dense_solution.hpp"
 
 namespace rhec {
-namespace {
+namespace free_initial_state_test {
 
 using namespace testing;
 
@@ -86,5 +86,5 @@ TEST(FreeInitialState, HasNoCostate) {
   for (int j = 0; j < 3; ++j) EXPECT_EQ(step.costate(0)[j], 0.0);
 }
 
-}  // namespace
+}  // namespace free_initial_state_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include <cstdint>
 
 namespace rhec {
-namespace {
+namespace iterate_test {
 
 TEST(Capacity, HasRowsAsLongAsRegistersAreWide) {
   EXPECT_EQ((Capacity{5, 3, 2}.row()), 8);
@@ -67,5 +67,5 @@ TEST(Iterate, LosesItsMultipliersAlone) {
   for (const double* row : {point.costate(2), point.state_bound(2), point.control_bound(1)}) EXPECT_EQ(row[1], 0.0);
 }
 
-}  // namespace
+}  // namespace iterate_test
 }  // namespace rhec

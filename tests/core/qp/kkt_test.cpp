@@ -8,7 +8,7 @@
 #include "support/random_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace kkt_test {
 
 using testing::RandomQp;
 
@@ -117,5 +117,5 @@ TEST(Kkt, WhatIsNoNumberIsNotLost) {
   EXPECT_TRUE(std::isnan(terms.defect));
 }
 
-}  // namespace
+}  // namespace kkt_test
 }  // namespace rhec

@@ -11,7 +11,7 @@
 #include "support/random_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace riccati_test {
 
 using testing::DenseQp;
 using testing::expect_same_as_dense;
@@ -179,5 +179,5 @@ TEST(Riccati, TheCovarianceIsThatOfTheDenseInverse) {
   }
 }
 
-}  // namespace
+}  // namespace riccati_test
 }  // namespace rhec

@@ -12,7 +12,7 @@
 #include "support/dense_solution.hpp"
 
 namespace rhec {
-namespace {
+namespace special_stages_test {
 
 using testing::DenseQp;
 using testing::expect_same_as_dense;
@@ -104,5 +104,5 @@ TEST(SpecialStages, ConvexifiesWhatIsNotPositiveDefiniteAndCanWriteItBack) {
   EXPECT_GT(convexified, 25);
 }
 
-}  // namespace
+}  // namespace special_stages_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/random_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace stage_checks_test {
 
 using ::testing::ElementsAre;
 using testing::RandomQp;
@@ -132,5 +132,5 @@ TEST_F(StageChecks, AddsAStepToThePointThatItStartsFrom) {
   EXPECT_EQ(step.costate(4)[1], 0.25) << "a step's multipliers are the new ones already";
 }
 
-}  // namespace
+}  // namespace stage_checks_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/qp_conditions.hpp"
 
 namespace rhec::gn_rti {
-namespace {
+namespace stage_qp_solver_test {
 
 using rhec::testing::bounded_qp;
 using rhec::testing::feasible_qp;
@@ -142,5 +142,5 @@ TEST(StageQpSolver, SaysSoWhenTheBoundsCannotBeSatisfied) {
   }
 }
 
-}  // namespace
+}  // namespace stage_qp_solver_test
 }  // namespace rhec::gn_rti

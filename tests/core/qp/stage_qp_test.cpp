@@ -8,7 +8,7 @@
 #include "support/random_qp.hpp"
 
 namespace rhec {
-namespace {
+namespace stage_qp_test {
 
 using testing::RandomQp;
 
@@ -67,5 +67,5 @@ TEST(StageQp, MovesTowardsTheFrontAndLeavesZerosBehind) {
   }
 }
 
-}  // namespace
+}  // namespace stage_qp_test
 }  // namespace rhec

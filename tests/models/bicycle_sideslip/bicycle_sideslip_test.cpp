@@ -1,7 +1,7 @@
 #include "models/drive.hpp"
 
 namespace rhec {
-namespace {
+namespace bicycle_sideslip_test {
 
 using namespace testing;
 
@@ -51,5 +51,5 @@ TEST(BicycleSideslip, HasItsAntennaAtItsPlace) {
   expect_near(seen(*bicycle(), {3.0, 4.0, 1.1, 0.0}), {3.0 + 0.3 * c + 0.4 * s, 4.0 + 0.3 * s - 0.4 * c}, 1e-14);
 }
 
-}  // namespace
+}  // namespace bicycle_sideslip_test
 }  // namespace rhec

@@ -1,7 +1,7 @@
 #include "models/drive.hpp"
 
 namespace rhec {
-namespace {
+namespace bicycle_slip_test {
 
 using namespace testing;
 
@@ -46,5 +46,5 @@ TEST(BicycleSlip, RefusesAnAxleOnTheOther) {
   EXPECT_THROW(vehicle("bicycle_slip", "{wheelbase: -1.4}"), Error);
 }
 
-}  // namespace
+}  // namespace bicycle_slip_test
 }  // namespace rhec

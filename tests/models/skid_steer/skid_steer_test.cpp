@@ -1,7 +1,7 @@
 #include "models/drive.hpp"
 
 namespace rhec {
-namespace {
+namespace skid_steer_test {
 
 using namespace testing;
 
@@ -55,5 +55,5 @@ TEST(SkidSteer, HasItsAntennaAtItsPlace) {
   expect_near(seen(*robot(), {3.0, 4.0, 2.1}), {3.0 + 0.1 * c - 0.2 * s, 4.0 + 0.1 * s + 0.2 * c}, 1e-14);
 }
 
-}  // namespace
+}  // namespace skid_steer_test
 }  // namespace rhec

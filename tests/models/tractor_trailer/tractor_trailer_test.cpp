@@ -12,13 +12,13 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
-namespace {
+namespace tractor_trailer_test {
 
 constexpr double tractor_length = 1.4, trailer_length = 1.3;
 using Point = std::complex<double>;
 using State = std::array<double, 5>;
 
-class TractorTrailerWithoutSlip : public testing::TestWithParam<double> {
+class TractorTrailerWithoutSlip : public ::testing::TestWithParam<double> {
  protected:
   static std::shared_ptr<Model> vehicle(double hitch, const std::string& outputs) {
     return Host().make_model("tractor_trailer",
@@ -127,9 +127,9 @@ TEST_P(TractorTrailerWithoutSlip, HeadingsTurnAsPublished) {
               1e-14);
 }
 
-INSTANTIATE_TEST_SUITE_P(Hitch, TractorTrailerWithoutSlip, testing::Values(1.1, 0.0, -0.6), [](const auto& found) {
+INSTANTIATE_TEST_SUITE_P(Hitch, TractorTrailerWithoutSlip, ::testing::Values(1.1, 0.0, -0.6), [](const auto& found) {
   return found.param > 0.0 ? "Behind" : found.param < 0.0 ? "Ahead" : "AtTheAxle";
 });
 
-}  // namespace
+}  // namespace tractor_trailer_test
 }  // namespace rhec

@@ -1,7 +1,7 @@
 #include "models/drive.hpp"
 
 namespace rhec {
-namespace {
+namespace unicycle_traction_test {
 
 using namespace testing;
 
@@ -31,5 +31,5 @@ TEST(UnicycleTraction, HasItsAntennaAtItsPlace) {
   expect_near(seen(*robot(), {3.0, 4.0, 0.6}), {3.0 - 0.2 * c - 0.1 * s, 4.0 - 0.2 * s + 0.1 * c}, 1e-14);
 }
 
-}  // namespace
+}  // namespace unicycle_traction_test
 }  // namespace rhec

@@ -5,7 +5,7 @@
 #include <string>
 
 namespace rhec::equations {
-namespace {
+namespace cpp_terms_test {
 
 class CppTermsTest : public ::testing::Test {
  protected:
@@ -110,5 +110,5 @@ TEST(CppTexts, BreakLinesOutsideOfWords) {
             "a;     // first\nlong;  // second\nb;\n");
 }
 
-}  // namespace
+}  // namespace cpp_terms_test
 }  // namespace rhec::equations

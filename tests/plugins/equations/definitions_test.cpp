@@ -10,7 +10,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::equations {
-namespace {
+namespace definitions_test {
 
 SourceText source_of(std::string_view text) {
   SourceText source{"vehicle.yaml", {}};
@@ -115,5 +115,5 @@ TEST(Definitions, LongChainsTakeNoStack) {
   EXPECT_EQ(Equations(text).value("a19999", 1.0, 2.0), 1.0 + 19999 * 2.0);
 }
 
-}  // namespace
+}  // namespace definitions_test
 }  // namespace rhec::equations

@@ -15,7 +15,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace equations_test {
 
 using ::testing::ElementsAre;
 
@@ -204,5 +204,5 @@ TEST(Equations, ManyTerms) {
   EXPECT_CONTAINS(why_not(cart_of(100000)), "operations; expected at most");
 }
 
-}  // namespace
+}  // namespace equations_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::equations {
-namespace {
+namespace statements_test {
 
 /// A text whose first line is line 10 of a file, four columns in.
 SourceText source_of(std::string_view text) {
@@ -141,5 +141,5 @@ TEST(Names, AreLettersDigitsAndUnderscores) {
   EXPECT_FALSE(is_reserved("speed"));
 }
 
-}  // namespace
+}  // namespace statements_test
 }  // namespace rhec::equations

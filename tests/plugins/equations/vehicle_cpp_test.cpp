@@ -23,7 +23,7 @@
 #include "skid_steer/skid_steer.hpp"
 
 namespace rhec {
-namespace {
+namespace vehicle_cpp_test {
 
 std::vector<double> values_of(const VehicleGraph& vehicle, const std::vector<double>& options,
                               const std::vector<double>& z) {
@@ -162,5 +162,5 @@ TEST(VehicleCpp, AsksForAnOptionWithoutDefault) {
   EXPECT_CONTAINS(content(sources, "needy.cpp"), "set it in the section 'model' (of it all [kg])");
 }
 
-}  // namespace
+}  // namespace vehicle_cpp_test
 }  // namespace rhec

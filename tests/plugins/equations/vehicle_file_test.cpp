@@ -11,7 +11,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::equations {
-namespace {
+namespace vehicle_file_test {
 
 using ::testing::ElementsAre;
 
@@ -164,5 +164,5 @@ TEST_F(VehicleFileTest, TellsWhatYamlMadeOfTheText) {
   EXPECT_CONTAINS(why_not("width: 3", "width: .nan"), "found '.nan', expected a finite number");
 }
 
-}  // namespace
+}  // namespace vehicle_file_test
 }  // namespace rhec::equations

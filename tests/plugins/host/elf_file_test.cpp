@@ -11,7 +11,7 @@
 #include "plugins/host/fixtures.hpp"
 
 namespace rhec {
-namespace {
+namespace elf_file_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -99,5 +99,5 @@ TEST(ElfFile, BytesThatAreWrongDoNotHarmTheReader) {
   }
 }
 
-}  // namespace
+}  // namespace elf_file_test
 }  // namespace rhec

@@ -16,7 +16,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace host_test {
 
 using testing::AllOf;
 using testing::Contains;
@@ -237,5 +237,5 @@ TEST(Trial, PluginsOfTheHouseAreMadeOrSayWhatTheyNeed) {
   EXPECT_THAT(needing, Contains("pattern"));
 }
 
-}  // namespace
+}  // namespace host_test
 }  // namespace rhec

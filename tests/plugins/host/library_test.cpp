@@ -9,7 +9,7 @@
 #include "rhec/plugins/kit/manifest.hpp"
 
 namespace rhec {
-namespace {
+namespace library_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -88,5 +88,5 @@ TEST(Library, ASymbolOfAnotherRhecIsToldWithHowThisOneWasBuilt) {
   EXPECT_THAT(records[0].remedy, AllOf(HasSubstr("build it again"), HasSubstr(RHEC_BUILD_FINGERPRINT)));
 }
 
-}  // namespace
+}  // namespace library_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace blocking_section_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -44,5 +44,5 @@ TEST(BlockingSection, SaysWhichHorizonDoesNotFit) {
               AllOf(StartsWith("robot.yaml:1: kappa: "), HasSubstr("change it or estimator.horizon")));
 }
 
-}  // namespace
+}  // namespace blocking_section_test
 }  // namespace rhec

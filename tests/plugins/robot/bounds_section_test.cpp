@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace bounds_section_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -51,5 +51,5 @@ TEST(BoundsSection, DocumentsOneRowForAllKinds) {
   EXPECT_EQ(section.rows[0].default_value, "the model's own");
 }
 
-}  // namespace
+}  // namespace bounds_section_test
 }  // namespace rhec

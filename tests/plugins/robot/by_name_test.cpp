@@ -9,7 +9,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace by_name_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -84,5 +84,5 @@ TEST(BoundsValue, ReadsPairsOfWhichNullIsNone) {
               HasSubstr("found [2, 1], expected lower <= upper"));
 }
 
-}  // namespace
+}  // namespace by_name_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace controller_section_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -31,7 +31,8 @@ TEST(ControllerSection, HasTheDocumentedDefaults) {
   const OptionSection documentation = ControllerSection::documentation();
   const auto shown = [&](const char* key) { return documented_default(documentation, key); };
   EXPECT_EQ(shown("horizon"), std::to_string(problem.max_intervals));
-  EXPECT_EQ(shown("substeps"), std::to_string(problem.substeps));
+  EXPECT_EQ(shown("substeps"), "auto");
+  EXPECT_EQ(problem.substeps, 1);
   EXPECT_EQ(shown("reference_speed"), "ground");
   EXPECT_EQ(shown("least_speed_factor"), NumberValue{}.print(options.least_speed_factor));
   EXPECT_EQ(shown("speed_bound_factor"), NumberValue{}.print(options.speed_bound_factor));
@@ -89,5 +90,5 @@ TEST(ControllerSection, LooksAtWeightsOnlyOnceThereIsAController) {
   EXPECT_THAT(error_of([&] { section.make(Path({{0.0, 0.0, 2.0}, {50.0, 0.0, 2.0}})); }), HasSubstr("nobody"));
 }
 
-}  // namespace
+}  // namespace controller_section_test
 }  // namespace rhec

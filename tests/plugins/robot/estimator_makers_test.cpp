@@ -14,7 +14,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace estimator_makers_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -108,5 +108,5 @@ TEST(EstimatorMakers, MakeNothingOfABlockingThatDoesNotFitTheHorizon) {
   EstimatorSection(context, wide, settings("name: ekf")).make();  // a filter has no blocks
 }
 
-}  // namespace
+}  // namespace estimator_makers_test
 }  // namespace rhec

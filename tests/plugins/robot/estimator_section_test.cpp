@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace estimator_section_test {
 
 using testing::AllOf;
 using testing::DoubleEq;
@@ -46,7 +46,8 @@ TEST(EstimatorSection, HasTheDocumentedDefaults) {
   const auto shown = [&](const char* key) { return documented_default(documentation, key); };
   EXPECT_EQ(shown("name"), "rhe");
   EXPECT_EQ(shown("horizon"), std::to_string(parts.horizon));
-  EXPECT_EQ(shown("substeps"), std::to_string(parts.substeps));
+  EXPECT_EQ(shown("substeps"), "auto");
+  EXPECT_EQ(parts.substeps, 1);
   EXPECT_EQ(shown("heading_starts"), std::to_string(parts.heading_starts));
   EXPECT_EQ(shown("arrival.name"), "ekf");
   EXPECT_EQ(shown("process_noise.PARAMETER"), NumberValue{}.print(parts.walks[1].process_noise));
@@ -146,5 +147,5 @@ TEST(EstimatorSection, MakesTheEstimatorOfItsNameOnItsTimeline) {
   }
 }
 
-}  // namespace
+}  // namespace estimator_section_test
 }  // namespace rhec

@@ -11,7 +11,7 @@
 #include "rhec/plugins/robot/robot.hpp"
 
 namespace rhec {
-namespace {
+namespace hooks_test {
 
 using testing::ElementsAre;
 
@@ -91,5 +91,5 @@ TEST(RecordingNodes, KeepsWhatAnEstimatorIsGiven) {
   EXPECT_THAT(log->outputs, ElementsAre(1.0, 2.0, 0.0, 1.0, 2.0, 0.0));
 }
 
-}  // namespace
+}  // namespace hooks_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace memory_section_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -62,5 +62,5 @@ TEST(MemorySection, RefusesWhatCannotBe) {
   EXPECT_THAT(error("{name: ekf, memory: place}"), AllOf(HasSubstr("robot.yaml"), HasSubstr("bank")));
 }
 
-}  // namespace
+}  // namespace memory_section_test
 }  // namespace rhec

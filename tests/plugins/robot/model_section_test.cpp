@@ -6,7 +6,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace model_section_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -30,5 +30,5 @@ TEST(ModelSection, ErrorsNameThePlace) {
               AllOf(StartsWith("robot.yaml:2: wheelbase"), HasSubstr("greater than 0")));
 }
 
-}  // namespace
+}  // namespace model_section_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace noise_section_test {
 
 using testing::DoubleEq;
 using testing::ElementsAre;
@@ -39,5 +39,5 @@ TEST(NoiseSection, RefusesUnknownNamesAndWrongNumbers) {
   EXPECT_THAT(error_of([] { noise("inputs: {u1: .inf}"); }), HasSubstr("a finite number"));
 }
 
-}  // namespace
+}  // namespace noise_section_test
 }  // namespace rhec

@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace plugin_option_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -50,5 +50,5 @@ TEST(PluginOption, DocumentsItsDefault) {
   EXPECT_EQ(row.constraint, "a blocking plugin");
 }
 
-}  // namespace
+}  // namespace plugin_option_test
 }  // namespace rhec

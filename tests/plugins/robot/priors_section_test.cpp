@@ -6,7 +6,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace priors_section_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -39,5 +39,5 @@ TEST(PriorsSection, RefusesMistakesAtOnce) {
               AllOf(StartsWith("robot.yaml:1"), HasSubstr("25 combinations")));
 }
 
-}  // namespace
+}  // namespace priors_section_test
 }  // namespace rhec

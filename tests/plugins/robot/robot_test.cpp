@@ -10,7 +10,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace robot_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -147,5 +147,5 @@ TEST(RobotWithEstimators, UsesThoseThatItIsGiven) {
   EXPECT_EQ(*given, 1);
 }
 
-}  // namespace
+}  // namespace robot_test
 }  // namespace rhec

@@ -6,7 +6,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace robust_losses_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -42,5 +42,5 @@ TEST(RobustLosses, RefuseWhatIsNoOutputOrNoDelta) {
   EXPECT_THAT(error_of([] { losses("{outputs: [x_gps], delta: 0}"); }), HasSubstr("greater than 0"));
 }
 
-}  // namespace
+}  // namespace robust_losses_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace smoother_section_test {
 
 using testing::AllOf;
 using testing::Each;
@@ -91,5 +91,5 @@ TEST(SmootherSection, RefusesUnknownNamesAndWrongNumbers) {
   EXPECT_THAT(error_of([] { smoothed("blocking: {kapa: unblocked}", ""); }), HasSubstr("did you mean 'kappa'?"));
 }
 
-}  // namespace
+}  // namespace smoother_section_test
 }  // namespace rhec

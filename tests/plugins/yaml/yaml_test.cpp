@@ -9,7 +9,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec {
-namespace {
+namespace yaml_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -143,5 +143,5 @@ TEST(Assignment, WrongOnesAreNamed) {
   EXPECT_EQ(root.members().size(), 1u) << "nothing was changed";
 }
 
-}  // namespace
+}  // namespace yaml_test
 }  // namespace rhec

@@ -1,7 +1,7 @@
 #include "view.hpp"
 
 namespace rhec {
-namespace {
+namespace constant_test {
 
 using namespace testing;
 
@@ -13,5 +13,5 @@ TEST(Constant, NeverChanges) {
   EXPECT_EQ(Advance(*constant, 1e6).F(0, 0), 1.0);
 }
 
-}  // namespace
+}  // namespace constant_test
 }  // namespace rhec

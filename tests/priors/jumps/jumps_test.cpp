@@ -3,7 +3,7 @@
 #include "view.hpp"
 
 namespace rhec {
-namespace {
+namespace jumps_test {
 
 using namespace testing;
 
@@ -13,5 +13,5 @@ TEST(Jumps, HaveTheCovarianceOfLevelsThatChangeAtRandom) {
   EXPECT_EQ(jumps->course(), Course::held);
 }
 
-}  // namespace
+}  // namespace jumps_test
 }  // namespace rhec

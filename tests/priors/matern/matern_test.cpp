@@ -3,7 +3,7 @@
 #include "view.hpp"
 
 namespace rhec {
-namespace {
+namespace matern_test {
 
 using namespace testing;
 
@@ -37,5 +37,5 @@ TEST(MaternPlugin, TakesItsSpreadFromTheBounds) {
   EXPECT_NEAR(Start(*of_wide).mean[0], 0.5, 1e-15);
 }
 
-}  // namespace
+}  // namespace matern_test
 }  // namespace rhec

@@ -1,7 +1,7 @@
 #include "view.hpp"
 
 namespace rhec {
-namespace {
+namespace walk_test {
 
 using namespace testing;
 
@@ -20,5 +20,5 @@ TEST(Walk, CanBePerSecondAndInSteps) {
   EXPECT_EQ(walk->course(), Course::held);
 }
 
-}  // namespace
+}  // namespace walk_test
 }  // namespace rhec

@@ -9,7 +9,7 @@
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace derivative_check_test {
 
 using testing::Pair;
 
@@ -126,5 +126,5 @@ TEST(IntegrationError, NamesTheStateThatIsIntegratedOtherwise) {
   EXPECT_GT(worst.error, 1e-5);
 }
 
-}  // namespace
+}  // namespace derivative_check_test
 }  // namespace rhec::sim

@@ -8,7 +8,7 @@
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace drive_information_test {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -88,5 +88,5 @@ TEST(DriveInformation, KnowsLessOfAParameterInBlocks) {
   }
 }
 
-}  // namespace
+}  // namespace drive_information_test
 }  // namespace rhec::sim

@@ -9,7 +9,7 @@
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace drives_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -129,5 +129,5 @@ TEST_F(DrivesTest, ADriveThatIsNotFiniteSaysSo) {
   for (const Drive& drive : Drives(checked).all()) EXPECT_THAT(drive.unusable, HasSubstr("not finite")) << drive.name;
 }
 
-}  // namespace
+}  // namespace drives_test
 }  // namespace rhec::sim

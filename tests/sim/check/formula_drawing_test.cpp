@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace formula_drawing_test {
 
 std::size_t count(const std::string& text, const std::string& part) {
   std::size_t found = 0;
@@ -38,5 +38,5 @@ TEST(FormulaDrawing, RefusesWhatNobodyCouldRead) {
                   "too many for a drawing of at most 1500");
 }
 
-}  // namespace
+}  // namespace formula_drawing_test
 }  // namespace rhec::sim

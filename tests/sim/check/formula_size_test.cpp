@@ -6,7 +6,7 @@
 #include "sim/support/tank_graph.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace formula_size_test {
 
 using testing::ElementsAre;
 using testing::Pair;
@@ -49,5 +49,5 @@ TEST(FormulaSize, IsWrittenAsJson) {
   EXPECT_EQ(json["rates"]["lines"][1].as_text(), ".xcx");
 }
 
-}  // namespace
+}  // namespace formula_size_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace formula_trace_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -127,5 +127,5 @@ TEST(FormulaTrace, IsWrittenAsJson) {
   EXPECT_EQ(json["values"]["nodes"][0]["name"].as_text(), "hole");
 }
 
-}  // namespace
+}  // namespace formula_trace_test
 }  // namespace rhec::sim

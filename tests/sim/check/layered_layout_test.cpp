@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace rhec::sim {
-namespace {
+namespace layered_layout_test {
 
 TEST(LayeredLayout, PutsAChainIntoColumns) {
   const std::vector<LayoutNode> nodes(3, {40.0, 20.0, false});
@@ -67,5 +67,5 @@ TEST(LayeredLayout, HoldsItsRules) {
   }
 }
 
-}  // namespace
+}  // namespace layered_layout_test
 }  // namespace rhec::sim

@@ -7,7 +7,7 @@
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace model_check_description_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -61,5 +61,5 @@ TEST(ModelCheck, FindsThatStraightIsNotStraight) {
               ElementsAre("warn straight_motion: at other parameters"));
 }
 
-}  // namespace
+}  // namespace model_check_description_test
 }  // namespace rhec::sim

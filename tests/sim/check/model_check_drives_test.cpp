@@ -4,7 +4,7 @@
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace model_check_drives_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -36,5 +36,5 @@ TEST(ModelCheck, FindsAScaleThatIsFarOff) {
               Contains("warn description: parameter mu"));
 }
 
-}  // namespace
+}  // namespace model_check_drives_test
 }  // namespace rhec::sim

@@ -7,7 +7,7 @@
 #include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace model_check_files_test {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -82,5 +82,5 @@ TEST(CheckJson, TheVerdictIsThatOfTheWorstFinding) {
   EXPECT_EQ(Json::parse(check_json(check)).at("verdict"), "pass");
 }
 
-}  // namespace
+}  // namespace model_check_files_test
 }  // namespace rhec::sim

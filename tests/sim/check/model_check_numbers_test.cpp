@@ -6,7 +6,7 @@
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace model_check_numbers_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -48,5 +48,5 @@ TEST(ModelCheck, FindsAPoleThatIsFiniteEverywhere) {
   EXPECT_THAT(faults(check(Fault::pole_of_a_state)), ElementsAre());
 }
 
-}  // namespace
+}  // namespace model_check_numbers_test
 }  // namespace rhec::sim

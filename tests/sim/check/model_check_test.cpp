@@ -9,7 +9,7 @@
 #include "sim/support/unicycle.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace model_check_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -30,7 +30,7 @@ TEST(ModelCheck, FindsNothingWrongWithAGoodModel) {
   EXPECT_EQ(found.count(Verdict::skip), 0);
   std::set<std::string> checks;
   for (const Finding& finding : found.findings) checks.insert(finding.check);
-  EXPECT_THAT(checks, ElementsAre("derivatives", "description", "numbers", "observability", "scaling",
+  EXPECT_THAT(checks, ElementsAre("derivatives", "description", "integration", "numbers", "observability", "scaling",
                                   "straight_motion", "symmetry", "time"));
   EXPECT_EQ(found.drives.size(), 4u);
   EXPECT_EQ(found.times.size(), unicycle()->instruction_sets().size());
@@ -117,7 +117,7 @@ TEST(ModelCheck, FindsResultsThatAreNotWritten) {
 
 TEST(ModelCheck, DoesNotTryAModelThatHasNoScale) {
   const ModelCheck found = check([](ModelDescription& about) { about.states[0].scale = -1.0; });
-  EXPECT_EQ(found.count(Verdict::skip), 7);
+  EXPECT_EQ(found.count(Verdict::skip), 8);
   EXPECT_TRUE(found.drives.empty());
   EXPECT_NO_THROW(check_json(found));
 }
@@ -152,5 +152,5 @@ TEST(ModelCheck, RefusesOptionsThatDoNotFit) {
   EXPECT_THROW(check_model(*model, other), Error);
 }
 
-}  // namespace
+}  // namespace model_check_test
 }  // namespace rhec::sim

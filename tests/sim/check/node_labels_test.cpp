@@ -5,7 +5,7 @@
 #include "sim/support/tank_graph.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace node_labels_test {
 
 TEST(NodeLabels, AreTheDescriptionsNames) {
   const TankGraph tank;
@@ -55,5 +55,5 @@ TEST(NodeLabels, GiveANameToWhatHasNone) {
   EXPECT_EQ(labels.name(tank.vehicle.states[0]), "level");
 }
 
-}  // namespace
+}  // namespace node_labels_test
 }  // namespace rhec::sim

@@ -12,9 +12,9 @@
 #include "sim/support/comparisons.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace accuracy_test {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 /// Problems of the reference's run, kept by other means than the comparison's.
 struct Kept {
@@ -104,5 +104,5 @@ TEST(Accuracy, AnAccuracyThatIsNotReachedIsTold) {
   }
 }
 
-}  // namespace
+}  // namespace accuracy_test
 }  // namespace rhec::sim

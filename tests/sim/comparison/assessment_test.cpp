@@ -15,7 +15,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace assessment_test {
 
 using rhec::testing::RandomProblem;
 
@@ -137,5 +137,5 @@ TEST_F(AssessorTest, OfAWindowWithoutIntervalsParametersCount) {
   EXPECT_NEAR(assessor_.distance(one, other), 0.5, 1e-12);
 }
 
-}  // namespace
+}  // namespace assessment_test
 }  // namespace rhec::sim

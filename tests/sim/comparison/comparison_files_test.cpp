@@ -5,11 +5,11 @@
 #include "sim/support/comparisons.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace comparison_files_test {
 
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 Json without_times(const Json& node) {
   if (node.is_array()) {
@@ -44,5 +44,5 @@ TEST(ComparisonFiles, ThePictureShowsTheKindsOfProblemThatThereAre) {
               AllOf(HasSubstr("Control"), Not(HasSubstr("Estimation"))));
 }
 
-}  // namespace
+}  // namespace comparison_files_test
 }  // namespace rhec::sim

@@ -13,13 +13,13 @@
 #include "sim/support/comparisons.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace comparison_test {
 
-using testing::AllOf;
-using testing::Each;
-using testing::Ge;
-using testing::HasSubstr;
-using testing::Le;
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::Ge;
+using ::testing::HasSubstr;
+using ::testing::Le;
 
 std::vector<double> numbers(const BackendAnswers& backend, double Answer::*number) {
   std::vector<double> values;
@@ -41,7 +41,7 @@ TEST(Comparison, SolversAgreeOnTheSameProblemsAndOneIterationIsLess) {
       const BackendAnswers& mine = same.backends[b];
       ASSERT_EQ(mine.answers.size(), same.problems.size());
       EXPECT_THAT(numbers(mine, &Answer::gap), Each(Ge(-1e-12)));
-      EXPECT_THAT(numbers(mine, &Answer::time_us), Each(testing::Gt(0.0)));
+      EXPECT_THAT(numbers(mine, &Answer::time_us), Each(::testing::Gt(0.0)));
       const Spread gap = spread_of(mine.answers, &Answer::gap), kkt = spread_of(mine.answers, &Answer::kkt);
       if (b == 0) {
         EXPECT_GT(gap.median, 1e-6);
@@ -182,7 +182,7 @@ TEST(Comparison, SeedsFollowTheScenariosAndProblemsAreThinned) {
   ComparisonOptions options = comparing({converged()});
   options.seeds = 3;
   const Comparison all = compare(host(), settings, options);
-  EXPECT_THAT(all.seeds, testing::ElementsAre(5, 6, 7));
+  EXPECT_THAT(all.seeds, ::testing::ElementsAre(5, 6, 7));
   std::set<std::int64_t> seeds;
   for (const SameProblems::Place& place : all.problems[0].problems) seeds.insert(place.seed);
   EXPECT_EQ(seeds, (std::set<std::int64_t>{5, 6, 7}));
@@ -254,5 +254,5 @@ TEST(Comparison, MeansOfPairs) {
   EXPECT_TRUE(std::isnan(paired_mean(runs, {}, position).difference));
 }
 
-}  // namespace
+}  // namespace comparison_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "rhec/core/base/error.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace run_picture_test {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -79,5 +79,5 @@ TEST(DrawRun, RefusesCurvesThatDoNotFit) {
   EXPECT_THROW(draw_run(picture), Error);
 }
 
-}  // namespace
+}  // namespace run_picture_test
 }  // namespace rhec::sim

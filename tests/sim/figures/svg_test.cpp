@@ -9,7 +9,7 @@
 #include <vector>
 
 namespace rhec::sim {
-namespace {
+namespace svg_test {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -52,5 +52,5 @@ TEST(ThinTrack, StaysWithinItsToleranceAndItsNumber) {
   EXPECT_FALSE(thin_track(shreds, 0.3, 10).empty()) << "it ends, even where it cannot get below the number";
 }
 
-}  // namespace
+}  // namespace svg_test
 }  // namespace rhec::sim

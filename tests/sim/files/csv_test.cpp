@@ -9,7 +9,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace csv_test {
 
 std::string message_for(const std::string& text, const CsvOptions& options = {}) {
   return error_of([&] { parse_csv(text, "log.csv", options); });
@@ -71,5 +71,5 @@ TEST(Csv, ReadsALongLogQuickly) {
   EXPECT_LT(elapsed.count(), 1.0) << "ten times what it may take, for slow and instrumented machines";
 }
 
-}  // namespace
+}  // namespace csv_test
 }  // namespace rhec::sim

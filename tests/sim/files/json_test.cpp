@@ -12,7 +12,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace json_test {
 
 JsonParseError mistake_in(const std::string& text, Json::RepeatedKeys repeated = Json::RepeatedKeys::last_counts) {
   try {
@@ -111,5 +111,5 @@ TEST(Json, TakesSettings) {
   EXPECT_EQ(json_text(options), R"({"a":1.5,"b":true,"c":"text","d":"007","e":[1,".inf"],"f":{"g":null}})");
 }
 
-}  // namespace
+}  // namespace json_test
 }  // namespace rhec::sim

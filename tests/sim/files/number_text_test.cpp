@@ -7,7 +7,7 @@
 #include <string>
 
 namespace rhec::sim {
-namespace {
+namespace number_text_test {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -45,5 +45,5 @@ TEST(NumberText, SeesAHundredThousandthOfTheMagnitude) {
   EXPECT_EQ(decimals_for(1e9), 0);
 }
 
-}  // namespace
+}  // namespace number_text_test
 }  // namespace rhec::sim

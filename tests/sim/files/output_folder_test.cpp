@@ -11,7 +11,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace output_folder_test {
 
 namespace fs = std::filesystem;
 
@@ -99,5 +99,5 @@ TEST_F(OutputFolderTest, RefusesBeforeAnythingIsReplaced) {
   EXPECT_CONTAINS(error_of([&] { forgetful.commit(); }), "never written");
 }
 
-}  // namespace
+}  // namespace output_folder_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "sim/support/recorded_drive.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace horizon_files_test {
 
 using testing::ElementsAre;
 
@@ -108,5 +108,5 @@ TEST(HorizonsText, OfALogHasEachVariantForEachSuffix) {
   EXPECT_EQ(json.at("model").at("name"), "bicycle_slip");
 }
 
-}  // namespace
+}  // namespace horizon_files_test
 }  // namespace rhec::sim

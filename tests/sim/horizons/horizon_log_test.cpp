@@ -10,7 +10,7 @@
 #include "rhec/sim/loop/run_files.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace horizon_log_test {
 
 Scenario scenario_with(const std::vector<std::string>& assignments) {
   Settings settings = load_yaml(SCENARIOS "/figure8.yaml");
@@ -76,5 +76,5 @@ TEST(HorizonLog, ShowsWhereTheWindowsEdgeCutsABlock) {
   EXPECT_EQ(block.at("next_start"), 24);
 }
 
-}  // namespace
+}  // namespace horizon_log_test
 }  // namespace rhec::sim

@@ -13,7 +13,7 @@
 #include "sim/support/recorded_drive.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace recorded_log_files_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -118,5 +118,5 @@ TEST(ReplaySvg, ShowsFixesAndBesideItTheParametersOfAnother) {
   EXPECT_THAT(both, HasSubstr("the other one"));
 }
 
-}  // namespace
+}  // namespace recorded_log_files_test
 }  // namespace rhec::sim

@@ -11,7 +11,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace recorded_log_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -190,5 +190,5 @@ TEST(LogScenario, RefusesWhatDoesNotFit) {
               HasSubstr("no variants"));
 }
 
-}  // namespace
+}  // namespace recorded_log_test
 }  // namespace rhec::sim

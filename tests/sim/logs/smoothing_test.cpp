@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace smoothing_test {
 
 using testing::HasSubstr;
 
@@ -88,5 +88,5 @@ TEST_F(SmoothingTest, WithoutAFixNothingCanBeEstimated) {
               HasSubstr("the log has no fix that is not withheld"));
 }
 
-}  // namespace
+}  // namespace smoothing_test
 }  // namespace rhec::sim

@@ -9,7 +9,7 @@
 #include "rhec/sim/loop/run_files.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace closed_loop_test {
 
 Scenario scenario_with(const std::vector<std::string>& assignments) {
   Settings settings = load_yaml(SCENARIOS "/figure8.yaml");
@@ -48,5 +48,5 @@ TEST(LoopTimes, FeedbackIsPartOfTheEstimatorsTime) {
   }
 }
 
-}  // namespace
+}  // namespace closed_loop_test
 }  // namespace rhec::sim

@@ -7,7 +7,7 @@
 #include <numbers>
 
 namespace rhec::sim {
-namespace {
+namespace consistency_test {
 
 /// Two states, the second one an angle, and one parameter.
 ModelDescription vehicle() {
@@ -64,5 +64,5 @@ TEST(Consistency, IsFiniteWhereOneNumberIsKnownExactly) {
   EXPECT_NEAR(sample.nees, 5.0, 1e-12);
 }
 
-}  // namespace
+}  // namespace consistency_test
 }  // namespace rhec::sim

@@ -13,7 +13,7 @@
 #include "sim/support/figure8.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace run_files_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -112,5 +112,5 @@ TEST(RunSvg, HasATitleAndAPanelForEachParameterAndTheTracking) {
     EXPECT_THAT(svg, HasSubstr(words));
 }
 
-}  // namespace
+}  // namespace run_files_test
 }  // namespace rhec::sim

@@ -14,7 +14,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace scenario_test {
 
 using testing::AllOf;
 using testing::Contains;
@@ -132,5 +132,5 @@ TEST(ScenarioSections, AreThoseOfTheWorldBeforeThoseOfTheRobot) {
   for (const char* key : {"speed", "seed", "path", "terrain", "vehicle", "estimator"}) EXPECT_THAT(keys, Contains(key));
 }
 
-}  // namespace
+}  // namespace scenario_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "sim/support/figure8.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace smoothed_drive_test {
 
 using testing::IsEmpty;
 using testing::Not;
@@ -68,5 +68,5 @@ TEST(SmoothedDrive, SaysWhereItWasNotSolved) {
   EXPECT_EQ(drive.smoothed.samples.back().estimator_status, Status::iteration_limit);
 }
 
-}  // namespace
+}  // namespace smoothed_drive_test
 }  // namespace rhec::sim

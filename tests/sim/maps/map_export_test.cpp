@@ -14,7 +14,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace map_export_test {
 
 using testing::HasSubstr;
 
@@ -87,5 +87,5 @@ TEST(MapExport, RefusesAnEmptyMapAHugeOneAndAFileThatCannotBe) {
               HasSubstr("/no/such/folder/x.tif"));
 }
 
-}  // namespace
+}  // namespace map_export_test
 }  // namespace rhec::sim

@@ -11,7 +11,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace map_keeper_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -78,5 +78,5 @@ TEST_F(MapKeeperTest, WithoutAMemoryThereIsNothingToSave) {
   EXPECT_FALSE(fs::exists(file()));
 }
 
-}  // namespace
+}  // namespace map_keeper_test
 }  // namespace rhec::sim

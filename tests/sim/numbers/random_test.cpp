@@ -6,7 +6,7 @@
 #include <vector>
 
 namespace rhec::sim {
-namespace {
+namespace random_test {
 
 TEST(RandomStream, SameSeedAndNameGiveTheSameBits) {
   RandomStream a(7, "fixes"), b(7, "fixes");
@@ -62,5 +62,5 @@ TEST(RandomStream, NormalHasTheMomentsOfANormal) {
   EXPECT_NEAR(moments[4], 3.0, 4.0 * std::sqrt(96.0 / count));
 }
 
-}  // namespace
+}  // namespace random_test
 }  // namespace rhec::sim

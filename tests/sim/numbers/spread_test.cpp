@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace rhec::sim {
-namespace {
+namespace spread_test {
 
 TEST(Spread, QuantilesAreOfTheValuesThatAreNumbers) {
   std::vector<double> values;
@@ -47,5 +47,5 @@ TEST(Spread, WhatIsInfiniteCounts) {
   EXPECT_EQ(spread.max, infinity);
 }
 
-}  // namespace
+}  // namespace spread_test
 }  // namespace rhec::sim

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace rhec::sim {
-namespace {
+namespace statistics_test {
 
 TEST(Student, IsThatOfTheTables) {
   EXPECT_NEAR(student_975(1), 12.7062047364, 1e-8);
@@ -26,5 +26,5 @@ TEST(Moments, AreThoseOfTheNumbers) {
   EXPECT_NEAR(moments.half_width(quantiles), 4.3026527297 * std::sqrt(13.0 / 3.0), 1e-8);
 }
 
-}  // namespace
+}  // namespace statistics_test
 }  // namespace rhec::sim

@@ -9,7 +9,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace format_parts_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -113,5 +113,5 @@ TEST(ModelNames, TellWhatTheModelDoesNotHave) {
   EXPECT_EQ(error_of([&] { names.check_count("inputs[0]", 2, about.inputs); }), "");
 }
 
-}  // namespace
+}  // namespace format_parts_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace line_value_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -110,5 +110,5 @@ TEST(DidYouMean, NamesTheNearestWordOrAll) {
   EXPECT_EQ(did_you_mean("something else", {"kappa", "mu"}), "expected one of kappa, mu");
 }
 
-}  // namespace
+}  // namespace line_value_test
 }  // namespace rhec::sim

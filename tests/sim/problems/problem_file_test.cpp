@@ -12,7 +12,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace problem_file_test {
 
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
@@ -116,5 +116,5 @@ TEST(ProblemFile, RefusesWhatIsNoProblem) {
     EXPECT_THAT(error_of([&] { read_problem(text, "set.jsonl", 3); }), StartsWith("set.jsonl:3: ")) << text;
 }
 
-}  // namespace
+}  // namespace problem_file_test
 }  // namespace rhec::sim

@@ -17,7 +17,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace problem_format_test {
 
 using rhec::testing::RandomProblem;
 
@@ -76,5 +76,5 @@ TEST(ProblemFormat, RefusesAClassThatOnlyBorrowsTheName) {
   EXPECT_CONTAINS(error_of([&] { problem_format(impostor.kind()).copy(impostor); }), "another class");
 }
 
-}  // namespace
+}  // namespace problem_format_test
 }  // namespace rhec::sim

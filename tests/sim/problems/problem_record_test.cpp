@@ -21,7 +21,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace problem_record_test {
 
 using rhec::testing::RandomProblem;
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -332,5 +332,5 @@ TEST_P(Replayed, GivesTheSameBits) {
   }
 }
 
-}  // namespace
+}  // namespace problem_record_test
 }  // namespace rhec::sim

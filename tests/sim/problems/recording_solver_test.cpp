@@ -14,7 +14,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace recording_solver_test {
 
 using rhec::testing::RandomProblem;
 
@@ -141,5 +141,5 @@ TEST(RecordingSolver, TellsOfAFeedbackOnceItIsFinished) {
   EXPECT_EQ(told.size(), 4U);
 }
 
-}  // namespace
+}  // namespace recording_solver_test
 }  // namespace rhec::sim

@@ -8,7 +8,7 @@
 #include "sim/support/problem_lines.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace rhc_format_test {
 
 using ::testing::ElementsAre;
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -65,5 +65,5 @@ TEST(RhcFormat, NamesThePlaceAndTheRemedy) {
   expect_told(mistakes);
 }
 
-}  // namespace
+}  // namespace rhc_format_test
 }  // namespace rhec::sim

@@ -11,7 +11,7 @@
 #include "sim/support/problem_lines.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace rhe_format_test {
 
 using ::testing::ElementsAre;
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -144,5 +144,5 @@ TEST(RheFormat, NamesThePlaceAndTheRemedy) {
   expect_told(mistakes);
 }
 
-}  // namespace
+}  // namespace rhe_format_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include <vector>
 
 namespace rhec::sim {
-namespace {
+namespace report_files_test {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -69,5 +69,5 @@ TEST(Histogram, CountsEverySolveThatTookTime) {
   EXPECT_TRUE(times_histogram({0.0, 0.0}).is_null());
 }
 
-}  // namespace
+}  // namespace report_files_test
 }  // namespace rhec::sim

@@ -8,7 +8,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace report_test {
 
 TEST(ReportDocument, RefusesWhatIsNotThere) {
   const std::string refusal = error_of([] { report_document("no/such/folder", "test"); });
@@ -16,5 +16,5 @@ TEST(ReportDocument, RefusesWhatIsNotThere) {
   EXPECT_CONTAINS(refusal, "rhec run");
 }
 
-}  // namespace
+}  // namespace report_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "sim/support/run_groups.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace sweep_maps_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -143,5 +143,5 @@ TEST(GeneralMaps, WhereThereAreTooManyChoicesMeansAreOverThem) {
   EXPECT_THAT(notes.dump(), HasSubstr("the 61 values of path.file"));
 }
 
-}  // namespace
+}  // namespace sweep_maps_test
 }  // namespace rhec::sim

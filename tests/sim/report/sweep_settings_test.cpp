@@ -8,7 +8,7 @@
 #include "sim/support/run_groups.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace sweep_settings_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -111,5 +111,5 @@ TEST(SweepSettings, SaysWhatIsBlockedAndWhatElseVaries) {
   EXPECT_THAT(settings.blocked_words(groups[0], {"kappa", "mu"}), testing::StartsWith("kappa and mu"));
 }
 
-}  // namespace
+}  // namespace sweep_settings_test
 }  // namespace rhec::sim

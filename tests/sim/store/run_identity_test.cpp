@@ -7,7 +7,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace run_identity_test {
 
 TEST(RunIdentity, IsSha256OfTheConfiguration) {
   // FIPS 180-4's own examples, and a text of a million characters.
@@ -26,5 +26,5 @@ TEST(RunIdentity, IsTheSameForAllWaysToWriteTheSame) {
   EXPECT_NE(text("{a: [1, 2]}"), text("{a: [2, 1]}"));
 }
 
-}  // namespace
+}  // namespace run_identity_test
 }  // namespace rhec::sim

@@ -12,7 +12,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace slip_map_file_test {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
@@ -146,5 +146,5 @@ TEST_F(SlipMapFileTest, IsMovedToAnotherOrigin) {
               HasSubstr("estimator.memory.cells"));
 }
 
-}  // namespace
+}  // namespace slip_map_file_test
 }  // namespace rhec::sim

@@ -9,7 +9,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace sqlite_database_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -102,5 +102,5 @@ TEST_F(SqliteDatabaseTest, MissesAPartOfTheLastPage) {
               HasSubstr("is damaged or cut short"));
 }
 
-}  // namespace
+}  // namespace sqlite_database_test
 }  // namespace rhec::sim

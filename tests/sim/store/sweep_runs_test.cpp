@@ -14,7 +14,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace sweep_runs_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -143,5 +143,5 @@ TEST_F(SweepRunsTest, NamesTheRunWhoseSummaryIsBroken) {
   EXPECT_THAT(message, HasSubstr("run " + broken.identity.text() + ": mae is no map of JSON"));
 }
 
-}  // namespace
+}  // namespace sweep_runs_test
 }  // namespace rhec::sim

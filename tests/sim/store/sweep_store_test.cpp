@@ -12,7 +12,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace sweep_store_test {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
@@ -250,5 +250,5 @@ TEST_F(SweepStoreTest, RefusesAFileThatMayOnlyBeRead) {
   EXPECT_THAT(refusal_of(file()), HasSubstr("cannot be opened and written"));
 }
 
-}  // namespace
+}  // namespace sweep_store_test
 }  // namespace rhec::sim

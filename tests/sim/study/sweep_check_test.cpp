@@ -7,7 +7,7 @@
 #include "sim/support/sweeps.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace sweep_check_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -54,5 +54,5 @@ TEST(SweepMistakes, RunsThatAreTheSame) {
               HasSubstr("two runs of the grid are the same"));
 }
 
-}  // namespace
+}  // namespace sweep_check_test
 }  // namespace rhec::sim

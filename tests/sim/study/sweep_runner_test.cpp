@@ -14,7 +14,7 @@
 #include "rhec/sim/loop/closed_loop.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace sweep_runner_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -176,5 +176,5 @@ TEST_F(SweepRunnerTest, TheEndOfAWorkerEndsTheSweep) {
   EXPECT_THROW(run_sweep(sweep, store, workers), Error);
 }
 
-}  // namespace
+}  // namespace sweep_runner_test
 }  // namespace rhec::sim

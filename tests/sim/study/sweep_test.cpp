@@ -9,7 +9,7 @@
 #include "sim/support/sweeps.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace sweep_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -151,5 +151,5 @@ TEST(SweepMistakes, InTheFormOfTheGrid) {
               AllOf(StartsWith("sweep.yaml:4"), HasSubstr("replaces the whole section")));
 }
 
-}  // namespace
+}  // namespace sweep_test
 }  // namespace rhec::sim

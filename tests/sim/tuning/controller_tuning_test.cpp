@@ -10,7 +10,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace controller_tuning_test {
 
 using testing::HasSubstr;
 
@@ -91,5 +91,5 @@ TEST(ControllerTuning, RefusesAScenarioWithoutWeights) {
               HasSubstr("controller.weights"));
 }
 
-}  // namespace
+}  // namespace controller_tuning_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "sim/support/weaving_drive.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace innovations_test {
 
 TEST(Innovations, DensitiesAreStudentsAndTheNormalOne) {
   const Innovation pair{.size = 2, .squared = 3.0, .log_determinant = 0.7};
@@ -81,5 +81,5 @@ TEST(Innovations, TakeACoordinateAlone) {
   EXPECT_EQ(found[102].size, 2);
 }
 
-}  // namespace
+}  // namespace innovations_test
 }  // namespace rhec::sim

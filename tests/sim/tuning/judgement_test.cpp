@@ -7,7 +7,7 @@
 #include "rhec/sim/numbers/random.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace judgement_test {
 
 TEST(Judgement, StatisticsAreWhatTheyAreCalled) {
   EXPECT_EQ(median_of({3.0, 1.0, 2.0}), 2.0);
@@ -50,5 +50,5 @@ TEST(Judgement, BlocksWidenIntervalsOfErrorsThatLast) {
   EXPECT_GT(width(100.0), 2.0 * width(1.0));
 }
 
-}  // namespace
+}  // namespace judgement_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace log_tuning_test {
 
 using testing::HasSubstr;
 
@@ -109,5 +109,5 @@ TEST(LogTuning, RefusesALogThatIsTooShort) {
               HasSubstr("expected at least 30"));
 }
 
-}  // namespace
+}  // namespace log_tuning_test
 }  // namespace rhec::sim

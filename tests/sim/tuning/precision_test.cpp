@@ -9,7 +9,7 @@
 #include "rhec/sim/numbers/random.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace precision_test {
 
 PrecisionOptions within(Eigen::Index size, double half) {
   PrecisionOptions options;
@@ -86,5 +86,5 @@ TEST(Precision, LooksPastRoughness) {
   EXPECT_LT(std::abs(found.correlation(0, 1)), 0.6);
 }
 
-}  // namespace
+}  // namespace precision_test
 }  // namespace rhec::sim

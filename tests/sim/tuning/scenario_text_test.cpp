@@ -6,7 +6,7 @@
 #include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace scenario_text_test {
 
 TEST(ScenarioText, IsReadBackAsTheSame) {
   for (const char* file : {SCENARIOS "/figure8.yaml", SCENARIOS "/paper/figure8.yaml", SCENARIOS "/victoria_park.yaml",
@@ -35,5 +35,5 @@ TEST(ScenarioText, LeavesOutWhatIsNotGiven) {
   EXPECT_NE(scenario_text(settings).find("c: 2"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace scenario_text_test
 }  // namespace rhec::sim

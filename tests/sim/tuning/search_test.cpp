@@ -7,7 +7,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace search_test {
 
 SearchOptions box(Eigen::Index size, double half) {
   SearchOptions options;
@@ -86,5 +86,5 @@ TEST(Search, PassesErrorsOnAndRefusesWhatHasNoValue) {
             "five");
 }
 
-}  // namespace
+}  // namespace search_test
 }  // namespace rhec::sim

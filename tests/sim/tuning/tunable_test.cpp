@@ -9,7 +9,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace tunable_test {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -117,5 +117,5 @@ controller:
   EXPECT_EQ(all.back().value_at(0.3), std::round(12.0 * std::pow(2.0, 0.3)));
 }
 
-}  // namespace
+}  // namespace tunable_test
 }  // namespace rhec::sim

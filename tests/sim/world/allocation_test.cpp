@@ -13,7 +13,7 @@
 #include "support/allocations.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace allocation_test {
 
 TEST(Allocation, IsCounted) {
   const long before = allocation_count();
@@ -47,5 +47,5 @@ TEST(Allocation, NoneInALoopOfTruthSensorsFieldsAndFollower) {
   }
 }
 
-}  // namespace
+}  // namespace allocation_test
 }  // namespace rhec::sim

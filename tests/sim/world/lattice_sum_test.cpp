@@ -9,7 +9,7 @@
 #include "rhec/sim/numbers/random.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace lattice_sum_test {
 
 TEST(LatticeSum, IsTheSameToTheBitWithWhateverInstructions) {
   constexpr int stride = lattice_taps + 5;
@@ -36,5 +36,5 @@ TEST(LatticeSum, IsTheSameToTheBitWithWhateverInstructions) {
   }
 }
 
-}  // namespace
+}  // namespace lattice_sum_test
 }  // namespace rhec::sim

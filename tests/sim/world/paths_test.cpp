@@ -13,7 +13,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace paths_test {
 
 std::filesystem::path file_with(const std::string& content) {
   auto file = std::filesystem::path(testing::TempDir()) / "rhec_waypoints.csv";
@@ -114,5 +114,5 @@ TEST(LoadWaypoints, NamesTheRowOfAMistake) {
   EXPECT_CONTAINS(message_for(""), "empty");
 }
 
-}  // namespace
+}  // namespace paths_test
 }  // namespace rhec::sim

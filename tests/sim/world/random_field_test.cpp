@@ -12,7 +12,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace random_field_test {
 
 // The inverse of the normal distribution function, by bisection.
 double normal_quantile(double share) {
@@ -175,5 +175,5 @@ TEST(PatchField, SeedsDiffer) {
   EXPECT_EQ(u, w);
 }
 
-}  // namespace
+}  // namespace random_field_test
 }  // namespace rhec::sim

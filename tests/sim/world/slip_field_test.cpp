@@ -14,7 +14,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace slip_field_test {
 
 std::filesystem::path file_with(const std::string& content, const std::string& name = "rhec_raster.csv") {
   const auto file = std::filesystem::path(testing::TempDir()) / name;
@@ -98,5 +98,5 @@ TEST(SplitField, RefusesSidesThatDoNotFit) {
   EXPECT_CONTAINS(message_for(constant_field({1}), constant_field({1}), NAN), "border is nan");
 }
 
-}  // namespace
+}  // namespace slip_field_test
 }  // namespace rhec::sim

@@ -10,7 +10,7 @@
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace truth_estimator_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -59,5 +59,5 @@ TEST(TruthEstimator, IsOneOfThoseThatAScenarioNames) {
   EXPECT_EQ(makers.all().size(), EstimatorMakers().all().size() + 1);
 }
 
-}  // namespace
+}  // namespace truth_estimator_test
 }  // namespace rhec::sim

@@ -12,7 +12,7 @@
 #include "sim/support/bicycle.hpp"
 
 namespace rhec::sim {
-namespace {
+namespace truth_test {
 
 Eigen::VectorXd state(double x, double y, double beta, double delta) { return Eigen::Vector4d(x, y, beta, delta); }
 
@@ -196,5 +196,5 @@ TEST(Sensors, RefuseWrongStandardDeviations) {
   EXPECT_NO_THROW(Sensors(model, {}, 1));
 }
 
-}  // namespace
+}  // namespace truth_test
 }  // namespace rhec::sim

@@ -13,7 +13,7 @@
 #include "rhec/core/ocp/solver_decorator.hpp"
 
 namespace rhec::conformance {
-namespace {
+namespace assessment_test {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -95,5 +95,5 @@ TEST(Assessment, SeesASolutionThatIsNone) {
       Contains(HasSubstr("a multiplier is not at its bound")));
 }
 
-}  // namespace
+}  // namespace assessment_test
 }  // namespace rhec::conformance

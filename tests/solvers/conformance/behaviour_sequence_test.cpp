@@ -9,7 +9,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec::conformance {
-namespace {
+namespace behaviour_sequence_test {
 
 using testing::RandomProblem;
 
@@ -100,5 +100,5 @@ TEST_P(BehaviourInSequence, KeepsUpWithBlocksThatMoveFromSampleToSample) {
 INSTANTIATE_TEST_SUITE_P(Every, BehaviourInSequence, ::testing::ValuesIn(all_pairs()),
                          [](const auto& of) { return of.param.solver + "_on_" + of.param.model; });
 
-}  // namespace
+}  // namespace behaviour_sequence_test
 }  // namespace rhec::conformance

@@ -16,7 +16,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec::conformance {
-namespace {
+namespace behaviour_test {
 
 using testing::RandomProblem;
 
@@ -367,5 +367,5 @@ INSTANTIATE_TEST_SUITE_P(Every, Behaviour, ::testing::ValuesIn(all_pairs()),
 INSTANTIATE_TEST_SUITE_P(Every, SolverAlone, ::testing::ValuesIn(host().names(PluginKind::solver)),
                          [](const auto& of) { return of.param; });
 
-}  // namespace
+}  // namespace behaviour_test
 }  // namespace rhec::conformance

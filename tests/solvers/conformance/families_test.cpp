@@ -13,7 +13,7 @@
 #include "verdicts.hpp"
 
 namespace rhec::conformance {
-namespace {
+namespace families_test {
 
 struct Case {
   std::string solver, model, family;
@@ -138,5 +138,5 @@ TEST(Documentation, ListsOnlyRefusalsThatHappen) {
   }
 }
 
-}  // namespace
+}  // namespace families_test
 }  // namespace rhec::conformance

@@ -16,7 +16,7 @@
 #include "verdicts.hpp"
 
 namespace rhec::conformance {
-namespace {
+namespace reference_test {
 
 // Of each set, every so-many-th problem: an odd number, so that all block structures have their turn.
 constexpr std::size_t stride = 71;
@@ -111,5 +111,5 @@ INSTANTIATE_TEST_SUITE_P(Problems, Reference, ::testing::ValuesIn(all_cases()), 
   return name;
 });
 
-}  // namespace
+}  // namespace reference_test
 }  // namespace rhec::conformance

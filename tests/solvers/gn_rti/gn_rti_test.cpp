@@ -15,7 +15,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec {
-namespace {
+namespace gn_rti_test {
 
 using testing::RandomProblem;
 
@@ -334,5 +334,5 @@ TEST(Identities, WithNoBorderInViewTheStructureIsThatOfFullHorizonBlocking) {
                    estimates("{name: full_horizon}", "{name: full_horizon}", 15, 60));
 }
 
-}  // namespace
+}  // namespace gn_rti_test
 }  // namespace rhec

@@ -14,7 +14,7 @@
 #include "problems.hpp"
 
 namespace rhec::ipopt {
-namespace {
+namespace ipopt_solver_test {
 
 using namespace testing;
 
@@ -193,5 +193,5 @@ TEST(Ipopt, AnotherCapacityThanAtSetupIsBadInput) {
   EXPECT_EQ(solver->solve(point).status, Status::bad_input);
 }
 
-}  // namespace
+}  // namespace ipopt_solver_test
 }  // namespace rhec::ipopt

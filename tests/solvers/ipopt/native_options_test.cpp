@@ -6,7 +6,7 @@
 #include "problems.hpp"
 
 namespace rhec::ipopt {
-namespace {
+namespace native_options_test {
 
 using namespace testing;
 using ::testing::ElementsAre;
@@ -81,5 +81,5 @@ TEST(IpoptNativeOptions, RefusesNativeOptionsWithTheirPlace) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace native_options_test
 }  // namespace rhec::ipopt

@@ -8,7 +8,7 @@
 #include "problems.hpp"
 
 namespace rhec::ipopt {
-namespace {
+namespace ocp_nlp_test {
 
 using namespace testing;
 using Vector = std::vector<double>;
@@ -136,5 +136,5 @@ TEST(IpoptProgram, EvaluatesEveryPointOnce) {
   EXPECT_EQ(counted.linearisations, 2);
 }
 
-}  // namespace
+}  // namespace ocp_nlp_test
 }  // namespace rhec::ipopt

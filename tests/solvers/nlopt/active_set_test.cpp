@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace rhec::nlopt {
-namespace {
+namespace active_set_test {
 
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
@@ -37,5 +37,5 @@ TEST(ActiveSet, SaysNoToCurvatureThatIsNotPositive) {
   EXPECT_FALSE(solve_active_set(qp, hessian, step, multipliers));
 }
 
-}  // namespace
+}  // namespace active_set_test
 }  // namespace rhec::nlopt

@@ -5,7 +5,7 @@
 #include "problems.hpp"
 
 namespace rhec::nlopt {
-namespace {
+namespace condensed_test {
 
 using namespace testing;
 using Vector = Eigen::VectorXd;
@@ -100,5 +100,5 @@ TEST(CondensedProblem, LeavesOutWhatItsBoundsFix) {
   EXPECT_EQ(problem.iterate().control(3)[0], 0.7);
 }
 
-}  // namespace
+}  // namespace condensed_test
 }  // namespace rhec::nlopt

@@ -6,7 +6,7 @@
 #include "problems.hpp"
 
 namespace rhec::nlopt {
-namespace {
+namespace nlopt_options_test {
 
 using namespace testing;
 using ::testing::ElementsAre;
@@ -108,5 +108,5 @@ TEST(NloptOptions, SayWhatIsWrongWithThem) {
   EXPECT_NE(error_of_options("{native: {inner_maxeval: many}}").find("options:1"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace nlopt_options_test
 }  // namespace rhec::nlopt

@@ -8,7 +8,7 @@
 #include "problems.hpp"
 
 namespace rhec::nlopt {
-namespace {
+namespace nlopt_run_test {
 
 using namespace testing;
 using Vector = Eigen::VectorXd;
@@ -174,5 +174,5 @@ TEST(NloptAlgorithms, StopsAtADeadlineInTheMiddleWithTheBestSoFar) {
   EXPECT_LT(seconds, 10.0) << "one iteration of a dense method may pass the deadline, no more";
 }
 
-}  // namespace
+}  // namespace nlopt_run_test
 }  // namespace rhec::nlopt

@@ -9,7 +9,7 @@
 #include "solvers/nlopt/condensed.hpp"
 
 namespace rhec::nlopt {
-namespace {
+namespace nlopt_solver_test {
 
 using namespace testing;
 
@@ -264,5 +264,5 @@ TEST(Nlopt, TwoThreadsDoNotDisturbEachOther) {
                        std::string("{polish: false, max_iterations: 2000, algorithm: ") + name + "}");
 }
 
-}  // namespace
+}  // namespace nlopt_solver_test
 }  // namespace rhec::nlopt

@@ -10,7 +10,7 @@
 #include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
-namespace {
+namespace kkt_factor_test {
 
 using namespace testing;
 
@@ -143,5 +143,5 @@ TEST(KktFactor, DropsTheStructureThatWasUsedLongestAgo) {
   EXPECT_EQ(factor.analyses(), limit + 11) << "it was kept beyond the limit";
 }
 
-}  // namespace
+}  // namespace kkt_factor_test
 }  // namespace rhec::sparse_sqp

@@ -9,7 +9,7 @@
 #include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
-namespace {
+namespace sparse_qp_test {
 
 using namespace testing;
 
@@ -151,5 +151,5 @@ TEST(SparseQp, KeepsADeadlineThatIsPast) {
             SparseQp::Outcome::deadline);
 }
 
-}  // namespace
+}  // namespace sparse_qp_test
 }  // namespace rhec::sparse_sqp

@@ -21,7 +21,7 @@
 #include "support/test_models.hpp"
 
 namespace rhec::sparse_sqp {
-namespace {
+namespace sparse_sqp_test {
 
 using rhec::testing::RandomProblem;
 using rhec::testing::WithoutSecondDerivatives;
@@ -430,5 +430,5 @@ TEST(SparseSqp, StructuresThatChangeFromSolveToSolve) {
   }
 }
 
-}  // namespace
+}  // namespace sparse_sqp_test
 }  // namespace rhec::sparse_sqp

@@ -8,7 +8,7 @@
 #include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
-namespace {
+namespace stage_convexity_test {
 
 using namespace testing;
 
@@ -67,5 +67,5 @@ TEST(StageConvexity, TakesOverTheStagesThatBringTheNegativeCurvature) {
   EXPECT_LT(2 * stages_taken, stages_seen) << "curvature was given up where there was no need";
 }
 
-}  // namespace
+}  // namespace stage_convexity_test
 }  // namespace rhec::sparse_sqp

@@ -9,7 +9,7 @@
 #include "test_qps.hpp"
 
 namespace rhec::sparse_sqp {
-namespace {
+namespace stage_covariances_test {
 
 using namespace testing;
 
@@ -44,5 +44,5 @@ TEST(StageCovariances, ThereAreNoneWithoutAnInverse) {
   EXPECT_THAT(blocks, ::testing::Each(-7.0));
 }
 
-}  // namespace
+}  // namespace stage_covariances_test
 }  // namespace rhec::sparse_sqp

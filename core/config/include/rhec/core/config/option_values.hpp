@@ -141,6 +141,24 @@ struct OptionalValue {
   std::string constraint() const { return value.constraint(); }
 };
 
+/// A value, or `auto`: chosen by the program.
+template <class Value>
+struct AutomaticValue {
+  Value value;
+  using Result = decltype(value.read(std::declval<const Settings&>(), std::declval<const OptionContext&>()));
+  std::optional<Result> read(const Settings& from, const OptionContext& context) const {
+    if (from.text() == "auto") return std::nullopt;
+    try {
+      return value.read(from, context);
+    } catch (const Error&) {
+      throw wrong_option(from, type(), constraint(), context);
+    }
+  }
+  std::string print(const std::optional<Result>& given) const { return given ? value.print(*given) : "auto"; }
+  std::string type() const { return value.type() + " or auto"; }
+  std::string constraint() const { return value.constraint(); }
+};
+
 template <class Value>
 struct ListValue {
   Value value;

@@ -61,6 +61,11 @@ class OptionTable {
                                 Range range = any()) {
     return leaf(std::move(name), member, OptionalValue<IntegerValue>{{range}}, std::move(meaning));
   }
+  /// `auto` means 'no value': the program chooses one.
+  OptionTable& automatic_integer(std::string name, std::optional<int> T::*member, std::string meaning,
+                                 Range range = any()) {
+    return leaf(std::move(name), member, AutomaticValue<IntegerValue>{{range}}, std::move(meaning));
+  }
   OptionTable& numbers(std::string name, std::vector<double> T::*member, std::string meaning, Range each = any()) {
     return leaf(std::move(name), member, ListValue<NumberValue>{{each}}, std::move(meaning));
   }

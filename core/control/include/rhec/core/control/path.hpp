@@ -40,6 +40,8 @@ class RHEC_EXPORT Path {
   int size() const noexcept { return static_cast<int>(x_.size()); }
   /// Arc length from the first waypoint to the last [m].
   double length() const noexcept { return arc_lengths_.back(); }
+  /// The largest reference speed of a waypoint [m/s].
+  double top_speed() const noexcept;
 
   /// The point at an arc length [m], by a binary search.
   PathPoint point_at(double arc_length) const noexcept;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rhec/core/estimation/estimation_method.hpp"
+#include "rhec/core/model/step_requirement.hpp"
 
 namespace rhec {
 
@@ -47,14 +48,19 @@ class RHEC_EXPORT Estimator {
   std::shared_ptr<const SlipAhead> slip_ahead() const noexcept { return method_->slip_ahead(); }
 
   struct Counts {
-    std::int64_t nodes = 0;      ///< including those that fill gaps
-    std::int64_t estimates = 0;  ///< estimates computed
-    std::int64_t fallbacks = 0;  ///< estimates for which the solver failed
-    std::int64_t late = 0;       ///< measurements merged into an older node
-    std::int64_t dropped = 0;    ///< measurements too late, too many, or with a stamp that is not finite
-    std::int64_t missing = 0;    ///< single outputs that were NaN or otherwise not valid
+    std::int64_t nodes = 0;       ///< including those that fill gaps
+    std::int64_t estimates = 0;   ///< estimates computed
+    std::int64_t fallbacks = 0;   ///< estimates for which the solver failed
+    std::int64_t late = 0;        ///< measurements merged into an older node
+    std::int64_t dropped = 0;     ///< measurements too late, too many, or with a stamp that is not finite
+    std::int64_t missing = 0;     ///< single outputs that were NaN or otherwise not valid
+    std::int64_t integrated = 0;  ///< intervals whose Runge-Kutta steps were held against twice as many: one in 16
+    std::int64_t coarse = 0;      ///< of these, those where a next state was off by more than `coarse_error`
+    int coarse_state = -1;        ///< the state that was off most; -1: none
   };
   const Counts& counts() const noexcept { return counts_; }
+  /// In typical magnitudes of a state, of an interval: what noise of sensors will not hide.
+  static constexpr double coarse_error = 10.0 * StepRequirement::state_tolerance;
   const EstimationMethod& method() const noexcept { return *method_; }
   const Model& model() const noexcept { return method_->model(); }
 
@@ -79,6 +85,7 @@ class RHEC_EXPORT Estimator {
   void add_node(double time, const double* outputs) noexcept;
   void mean_input(double from, double to) noexcept;
   void predict_to(double time) noexcept;
+  void check_integration() noexcept;
   void clear_estimates() noexcept;
 
   std::unique_ptr<EstimationMethod> method_;
@@ -89,6 +96,8 @@ class RHEC_EXPORT Estimator {
   bool started_ = false, stale_ = false;
   Estimate estimate_, predicted_;
   Counts counts_;
+  StepError step_error_;
+  double worst_error_ = 0.0;  ///< of the intervals that were coarse
   std::vector<double> mean_, weight_, nothing_, next_, values_;
 };
 

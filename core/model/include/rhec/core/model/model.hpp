@@ -29,6 +29,8 @@ struct Variable {
 RHEC_EXPORT std::vector<std::string> names_of(const std::vector<Variable>& variables);
 /// The values of parameters without slip.
 RHEC_EXPORT std::vector<double> nominal_values(const std::vector<Variable>& parameters);
+/// The middle of a parameter's bounds; of one without bounds its value without slip.
+RHEC_EXPORT double middle_value(const Variable& parameter);
 
 /// Which variables hold the vehicle's position and speed; -1 if the model has none. The dynamics depend neither on the
 /// position nor on a common rotation of all headings: a vehicle that is shifted and rotated as a whole moves as before.

@@ -14,7 +14,7 @@ namespace rhec {
 /// The keys of the section `controller`.
 struct RHEC_EXPORT ControllerOptions {
   int horizon = RhcProblem::Setup{}.max_intervals;
-  int substeps = RhcProblem::Setup{}.substeps;
+  std::optional<int> substeps = {};  ///< none: chosen for the model
   ReferenceSpeed reference_speed = Controller::Setup{}.reference_speed;
   double least_speed_factor = Controller::Setup{}.least_speed_factor;
   double speed_bound_factor = Controller::Setup{}.speed_bound_factor;
@@ -36,10 +36,11 @@ class RHEC_EXPORT ControllerSection {
                                    std::shared_ptr<const SlipAhead> ahead = nullptr) const;
 
  private:
-  RhcProblem::Setup problem() const;
+  RhcProblem::Setup problem(double top_speed) const;
   void add_blockings(Controller::Setup& setup) const;
 
   std::shared_ptr<const RobotContext> context_;
+  Settings section_;  ///< as written, for error messages
   ControllerOptions options_;
 };
 

@@ -19,7 +19,7 @@ enum class BlockCovariance { bank, blocks };
 struct RHEC_EXPORT EstimatorOptions {
   std::string name = "rhe";
   int horizon = RheProblem::Setup{}.max_intervals;
-  int substeps = RheProblem::Setup{}.substeps;
+  std::optional<int> substeps = {};  ///< none: chosen for the model
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
   BlockCovariance covariance = BlockCovariance::bank;
   Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, memory, initial, robust, solver;
@@ -37,6 +37,8 @@ class RHEC_EXPORT EstimatorSection {
 
   const EstimatorOptions& options() const noexcept { return options_; }
   PluginChoice solver_choice() const;
+  /// Runge-Kutta steps of an interval, as given or as the model needs them.
+  int substeps() const noexcept { return parts_.substeps; }
   /// The priors of a parameter as written, e.g. "auto" or "walk, matern".
   std::string priors_text(int parameter) const { return parts_.priors.text(parameter); }
   /// What it remembers of places.

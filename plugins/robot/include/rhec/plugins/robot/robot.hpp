@@ -57,6 +57,8 @@ class RHEC_EXPORT Robot {
   PluginChoice blocking_choice(int parameter) const { return blocking_.choice(parameter); }
   double step() const noexcept { return context_->step; }
   const EstimatorOptions& estimator_options() const noexcept { return estimator_.options(); }
+  /// Runge-Kutta steps in which the estimator integrates an interval.
+  int substeps() const noexcept { return estimator_.substeps(); }
   const SmootherOptions& smoother_options() const noexcept { return smoother_.options(); }
   const std::vector<double>& output_sigmas() const noexcept { return context_->noise.output_sigmas; }
   const std::vector<double>& input_sigmas() const noexcept { return context_->noise.input_sigmas; }

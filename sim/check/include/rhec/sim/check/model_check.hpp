@@ -22,8 +22,8 @@ enum class Verdict { pass, skip, warn, fail };
 RHEC_EXPORT std::string_view word_of(Verdict verdict);
 
 struct Finding {
-  std::string check;  ///< "description", "symmetry", "straight_motion", "derivatives", "numbers", "scaling",
-                      ///< "observability" or "time"
+  std::string check;  ///< "description", "symmetry", "straight_motion", "integration", "derivatives", "numbers",
+                      ///< "scaling", "observability" or "time"
   Verdict verdict = Verdict::pass;
   std::string where;                                    ///< the variable or entry; empty: the whole model
   std::string found;                                    ///< a phrase with numbers
@@ -73,7 +73,7 @@ struct ModelCheckOptions {
   std::optional<double> speed = {};  ///< ground speed of the drives [m/s]; none: derived from the inputs' scales
   double interval = 0.2;             ///< [s]
   int horizon = 15;                  ///< intervals; capped at `longest_horizon`
-  int substeps = 1;
+  std::optional<int> substeps = {};  ///< none: as many as the model needs
   /// Standard deviations; empty: as in Robot. Clamped to between 1e-9 and 1e9 scales.
   std::vector<double> output_sigmas = {}, input_sigmas = {};
   std::vector<std::shared_ptr<const Blocking>> blockings = {};  ///< by parameter; empty: one value over the horizon

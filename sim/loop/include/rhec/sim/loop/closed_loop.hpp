@@ -36,6 +36,7 @@ struct RunLog {
   std::string ended = {};  ///< why the run ended
   /// By output, what the estimator has learnt of its noise at the end; empty for one that does not adapt.
   std::map<std::string, EstimationMethod::OutputNoise> noise = {};
+  Estimator::Counts counts = {};  ///< of the estimator
 };
 
 /// Runs estimator -> controller -> ground truth until the path ends, the vehicle is lost, or the run takes far too
@@ -68,6 +69,7 @@ struct RunSummary {
   std::map<std::string, std::int64_t> estimator_statuses, controller_statuses;
   std::int64_t fallbacks = 0;  ///< solves with unusable results
   std::int64_t solves = 0;
+  Estimator::Counts counts;  ///< of the estimator
 };
 /// From where on a covariance is called wrong: mean NEES in units of its expected value, and the share of samples
 /// within two standard deviations.

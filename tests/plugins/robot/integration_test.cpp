@@ -1,0 +1,81 @@
+#include "rhec/plugins/robot/integration.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plugins/robot/robots.hpp"
+#include "support/error_of.hpp"
+
+namespace rhec {
+namespace integration_test {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+/// A vehicle whose steering follows a set point with a lag [s].
+std::shared_ptr<const RobotContext> lagging(const std::string& lag, double step = 0.2) {
+  const Settings section = settings(
+      "equations:\n"
+      "  states:\n"
+      "    x: {unit: m, typical: 10, role: position_x}\n"
+      "    y: {unit: m, typical: 10, role: position_y}\n"
+      "    psi: {unit: rad, angle: true, role: heading}\n"
+      "    delta: {unit: rad, typical: 0.3, bounds: [-0.6, 0.6]}\n"
+      "  inputs:\n"
+      "    v: {unit: m/s, typical: 5, role: speed}\n"
+      "    set_point: {unit: rad, typical: 0.3, bounds: [-0.6, 0.6]}\n"
+      "  outputs:\n"
+      "    x: {unit: m}\n"
+      "    y: {unit: m}\n"
+      "  options: {lag: {default: " +
+      lag +
+      ", unit: s, above: 0}}\n"
+      "  equations: |\n"
+      "    x' = v * cos(psi)\n"
+      "    y' = v * sin(psi)\n"
+      "    psi' = v / 1.4 * tan(delta)\n"
+      "    delta' = (set_point - delta) / lag\n");
+  const auto model = ModelSection(host(), section).model();
+  return std::make_shared<const RobotContext>(
+      RobotContext{host(), step, model, model->description(), NoiseSection({}, model->description())});
+}
+
+TEST(Integration, AutoFollowsTheShortestTimeConstant) {
+  EXPECT_EQ(substeps_of({}, {}, *lagging("1"), {}), 1);
+  // 10 ms in steps of 0.2 s: 20 / 2.785 = 7.2 steps are stable.
+  EXPECT_GE(substeps_of({}, {}, *lagging("0.01"), {}), 8);
+  EXPECT_LE(substeps_of({}, {}, *lagging("0.01"), {}), 12);
+  EXPECT_LE(substeps_of({}, {}, *lagging("0.01", 0.01), {}), 2);
+  EXPECT_EQ(substeps_of({}, {}, *lagging("0.01", 0.001), {}), 1);
+  EXPECT_EQ(substeps_of({}, {}, *context_with(), std::vector<double>{0.5, 0.5}), 1);
+}
+
+TEST(Integration, StepsThatAreGivenAreTakenIfTheyAreStable) {
+  EXPECT_EQ(substeps_of(8, {}, *lagging("0.01"), {}), 8);
+  EXPECT_EQ(substeps_of(40, {}, *lagging("0.01"), {}), 40);
+  const Settings section = settings("horizon: 5\nsubsteps: 7");
+  EXPECT_THAT(
+      error_of([&] { substeps_of(7, section, *lagging("0.01"), {}); }),
+      AllOf(StartsWith("robot.yaml:2: substeps: found 7"), HasSubstr("unstable"),
+            HasSubstr("time constant of 0.01 s, in the state 'delta'"), HasSubstr("0.2 s (step)"),
+            HasSubstr("expected at least " + std::to_string(substeps_of({}, {}, *lagging("0.01"), {})) + ", or auto")));
+}
+
+TEST(Integration, WhatNoStepsFollowIsRefused) {
+  for (const char* text : {"substeps: auto", "substeps: 1000"}) {
+    const Settings section = settings(text);
+    EXPECT_THAT(
+        error_of([&] { substeps_of(section.find("substeps")->integer(), section, *lagging("0.00001"), {}); }),
+        AllOf(StartsWith("robot.yaml:1: substeps: "), HasSubstr("time constant of 1e-05 s, in the state 'delta'"),
+              HasSubstr("1000 Runge-Kutta steps are not enough"), HasSubstr("shorten `step`")))
+        << text;
+  }
+}
+
+}  // namespace integration_test
+}  // namespace rhec
