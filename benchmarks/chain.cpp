@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "program.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
-#include "rhec/core/model/graph_model.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/numbers/spread.hpp"
 #include "rti_loop.hpp"

@@ -1,5 +1,6 @@
 // The chain of masses as a plugin, for the benchmark of models with many states; RHEC_CHAIN is its number of states.
 #include <string>
+#include <vector>
 
 #include "chain_of_masses.hpp"
 #include "rhec/core/model/formula_model.hpp"

@@ -27,6 +27,13 @@ struct WideVehicle {
   }
 };
 
+template <class Scalar>
+struct Wide40 : WideVehicle<40, Scalar> {};
+template <class Scalar>
+struct Wide100 : WideVehicle<100, Scalar> {};
+template <class Scalar>
+struct Wide120 : WideVehicle<120, Scalar> {};
+
 inline ModelDescription about_wide_vehicle(int states) {
   const auto variables = [](const char* letter, int count) {
     std::vector<Variable> all;
