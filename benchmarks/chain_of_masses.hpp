@@ -12,8 +12,8 @@
 template <int masses, class Scalar>
 struct ChainOfMasses {
   static constexpr int state_count = 6 * masses + 3, input_count = 3, parameter_count = 0, output_count = 3;
-  static constexpr int end = 3 * masses;    ///< where the position of the moved end stands
-  static constexpr int speeds = end + 3;    ///< where velocities begin
+  static constexpr int end = 3 * masses;  ///< where the position of the moved end stands
+  static constexpr int speeds = end + 3;  ///< where velocities begin
   static constexpr double mass = 0.03, stiffness = 1.0, length = 0.033, gravity = 9.81;
 
   void dynamics(const Scalar* x, const Scalar* u, const Scalar* /*p*/, Scalar* dxdt) const {

@@ -134,8 +134,8 @@ class FunctionText {
     for (const int result : results)
       if (!of.is_uniform(result) && input_[result] < 0 && slot_[result] < 0) slot_[result] = registers_++;
     order_ = by_results(of.steps, maker_, results);
-    const auto elementary =
-        std::count_if(of.steps.begin(), of.steps.end(), [](const Instruction& step) { return is_elementary(step.code); });
+    const auto elementary = std::count_if(of.steps.begin(), of.steps.end(),
+                                          [](const Instruction& step) { return is_elementary(step.code); });
     if (elementary > most_inlined) prefix_ = "called_";
   }
 
@@ -223,7 +223,8 @@ class FunctionText {
       }
       const int made = number(step.out);
       fmt::format_to(out, "  const Lane v{} = {};{}{}\n", made,
-                     formula_of(step, operands[0], operands[1], operands[2], prefix_), label.empty() ? "" : "  // ", label);
+                     formula_of(step, operands[0], operands[1], operands[2], prefix_), label.empty() ? "" : "  // ",
+                     label);
       make(step.out);
     }
   }

@@ -228,7 +228,8 @@ void ChainRule::plan_backward() {
   const auto states = static_cast<std::size_t>(at_.nx), all = static_cast<std::size_t>(at_.na),
              variables = static_cast<std::size_t>(at_.nz);
   const std::vector<char> none(variables, 0), full(variables, 1);
-  std::vector<std::vector<std::pair<int, std::uint32_t>>> bends(all), slopes(all);  // by row of G: other index, register
+  std::vector<std::vector<std::pair<int, std::uint32_t>>> bends(all),
+      slopes(all);  // by row of G: other index, register
   for (std::size_t e = 0; e < of_.bends.size(); ++e) {
     const auto& [r, c] = of_.bends[e];
     const std::uint32_t at = at_.bends + static_cast<std::uint32_t>(e);

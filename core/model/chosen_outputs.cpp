@@ -24,8 +24,8 @@ class ChosenOutputs final : public Model {
     all_ = model_->output_count();
     const std::size_t a_node = static_cast<std::size_t>(all_) * (static_cast<std::size_t>(model_->state_count()) + 2);
     if (chosen_.size() > room)
-      throw Error(fmt::format("model '{}': {} outputs chosen; expected at most {}", description_.name, chosen_.size(),
-                              room));
+      throw Error(
+          fmt::format("model '{}': {} outputs chosen; expected at most {}", description_.name, chosen_.size(), room));
     if (a_node > room) reserve_ = std::make_unique<Reserve>(a_node);
     nodes_at_once_ = static_cast<int>(std::max<std::size_t>(room / std::max<std::size_t>(a_node, 1), 1));
     description_.outputs.clear();
@@ -48,6 +48,7 @@ class ChosenOutputs final : public Model {
   void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept override {
     model_->straight_motion(ground_speed, p, state, inputs);
   }
+  Operations operations() const noexcept override { return model_->operations(); }
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   std::vector<std::string> instruction_sets() const override { return model_->instruction_sets(); }
   bool use_instruction_set(const std::string& name) override { return model_->use_instruction_set(name); }

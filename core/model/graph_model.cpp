@@ -194,9 +194,9 @@ void GraphModel::straight_motion(double ground_speed, const double* p, double* s
 void GraphModel::observe(const Nodes& q) const noexcept {
   RHEC_ASSERT(q.count == 0 || (q.count > 0 && q.states), "where to observe");
   RHEC_ASSERT(q.count == 0 || !q.hessians || q.multipliers, "second derivatives are weighted by multipliers");
-  const int registers = std::max(tapes_.outputs.register_count(),
-                                 std::max(q.jacobians ? tapes_.output_jacobians.register_count() : 0,
-                                          q.hessians ? tapes_.output_hessians.register_count() : 0));
+  const int registers =
+      std::max(tapes_.outputs.register_count(), std::max(q.jacobians ? tapes_.output_jacobians.register_count() : 0,
+                                                         q.hessians ? tapes_.output_hessians.register_count() : 0));
   with_memory(static_cast<std::size_t>(registers) * GraphSteps::lanes, [&](double* memory) {
     for (int first = 0; first < q.count; first += GraphSteps::lanes)
       observe(q, first, std::min(GraphSteps::lanes, q.count - first), memory);

@@ -112,6 +112,13 @@ GraphModel::Cost GraphModel::cost_of(const Tape& tape, bool with_jacobian, bool 
           static_cast<int>(staged.memory() / StagedSteps::lanes)};
 }
 
+Model::Operations GraphModel::operations() const noexcept {
+  const auto of_one = [](const Cost& of_eight) {
+    return static_cast<double>(of_eight.instructions) / GraphSteps::lanes;
+  };
+  return {of_one(cost_of_values()), of_one(cost_of_jacobians()), of_one(cost_of_hessians())};
+}
+
 bool GraphModel::is_compiled() const noexcept {
   const Tape& values = tapes_.steady.values;
   return values.results().empty() ? tapes_.steady.staged->is_compiled() : values.is_compiled();

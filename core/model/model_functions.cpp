@@ -15,10 +15,9 @@
 namespace rhec {
 namespace {
 
-constexpr std::string_view names[] = {"step",    "step_jacobian",   "step_hessian",
-                                      "ramp",    "ramp_jacobian",   "ramp_hessian",
-                                      "outputs", "output_jacobian", "output_hessian",
-                                      "rates",   "rates_jacobian",  "rates_hessian"};
+constexpr std::string_view names[] = {"step",           "step_jacobian", "step_hessian",   "ramp",
+                                      "ramp_jacobian",  "ramp_hessian",  "outputs",        "output_jacobian",
+                                      "output_hessian", "rates",         "rates_jacobian", "rates_hessian"};
 
 std::vector<int> joined(std::vector<int> first, const std::vector<int>& second) {
   first.insert(first.end(), second.begin(), second.end());

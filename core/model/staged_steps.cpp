@@ -62,8 +62,8 @@ StoredRows StagedSteps::rows_of(const std::vector<std::uint32_t>& registers, int
       StoredEight eight;
       int varying = 0;
       for (int k = 0; k < 8; ++k) {
-        const std::uint32_t source = from + k < columns ? registers[static_cast<std::size_t>(r * columns + from + k)]
-                                                        : at.zero;
+        const std::uint32_t source =
+            from + k < columns ? registers[static_cast<std::size_t>(r * columns + from + k)] : at.zero;
         if (source != at.zero) varying = k + 1;
         eight.sources[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(source) * lanes;
       }
@@ -170,8 +170,7 @@ class StagedSteps::Run {
     for (int k = 3; k >= 0; --k) {
       multiply(chain_.rule.adjoints(k));
       const auto stage = static_cast<std::size_t>(k);
-      double* const weights =
-          std::copy_n(at(at_.arguments[stage]), std::ptrdiff_t{at_.na} * lanes, registers_);
+      double* const weights = std::copy_n(at(at_.arguments[stage]), std::ptrdiff_t{at_.na} * lanes, registers_);
       std::copy_n(at(at_.adjoints[stage]), std::ptrdiff_t{at_.nx} * lanes, weights);
       const Tape& tape = of_.tapes_->bends;
       tape.run(kernels_, registers_, lanes, count_);
@@ -221,8 +220,7 @@ void StagedSteps::integrate_rows(const IntervalRows& q, const TapeKernels& kerne
     };
     run.integrate(q.durations + first, count, [&] {
       if (q.next_states) store(next_, {q.next_states + first * q.next_step, q.next_step, 0});
-      if (q.jacobians)
-        store(chain.jacobian, {q.jacobians + first * q.jacobian_step, q.jacobian_step, q.jacobian_row});
+      if (q.jacobians) store(chain.jacobian, {q.jacobians + first * q.jacobian_step, q.jacobian_step, q.jacobian_row});
     });
     if (q.hessians) store(chain.hessian, {q.hessians + first * q.hessian_step, q.hessian_step, q.hessian_row});
   }

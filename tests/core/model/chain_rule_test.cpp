@@ -106,7 +106,8 @@ TEST(ChainRule, HasNoProductForWhatIsZeroByStructure) {
   EXPECT_NE(rule.hessian()[3], at.zero);
   EXPECT_LT(rule.operations(false), rule.operations(true));
   // Rows that are coupled take more.
-  const RatesStructure coupled{.nx = 2, .np = 0, .nu = 0, .slopes = {{0, 0}, {0, 1}, {1, 0}, {1, 1}}, .bends = {{1, 1}}};
+  const RatesStructure coupled{
+      .nx = 2, .np = 0, .nu = 0, .slopes = {{0, 0}, {0, 1}, {1, 0}, {1, 1}}, .bends = {{1, 1}}};
   EXPECT_GT(ChainRule(coupled, ChainRulePlaces(coupled, false), true).operations(true), rule.operations(true));
 }
 
@@ -114,9 +115,9 @@ TEST(ChainRulePlaces, AreApart) {
   const RatesStructure of{.nx = 3, .np = 2, .nu = 1, .slopes = {{0, 0}}, .bends = {{0, 0}, {1, 0}}};
   const ChainRulePlaces at(of, true);
   EXPECT_EQ(at.nz, 8);
-  std::set<std::uint32_t> begins{at.zero, at.one, at.share, at.reach, at.run, at.rest, at.z, at.x, at.next, at.weights,
-                                 at.next_weights, at.product, at.bends, at.sum, at.moved_next, at.hessian, at.pull,
-                                 at.pull_next, at.bent[0], at.bent[1]};
+  std::set<std::uint32_t> begins{at.zero,       at.one,     at.share,   at.reach,        at.run,     at.rest,   at.z,
+                                 at.x,          at.next,    at.weights, at.next_weights, at.product, at.bends,  at.sum,
+                                 at.moved_next, at.hessian, at.pull,    at.pull_next,    at.bent[0], at.bent[1]};
   for (std::size_t k = 0; k < 4; ++k)
     for (const std::uint32_t place : {at.arguments[k], at.rates[k], at.slopes[k], at.adjoints[k], at.moved[k]})
       begins.insert(place);

@@ -101,8 +101,7 @@ TEST(GraphTapes, RowsOfManyStatesAreThoseOfDenseRequests) {
 }
 
 TEST(GraphTapes, CompiledRatesGiveTheBitsOfTheInterpreter) {
-  FormulaModel<Wide40> compiled({}, about_wide_vehicle(40), wide_40_kernels()),
-      interpreted({}, about_wide_vehicle(40));
+  FormulaModel<Wide40> compiled({}, about_wide_vehicle(40), wide_40_kernels()), interpreted({}, about_wide_vehicle(40));
   for (const std::string& set : compiled.instruction_sets()) {
     if (set == "interpreted") continue;
     SCOPED_TRACE(set);

@@ -20,9 +20,9 @@ RHEC_EXPORT void check_description(const ModelDescription& description, const Fo
 
 /// A Model whose formula is a graph. Integration and derivatives are graphs too (ModelFunctions); those of several
 /// Runge-Kutta steps in an interval follow from them by the chain rule, and so do those of a step that is too long to
-/// be written out (ModelFunctions::is_whole), from the formula's own derivatives. What evaluates them is straight code that was
-/// compiled of the same graph (rhec_add_model in CMake), or else an interpreter, which takes one operation after the
-/// other, each for all stages, and needs no compiler. Both give the same bits on the same instruction set.
+/// be written out (ModelFunctions::is_whole), from the formula's own derivatives. What evaluates them is straight code
+/// that was compiled of the same graph (rhec_add_model in CMake), or else an interpreter, which takes one operation
+/// after the other, each for all stages, and needs no compiler. Both give the same bits on the same instruction set.
 class RHEC_EXPORT GraphModel : public Model {
  public:
   /// Straight motion as nodes of the vehicle's graph, of `ground_speed` and the parameters.
@@ -50,6 +50,7 @@ class RHEC_EXPORT GraphModel : public Model {
   std::size_t rows_scratch(int count) const noexcept override;
   void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override;
   void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept override;
+  Operations operations() const noexcept override;
   bool has_second_derivatives() const noexcept override { return true; }
   /// Of a compiled model: "interpreted", and those that it was compiled for; else those of the interpreter.
   std::vector<std::string> instruction_sets() const override;
