@@ -146,6 +146,8 @@ TEST(ChosenOutputs, LeaveTheVehicleAsItIs) {
   EXPECT_EQ(straight, same);
   EXPECT_EQ(all->instruction_sets(), some->instruction_sets());
   EXPECT_EQ(all->has_second_derivatives(), some->has_second_derivatives());
+  EXPECT_EQ(all->operations().hessians, some->operations().hessians);
+  EXPECT_GT(all->operations().hessians, all->operations().jacobians);
 }
 
 TEST(ChosenOutputs, MistakesAreNamedWithTheirPlace) {

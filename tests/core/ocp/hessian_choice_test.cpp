@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <vector>
+
+#include "support/cart.hpp"
+#include "support/test_models.hpp"
 
 namespace rhec {
 namespace {
@@ -143,6 +147,21 @@ TEST(HessianChoice, TakesGaussNewtonsAtOnceWhereTheExactOneCostsFarMore) {
   EXPECT_EQ(small.choice.now(), Hessian::gauss_newton);
   small.take(2);
   EXPECT_EQ(small.bowl.linearised, 0);
+}
+
+TEST(StepOperations, AreCountedOfModelAndRecursion) {
+  const auto narrow = testing::cart_control(15), longer = testing::cart_control(30);
+  const Ocp::StepOperations of = narrow->step_operations();
+  EXPECT_GT(of.gauss_newton, 0.0);
+  EXPECT_GT(of.exact, of.gauss_newton);
+  EXPECT_NEAR(longer->step_operations().exact, 2.0 * of.exact, 1e-9 * of.exact);
+  HessianChoice choice;
+  choice.setup(*narrow);
+  EXPECT_EQ(choice.now(), Hessian::exact) << "a cart takes few operations";
+  const RhcProblem blunt(std::make_shared<testing::WithoutSecondDerivatives>(testing::cart()), narrow->setup());
+  EXPECT_EQ(blunt.step_operations().exact, 0.0) << "not known";
+  choice.setup(blunt);
+  EXPECT_EQ(choice.now(), Hessian::gauss_newton);
 }
 
 }  // namespace
