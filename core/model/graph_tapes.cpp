@@ -28,9 +28,9 @@ class GraphModel::TapeMaker {
   }
   /// Whether a step is one function; what was compiled has decided that.
   bool is_whole(ModelFunction step) {
-    constexpr auto rates = static_cast<std::size_t>(ModelFunction::rates);
-    if (code_ && code_->functions.size() <= rates) return true;
-    return code_ ? set_->runs[static_cast<std::size_t>(step)] != nullptr : functions_.is_whole(step);
+    if (code_ && set_->runs[static_cast<std::size_t>(step)]) return true;
+    const bool has_rates = code_ && code_->functions.size() > static_cast<std::size_t>(ModelFunction::rates);
+    return !has_rates && functions_.is_whole(step);
   }
   /// The formula and its derivatives, made once.
   std::shared_ptr<const RatesTapes> rates() {

@@ -1,6 +1,7 @@
 #include "staged_steps.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "graph_steps.hpp"
@@ -13,8 +14,8 @@ constexpr int lanes = StagedSteps::lanes;
 constexpr std::array<double, 4> reach{0.0, 0.5, 0.5, 1.0}, share{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
 
 std::vector<std::uint32_t> numbered(std::uint32_t first, int count) {
-  std::vector<std::uint32_t> all;
-  for (int k = 0; k < count; ++k) all.push_back(first + static_cast<std::uint32_t>(k));
+  std::vector<std::uint32_t> all(static_cast<std::size_t>(count));
+  std::iota(all.begin(), all.end(), first);
   return all;
 }
 
@@ -63,7 +64,7 @@ StoredRows StagedSteps::rows_of(const std::vector<std::uint32_t>& registers, int
       int varying = 0;
       for (int k = 0; k < 8; ++k) {
         const std::uint32_t source =
-            from + k < columns ? registers[static_cast<std::size_t>(r * columns + from + k)] : at.zero;
+            from + k < columns ? registers[static_cast<std::size_t>(r) * columns + from + k] : at.zero;
         if (source != at.zero) varying = k + 1;
         eight.sources[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(source) * lanes;
       }
@@ -254,14 +255,14 @@ void StagedSteps::integrate(const Model::Intervals& q, const TapeKernels& kernel
         for (int r = 0; q.jacobians && r < nx; ++r)
           for (int c = 0; c < nz; ++c)
             q.jacobians[((first + i) * nz + column(c)) * nx + r] =
-                run.at(rule.moved()[static_cast<std::size_t>(r * nz + c)])[i];
+                run.at(rule.moved()[static_cast<std::size_t>(r) * nz + c])[i];
       }
     });
     for (std::ptrdiff_t i = 0; q.hessians && i < count; ++i)
       for (int r = 0; r < nz; ++r)
         for (int c = 0; c < nz; ++c)
           q.hessians[((first + i) * nz + column(r)) * nz + column(c)] =
-              run.at(rule.hessian()[static_cast<std::size_t>(r * nz + c)])[i];
+              run.at(rule.hessian()[static_cast<std::size_t>(r) * nz + c])[i];
   }
 }
 

@@ -46,6 +46,7 @@ class RHEC_EXPORT ModelFunctions {
   explicit ModelFunctions(const VehicleGraph& vehicle) : vehicle_(vehicle) {}
 
   std::vector<int> inputs(ModelFunction function);
+  /// Of a step only where it is whole.
   std::vector<int> results(ModelFunction function);
 
   /// Instructions that a step may have, with its derivatives or without, to be one function. What is longer, or would
