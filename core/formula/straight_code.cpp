@@ -47,8 +47,15 @@ const char* function_of(TapeCode code) {
   }
 }
 
-/// The right-hand side of an instruction with operands a, b, c.
-std::string formula_of(const Instruction& step, const std::string& a, const std::string& b, const std::string& c) {
+/// Whether an instruction is an elementary function, whose code is long.
+bool is_elementary(TapeCode code) {
+  return code == TapeCode::sine_cosine ||
+         (function_of(code) && code != TapeCode::reciprocal && code != TapeCode::square_root);
+}
+
+/// The right-hand side of an instruction with operands a, b, c; `prefix` of elementary functions.
+std::string formula_of(const Instruction& step, const std::string& a, const std::string& b, const std::string& c,
+                       const char* prefix) {
   switch (step.code) {
     case TapeCode::fill:
       return a;
@@ -77,9 +84,9 @@ std::string formula_of(const Instruction& step, const std::string& a, const std:
     case TapeCode::power:
       return fmt::format("to_power({}, {})", a, step.exponent);
     case TapeCode::arc_tangent_2:
-      return fmt::format("atan2({}, {})", a, b);
+      return fmt::format("{}atan2({}, {})", prefix, a, b);
     default:
-      return fmt::format("{}({})", function_of(step.code), a);
+      return fmt::format("{}{}({})", is_elementary(step.code) ? prefix : "", function_of(step.code), a);
   }
 }
 
@@ -127,6 +134,9 @@ class FunctionText {
     for (const int result : results)
       if (!of.is_uniform(result) && input_[result] < 0 && slot_[result] < 0) slot_[result] = registers_++;
     order_ = by_results(of.steps, maker_, results);
+    const auto elementary = std::count_if(of.steps.begin(), of.steps.end(),
+                                          [](const Instruction& step) { return is_elementary(step.code); });
+    if (elementary > most_inlined) prefix_ = "called_";
   }
 
   int registers() const { return registers_; }
@@ -206,14 +216,15 @@ class FunctionText {
       const std::string& label = graph_.name_of(step.out);
       if (step.second_out >= 0) {
         const int sine = number(step.out), cosine = number(step.second_out);
-        fmt::format_to(out, "  const auto [v{}, v{}] = sincos({});\n", sine, cosine, operands[0]);
+        fmt::format_to(out, "  const auto [v{}, v{}] = {}sincos({});\n", sine, cosine, prefix_, operands[0]);
         make(step.out);
         make(step.second_out);
         continue;
       }
       const int made = number(step.out);
-      fmt::format_to(out, "  const Lane v{} = {};{}{}\n", made, formula_of(step, operands[0], operands[1], operands[2]),
-                     label.empty() ? "" : "  // ", label);
+      fmt::format_to(out, "  const Lane v{} = {};{}{}\n", made,
+                     formula_of(step, operands[0], operands[1], operands[2], prefix_), label.empty() ? "" : "  // ",
+                     label);
       make(step.out);
     }
   }
@@ -224,8 +235,13 @@ class FunctionText {
     return numbers_.emplace(node, static_cast<int>(numbers_.size())).first->second;
   }
 
+  /// A function with more elementary functions calls them; each that is inlined is code of a hundred instructions,
+  /// which compilers take long for, and which does not stay in the processor's cache.
+  static constexpr std::ptrdiff_t most_inlined = 100;
+
   const Graph& graph_;
   std::string name_;
+  const char* prefix_ = "";
   const Instructions& of_;
   const std::vector<std::string>& uniforms_;
   std::vector<int> maker_, input_, slot_, piece_, carried_, order_;
@@ -297,6 +313,15 @@ std::string StraightWriter::kernels(const std::string& prefix, const std::string
       "[[maybe_unused]] RHEC_INLINE inline void put(double* registers, int which, Lane value) {{\n"
       "  rhec::store_lane(value, registers + which * rhec::StraightFunction::rows);\n}}\n\n",
       about);
+  if (std::any_of(functions_.begin(), functions_.end(),
+                  [](const Function& function) { return function.text.find("called_") != std::string::npos; })) {
+    for (const char* name : {"exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "tanh"})
+      fmt::format_to(std::back_inserter(all),
+                     "[[maybe_unused]] RHEC_STRAIGHT Lane called_{0}(Lane a) {{ return {0}(a); }}\n", name);
+    all +=
+        "[[maybe_unused]] RHEC_STRAIGHT Lane called_atan2(Lane a, Lane b) { return atan2(a, b); }\n"
+        "[[maybe_unused]] RHEC_STRAIGHT std::pair<Lane, Lane> called_sincos(Lane a) { return sincos(a); }\n\n";
+  }
   for (const Function& function : functions_)
     if (!function.name.empty())
       fmt::format_to(std::back_inserter(all), "// {} instructions.\n{}\n", function.instructions, function.text);

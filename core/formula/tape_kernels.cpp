@@ -332,10 +332,28 @@ void store_rows(const StoredEight* groups, int rows, int eights, const double* r
   store_rows_of<32>(groups, rows, eights, registers, places, count);
 }
 
+void add_products(std::span<const SparseProduct> products, double* registers) {
+  constexpr int packs = 8 / width;
+  const auto at = [&](std::uint32_t number) RHEC_INLINE { return registers + static_cast<std::size_t>(number) * 8; };
+  for (const SparseProduct& product : products) {
+    double* to = at(product.to);
+    if (product.factor == SparseProduct::none) {
+      std::fill_n(to, static_cast<std::size_t>(product.count) * 8, 0.0);
+      continue;
+    }
+    Lane factor[packs];
+    for (int k = 0; k < packs; ++k) factor[k] = load_lane(at(product.factor) + k * width);
+    const double* from = at(product.from);
+    for (std::uint32_t n = 0; n < product.count; ++n, from += 8, to += 8)
+      for (int k = 0; k < packs; ++k)
+        store_lane(multiply_add(factor[k], load_lane(from + k * width), load_lane(to + k * width)), to + k * width);
+  }
+}
+
 }  // namespace
 
 extern const TapeKernels RHEC_JOIN(tape_kernels_, RHEC_TAPE_SET);
 constinit const TapeKernels RHEC_JOIN(tape_kernels_, RHEC_TAPE_SET) = {RHEC_TEXT(RHEC_TAPE_SET), &run, &load_rows,
-                                                                       &store_rows};
+                                                                       &store_rows, &add_products};
 
 }  // namespace rhec

@@ -56,6 +56,19 @@ void HorizonProblem::take_horizon(const HorizonProblem& from) noexcept {
   upper_ = from.upper_;
 }
 
+Ocp::StepOperations HorizonProblem::step_operations() const noexcept {
+  const Model::Operations model = model_->operations();
+  if (!(model.hessians > 0.0)) return {};
+  // A stage of the recursion: [A B]' (P [A B]), of which half is needed, and the elimination of the controls (Frison
+  // and Jorgensen, Efficient implementation of the Riccati recursion for solving linear-quadratic control problems,
+  // 2013).
+  const double n = capacity().states, m = capacity().controls;
+  const double products = n * n * (n + m) + n * (n + m) * (n + m) / 2 + m * m * m / 6 + m * m * n / 2 + m * n * n / 2;
+  const double recursion = products / 8, steps = substeps_, stages = capacity().intervals;
+  return {.gauss_newton = stages * (recursion + steps * model.jacobians),
+          .exact = stages * (recursion + steps * model.hessians)};
+}
+
 std::size_t HorizonProblem::scratch_size() const noexcept {
   const auto nodes = static_cast<std::size_t>(structure_.capacity().intervals) + 1;
   return IntervalDynamics::scratch_size(*model_, structure_, nodes) + cost_scratch_size();

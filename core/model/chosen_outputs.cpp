@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "reserve.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/formula_copy.hpp"
 
@@ -21,12 +23,11 @@ class ChosenOutputs final : public Model {
       : model_(std::move(model)), chosen_(std::move(chosen)), description_(model_->description()) {
     all_ = model_->output_count();
     const std::size_t a_node = static_cast<std::size_t>(all_) * (static_cast<std::size_t>(model_->state_count()) + 2);
-    if (a_node > room)
+    if (chosen_.size() > room)
       throw Error(
-          fmt::format("model '{}': {} outputs of {} states are too many to choose from; expected at most {} "
-                      "derivatives",
-                      description_.name, all_, model_->state_count(), room));
-    nodes_at_once_ = static_cast<int>(room / std::max<std::size_t>(a_node, 1));
+          fmt::format("model '{}': {} outputs chosen; expected at most {}", description_.name, chosen_.size(), room));
+    if (a_node > room) reserve_ = std::make_unique<Reserve>(a_node);
+    nodes_at_once_ = static_cast<int>(std::max<std::size_t>(room / std::max<std::size_t>(a_node, 1), 1));
     description_.outputs.clear();
     for (const int output : chosen_) description_.outputs.push_back(model_->description().outputs[output]);
     if (const VehicleGraph* all = model_->graph()) graph_ = formula_copy(*all, chosen_);
@@ -47,15 +48,25 @@ class ChosenOutputs final : public Model {
   void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept override {
     model_->straight_motion(ground_speed, p, state, inputs);
   }
+  Operations operations() const noexcept override { return model_->operations(); }
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   std::vector<std::string> instruction_sets() const override { return model_->instruction_sets(); }
   bool use_instruction_set(const std::string& name) override { return model_->use_instruction_set(name); }
   const VehicleGraph* graph() const noexcept override { return graph_ ? &*graph_ : nullptr; }
 
   void observe(const Nodes& request) const noexcept override {
+    if (reserve_) return reserve_->lend([&](double* memory) { observe_of_all(request, memory); });
+    std::array<double, room> memory;
+    observe_of_all(request, memory.data());
+  }
+
+ private:
+  static constexpr std::size_t room = 4096;  ///< doubles on the stack
+
+  /// With all outputs, their derivatives and their multipliers in memory, for some nodes at a time.
+  void observe_of_all(const Nodes& request, double* memory) const noexcept {
     const std::ptrdiff_t nx = state_count(), ny = output_count();
-    std::array<double, room> buffer;
-    double* const outputs = buffer.data();
+    double* const outputs = memory;
     double* const jacobians = outputs + static_cast<std::ptrdiff_t>(nodes_at_once_) * all_;
     double* const multipliers = jacobians + nodes_at_once_ * all_ * nx;
     for (int first = 0; first < request.count; first += nodes_at_once_) {
@@ -80,9 +91,6 @@ class ChosenOutputs final : public Model {
       }
     }
   }
-
- private:
-  static constexpr std::size_t room = 4096;  ///< doubles on the stack
 
   /// For some of the chosen outputs.
   void observe_some(const NodeRows& request) const noexcept {
@@ -119,6 +127,7 @@ class ChosenOutputs final : public Model {
   ModelDescription description_;
   std::optional<VehicleGraph> graph_;
   int all_ = 0, nodes_at_once_ = 1;
+  std::unique_ptr<Reserve> reserve_;  ///< null where a node fits on the stack
 };
 
 }  // namespace

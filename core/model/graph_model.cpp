@@ -1,19 +1,15 @@
 #include "rhec/core/model/graph_model.hpp"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "graph_steps.hpp"
+#include "reserve.hpp"
 #include "rhec/core/base/assertion.hpp"
-#include "rhec/core/base/error.hpp"
-#include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/scratch.hpp"
-#include "rhec/core/formula/derivatives.hpp"
 #include "rhec/core/model/formula_copy.hpp"
 #include "rhec/core/model/model_functions.hpp"
+#include "staged_steps.hpp"
 
 // Memory of a size that is known at run time only, without an allocation.
 #define RHEC_STACK(size) (static_cast<double*>(__builtin_alloca_with_align((size) * sizeof(double), 512)))
@@ -40,57 +36,6 @@ void for_each_block(const Tape& tape, int rows, Evaluate evaluate) {
 
 }  // namespace
 
-/// Makes tapes: of compiled functions, as far as there are some, else for the interpreter.
-class GraphModel::TapeMaker {
- public:
-  TapeMaker(const VehicleGraph& vehicle, const StraightCode* code, const StraightSet* set)
-      : vehicle_(formula_copy(vehicle)), functions_(vehicle_), code_(set ? code : nullptr), set_(set) {
-    if (!code_) return;
-    std::vector<double> values;
-    for (const auto& [node, value] : vehicle.options) values.push_back(value);
-    uniforms_ = code_->uniforms(values);
-  }
-  Tape make(ModelFunction function) {
-    const auto which = static_cast<std::size_t>(function);
-    if (code_ && set_->runs[which]) return {code_->functions[which], set_->runs[which], uniforms_};
-    return {*vehicle_.graph, functions_.inputs(function), functions_.results(function), vehicle_.options};
-  }
-
- private:
-  VehicleGraph vehicle_;  ///< derivatives are made in a copy, which goes with them
-  ModelFunctions functions_;
-  const StraightCode* code_;
-  const StraightSet* set_;
-  std::vector<double> uniforms_;
-};
-
-GraphModel::StepTapes::StepTapes(TapeMaker& maker, int nx, int nz, bool ramp)
-    : values(maker.make(ramp ? ModelFunction::ramp : ModelFunction::step)),
-      jacobians(maker.make(ramp ? ModelFunction::ramp_jacobian : ModelFunction::step_jacobian)),
-      hessians(maker.make(ramp ? ModelFunction::ramp_hessian : ModelFunction::step_hessian)),
-      next_of_values(values.rows(0, 1, nx)),
-      next_of_jacobians(jacobians.rows(0, 1, nx)),
-      next_of_hessians(hessians.rows(0, 1, nx)),
-      rows_of_jacobians(jacobians.rows(nx, nx, nz)),
-      jacobian_of_hessians(hessians.rows(nx, nx, nz)),
-      hessian_of_hessians(hessians.rows(nx + nx * nz, nz, nz)) {}
-
-GraphModel::Tapes::Tapes(TapeMaker& maker, const Counts& n)
-    : steady(maker, n.x, n.z(false), false),
-      outputs(maker.make(ModelFunction::outputs)),
-      output_jacobians(maker.make(ModelFunction::output_jacobian)),
-      output_hessians(maker.make(ModelFunction::output_hessian)),
-      output_values(outputs.rows(0, 1, n.y)),
-      values_of_output_jacobians(output_jacobians.rows(0, 1, n.y)),
-      output_slopes(output_jacobians.rows(n.y, n.y, n.x)) {
-  if (n.p > 0) ramped = StepTapes(maker, n.x, n.z(true), true);
-  for (int entry = 0; entry < n.x * n.x; ++entry)
-    if (output_hessians.results()[static_cast<std::size_t>(entry)] != Tape::zero) curved.push_back(entry);
-  for (const Tape* each : {&steady.values, &steady.jacobians, &steady.hessians, &ramped.values, &ramped.jacobians,
-                           &ramped.hessians, &outputs, &output_jacobians, &output_hessians})
-    most_registers = std::max(most_registers, each->register_count());
-}
-
 GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description, const StraightMotion* straight,
                        const StraightCode* code)
     : vehicle_(formula_copy(vehicle)),
@@ -116,66 +61,68 @@ GraphModel::GraphModel(const VehicleGraph& vehicle, ModelDescription description
   GraphModel::use_instruction_set(GraphModel::instruction_sets().back());
 }
 
-/// Makes the tapes of an instruction set, and finds out what memory they need.
-void GraphModel::use(const TapeKernels& kernels, const StraightSet* set) {
-  TapeMaker maker(vehicle_, code_, set);
-  Tapes made(maker, n_);
-  const std::size_t registers =
-      static_cast<std::size_t>(std::max({made.most_registers, rates_.register_count(), straight_.register_count()}));
-  const std::size_t stack = registers * GraphSteps::lanes + GraphSteps::memory(n_.x, n_.z(true));
-  if (stack > most_stack)
-    throw Error(
-        fmt::format("model '{}': its step of {} states with second derivatives takes {} numbers for {} rows; "
-                    "expected at most {}; write it with fewer states or terms",
-                    description_.name, n_.x, stack, GraphSteps::lanes, most_stack));
-  tapes_ = std::move(made);
-  stack_ = stack;
-  kernels_ = &kernels;
+template <class Use>
+void GraphModel::with_memory(std::size_t size, Use use) const noexcept {
+  if (size > most_stack) return reserve_->lend(use);
+  use(RHEC_STACK(size));
 }
 
 void GraphModel::integrate(const Intervals& q) const noexcept {
   RHEC_ASSERT(q.count >= 0 && q.substeps >= 1, "whole intervals and Runge-Kutta steps");
   RHEC_ASSERT(q.count == 0 || (q.states && q.durations), "where to integrate");
   RHEC_ASSERT(q.count == 0 || !q.hessians || q.multipliers, "second derivatives are weighted by multipliers");
-  if (q.substeps == 1 && !q.parameters_end && !q.jacobians && !q.hessians) return integrate_values(q);
   const StepTapes& of = steps(GraphSteps::is_ramp(q, n_.p));
-  GraphSteps steps({&of.values, &of.jacobians, &of.hessians, kernels_, n_.x, n_.u, n_.p}, q, RHEC_STACK(stack_));
-  for (int first = 0; first < q.count; first += GraphSteps::lanes)
-    steps.integrate(first, std::min(GraphSteps::lanes, q.count - first));
+  if (q.substeps == 1 && !q.parameters_end && !q.jacobians && !q.hessians && !of.values.results().empty())
+    return integrate_values(q);
+  if (is_staged(of, q.substeps, q.jacobians != nullptr, q.hessians != nullptr))
+    return with_memory(of.staged->memory(), [&](double* memory) { of.staged->integrate(q, *kernels_, memory); });
+  with_memory(memory_of_steps_, [&](double* memory) {
+    GraphSteps steps({&of.values, &of.jacobians, &of.hessians, kernels_, n_.x, n_.u, n_.p}, q, memory);
+    for (int first = 0; first < q.count; first += GraphSteps::lanes)
+      steps.integrate(first, std::min(GraphSteps::lanes, q.count - first));
+  });
 }
 
 /// One step without derivatives, as the defects of each iterate need it: as many rows at once as the stack holds.
 void GraphModel::integrate_values(const Intervals& q) const noexcept {
   const Tape& tape = tapes_.steady.values;
-  double* const registers = RHEC_STACK(stack_);
-  const int most = tape.scratch(32) <= stack_ ? 32 : tape.scratch(16) <= stack_ ? 16 : 8;
-  for (int first = 0, count = 0; first < q.count; first += count) {
-    const int lanes = std::min(tape.lanes(q.count - first), most);
-    count = std::min(lanes, q.count - first);
-    double* next = registers;
-    const auto load = [&](const double* rows, int columns) {
-      rows += static_cast<std::ptrdiff_t>(first) * columns;
-      for (int c = 0; c < columns; ++c, next += lanes) {
-        for (int i = 0; i < count; ++i) next[i] = rows[i * columns + c];
-        std::fill(next + count, next + lanes, next[count - 1]);
+  const int most = tape.scratch(32) <= most_stack ? 32 : tape.scratch(16) <= most_stack ? 16 : 8;
+  with_memory(tape.scratch(most), [&](double* registers) {
+    for (int first = 0, count = 0; first < q.count; first += count) {
+      const int lanes = std::min(tape.lanes(q.count - first), most);
+      count = std::min(lanes, q.count - first);
+      double* next = registers;
+      const auto load = [&](const double* rows, int columns) {
+        rows += static_cast<std::ptrdiff_t>(first) * columns;
+        for (int c = 0; c < columns; ++c, next += lanes) {
+          for (int i = 0; i < count; ++i) next[i] = rows[i * columns + c];
+          std::fill(next + count, next + lanes, next[count - 1]);
+        }
+      };
+      load(q.states, n_.x);
+      load(q.parameters, n_.p);
+      load(q.inputs, n_.u);
+      load(q.durations, 1);
+      tape.run(*kernels_, registers, lanes, count);
+      for (int j = 0; q.next_states && j < n_.x; ++j) {
+        double* const out = q.next_states + static_cast<std::ptrdiff_t>(first) * n_.x + j;
+        for (int i = 0; i < count; ++i) out[i * n_.x] = tape.result(j, registers, lanes, i);
       }
-    };
-    load(q.states, n_.x);
-    load(q.parameters, n_.p);
-    load(q.inputs, n_.u);
-    load(q.durations, 1);
-    tape.run(*kernels_, registers, lanes, count);
-    for (int j = 0; q.next_states && j < n_.x; ++j) {
-      double* const out = q.next_states + static_cast<std::ptrdiff_t>(first) * n_.x + j;
-      for (int i = 0; i < count; ++i) out[i * n_.x] = tape.result(j, registers, lanes, i);
     }
-  }
+  });
+}
+
+bool GraphModel::is_staged(const StepTapes& of, int substeps, bool with_jacobian, bool with_hessian) noexcept {
+  if (!of.staged || substeps > 1) return of.staged != nullptr;
+  return (with_hessian ? of.hessians : with_jacobian ? of.jacobians : of.values).results().empty();
 }
 
 void GraphModel::integrate_rows(const IntervalRows& q) const noexcept {
-  if (q.substeps != 1) return Model::integrate_rows(q);
   const bool ramp = q.ramp && n_.p > 0;
   const StepTapes& of = steps(ramp);
+  if (is_staged(of, q.substeps, q.jacobians != nullptr, q.hessians != nullptr))
+    return of.staged->integrate_rows(q, *kernels_, Scratch(q.scratch).take(0));
+  if (q.substeps != 1) return Model::integrate_rows(q);
   const int nz = n_.z(ramp);
   const Tape& tape = q.hessians ? of.hessians : q.jacobians ? of.jacobians : of.values;
   const StoredRows& next = q.hessians ? of.next_of_hessians : q.jacobians ? of.next_of_jacobians : of.next_of_values;
@@ -208,66 +155,78 @@ void GraphModel::integrate_rows(const IntervalRows& q) const noexcept {
 }
 
 std::size_t GraphModel::rows_scratch(int count) const noexcept {
-  const int lanes = std::max(tapes_.outputs.lanes(count), tapes_.steady.hessians.lanes(count));
-  return std::max(static_cast<std::size_t>(tapes_.most_registers) * lanes + 7, Model::rows_scratch(count));
+  const int lanes = std::max(tapes_.outputs.lanes(count), lanes_for(count));
+  std::size_t most = static_cast<std::size_t>(tapes_.most_registers) * lanes;
+  for (const StepTapes* each : {&tapes_.steady, &tapes_.ramped})
+    if (each->staged) most = std::max(most, each->staged->memory());
+  // Several whole steps go by way of dense rows.
+  return tapes_.steady.staged ? most + 7 : std::max(most + 7, Model::rows_scratch(count));
 }
 
 void GraphModel::rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept {
   constexpr int lanes = GraphSteps::lanes;
-  double* const registers = RHEC_STACK(stack_);
-  double* next = registers;
-  const auto load = [&](const double* values, int count) {
-    for (int j = 0; j < count; ++j, next += lanes) std::fill_n(next, lanes, values[j]);
-  };
-  load(x, n_.x);
-  load(p, n_.p);
-  load(u, n_.u);
-  rates_.run(*kernels_, registers, lanes, 1);
-  for (int j = 0; j < n_.x; ++j) dxdt[j] = rates_.result(j, registers, lanes, 0);
+  with_memory(rates_.scratch(lanes), [&](double* registers) {
+    double* next = registers;
+    const auto load = [&](const double* values, int count) {
+      for (int j = 0; j < count; ++j, next += lanes) std::fill_n(next, lanes, values[j]);
+    };
+    load(x, n_.x);
+    load(p, n_.p);
+    load(u, n_.u);
+    rates_.run(*kernels_, registers, lanes, 1);
+    for (int j = 0; j < n_.x; ++j) dxdt[j] = rates_.result(j, registers, lanes, 0);
+  });
 }
 
 void GraphModel::straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept {
   if (straight_.results().empty()) return Model::straight_motion(ground_speed, p, state, inputs);
   constexpr int lanes = GraphSteps::lanes;
-  double* const registers = RHEC_STACK(stack_);
-  std::fill_n(registers, lanes, ground_speed);
-  for (int j = 0; j < n_.p; ++j) std::fill_n(registers + (1 + j) * lanes, lanes, p[j]);
-  straight_.run(*kernels_, registers, lanes, 1);
-  for (int j = 0; j < n_.u; ++j) inputs[j] = straight_.result(j, registers, lanes, 0);
-  for (std::size_t k = 0; k < straight_states_.size(); ++k)
-    state[straight_states_[k]] = straight_.result(n_.u + k, registers, lanes, 0);
+  with_memory(straight_.scratch(lanes), [&](double* registers) {
+    std::fill_n(registers, lanes, ground_speed);
+    for (int j = 0; j < n_.p; ++j) std::fill_n(registers + (1 + j) * lanes, lanes, p[j]);
+    straight_.run(*kernels_, registers, lanes, 1);
+    for (int j = 0; j < n_.u; ++j) inputs[j] = straight_.result(j, registers, lanes, 0);
+    for (std::size_t k = 0; k < straight_states_.size(); ++k)
+      state[straight_states_[k]] = straight_.result(n_.u + k, registers, lanes, 0);
+  });
 }
 
 void GraphModel::observe(const Nodes& q) const noexcept {
   RHEC_ASSERT(q.count == 0 || (q.count > 0 && q.states), "where to observe");
   RHEC_ASSERT(q.count == 0 || !q.hessians || q.multipliers, "second derivatives are weighted by multipliers");
-  double* const registers = RHEC_STACK(stack_);
+  const int registers =
+      std::max(tapes_.outputs.register_count(), std::max(q.jacobians ? tapes_.output_jacobians.register_count() : 0,
+                                                         q.hessians ? tapes_.output_hessians.register_count() : 0));
+  with_memory(static_cast<std::size_t>(registers) * GraphSteps::lanes, [&](double* memory) {
+    for (int first = 0; first < q.count; first += GraphSteps::lanes)
+      observe(q, first, std::min(GraphSteps::lanes, q.count - first), memory);
+  });
+}
+
+void GraphModel::observe(const Nodes& q, int first, int count, double* registers) const noexcept {
   constexpr int lanes = GraphSteps::lanes;
-  for (int first = 0; first < q.count; first += lanes) {
-    const int count = std::min(lanes, q.count - first);
-    load_columns(q.states + static_cast<std::ptrdiff_t>(first) * n_.x, n_.x, count, registers);
-    const auto store = [&](const Tape& tape, int result, double* out, int size, int entry) {
-      for (int i = 0; i < count; ++i)
-        out[static_cast<std::ptrdiff_t>(first + i) * size + entry] = tape.result(result, registers, lanes, i);
-    };
-    if (q.outputs || q.jacobians) {
-      const Tape& tape = q.jacobians ? tapes_.output_jacobians : tapes_.outputs;
-      tape.run(*kernels_, registers, lanes, count);
-      for (int j = 0; q.outputs && j < n_.y; ++j) store(tape, j, q.outputs, n_.y, j);
-      for (int j = 0; q.jacobians && j < n_.y; ++j)
-        for (int c = 0; c < n_.x; ++c) store(tape, n_.y + j * n_.x + c, q.jacobians, n_.y * n_.x, c * n_.y + j);
-    }
-    if (!q.hessians) continue;
-    const int size = n_.x * n_.x;
-    std::fill_n(q.hessians + static_cast<std::ptrdiff_t>(first) * size, static_cast<std::ptrdiff_t>(count) * size, 0.0);
-    load_columns(q.states + static_cast<std::ptrdiff_t>(first) * n_.x, n_.x, count, registers);
-    load_columns(q.multipliers + static_cast<std::ptrdiff_t>(first) * n_.y, n_.y, count, registers + n_.x * lanes);
-    tapes_.output_hessians.run(*kernels_, registers, lanes, count);
-    for (const int entry : tapes_.curved) {
-      const int r = entry / n_.x, c = entry % n_.x;
-      store(tapes_.output_hessians, entry, q.hessians, size, r * n_.x + c);
-      store(tapes_.output_hessians, entry, q.hessians, size, c * n_.x + r);
-    }
+  const auto store = [&](const Tape& tape, int result, double* out, int size, int entry) {
+    for (int i = 0; i < count; ++i)
+      out[static_cast<std::ptrdiff_t>(first + i) * size + entry] = tape.result(result, registers, lanes, i);
+  };
+  load_columns(q.states + static_cast<std::ptrdiff_t>(first) * n_.x, n_.x, count, registers);
+  if (q.outputs || q.jacobians) {
+    const Tape& tape = q.jacobians ? tapes_.output_jacobians : tapes_.outputs;
+    tape.run(*kernels_, registers, lanes, count);
+    for (int j = 0; q.outputs && j < n_.y; ++j) store(tape, j, q.outputs, n_.y, j);
+    for (int j = 0; q.jacobians && j < n_.y; ++j)
+      for (int c = 0; c < n_.x; ++c) store(tape, n_.y + j * n_.x + c, q.jacobians, n_.y * n_.x, c * n_.y + j);
+  }
+  if (!q.hessians) return;
+  const int size = n_.x * n_.x;
+  std::fill_n(q.hessians + static_cast<std::ptrdiff_t>(first) * size, static_cast<std::ptrdiff_t>(count) * size, 0.0);
+  load_columns(q.states + static_cast<std::ptrdiff_t>(first) * n_.x, n_.x, count, registers);
+  load_columns(q.multipliers + static_cast<std::ptrdiff_t>(first) * n_.y, n_.y, count, registers + n_.x * lanes);
+  tapes_.output_hessians.run(*kernels_, registers, lanes, count);
+  for (const int entry : tapes_.curved) {
+    const int r = entry / n_.x, c = entry % n_.x;
+    store(tapes_.output_hessians, entry, q.hessians, size, r * n_.x + c);
+    store(tapes_.output_hessians, entry, q.hessians, size, c * n_.x + r);
   }
 }
 

@@ -10,13 +10,14 @@
 
 #include "rhec/core/formula/straight_code.hpp"
 #include "rhec/core/model/formula_copy.hpp"
+#include "staged_steps.hpp"
 
 namespace rhec {
 namespace {
 
-constexpr std::string_view names[] = {"step",    "step_jacobian",   "step_hessian",
-                                      "ramp",    "ramp_jacobian",   "ramp_hessian",
-                                      "outputs", "output_jacobian", "output_hessian"};
+constexpr std::string_view names[] = {"step",           "step_jacobian", "step_hessian",   "ramp",
+                                      "ramp_jacobian",  "ramp_hessian",  "outputs",        "output_jacobian",
+                                      "output_hessian", "rates",         "rates_jacobian", "rates_hessian"};
 
 std::vector<int> joined(std::vector<int> first, const std::vector<int>& second) {
   first.insert(first.end(), second.begin(), second.end());
@@ -47,14 +48,33 @@ class Hash {
   std::uint64_t value_ = 0xcbf29ce484222325u;
 };
 
+/// Whether a step that takes so many operations by its stages need not be made to see that it is too long as a whole:
+/// that takes no less than half of them.
+bool is_far_too_long(long staged_operations) { return staged_operations > 2L * ModelFunctions::longest_step; }
+
+/// The part above the diagonal becomes zero.
+void keep_lower(Graph& graph, NodeMatrix& matrix) {
+  const int zero = graph.constant(0.0);
+  for (int r = 0; r < matrix.rows; ++r)
+    for (int c = r + 1; c < matrix.columns; ++c) matrix.at(r, c) = zero;
+}
+
+std::vector<int> arguments_of(const VehicleGraph& vehicle) {
+  return joined(joined(vehicle.states, vehicle.parameters), vehicle.inputs);
+}
+
 }  // namespace
 
 std::string_view name_of(ModelFunction function) noexcept { return names[static_cast<std::size_t>(function)]; }
 
 const StepGraph& ModelFunctions::step(bool ramp) {
   std::optional<StepGraph>& of = ramp ? ramped_ : steady_;
-  if (!of) of = StepGraph::make(vehicle_, ramp);
-  return *of;
+  if (of) return *of;
+  const Operations& staged = staged_operations(ramp);
+  const StepCurvature curvature = is_far_too_long(staged[1])   ? StepCurvature::no_derivatives
+                                  : is_far_too_long(staged[2]) ? StepCurvature::no_hessian
+                                                               : StepCurvature::by_count;
+  return of.emplace(StepGraph::make(vehicle_, ramp, curvature));
 }
 
 const ModelFunctions::Outputs& ModelFunctions::outputs() {
@@ -64,10 +84,53 @@ const ModelFunctions::Outputs& ModelFunctions::outputs() {
   made.jacobian = jacobian(graph, vehicle_.outputs, vehicle_.states);
   for (std::size_t j = 0; j < vehicle_.outputs.size(); ++j) made.weights.push_back(graph.input("weight"));
   made.hessian = weighted_hessian(graph, vehicle_.outputs, made.weights, vehicle_.states);
-  const int zero = graph.constant(0.0);
-  for (int r = 0; r < made.hessian.rows; ++r)
-    for (int c = r + 1; c < made.hessian.columns; ++c) made.hessian.at(r, c) = zero;
+  keep_lower(graph, made.hessian);
   return outputs_.emplace(std::move(made));
+}
+
+const ModelFunctions::Rates& ModelFunctions::rates() {
+  if (rates_) return *rates_;
+  Graph& graph = *vehicle_.graph;
+  const std::vector<int> arguments = arguments_of(vehicle_);
+  Rates made;
+  made.jacobian = jacobian(graph, vehicle_.rates, arguments);
+  for (std::size_t r = 0; r < vehicle_.rates.size(); ++r) made.weights.push_back(graph.input("weight"));
+  made.hessian = weighted_hessian(graph, vehicle_.rates, made.weights, arguments);
+  keep_lower(graph, made.hessian);
+  return rates_.emplace(std::move(made));
+}
+
+/// What the chain rule over the stages takes. Of a copy: nodes of another order would change a step that is whole.
+const ModelFunctions::Operations& ModelFunctions::staged_operations(bool ramp) {
+  std::optional<Operations>& of = ramp ? staged_ramp_ : staged_;
+  if (of) return *of;
+  const VehicleGraph copy = formula_copy(vehicle_);
+  ModelFunctions functions(copy);
+  const auto tape = [&](ModelFunction function) {
+    return Tape(*copy.graph, functions.inputs(function), functions.results(function), copy.options);
+  };
+  const auto tapes = std::make_shared<const RatesTapes>(RatesTapes{.rates = tape(ModelFunction::rates),
+                                                                   .slopes = tape(ModelFunction::rates_jacobian),
+                                                                   .bends = tape(ModelFunction::rates_hessian)});
+  const auto count = [](const std::vector<int>& list) { return static_cast<int>(list.size()); };
+  const StagedSteps staged(tapes, count(copy.states), count(copy.parameters), count(copy.inputs), ramp);
+  return of.emplace(
+      Operations{staged.operations(false, false), staged.operations(true, false), staged.operations(true, true)});
+}
+
+bool ModelFunctions::is_whole(ModelFunction function) {
+  if (function > ModelFunction::ramp_hessian) return true;
+  const auto [found, is_new] = is_whole_.emplace(function, false);
+  if (!is_new) return found->second;
+  const bool ramp = is_ramp(function);
+  const int which = static_cast<int>(function) - static_cast<int>(ramp ? ModelFunction::ramp : ModelFunction::step);
+  if (which > 0 && !is_whole(static_cast<ModelFunction>(static_cast<int>(function) - 1))) return false;
+  if (is_far_too_long(staged_operations(ramp)[static_cast<std::size_t>(which)])) return false;
+  const std::vector<int> made = results(function);
+  const bool is_short =
+      vehicle_.graph->count_operations(made) <= longest_step ||
+      Tape(*vehicle_.graph, inputs(function), made, vehicle_.options).instruction_count() <= longest_step;
+  return is_whole_[function] = is_short;
 }
 
 std::vector<int> ModelFunctions::inputs(ModelFunction function) {
@@ -77,6 +140,11 @@ std::vector<int> ModelFunctions::inputs(ModelFunction function) {
       return vehicle_.states;
     case ModelFunction::output_hessian:
       return joined(vehicle_.states, outputs().weights);
+    case ModelFunction::rates:
+    case ModelFunction::rates_jacobian:
+      return arguments_of(vehicle_);
+    case ModelFunction::rates_hessian:
+      return joined(arguments_of(vehicle_), rates().weights);
     default:
       return step(is_ramp(function)).arguments();
   }
@@ -90,6 +158,12 @@ std::vector<int> ModelFunctions::results(ModelFunction function) {
       return joined(vehicle_.outputs, outputs().jacobian.nodes);
     case ModelFunction::output_hessian:
       return outputs().hessian.nodes;
+    case ModelFunction::rates:
+      return vehicle_.rates;
+    case ModelFunction::rates_jacobian:
+      return joined(vehicle_.rates, rates().jacobian.nodes);
+    case ModelFunction::rates_hessian:
+      return rates().hessian.nodes;
     default:
       break;
   }
@@ -133,10 +207,15 @@ ModelCode write_model_code(const VehicleGraph& given, const std::string& prefix,
   const VehicleGraph vehicle = formula_copy(given);  // as a model has it, so that the same is made of it
   ModelFunctions functions(vehicle);
   StraightWriter writer(*vehicle.graph, option_nodes(vehicle), most);
+  bool is_any_staged = false;
   for (int k = 0; k < static_cast<int>(ModelFunction::count); ++k) {
     const auto function = static_cast<ModelFunction>(k);
+    if (function >= ModelFunction::rates && !is_any_staged) break;
     // Without parameters there is nothing that could run along an interval.
-    if (is_ramp(function) && vehicle.parameters.empty())
+    const bool is_needed = !is_ramp(function) || !vehicle.parameters.empty();
+    const bool is_staged = is_needed && !functions.is_whole(function);
+    is_any_staged |= is_staged;
+    if (!is_needed || is_staged)
       writer.skip();
     else
       writer.add(std::string(name_of(function)), functions.inputs(function), functions.results(function));

@@ -36,7 +36,9 @@ class StepBuilder {
 
   StepGraph make(StepCurvature curvature) {
     take();
+    if (curvature == StepCurvature::no_derivatives) return std::move(step_);
     step_.jacobian = jacobian(graph_, step_.next, step_.z);
+    if (curvature == StepCurvature::no_hessian) return std::move(step_);
     if (curvature != StepCurvature::stages)
       step_.hessian = weighted_hessian(graph_, step_.next, step_.weights, step_.z);
     if (curvature != StepCurvature::whole) {
@@ -79,8 +81,21 @@ class StepBuilder {
     }
   }
 
-  /// sum_k S_k' (sum_r mu_k,r d2f_r(a_k)) S_k with S_k = d a_k / dz and the adjoints mu_k of f_k: SensitiveStep has the
-  /// equations.
+  /// The Hessian of w'F by adjoint second-order sensitivities. The step is
+  ///
+  ///     a_k = [x_k; p_k; u],  x_1 = x,  x_k = x + h c_k f(a_{k-1}),  F = x + h sum_k b_k f(a_k),
+  ///
+  /// with c = (0, 1/2, 1/2, 1) and b = (1/6, 1/3, 1/3, 1/6) for `reach` and `share`. The derivative mu_k of w'F by
+  /// f(a_k) follows backwards, since f(a_k) enters F and, by x_{k+1}, f(a_{k+1}):
+  ///
+  ///     mu_4 = h b_4 w,      mu_k = h b_k w + h c_{k+1} f_x(a_{k+1})' mu_{k+1}
+  ///
+  /// All other lines are linear, so that the curvature is that of f alone: with S_k = d a_k / dz,
+  ///
+  ///     d2(w'F)/dz2 = sum_k S_k' (sum_r mu_k,r d2f_r(a_k)) S_k
+  ///
+  /// (Griewank and Walther, Evaluating Derivatives, 2008, section 5.1; the adjoint scheme is that of Hager, Runge-Kutta
+  /// methods in optimal control and the transformed adjoint system, Numerische Mathematik 87, 2000).
   NodeMatrix by_stages() {
     const std::vector<int>& rates = vehicle_.rates;
     std::vector<int> mu;

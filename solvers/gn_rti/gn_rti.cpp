@@ -56,7 +56,9 @@ const OptionTable<GnRtiOptions>& GnRtiOptions::table() {
           .choice(
               "hessian", &GnRtiOptions::hessian,
               {{"gauss_newton", Curvature::gauss_newton}, {"exact", Curvature::exact}, {"auto", Curvature::automatic}},
-              "curvature of the quadratic programs; auto: Gauss-Newton for estimation, exact for control")
+              "curvature of the quadratic programs; auto: Gauss-Newton for estimation; for control exact, or in mode "
+              "rti "
+              "Gauss-Newton where that costs much less and does as well")
           .integer("iterations", &GnRtiOptions::iterations, "steps a sample in mode rti, at most", between(1, 1000))
           .number("residual", &GnRtiOptions::residual,
                   "KKT residual at which mode rti takes no further step in a sample; 0: it always takes all",
@@ -92,6 +94,7 @@ void GnRti::setup(const Ocp& ocp) {
   qp_solver_ = StageQpSolver(capacity);
   for (Iterate* iterate : {&step_, &trial_, &best_, &other_trial_}) *iterate = Iterate(capacity);
   scratch_.assign(ocp.scratch_size(), 0.0);
+  if (options_.hessian == Curvature::automatic && options_.mode == Mode::rti) choice_.setup(ocp);
   defects_.assign(static_cast<std::size_t>(capacity.intervals) * capacity.states, 0.0);
   reset();
 }
@@ -100,11 +103,13 @@ void GnRti::reset() noexcept {
   is_prepared_ = is_pending_ = false;
   if (linearisation_) linearisation_->forget();
   qp_solver_.reset();
+  choice_.reset();
 }
 
 Hessian GnRti::hessian() const noexcept {
   if (use_exact_ && ocp_->has_second_derivatives()) return Hessian::exact;
-  if (options_.hessian == Curvature::automatic) return ocp_->preferred_hessian();
+  if (options_.hessian == Curvature::automatic)
+    return options_.mode == Mode::rti ? choice_.now() : ocp_->preferred_hessian();
   return options_.hessian == Curvature::exact ? Hessian::exact : Hessian::gauss_newton;
 }
 
@@ -259,7 +264,9 @@ void GnRti::settle(Iterate& iterate, Report& report) noexcept {
     report.status = report.iterations > 0 ? Status::iteration_limit : Status::stalled;
     std::swap(iterate, step_);  // back to the iterate before the last step
     if (report.iterations == 0) give_up(iterate, report);
+    return;
   }
+  if (options_.hessian == Curvature::automatic) choice_.step(step_, iterate, report.kkt.largest(), scratch_);
 }
 
 /// If the iterate was assessed, its linearisation is already available.

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "rhec/core/config/options.hpp"
+#include "rhec/core/ocp/hessian_choice.hpp"
 #include "rhec/core/ocp/linearisation.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/stage_qp_solver.hpp"
@@ -17,7 +18,7 @@ enum class Mode {
 enum class Curvature {
   gauss_newton,
   exact,
-  automatic  ///< Gauss-Newton for estimation, exact for control
+  automatic  ///< Gauss-Newton for estimation; for control exact, or what HessianChoice says
 };
 
 struct GnRtiOptions {
@@ -82,6 +83,7 @@ class GnRti final : public Solver {
   bool is_prepared_ = false;
   bool is_pending_ = false;  ///< the last step is not assessed yet; `step_` holds the iterate before it
   bool use_exact_ = false;
+  HessianChoice choice_;  ///< of mode rti
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
   double asked_share_ = 1.0;  ///< share of the defects and violations that the step must remove
 };

@@ -1,5 +1,6 @@
 // A vehicle with some of its outputs: the chosen ones equal those of the full model, and everything else is unchanged.
 #include "rhec/core/model/chosen_outputs.hpp"
+#include "rhec/core/model/formula_model.hpp"
 
 #include <gmock/gmock.h>
 
@@ -85,6 +86,37 @@ TEST(ChosenOutputs, AskForNoMoreThanIsAskedFor) {
   EXPECT_THAT(jacobian, ElementsAre(0.0, 0.0, -1.0, 1.0, 0.0));
 }
 
+/// More outputs of more states than a stack should hold.
+template <class Scalar>
+struct Bus {
+  static constexpr int state_count = 90, input_count = 0, parameter_count = 0, output_count = 60;
+  void dynamics(const Scalar* x, const Scalar*, const Scalar*, Scalar* dxdt) const {
+    for (int i = 0; i < state_count; ++i) dxdt[i] = -x[i];
+  }
+  void outputs(const Scalar* x, Scalar* y) const {
+    for (int j = 0; j < output_count; ++j) y[j] = x[j] * x[j + 30];
+  }
+};
+
+TEST(ChosenOutputs, OfManyStates) {
+  ModelDescription about;
+  about.name = "bus";
+  about.states.resize(90);
+  about.outputs.resize(60);
+  const auto some = with_outputs(std::make_shared<FormulaModel<Bus>>(Bus<double>{}, about), {3, 59});
+  std::vector<double> states(2 * 90), outputs(2 * 2), jacobians(2 * 2 * 90);
+  for (std::size_t k = 0; k < states.size(); ++k) states[k] = 0.01 * static_cast<double>(k);
+  some->observe({.count = 2, .states = states.data(), .outputs = outputs.data(), .jacobians = jacobians.data()});
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double* x = states.data() + 90 * i;
+    EXPECT_EQ(outputs[2 * i], x[3] * x[33]);
+    EXPECT_EQ(outputs[2 * i + 1], x[59] * x[89]);
+    EXPECT_EQ(jacobians[(i * 90 + 33) * 2], x[3]);
+    EXPECT_EQ(jacobians[(i * 90 + 33) * 2 + 1], 0.0);
+    EXPECT_EQ(jacobians[(i * 90 + 59) * 2 + 1], x[89]);
+  }
+}
+
 TEST(ChosenOutputs, AreTheUsualOnesWhereNoneAreNamed) {
   EXPECT_THAT(names_of(host().make_model("bicycle_slip")->description().outputs),
               ElementsAre("x_gps", "y_gps", "delta"));
@@ -114,6 +146,8 @@ TEST(ChosenOutputs, LeaveTheVehicleAsItIs) {
   EXPECT_EQ(straight, same);
   EXPECT_EQ(all->instruction_sets(), some->instruction_sets());
   EXPECT_EQ(all->has_second_derivatives(), some->has_second_derivatives());
+  EXPECT_EQ(all->operations().hessians, some->operations().hessians);
+  EXPECT_GT(all->operations().hessians, all->operations().jacobians);
 }
 
 TEST(ChosenOutputs, MistakesAreNamedWithTheirPlace) {

@@ -106,21 +106,6 @@ TEST(GraphModel, RefusesADescriptionOfAnotherVehicle) {
                   "its formula has 4 states and its description 5");
 }
 
-/// So many states that their derivatives alone are too much for a stack.
-template <class Scalar>
-struct Wide {
-  static constexpr int state_count = 80, input_count = 1, parameter_count = 1, output_count = 1;
-  void dynamics(const Scalar*, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
-    for (int i = 0; i < state_count; ++i) dxdt[i] = u[0] * p[0];
-  }
-  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
-};
-
-TEST(GraphModel, RefusesWhatDoesNotFitOnTheStack) {
-  EXPECT_CONTAINS(error_of([] { GraphModel(trace<Wide>(), describe<Wide>()); }),
-                  "its step of 80 states with second derivatives takes");
-}
-
 /// Masses on springs in a row, whose last one is driven (Wirsching, Bock and Diehl 2006): 39 states with six masses.
 template <class Scalar>
 struct MassesOnSprings {

@@ -63,6 +63,69 @@ equations: |
   far = x + limit
 )";
 
+/// Pendulums in a row, each coupled to the next, the first one pushed: two states each.
+std::string pendulums(int count) {
+  std::string states, equations;
+  for (int k = 0; k < count; ++k) {
+    const std::string n = std::to_string(k);
+    states += "  a" + n + ":\n  w" + n + ":\n";
+    equations += "  a" + n + "' = w" + n + "\n  w" + n + "' = -sin(a" + n + ") - drag * w" + n;
+    if (k > 0) equations += " - 4 * (a" + n + " - a" + std::to_string(k - 1) + ")^3";
+    if (k + 1 < count) equations += " + 4 * (a" + std::to_string(k + 1) + " - a" + n + ")^3";
+    equations += k == 0 ? " + push * cos(a0)\n" : "\n";
+  }
+  return "states:\n" + states + "inputs:\n  push:\nparameters:\n  drag:\noutputs:\n  a0:\n  bent:\nequations: |\n" +
+         equations + "  bent = a0 * a1\n";
+}
+
+// Forty states and a hundred and twenty, with the interpreter alone: derivatives along a direction against differences.
+TEST(LoadVehicle, TakesManyStates) {
+  for (const int count : {20, 60}) {
+    SCOPED_TRACE(count);
+    const std::shared_ptr<Model> model = load(pendulums(count));
+    const int nx = model->state_count(), nz = nx + 2;
+    ASSERT_EQ(nx, 2 * count);
+    EXPECT_TRUE(model->has_second_derivatives());
+    const auto states = static_cast<std::size_t>(nx), all = static_cast<std::size_t>(nz);
+    const double h = 1e-5, duration = 0.1;
+    std::vector<double> weights(states), direction(all);
+    for (std::size_t c = 0; c < all; ++c) direction[c] = std::sin(1.3 * static_cast<double>(c) + 0.2);
+    for (std::size_t r = 0; r < states; ++r) weights[r] = std::cos(0.7 * static_cast<double>(r));
+    struct Results {
+      std::vector<double> next, jacobian, hessian;
+    };
+    const auto at = [&](double along) {
+      std::vector<double> x(states);
+      for (std::size_t r = 0; r < states; ++r) x[r] = 0.4 * std::sin(static_cast<double>(r)) + along * direction[r];
+      const double u = 0.3 + along * direction[states], p = 0.2 + along * direction[states + 1];
+      Results made{std::vector<double>(states), std::vector<double>(states * all), std::vector<double>(all * all)};
+      model->integrate({.count = 1,
+                        .states = x.data(),
+                        .inputs = &u,
+                        .parameters = &p,
+                        .durations = &duration,
+                        .next_states = made.next.data(),
+                        .jacobians = made.jacobian.data(),
+                        .multipliers = weights.data(),
+                        .hessians = made.hessian.data()});
+      return made;
+    };
+    const Results here = at(0.0), ahead = at(h), behind = at(-h);
+    for (std::size_t r = 0; r < states; ++r) {
+      double slope = 0.0;
+      for (std::size_t c = 0; c < all; ++c) slope += here.jacobian[c * states + r] * direction[c];
+      ASSERT_NEAR(slope, (ahead.next[r] - behind.next[r]) / (2 * h), 1e-8);
+    }
+    for (std::size_t d = 0; d < all; ++d) {
+      double bend = 0.0, expected = 0.0;
+      for (std::size_t c = 0; c < all; ++c) bend += here.hessian[d * all + c] * direction[c];
+      for (std::size_t r = 0; r < states; ++r)
+        expected += weights[r] * (ahead.jacobian[d * states + r] - behind.jacobian[d * states + r]) / (2 * h);
+      ASSERT_NEAR(bend, expected, 1e-7);
+    }
+  }
+}
+
 std::string with(const std::string& part, const std::string& other) {
   std::string text = cart;
   return text.replace(text.find(part), part.size(), other);

@@ -2,17 +2,24 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
+#include <memory>
+#include <vector>
 
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
+#include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/shift.hpp"
+#include "rhec/core/model/formula_model.hpp"
+#include "rhec/core/ocp/hessian_choice.hpp"
 #include "rhec/core/qp/riccati.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "support/allocations.hpp"
 #include "support/other_model.hpp"
 #include "support/random_problem.hpp"
+#include "support/wide_vehicle.hpp"
 
 namespace rhec {
 namespace gn_rti_test {
@@ -67,6 +74,59 @@ TEST(GnRti, AllocatesNothingAfterSetup) {
       }
     }
   }
+}
+
+template <class Scalar>
+struct Wide20 : testing::WideVehicle<20, Scalar> {};
+
+/// Twenty states that are to come to rest over a long horizon: small residuals, and a Hessian that takes many
+/// operations.
+RhcProblem wide_control() {
+  RhcProblem::Setup setup;
+  setup.max_intervals = 40;
+  setup.state_weights.assign(20, 1.0);
+  setup.terminal_weights.assign(20, 1.0);
+  setup.input_weights.assign(2, 1.0);
+  RhcProblem problem(std::make_shared<FormulaModel<Wide20>>(Wide20<double>{}, testing::about_wide_vehicle(20)), setup);
+  problem.set_intervals(40);
+  for (int i = 0; i < 40; ++i) problem.set_duration(i, 0.05);
+  std::fill_n(problem.given_state(), 20, 0.05);
+  std::fill_n(problem.given_parameters(), 2, 0.3);
+  return problem;
+}
+
+// Exact at first; once its steps have shown that it gains nothing, the steps are those of Gauss-Newton.
+TEST(GnRti, TakesGaussNewtonWhereTheExactHessianGainsLittle) {
+  RhcProblem problem = wide_control();
+  std::vector<double> scratch(problem.scratch_size());
+  problem.finish(scratch);
+  const auto of_auto = gn_rti("{}"), exact = gn_rti("{hessian: exact}"),
+             gauss_newton = gn_rti("{hessian: gauss_newton}");
+  for (const auto& solver : {of_auto, exact, gauss_newton}) solver->setup(problem);
+  Iterate point(problem.capacity());
+  roll_out(problem, point, scratch);
+  ASSERT_TRUE(is_usable(of_auto->solve(point).status));
+  const auto is_the_step_of = [&](Solver& other) {
+    Iterate same = point;
+    other.prepare(same);
+    other.solve(same);
+    of_auto->prepare(point);
+    EXPECT_EQ(of_auto->solve(point).status, Status::step_taken);
+    bool is_same = true;
+    for (int i = 0; i < 40; ++i)
+      for (int j = 0; j < 2; ++j) is_same &= same.control(i)[j] == point.control(i)[j];
+    return is_same;
+  };
+  int exact_steps = 0, gauss_newton_steps = 0;
+  for (int k = 0; k < 30; ++k) {
+    problem.given_state()[k % 20] += 0.01;
+    problem.finish(scratch);
+    if (k == 0) exact_steps += is_the_step_of(*exact);
+    const bool is_exact = k < HessianChoice::trial_steps - 1;
+    (is_exact ? exact_steps : gauss_newton_steps) += is_the_step_of(is_exact ? *exact : *gauss_newton);
+  }
+  EXPECT_EQ(exact_steps, HessianChoice::trial_steps);
+  EXPECT_EQ(gauss_newton_steps, 30 - (HessianChoice::trial_steps - 1));
 }
 
 TEST(GnRti, AStepIsTheSamePreparedOrNot) {

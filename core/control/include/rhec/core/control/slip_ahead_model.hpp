@@ -29,6 +29,7 @@ class RHEC_EXPORT SlipAheadModel final : public Model {
   void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept override {
     vehicle_->straight_motion(ground_speed, p, state, inputs);
   }
+  Operations operations() const noexcept override { return vehicle_->operations(); }
   bool has_second_derivatives() const noexcept override { return vehicle_->has_second_derivatives(); }
 
  private:

@@ -84,6 +84,13 @@ struct RowPlaces {
   std::ptrdiff_t step, row_step;
 };
 
+/// A part of a product of sparse matrices whose entries are registers: to[k] += factor * from[k] for `count` registers
+/// that follow each other. Without a factor, they are set to zero.
+struct SparseProduct {
+  std::uint32_t factor = 0, from = 0, to = 0, count = 0;
+  static constexpr std::uint32_t none = ~std::uint32_t{0};
+};
+
 /// How a tape is run on one instruction set. A register is an array of `lanes` doubles, one for each row (stage) that
 /// is evaluated; lanes is 8, 16 or 32. Registers are aligned to 64 bytes. Rows beyond `count` repeat the last one.
 struct TapeKernels {
@@ -97,6 +104,8 @@ struct TapeKernels {
   /// Registers become `rows` rows of `eights` groups each, for the first `count` stages.
   void (*store_rows)(const StoredEight* groups, int rows, int eights, const double* registers, int lanes,
                      const RowPlaces& places, int count);
+  /// Sparse products one after the other, on registers of eight lanes.
+  void (*add_products)(std::span<const SparseProduct> products, double* registers);
 };
 
 /// Those that this machine can run, slowest first.

@@ -52,6 +52,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   const double* control_lower(int i) const noexcept override { return at(lower_, i) + structure_.capacity().states; }
   const double* control_upper(int i) const noexcept override { return at(upper_, i) + structure_.capacity().states; }
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
+  /// From the operations of the model (Model::operations) and of a Riccati recursion.
+  StepOperations step_operations() const noexcept override;
   std::size_t scratch_size() const noexcept override;
   void mark_dynamics(int interval, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
   double evaluate_stages(const Iterate& iterate, double* defects, double* stage_costs,

@@ -132,6 +132,13 @@ class RHEC_EXPORT Model {
   /// in m/s (e.g. one wheel speed per side) overrides this.
   virtual void straight_motion(double ground_speed, const double* p, double* state, double* inputs) const noexcept;
 
+  /// What one Runge-Kutta step takes for one interval, in operations on eight numbers at a time; zeros where that is
+  /// not known. Each comes with what stands before it.
+  struct Operations {
+    double values = 0.0, jacobians = 0.0, hessians = 0.0;
+  };
+  virtual Operations operations() const noexcept { return {}; }
+
   /// False if `hessians` are not available; such a model can be used with Gauss-Newton only.
   virtual bool has_second_derivatives() const noexcept = 0;
 

@@ -48,7 +48,13 @@ class RHEC_EXPORT Ocp {
   /// Whether the cost is a sum of squares with small residuals at the solution, so that full Gauss-Newton steps
   /// converge. True for estimation, false for control, where a reference may be out of reach.
   virtual bool has_small_residuals() const noexcept { return false; }
-  /// The Hessian that QPs of this problem should use.
+  /// What a step over the longest horizon takes with either Hessian, in operations on eight numbers at a time; zeros
+  /// where that is not known.
+  struct StepOperations {
+    double gauss_newton = 0.0, exact = 0.0;
+  };
+  virtual StepOperations step_operations() const noexcept { return {}; }
+  /// The Hessian that QPs of this problem should use; HessianChoice looks at both.
   Hessian preferred_hessian() const noexcept {
     return has_second_derivatives() && !has_small_residuals() ? Hessian::exact : Hessian::gauss_newton;
   }

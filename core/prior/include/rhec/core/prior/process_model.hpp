@@ -40,6 +40,7 @@ class RHEC_EXPORT ProcessModel final : public Model {
   void observe(const Nodes& request) const noexcept override;
   /// Of the vehicle, with the parameters at rest.
   void rates(const double* x, const double* u, const double* p, double* dxdt) const noexcept override;
+  Operations operations() const noexcept override { return vehicle_->operations(); }
   bool has_second_derivatives() const noexcept override { return vehicle_->has_second_derivatives(); }
 
  private:
