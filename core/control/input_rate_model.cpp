@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -37,6 +38,50 @@ ModelDescription with_rates(const ModelDescription& vehicle, const std::vector<i
   return about;
 }
 
+/// Moves parts of rows of derivatives with respect to [x; p; u] to where they are with respect to [x; c; p; v]. The
+/// tail is what follows x.
+struct AnyShape {
+  int of_states, of_held, of_tail;
+  int states() const { return of_states; }
+  int held() const { return of_held; }
+  int tail() const { return of_tail; }
+  void move_tail(const double* from, double* to) const {
+    const int used = of_states + of_held + of_tail;
+    std::copy_backward(from + of_states, from + of_states + of_tail, to + used);
+    std::fill(to + used, to + padded(used), 0.0);
+  }
+  /// From [x; c; p; v] to [x; p; v].
+  void gather(const double* from, double* to) const {
+    std::copy_n(from, of_states, to);
+    std::copy_n(from + of_states + of_held, of_tail, to + of_states);
+    std::fill(to + of_states + of_tail, to + padded(of_states + of_tail), 0.0);
+  }
+  void copy_states(const double* from, double* to) const { std::copy_n(from, of_states, to); }
+  void copy_row(const double* from, double* to) const { std::copy_n(from, padded(of_states + of_held + of_tail), to); }
+};
+
+/// The same with sizes that the compiler knows, so that no loop remains.
+template <int known_states, int known_held, int known_tail>
+struct KnownShape {
+  static constexpr int used = known_states + known_held + known_tail, wide = padded(used);
+  static constexpr int states() { return known_states; }
+  static constexpr int held() { return known_held; }
+  static constexpr int tail() { return known_tail; }
+  static void move_tail(const double* from, double* to) {
+    std::array<double, wide - known_states - known_held> moved{};
+    std::memcpy(moved.data(), from + known_states, known_tail * sizeof(double));
+    std::memcpy(to + known_states + known_held, moved.data(), sizeof moved);
+  }
+  static void gather(const double* from, double* to) {
+    std::array<double, padded(known_states + known_tail)> all{};
+    std::memcpy(all.data(), from, known_states * sizeof(double));
+    std::memcpy(all.data() + known_states, from + known_states + known_held, known_tail * sizeof(double));
+    std::memcpy(to, all.data(), sizeof all);
+  }
+  static void copy_states(const double* from, double* to) { std::memcpy(to, from, known_states * sizeof(double)); }
+  static void copy_row(const double* from, double* to) { std::memcpy(to, from, wide * sizeof(double)); }
+};
+
 }  // namespace
 
 std::string rate_name(const Variable& input) { return input.name + "_rate"; }
@@ -69,22 +114,30 @@ std::size_t InputRateModel::rows_scratch(int count) const noexcept {
   return std::max(Model::rows_scratch(count), vehicle_->rows_scratch(count) + static_cast<std::size_t>(count) * nz + 7);
 }
 
-/// The vehicle writes its rows to where they are wanted. Then they are widened in place: [x; p; u] becomes
-/// [x; c; p; u].
+/// The bicycle with a steering rate is worth being compiled for.
 void InputRateModel::integrate_rows(const IntervalRows& request) const noexcept {
   const int nx = vehicle_->state_count(), nc = static_cast<int>(rated_.size());
-  const int np = parameter_count(), nu = input_count(), tail = np + nu + (request.ramp ? np : 0);
-  const int narrow = padded(nx + tail);
+  const int tail = parameter_count() + input_count() + (request.ramp ? parameter_count() : 0);
+  if (nx == 4 && nc == 1 && tail == 4)
+    integrate_rows_of(request, KnownShape<4, 1, 4>());
+  else
+    integrate_rows_of(request, AnyShape{nx, nc, tail});
+}
+
+/// The vehicle writes its rows to where they are wanted. Then they are widened in place: [x; p; u] becomes
+/// [x; c; p; v].
+template <class Shape>
+void InputRateModel::integrate_rows_of(const IntervalRows& request, const Shape& shape) const noexcept {
+  const int nx = shape.states(), nc = shape.held(), first_input = nx + parameter_count();
+  const int narrow = padded(nx + shape.tail());
   Scratch memory(request.scratch);
   double* const z = memory.take(static_cast<std::ptrdiff_t>(request.count) * narrow);
   for (int i = 0; i < request.count; ++i) {
     const double* from = request.z + i * request.z_step;
     double* const to = z + static_cast<std::ptrdiff_t>(i) * narrow;
-    std::copy_n(from, nx, to);
-    std::copy_n(from + nx + nc, tail, to + nx);
-    std::fill(to + nx + tail, to + narrow, 0.0);
+    shape.gather(from, to);
     for (int k = 0; k < nc; ++k) {
-      double& input = to[nx + np + rated_[k]];
+      double& input = to[first_input + rated_[k]];
       input = from[nx + k] + request.durations[i] * input;
     }
   }
@@ -93,61 +146,57 @@ void InputRateModel::integrate_rows(const IntervalRows& request) const noexcept 
   inner.z_step = narrow;
   inner.scratch = memory.rest();
   vehicle_->integrate_rows(inner);
+  for (int i = 0; i < request.count && request.next_states; ++i) {
+    double* const next = request.next_states + i * request.next_step;
+    for (int k = 0; k < nc; ++k) next[nx + k] = z[static_cast<std::ptrdiff_t>(i) * narrow + first_input + rated_[k]];
+    std::fill(next + nx + nc, next + padded(nx + nc), 0.0);
+  }
+  widen(request, shape);
+}
+
+/// Widens the derivatives.
+template <class Shape>
+void InputRateModel::widen(const IntervalRows& request, const Shape& shape) const noexcept {
+  const int nx = shape.states(), nc = shape.held(), first = nx + nc + parameter_count(), used = nx + nc + shape.tail();
+  const auto split = [&](double* row, double duration) {
+    for (int k = 0; k < nc; ++k) {
+      double& of_input = row[first + rated_[k]];
+      row[nx + k] = of_input;
+      of_input *= duration;
+    }
+  };
   for (int i = 0; i < request.count; ++i) {
-    if (request.next_states) {
-      double* const next = request.next_states + i * request.next_step;
-      for (int k = 0; k < nc; ++k) next[nx + k] = z[static_cast<std::ptrdiff_t>(i) * narrow + nx + np + rated_[k]];
-      std::fill(next + nx + nc, next + padded(nx + nc), 0.0);
+    const double duration = request.durations[i];
+    if (request.jacobians) {
+      double* const rows = request.jacobians + i * request.jacobian_step;
+      for (int r = 0; r < nx; ++r) {
+        double* const at = rows + r * request.jacobian_row;
+        shape.move_tail(at, at);
+        split(at, duration);
+      }
+      for (int k = 0; k < nc; ++k) {
+        double* const at = rows + (nx + k) * request.jacobian_row;
+        std::fill_n(at, padded(used), 0.0);
+        at[nx + k] = 1.0;
+        at[first + rated_[k]] = duration;
+      }
     }
-    if (request.jacobians)
-      widen_jacobian(request.jacobians + i * request.jacobian_step, request.jacobian_row, tail, request.durations[i]);
-    if (request.hessians)
-      widen_hessian(request.hessians + i * request.hessian_step, request.hessian_row, tail, request.durations[i]);
-  }
-}
-
-/// What a row of derivatives with respect to [x; p; u] becomes with respect to [x; c; p; v].
-void InputRateModel::widen_jacobian(double* rows, std::ptrdiff_t row, int tail, double duration) const noexcept {
-  const int nx = vehicle_->state_count(), nc = static_cast<int>(rated_.size()), first = nx + nc + parameter_count();
-  const int used = nx + nc + tail, wide = padded(used);
-  for (int r = 0; r < nx; ++r) {
-    double* const at = rows + r * row;
-    std::copy_backward(at + nx, at + nx + tail, at + used);
+    if (!request.hessians) continue;
+    double* const rows = request.hessians + i * request.hessian_step;
+    // From the last row to the first, since rows after x move down.
+    for (int r = nx + shape.tail() - 1; r >= 0; --r) {
+      const double* const from = rows + r * request.hessian_row;
+      double* const to = rows + (r < nx ? r : r + nc) * request.hessian_row;
+      shape.move_tail(from, to);
+      if (r >= nx) shape.copy_states(from, to);
+      split(to, duration);
+    }
     for (int k = 0; k < nc; ++k) {
-      double& of_input = at[first + rated_[k]];
-      at[nx + k] = of_input;
-      of_input *= duration;
+      double *const of_input = rows + (first + rated_[k]) * request.hessian_row,
+                    *held = rows + (nx + k) * request.hessian_row;
+      shape.copy_row(of_input, held);
+      for (int c = 0; c < used; ++c) of_input[c] *= duration;
     }
-    std::fill(at + used, at + wide, 0.0);
-  }
-  for (int k = 0; k < nc; ++k) {
-    double* const at = rows + (nx + k) * row;
-    std::fill_n(at, wide, 0.0);
-    at[nx + k] = 1.0;
-    at[first + rated_[k]] = duration;
-  }
-}
-
-void InputRateModel::widen_hessian(double* rows, std::ptrdiff_t row, int tail, double duration) const noexcept {
-  const int nx = vehicle_->state_count(), nc = static_cast<int>(rated_.size()), first = nx + nc + parameter_count();
-  const int used = nx + nc + tail, wide = padded(used);
-  // From the last row to the first, since rows after x move down.
-  for (int r = nx + tail - 1; r >= 0; --r) {
-    const double* const from = rows + r * row;
-    double* const to = rows + (r < nx ? r : r + nc) * row;
-    std::copy_backward(from + nx, from + nx + tail, to + used);
-    if (to != from) std::copy_n(from, nx, to);
-    for (int k = 0; k < nc; ++k) {
-      double& of_input = to[first + rated_[k]];
-      to[nx + k] = of_input;
-      of_input *= duration;
-    }
-    std::fill(to + used, to + wide, 0.0);
-  }
-  for (int k = 0; k < nc; ++k) {
-    double* const of_input = rows + (first + rated_[k]) * row;
-    std::copy_n(of_input, wide, rows + (nx + k) * row);
-    for (int c = 0; c < used; ++c) of_input[c] *= duration;
   }
 }
 

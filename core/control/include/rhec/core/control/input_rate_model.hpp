@@ -39,8 +39,10 @@ class RHEC_EXPORT InputRateModel final : public Model {
 
  private:
   void write_inputs(const double* held, const double* given, double duration, double* inputs) const noexcept;
-  void widen_jacobian(double* rows, std::ptrdiff_t row, int tail, double duration) const noexcept;
-  void widen_hessian(double* rows, std::ptrdiff_t row, int tail, double duration) const noexcept;
+  template <class Shape>
+  void integrate_rows_of(const IntervalRows& request, const Shape& shape) const noexcept;
+  template <class Shape>
+  void widen(const IntervalRows& request, const Shape& shape) const noexcept;
 
   std::shared_ptr<const Model> vehicle_;
   std::vector<int> rated_;
