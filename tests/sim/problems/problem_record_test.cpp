@@ -283,7 +283,7 @@ TEST(ProblemRecord, OptionsKeepTheirMeaning) {
   const ProblemRecord read = read_problem(problem_line(record), "dump.jsonl", 3);
   EXPECT_EQ(json_text(read.model_options), json_text(options));
   EXPECT_EQ(read.origin, record.origin);
-  EXPECT_EQ(read.version, 2);
+  EXPECT_EQ(read.version, problem_format_version);
   EXPECT_EQ(read.step, 8);
   EXPECT_FALSE(read.guess.has_value());
 }
