@@ -205,6 +205,10 @@ const std::vector<Drive>& usual_drives() {
   static const std::string zigzag = RHEC_SOURCE_DIRECTORY "/scenarios/zigzag.yaml";
   static const std::vector<Drive> drives = {
       {"figure8/fhb", figure8, {"path.laps=1", "blocking.kappa=" + full}},
+      {"figure8/rates",
+       figure8,
+       {"path.laps=1", "blocking.kappa=" + full, "controller.weights.stage.u2=0.1",
+        "controller.weights.rates.u2=0.02"}},
       {"figure8/sbo_5_3", figure8, {"path.laps=1", "blocking.kappa=" + blocks}},
       {"figure8/sbo_5_3_both", figure8, {"path.laps=1", "blocking.kappa=" + blocks, "blocking.mu=" + blocks}},
       {"zigzag/fhb", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4", "blocking.kappa=" + full}},

@@ -9,13 +9,70 @@
 
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/infinity.hpp"
+#include "rhec/core/control/input_rate_model.hpp"
 #include "rhec/core/control/slip_ahead_model.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 
 namespace rhec {
 namespace {
 
-RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Setup& setup) {
+/// The problem's state that holds an input whose rate has a weight or bounds, or -1.
+std::vector<int> find_held_states(const Model& model, const Controller::Setup& setup) {
+  const ModelDescription& about = model.description();
+  const std::size_t nu = about.inputs.size();
+  for (const auto* each : {&setup.rate_weights, &setup.rate_lower, &setup.rate_upper})
+    if (!each->empty() && each->size() != nu)
+      throw Error(fmt::format("controller: rates: {} numbers; expected {}, one for each input", each->size(), nu));
+  std::vector<int> held(nu, -1);
+  auto next = static_cast<int>(about.states.size());
+  for (std::size_t j = 0; j < nu; ++j) {
+    const double weight = setup.rate_weights.empty() ? 0.0 : setup.rate_weights[j];
+    const double lower = setup.rate_lower.empty() ? -infinity : setup.rate_lower[j];
+    const double upper = setup.rate_upper.empty() ? infinity : setup.rate_upper[j];
+    if (!(weight >= 0.0) || !std::isfinite(weight))
+      throw Error(fmt::format("controller: the weight {} of the rate of '{}'; expected a finite number of at least 0",
+                              weight, about.inputs[j].name));
+    if (!(lower <= 0.0) || !(upper >= 0.0))
+      throw Error(
+          fmt::format("controller: bounds [{}, {}] of the rate of '{}'; expected 0 between them, since an input "
+                      "must be able to stay as it is",
+                      lower, upper, about.inputs[j].name));
+    if (weight > 0.0 || std::isfinite(lower) || std::isfinite(upper)) held[j] = next++;
+  }
+  return held;
+}
+
+/// Moves weights, bounds and blocks of inputs that are states to where the problem of an InputRateModel has them.
+RhcProblem::Setup with_rates(RhcProblem::Setup problem, const Controller::Setup& setup, const std::vector<int>& held,
+                             const ModelDescription& about) {
+  const auto bounds_of = [](std::vector<double>& lower, std::vector<double>& upper,
+                            const std::vector<Variable>& variables) {
+    if (lower.empty())
+      for (const Variable& variable : variables) lower.push_back(variable.lower);
+    if (upper.empty())
+      for (const Variable& variable : variables) upper.push_back(variable.upper);
+  };
+  bounds_of(problem.state_lower, problem.state_upper, about.states);
+  bounds_of(problem.input_lower, problem.input_upper, about.inputs);
+  for (std::size_t j = 0; j < held.size(); ++j) {
+    if (held[j] < 0) continue;
+    const int input = static_cast<int>(j);
+    problem.rates.push_back({input, held[j]});
+    problem.state_weights.push_back(problem.input_weights[j]);
+    problem.terminal_weights.push_back(problem.input_weights[j]);
+    problem.state_lower.push_back(problem.input_lower[j]);
+    problem.state_upper.push_back(problem.input_upper[j]);
+    problem.input_weights[j] = setup.rate_weights.empty() ? 0.0 : setup.rate_weights[j];
+    problem.input_lower[j] = setup.rate_lower.empty() ? -infinity : setup.rate_lower[j];
+    problem.input_upper[j] = setup.rate_upper.empty() ? infinity : setup.rate_upper[j];
+    std::erase(problem.blocked_inputs, input);
+  }
+  return problem;
+}
+
+RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Setup& setup,
+                        const std::vector<int>& held) {
   const Roles& roles = model->description().roles;
   if (roles.position_x < 0 || roles.position_y < 0)
     throw Error(
@@ -30,16 +87,23 @@ RhcProblem make_problem(std::shared_ptr<const Model> model, const Controller::Se
   if (!(setup.interval > 0.0))
     throw Error(fmt::format("controller: interval {} s; expected a positive number", setup.interval));
   if (setup.ahead) model = std::make_shared<SlipAheadModel>(std::move(model));
-  return {std::move(model), setup.problem};
+  std::vector<int> rated;
+  for (std::size_t j = 0; j < held.size(); ++j)
+    if (held[j] >= 0) rated.push_back(static_cast<int>(j));
+  if (rated.empty()) return {std::move(model), setup.problem};
+  RhcProblem::Setup problem = with_rates(setup.problem, setup, held, model->description());
+  return {std::make_shared<InputRateModel>(std::move(model), std::move(rated)), std::move(problem)};
 }
 
 }  // namespace
 
 Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Path path, Setup setup)
     : setup_(std::move(setup)),
+      vehicle_(std::move(model)),
+      held_state_(find_held_states(*vehicle_, setup_)),
       path_(std::move(path)),
       follower_(path_, setup_.search),
-      problem_(make_problem(std::move(model), setup_)),
+      problem_(make_problem(vehicle_, setup_, held_state_)),
       solver_(std::move(solver)),
       shifter_(problem_),
       point_(problem_.capacity()) {
@@ -49,16 +113,21 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   for (int i = 0; i < N; ++i) problem_.set_duration(i, setup_.interval);
   // Move blocking is counted from the start of the horizon, so it is the same in every sample.
   for (std::size_t b = 0; b < setup_.blockings.size(); ++b) {
+    const int input = setup_.problem.blocked_inputs[b];
     setup_.blockings[b]->starts({0, N}, begins_.data());
-    problem_.set_blocks(setup_.problem.blocked_inputs[b], begins_.data());
+    problem_.set_blocks(input, begins_.data());
+    // Within a block an input that is a state does not change.
+    for (int i = 1; held_state_[input] >= 0 && i < N; ++i)
+      if (!begins_[i]) problem_.input_lower(i, input) = problem_.input_upper(i, input) = 0.0;
   }
   scratch_.assign(problem_.scratch_size(), 0.0);
   problem_.finish(scratch_);
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
     throw Error("controller: the solver cannot take this problem: " + reason);
   solver_->setup(problem_);
-  const Model& vehicle = problem_.model();
+  const Model& vehicle = *vehicle_;
   command_.inputs.assign(vehicle.input_count(), 0.0);
+  last_inputs_.assign(vehicle.input_count(), std::numeric_limits<double>::quiet_NaN());
   const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count());
   for (std::vector<double>* motion : {&straight_, &slipless_, &largest_}) motion->assign(nx + nu, 0.0);
   nominal_parameters_ = nominal_values(vehicle.description().parameters);
@@ -77,11 +146,39 @@ void Controller::reset() noexcept {
   has_plan_ = prepared_ = false;
   is_finished_ = true;
   fallbacks_ = 0;
+  std::fill(last_inputs_.begin(), last_inputs_.end(), std::numeric_limits<double>::quiet_NaN());
+}
+
+void Controller::applied(const double* inputs) noexcept {
+  for (std::size_t j = 0; j < last_inputs_.size(); ++j)
+    if (!std::isnan(inputs[j])) last_inputs_[j] = inputs[j];
+}
+
+void Controller::plan_inputs(int interval, double* inputs) const noexcept {
+  problem_.structure().inputs_on(point_, interval, inputs);
+  for (std::size_t j = 0; j < held_state_.size(); ++j)
+    if (const int held = held_state_[j]; held >= 0)
+      inputs[j] = point_.state(interval)[held] + problem_.duration(interval) * inputs[j];
+}
+
+double Controller::input_reference(int interval, int input) const noexcept {
+  const int held = held_state_[input];
+  return held < 0 ? problem_.input_reference(interval)[input] : problem_.state_reference(interval + 1)[held];
+}
+
+double Controller::input_lower(int input) const noexcept {
+  const int held = held_state_[input];
+  return held < 0 ? problem_.input_lower(0, input) : problem_.setup().state_lower[held];
+}
+
+double Controller::input_upper(int input) const noexcept {
+  const int held = held_state_[input];
+  return held < 0 ? problem_.input_upper(0, input) : problem_.setup().state_upper[held];
 }
 
 /// Writes the speeds among the states, then the inputs.
 void Controller::go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept {
-  const Model& vehicle = problem_.model();
+  const Model& vehicle = *vehicle_;
   std::fill(motion.begin(), motion.end(), 0.0);
   vehicle.straight_motion(ground_speed, parameters, motion.data(), motion.data() + vehicle.state_count());
 }
@@ -101,7 +198,7 @@ void Controller::choose_straight_motion(double ground_speed, const double* param
 
 /// References and bounds of the horizon that starts at an arc length of the path.
 void Controller::set_reference(double arc_length, const double* parameters) noexcept {
-  const Model& vehicle = problem_.model();
+  const Model& vehicle = *vehicle_;
   const Roles& roles = vehicle.description().roles;
   const int N = problem_.intervals(), nx = vehicle.state_count(), nu = vehicle.input_count();
   int segment = reference_segment_;
@@ -116,14 +213,27 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
         ahead_parameters_[j] = parameters[j] + (setup_.ahead ? problem_.interval_data(i)[j] : 0.0);
       choose_straight_motion(ground_speed, ahead_parameters_.data());
       for (int j = 0; j < nu; ++j)
-        straight_[nx + j] =
-            std::min(std::max(straight_[nx + j], problem_.input_lower(0, j)), problem_.input_upper(0, j));
+        straight_[nx + j] = std::min(std::max(straight_[nx + j], input_lower(j)), input_upper(j));
     }
     const PathPoint target = path_.point_at(arc_length + i * distance, segment);
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
-    if (i < N) std::copy_n(straight_.data() + nx, nu, problem_.input_reference(i));
+    for (int j = 0; j < nu && i < N; ++j) {
+      // The inputs on an interval are states at its end.
+      const int held = held_state_[j];
+      (held < 0 ? problem_.input_reference(i)[j] : problem_.state_reference(i + 1)[held]) = straight_[nx + j];
+    }
+  }
+}
+
+/// The inputs applied last, which are given states where their rates count.
+void Controller::write_held_inputs() noexcept {
+  for (std::size_t j = 0; j < held_state_.size(); ++j) {
+    const int held = held_state_[j];
+    if (held < 0) continue;
+    const double last = last_inputs_[j];
+    problem_.given_state()[held] = std::isfinite(last) ? last : problem_.state_reference(1)[held];
   }
 }
 
@@ -147,11 +257,15 @@ void Controller::bound_speed(double most) noexcept {
   if (!std::isfinite(most) || most == bounded_speed_) return;
   bounded_speed_ = most;
   go_straight(most, nominal_parameters_.data(), largest_);
-  const int nx = problem_.model().state_count(), nu = problem_.model().input_count();
+  const int nx = vehicle_->state_count(), nu = vehicle_->input_count();
   for (int i = 0; i < problem_.intervals(); ++i) {
     for (int j = 0; j < nu; ++j) {
       const double largest = largest_[nx + j];
       if (largest == 0.0) continue;
+      if (held_state_[j] >= 0) {
+        problem_.set_state_bounds(held_state_[j], std::min(0.0, largest), std::max(0.0, largest));
+        continue;
+      }
       problem_.input_lower(i, j) = std::min(0.0, largest);
       problem_.input_upper(i, j) = std::max(0.0, largest);
     }
@@ -160,9 +274,19 @@ void Controller::bound_speed(double most) noexcept {
 
 /// Cold start: the reference inputs, rolled out.
 void Controller::start_cold() noexcept {
-  const int nu = problem_.model().input_count();
+  const int nu = vehicle_->input_count();
   for (int i = 0; i < problem_.intervals(); ++i)
     std::copy_n(problem_.input_reference(i), nu, scratch_.data() + static_cast<std::ptrdiff_t>(i) * nu);
+  for (int j = 0; j < nu; ++j) {
+    if (held_state_[j] < 0) continue;
+    double held = problem_.given_state()[held_state_[j]];
+    for (int i = 0; i < problem_.intervals(); ++i) {
+      const double dt = problem_.duration(i), wanted = (input_reference(i, j) - held) / dt;
+      double& rate = scratch_[static_cast<std::size_t>(i) * nu + j];
+      rate = std::min(std::max(wanted, problem_.input_lower(i, j)), problem_.input_upper(i, j));
+      held += dt * rate;
+    }
+  }
   problem_.structure().set_decisions(point_, scratch_.data(), problem_.given_parameters());
   point_.clear_multipliers();
   roll_out(problem_, point_, scratch_);
@@ -172,7 +296,7 @@ void Controller::start_cold() noexcept {
 bool Controller::find_plan(Clock::time_point deadline) noexcept {
   command_.report = solver_->feedback(point_, deadline);
   if (!is_usable(command_.report.status)) return false;
-  problem_.structure().inputs_on(point_, 0, command_.inputs.data());
+  plan_inputs(0, command_.inputs.data());
   // No solver should return such a command, and none must reach the robot.
   const bool is_number =
       std::all_of(command_.inputs.begin(), command_.inputs.end(), [](double value) { return std::isfinite(value); });
@@ -180,16 +304,35 @@ bool Controller::find_plan(Clock::time_point deadline) noexcept {
   return is_number;
 }
 
+/// What is applied keeps the bounds, whatever a solver says.
+void Controller::keep_within_bounds() noexcept {
+  for (std::size_t k = 0; k < command_.inputs.size(); ++k) {
+    const int j = static_cast<int>(k), held = held_state_[k];
+    double& input = command_.inputs[k];
+    double lower = problem_.input_lower(0, j), upper = problem_.input_upper(0, j);
+    if (held >= 0) {
+      // Bounds of rates come first: an input that was applied beyond its bounds returns as fast as it may.
+      const double last = problem_.given_state()[held], dt = problem_.duration(0);
+      const double least = last + dt * lower, most = last + dt * upper;
+      lower = std::min(std::max(problem_.setup().state_lower[held], least), most);
+      upper = std::max(std::min(problem_.setup().state_upper[held], most), least);
+    }
+    input = std::min(std::max(input, lower), upper);
+    last_inputs_[k] = input;
+  }
+}
+
 const Controller::Command& Controller::control(const Estimate& estimate, Clock::time_point deadline) noexcept {
   finish();
   const Roles& roles = problem_.model().description().roles;
-  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count();
+  const int nx = vehicle_->state_count(), np = vehicle_->parameter_count();
   follower_.advance(estimate.state[roles.position_x], estimate.state[roles.position_y]);
   std::copy_n(estimate.state.data(), nx, problem_.given_state());
   std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
   // What is prepared is linearised with the slip that was expected then.
   if (!prepared_) look_ahead(follower_.arc_length(), estimate.parameters.data());
   set_reference(follower_.arc_length(), estimate.parameters.data());
+  write_held_inputs();
   command_.relaxed = problem_.finish(scratch_) > 0;
   bool from_plan = has_plan_;
   if (!has_plan_) {
@@ -212,11 +355,9 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   if (!is_found) {
     // Continue the last plan, which the shifter still has; without one, go straight ahead along the path.
     if (!from_plan || !shifter_.apply(1, problem_, point_)) start_cold();
-    problem_.structure().inputs_on(point_, 0, command_.inputs.data());
+    plan_inputs(0, command_.inputs.data());
   }
-  for (std::size_t j = 0; j < command_.inputs.size(); ++j)
-    command_.inputs[j] = std::min(std::max(command_.inputs[j], problem_.input_lower(0, static_cast<int>(j))),
-                                  problem_.input_upper(0, static_cast<int>(j)));
+  keep_within_bounds();
   RHEC_ASSERT(all_finite(command_.inputs), "a command is finite");
   is_finished_ = false;
   return command_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 
 #include "interval_dynamics.hpp"
@@ -124,10 +125,13 @@ void HorizonLinearisation::remember(const Iterate& iterate, int first) noexcept 
               starts_.data());
 }
 
-/// Extends the cache by one interval behind the horizon, with the last inputs.
+/// Extends the cache by one interval behind the horizon, with the inputs that a guess goes on with.
 void HorizonLinearisation::extend_horizon() noexcept {
   const int N = known_intervals_, states = qp_.capacity().states, lifted = problem_.structure_.lifted_count();
   std::copy_n(row(rows_, N - 1) + states, qp_.capacity().controls, row(rows_, N) + states);
+  if (const double* behind = problem_.inputs_behind())
+    for (int j = 0; j < problem_.nu(); ++j)
+      if (!std::isnan(behind[j])) row(rows_, N)[states + j] = behind[j];
   std::copy_n(row(costates_, N), qp_.stride(), row(costates_, N + 1));
   durations_[N] = durations_[N - 1];
   const auto data_count = problem_.at_data(1);

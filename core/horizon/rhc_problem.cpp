@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "checks.hpp"
 #include "cost_view.hpp"
@@ -28,6 +31,7 @@ RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup)
   fill_default_bounds("state bounds", setup_.state_lower, setup_.state_upper, about.states, true);
   fill_default_bounds("input bounds", setup_.input_lower, setup_.input_upper, about.inputs, true);
   const auto nodes = static_cast<std::size_t>(setup_.max_intervals) + 1;
+  check_rates();
   initial_.assign(capacity().states, 0.0);
   reference_.assign(nodes * stride(), 0.0);
   for (auto* v : {&stage_weights_, &terminal_weights_, &periods_, &inverse_periods_}) v->assign(stride(), 0.0);
@@ -46,6 +50,27 @@ RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup)
   }
 }
 
+void RhcProblem::check_rates() {
+  if (setup_.rates.empty()) return;
+  behind_.assign(nu(), std::numeric_limits<double>::quiet_NaN());
+  for (const Rate& rate : setup_.rates) {
+    if (rate.input < 0 || rate.input >= nu() || rate.state < 0 || rate.state >= nx())
+      throw Error(
+          fmt::format("rates: input {} as the rate of state {}; expected an input of 0 .. {} and a state of 0 .. {}",
+                      rate.input, rate.state, nu() - 1, nx() - 1));
+    if (structure().lifted_of_input(rate.input) >= 0)
+      throw Error(fmt::format("rates: input {} is a rate and blocked; bound it to 0 where it must not change instead",
+                              rate.input));
+    behind_[rate.input] = 0.0;
+  }
+}
+
+void RhcProblem::set_state_bounds(int state, double lower, double upper) noexcept {
+  has_new_state_bounds_ |= setup_.state_lower[state] != lower || setup_.state_upper[state] != upper;
+  setup_.state_lower[state] = lower;
+  setup_.state_upper[state] = upper;
+}
+
 void RhcProblem::set_blocks(int input, const std::uint8_t* begins) noexcept {
   const int lifted = structure().lifted_of_input(input);
   if (lifted < 0) return;
@@ -59,11 +84,15 @@ void RhcProblem::take_data(const RhcProblem& from) noexcept {
   input_upper_ = from.input_upper_;
   reference_ = from.reference_;
   moved_bounds_ = from.moved_bounds_;
+  setup_.state_lower = from.setup_.state_lower;
+  setup_.state_upper = from.setup_.state_upper;
+  has_new_state_bounds_ = from.has_new_state_bounds_;
 }
 
 int RhcProblem::finish(std::span<double> scratch) noexcept {
   // State bounds stay as written, unless one was relaxed.
-  if (changing_structure().finish() || moved_bounds_ > 0) write_state_bounds();
+  if (changing_structure().finish() || moved_bounds_ > 0 || has_new_state_bounds_) write_state_bounds();
+  has_new_state_bounds_ = false;
   write_input_bounds();
   moved_bounds_ = relax_unreachable_bounds(scratch);
   return moved_bounds_;
@@ -135,8 +164,22 @@ int RhcProblem::relax_unreachable_bounds(std::span<double> scratch) noexcept {
     while (end < intervals() && !all_change(end)) ++end;
     return end;
   };
-  const auto step = [&](double* state, int interval) {
+  // Rates lead to the same values as soon as they may, rather than being that large themselves.
+  const auto choose_rates = [&](int candidate, const double* state, int interval) {
+    for (const Rate& rate : setup_.rates) {
+      int corner = candidate;
+      for (int k = 0; k < rate.input; ++k) corner /= 3;
+      const double lower = setup_.state_lower[rate.state], upper = setup_.state_upper[rate.state];
+      const double middle = std::min(std::max(0.0, lower), upper);
+      const double wanted = corner % 3 == 0 ? lower : corner % 3 == 1 ? upper : middle;
+      const double change = std::isfinite(wanted) ? wanted - state[rate.state] : 0.0;
+      u[rate.input] = std::min(std::max(change / duration(interval), input_lower(interval, rate.input)),
+                               input_upper(interval, rate.input));
+    }
+  };
+  const auto step = [&](int candidate, double* state, int interval) {
     const double seconds = duration(interval);
+    choose_rates(candidate, state, interval);
     model().integrate({.count = 1,
                        .states = state,
                        .inputs = u,
@@ -163,14 +206,14 @@ int RhcProblem::relax_unreachable_bounds(std::span<double> scratch) noexcept {
         choose(candidate, first);
         double sum = 0.0;
         for (int i = first; i < end; ++i) {
-          step(trial, i);
+          step(candidate, trial, i);
           sum += violation(trial);
         }
         if (sum < least) least = sum, best = candidate;
       }
       choose(best, first);
       for (int i = first; i < end; ++i) {
-        step(x, i);
+        step(best, x, i);
         if (violation(x) <= 0.0) continue;
         // A small slack keeps the feasible set from being a single point.
         const double slack = 1e-6 * (1.0 + std::abs(x[j]));

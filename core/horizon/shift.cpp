@@ -195,7 +195,7 @@ void GuessShifter::move_lifted_bounds(int lifted, int steps, const HorizonProble
 void GuessShifter::add_intervals(int steps, HorizonProblem& to, Iterate& guess) noexcept {
   for (int i = intervals_ - steps; i < to.intervals(); ++i) {
     double* w = guess.control(i);
-    const double* known = to.known_inputs(i);
+    const double* known = to.known_inputs(i) ? to.known_inputs(i) : to.inputs_behind();
     for (int j = 0; j < free_count_; ++j) {
       const double measured = known ? known[j] : std::nan("");
       w[j] = clipped(std::isnan(measured) ? kept_.control(intervals_ - 1)[j] : measured, to.control_lower(i)[j],

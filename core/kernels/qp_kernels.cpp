@@ -13,11 +13,11 @@ inline int parts_of(const QpView& view, int stage) {
   return (view.states + controls + lane_count - 1) / lane_count;
 }
 
-/// For rows with a known number of used registers and states (0: unknown), and AB with at least `known_moved` rows that
-/// are not rows of the identity.
-template <int known_parts, int known_states, int known_moved>
+/// For rows with a known number of used registers and states (0: unknown) and a known stride, and AB with at least
+/// `known_moved` rows that are not rows of the identity.
+template <int known_parts, int known_states, int known_moved, int known_stride = known_parts* lane_count>
 KktParts kkt_of(const QpView& view) {
-  const long stride = known_parts > 0 ? known_parts * lane_count : view.stride;
+  const long stride = known_stride > 0 ? known_stride : view.stride;
   const int states = known_states > 0 ? known_states : view.states,
             state_parts = (states + lane_count - 1) / lane_count;
   Lanes stationarity{}, defect{}, complementarity{}, highest_lower{}, lowest_upper{};
@@ -83,6 +83,10 @@ inline bool is_full(const QpView& view, int most_carried) {
 template <int known_states, int most_carried>
 KktParts kkt_of_states(const QpView& view) {
   if (is_full(view, most_carried)) {
+    // Two controls beside the states of a row that is longer than both.
+    constexpr int used = (known_states + 2 + lane_count - 1) / lane_count;
+    if (known_states > 6 && view.stride == 16 && view.controls == 2)
+      return kkt_of<used, known_states, known_states - most_carried, 16>(view);
     if (view.stride == lane_count) return kkt_of<1, known_states, known_states - most_carried>(view);
     if (view.stride == 2 * lane_count) return kkt_of<2, known_states, known_states - most_carried>(view);
   }

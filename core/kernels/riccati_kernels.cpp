@@ -22,7 +22,9 @@ struct Shape {
   static constexpr bool is_known = state_count > 0;
   static constexpr bool has_pair = is_known && control_count == 2;
   static constexpr int most_columns = eights * 8;
-  static constexpr int registers = most_columns / lane_count;
+  /// Rows of a known length need no registers for their padding, which stays zero in memory.
+  static constexpr int registers =
+      is_known ? (state_count + control_count + lane_count - 1) / lane_count : most_columns / lane_count;
   static constexpr int state_registers = is_known ? (state_count + lane_count - 1) / lane_count : registers;
   static constexpr int most_states = is_known ? state_count : (most_columns < 32 ? most_columns : 32);
   using R = Row<registers>;
@@ -517,8 +519,9 @@ inline void sensitivities_stage_forward(const RiccatiView& view, int i, int last
 
 /// Calls `function` with the type of a stage's shape: one of the sizes for which kernels are compiled, or a general
 /// one. The compiled sizes are those of estimators and controllers with two inputs: vehicles with three to five states
-/// plus parameters, between the starts of blocks, where the parameters are carried; and the most common ones where
-/// blocks start. The row length has no other effect: a QP gives the same bits with another capacity.
+/// plus parameters, between the starts of blocks, where the parameters are carried; that of a controller with the rate
+/// of one input; and the most common ones where blocks start. The row length has no other effect: a QP gives the same
+/// bits with another capacity.
 template <bool is_written_out, class Function>
 inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
   const int states = view.states, controls = view.control_counts[i], carried = view.identity_counts[i];
@@ -533,6 +536,7 @@ inline auto with_shape(const RiccatiView& view, int i, const Function& function)
       if (states == 5 && carried == 2) return function.template operator()<Shape<1, 5, 2, true, 2, 16>>();
       if (states == 6 && carried == 2) return function.template operator()<Shape<1, 6, 2, true, 2, 16>>();
       if (states == 6) return function.template operator()<Shape<1, 6, 2, true, 0, 16>>();
+      if (states == 7 && carried == 2) return function.template operator()<Shape<2, 7, 2, is_written_out, 2, 16>>();
       if (states == 7 && carried == 3) return function.template operator()<Shape<2, 7, 2, is_written_out, 3, 16>>();
       if (states == 8 && carried == 3) return function.template operator()<Shape<2, 8, 2, is_written_out, 3, 16>>();
     }

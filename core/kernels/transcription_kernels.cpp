@@ -106,8 +106,9 @@ double write_tracking(const CostView& view, const TrackingView& tracked, int fir
 }
 
 double write_tracking(const CostView& view, const TrackingView& tracked, int first, int last) {
-  return view.stride == 8 ? write_tracking<8>(view, tracked, first, last)
-                          : write_tracking<0>(view, tracked, first, last);
+  if (view.stride == 8) return write_tracking<8>(view, tracked, first, last);
+  if (view.stride == 16) return write_tracking<16>(view, tracked, first, last);
+  return write_tracking<0>(view, tracked, first, last);
 }
 
 /// For rows of a known stride, or any (0).

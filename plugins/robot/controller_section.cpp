@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/plugins/robot/bounds_section.hpp"
 #include "rhec/plugins/robot/by_name.hpp"
 #include "rhec/plugins/robot/integration.hpp"
@@ -55,13 +56,32 @@ const NumbersByName& terminal_by_name() {
   return map;
 }
 
+const NumbersByName& rates_by_name() {
+  static const NumbersByName map("weights: rates", {at_least(0.0)},
+                                 {{"INPUT", &ModelDescription::inputs, constant_default(0.0),
+                                   "of the squared rate of change [unit of the input / s] on an interval, from the "
+                                   "input on the interval before; on the first one from the input applied last"}});
+  return map;
+}
+
+const ByName<BoundsValue>& rate_bounds_by_name() {
+  static const ByName<BoundsValue> map(
+      "rate_bounds", {},
+      {{"INPUT",
+        &ModelDescription::inputs,
+        {"none", [](const ModelDescription&, const Variable&, std::size_t) { return std::pair(-infinity, infinity); }},
+        "[lower, upper] of the rate of change from interval to interval [unit of the input / s], 0 between them"}});
+  return map;
+}
+
 struct WeightOptions {
-  Settings stage, terminal;
+  Settings stage, terminal, rates;
 
   static const OptionTable<WeightOptions>& table() {
     static const auto rows = OptionTable<WeightOptions>()
                                  .map("stage", &WeightOptions::stage, stage_by_name().rows())
-                                 .map("terminal", &WeightOptions::terminal, terminal_by_name().rows());
+                                 .map("terminal", &WeightOptions::terminal, terminal_by_name().rows())
+                                 .map("rates", &WeightOptions::rates, rates_by_name().rows());
     return rows;
   }
 };
@@ -95,6 +115,7 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
                   at_least(0.0))
           .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", at_least(0.0))
           .map("weights", &C::weights, WeightOptions::table().schema())
+          .map("rate_bounds", &C::rate_bounds, rate_bounds_by_name().rows())
           .map("blocking", &C::blocking, {blocking_row()})
           .map("solver", &C::solver,
                {default_solver.row(
@@ -120,9 +141,9 @@ OptionSection ControllerSection::documentation() {
 
 PluginChoice ControllerSection::solver_choice() const { return default_solver.choice(options_.solver); }
 
-RhcProblem::Setup ControllerSection::problem(double top_speed) const {
+void ControllerSection::add_problem(Controller::Setup& setup, double top_speed) const {
   const ModelDescription& about = context_->about;
-  RhcProblem::Setup problem;
+  RhcProblem::Setup& problem = setup.problem;
   problem.max_intervals = options_.horizon;
   std::vector<double> parameters;
   for (const Variable& parameter : about.parameters) parameters.push_back(middle_value(parameter));
@@ -133,11 +154,19 @@ RhcProblem::Setup ControllerSection::problem(double top_speed) const {
   problem.state_weights.assign(stage.begin(), first_input);
   problem.input_weights.assign(first_input, stage.end());
   problem.terminal_weights = terminal_by_name().read(weights.terminal, about);
+  setup.rate_weights = rates_by_name().read(weights.rates, about);
   problem.state_lower = lower_bounds_of(about.states);
   problem.state_upper = upper_bounds_of(about.states);
   problem.input_lower = lower_bounds_of(about.inputs);
   problem.input_upper = upper_bounds_of(about.inputs);
-  return problem;
+  for (const auto& [lower, upper] : rate_bounds_by_name().read(options_.rate_bounds, about)) {
+    if (!(lower <= 0.0 && upper >= 0.0))
+      throw options_.rate_bounds.find(about.inputs[setup.rate_lower.size()].name)
+          ->error(fmt::format("found [{}, {}], expected 0 between them: an input must be able to stay as it is", lower,
+                              upper));
+    setup.rate_lower.push_back(lower);
+    setup.rate_upper.push_back(upper);
+  }
 }
 
 void ControllerSection::add_blockings(Controller::Setup& setup) const {
@@ -160,7 +189,7 @@ void ControllerSection::add_blockings(Controller::Setup& setup) const {
 std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks,
                                                     std::shared_ptr<const SlipAhead> ahead) const {
   Controller::Setup setup;
-  setup.problem = problem(path.top_speed());
+  add_problem(setup, path.top_speed());
   setup.interval = context_->step;
   setup.reference_speed = options_.reference_speed;
   setup.least_speed_factor = options_.least_speed_factor;

@@ -293,8 +293,7 @@ struct HorizonLog::Parts {
     for (int j = 0; j < nx; ++j) line.column(N + 1, state_decimals[j], [&](int i) { return plan.state(i)[j]; });
     line.close(']');
     row.resize(static_cast<std::size_t>(N) * nu);
-    for (int i = 0; i < N; ++i)
-      problem.structure().inputs_on(plan, i, row.data() + static_cast<std::ptrdiff_t>(i) * nu);
+    for (int i = 0; i < N; ++i) controller.plan_inputs(i, row.data() + static_cast<std::ptrdiff_t>(i) * nu);
     line.key("input");
     line.open('[');
     for (int j = 0; j < nu; ++j) line.column(N, input_decimals[j], [&](int i) { return row[i * nu + j]; });
@@ -310,12 +309,12 @@ struct HorizonLog::Parts {
     line.key("input_reference");
     line.open('[');
     for (int j = 0; j < nu; ++j)
-      line.column(N, input_decimals[j], [&](int i) { return problem.input_reference(i)[j]; });
+      line.column(N, input_decimals[j], [&](int i) { return controller.input_reference(i, j); });
     line.close(']');
     line.key("lower");
-    line.column(nu, 9, [&](int j) { return problem.input_lower(0, j); });
+    line.column(nu, 9, [&](int j) { return controller.input_lower(j); });
     line.key("upper");
-    line.column(nu, 9, [&](int j) { return problem.input_upper(0, j); });
+    line.column(nu, 9, [&](int j) { return controller.input_upper(j); });
     line.key("status");
     line.word(name_of(command.report.status));
     line.key("fallback");

@@ -117,11 +117,15 @@ void LineValue::allow(const std::vector<std::string>& known) const {
       throw Error(at_key(*where_, child(key), "unknown key; " + did_you_mean(key, known)));
 }
 
-void LineValue::allow(std::vector<std::string> known, const std::vector<std::string>& since_2, int version) const {
-  for (const std::string& key : since_2)
-    if (version < 2 && has(key))
-      throw Error(at_key(*where_, child(key), "is a key of version 2; add \"version\": 2 to the line"));
-  known.insert(known.end(), since_2.begin(), since_2.end());
+void LineValue::allow(std::vector<std::string> known, const std::map<int, std::vector<std::string>>& added,
+                      int version) const {
+  for (const auto& [since, keys] : added) {
+    for (const std::string& key : keys)
+      if (version < since && has(key))
+        throw Error(at_key(*where_, child(key),
+                           fmt::format("is a key of version {0}; add \"version\": {0} to the line", since)));
+    known.insert(known.end(), keys.begin(), keys.end());
+  }
   allow(known);
 }
 

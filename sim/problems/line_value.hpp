@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -49,8 +50,8 @@ class LineValue {
   bool has(const std::string& key) const { return map().contains(key); }
   /// Throws Error for any other key.
   void allow(const std::vector<std::string>& known) const;
-  /// The same, with the keys added in version 2.
-  void allow(std::vector<std::string> known, const std::vector<std::string>& since_2, int version) const;
+  /// The same, with the keys that later versions added, by version.
+  void allow(std::vector<std::string> known, const std::map<int, std::vector<std::string>>& added, int version) const;
   template <class Each>
   void for_each(const Each& each) const {
     for (const auto& [key, value] : map().items()) each(key, LineValue(value, child(key), *where_));

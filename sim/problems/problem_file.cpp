@@ -187,7 +187,7 @@ ProblemRecord read_problem(std::string_view text, const std::string& file, int l
   const ProblemFormat* format = find_problem_format(kind);
   if (!format) throw line["problem"].mismatch(fmt::format("\"{}\"", fmt::join(problem_kinds(), "\" or \"")));
   record.kind = kind;
-  line.allow(format->traits().keys, format->traits().since_2, record.version);
+  line.allow(format->traits().keys, format->traits().added, record.version);
   record.model = line["model"]["name"].text();
   record.model_options = Settings::map({file, line_number});
   line["model"].for_each([&](const std::string& key, const LineValue& value) {

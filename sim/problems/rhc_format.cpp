@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "format_parts.hpp"
+#include "rhec/core/control/input_rate_model.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
 
 namespace rhec::sim {
@@ -16,6 +17,42 @@ std::map<std::string, double> read_named_weights(const LineValue& map) {
     weights[name] = weight.number();
   });
   return weights;
+}
+
+/// The vehicle with inputs as states, if the record has some.
+std::shared_ptr<const Model> with_rates(const ProblemRecord& record, std::shared_ptr<const Model> model) {
+  if (record.rates.empty()) return model;
+  const ModelNames names(record, *model);
+  const std::vector<Variable>& inputs = model->description().inputs;
+  std::vector<int> rated;
+  for (const std::string& name : record.rates) {
+    const int input = ModelNames::index_of(inputs, name);
+    if (input < 0)
+      throw names.error("rates", fmt::format("model '{}' has no input '{}'; {}", model->description().name, name,
+                                             did_you_mean(name, names_of(inputs))));
+    if (!rated.empty() && input <= rated.back())
+      throw names.error("rates", fmt::format("expected each input once, in the model's order: {}",
+                                             fmt::join(names_of(inputs), ", ")));
+    rated.push_back(input);
+  }
+  return std::make_shared<InputRateModel>(std::move(model), std::move(rated));
+}
+
+/// The vehicle's inputs whose rates are inputs of a model.
+std::vector<std::string> rated_inputs(const Model& model) {
+  std::vector<std::string> names;
+  if (const auto* with = dynamic_cast<const InputRateModel*>(&model))
+    for (const int input : with->rated()) names.push_back(with->vehicle().description().inputs[input].name);
+  return names;
+}
+
+/// Which inputs of a model are rates, and of which states.
+std::vector<RhcProblem::Rate> rates_of(const Model& model) {
+  std::vector<RhcProblem::Rate> rates;
+  if (const auto* with = dynamic_cast<const InputRateModel*>(&model))
+    for (const int input : with->rated())
+      rates.push_back({input, with->vehicle().state_count() + static_cast<int>(rates.size())});
+  return rates;
 }
 
 RhcProblem::Setup control_setup_of(const ProblemRecord& record, const Model& model) {
@@ -54,6 +91,7 @@ RhcProblem::Setup control_setup_of(const ProblemRecord& record, const Model& mod
   for (const auto& [name, starts] : record.block_starts)
     setup.blocked_inputs.push_back(ModelNames::index_of(about.inputs, name));
   std::sort(setup.blocked_inputs.begin(), setup.blocked_inputs.end());
+  setup.rates = rates_of(model);
   return setup;
 }
 
@@ -95,7 +133,8 @@ bool fits(const RhcProblem::Setup& wanted, const RhcProblem::Setup& there) {
   return wanted.max_intervals <= there.max_intervals && wanted.substeps == there.substeps &&
          wanted.state_weights == there.state_weights && wanted.input_weights == there.input_weights &&
          wanted.terminal_weights == there.terminal_weights && wanted.state_lower == there.state_lower &&
-         wanted.state_upper == there.state_upper && wanted.blocked_inputs == there.blocked_inputs;
+         wanted.state_upper == there.state_upper && wanted.blocked_inputs == there.blocked_inputs &&
+         wanted.rates == there.rates;
 }
 
 class RhcFormat final : public ProblemFormat {
@@ -104,7 +143,7 @@ class RhcFormat final : public ProblemFormat {
       : ProblemFormat({.kind = "rhc",
                        .keys = {"version", "id", "problem", "model", "horizon", "initial_state", "parameters",
                                 "reference", "weights", "bounds", "block_starts"},
-                       .since_2 = {"guess", "origin"},
+                       .added = {{2, {"guess", "origin"}}, {3, {"rates"}}},
                        .has_interval_bounds = true}) {}
 
   void read(const LineValue& line, ProblemRecord& record) const override {
@@ -117,6 +156,8 @@ class RhcFormat final : public ProblemFormat {
     record.stage_weights = read_named_weights(weights["stage"]);
     record.terminal_weights = read_named_weights(weights["terminal"]);
     if (line.has("block_starts")) read_block_starts(line["block_starts"], record);
+    if (!line.has("rates")) return;
+    for (const LineValue& name : line["rates"].items("a list of inputs")) record.rates.push_back(name.text());
   }
 
   void write(const ProblemRecord& record, Json& line) const override {
@@ -125,6 +166,7 @@ class RhcFormat final : public ProblemFormat {
     line["reference"] = map_of(record.reference, list_of);
     line["weights"] = {{"stage", map_of(record.stage_weights, number_or_null)},
                        {"terminal", map_of(record.terminal_weights, number_or_null)}};
+    if (!record.rates.empty()) line["rates"] = record.rates;
     if (!record.block_starts.empty())
       line["block_starts"] = map_of(record.block_starts, [](const std::vector<int>& starts) { return Json(starts); });
   }
@@ -136,6 +178,12 @@ class RhcFormat final : public ProblemFormat {
     const RhcProblem::Setup& setup = problem.setup();
     const int nx = static_cast<int>(about.states.size()), nu = static_cast<int>(about.inputs.size());
     const int np = static_cast<int>(about.parameters.size());
+    record.rates = rated_inputs(problem.model());
+    if (setup.rates != rates_of(problem.model()))
+      throw Error(fmt::format(
+          "{}: the problem's rates are not those of its model; give RhcProblem::Setup::rates the inputs and "
+          "states of an InputRateModel, in their order",
+          record.id));
     record.initial_state = copied(problem.initial_state(), nx);
     record.parameters = copied(problem.initial_state() + nx, np);
     for (int j = 0; j < nx; ++j) {
@@ -179,6 +227,7 @@ class RhcFormat final : public ProblemFormat {
 
   std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                         int max_intervals, std::vector<int>) const override {
+    model = with_rates(record, std::move(model));
     RhcProblem::Setup setup = control_setup_of(record, *model);
     setup.max_intervals = std::max({record.intervals, max_intervals, 1});
     auto problem = std::make_unique<RhcProblem>(std::move(model), std::move(setup));
@@ -189,6 +238,7 @@ class RhcFormat final : public ProblemFormat {
 
   bool refill(const ProblemRecord& record, HorizonProblem& filled) const override {
     auto& problem = as_kind<RhcProblem>(filled);
+    if (rated_inputs(problem.model()) != record.rates) return false;
     if (!fits(control_setup_of(record, problem.model()), problem.setup())) return false;
     fill(record, problem);
     check_guess(record, problem);

@@ -244,7 +244,7 @@ class RheFormat final : public ProblemFormat {
             {.kind = "rhe",
              .keys = {"version", "id", "problem", "model", "horizon", "arrival", "outputs", "inputs", "weights",
                       "bounds", "block_starts"},
-             .since_2 = {"robust", "neighbour_variance", "transition", "guess", "origin", "processes", "data"},
+             .added = {{2, {"robust", "neighbour_variance", "transition", "guess", "origin", "processes", "data"}}},
              .looks_back = true,
              .may_be_empty = true,
              .finds_parameters = true}) {}

@@ -231,7 +231,8 @@ std::vector<Tunable> tunables_of(const Host& host, const LogScenario& scenario, 
 std::vector<Tunable> controller_tunables(const Robot& robot, const Settings& settings) {
   const ModelDescription& about = robot.model()->description();
   std::vector<Tunable> all;
-  for (const std::string section : {"controller.weights.stage", "controller.weights.terminal"}) {
+  for (const std::string section :
+       {"controller.weights.stage", "controller.weights.terminal", "controller.weights.rates"}) {
     const Settings* weights = settings.find_path(section);
     if (!weights) continue;
     for (const auto* variables : {&about.states, &about.inputs}) {

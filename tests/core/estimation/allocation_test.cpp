@@ -37,6 +37,7 @@ struct Options {
   const char* blocking = "{size: 5, overlap: 3}";
   const char* solver = "{mode: rti}";
   int heading_starts = 1;
+  bool rates = false;  ///< of inputs, which the controller weighs and bounds
 };
 
 std::unique_ptr<EstimationMethod> make_method(const std::shared_ptr<Model>& model, const Options& options) {
@@ -109,6 +110,11 @@ long allocations_in_the_loop(const Options& options) {
   setup.problem.state_weights = {1.0, 1.0, 0.0, 0.0};
   setup.problem.input_weights = {5.0, 5.0};
   setup.problem.terminal_weights = {10.0, 10.0, 0.0, 0.0};
+  if (options.rates) {
+    setup.rate_weights = {0.0, 0.02};
+    setup.rate_lower = {-3.0, -2.0};
+    setup.rate_upper = {3.0, 2.0};
+  }
   sim::FigureEight path;
   path.speed = 4.0;
   setup.ahead = estimator.slip_ahead();
@@ -184,6 +190,11 @@ TEST(EstimationAllocation, NoneInTheClosedLoopOfAWindowWithABank) {
 TEST(EstimationAllocation, NoneWherePlacesAreRemembered) {
   EXPECT_EQ(allocations_in_the_loop({.bank = true, .place = true}), 0);
   EXPECT_EQ(allocations_in_the_loop({.priors = true, .place = true}), 0);
+}
+
+TEST(EstimationAllocation, NoneWhereRatesOfInputsCount) {
+  EXPECT_EQ(allocations_in_the_loop({.rates = true}), 0);
+  EXPECT_EQ(allocations_in_the_loop({.bank = true, .place = true, .rates = true}), 0);
 }
 
 TEST(EstimationAllocation, NoneWhereTheHeadingIsSearchedFor) {

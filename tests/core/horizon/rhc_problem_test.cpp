@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/control/input_rate_model.hpp"
 #include "support/cart.hpp"
 #include "support/error_of.hpp"
 
@@ -116,6 +117,68 @@ TEST(RhcProblem, MovesBoundsThatAreOutOfReachNoFurtherThanItMust) {
   problem->given_state()[1] = 1.0;
   EXPECT_EQ(problem->finish(scratch), 0);
   EXPECT_EQ(problem->state_upper(1)[1], 5.0) << "they are back where they were";
+}
+
+/// The cart with its acceleration as a third state.
+std::unique_ptr<RhcProblem> cart_with_rates(double largest_rate) {
+  RhcProblem::Setup setup;
+  setup.max_intervals = 6;
+  setup.state_weights = {2.0, 0.5, 0.3};
+  setup.terminal_weights = {7.0, 0.0, 0.3};
+  setup.input_weights = {0.2};
+  setup.input_lower = {-largest_rate};
+  setup.input_upper = {largest_rate};
+  setup.rates = {{0, 2}};
+  auto problem = std::make_unique<RhcProblem>(std::make_shared<InputRateModel>(cart(), std::vector{0}), setup);
+  problem->set_intervals(6);
+  for (int i = 0; i < 6; ++i) problem->set_duration(i, 0.2);
+  problem->given_parameters()[1] = 1.0;
+  return problem;
+}
+
+TEST(RhcProblem, HeldInputsReturnToTheirBoundsAsFastAsTheirRatesMay) {
+  const auto slow = cart_with_rates(2.0), free = cart_with_rates(infinity);
+  std::vector<double> scratch(slow->scratch_size());
+  for (RhcProblem* problem : {slow.get(), free.get()}) problem->given_state()[2] = 1.9;  // up to 1 is allowed
+  EXPECT_EQ(slow->finish(scratch), 2);
+  for (int i = 1; i <= 6; ++i)
+    EXPECT_NEAR(slow->state_upper(i)[2], std::max(1.0, 1.9 - 0.4 * i), 1e-5) << "2 m/s3 are 0.4 m/s2 an interval";
+  EXPECT_EQ(free->finish(scratch), 0) << "one that may jump is back at once";
+  // A state that only a held input can bring back: the speed, with the strongest brake.
+  for (RhcProblem* problem : {slow.get(), free.get()}) {
+    problem->given_state()[1] = 5.1;
+    problem->given_state()[2] = 0.0;
+  }
+  EXPECT_EQ(free->finish(scratch), 0) << "0.2 m/s an interval";
+  EXPECT_EQ(slow->finish(scratch), 1) << "0.08 m/s on the first, 0.16 on the second";
+  EXPECT_NEAR(slow->state_upper(1)[1], 5.1 - 0.08, 1e-4);
+}
+
+TEST(RhcProblem, TakesNewBoundsOfStatesOnceItIsFinished) {
+  const auto problem = cart_with_rates(infinity);
+  std::vector<double> scratch(problem->scratch_size());
+  problem->finish(scratch);
+  EXPECT_EQ(problem->state_upper(3)[2], 1.0);
+  problem->set_state_bounds(2, -0.5, 0.25);
+  problem->finish(scratch);
+  EXPECT_EQ(problem->state_lower(3)[2], -0.5);
+  EXPECT_EQ(problem->state_upper(6)[2], 0.25);
+  const auto other = cart_with_rates(infinity);
+  other->take_data(*problem);
+  EXPECT_EQ(other->setup().state_upper[2], 0.25);
+  EXPECT_EQ(other->state_upper(6)[2], 0.25);
+}
+
+TEST(RhcProblem, RefusesRatesThatAreNotThere) {
+  const auto refused = [&](const auto& spoil) {
+    RhcProblem::Setup setup = cart_with_rates(1.0)->setup();
+    spoil(setup);
+    return error_of([&] { RhcProblem(std::make_shared<InputRateModel>(cart(), std::vector{0}), setup); });
+  };
+  EXPECT_EQ(refused([](RhcProblem::Setup&) {}), "");
+  EXPECT_NE(refused([](RhcProblem::Setup& s) { s.rates = {{1, 2}}; }).find("input 1"), std::string::npos);
+  EXPECT_NE(refused([](RhcProblem::Setup& s) { s.rates = {{0, 3}}; }).find("state 3"), std::string::npos);
+  EXPECT_NE(refused([](RhcProblem::Setup& s) { s.blocked_inputs = {0}; }).find("blocked"), std::string::npos);
 }
 
 TEST(RhcProblem, TakesOnTheDataOfAnother) {

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "plugins/robot/robots.hpp"
 #include "support/error_of.hpp"
 
@@ -56,6 +58,22 @@ TEST(ControllerSection, ReadsWeightsAndBlockingByName) {
   EXPECT_THAT(problem.blocked_inputs, ElementsAre(1));
 }
 
+TEST(ControllerSection, ReadsWeightsAndBoundsOfRates) {
+  const auto made = controller("{weights: {stage: {u2: 0.5}, rates: {u2: 0.25}}, rate_bounds: {u1: [-2, null]}}",
+                               "{u2: [-0.125, 1]}");
+  const RhcProblem::Setup& problem = problem_of(*made);
+  // Both inputs are states now, one because its rate has a weight, one because it has a bound.
+  EXPECT_THAT(problem.rates, ElementsAre(RhcProblem::Rate{0, 4}, RhcProblem::Rate{1, 5}));
+  EXPECT_THAT(problem.state_weights, ElementsAre(1.0, 1.0, 0.0, 0.0, 5.0, 0.5));
+  EXPECT_THAT(problem.terminal_weights, ElementsAre(10.0, 10.0, 0.0, 0.0, 5.0, 0.5));
+  EXPECT_THAT(problem.input_weights, ElementsAre(0.0, 0.25));
+  EXPECT_THAT(problem.input_lower, ElementsAre(-2.0, -HUGE_VAL));
+  EXPECT_EQ(problem.input_upper[0], HUGE_VAL);
+  EXPECT_EQ(problem.state_lower[5], -0.125);
+  EXPECT_EQ(problem.state_upper[5], 1.0);
+  EXPECT_TRUE(problem_of(*controller("weights: {rates: {u2: 0}}")).rates.empty()) << "which costs nothing";
+}
+
 TEST(ControllerSection, HasTheBoundsOfTheConfiguration) {
   const auto made = controller("", "{delta: [-0.25, 0.5], u2: [-0.125, 1]}");
   EXPECT_EQ(problem_of(*made).state_lower[3], -0.25);
@@ -75,6 +93,12 @@ TEST(ControllerSection, RefusesUnknownNamesAndWrongNumbers) {
       {"weights: {stage: {bata: 1}}", "did you mean 'beta'?"},
       {"weights: {stage: {u1: -1}}", "at least 0"},
       {"weights: {terminal: {u1: 1}}", "weights: terminal has no option 'u1'"},
+      {"weights: {rates: {u3: 1}}", "weights: rates has no option 'u3'; did you mean 'u1'?"},
+      {"weights: {rates: {u2: -1}}", "at least 0"},
+      {"weights: {rate: {u2: 1}}", "did you mean 'rates'?"},
+      {"rate_bounds: {delta: [-1, 1]}", "rate_bounds has no option 'delta'"},
+      {"rate_bounds: {u2: [1, -1]}", "lower <= upper"},
+      {"rate_bounds: {u2: [0.1, 1]}", "found [0.1, 1], expected 0 between them"},
       {"blocking: {u3: unblocked}", "controller: blocking has no option 'u3'"},
       {"blocking: {u1: {name: structured, overlap: 30}}", "change it or controller.horizon"},
       {"blocking: {u1: {name: unblocked, transition: ramp}}", "drop transition and neighbour_sigma"},

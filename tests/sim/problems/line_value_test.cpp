@@ -83,10 +83,14 @@ TEST(LineValue, KeysAreToldWithTheMapsThatTheyAreIn) {
             }),
             "set.jsonl:7: horizon.steps: unknown key; did you mean 'step'?");
   EXPECT_EQ(error_of([&] {
-              horizon.allow({"dt", "steps"}, {"guess"}, 1);
+              horizon.allow({"dt", "steps"}, {{2, {"guess"}}}, 1);
             }),
             "set.jsonl:7: horizon.guess: is a key of version 2; add \"version\": 2 to the line");
-  EXPECT_NO_THROW(horizon.allow({"dt", "steps"}, {"guess"}, 2));
+  EXPECT_NO_THROW(horizon.allow({"dt", "steps"}, {{2, {"guess"}}}, 2));
+  EXPECT_THAT(error_of([&] {
+                horizon.allow({"dt"}, {{2, {"guess"}}, {3, {"steps"}}}, 2);
+              }),
+              HasSubstr("is a key of version 3; add \"version\": 3"));
   EXPECT_EQ(at_key("set.jsonl:7", "", "no map"), "set.jsonl:7: no map");
   std::vector<std::string> keys;
   horizon.for_each([&](const std::string& key, const LineValue&) { keys.push_back(key); });

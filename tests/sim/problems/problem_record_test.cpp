@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/control/input_rate_model.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/files/json.hpp"
@@ -87,12 +88,13 @@ Iterate perturbed(const Ocp& ocp, Iterate point, RandomProblem& random) {
 }
 
 /// Writes, reads, builds and compares; returns the record that was read.
-ProblemRecord round_trip(const HorizonProblem& problem, const Iterate& guess) {
+ProblemRecord round_trip(const HorizonProblem& problem, const Iterate& guess,
+                         std::shared_ptr<const Model> model = nullptr) {
   const std::string line = problem_line(record_of(problem, &guess, "run/7", "any", Settings::map()));
   EXPECT_EQ(line.find('\n'), std::string::npos);
   ProblemRecord record = read_problem(line, "dump.jsonl", 1);
   EXPECT_EQ(problem_line(record), line) << "a record that was read is written as it was";
-  const auto built = build(record, problem.shared_model());
+  const auto built = build(record, model ? model : problem.shared_model());
   Iterate started(built->capacity());
   start(record, *built, started);
   expect_same_point(problem, guess, started);
@@ -234,6 +236,27 @@ TEST_P(EveryModel, ControlKeepsEveryBit) {
   }
 }
 
+TEST_P(EveryModel, RatesKeepEveryBit) {
+  std::vector<int> rated{model->input_count() - 1};
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(fmt::format("seed {}", seed));
+    if (seed == 3 && model->input_count() > 1) rated.insert(rated.begin(), 0);
+    RandomProblem random(std::make_shared<InputRateModel>(model, rated), seed);
+    RandomProblem::RhcSpec spec;
+    spec.intervals = 10;
+    spec.adjust = [&](RhcProblem::Setup& setup, const RandomProblem::Drive&) {
+      for (std::size_t k = 0; k < rated.size(); ++k)
+        setup.rates.push_back({rated[k], model->state_count() + static_cast<int>(k)});
+      if (seed % 2 == 0) setup.input_upper.assign(model->input_count(), 1.5);
+      if (seed % 2 == 0) setup.input_lower.assign(model->input_count(), -0.5);
+    };
+    const auto problem = random.rhc(spec);
+    const Iterate guess = perturbed(*problem, RandomProblem::cold_start(*problem), random);
+    EXPECT_EQ(round_trip(*problem, guess, model).rates.size(), rated.size());
+    ASSERT_FALSE(HasFailure());
+  }
+}
+
 TEST(ProblemRecord, BoundsOfABicycleAreMovedAlike) {
   const auto model = host().make_model("bicycle_slip");
   RandomProblem random(model, 3);
@@ -260,7 +283,7 @@ TEST(ProblemRecord, OptionsKeepTheirMeaning) {
   const ProblemRecord read = read_problem(problem_line(record), "dump.jsonl", 3);
   EXPECT_EQ(json_text(read.model_options), json_text(options));
   EXPECT_EQ(read.origin, record.origin);
-  EXPECT_EQ(read.version, 2);
+  EXPECT_EQ(read.version, problem_format_version);
   EXPECT_EQ(read.step, 8);
   EXPECT_FALSE(read.guess.has_value());
 }

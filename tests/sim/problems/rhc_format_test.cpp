@@ -40,6 +40,24 @@ TEST(RhcFormat, BuildsBoundsThatDifferFromIntervalToInterval) {
   EXPECT_EQ(control->control_upper(1)[1], 1.0);
 }
 
+TEST(RhcFormat, BuildsTheRatesOfInputs) {
+  const ProblemRecord record = read_problem(rhc_line_3, "set.jsonl", 3);
+  const auto problem = build(record, cart());
+  auto& rhc = dynamic_cast<RhcProblem&>(*problem);
+  EXPECT_THAT(rhc.setup().rates, ElementsAre(RhcProblem::Rate{1, 2}));
+  EXPECT_THAT(rhc.setup().input_weights, ElementsAre(5.0, 0.5));
+  EXPECT_EQ(rhc.initial_state()[2], 0.25) << "the input before the first interval";
+  EXPECT_EQ(rhc.state_upper(1)[2], 1.0);
+  EXPECT_EQ(rhc.control_upper(0)[1], 3.0);
+  EXPECT_TRUE(refill(record, rhc));
+  EXPECT_FALSE(refill(read_problem(rhc_line, "set.jsonl", 3), rhc));
+  EXPECT_FALSE(refill(record, *build(read_problem(rhc_line_2, "set.jsonl", 3), cart())));
+  // And back to the same line.
+  const ProblemRecord kept = record_of(rhc, nullptr, record.id, record.model, record.model_options);
+  EXPECT_THAT(kept.rates, ElementsAre("push"));
+  EXPECT_EQ(problem_line(read_problem(problem_line(kept), "set.jsonl", 3)), problem_line(kept));
+}
+
 TEST(RhcFormat, RefillsInPlaceWhatFits) {
   const auto control = build(read_problem(rhc_line, "set.jsonl", 3), cart());
   ASSERT_TRUE(refill(read_problem(replaced(rhc_line, "[0, 4.5]", "[0, 4.25]"), "set.jsonl", 4), *control));
@@ -61,6 +79,10 @@ TEST(RhcFormat, NamesThePlaceAndTheRemedy) {
       {rhc_line_2, "[[0, null], 4.5]", "[[0, 5], 4.5]", "bounds.speed", "on interval 1, expected lower <= upper"},
       {rhc_line_2, "\"push\": [-1, 1]", "\"lean\": [[-1, 1], 2]", "bounds.lean", "lists of bounds are for inputs"},
       {rhc_line, "\"speed\": [0, 4.5]", "\"speed\": [[0, 0], 4.5]", "bounds.speed[0]", "expected a number"},
+      {rhc_line_3, "[\"push\"]", "[\"pusch\"]", "rates", "no input 'pusch'; did you mean 'push'?"},
+      {rhc_line_3, "[\"push\"]", "[\"push\", \"push\"]", "rates", "each input once, in the model's order"},
+      {rhc_line_3, "[1, 0.5, 0.25]", "[1, 0.5]", "initial_state", "expected 3, for pos, lean, push"},
+      {rhc_line_3, "\"version\": 3", "\"version\": 2", "rates", "is a key of version 3; add \"version\": 3"},
   };
   expect_told(mistakes);
 }

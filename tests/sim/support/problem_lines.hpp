@@ -64,6 +64,14 @@ inline const std::string rhc_line_2 = R"({"version": 2, "id": "run/rhc/8", "prob
  "initial_state": [1, 0.5], "parameters": [0.5], "reference": {}, "weights": {"stage": {}, "terminal": {}},
  "bounds": {"speed": [[0, null], 4.5], "push": [-1, 1]}})";
 
+// What version 3 adds: the rate of an input.
+inline const std::string rhc_line_3 = R"({"version": 3, "id": "run/rhc/8", "problem": "rhc", "model": {"name": "cart"},
+ "horizon": {"intervals": 2, "dt": 0.1, "integrator": "rk4", "substeps": 1}, "rates": ["push"],
+ "initial_state": [1, 0.5, 0.25], "parameters": [0.5],
+ "reference": {"pos": [1, 2, 3], "speed": [4, 5], "push": [0.25, 0, 0], "push_rate": [0, 0]},
+ "weights": {"stage": {"pos": 1, "speed": 5, "push": 2, "push_rate": 0.5}, "terminal": {"pos": 10, "push": 2}},
+ "bounds": {"speed": [0, 4.5], "push": [-1, 1], "push_rate": [-3, 3]}})";
+
 inline std::string replaced(std::string text, const std::string& old, const std::string& with) {
   const std::size_t at = text.find(old);
   EXPECT_NE(at, std::string::npos) << old;

@@ -105,14 +105,16 @@ controller:
   weights:
     stage: {x_pos: 1, y_pos: 1, beta: 2, u1: 5, u2: 0.5}
     terminal: {x_pos: 10, y_pos: 10}
+    rates: {u1: 0, u2: 0.01}
 )",
                                        "robot.yaml");
   const Host host;
   const Robot robot(host, RobotOptions::table().parse(settings, "robot"));
   const std::vector<Tunable> all = controller_tunables(robot, settings);
-  EXPECT_THAT(names(all), testing::ElementsAre("controller.weights.stage.beta", "controller.weights.stage.u1",
-                                               "controller.weights.stage.u2",
-                                               "controller.weights.terminal.x_pos, y_pos", "controller.horizon"));
+  EXPECT_THAT(names(all),
+              testing::ElementsAre("controller.weights.stage.beta", "controller.weights.stage.u1",
+                                   "controller.weights.stage.u2", "controller.weights.terminal.x_pos, y_pos",
+                                   "controller.weights.rates.u2", "controller.horizon"));
   EXPECT_TRUE(all.back().is_whole);
   EXPECT_EQ(all.back().value_at(0.3), std::round(12.0 * std::pow(2.0, 0.3)));
 }

@@ -250,6 +250,9 @@ std::vector<Family> make_families() {
     for (int j = 0; j < model->input_count(); ++j) spec.blocked_inputs.push_back(j);
     return random(spec)(model, seed);
   });
+  add("rhc_rates", "inputs are states, and their rates have weights", with_rates(false));
+  add("rhc_rates_at_bounds", "rates and inputs are bounded, and the path leaves both", with_rates(true))
+      .several_optima = true;
   add("rhc_states_at_bounds", "the path leaves the bounds of states", [](const ModelPointer& model, unsigned seed) {
     RhcSpec spec;
     spec.off = 0.0;

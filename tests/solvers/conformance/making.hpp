@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "families.hpp"
+#include "rhec/core/control/input_rate_model.hpp"
 #include "support/random_problem.hpp"
 #include "support/test_models.hpp"
 
@@ -125,6 +126,33 @@ inline Drive gentler(const Model& model, const Drive& d, double share) {
     model.integrate(request);
   }
   return other;
+}
+
+/// Control of a vehicle all of whose inputs are states with rates, within bounds of both that its path leaves; or
+/// without bounds of rates.
+inline Make with_rates(bool are_bounded) {
+  return [=](const ModelPointer& vehicle, unsigned seed) {
+    std::vector<int> rated;
+    RhcSpec spec;
+    for (int j = 0; j < vehicle->input_count(); ++j) rated.push_back(j);
+    const auto model = std::make_shared<InputRateModel>(vehicle, rated);
+    spec.off = 0.05;
+    spec.adjust = [&](RhcProblem::Setup& setup, const Drive& d) {
+      for (const int j : rated) setup.rates.push_back({j, vehicle->state_count() + j});
+      if (!are_bounded) return;
+      const Drive inner = gentler(*model, d, 0.7);
+      std::tie(setup.input_lower, setup.input_upper) = hull(inner.inputs, model->description().inputs, 0.01);
+      const auto held = hull(inner.states, model->description().states, 0.01);
+      for (const RhcProblem::Rate& rate : setup.rates) {
+        setup.state_lower.resize(model->state_count(), -infinity);
+        setup.state_upper.resize(model->state_count(), infinity);
+        setup.state_lower[rate.state] = held.first[rate.state];
+        setup.state_upper[rate.state] = held.second[rate.state];
+      }
+    };
+    RandomProblem problems(model, 9000 + seed);
+    return cold(problems.rhc(spec));
+  };
 }
 
 enum Bounded : unsigned { states = 1, inputs = 2, parameters = 4 };

@@ -25,7 +25,11 @@ enum class ReferenceSpeed {
 /// and the next N_c, each dt * u1ref metres further on. If the solver fails, and fails again from a simulation, the
 /// plan of the last sample is continued and the failure is counted: its inputs one after the other, then the last of
 /// them. Without a plan the vehicle goes straight ahead. Where a map knows the slip that is ahead, the plan and its
-/// reference count with it. Allocates in its constructor only.
+/// reference count with it.
+///
+/// Rates of inputs, (u_i - u_{i-1}) / dt with the input applied last as u_{-1}, can have weights and bounds. The
+/// problem is then that of an InputRateModel. Before the first command u_{-1} is what drives straight ahead, unless
+/// `applied` has said what it is. Allocates in its constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {
@@ -38,6 +42,8 @@ class RHEC_EXPORT Controller {
     /// factor * speed + offset without slip; an infinite factor leaves the model's bounds.
     double speed_bound_factor = 2.5, speed_bound_offset = 1.0;
     std::vector<std::shared_ptr<const Blocking>> blockings;  ///< one for each of problem.blocked_inputs
+    std::vector<double> rate_weights;                        ///< n_u, of squared rates; empty: 0
+    std::vector<double> rate_lower, rate_upper;  ///< n_u, bounds of rates [unit of the input / s]; empty: none
     PathFollower::Window search;
     /// What slip to expect ahead; null: that of the estimate, everywhere.
     std::shared_ptr<const SlipAhead> ahead = nullptr;
@@ -59,6 +65,9 @@ class RHEC_EXPORT Controller {
   /// Completes the last command's report with the objective and the KKT residual of its plan. `prepare` and the next
   /// `control` do that too; only the last command of a run needs this call.
   void finish() noexcept;
+  /// Says which inputs (n_u) the vehicle has had until now, where they are not the last command: at the start, or after
+  /// it was driven by hand. Matters to rates alone. NaN: the last command, or what drives straight ahead.
+  void applied(const double* inputs) noexcept;
   /// Does work for the next sample in advance; calling it is optional.
   void prepare() noexcept;
   void reset() noexcept;
@@ -69,6 +78,13 @@ class RHEC_EXPORT Controller {
   const Path& path() const noexcept { return path_; }
   const RhcProblem& problem() const noexcept { return problem_; }
   const Iterate& plan() const noexcept { return point_; }
+  /// The vehicle itself; the problem's model has further states if there are rates.
+  const Model& vehicle() const noexcept { return *vehicle_; }
+  // The vehicle's inputs (n_u) in the plan and its reference on an interval, and the bounds of one.
+  void plan_inputs(int interval, double* inputs) const noexcept;
+  double input_reference(int interval, int input) const noexcept;
+  double input_lower(int input) const noexcept;
+  double input_upper(int input) const noexcept;
   std::int64_t fallbacks() const noexcept { return fallbacks_; }
 
  private:
@@ -77,10 +93,14 @@ class RHEC_EXPORT Controller {
   void bound_speed(double most) noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
   void look_ahead(double arc_length, const double* parameters) noexcept;
+  void write_held_inputs() noexcept;
   void start_cold() noexcept;
+  void keep_within_bounds() noexcept;
   bool find_plan(Clock::time_point deadline) noexcept;
 
   Setup setup_;
+  std::shared_ptr<const Model> vehicle_;
+  std::vector<int> held_state_;  ///< n_u: the problem's state that holds an input, or -1
   Path path_;
   PathFollower follower_;
   RhcProblem problem_;
@@ -95,6 +115,7 @@ class RHEC_EXPORT Controller {
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
+  std::vector<double> last_inputs_;  ///< n_u, applied last; NaN: not known
   std::vector<std::uint8_t> begins_;
 };
 

@@ -42,6 +42,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   const double* interval_data(int interval) const noexcept { return data_.data() + at_data(interval); }
   /// The known inputs of an interval (n_u, NaN where unknown), for an initial guess; null if none is known.
   virtual const double* known_inputs(int /*interval*/) const noexcept { return nullptr; }
+  /// The inputs that a guess goes on with behind the end of a plan (n_u, NaN for the last ones); null: the last ones.
+  virtual const double* inputs_behind() const noexcept { return nullptr; }
 
   Capacity capacity() const noexcept override { return structure_.capacity(); }
   int intervals() const noexcept override { return structure_.intervals(); }

@@ -22,6 +22,11 @@ struct CostView;
 /// changing the structure, the initial state, or the bounds.
 class RHEC_EXPORT RhcProblem final : public HorizonProblem {
  public:
+  /// An input that is the rate at which a state changes, c_{i+1} = c_i + dt_i v_i (InputRateModel).
+  struct Rate {
+    int input, state;
+    bool operator==(const Rate&) const = default;
+  };
   struct Setup {
     int max_intervals = 15;
     int substeps = 1;
@@ -31,6 +36,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
     std::vector<double> state_lower, state_upper;  ///< n_x; empty: the model's own bounds
     std::vector<double> input_lower, input_upper;  ///< n_u; empty: the model's own bounds
     std::vector<int> blocked_inputs;               ///< inputs that are blocked
+    std::vector<Rate> rates = {};                  ///< inputs that are rates; beyond the horizon they are 0
   };
   RhcProblem(std::shared_ptr<const Model> model, Setup setup);
 
@@ -50,6 +56,9 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   double input_lower(int interval, int input) const noexcept { return input_lower_[interval * nu() + input]; }
   double input_upper(int interval, int input) const noexcept { return input_upper_[interval * nu() + input]; }
 
+  /// Bounds of a state, at nodes 1 .. N.
+  void set_state_bounds(int state, double lower, double upper) noexcept;
+
   void set_intervals(int intervals) noexcept { changing_structure().set_intervals(intervals); }
   /// Marks where the blocks of a blocked input start; begins[0] counts as 1.
   void set_blocks(int input, const std::uint8_t* begins) noexcept;
@@ -61,6 +70,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
 
   std::string_view kind() const noexcept override { return "rhc"; }
   const double* initial_state() const noexcept override { return initial_.data(); }
+  const double* inputs_behind() const noexcept override { return behind_.empty() ? nullptr : behind_.data(); }
 
  private:
   std::ptrdiff_t at(int stage) const noexcept { return static_cast<std::ptrdiff_t>(stage) * stride(); }
@@ -72,14 +82,17 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   bool has_late_bounds() const noexcept override { return true; }
   bool has_constant_cost_hessian() const noexcept override { return true; }
   double write_tracking(StageRange range, const Iterate& iterate, const CostView& view) const noexcept;
+  void check_rates();
   void write_state_bounds() noexcept;
   void write_input_bounds() noexcept;
   int relax_unreachable_bounds(std::span<double> scratch) noexcept;
 
   Setup setup_;
   std::vector<double> initial_, input_lower_, input_upper_;
-  int moved_bounds_ = 0;      ///< state bounds relaxed by the last `finish`
-  AlignedDoubles reference_;  ///< one row [x; p; u] per stage
+  std::vector<double> behind_;         ///< n_u: 0 for rates, otherwise NaN; empty if there are no rates
+  int moved_bounds_ = 0;               ///< state bounds relaxed by the last `finish`
+  bool has_new_state_bounds_ = false;  ///< since the last `finish`
+  AlignedDoubles reference_;           ///< one row [x; p; u] per stage
   AlignedDoubles stage_weights_, terminal_weights_, periods_,
       inverse_periods_;  ///< rows [x; p; u]; the period of angles and its inverse, else 0
 };

@@ -19,7 +19,7 @@ struct RHEC_EXPORT ControllerOptions {
   double least_speed_factor = Controller::Setup{}.least_speed_factor;
   double speed_bound_factor = Controller::Setup{}.speed_bound_factor;
   double speed_bound_offset = Controller::Setup{}.speed_bound_offset;
-  Settings weights, blocking, solver;
+  Settings weights, rate_bounds, blocking, solver;
   static const OptionTable<ControllerOptions>& table();
 };
 
@@ -36,7 +36,7 @@ class RHEC_EXPORT ControllerSection {
                                    std::shared_ptr<const SlipAhead> ahead = nullptr) const;
 
  private:
-  RhcProblem::Setup problem(double top_speed) const;
+  void add_problem(Controller::Setup& setup, double top_speed) const;
   void add_blockings(Controller::Setup& setup) const;
 
   std::shared_ptr<const RobotContext> context_;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -18,13 +19,13 @@ class LineValue;
 class RHEC_EXPORT ProblemFormat {
  public:
   struct Traits {
-    std::string_view kind;             ///< HorizonProblem::kind of its problems, and `problem` on their lines
-    std::vector<std::string> keys;     ///< keys of a line
-    std::vector<std::string> since_2;  ///< further keys, added in version 2
-    bool looks_back = false;           ///< its window ends at its step instead of starting there
-    bool may_be_empty = false;         ///< since version 2: it may have no intervals yet
-    bool has_interval_bounds = false;  ///< since version 2: bounds may differ between intervals
-    bool finds_parameters = false;     ///< parameters are part of its solution
+    std::string_view kind;          ///< HorizonProblem::kind of its problems, and `problem` on their lines
+    std::vector<std::string> keys;  ///< keys of a line
+    std::map<int, std::vector<std::string>> added;  ///< further keys, by the version that added them
+    bool looks_back = false;                        ///< its window ends at its step instead of starting there
+    bool may_be_empty = false;                      ///< since version 2: it may have no intervals yet
+    bool has_interval_bounds = false;               ///< since version 2: bounds may differ between intervals
+    bool finds_parameters = false;                  ///< parameters are part of its solution
   };
   virtual ~ProblemFormat();
   ProblemFormat(const ProblemFormat&) = delete;

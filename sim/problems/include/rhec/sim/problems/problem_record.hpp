@@ -16,7 +16,7 @@
 namespace rhec::sim {
 
 /// The newest version of the format of problem files; a line without `version` is of version 1.
-constexpr int problem_format_version = 2;
+constexpr int problem_format_version = 3;
 
 /// One line of a problem file: a problem with every number that a solver needs, as JSON. Values are stored by name and
 /// resolved later with the model. docs/problem_format.md describes the keys.
@@ -70,6 +70,9 @@ struct ProblemRecord {
   std::map<std::string, std::vector<double>> reference;  ///< N+1 values per state, N per input
   std::map<std::string, double> stage_weights, terminal_weights;
   std::map<std::string, std::vector<Interval>> interval_bounds;  ///< for inputs whose bounds vary over the N intervals
+  /// Inputs that are states, with their rates as inputs (InputRateModel). Then states, inputs, reference, weights and
+  /// bounds are those of that model.
+  std::vector<std::string> rates;
 
   /// Sets the id, and derives prefix and step from it.
   RHEC_EXPORT void set_id(std::string text);
