@@ -26,7 +26,7 @@ struct Shape {
   static constexpr int registers =
       is_known ? (state_count + control_count + lane_count - 1) / lane_count : most_columns / lane_count;
   static constexpr int state_registers = is_known ? (state_count + lane_count - 1) / lane_count : registers;
-  static constexpr int most_states = is_known ? state_count : (most_columns < 32 ? most_columns : 32);
+  static constexpr int most_states = is_known ? state_count : (most_columns < 64 ? most_columns : 64);
   using R = Row<registers>;
   /// Next state and control together fit into one register, which then holds the whole step.
   static constexpr bool is_compact = is_known && registers == 1;
@@ -548,7 +548,8 @@ inline auto with_shape(const RiccatiView& view, int i, const Function& function)
   if (columns <= 16) return function.template operator()<Shape<2, 0, 0>>();
   if (columns <= 24) return function.template operator()<Shape<3, 0, 0>>();  // rows are not longer than that here
   if (columns <= 32) return function.template operator()<Shape<4, 0, 0>>();
-  return function.template operator()<Shape<8, 0, 0>>();
+  if (columns <= 64) return function.template operator()<Shape<8, 0, 0>>();
+  return function.template operator()<Shape<16, 0, 0>>();
 }
 
 // Whole matrices of long rows fit only into the widest registers; unrolled for others, they are spilled to memory.
@@ -811,7 +812,7 @@ bool invert(const double* matrix, int count, int stride, double tolerance, doubl
 }
 
 void answer(const double* inverse, int count, int stride, double* batch) {
-  Batch gradients[32];
+  Batch gradients[64];
   for (int j = 0; j < count; ++j) gradients[j] = Batch::from(batch + j * response_batch);
   for (int j = 0; j < count; ++j) {
     Batch sum{};

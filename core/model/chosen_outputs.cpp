@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include "reserve.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/reserve.hpp"
 #include "rhec/core/model/formula_copy.hpp"
 
 namespace rhec {

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "graph_steps.hpp"
-#include "reserve.hpp"
 #include "rhec/core/base/assertion.hpp"
+#include "rhec/core/base/reserve.hpp"
 #include "rhec/core/base/scratch.hpp"
 #include "rhec/core/model/formula_copy.hpp"
 #include "rhec/core/model/model_functions.hpp"

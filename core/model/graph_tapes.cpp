@@ -2,7 +2,7 @@
 #include <utility>
 
 #include "graph_steps.hpp"
-#include "reserve.hpp"
+#include "rhec/core/base/reserve.hpp"
 #include "rhec/core/model/formula_copy.hpp"
 #include "rhec/core/model/graph_model.hpp"
 #include "rhec/core/model/model_functions.hpp"

@@ -72,11 +72,7 @@ ProcessModel::ProcessModel(std::shared_ptr<const Model> vehicle, std::vector<int
   if (static_cast<int>(counts_.size()) != np_)
     throw Error(fmt::format("model '{}': {} processes given; expected {}, one a parameter", description_.name,
                             counts_.size(), np_));
-  if (Rows::size(nx_, nu_, np_) > room)
-    throw Error(
-        fmt::format("model '{}': {} states, {} inputs and {} parameters are too many for priors of its "
-                    "parameters; give 'blocking' instead",
-                    description_.name, nx_, nu_, np_));
+  if (const std::size_t a_row = Rows::size(nx_, nu_, np_); a_row > room) reserve_ = std::make_unique<Reserve>(a_row);
   if (vehicle_->data_count() != 0)
     throw Error(fmt::format("model '{}' depends on data of the interval; priors of its parameters need one without",
                             description_.name));
@@ -104,13 +100,24 @@ ProcessModel::ProcessModel(std::shared_ptr<const Model> vehicle, std::vector<int
 void ProcessModel::integrate(const Intervals& request) const noexcept {
   RHEC_ASSERT(request.count == 0 || (request.states && request.inputs && request.durations && request.data),
               "where to integrate");
+  with_memory([&](double* memory) { integrate(request, memory); });
+}
+
+/// Calls `use` with memory for one row at least.
+template <class Use>
+void ProcessModel::with_memory(const Use& use) const noexcept {
+  if (reserve_) return reserve_->lend(use);
   std::array<double, room> memory;
-  const int at_once = static_cast<int>(room / Rows::size(nx_, nu_, np_));
+  use(memory.data());
+}
+
+void ProcessModel::integrate(const Intervals& request, double* memory) const noexcept {
+  const int at_once = std::max(1, static_cast<int>(room / Rows::size(nx_, nu_, np_)));
   const int inputs = nu_ + noises_, variables = n_ + inputs;
   const std::ptrdiff_t vehicle_z = nx_ + nu_ + 2 * std::ptrdiff_t{np_};
   for (int first = 0; first < request.count; first += at_once) {
     const int count = std::min(at_once, request.count - first);
-    const Rows rows(memory.data(), count, nx_, nu_, np_);
+    const Rows rows(memory, count, nx_, nu_, np_);
     for (int i = 0; i < count; ++i) {
       const double *s = request.states + static_cast<std::ptrdiff_t>(first + i) * n_,
                    *v = request.inputs + static_cast<std::ptrdiff_t>(first + i) * inputs,
@@ -225,7 +232,10 @@ void ProcessModel::write_hessian(const double* vehicle, const double* data, doub
 }
 
 void ProcessModel::observe(const Nodes& request) const noexcept {
-  std::array<double, room> memory;
+  with_memory([&](double* memory) { observe(request, memory); });
+}
+
+void ProcessModel::observe(const Nodes& request, double* memory) const noexcept {
   const std::ptrdiff_t ny = output_count();
   // One node at a time in place: the vehicle's state comes first in ours.
   for (std::ptrdiff_t i = 0; i < request.count; ++i) {
@@ -237,18 +247,19 @@ void ProcessModel::observe(const Nodes& request) const noexcept {
                        .outputs = request.outputs ? request.outputs + i * ny : nullptr,
                        .jacobians = jacobian,
                        .multipliers = hessian ? request.multipliers + i * ny : nullptr,
-                       .hessians = hessian ? memory.data() : nullptr});
+                       .hessians = hessian ? memory : nullptr});
     if (jacobian) std::fill(jacobian + ny * nx_, jacobian + ny * n_, 0.0);
     if (!hessian) continue;
     std::fill_n(hessian, static_cast<std::ptrdiff_t>(n_) * n_, 0.0);
-    for (std::ptrdiff_t c = 0; c < nx_; ++c) std::copy_n(memory.data() + c * nx_, nx_, hessian + c * n_);
+    for (std::ptrdiff_t c = 0; c < nx_; ++c) std::copy_n(memory + c * nx_, nx_, hessian + c * n_);
   }
 }
 
 void ProcessModel::rates(const double* x, const double* u, const double*, double* dxdt) const noexcept {
-  std::array<double, room> p;
-  for (int j = 0; j < np_; ++j) p[j] = x[first_[j]];
-  vehicle_->rates(x, u, p.data(), dxdt);
+  with_memory([&](double* p) {
+    for (int j = 0; j < np_; ++j) p[j] = x[first_[j]];
+    vehicle_->rates(x, u, p, dxdt);
+  });
   std::fill(dxdt + nx_, dxdt + n_, 0.0);
 }
 

@@ -194,6 +194,81 @@ TEST_F(ProcessModelTest, SeesWhatTheVehicleSees) {
   }
 }
 
+/// A cart that pulls a row of masses, too wide for a row to fit on the stack.
+template <class Scalar>
+struct Train {
+  static constexpr int state_count = 70, input_count = 2, parameter_count = 2, output_count = 2;
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    using std::sin;
+    Cart<Scalar>().dynamics(x, u, p, dxdt);
+    for (int j = 3; j < state_count; ++j) dxdt[j] = p[0] * sin(x[j - 1]) - x[j] * x[j];
+  }
+  void outputs(const Scalar* x, Scalar* y) const { Cart<Scalar>().outputs(x, y); }
+};
+
+TEST(ProcessModel, TakesAWideVehicle) {
+  constexpr int nx = 70, nz = nx + 2, inputs = 4, z_count = nx + 2 + 4, count = 3;
+  ModelDescription about;
+  about.name = "train";
+  about.states.resize(nx);
+  about.inputs.resize(2);
+  about.parameters.resize(2);
+  about.outputs.resize(2);
+  const auto vehicle = std::make_shared<FormulaModel<Train>>(Train<double>{}, about);
+  const ProcessModel model(vehicle, {1, 1});
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0.2, 1.0);
+  std::vector<double> s(count * nz), v(count * inputs), data(count * model.data_count()), durations(count, 0.2);
+  for (auto* values : {&s, &v, &data})
+    for (double& value : *values) value = uniform(random);
+  std::vector<double> x(count * nx), u(count * 2), p(count * 2);
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < 2; ++j) *model.process_data(j, data.data() + i * model.data_count()) = 0.0;  // held
+    std::copy_n(s.data() + i * nz, nx, x.data() + i * nx);
+    std::copy_n(s.data() + i * nz + nx, 2, p.data() + i * 2);
+    std::copy_n(v.data() + i * inputs, 2, u.data() + i * 2);
+  }
+  std::vector<double> next(count * nz), jacobians(count * nz * (nz + inputs));
+  model.integrate({.count = count,
+                   .states = s.data(),
+                   .inputs = v.data(),
+                   .durations = durations.data(),
+                   .data = data.data(),
+                   .next_states = next.data(),
+                   .jacobians = jacobians.data()});
+  std::vector<double> vehicle_next(count * nx), vehicle_jacobians(count * nx * (z_count));
+  vehicle->integrate({.count = count,
+                      .states = x.data(),
+                      .inputs = u.data(),
+                      .parameters = p.data(),
+                      .parameters_end = p.data(),
+                      .durations = durations.data(),
+                      .next_states = vehicle_next.data(),
+                      .jacobians = vehicle_jacobians.data()});
+  for (int i = 0; i < count; ++i) {
+    const double *of_ours = jacobians.data() + i * nz * (nz + inputs),
+                 *of_vehicle = vehicle_jacobians.data() + i * nx * z_count;
+    for (int r = 0; r < nx; ++r) {
+      ASSERT_EQ(next[i * nz + r], vehicle_next[i * nx + r]);
+      for (int c = 0; c < nx; ++c) ASSERT_EQ(of_ours[c * nz + r], of_vehicle[c * nx + r]);
+      for (int j = 0; j < 2; ++j) {
+        ASSERT_EQ(of_ours[(nz + j) * nz + r], of_vehicle[(nx + j) * nx + r]) << "by an input";
+        ASSERT_NEAR(of_ours[(nx + j) * nz + r], of_vehicle[(nx + 2 + j) * nx + r] + of_vehicle[(nx + 4 + j) * nx + r],
+                    1e-15)
+            << "by a parameter";
+      }
+    }
+  }
+  const auto node = [&](const double* states, double* y) {
+    model.observe({.count = 1, .states = states, .outputs = y});
+  };
+  double y[2], vehicle_y[2];
+  node(s.data(), y);
+  vehicle->observe({.count = 1, .states = x.data(), .outputs = vehicle_y});
+  EXPECT_EQ(y[0], vehicle_y[0]);
+  EXPECT_EQ(y[1], vehicle_y[1]);
+}
+
 TEST(ProcessModel, RefusesWhatItCannotHold) {
   EXPECT_THAT(error_of([] { ProcessModel(cart(), {1}); }), ::testing::HasSubstr("expected 2, one a parameter"));
   EXPECT_THAT(error_of([] { ProcessModel(cart(), {1, 9}); }), ::testing::HasSubstr("expected 1 to 4"));

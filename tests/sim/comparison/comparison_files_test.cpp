@@ -28,7 +28,7 @@ TEST(ComparisonFiles, ASecondRunGivesTheSameBytesButForTimes) {
   ComparisonOptions options = comparing(all_backends());
   options.closed_loop = true;
   options.seeds = 2;
-  options.every = 5;
+  options.every = 25;
   options.accuracy = 1e-5;
   const Json first = without_times(Json::parse(comparison_json(compare(host(), short_scenario(), options))));
   const Json second = without_times(Json::parse(comparison_json(compare(host(), short_scenario(), options))));

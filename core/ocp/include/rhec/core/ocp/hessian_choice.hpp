@@ -18,8 +18,7 @@ namespace rhec {
 /// estimation, 2009, section 4), so that a Gauss-Newton step leaves about kappa^2 of what the exact one gains. What
 /// either costs is known from the counts of operations (Ocp::step_operations).
 ///
-/// - Where the exact one adds fewer than `few_operations` to a step, or less than `modest_share` of it, it is taken:
-/// for
+/// - Where the exact one adds fewer than `few_operations` to a step, or less than `modest_share` of it, it is taken: of
 ///   a vehicle of a few states that is some microseconds.
 /// - Where it takes more than `high_cost` times as many as Gauss-Newton's, the latter is taken at once.
 /// - In between the exact one is taken, until kappa was below `small_kappa` at `trial_steps` steps in a row.

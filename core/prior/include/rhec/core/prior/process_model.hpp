@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "rhec/core/base/reserve.hpp"
 #include "rhec/core/model/model.hpp"
 
 namespace rhec {
@@ -16,11 +17,11 @@ namespace rhec {
 /// and the vehicle's parameter runs from z_j[0] to z_j+[0] over the interval, or is held at z_j[0]. F_j and L_j are
 /// known data of the interval, so that a problem takes on another prior by other data.
 ///
-/// It has no parameters of its own. Thread-safe and allocation-free as any model.
+/// It has no parameters of its own. Thread-safe and allocation-free as any model; calls for one so wide that its rows
+/// do not fit on the stack wait for each other.
 class RHEC_EXPORT ProcessModel final : public Model {
  public:
-  /// `counts`: states of each parameter's process. Throws Error if they do not fit the vehicle, or if its rows are too
-  /// large to be evaluated.
+  /// `counts`: states of each parameter's process. Throws Error if they do not fit the vehicle.
   ProcessModel(std::shared_ptr<const Model> vehicle, std::vector<int> counts);
 
   const Model& vehicle() const noexcept { return *vehicle_; }
@@ -45,6 +46,10 @@ class RHEC_EXPORT ProcessModel final : public Model {
 
  private:
   struct Rows;
+  template <class Use>
+  void with_memory(const Use& use) const noexcept;
+  void integrate(const Intervals& request, double* memory) const noexcept;
+  void observe(const Nodes& request, double* memory) const noexcept;
   void write_jacobian(const double* vehicle, const double* data, double* jacobian) const noexcept;
   void write_hessian(const double* vehicle, const double* data, double* hessian) const noexcept;
 
@@ -52,6 +57,7 @@ class RHEC_EXPORT ProcessModel final : public Model {
   std::vector<int> counts_, first_, data_first_;
   int nx_, nu_, np_, n_, noises_ = 0, data_count_ = 0;
   ModelDescription description_;
+  std::unique_ptr<Reserve> reserve_;  ///< null where a row fits on the stack
 };
 
 }  // namespace rhec

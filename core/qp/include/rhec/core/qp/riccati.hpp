@@ -120,7 +120,7 @@ class RHEC_EXPORT Riccati {
   void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
 
   /// The largest number of controls, and of states, of one stage.
-  static constexpr int max_width = 32;
+  static constexpr int max_width = 64;
   /// A reduced Hessian with a pivot below this fraction of its diagonal entry counts as not positive definite.
   static constexpr double definite_tolerance = 1e-11;
 

@@ -6,7 +6,7 @@
 namespace rhec::small {
 
 /// The largest number of rows of a matrix to factorise.
-inline constexpr int longest = 32;
+inline constexpr int longest = 64;
 
 /// C = A B;  A is m x k (leading dimension lda), B is k x n (ldb), C is m x n (ldc).
 inline void multiply(const double* A, int lda, const double* B, int ldb, double* C, int ldc, int m, int k,

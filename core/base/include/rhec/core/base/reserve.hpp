@@ -7,12 +7,14 @@
 
 namespace rhec {
 
-/// Memory that a model has from its set-up, for calls that bring none and need more than a stack should give: such
-/// calls wait for each other.
+/// Memory of a model from its set-up on, for calls that bring none and need more than a stack should give: such calls
+/// wait for each other.
 class Reserve {
  public:
+  /// Allocates.
   explicit Reserve(std::size_t doubles) : memory_(doubles) {}
   std::size_t size() const noexcept { return memory_.size(); }
+  /// Calls `use` with all of it, while nobody else has it.
   template <class Use>
   void lend(Use use) {
     const std::lock_guard lock(in_use_);
