@@ -12,9 +12,11 @@ bool is_finite(const Ocp& ocp, const Iterate& iterate) noexcept {
     for (int j = 0; j < n; ++j) of_row += 0.0 * row[j];
     rest += of_row;
   };
+  const bool is_limited = ocp.capacity().limits > 0;
   for (int i = 0; i <= ocp.intervals(); ++i) {
     const int n = ocp.state_count(i), m = i < ocp.intervals() ? ocp.control_count(i) : 0;
     for (const double* row : {iterate.state(i), iterate.costate(i), iterate.state_bound(i)}) check(row, n);
+    if (is_limited) check(iterate.limit_bound(i), ocp.limit_count(i));
     if (m == 0) continue;
     for (const double* row : {iterate.control(i), iterate.control_bound(i)}) check(row, m);
   }
@@ -25,6 +27,7 @@ namespace {
 
 bool bounds_are_numbers(const Ocp& ocp) noexcept {
   bool numbers = true;
+  const bool is_limited = ocp.capacity().limits > 0;
   const auto check = [&](const double* row, int n) {
     for (int j = 0; j < n; ++j) numbers = numbers && !std::isnan(row[j]);
   };
@@ -32,6 +35,9 @@ bool bounds_are_numbers(const Ocp& ocp) noexcept {
     for (const double* row : {ocp.state_lower(i), ocp.state_upper(i)}) check(row, ocp.state_count(i));
     if (i < ocp.intervals())
       for (const double* row : {ocp.control_lower(i), ocp.control_upper(i)}) check(row, ocp.control_count(i));
+    if (const int limits = is_limited ? ocp.limit_count(i) : 0; limits > 0)
+      for (const double* row : {ocp.limit_lower(i), ocp.limit_upper(i), ocp.limit_linear(i), ocp.limit_quadratic(i)})
+        check(row, limits);
   }
   return numbers;
 }
@@ -59,6 +65,8 @@ double largest_bound_multiplier(const Ocp& ocp, const Iterate& iterate) noexcept
     const int n = ocp.state_count(i), m = i < ocp.intervals() ? ocp.control_count(i) : 0;
     for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(iterate.state_bound(i)[j]));
     for (int j = 0; j < m; ++j) largest = std::max(largest, std::abs(iterate.control_bound(i)[j]));
+    for (int j = 0, limits = ocp.limit_count(i); j < limits; ++j)
+      largest = std::max(largest, std::abs(iterate.limit_bound(i)[j]));
   }
   return largest;
 }

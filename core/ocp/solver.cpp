@@ -62,6 +62,7 @@ void assess(const Ocp& ocp, const Iterate& iterate, StageQp& qp, std::span<doubl
   const int N = ocp.intervals();
   if (qp.window() == 0) {
     report.objective = ocp.linearise(all_stages(ocp), iterate, Hessian::none, qp, scratch);
+    report.objective += slack_costs(qp, all_stages(ocp));
     report.kkt = kkt_residual(qp, iterate);
     return;
   }
@@ -72,6 +73,7 @@ void assess(const Ocp& ocp, const Iterate& iterate, StageQp& qp, std::span<doubl
     piece.last = piece.first + qp.window() > N ? N : piece.first + qp.window() - 2;
     qp.look_at(piece.first);
     report.objective += ocp.linearise(piece, iterate, Hessian::none, qp, scratch);
+    report.objective += slack_costs(qp, piece);
     if (piece.last < N) qp.set_sizes(piece.last + 1, ocp.state_count(piece.last + 1), 0);
     terms.add(qp, iterate, piece);
   }

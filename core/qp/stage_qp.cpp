@@ -8,7 +8,7 @@ namespace rhec {
 StageQp::StageQp(const Capacity& capacity) : StageQp(capacity, capacity.intervals + 1) {
   window_ = 0;
   // Space for twice the stages, so that they are copied back to the front only once in many drops.
-  for (auto* v : {&AB_, &H_, &h_, &b_}) v->resize(2 * v->size(), 0.0);
+  for (auto* v : {&AB_, &H_, &h_, &b_, &G_, &limits_}) v->resize(2 * v->size(), 0.0);
 }
 
 StageQp::StageQp(const Capacity& capacity, int stages)
@@ -18,18 +18,21 @@ StageQp::StageQp(const Capacity& capacity, int stages)
       window_(std::min(stages, capacity.intervals + 1)) {
   const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1, held = static_cast<std::size_t>(window_);
   // Includes places behind the last stage, for a window that ends there.
-  for (auto* counts : {&state_counts_, &control_counts_, &identity_counts_}) counts->assign(nodes + held, 0);
+  for (auto* counts : {&state_counts_, &control_counts_, &identity_counts_, &limit_counts_})
+    counts->assign(nodes + held, 0);
   AB_.assign(held * capacity.states * stride_, 0.0);
   H_.assign(held * wide_ * stride_, 0.0);
   for (auto* v : {&h_, &b_}) v->assign(held * stride_, 0.0);
   lower_.assign(held * stride_, -infinity);
   upper_.assign(held * stride_, infinity);
   initial_step_.assign(stride_, 0.0);
+  G_.assign(held * capacity.limits * stride_, 0.0);
+  limits_.assign(held * rows_of_limits * capacity.limit_row(), 0.0);
 }
 
 void StageQp::look_at(int first) noexcept {
   // Each place keeps its content and the sizes of its former stage: `set_sizes` clears what is no longer used.
-  for (auto* counts : {&state_counts_, &control_counts_}) {
+  for (auto* counts : {&state_counts_, &control_counts_, &limit_counts_}) {
     const auto held = counts->begin() - first_, end = held + window_;
     if (first > -first_)
       std::copy_backward(held, end, counts->begin() + first + window_);
@@ -54,21 +57,30 @@ void StageQp::clear(int i) noexcept {
   std::fill_n(upper(i), stride_, infinity);
 }
 
+void StageQp::clear_limits(int i) noexcept {
+  std::fill_n(G(i), capacity_.limits * stride_, 0.0);
+  std::fill_n(of_limits(i, 0), rows_of_limits * capacity_.limit_row(), 0.0);
+}
+
 void StageQp::drop_first(int stages) noexcept {
   const int kept = intervals_ + 1 - stages;
   const bool has_room = first_ + stages + capacity_.intervals < 2 * (capacity_.intervals + 1);
   const int first = has_room ? first_ + stages : 0;
-  const auto move = [&](AlignedDoubles& v, int rows) {
-    const std::ptrdiff_t slot = static_cast<std::ptrdiff_t>(rows) * stride_;
+  const auto move = [&](AlignedDoubles& v, std::ptrdiff_t slot) {
     if (!has_room) std::copy_n(v.data() + (first_ + stages) * slot, kept * slot, v.data());
     // Includes what a longer horizon has left there.
     std::fill_n(v.data() + (first + kept) * slot, (capacity_.intervals + 1 - kept) * slot, 0.0);
   };
-  move(AB_, capacity_.states);
-  move(H_, wide_);
-  for (auto* v : {&h_, &b_}) move(*v, 1);
+  const std::ptrdiff_t row = stride_;
+  move(AB_, capacity_.states * row);
+  move(H_, wide_ * row);
+  for (auto* v : {&h_, &b_}) move(*v, row);
+  if (has_limits()) {
+    move(G_, capacity_.limits * row);
+    move(limits_, static_cast<std::ptrdiff_t>(rows_of_limits) * capacity_.limit_row());
+  }
   first_ = first;
-  for (auto* counts : {&state_counts_, &control_counts_, &identity_counts_})
+  for (auto* counts : {&state_counts_, &control_counts_, &identity_counts_, &limit_counts_})
     std::copy_n(counts->data() + stages, kept, counts->data());
 }
 

@@ -71,9 +71,10 @@ const OptionTable<GnRtiOptions>& GnRtiOptions::table() {
 
 std::string GnRti::why_not(const Ocp& ocp) const {
   const Capacity capacity = ocp.capacity();
+  if (capacity.limits > 0) return "the problem has limits, which gn_rti does not take yet";
   if (std::max(capacity.states, capacity.controls) > Riccati::max_width)
     return "a stage has more than " + std::to_string(Riccati::max_width) +
-           " states or controls; use a sparse solver for so wide a model";
+           " states or controls; use sparse_sqp, which is for wide models";
   if (ocp.has_second_derivatives()) return {};
   if (options_.hessian == Curvature::exact)
     return "the exact Hessian was asked for and the model has no second derivatives; set hessian: gauss_newton";

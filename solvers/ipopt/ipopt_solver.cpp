@@ -139,6 +139,7 @@ IpoptSolver::~IpoptSolver() {
 }
 
 std::string IpoptSolver::why_not(const Ocp& ocp) const {
+  if (ocp.capacity().limits > 0) return "the problem has limits, which ipopt does not take yet";
   if (options_.hessian == Curvature::exact && !ocp.has_second_derivatives())
     return "the model has no second derivatives; set hessian: gauss_newton or limited_memory";
   return {};

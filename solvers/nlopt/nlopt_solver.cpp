@@ -63,6 +63,7 @@ bool NloptSolver::scales_fully() const noexcept {
 }
 
 std::string NloptSolver::why_not(const Ocp& ocp) const {
+  if (ocp.capacity().limits > 0) return "the problem has limits, which nlopt does not take yet";
   const std::string name = "NLopt's " + name_of(options_.algorithm);
   int variables = 0;
   bool bounded = false, unbounded = false, inequalities = false, equalities = false;

@@ -84,6 +84,7 @@ const OptionTable<SparseSqpOptions>& SparseSqpOptions::table() {
 }
 
 std::string SparseSqp::why_not(const Ocp& ocp) const {
+  if (ocp.capacity().limits > 0) return "the problem has limits, which sparse_sqp does not take yet";
   if (options_.hessian == Curvature::exact && !ocp.has_second_derivatives())
     return "the model has no second derivatives; set hessian: gauss_newton";
   return {};

@@ -3,11 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/ocp/linearisation.hpp"
 #include "support/cart.hpp"
+#include "support/same_ocp.hpp"
 #include "support/test_models.hpp"
 
 namespace rhec {
@@ -16,6 +19,7 @@ namespace ocp_test {
 using testing::cart_control;
 using testing::cart_estimation;
 using ::testing::Each;
+using testing::SameOcp;
 using testing::scattered_point;
 
 TEST(RollOut, ClipsControlsAndLeavesNoDefect) {
@@ -62,40 +66,9 @@ TEST(Ocp, CanRollOutWhereTheInitialStateIsGiven) {
   EXPECT_FALSE(cart_estimation(3)->can_roll_out());
 }
 
-/// A minimal Ocp: the base class provides everything it does not define.
-class Plain final : public Ocp {
- public:
-  explicit Plain(const Ocp& of) : of_(of) {}
-  Capacity capacity() const noexcept override { return of_.capacity(); }
-  int intervals() const noexcept override { return of_.intervals(); }
-  int state_count(int node) const noexcept override { return of_.state_count(node); }
-  int control_count(int interval) const noexcept override { return of_.control_count(interval); }
-  const double* initial_state() const noexcept override { return of_.initial_state(); }
-  const double* state_lower(int node) const noexcept override { return of_.state_lower(node); }
-  const double* state_upper(int node) const noexcept override { return of_.state_upper(node); }
-  const double* control_lower(int interval) const noexcept override { return of_.control_lower(interval); }
-  const double* control_upper(int interval) const noexcept override { return of_.control_upper(interval); }
-  bool has_second_derivatives() const noexcept override { return of_.has_second_derivatives(); }
-  std::size_t scratch_size() const noexcept override { return of_.scratch_size(); }
-  double evaluate_stages(const Iterate& point, double* defects, double* costs,
-                         std::span<double> scratch) const noexcept override {
-    return of_.evaluate_stages(point, defects, costs, scratch);
-  }
-  void simulate_interval(int interval, Iterate& point, std::span<double> scratch) const noexcept override {
-    of_.simulate_interval(interval, point, scratch);
-  }
-  double linearise(StageRange range, const Iterate& point, Hessian hessian, StageQp& qp,
-                   std::span<double> scratch) const noexcept override {
-    return of_.linearise(range, point, hessian, qp, scratch);
-  }
-
- private:
-  const Ocp& of_;
-};
-
 TEST(Ocp, MayDependOnEverythingUnlessItSaysOtherwise) {
   const auto problem = cart_control(3);
-  const Plain plain(*problem);
+  const SameOcp plain(*problem);
   const auto ns = static_cast<std::size_t>(problem->capacity().states);
   std::vector<std::uint8_t> states(ns * ns, 7), controls(ns, 7);
   plain.mark_dynamics(1, states.data(), controls.data());
@@ -110,7 +83,7 @@ TEST(Ocp, MayDependOnEverythingUnlessItSaysOtherwise) {
 
 TEST(Ocp, RefreshesByLinearisingAnewUnlessItKnowsBetter) {
   const auto problem = cart_control(4);
-  const Plain plain(*problem);
+  const SameOcp plain(*problem);
   const Iterate point = scattered_point(*problem);
   std::vector<double> scratch(problem->scratch_size());
   StageQp qp(problem->capacity()), expected(problem->capacity());
@@ -124,6 +97,51 @@ TEST(Ocp, RefreshesByLinearisingAnewUnlessItKnowsBetter) {
   EXPECT_EQ(qp.initial_step()[0], problem->given_state()[0] - point.state(0)[0]);
   const auto linearisation = plain.make_linearisation();
   EXPECT_EQ(&linearisation->ocp(), &plain);
+}
+
+/// Two limits at each node: a hard one and a soft one.
+class WithLimits final : public SameOcp {
+ public:
+  using SameOcp::SameOcp;
+  int limit_count(int) const noexcept override { return 2; }
+  const double* limit_lower(int) const noexcept override { return lower_; }
+  const double* limit_upper(int) const noexcept override { return upper_; }
+  const double* limit_linear(int) const noexcept override { return linear_; }
+  const double* limit_quadratic(int) const noexcept override { return quadratic_; }
+
+ private:
+  double lower_[2] = {-1.0, -infinity}, upper_[2] = {1.0, 2.0}, linear_[2] = {infinity, 3.0},
+         quadratic_[2] = {0.0, 8.0};
+};
+
+TEST(Ocp, WhatIsBeyondALimitCostsOrIsAViolation) {
+  const auto problem = cart_control(3);
+  const WithLimits limited(*problem);
+  const auto costs = [&](double hard, double soft) {
+    const double values[2] = {hard, soft};
+    return limit_costs(limited, 1, values);
+  };
+  EXPECT_EQ(costs(0.5, -100.0).slack, 0.0);
+  EXPECT_EQ(costs(0.5, -100.0).violation, 0.0);
+  EXPECT_EQ(costs(-1.5, 2.0).violation, 0.5);
+  EXPECT_EQ(costs(1.25, 2.0).violation, 0.25);
+  EXPECT_EQ(costs(0.0, 2.5).slack, 3.0 * 0.5 + 0.5 * 8.0 * 0.25);
+  EXPECT_TRUE(std::isnan(costs(0.0, std::nan("")).slack));
+  std::vector<std::uint8_t> states(2 * static_cast<std::size_t>(limited.state_count(3)), 7);
+  limited.mark_limits(3, states.data(), nullptr);
+  EXPECT_THAT(states, Each(1));
+
+  StageQp qp({.intervals = 1, .states = 1, .controls = 1, .limits = 1});
+  qp.set_intervals(1);
+  qp.set_limits(1, 1);
+  qp.limit_upper(1)[0] = -0.5;  // the iterate is beyond it by a half
+  qp.limit_lower(1)[0] = -infinity;
+  qp.limit_linear(1)[0] = 3.0;
+  qp.limit_quadratic(1)[0] = 8.0;
+  EXPECT_EQ(slack_costs(qp, {0, 1}), 2.5);
+  EXPECT_EQ(slack_costs(qp, {0, 0}), 0.0);
+  qp.limit_linear(1)[0] = infinity;
+  EXPECT_EQ(slack_costs(qp, {0, 1}), 0.0);
 }
 
 }  // namespace ocp_test

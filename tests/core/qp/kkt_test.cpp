@@ -1,8 +1,10 @@
 #include "rhec/core/qp/kkt.hpp"
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/qp/stage_qp_views.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "support/random_qp.hpp"
@@ -74,6 +76,73 @@ TEST(Kkt, EachTermSeesWhatItIsAbout) {
   EXPECT_GT(idle.complementarity, 0.01) << "a multiplier whose bound is far";
   const KktResidual nowhere = residual([](Stationary& s) { s.point.state_bound(4)[2] = 0.1; });
   EXPECT_GT(nowhere.largest(), 0.01) << "a multiplier whose bound is nowhere";
+}
+
+/// The same with two limits at node 3: one hard and at its upper side, one soft and violated by a quarter below.
+struct Limited {
+  static constexpr int node = 3;
+  explicit Limited(unsigned seed) : qp(with_limits(RandomQp(seed).make(5, 3, 2, true))), point(qp.capacity()) {
+    qp.limit_upper(node)[0] = 0.0;
+    qp.limit_lower(node)[0] = -infinity;
+    qp.limit_linear(node)[0] = infinity;
+    qp.limit_lower(node)[1] = 0.25;
+    qp.limit_upper(node)[1] = 2.0;
+    qp.limit_linear(node)[1] = 0.5;
+    qp.limit_quadratic(node)[1] = 4.0;
+    point.limit_bound(node)[0] = 0.75;
+    point.limit_bound(node)[1] = -1.5;  // 0.5 + 4 * 0.25
+    for (int r = 0; r < 2; ++r)
+      for (int c = 0; c < 5; ++c) qp.G(node)[r * qp.stride() + c] = 0.1 * (r + 1) - 0.07 * c;
+    for (int i = 0; i < 5; ++i) std::fill_n(qp.b(i), 3, 0.0);
+    std::fill_n(qp.initial_step(), 3, 0.0);
+    set_costates(qp, point);
+    for (int i = 0; i < 5; ++i)
+      for (int j = 0; j < 2; ++j) {
+        qp.r(i)[j] = 0.0;
+        for (int r = 0; r < 3; ++r) qp.r(i)[j] -= B_of(qp, i)(r, j) * point.costate(i + 1)[r];
+        for (int r = 0; r < qp.limits(i); ++r) qp.r(i)[j] -= qp.G(i)[r * qp.stride() + 3 + j] * point.limit_bound(i)[r];
+      }
+  }
+  /// A copy with room for two limits a stage, and two at the node.
+  static StageQp with_limits(const StageQp& from) {
+    StageQp to({.intervals = 5, .states = 3, .controls = 2, .limits = 2});
+    to.set_intervals(5);
+    to.initial_state_is_given = true;
+    for (int i = 0; i <= 5; ++i) {
+      to.set_sizes(i, 3, i < 5 ? 2 : 0);
+      std::copy_n(from.AB(i), 3 * from.stride(), to.AB(i));
+      std::copy_n(from.H(i), 5 * from.stride(), to.H(i));
+      std::copy_n(from.h(i), from.stride(), to.h(i));
+    }
+    to.set_limits(node, 2);
+    return to;
+  }
+  StageQp qp;
+  Iterate point;
+};
+
+TEST(Kkt, LimitsPullAsTheirMultipliersSay) {
+  const Limited found(3);
+  EXPECT_LT(kkt_residual(found.qp, found.point).largest(), 1e-14);
+  const auto residual = [&](const auto& change) {
+    Limited changed = found;
+    change(changed);
+    return kkt_residual(changed.qp, changed.point);
+  };
+  constexpr int node = Limited::node;
+  EXPECT_GT(residual([](Limited& s) { s.qp.G(node)[1] += 0.5; }).stationarity, 0.01);
+  EXPECT_GT(residual([](Limited& s) { s.qp.G(node)[3] += 0.5; }).stationarity, 0.01);
+  EXPECT_EQ(residual([](Limited& s) { s.qp.limit_upper(node)[0] = -0.5; }).bound_violation, 0.5);
+  EXPECT_EQ(residual([](Limited& s) { s.qp.limit_lower(node)[0] = 0.5; }).bound_violation, 0.5);
+  EXPECT_GT(residual([](Limited& s) { s.qp.limit_upper(node)[0] = 0.5; }).complementarity, 0.01);
+  EXPECT_GT(residual([](Limited& s) { s.qp.limit_upper(node)[0] = infinity; }).complementarity, 0.01)
+      << "a multiplier whose limit is nowhere";
+  const KktResidual more = residual([](Limited& s) { s.qp.limit_lower(node)[1] = 0.5; });
+  EXPECT_EQ(more.bound_violation, 0.0) << "soft";
+  EXPECT_GT(more.complementarity, 0.01) << "the multiplier is too small for this slack";
+  const KktResidual less = residual([](Limited& s) { s.qp.limit_lower(node)[1] = 0.125; });
+  EXPECT_GT(less.stationarity, 0.01) << "the multiplier is too large for this slack";
+  EXPECT_FALSE(std::isfinite(residual([](Limited& s) { s.point.limit_bound(node)[1] = std::nan(""); }).stationarity));
 }
 
 TEST(Kkt, LargestIsTheLargestOfAll) {

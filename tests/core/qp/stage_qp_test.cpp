@@ -21,6 +21,9 @@ std::vector<double> contents(const StageQp& qp, int i) {
   add(qp.H(i), capacity.states + capacity.controls);
   add(qp.h(i), 1);
   add(qp.b(i), 1);
+  add(qp.G(i), capacity.limits);
+  for (const double* row : {qp.limit_lower(i), qp.limit_upper(i), qp.limit_linear(i), qp.limit_quadratic(i)})
+    all.insert(all.end(), row, row + capacity.limit_row());
   return all;
 }
 
@@ -28,16 +31,24 @@ TEST(StageQp, MovesTowardsTheFrontAndLeavesZerosBehind) {
   RandomQp random(31);
   for (int trial = 0; trial < 20; ++trial) {
     const int most = random.integer(1, 7), states = random.integer(1, 7), controls = random.integer(1, 4);
-    StageQp qp({most, states, controls});
+    const int limits = random.integer(0, 3);
+    StageQp qp({most, states, controls, limits});
     int intervals = 0;
     std::vector<std::vector<double>> stages;
-    std::vector<int> control_counts, identity_counts;
+    std::vector<int> control_counts, identity_counts, limit_counts;
     double number = 1.0;
     const auto write = [&](int i) {
       const int m = random.integer(0, controls), carried = random.integer(0, states);
       qp.set_sizes(i, states, m, carried);
       for (int k = 0; k < (states + m) * qp.stride(); ++k) qp.H(i)[k] = number++;
       for (double* row : {qp.AB(i), qp.h(i), qp.b(i)}) std::fill_n(row, states, number++);
+      qp.set_limits(i, random.integer(0, limits));
+      for (int r = 0; r < qp.limits(i); ++r) {
+        std::fill_n(qp.G(i) + r * qp.stride(), states, number++);
+        for (double* row : {qp.limit_lower(i), qp.limit_upper(i), qp.limit_linear(i), qp.limit_quadratic(i)})
+          row[r] = number++;
+      }
+      limit_counts.push_back(qp.limits(i));
       stages.push_back(contents(qp, i));
       control_counts.push_back(m);
       identity_counts.push_back(carried);
@@ -51,11 +62,13 @@ TEST(StageQp, MovesTowardsTheFrontAndLeavesZerosBehind) {
       stages.erase(stages.begin(), stages.begin() + steps);
       control_counts.erase(control_counts.begin(), control_counts.begin() + steps);
       identity_counts.erase(identity_counts.begin(), identity_counts.begin() + steps);
+      limit_counts.erase(limit_counts.begin(), limit_counts.begin() + steps);
       intervals -= steps;
       for (int i = 0; i <= intervals; ++i) {
         ASSERT_EQ(contents(qp, i), stages[i]) << "trial " << trial << ", move " << move << ", stage " << i;
         ASSERT_EQ(qp.control_counts()[i], control_counts[i]);
         ASSERT_EQ(qp.identity_counts()[i], identity_counts[i]);
+        ASSERT_EQ(qp.limits(i), limit_counts[i]);
       }
       for (int i = intervals + 1; steps > 0 && i <= most; ++i)
         for (const double entry : contents(qp, i)) ASSERT_EQ(entry, 0.0) << "move " << move << ", stage " << i;

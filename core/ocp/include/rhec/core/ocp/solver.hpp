@@ -30,7 +30,7 @@ struct Report {
   int iterations = 0;           ///< of the nonlinear solver
   int factorisations = 0;       ///< of the linear systems below it
   bool fallback_used = false;   ///< a robust method had to replace the fast one
-  double objective = 0.0;       ///< at the returned iterate
+  double objective = 0.0;       ///< at the returned iterate, with the costs of slacks
   KktResidual kkt;              ///< of the returned iterate, measured by the core
   double preparation_us = 0.0;  ///< time in prepare, and in finish before it [us]; set by TimedSolver
   double feedback_us = 0.0;     ///< time in solve, or in feedback [us]; set by TimedSolver

@@ -14,6 +14,7 @@ struct Capacity {
   int intervals = 0;  ///< N
   int states = 0;     ///< n_s, at any node
   int controls = 0;   ///< n_w, on any interval
+  int limits = 0;     ///< n_g, at any node
 
   bool operator==(const Capacity&) const = default;
 
@@ -23,6 +24,8 @@ struct Capacity {
     const int used = states + controls;
     return used > 32 ? (used + 63) / 64 * 64 : padded(used);
   }
+  /// The same for a row of limits g.
+  int limit_row() const noexcept { return padded(limits); }
 };
 
 /// Consecutive stages first .. last (both included).
@@ -34,10 +37,11 @@ struct StageRange {
 /// A primal-dual iterate of an Ocp. Rows have the capacity's length, whatever a stage uses. With the Lagrangian
 ///
 ///     L = sum_i l_i(s_i, w_i) + sum_i costate_{i+1}' (F_i(s_i, w_i) - s_{i+1}) + sum_i state_bound_i' s_i +
-///     control_bound_i' w_i
+///     control_bound_i' w_i + limit_bound_i' g_i(s_i, w_i)
 ///
-/// a bound multiplier is positive at an upper bound, negative at a lower one and zero between (docs/method.md, section
-/// 7). costate_0 belongs to a given initial state; it is zero if the initial state is free.
+/// a multiplier of a bound or limit is positive at the upper side, negative at the lower one and zero between
+/// (docs/method.md, section 7). That of a violated soft limit has its side's sign and the size linear + quadratic times
+/// the violation. costate_0 belongs to a given initial state; it is zero if the initial state is free.
 class RHEC_EXPORT Iterate {
  public:
   Iterate() = default;
@@ -55,6 +59,10 @@ class RHEC_EXPORT Iterate {
   const double* costate(int node) const noexcept { return at(costates_, node); }
   const double* state_bound(int node) const noexcept { return at(bounds_, node); }
   const double* control_bound(int interval) const noexcept { return at(bounds_, interval) + capacity_.states; }
+
+  /// Multipliers of the limits of a stage; rows of capacity().limit_row() are consecutive.
+  double* limit_bound(int stage) noexcept { return limits_.data() + limit_place(stage); }
+  const double* limit_bound(int stage) const noexcept { return limits_.data() + limit_place(stage); }
 
   /// Values and bound multipliers of a stage as one row [s; w]; rows are consecutive.
   double* row(int stage) noexcept { return at(values_, stage); }
@@ -74,10 +82,14 @@ class RHEC_EXPORT Iterate {
     RHEC_ASSERT(i >= 0 && i <= capacity_.intervals, "a stage of the capacity");
     return v.data() + static_cast<std::ptrdiff_t>(i) * row_;
   }
+  std::ptrdiff_t limit_place(int stage) const noexcept {
+    RHEC_ASSERT(stage >= 0 && stage <= capacity_.intervals, "a stage of the capacity");
+    return static_cast<std::ptrdiff_t>(stage) * capacity_.limit_row();
+  }
 
   Capacity capacity_;
   int row_ = 0;
-  AlignedDoubles values_, costates_, bounds_;
+  AlignedDoubles values_, costates_, bounds_, limits_;
 };
 
 }  // namespace rhec

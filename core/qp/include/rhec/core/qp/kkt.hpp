@@ -7,14 +7,17 @@ namespace rhec {
 /// How far a primal-dual iterate is from a first-order optimum: the same measure for every solver (docs/method.md,
 /// section 7).
 ///
+/// A soft limit's slack sigma is its violation. Stationarity in sigma: its multiplier is at most linear + quadratic
+/// sigma, and equal to that where sigma is above zero.
+///
 /// Stationarity and complementarity are relative to 1 + the largest term of the Lagrangian's gradient (objective,
 /// costates and bound multipliers), so that scaling the objective changes little. Defect and bound violation are
 /// absolute, in the units of their variables.
 struct RHEC_EXPORT KktResidual {
   double stationarity = 0.0;
-  double defect = 0.0;  ///< max |F_i(s_i, w_i) - s_{i+1}|, the given initial state included
-  double bound_violation = 0.0;
-  double complementarity = 0.0;  ///< max |multiplier| x distance from its bound
+  double defect = 0.0;           ///< max |F_i(s_i, w_i) - s_{i+1}|, the given initial state included
+  double bound_violation = 0.0;  ///< of bounds and hard limits
+  double complementarity = 0.0;  ///< max |multiplier| x distance from its bound or limit; of slacks too
 
   double largest() const noexcept;
 };
