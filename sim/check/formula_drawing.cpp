@@ -15,7 +15,7 @@
 namespace rhec::sim {
 namespace {
 
-constexpr double letter = 7.3, line_height = 15.0, margin = 24.0, head = 64.0;  // [pixels], of a font of 12
+constexpr double letter = 7.3, line_height = 15.0, page_margin = 24.0, head = 64.0;  // [pixels], of a font of 12
 constexpr const char* font = "font-family=\"DejaVu Sans Mono, Menlo, Consolas, monospace\" font-size=\"12\"";
 
 /// What a box is coloured by.
@@ -171,37 +171,38 @@ std::string formula_drawing(const VehicleGraph& vehicle, const ModelDescription&
       {&size.rates, "df/dz", false}, {&size.outputs, "dh/dx", false}, {&size.hessian, "Hessian of f", true}};
   double below_width = 0.0, below_height = 0.0;
   for (const Shown& each : shown) {
-    below_width += size_of(*each.pattern).x + 2 * margin;
+    below_width += size_of(*each.pattern).x + 2 * page_margin;
     below_height = std::max(below_height, size_of(*each.pattern).y);
   }
   double legend_width = 0.0;
   for (const Kind& kind : kinds)
     legend_width += 26.0 + letter * static_cast<double>(std::string_view(kind.meaning).size());
-  const double width = std::max({layout.width, below_width, legend_width, 420.0}) + 2 * margin;
-  const double top = margin + head, below = top + layout.height + 2 * margin;
-  Svg svg(width, below + below_height + margin + 24.0);
+  const double width = std::max({layout.width, below_width, legend_width, 420.0}) + 2 * page_margin;
+  const double top = page_margin + head, below = top + layout.height + 2 * page_margin;
+  Svg svg(width, below + below_height + page_margin + 24.0);
   svg.raw(
       "<defs><marker id=\"arrow\" viewBox=\"0 0 8 8\" refX=\"8\" refY=\"4\" markerWidth=\"7\" markerHeight=\"7\" "
       "orient=\"auto\"><path d=\"M0 0L8 4L0 8z\" fill=\"#9aa5b1\"/></marker></defs>\n");
-  svg.text({margin, margin + 8.0}, fmt::format("{}: {} operations, depth {}", about.name, operations, size.depth),
+  svg.text({page_margin, page_margin + 8.0},
+           fmt::format("{}: {} operations, depth {}", about.name, operations, size.depth),
            "font-family=\"DejaVu Sans, sans-serif\" font-size=\"16\" font-weight=\"bold\"");
-  double x = margin;
+  double x = page_margin;
   for (const Kind& kind : kinds) {
-    svg.rectangle({x, margin + 22.0}, 12.0, 12.0,
+    svg.rectangle({x, page_margin + 22.0}, 12.0, 12.0,
                   fmt::format("rx=\"2\" fill=\"{}\" stroke=\"{}\"", kind.fill, kind.line));
-    svg.text({x + 17.0, margin + 32.0}, kind.meaning, font);
+    svg.text({x + 17.0, page_margin + 32.0}, kind.meaning, font);
     x += 26.0 + letter * static_cast<double>(std::string_view(kind.meaning).size());
   }
-  const Point origin{margin, top};
+  const Point origin{page_margin, top};
   for (const std::vector<Point>& route : layout.routes) draw_route(svg, route, origin);
   for (std::size_t k = 0; k < boxes.all.size(); ++k)
     draw_box(svg, boxes.all[k], {layout.centres[k].x + origin.x, layout.centres[k].y + origin.y});
-  x = margin;
+  x = page_margin;
   for (const Shown& each : shown) {
     draw_pattern(svg, *each.pattern, each.title, {x, below}, each.is_lower);
-    x += size_of(*each.pattern).x + 2 * margin;
+    x += size_of(*each.pattern).x + 2 * page_margin;
   }
-  svg.text({margin, below + below_height + 24.0},
+  svg.text({page_margin, below + below_height + 24.0},
            "dark: varies with the variables; light: a number, once options are known; white: always zero", font);
   return svg.document();
 }

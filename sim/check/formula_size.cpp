@@ -15,7 +15,7 @@
 namespace rhec::sim {
 namespace {
 
-using Entry = DerivativePattern::Entry;
+using PatternEntry = DerivativePattern::Entry;
 
 template <class... Lists>
 std::vector<int> joined(const Lists&... lists) {
@@ -44,17 +44,17 @@ std::vector<std::pair<std::string, int>> kinds_of(const Graph& graph, const std:
   std::map<std::string, int> counts;
   for (const int node : graph.reach(targets))
     if (operand_count(graph[node].operation) > 0) ++counts[std::string(name_of(graph[node].operation))];
-  std::vector<std::pair<std::string, int>> kinds(counts.begin(), counts.end());
-  std::stable_sort(kinds.begin(), kinds.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
-  return kinds;
+  std::vector<std::pair<std::string, int>> sorted(counts.begin(), counts.end());
+  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  return sorted;
 }
 
 /// Constant is what no variable is needed for; options are numbers by then.
-Entry entry_of(const Graph& graph, int node, const std::vector<int>& variables) {
-  if (graph.is_constant(node, 0.0)) return Entry::zero;
+PatternEntry entry_of(const Graph& graph, int node, const std::vector<int>& variables) {
+  if (graph.is_constant(node, 0.0)) return PatternEntry::zero;
   for (const int reached : graph.reach({&node, 1}))
-    if (std::find(variables.begin(), variables.end(), reached) != variables.end()) return Entry::varies;
-  return Entry::constant;
+    if (std::find(variables.begin(), variables.end(), reached) != variables.end()) return PatternEntry::varies;
+  return PatternEntry::constant;
 }
 
 DerivativePattern pattern_of(const Graph& graph, const NodeMatrix& matrix, std::vector<std::string> rows,
@@ -62,7 +62,7 @@ DerivativePattern pattern_of(const Graph& graph, const NodeMatrix& matrix, std::
   DerivativePattern pattern{std::move(rows), std::move(columns), {}};
   for (int r = 0; r < matrix.rows; ++r)
     for (int c = 0; c < matrix.columns; ++c)
-      pattern.entries.push_back(is_lower && c > r ? Entry::zero : entry_of(graph, matrix.at(r, c), variables));
+      pattern.entries.push_back(is_lower && c > r ? PatternEntry::zero : entry_of(graph, matrix.at(r, c), variables));
   return pattern;
 }
 
@@ -87,7 +87,8 @@ Json json_of(const DerivativePattern& pattern) {
 }  // namespace
 
 int DerivativePattern::count() const {
-  return static_cast<int>(std::count_if(entries.begin(), entries.end(), [](Entry e) { return e != Entry::zero; }));
+  return static_cast<int>(
+      std::count_if(entries.begin(), entries.end(), [](PatternEntry e) { return e != PatternEntry::zero; }));
 }
 
 std::vector<std::string> DerivativePattern::lines() const {

@@ -82,7 +82,7 @@ void require_fitting(const Model& model, const ModelDescription& within, const M
 }
 
 /// The worst of several comparisons, with a description of the circumstances.
-struct Worst {
+struct WorstOfAll {
   WorstEntry entry;
   std::string circumstances;
   void take(const WorstEntry& other, const std::string& under) {
@@ -101,7 +101,7 @@ std::vector<Finding> check_derivatives(const CheckedModel& checked) {
   FindingList findings("derivatives");
   const FastestAtTheEnd restore(checked.model);
   const StagePoints stages = random_stages(checked.about, stages_of_a_range, checked.options.seed);
-  Worst first, second, output_first, output_second, integration;
+  WorstOfAll first, second, output_first, output_second, integration;
   int compared = 0, skipped = 0;
   const std::vector<std::string> sets = checked.model.instruction_sets();
   for (const std::string& set : sets) {
@@ -125,7 +125,7 @@ std::vector<Finding> check_derivatives(const CheckedModel& checked) {
       }
     }
   }
-  const auto report_worst = [&](const Worst& worst, double tolerance, const char* what, const char* against,
+  const auto report_worst = [&](const WorstOfAll& worst, double tolerance, const char* what, const char* against,
                                 const char* advice) {
     if (!(worst.entry.error > tolerance)) return;
     findings.fail(worst.entry.where,

@@ -14,7 +14,7 @@
 namespace rhec::sim {
 namespace {
 
-constexpr double far_off = 100.0;  // a scale wrong by this factor misleads finite differences and solvers
+constexpr double far_from_width = 100.0;  // a scale wrong by this factor misleads finite differences and solvers
 
 struct Kind {
   const char* word;
@@ -84,7 +84,7 @@ class Description {
            fmt::format("where nothing slips it is {:g}, outside its bounds [{:g}, {:g}]", v.nominal, v.lower, v.upper),
            "set Variable::nominal, or widen the bounds");
     const double width = v.upper - v.lower;
-    if (std::isfinite(width) && width > 0.0 && (width > far_off * v.scale || far_off * width < v.scale))
+    if (std::isfinite(width) && width > 0.0 && (width > far_from_width * v.scale || far_from_width * width < v.scale))
       findings_.warn(where, fmt::format("its bounds are {:g} apart and its scale is {:g}", width, v.scale),
                      "make the scale a typical magnitude inside the bounds");
   }

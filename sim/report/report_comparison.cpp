@@ -8,11 +8,11 @@
 namespace rhec::sim {
 namespace {
 
-constexpr const char* maker = "rhec compare";
+constexpr const char* comparison_maker = "rhec compare";
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
   throw Error(fmt::format("{}: {}; expected compare.json as docs/compare.md describes it, which '{}' writes",
-                          file.string(), what, maker));
+                          file.string(), what, comparison_maker));
 }
 
 /// A member of this kind; otherwise throws an Error with its location.
@@ -30,7 +30,7 @@ const Json& required(const Json& json, const std::string& key, Json::Kind kind, 
 
 Json comparison_report(const std::filesystem::path& file) {
   using Kind = Json::Kind;
-  Json comparison = read_json(file, maker);
+  Json comparison = read_json(file, comparison_maker);
   const Json& solvers = required(comparison, "solvers", Kind::array, file, "");
   required(comparison, "scenario", Kind::text, file, "");
   required(comparison, "seeds", Kind::array, file, "");

@@ -23,13 +23,16 @@ struct Kept {
   std::map<std::string, std::vector<Iterate>> guesses;
 };
 
-Kept keep_problems(Settings settings) {
+/// The problems of every n-th step.
+Kept keep_problems(Settings settings, int every) {
   apply_assignment(settings, "estimator.solver={name: gn_rti, mode: converge}");
   apply_assignment(settings, "controller.solver={name: gn_rti, mode: converge}");
   const Scenario scenario(host(), settings);
   Kept kept;
   LoopHooks hooks;
-  hooks.solved = [&](std::int64_t, const HorizonProblem& problem, const Iterate& guess, const Iterate&, const Report&) {
+  hooks.solved = [&](std::int64_t step, const HorizonProblem& problem, const Iterate& guess, const Iterate&,
+                     const Report&) {
+    if (step % every != 0) return;
     if (problem.kind() == "rhe") kept.rhe.push_back(dynamic_cast<const RheProblem&>(problem));
     if (problem.kind() == "rhc") kept.rhc.push_back(dynamic_cast<const RhcProblem&>(problem));
     kept.guesses[std::string(problem.kind())].push_back(guess);
@@ -65,7 +68,7 @@ TEST(Accuracy, EqualAccuracyEndsWithTheResidualAskedFor) {
   options.accuracy = wanted;
   options.every = 4;
   const Comparison result = compare(host(), short_scenario(), options);
-  const Kept kept = keep_problems(short_scenario());
+  const Kept kept = keep_problems(short_scenario(), options.every);
   for (const SameProblems& same : result.problems) {
     for (std::size_t b = 0; b < result.backends.size(); ++b) {
       const Backend& mine = result.backends[b];
