@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/infinity.hpp"
@@ -16,6 +17,9 @@
 
 namespace rhec {
 namespace {
+
+// A heading whose standard deviation is larger does not count in the search for the vehicle's place [rad].
+constexpr double known_heading = 0.5;
 
 /// The problem's state that holds an input whose rate has a weight or bounds, or -1.
 std::vector<int> find_held_states(const Model& model, const Controller::Setup& setup) {
@@ -107,9 +111,11 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
       solver_(std::move(solver)),
       shifter_(problem_),
       point_(problem_.capacity()) {
+  if (const std::string& reason = path_.why_not_drivable(); !reason.empty()) throw Error(reason);
   const int N = setup_.problem.max_intervals;
   problem_.set_intervals(N);
   begins_.assign(N, 0);
+  points_.resize(static_cast<std::size_t>(N) + 1);
   for (int i = 0; i < N; ++i) problem_.set_duration(i, setup_.interval);
   // Move blocking is counted from the start of the horizon, so it is the same in every sample.
   for (std::size_t b = 0; b < setup_.blockings.size(); ++b) {
@@ -129,7 +135,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   command_.inputs.assign(vehicle.input_count(), 0.0);
   last_inputs_.assign(vehicle.input_count(), std::numeric_limits<double>::quiet_NaN());
   const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count());
-  for (std::vector<double>* motion : {&straight_, &slipless_, &largest_}) motion->assign(nx + nu, 0.0);
+  for (std::vector<double>* motion : {&straight_, &slipless_, &largest_, &smallest_}) motion->assign(nx + nu, 0.0);
   nominal_parameters_ = nominal_values(vehicle.description().parameters);
   reference_parameters_ = ahead_parameters_ = nominal_parameters_;
   go_straight(1.0, nominal_parameters_.data(), slipless_);
@@ -143,6 +149,7 @@ void Controller::reset() noexcept {
   solver_->reset();
   shifter_.forget();
   follower_.reset();
+  is_located_ = false;
   has_plan_ = prepared_ = false;
   is_finished_ = true;
   fallbacks_ = 0;
@@ -196,29 +203,54 @@ void Controller::choose_straight_motion(double ground_speed, const double* param
   }
 }
 
+/// The same with inputs that keep their bounds.
+void Controller::choose_straight_motion_within_bounds(double ground_speed) noexcept {
+  choose_straight_motion(ground_speed, ahead_parameters_.data());
+  const int nx = vehicle_->state_count(), nu = vehicle_->input_count();
+  for (int j = 0; j < nu; ++j)
+    straight_[nx + j] = std::min(std::max(straight_[nx + j], input_lower(j)), input_upper(j));
+}
+
+/// Where the vehicle shall be at each node of a horizon that starts at an arc length.
+void Controller::find_points(double arc_length) noexcept {
+  int segment = reference_segment_;
+  points_[0] = path_.point_at(arc_length, segment);
+  reference_segment_ = segment;
+  const int N = problem_.intervals();
+  for (int i = 1; i <= N; ++i) {
+    segment = reference_segment_;
+    const double there = path_.arc_length_after(arc_length, i * setup_.interval, segment);
+    points_[i] = path_.point_at(there, segment);
+  }
+}
+
 /// References and bounds of the horizon that starts at an arc length of the path.
 void Controller::set_reference(double arc_length, const double* parameters) noexcept {
   const Model& vehicle = *vehicle_;
   const Roles& roles = vehicle.description().roles;
   const int N = problem_.intervals(), nx = vehicle.state_count(), nu = vehicle.input_count();
-  int segment = reference_segment_;
-  command_.reference = path_.point_at(arc_length, segment);
-  reference_segment_ = segment;
-  const double ground_speed = command_.reference.speed, distance = setup_.interval * std::abs(ground_speed);
-  bound_speed(setup_.speed_bound_factor * std::abs(ground_speed) + setup_.speed_bound_offset);
+  find_points(arc_length);
+  command_.reference = points_[0];
+  bound_speed();
+  double chosen_speed = std::numeric_limits<double>::quiet_NaN();
   for (int i = 0; i <= N; ++i) {
     if (i == 0 || (setup_.ahead && i < N)) {
       const int np = vehicle.parameter_count();
       for (int j = 0; j < np; ++j)
         ahead_parameters_[j] = parameters[j] + (setup_.ahead ? problem_.interval_data(i)[j] : 0.0);
-      choose_straight_motion(ground_speed, ahead_parameters_.data());
-      for (int j = 0; j < nu; ++j)
-        straight_[nx + j] = std::min(std::max(straight_[nx + j], input_lower(j)), input_upper(j));
+      chosen_speed = std::numeric_limits<double>::quiet_NaN();
     }
-    const PathPoint target = path_.point_at(arc_length + i * distance, segment);
+    const auto choose = [&](double speed) {
+      if (speed == chosen_speed) return;
+      chosen_speed = speed;
+      choose_straight_motion_within_bounds(speed);
+    };
+    const PathPoint& target = points_[i];
+    choose(target.speed);
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
+    if (i < N) choose(0.5 * (target.speed + points_[i + 1].speed));
     for (int j = 0; j < nu && i < N; ++j) {
       // The inputs on an interval are states at its end.
       const int held = held_state_[j];
@@ -243,31 +275,45 @@ void Controller::look_ahead(double arc_length, const double* parameters) noexcep
   int segment = reference_segment_;
   const PathPoint start = path_.point_at(arc_length, segment);
   const std::array here{start.x, start.y};
-  const double distance = setup_.interval * std::abs(start.speed);
   for (int i = 0; i < problem_.intervals(); ++i) {
-    const double way = (i + 0.5) * distance;  // to the middle of the interval, for which the slip holds
-    const PathPoint point = path_.point_at(arc_length + way, segment);
+    // At the middle of the interval, for which the slip holds.
+    segment = reference_segment_;
+    const double place = path_.arc_length_after(arc_length, (i + 0.5) * setup_.interval, segment);
+    const PathPoint point = path_.point_at(place, segment);
+    const double way = place - arc_length;
     const std::array there{point.x, point.y};
     setup_.ahead->change(here.data(), there.data(), way, parameters, problem_.interval_data(i));
   }
 }
 
-/// Bounds the forward inputs by those for the given ground speed without slip.
-void Controller::bound_speed(double most) noexcept {
-  if (!std::isfinite(most) || most == bounded_speed_) return;
-  bounded_speed_ = most;
-  go_straight(most, nominal_parameters_.data(), largest_);
+/// Bounds the inputs that drive straight ahead by those for the fastest reference of the horizon without slip, in the
+/// directions that it goes. Where it only stands, forwards is one of them.
+void Controller::bound_speed() noexcept {
+  double fastest = 0.0, least = 0.0, most = 0.0;
+  for (const PathPoint& point : points_) {
+    fastest = std::max(fastest, std::abs(point.speed));
+    least = std::min(least, point.speed);
+    most = std::max(most, point.speed);
+  }
+  const double bound = setup_.speed_bound_factor * fastest + setup_.speed_bound_offset;
+  if (!std::isfinite(bound)) return;
+  const double forwards = most > 0.0 || least == 0.0 ? bound : 0.0, in_reverse = least < 0.0 ? -bound : 0.0;
+  if (forwards == bounded_forwards_ && in_reverse == bounded_in_reverse_) return;
+  bounded_forwards_ = forwards;
+  bounded_in_reverse_ = in_reverse;
+  go_straight(forwards, nominal_parameters_.data(), largest_);
+  go_straight(in_reverse, nominal_parameters_.data(), smallest_);
   const int nx = vehicle_->state_count(), nu = vehicle_->input_count();
   for (int i = 0; i < problem_.intervals(); ++i) {
     for (int j = 0; j < nu; ++j) {
-      const double largest = largest_[nx + j];
-      if (largest == 0.0) continue;
+      const auto [lower, upper] = std::minmax({0.0, smallest_[nx + j], largest_[nx + j]});
+      if (lower == 0.0 && upper == 0.0) continue;
       if (held_state_[j] >= 0) {
-        problem_.set_state_bounds(held_state_[j], std::min(0.0, largest), std::max(0.0, largest));
+        problem_.set_state_bounds(held_state_[j], lower, upper);
         continue;
       }
-      problem_.input_lower(i, j) = std::min(0.0, largest);
-      problem_.input_upper(i, j) = std::max(0.0, largest);
+      problem_.input_lower(i, j) = lower;
+      problem_.input_upper(i, j) = upper;
     }
   }
 }
@@ -322,16 +368,34 @@ void Controller::keep_within_bounds() noexcept {
   }
 }
 
+/// Moves along the path with the vehicle. At first its place may be anywhere; a heading counts where it is known.
+void Controller::find_place(const Estimate& estimate) noexcept {
+  const Roles& roles = vehicle_->description().roles;
+  const double x = estimate.state[roles.position_x], y = estimate.state[roles.position_y];
+  if (!is_located_ && std::isfinite(x) && std::isfinite(y)) {
+    double heading = std::numeric_limits<double>::quiet_NaN();
+    if (roles.heading >= 0 && std::isfinite(estimate.state[roles.heading])) {
+      const bool has_covariance = estimate.covariance.rows() > roles.heading;
+      const double variance = has_covariance ? estimate.covariance(roles.heading, roles.heading) : 0.0;
+      if (!(variance > known_heading * known_heading)) heading = estimate.state[roles.heading];
+    }
+    follower_.locate(x, y, heading);
+    is_located_ = true;
+  }
+  follower_.advance(x, y);
+}
+
 const Controller::Command& Controller::control(const Estimate& estimate, Clock::time_point deadline) noexcept {
   finish();
-  const Roles& roles = problem_.model().description().roles;
   const int nx = vehicle_->state_count(), np = vehicle_->parameter_count();
-  follower_.advance(estimate.state[roles.position_x], estimate.state[roles.position_y]);
+  find_place(estimate);
   std::copy_n(estimate.state.data(), nx, problem_.given_state());
   std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
   // What is prepared is linearised with the slip that was expected then.
   if (!prepared_) look_ahead(follower_.arc_length(), estimate.parameters.data());
   set_reference(follower_.arc_length(), estimate.parameters.data());
+  const int heading = vehicle_->description().roles.heading;
+  command_.heading_error = heading >= 0 ? angle_difference(estimate.state[heading], command_.reference.heading) : 0.0;
   write_held_inputs();
   command_.relaxed = problem_.finish(scratch_) > 0;
   bool from_plan = has_plan_;
@@ -381,7 +445,8 @@ void Controller::prepare() noexcept {
   std::copy_n(point_.state(1), nx, problem_.given_state());
   std::copy_n(problem_.given_parameters(), np, reference_parameters_.data());
   const PathPoint reference = command_.reference;
-  const double next = follower_.arc_length() + setup_.interval * std::abs(reference.speed);
+  int segment = reference_segment_;
+  const double next = path_.arc_length_after(follower_.arc_length(), setup_.interval, segment);
   look_ahead(next, reference_parameters_.data());
   set_reference(next, reference_parameters_.data());
   command_.reference = reference;

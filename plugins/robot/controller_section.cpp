@@ -191,6 +191,7 @@ std::unique_ptr<Controller> ControllerSection::make(const Path& path, const Robo
   Controller::Setup setup;
   add_problem(setup, path.top_speed());
   setup.interval = context_->step;
+  setup.search.stop_time = context_->step;
   setup.reference_speed = options_.reference_speed;
   setup.least_speed_factor = options_.least_speed_factor;
   setup.speed_bound_factor = options_.speed_bound_factor;

@@ -96,10 +96,12 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
 
   const double step = robot.step();
   // Three times the path's nominal duration, enough for a vehicle that lags behind its literal reference.
-  const auto limit =
-      static_cast<std::int64_t>(3.0 * scenario.path().length() / (scenario.options().speed * step)) + 100;
+  const auto limit = static_cast<std::int64_t>(3.0 * scenario.path().duration() / step) + 100;
   std::vector<double> outputs(model.output_count()), measured(model.input_count());
   Consistency consistency(model.description());
+  int path_segment = 0;
+  true_follower.locate(truth.state()[roles.position_x], truth.state()[roles.position_y],
+                       roles.heading >= 0 ? truth.state()[roles.heading] : std::numeric_limits<double>::quiet_NaN());
   RunLog log;
   log.samples.reserve(static_cast<std::size_t>(limit));
   const auto begin = [&hooks](LoopPart part) {
@@ -115,7 +117,8 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     begin(LoopPart::control);
     const Controller::Command& command = controller->control(estimate);
     begin(LoopPart::log_sample);
-    true_follower.advance(truth.state()[roles.position_x], truth.state()[roles.position_y]);
+    true_follower.advance_with(controller->follower(), truth.state()[roles.position_x],
+                               truth.state()[roles.position_y]);
 
     Sample sample;
     sample.step = k;
@@ -128,6 +131,9 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.inputs = command.inputs;
     sample.reference = command.reference;
     sample.tracking = true_follower.lateral();
+    if (roles.heading >= 0)
+      sample.heading_error = angle_difference(
+          truth.state()[roles.heading], scenario.path().point_at(true_follower.arc_length(), path_segment).heading);
     sample.estimator_status = estimate.report.status;
     sample.controller_status = command.report.status;
     sample.estimator_fallback = estimate.fallback;

@@ -76,7 +76,8 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
   head("sigma_", about.parameters);
   head("", about.inputs);
   text +=
-      ",reference_x,reference_y,reference_heading,tracking,nees,estimator_status,controller_status,estimator_fallback,"
+      ",reference_x,reference_y,reference_heading,reference_speed,tracking,heading_error,nees,estimator_status,"
+      "controller_status,estimator_fallback,"
       "controller_fallback,relaxed\n";
   const std::size_t sigmas = about.states.size() + about.parameters.size();
   for (const Sample& sample : log.samples) {
@@ -95,7 +96,8 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
       text.append(sigmas, ',');
     }
     row(sample.inputs);
-    row(std::array{sample.reference.x, sample.reference.y, sample.reference.heading, sample.tracking});
+    row(std::array{sample.reference.x, sample.reference.y, sample.reference.heading, sample.reference.speed,
+                   sample.tracking, sample.heading_error});
     if (std::isfinite(sample.nees)) {
       append_number(sample.nees, text);
     } else {

@@ -18,10 +18,16 @@ namespace rhec::sim {
 namespace {
 
 struct PathOptions {
-  enum class Name { figure8, zigzag, file };
+  enum class Name { figure8, zigzag, headland, file };
   Name name = Name::figure8;
   int laps = 2, legs = 6;
-  double radius = 21.9, leg_length = 68.0, turn_radius = 9.0, spacing = 0.1;
+  double radius = 21.9, leg_length = 68.0, spacing = 0.1;
+  int rows = 4;
+  double row_length = 40.0, row_spacing = 3.0;
+  std::optional<double> turn_radius;
+  double acceleration = 1.0;
+  std::optional<double> lateral_acceleration;
+  double start = 0.0;
   std::string file;
 };
 
@@ -44,14 +50,31 @@ const OptionTable<PathOptions>& path_table() {
   static const auto rows =
       OptionTable<P>()
           .choice("name", &P::name,
-                  {{"figure8", P::Name::figure8}, {"zigzag", P::Name::zigzag}, {"file", P::Name::file}}, "which path")
+                  {{"figure8", P::Name::figure8},
+                   {"zigzag", P::Name::zigzag},
+                   {"headland", P::Name::headland},
+                   {"file", P::Name::file}},
+                  "which path")
           .integer("laps", &P::laps, "of figure8", between(1, 1000))
           .number("radius", &P::radius, "of the circles of figure8 [m]", greater_than(0.0))
           .integer("legs", &P::legs, "of zigzag", between(1, 1000))
           .number("leg_length", &P::leg_length, "of zigzag [m]", greater_than(0.0))
-          .number("turn_radius", &P::turn_radius, "of the half circles of zigzag [m]", greater_than(0.0))
+          .integer("rows", &P::rows, "of headland", between(1, 1000))
+          .number("row_length", &P::row_length, "of headland [m]", greater_than(0.0))
+          .number("row_spacing", &P::row_spacing,
+                  "of headland [m]; where it is less than two radii, the vehicle reverses in its turns",
+                  greater_than(0.0))
+          .optional_number("turn_radius", &P::turn_radius, "of zigzag (none: 9) and headland (none: 5) [m]",
+                           greater_than(0.0))
           .number("spacing", &P::spacing, "largest distance between waypoints [m]", greater_than(0.0))
-          .text("file", &P::file, "of waypoints x, y (, speed), for path.name: file");
+          .text("file", &P::file, "of waypoints x, y (, speed, left, right), for path.name: file")
+          .number("acceleration", &P::acceleration,
+                  "with which speeds change along the path: a vehicle brakes in time for what comes [m/s^2]",
+                  greater_than(0.0))
+          .optional_number("lateral_acceleration", &P::lateral_acceleration,
+                           "at most this in bends, where speeds are lowered for it; none: no limit [m/s^2]",
+                           greater_than(0.0))
+          .number("start", &P::start, "how far along the path the vehicle starts [m]", at_least(0.0));
   return rows;
 }
 
@@ -135,16 +158,32 @@ void require_few_waypoints(const Settings& section, double length, double spacin
                          length, spacing, most_waypoints));
 }
 
-std::vector<Waypoint> make_waypoints(const ScenarioOptions& options) {
-  const PathOptions path = path_table().parse(options.path, "path");
+std::vector<Waypoint> make_waypoints(const ScenarioOptions& options, const PathOptions& path) {
+  struct {
+    ZigZag zig_zag;
+    Headland headland;
+  } shape{
+      .zig_zag = {.speed = options.speed, .legs = path.legs, .leg_length = path.leg_length, .spacing = path.spacing},
+      .headland = {.speed = options.speed,
+                   .rows = path.rows,
+                   .row_length = path.row_length,
+                   .row_spacing = path.row_spacing,
+                   .point_spacing = path.spacing}};
   switch (path.name) {
     case PathOptions::Name::figure8:
       require_few_waypoints(options.path, path.laps * 4.0 * std::numbers::pi * path.radius, path.spacing);
       return figure_eight({options.speed, path.laps, path.radius, path.spacing});
     case PathOptions::Name::zigzag:
-      require_few_waypoints(options.path, path.legs * (path.leg_length + std::numbers::pi * path.turn_radius),
+      shape.zig_zag.radius = path.turn_radius.value_or(shape.zig_zag.radius);
+      require_few_waypoints(options.path, path.legs * (path.leg_length + std::numbers::pi * shape.zig_zag.radius),
                             path.spacing);
-      return zig_zag({options.speed, path.legs, path.leg_length, path.turn_radius, path.spacing});
+      return zig_zag(shape.zig_zag);
+    case PathOptions::Name::headland:
+      shape.headland.turn_radius = path.turn_radius.value_or(shape.headland.turn_radius);
+      require_few_waypoints(options.path,
+                            path.rows * (path.row_length + path.row_spacing + 6.0 * shape.headland.turn_radius),
+                            path.spacing);
+      return headland(shape.headland);
     case PathOptions::Name::file:
       if (path.file.empty())
         throw key_or_section(options.path, "name")
@@ -152,6 +191,12 @@ std::vector<Waypoint> make_waypoints(const ScenarioOptions& options) {
       return load_waypoints(file_at(*options.path.find("file")), {options.speed});
   }
   return {};
+}
+
+Path make_path(const ScenarioOptions& options) {
+  const PathOptions path = path_table().parse(options.path, "path");
+  return {make_waypoints(options, path),
+          {.acceleration = path.acceleration, .lateral_acceleration = path.lateral_acceleration.value_or(infinity)}};
 }
 
 std::vector<SlipRange> slip_ranges(const TerrainOptions& terrain, const ModelDescription& about,
@@ -258,15 +303,20 @@ std::vector<OptionSection> scenario_sections() {
 Scenario::Scenario(const Host& host, const Settings& settings)
     : options_(ScenarioOptions::table().parse(settings, "scenario")),
       robot_(host, options_, scenario_estimators()),
-      path_(make_waypoints(options_)),
+      path_(make_path(options_)),
       terrain_(make_terrain(options_.terrain, options_.seed, robot_.model()->description())) {
   vehicle_ = vehicle_table().parse(options_.vehicle, "vehicle");
-  const double samples = path_.length() / (options_.speed * options_.step);
+  const double samples = path_.duration() / options_.step;
   if (!(samples >= 1.0 && samples <= most_samples))
     throw key_or_section(settings, "step")
-        .error(fmt::format("a path of {:.4g} m at {} m/s has {:.4g} steps of {} s; expected between 1 and {:g}",
-                           path_.length(), options_.speed, samples, options_.step, most_samples));
-  const PathPoint start = path_.point_at(0.0);
+        .error(
+            fmt::format("a path of {:.4g} m that takes {:.4g} s has {:.4g} steps of {} s; expected between 1 and {:g}",
+                        path_.length(), path_.duration(), samples, options_.step, most_samples));
+  const double along = path_table().parse(options_.path, "path").start;
+  if (!(along < path_.length()))
+    throw key_or_section(options_.path, "start")
+        .error(fmt::format("found {}, expected less than the path's length of {:.4g} m", along, path_.length()));
+  const PathPoint start = path_.point_at(along);
   initial_state_ = Eigen::VectorXd::Zero(robot_.model()->state_count());
   robot_.model()->description().roles.place(start.x, start.y, start.heading, initial_state_.data());
 }

@@ -109,7 +109,7 @@ SETTINGS = [
     # names
     ("estimator.name=nonsense", "one of rhe, ekf, bank, truth"),
     ("estimator.arrival.name=ekv", "did you mean 'ekf'"),
-    ("path.name=zig", "one of figure8, zigzag, file"),
+    ("path.name=zig", "one of figure8, zigzag, headland, file"),
     ("terrain.name=gauss", "one of gaussian"),
     ("estimator.solver.mode=fast", "one of rti, converge"),
     # files
@@ -155,7 +155,7 @@ WAYPOINTS = [
     ("x,y\n", ": "),
     ("", ": the file is empty"),
     ("0,0\n1,\n", ":2: a coordinate is missing"),
-    ("0,0,3\n1,0,-3\n", ":2: the speed is -3"),
+    ("0,0,3\n1,0,-3\n", ":2: path: the speed is 3 m/s at waypoint 1 and -3 m/s"),
     ("0,0,3\n1,0,nan\n", ":2: the speed is missing"),
     ("0\n1\n", ": 1 column(s)"),
     ("0,0\n\n1,0\n", ":2: a blank line"),

@@ -72,7 +72,9 @@ class Drive {
     setup.interval = step;
     setup.speed_bound_factor = 1.2;
     setup.speed_bound_offset = 0.5 * frame.unit;
-    setup.search = {.ahead = 8.0 * frame.unit, .behind = frame.unit};
+    setup.search = {.ahead = 8.0 * frame.unit,
+                    .behind = frame.unit,
+                    .place = {.turn_length = 2.0 * frame.unit, .margin = frame.unit}};
     controller_ = std::make_unique<Controller>(model_, host().make_solver("gn_rti", solver()), path(), setup);
     estimator_ = robot_.make_estimator();
   }

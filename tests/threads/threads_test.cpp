@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "rhec/core/control/path.hpp"
+#include "rhec/core/control/path_follower.hpp"
 #include "rhec/plugins/robot/robot.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "support/random_problem.hpp"

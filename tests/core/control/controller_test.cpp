@@ -3,12 +3,15 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <limits>
 #include <numbers>
+#include <vector>
 
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/plugins/robot/robot.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "support/error_of.hpp"
 
 namespace rhec {
 namespace controller_test {
@@ -148,6 +151,69 @@ TEST(ControllerReference, BoundsTheInputsThatDriveAndNoOthers) {
   const auto free = controller_for("{model: bicycle_slip, controller: {speed_bound_factor: .inf}}");
   reference(*free, {1.0, 1.0});
   EXPECT_EQ(free->problem().input_upper(3, 0), std::numeric_limits<double>::infinity());
+}
+
+/// The estimate of a vehicle that is somewhere, without slip.
+Estimate estimate_at(const Controller& controller, double x, double y, double heading) {
+  const Model& model = controller.vehicle();
+  Estimate estimate;
+  estimate.state = Eigen::VectorXd::Zero(model.state_count());
+  model.description().roles.place(x, y, heading, estimate.state.data());
+  estimate.parameters = Eigen::VectorXd::Ones(model.parameter_count());
+  return estimate;
+}
+
+std::unique_ptr<Controller> controller_on(const Path& path, const std::string& configuration = "model: bicycle_slip") {
+  return Robot(host(), RobotOptions::table().parse(parse_yaml(configuration, "robot.yaml"), "robot"))
+      .make_controller(path);
+}
+
+TEST(ControllerReference, BrakesForAStopAndGoesOnInReverse) {
+  // From 2 m/s to rest within 4 m: 0.5 m/s^2, 4 s; then back.
+  const Path path({{0, 0, 2.0}, {10, 0, 2.0}, {14, 0, 0.0}, {10, 0, -2.0}, {0, 0, -2.0}});
+  const auto controller = controller_on(path);
+  controller->control(estimate_at(*controller, 11.0, 0.0, 0.0));
+  const RhcProblem& problem = controller->problem();
+  const double first = std::sqrt(4.0 - 2.0 * 0.5 * 1.0);  // m/s at 11 m
+  for (int i = 0; i <= problem.intervals(); ++i) {
+    const double t = 0.2 * i, rest = first / 0.5;
+    const double x = t < rest ? 11.0 + (first - 0.25 * t) * t : 14.0 - 0.25 * (t - rest) * (t - rest);
+    EXPECT_NEAR(problem.state_reference(i)[0], x, 1e-9) << i;
+    EXPECT_NEAR(problem.state_reference(i)[2], 0.0, 1e-12) << "in reverse the heading stays";
+    if (i == problem.intervals()) break;
+    EXPECT_NEAR(problem.input_reference(i)[0], first - 0.5 * (t + 0.1), 1e-9);
+  }
+  EXPECT_EQ(problem.input_lower(0, 0), 0.0) << "still forwards alone";
+  controller->control(estimate_at(*controller, 13.9, 0.0, 0.0));
+  EXPECT_EQ(controller->follower().section(), 1);
+  EXPECT_LT(controller->problem().input_reference(10)[0], 0.0);
+  EXPECT_LT(controller->problem().input_lower(0, 0), -1.0);
+  EXPECT_EQ(controller->problem().input_upper(0, 0), 0.0);
+  EXPECT_TRUE(is_usable(controller->control(estimate_at(*controller, 13.9, 0.0, 0.0)).report.status));
+}
+
+TEST(ControllerReference, StartsWhereTheVehicleIs) {
+  std::vector<Waypoint> waypoints;
+  for (int i = 0; i <= 100; ++i) waypoints.push_back({1.0 * i, 0.0, 2.0});
+  const Path path(waypoints);
+  const auto controller = controller_on(path);
+  const Controller::Command& command = controller->control(estimate_at(*controller, 30.0, 0.5, 0.1));
+  EXPECT_NEAR(command.reference.x, 30.0, 1e-9);
+  EXPECT_NEAR(command.heading_error, 0.1, 1e-12);
+  EXPECT_NEAR(controller->follower().lateral(), 0.5, 1e-12);
+  // Then it is searched for near the last place alone, unless that is asked for.
+  EXPECT_NEAR(controller->control(estimate_at(*controller, 60.0, 0.0, 0.0)).reference.x, 38.0, 1e-9);
+  controller->locate();
+  EXPECT_NEAR(controller->control(estimate_at(*controller, 60.0, 0.0, 0.0)).reference.x, 60.0, 1e-9);
+  controller->reset();
+  EXPECT_NEAR(controller->control(estimate_at(*controller, 80.0, 0.0, 0.0)).reference.x, 80.0, 1e-9);
+}
+
+TEST(ControllerReference, RefusesAPathThatNoVehicleCanFollow) {
+  EXPECT_THAT(error_of([] {
+                controller_on(Path({{0, 0, 1.0}, {5, 0, 1.0}, {0, 0.1, 1.0}}));
+              }),
+              ::testing::HasSubstr("at waypoint 2; where a path turns back, the speed is 0"));
 }
 
 TEST(ControllerReference, PutsAllBodiesInLineAlongThePath) {

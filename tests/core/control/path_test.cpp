@@ -7,6 +7,8 @@
 #include <numbers>
 #include <random>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "rhec/core/base/error.hpp"
 #include "support/error_of.hpp"
@@ -26,7 +28,7 @@ TEST(Path, IsAddressedByArcLength) {
   EXPECT_DOUBLE_EQ(point.x, 3.0);
   EXPECT_DOUBLE_EQ(point.y, 2.0);
   EXPECT_DOUBLE_EQ(point.heading, pi / 2);
-  EXPECT_DOUBLE_EQ(point.speed, 3.0);
+  EXPECT_DOUBLE_EQ(point.speed, std::sqrt(10.0)) << "between 2 and 4 m/s with constant acceleration";
   EXPECT_DOUBLE_EQ(path.point_at(3.0).heading, pi / 2) << "at a waypoint the segment that follows counts";
   EXPECT_DOUBLE_EQ(path.point_at(2.999).heading, 0.0);
 }
@@ -150,94 +152,115 @@ TEST(Path, APointIsTheSameFromWhateverSegmentItIsSearched) {
   }
 }
 
-TEST(PathFollower, ProjectsOnSegmentsWithASignedDistance) {
-  const Path path = corner();
-  PathFollower follower(path);
-  EXPECT_DOUBLE_EQ(follower.advance(1.25, 0.5), 1.25);
-  EXPECT_DOUBLE_EQ(follower.lateral(), 0.5) << "left of +x is +y";
-  EXPECT_DOUBLE_EQ(follower.advance(1.5, -0.25), 1.5);
-  EXPECT_DOUBLE_EQ(follower.lateral(), -0.25);
-  EXPECT_DOUBLE_EQ(follower.advance(4.0, -1.0), 3.0) << "outside the corner the corner itself is closest";
-  EXPECT_DOUBLE_EQ(follower.lateral(), -std::sqrt(2.0));
+// 4 m forwards along +x, a stop, 2 m back along +y in reverse (heading -y), a stop, and on along +y.
+Path headland() {
+  return Path({{0, 0, 2.0}, {2, 0, 2.0}, {4, 0, 0.0}, {3.2, 0.6, -1.0}, {2.4, 1.2, 0.0}, {3.4, 1.2, 1.0}});
 }
 
-TEST(PathFollower, StopsAtTheStartAndFinishesAtTheEnd) {
-  const Path path = corner();
-  PathFollower follower(path);
-  EXPECT_DOUBLE_EQ(follower.advance(-5.0, 0.0), 0.0);
-  EXPECT_FALSE(follower.finished());
-  follower.advance(2.9, 1.0);
-  follower.advance(3.0, 3.99);
-  EXPECT_FALSE(follower.finished());
-  EXPECT_DOUBLE_EQ(follower.advance(2.5, 4.5), 7.5) << "the last segment goes on";
-  EXPECT_TRUE(follower.finished());
-  EXPECT_DOUBLE_EQ(follower.lateral(), 0.5);
-  follower.reset();
-  EXPECT_FALSE(follower.finished());
-  EXPECT_DOUBLE_EQ(follower.arc_length(), 0.0);
+TEST(Path, SpeedsVaryWithConstantAcceleration) {
+  const Path path({{0, 0, 2.0}, {10, 0, 4.0}, {14, 0, 0.0}, {14, 6, 3.0}});
+  int segment = 0;
+  // 12 m^2/s^2 over twice 10 m, from 2 m/s.
+  EXPECT_DOUBLE_EQ(path.arc_length_after(0.0, 1.0, segment), 2.0 + 0.5 * 0.6);
+  EXPECT_DOUBLE_EQ(path.point_at(2.3).speed, 2.6);
+  const double first = 10.0 / 3.0, second = 2.0, third = 4.0;
+  EXPECT_DOUBLE_EQ(path.duration(), first + second + third);
+  EXPECT_EQ(path.point_at(14.0).speed, 0.0);
+  EXPECT_NEAR(path.arc_length_after(0.0, first + second, segment), 14.0, 1e-12) << "a stop is reached in time";
+  EXPECT_NEAR(path.arc_length_after(0.0, first + second + 2.0, segment), 14.0 + 0.5 * 0.75 * 4.0, 1e-12) << "and left";
+  EXPECT_NEAR(path.arc_length_after(20.0, 2.0, segment), 26.0, 1e-12) << "beyond the end at the last speed";
+  EXPECT_NEAR(path.arc_length_after(-4.0, 1.0, segment), -2.0, 1e-12) << "before the start at the first";
+  const Path standing({{0, 0, 0.0}, {10, 0, 2.0}, {20, 0, 0.0}});
+  EXPECT_EQ(standing.arc_length_after(20.0, 5.0, segment), 20.0);
+  EXPECT_EQ(standing.arc_length_after(0.0, 1e6, segment), 20.0);
+  EXPECT_DOUBLE_EQ(standing.arc_length_after(0.0, 1.0, segment), 0.1) << "4 / 20 m/s^2 from rest";
 }
 
-TEST(PathFollower, StaysWhereItIsOnANonFinitePosition) {
-  const Path path = corner();
-  PathFollower follower(path);
-  follower.advance(1.0, 0.2);
-  EXPECT_DOUBLE_EQ(follower.advance(std::numeric_limits<double>::quiet_NaN(), 0.0), 1.0);
-  EXPECT_DOUBLE_EQ(follower.lateral(), 0.2);
-}
-
-TEST(PathFollower, RefusesAWindowThatSeesNothing) {
-  const Path path = corner();
-  EXPECT_THROW(PathFollower(path, {.ahead = 0.0}), Error);
-  EXPECT_THROW(PathFollower(path, {.ahead = 5.0, .behind = -1.0}), Error);
-  EXPECT_THROW(PathFollower(path, {.ahead = std::numeric_limits<double>::quiet_NaN()}), Error);
-}
-
-// A figure-8 whose branches really cross at the origin (a lemniscate of Gerono, 40 m wide), two laps.
-Path crossing_eight() {
-  std::vector<Waypoint> waypoints;
-  for (int i = 0; i <= 4000; ++i) {
-    const double t = pi / 2 + 4.0 * pi * i / 4000.0;
-    waypoints.push_back({40.0 * std::sin(t), 40.0 * std::sin(t) * std::cos(t), {}});
-  }
-  return Path(waypoints);
-}
-
-TEST(PathFollower, NeverJumpsBranchesAtACrossing) {
-  const Path path = crossing_eight();
-  const double stride = 1.0, noise = 0.4;
-  for (unsigned seed = 0; seed < 20; ++seed) {
-    std::mt19937 random(seed);
-    std::normal_distribution<double> lateral(0.0, noise);
-    PathFollower follower(path);
-    for (double arc_length = 0.0; arc_length < path.length(); arc_length += stride) {
-      const PathPoint point = path.point_at(arc_length);
-      const double offset = lateral(random);
-      const double found =
-          follower.advance(point.x - offset * std::sin(point.heading), point.y + offset * std::cos(point.heading));
-      ASSERT_NEAR(found, arc_length, 1.0) << "seed " << seed;
+TEST(Path, WhereAVehicleGetsToIsTheSumOfItsWays) {
+  std::vector<double> arc_lengths;
+  const Path path = winding_path(5, &arc_lengths);
+  for (const double start : {-0.5, 0.0, 7.3, path.length() - 0.2}) {
+    int segment = 3;
+    double stepwise = start, way = start;
+    for (int k = 0; k < 2000; ++k) {
+      stepwise = path.arc_length_after(stepwise, 0.005, segment);
+      way += 0.005 * path.point_at(way).speed;  // Euler's rule
     }
+    segment = 0;
+    EXPECT_NEAR(path.arc_length_after(start, 10.0, segment), stepwise, 1e-9);
+    EXPECT_NEAR(stepwise, way, 0.01);
   }
-  // The test could fail: a search over the whole path does jump.
-  const PathPoint before_crossing = path.point_at(path.length() / 8.0 + 0.3);
-  const PathProjection anywhere =
-      path.closest(before_crossing.x + 0.3, before_crossing.y + 0.3, path.length() / 4, path.length());
-  EXPECT_LT(std::abs(anywhere.lateral), 1.0);
-  EXPECT_GT(anywhere.arc_length, path.length() / 4);
 }
 
-TEST(PathFollower, ResultDoesNotDependOnResolution) {
-  // A straight line with few and with many waypoints; the window cuts the long segments.
-  std::vector<Waypoint> fine;
-  for (int i = 0; i <= 10000; ++i) fine.push_back({0.01 * i, 0.0, {}});
-  const Path coarse_path({{0, 0, {}}, {100, 0, {}}}), fine_path(fine);
-  PathFollower coarse(coarse_path), finely(fine_path);
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> step(-1.5, 3.0), side(-2.0, 2.0);
-  for (double x = 0.0; x < 100.0; x += step(random)) {
-    const double y = side(random);
-    ASSERT_NEAR(coarse.advance(x, y), finely.advance(x, y), 1e-9);
-    ASSERT_NEAR(coarse.lateral(), finely.lateral(), 1e-9);
-  }
+TEST(Path, InReverseTheVehicleLooksTheOtherWay) {
+  const Path path = headland();
+  EXPECT_EQ(path.why_not_drivable(), "");
+  EXPECT_EQ(path.section_count(), 3);
+  EXPECT_DOUBLE_EQ(path.section_end(0), 4.0);
+  EXPECT_DOUBLE_EQ(path.section_start(2), 6.0);
+  EXPECT_TRUE(path.stops_after(1));
+  EXPECT_FALSE(path.stops_after(2));
+  EXPECT_EQ(path.point_at(1.0).heading, 0.0);
+  const PathPoint back = path.point_at(5.0);
+  EXPECT_EQ(back.speed, -1.0);
+  EXPECT_NEAR(back.heading, std::atan2(-0.6, 0.8), 1e-12) << "against the direction of the path";
+  EXPECT_EQ(path.point_at(6.5).heading, 0.0);
+  EXPECT_EQ(path.top_speed(), 2.0);
+  EXPECT_DOUBLE_EQ(path.time_to_section_end(2.0, 0), 2.0);
+}
+
+TEST(Path, SpeedsAreLoweredInTime) {
+  std::vector<Waypoint> waypoints;
+  for (int i = 0; i <= 400; ++i) waypoints.push_back({0.1 * i, 0.0, i == 200 ? 0.0 : 3.0});
+  const Path path(waypoints, {.acceleration = 0.5});
+  for (double s = 0.0; s < 40.0; s += 0.37)
+    EXPECT_NEAR(path.point_at(s).speed, std::min(3.0, std::sqrt(2.0 * 0.5 * std::abs(s - 20.0))), 1e-9) << s;
+  std::vector<Waypoint> circle;
+  for (int i = 0; i <= 400; ++i) circle.push_back({5.0 * std::cos(0.01 * i), 5.0 * std::sin(0.01 * i), 3.0});
+  EXPECT_NEAR(Path(circle).point_at(10.0).curvature, 0.2, 1e-5);
+  EXPECT_NEAR(Path(circle, {.lateral_acceleration = 0.8}).point_at(10.0).speed, 2.0, 1e-4);
+  EXPECT_EQ(Path(circle, {.lateral_acceleration = 2.0}).point_at(10.0).speed, 3.0);
+}
+
+TEST(Path, SaysWhatNoVehicleCanFollow) {
+  const auto why = [](const std::vector<Waypoint>& waypoints) { return Path(waypoints).why_not_drivable(); };
+  EXPECT_EQ(why({{0, 0, 1.0}, {1, 0, 0.0}, {2, 0, 1.0}}), "");
+  EXPECT_NE(why({{0, 0, 1.0}, {1, 0, 0.0}, {2, 0, 0.0}}).find("waypoint 2 and at waypoint 3"), std::string::npos);
+  EXPECT_NE(why({{0, 0, 1.0}, {1, 0, 2.0}, {1, 0, 2.0}, {0, 0, -1.0}}).find("-1 m/s at waypoint 4"), std::string::npos);
+  EXPECT_NE(why({{0, 0, 1.0}, {1, 0, 1.0}, {0, 0, 1.0}}).find("180 degrees on the spot at waypoint 2"),
+            std::string::npos)
+      << "a cusp that is driven forwards";
+  EXPECT_NE(why({{0, 0, 1.0}, {1, 0, 0.0}, {2, 0, -1.0}}).find("180 degrees"), std::string::npos)
+      << "in reverse, but not back";
+}
+
+TEST(Path, RoomBesideItVariesFromWaypointToWaypoint) {
+  const Path path({{0, 0, 1, 2.0, 3.0}, {4, 0, 1, 4.0}, {8, 0, 1, 4.0}});
+  EXPECT_DOUBLE_EQ(path.point_at(1.0).left, 2.5);
+  EXPECT_DOUBLE_EQ(path.point_at(0.0).right, 3.0);
+  EXPECT_EQ(path.point_at(1.0).right, infinity);
+  EXPECT_EQ(path.point_at(6.0).right, infinity);
+  EXPECT_NE(error_of([] { Path({{0, 0, 1}, {1, 0, 1, -2.0}}); }).find("waypoint 2"), std::string::npos);
+}
+
+TEST(Path, LocatesAVehicleAnywhere) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  // Two rows 3 m apart, there and back, twice.
+  std::vector<Waypoint> waypoints;
+  for (int lap = 0; lap < 2; ++lap)
+    for (const auto& [x, y] : {std::pair{0.0, 0.0}, {50.0, 0.0}, {51.5, 1.5}, {50.0, 3.0}, {0.0, 3.0}, {-1.5, 1.5}})
+      waypoints.push_back({x, y, 1.0});
+  const Path path(waypoints);
+  EXPECT_NEAR(path.locate(30.0, 0.4, 0.1).arc_length, 30.0, 1e-9) << "of equal laps the first";
+  EXPECT_NEAR(path.locate(30.0, 1.4, 0.1).arc_length, 30.0, 1e-9);
+  const double back = path.length() / 2.0;
+  EXPECT_NEAR(path.locate(30.0, 1.4, pi - 0.1).arc_length, 50.0 + 2.0 * 1.5 * std::sqrt(2.0) + 20.0, 1e-9)
+      << "the row that leads where the vehicle looks";
+  EXPECT_LT(path.locate(30.0, 2.9, nan).arc_length, back);
+  const Path reversing = headland();
+  EXPECT_EQ(reversing.locate(3.2, 0.6, -0.6).section, 1);
+  EXPECT_EQ(reversing.locate(3.3, 1.2, 0.0).section, 2);
+  EXPECT_EQ(reversing.locate(1.0, 0.0, 0.0).section, 0);
 }
 
 }  // namespace path_test

@@ -1,6 +1,7 @@
 // What a closed loop tells of its parts: each sample's in their order, and nothing of the run changes.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,37 @@ TEST(LoopTimes, FeedbackIsPartOfTheEstimatorsTime) {
     EXPECT_GT(sample.estimator_feedback_us, 0.0);
     EXPECT_GE(sample.estimator_us, sample.estimator_feedback_us);
   }
+}
+
+TEST(Headlands, AreDrivenInReverse) {
+  for (const int seed : {71, 72}) {
+    Settings settings = load_yaml(SCENARIOS "/headland.yaml");
+    apply_assignment(settings, "seed=" + std::to_string(seed));
+    const Scenario scenario(Host(), settings);
+    ASSERT_EQ(scenario.path().section_count(), 7) << "three fishtails";
+    const RunLog log = run_closed_loop(scenario);
+    ASSERT_TRUE(log.completed) << log.ended;
+    const RunSummary summary = summarise(log, scenario);
+    EXPECT_LT(summary.mae.tracking, 0.15);
+    EXPECT_LT(summary.nees, 1.5 * summary.nees_expected) << "at stops, too, the covariance is honest";
+    EXPECT_EQ(summary.fallbacks, 0);
+    double in_reverse = 0.0;
+    for (const Sample& sample : log.samples) {
+      if (sample.inputs[0] < -0.05) in_reverse += scenario.robot().step();
+      ASSERT_TRUE(sample.sigma.allFinite());
+      EXPECT_LT(std::abs(sample.heading_error), 0.5) << sample.time;
+    }
+    EXPECT_GT(in_reverse, 10.0) << "seconds, of three times 7 m";
+  }
+}
+
+TEST(Headlands, StartsMayBeAnywhereOnThePath) {
+  const Scenario scenario = scenario_with({"path.laps=1", "speed=4", "path.start=60"});
+  const RunLog log = run_closed_loop(scenario);
+  ASSERT_TRUE(log.completed) << log.ended;
+  const double rest = scenario.path().length() - 60.0;
+  EXPECT_NEAR(static_cast<double>(log.samples.size()) * scenario.robot().step(), rest / 4.0, 5.0);
+  for (const Sample& sample : log.samples) EXPECT_LT(std::abs(sample.tracking), 2.0) << sample.time;
 }
 
 }  // namespace closed_loop_test

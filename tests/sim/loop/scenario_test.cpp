@@ -42,6 +42,18 @@ TEST(Scenario, TheVehicleStartsOnThePathAndFacesAlongIt) {
   EXPECT_EQ(start.speed, 8.0);
 }
 
+TEST(Scenario, ThePathsSpeedsChangeAsFastAsTheyMay) {
+  const Scenario bends = figure8_with({"path.radius=12", "path.lateral_acceleration=3"});
+  EXPECT_NEAR(bends.path().point_at(20.0).speed, 6.0, 0.01) << "3 m/s^2 at a radius of 12 m";
+  const Scenario rows = figure8_with({"path={name: headland, row_length: 40, turn_radius: 4, acceleration: 0.5}"});
+  EXPECT_EQ(rows.path().section_count(), 7);
+  const double quarter = rows.path().section_end(0) - 40.0;
+  EXPECT_NEAR(quarter, 2.0 * M_PI, 1e-3);
+  EXPECT_NEAR(rows.path().point_at(rows.path().section_end(0) - 1.0).speed, 1.0, 0.01);
+  const Scenario on_the_way = figure8_with({"path.start=30"});
+  EXPECT_EQ(on_the_way.initial_state()[0], on_the_way.path().point_at(30.0).x);
+}
+
 TEST(Scenario, TheGroundIsAsItIsNamed) {
   const Scenario constant = figure8_with({"terrain={name: constant, values: {kappa: 0.75}}"});
   EXPECT_EQ(slip_at(constant, 3.0, -7.0), (std::array{0.75, 1.0})) << "mu is where nothing slips";

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rhec/core/control/path.hpp"
+#include "rhec/core/control/path_follower.hpp"
 #include "rhec/sim/world/paths.hpp"
 #include "rhec/sim/world/truth.hpp"
 #include "sim/support/bicycle.hpp"

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/control/path_follower.hpp"
 #include "rhec/sim/numbers/random.hpp"
 #include "support/error_of.hpp"
 
@@ -94,6 +95,35 @@ TEST(GeneratedPaths, HaveTheirSpeedEverywhere) {
   for (const double at : {0.0, 10.0, 200.0}) EXPECT_EQ(path.point_at(at).speed, 3.0);
 }
 
+TEST(Headland, TurnsAsAFishtailWhereRowsAreNear) {
+  const Path path(headland({.speed = 2.0, .rows = 3, .row_length = 40.0, .row_spacing = 3.0, .turn_radius = 5.0}));
+  EXPECT_EQ(path.why_not_drivable(), "");
+  ASSERT_EQ(path.section_count(), 5);
+  const PathPoint first_stop = path.point_at(path.section_end(0)), second = path.point_at(path.section_end(1));
+  EXPECT_NEAR(first_stop.x, 45.0, 1e-9);
+  EXPECT_NEAR(first_stop.y, 5.0, 1e-9);
+  EXPECT_NEAR(second.y, 5.0 - 7.0, 1e-9);
+  EXPECT_LT(path.point_at(path.section_start(1) + 1.0).speed, 0.0);
+  const PathPoint end = path.point_at(path.length());
+  EXPECT_NEAR(end.x, 40.0, 1e-9);
+  EXPECT_NEAR(end.y, 6.0, 1e-9);
+  EXPECT_EQ(end.speed, 0.0);
+  const Path wide(headland({.rows = 2, .row_spacing = 14.0, .turn_radius = 5.0}));
+  EXPECT_EQ(wide.section_count(), 1) << "wide rows are joined without a stop";
+  EXPECT_NEAR(wide.point_at(wide.length()).y, 14.0, 1e-9);
+  EXPECT_THROW(headland({.row_spacing = 0.0}), Error);
+}
+
+TEST(LoadWaypoints, ReadsReverseStopsAndRoom) {
+  const auto waypoints = load_waypoints(file_with("speed,y,x,right\n2,0,0,1.5\n0,0,10,\n-1,0,5,0.5\n"));
+  ASSERT_EQ(waypoints.size(), 3u);
+  EXPECT_EQ(waypoints[2].x, 5.0);
+  EXPECT_EQ(waypoints[2].speed, -1.0);
+  EXPECT_EQ(waypoints[0].right, 1.5);
+  EXPECT_EQ(waypoints[1].right, infinity);
+  EXPECT_EQ(waypoints[0].left, infinity);
+}
+
 TEST(LoadWaypoints, ReadsWithAndWithoutHeaderAndSpeed) {
   const auto plain = load_waypoints(file_with("0,0\n1,2\n"), {.speed = 4.0});
   ASSERT_EQ(plain.size(), 2u);
@@ -108,7 +138,13 @@ TEST(LoadWaypoints, NamesTheRowOfAMistake) {
   EXPECT_CONTAINS(message_for("0,0\n1,2,3\n"), "rhec_waypoints.csv:2: 3 field(s) where 2");
   EXPECT_CONTAINS(message_for("x,y\n0,0\n1,two\n"), "rhec_waypoints.csv:3: field 2 is 'two'");
   EXPECT_CONTAINS(message_for("0,0\n1,\n"), "rhec_waypoints.csv:2: a coordinate is missing");
-  EXPECT_CONTAINS(message_for("0,0,1\n1,0,-1\n"), "rhec_waypoints.csv:2: the speed is -1");
+  EXPECT_CONTAINS(message_for("0,0,1\n1,0,-1\n"), "give the waypoint where it does the speed 0");
+  EXPECT_CONTAINS(message_for("0,0,1\n1,0,\n"), "rhec_waypoints.csv:2: the speed is missing");
+  EXPECT_CONTAINS(message_for("x,y\n0,0\n9,0\n1,0.1\n"), "rhec_waypoints.csv:3: path: a vehicle");
+  EXPECT_CONTAINS(message_for("x,y\n0,0\n0,0\n"), "rhec_waypoints.csv: path: 1 distinct waypoint(s)");
+  EXPECT_CONTAINS(message_for("x,z\n0,0\n9,0\n"), "a column 'z'");
+  EXPECT_CONTAINS(message_for("x,speed\n0,1\n9,1\n"), "no column 'y'");
+  EXPECT_CONTAINS(message_for("x,y,left\n0,0,1\n9,0,-1\n"), "rhec_waypoints.csv:3: room of -1 m");
   EXPECT_CONTAINS(message_for("0\n1\n"), "expected x,y");
   EXPECT_CONTAINS(message_for("x,y\n1,1\n"), "at least 2 rows");
   EXPECT_CONTAINS(message_for(""), "empty");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rhec/core/control/path.hpp"
+#include "rhec/core/control/path_follower.hpp"
 #include "rhec/core/estimation/estimate.hpp"
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/horizon/rhc_problem.hpp"
@@ -21,8 +22,10 @@ enum class ReferenceSpeed {
 
 /// Path-following controller: estimate in, input out (docs/method.md, section 3).
 ///
-/// At each call the closest point of the path is searched for ahead of the last one. The local reference is that point
-/// and the next N_c, each dt * u1ref metres further on. If the solver fails, and fails again from a simulation, the
+/// At the first call, and where `locate` asks for it, the vehicle's place is searched for on the whole path; from then
+/// on the closest point of the path is searched for ahead of the last one. The local reference is that point and those
+/// that a vehicle passes in N_c intervals from there at the path's speeds: it brakes in time for what comes, and goes
+/// through stops, where it may change its direction. If the solver fails, and fails again from a simulation, the
 /// plan of the last sample is continued and the failure is counted: its inputs one after the other, then the last of
 /// them. Without a plan the vehicle goes straight ahead. Where a map knows the slip that is ahead, the plan and its
 /// reference count with it.
@@ -48,7 +51,8 @@ class RHEC_EXPORT Controller {
     /// What slip to expect ahead; null: that of the estimate, everywhere.
     std::shared_ptr<const SlipAhead> ahead = nullptr;
   };
-  /// Throws Error if the model has no position or speed to follow a path with, or sizes do not match.
+  /// Throws Error if the model has no position or speed to follow a path with, no vehicle can follow the path
+  /// (Path::why_not_drivable), or sizes do not match.
   Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Path path, Setup setup);
   Controller(const Controller&) = delete;  // the follower points into the path
   Controller& operator=(const Controller&) = delete;
@@ -58,6 +62,7 @@ class RHEC_EXPORT Controller {
     PathPoint reference;         ///< the closest point of the path
     Report report;               ///< objective and KKT residual may be missing before `finish`
     bool fallback = false;       ///< the solver failed; the last plan is continued, if there is one
+    double heading_error = 0.0;  ///< heading of the estimate - that of the reference, in (-pi, pi] [rad]
     bool relaxed = false;        ///< a state bound was out of reach from the estimate and was relaxed
   };
   /// The input for an estimate. Valid until the next call.
@@ -68,11 +73,13 @@ class RHEC_EXPORT Controller {
   /// Says which inputs (n_u) the vehicle has had until now, where they are not the last command: at the start, or after
   /// it was driven by hand. Matters to rates alone. NaN: the last command, or what drives straight ahead.
   void applied(const double* inputs) noexcept;
+  /// Searches the whole path for the vehicle at the next call, as at the first one.
+  void locate() noexcept { is_located_ = false; }
   /// Does work for the next sample in advance; calling it is optional.
   void prepare() noexcept;
   void reset() noexcept;
 
-  /// True once the vehicle has passed the end of the path.
+  /// True once the vehicle has passed the end of the path, or has come to a stop there.
   bool finished() const noexcept { return follower_.finished(); }
   const PathFollower& follower() const noexcept { return follower_; }
   const Path& path() const noexcept { return path_; }
@@ -88,9 +95,12 @@ class RHEC_EXPORT Controller {
   std::int64_t fallbacks() const noexcept { return fallbacks_; }
 
  private:
+  void find_place(const Estimate& estimate) noexcept;
   void go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept;
   void choose_straight_motion(double ground_speed, const double* parameters) noexcept;
-  void bound_speed(double most) noexcept;
+  void choose_straight_motion_within_bounds(double ground_speed) noexcept;
+  void find_points(double arc_length) noexcept;
+  void bound_speed() noexcept;
   void set_reference(double arc_length, const double* parameters) noexcept;
   void look_ahead(double arc_length, const double* parameters) noexcept;
   void write_held_inputs() noexcept;
@@ -110,10 +120,13 @@ class RHEC_EXPORT Controller {
   Command command_;
   bool has_plan_ = false, prepared_ = false;
   bool is_finished_ = true;  ///< the last sample's plan was assessed and kept for the next one
-  double bounded_speed_ = std::numeric_limits<double>::quiet_NaN();  ///< for which the inputs' bounds were made [m/s]
-  int reference_segment_ = 0;  ///< segment of the path where the last reference began
+  bool is_located_ = false;  ///< where the vehicle is on the path is known
+  // For which the inputs' bounds were made [m/s].
+  double bounded_forwards_ = std::numeric_limits<double>::quiet_NaN(), bounded_in_reverse_ = bounded_forwards_;
+  int reference_segment_ = 0;      ///< segment of the path where the last reference began
+  std::vector<PathPoint> points_;  ///< N_c + 1: the reference
   std::int64_t fallbacks_ = 0;
-  std::vector<double> scratch_, straight_, slipless_, largest_;
+  std::vector<double> scratch_, straight_, slipless_, largest_, smallest_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
   std::vector<double> last_inputs_;  ///< n_u, applied last; NaN: not known
   std::vector<std::uint8_t> begins_;

@@ -23,7 +23,8 @@ struct Sample {
   double nees = 0.0;  ///< normalised estimation error squared of [state; parameters]; NaN without covariance
   std::vector<double> inputs;
   PathPoint reference;
-  double tracking = 0.0;  ///< signed distance of the true position from the path [m]
+  double tracking = 0.0;       ///< signed distance of the true position from the path [m]
+  double heading_error = 0.0;  ///< true heading - that of the path there, in (-pi, pi]; 0 without a heading [rad]
   Status estimator_status = Status::solved, controller_status = Status::solved;
   bool estimator_fallback = false, controller_fallback = false, relaxed = false;
   double estimator_us = 0.0, controller_us = 0.0;  ///< preparation and feedback of the solvers [us]

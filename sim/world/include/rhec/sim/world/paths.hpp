@@ -34,9 +34,27 @@ struct ZigZag {
 };
 RHEC_EXPORT std::vector<Waypoint> zig_zag(const ZigZag& options = {});
 
-/// Waypoints from a CSV file: columns x, y [m] and, optionally, the reference speed [m/s]; a header row is allowed.
-/// Without that column the speed is `speed`. Throws Error, naming file and row, for rows that are ragged or not
-/// numeric, for missing values, for speeds that are not positive, and for fewer than two rows.
+/// Rows of a field, driven there and back: from (0, 0) facing +x, each offset by `row_spacing` along +y from the last
+/// one. Where rows are nearer than two radii the vehicle turns as a fishtail, with a stop at each change of direction:
+/// a quarter of a circle forwards, 2 radius - row_spacing back in reverse, and another quarter forwards. Other rows are
+/// joined by quarters with a straight between them. It comes to rest at the end of the last row.
+struct Headland {
+  double speed = 2.0;          ///< reference ground speed, in reverse too [m/s]
+  int rows = 4;                ///< number of rows
+  double row_length = 40.0;    ///< [m]
+  double row_spacing = 3.0;    ///< [m]
+  double turn_radius = 5.0;    ///< [m]
+  double point_spacing = 0.1;  ///< largest distance between waypoints [m]
+};
+RHEC_EXPORT std::vector<Waypoint> headland(const Headland& options = {});
+
+/// Waypoints from a CSV file. With a header its columns are, in any order, x, y [m] and, as far as they are given,
+/// speed [m/s] (negative: in reverse; 0: a stop), left and right: the room beside the path [m]; a missing number there
+/// is no limit. Without a header the columns are x, y or x, y, speed. Without a column of speeds the speed is `speed`.
+///
+/// Throws Error, naming file and line, for rows that are ragged or not numeric, for coordinates and speeds that are
+/// missing, for columns that are not known, for fewer than two rows, and for a path that no vehicle can follow
+/// (Path::why_not_drivable).
 struct WaypointFile {
   double speed = 2.0;  ///< if the file has none [m/s]
 };
