@@ -149,7 +149,7 @@ void SparseSqp::linearise(const Ocp& ocp, Hessian hessian) {
 
 double SparseSqp::merit(const Ocp& ocp, const Iterate& iterate) noexcept {
   const double objective = ocp.evaluate_stages(iterate, defects_.data(), stage_merits_.data(), scratch_);
-  nlp_.constraints(ocp, defects_.data(), trial_constraints_.data());
+  nlp_.constraints(ocp, defects_.data(), nullptr, trial_constraints_.data());
   for (std::size_t r = 0; r < trial_constraints_.size(); ++r)
     stage_merits_[stage_of_row_[r]] += penalty_ * std::abs(trial_constraints_[r]);
   return objective + penalty_ * norm1(trial_constraints_);
