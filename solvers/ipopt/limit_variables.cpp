@@ -14,19 +14,34 @@ void LimitVariables::take(const Ocp& ocp, const SparseNlp& nlp) {
     for (int r = 0; r < nlp.limit_count(i); ++r) {
       const double lower = ocp.limit_lower(i)[r], upper = ocp.limit_upper(i)[r], linear = ocp.limit_linear(i)[r],
                    quadratic = ocp.limit_quadratic(i)[r];
+      const bool is_hard = linear == infinity;
       const auto add = [&](Kind kind, double factor, double least, double most) {
-        variables_.push_back({kind, nlp.limit_start(i) + r, factor, least, most, lower, upper, linear, quadratic});
+        const bool costs = kind != Kind::value;
+        const Variable v{kind,
+                         nlp.limit_start(i) + r,
+                         factor,
+                         least,
+                         most,
+                         {is_hard ? -infinity : lower, is_hard ? infinity : upper},
+                         costs ? linear : 0.0,
+                         costs ? quadratic : 0.0};
+        variables_.push_back(v);
       };
-      add(Kind::value, -1.0, lower, upper);
-      if (linear == infinity) continue;
       if (linear == 0.0) {
-        add(Kind::either, 1.0, -infinity, infinity);
+        add(Kind::free, -1.0, -infinity, infinity);
         continue;
       }
+      add(Kind::value, -1.0, lower, upper);
+      if (is_hard) continue;
       if (lower > -infinity) add(Kind::lower, 1.0, 0.0, infinity);
       if (upper < infinity) add(Kind::upper, -1.0, 0.0, infinity);
     }
   }
+}
+
+double LimitVariables::Variable::slack(double value) const noexcept {
+  if (kind != Kind::free) return value;
+  return value - std::min(std::max(value, beyond[0]), beyond[1]);
 }
 
 void LimitVariables::bounds(double* lower, double* upper) const noexcept {
@@ -40,11 +55,11 @@ void LimitVariables::start(const double* c, const double* multipliers, double* v
                            double* bound_multipliers) const noexcept {
   for (const Variable& of : variables_) {
     const double value = c[of.row], multiplier = multipliers ? multipliers[of.row] : 0.0;
-    const double below = std::max(0.0, of.limit_lower - value), above = std::max(0.0, value - of.limit_upper);
+    const double below = std::max(0.0, of.beyond[0] - value), above = std::max(0.0, value - of.beyond[1]);
     double at = 0.0, pull = 0.0;
     switch (of.kind) {
       case Kind::value:
-        at = of.linear == infinity ? value : value + below - above;
+        at = value + below - above;
         pull = multiplier;
         break;
       case Kind::lower:
@@ -52,8 +67,8 @@ void LimitVariables::start(const double* c, const double* multipliers, double* v
         at = of.kind == Kind::lower ? below : above;
         pull = std::min(0.0, of.factor * -multiplier - of.linear - of.quadratic * at);
         break;
-      case Kind::either:
-        at = below - above;
+      case Kind::free:
+        at = value;
         break;
     }
     *values++ = at;
@@ -64,17 +79,15 @@ void LimitVariables::start(const double* c, const double* multipliers, double* v
 double LimitVariables::cost(const double* values) const noexcept {
   double sum = 0.0;
   for (const Variable& variable : variables_) {
-    const double slack = *values++;
-    if (variable.kind != Kind::value) sum += (variable.linear + 0.5 * variable.quadratic * slack) * slack;
+    const double slack = variable.slack(*values++);
+    sum += (variable.linear + 0.5 * variable.quadratic * slack) * slack;
   }
   return sum;
 }
 
 void LimitVariables::gradient(const double* values, double* derivatives) const noexcept {
-  for (const Variable& variable : variables_) {
-    const double slack = *values++;
-    *derivatives++ = variable.kind == Kind::value ? 0.0 : variable.linear + variable.quadratic * slack;
-  }
+  for (const Variable& variable : variables_)
+    *derivatives++ = variable.linear + variable.quadratic * variable.slack(*values++);
 }
 
 void LimitVariables::add_to(const double* values, double* c) const noexcept {
@@ -96,8 +109,12 @@ void LimitVariables::hessian_pattern(int first_variable, int* rows, int* columns
   for (int k = 0; k < count(); ++k) rows[k] = columns[k] = first_variable + k;
 }
 
-void LimitVariables::hessian(double* entries) const noexcept {
-  for (const Variable& variable : variables_) *entries++ = variable.kind == Kind::value ? 0.0 : variable.quadratic;
+void LimitVariables::hessian(const double* values, double* entries) const noexcept {
+  for (const Variable& variable : variables_) {
+    const bool has_curvature = variable.kind != Kind::free || variable.slack(*values) != 0.0;
+    *entries++ = has_curvature ? variable.quadratic : 0.0;
+    ++values;
+  }
 }
 
 }  // namespace rhec::ipopt

@@ -12,7 +12,8 @@ namespace rhec::ipopt {
 ///     g(s, w) + sigma_lower - sigma_upper - t = 0,   lower <= t <= upper,   sigma >= 0
 ///
 /// A soft limit has a slack sigma for each side that it has, which costs  linear sigma + 1/2 quadratic sigma^2. Without
-/// a linear weight one slack of either sign serves both sides: bounds at zero would have no multipliers.
+/// a linear weight it has none: there t is free, and its distance from the sides costs as much. That has a continuous
+/// gradient, and an interior point would keep away from bounds whose multipliers are zero.
 class LimitVariables {
  public:
   /// Takes over the limits of a problem as they are.
@@ -33,21 +34,23 @@ class LimitVariables {
   void jacobian(double* entries) const noexcept;
   /// And one in the Hessian, on the diagonal; zero for most.
   void hessian_pattern(int first_variable, int* rows, int* columns) const noexcept;
-  void hessian(double* entries) const noexcept;
+  void hessian(const double* values, double* entries) const noexcept;
 
  private:
   enum class Kind {
-    value,   ///< t
-    lower,   ///< slack of the lower side
-    upper,   ///< slack of the upper side
-    either,  ///< slack of both
+    value,  ///< t
+    lower,  ///< slack of the lower side
+    upper,  ///< slack of the upper side
+    free,   ///< t that may be anywhere
   };
   struct Variable {
     Kind kind;
-    int row;              ///< in c
-    double factor;        ///< in that row
-    double lower, upper;  ///< of the variable; for slacks, `limit_*` are those of the limit
-    double limit_lower, limit_upper, linear, quadratic;
+    int row;                   ///< in c
+    double factor;             ///< in that row
+    double lower, upper;       ///< bounds of the variable
+    double beyond[2];          ///< sides of the limit, beyond which it is soft; none if it is hard
+    double linear, quadratic;  ///< weights of the slack
+    double slack(double value) const noexcept;
   };
   std::vector<Variable> variables_;
 };

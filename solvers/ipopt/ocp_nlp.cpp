@@ -81,7 +81,6 @@ void OcpNlp::take(const Ocp& ocp) {
   nlp_.bounds(ocp, lower_.data(), upper_.data());
   limits_.bounds(lower_.data() + nlp_.variables(), upper_.data() + nlp_.variables());
   limits_.jacobian(jacobian_.data() + nlp_.jacobian().entries());
-  limits_.hessian(hessian_.data() + nlp_.hessian().entries());
   any_fixed_ = false;
   bounded_.clear();
   for (int j = 0; j < variables(); ++j) {
@@ -225,7 +224,9 @@ void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noex
     terms.add(pieces_, linear_, piece);
   };
   linear_objective_ = linearise(linearised_.z.data(), of_constraints.data(), of_bounds.data(), hessian, take);
-  limits_.gradient(linearised_.z.data() + nlp_.variables(), gradient_.data() + nlp_.variables());
+  const double* of_limits = linearised_.z.data() + nlp_.variables();
+  limits_.gradient(of_limits, gradient_.data() + nlp_.variables());
+  limits_.hessian(of_limits, hessian_.data() + nlp_.hessian().entries());
   linear_iterate_ = &iterate;
   linear_tag_ = are_equal(linearised_.z, iterate.z.data()) ? iterate.tag : 0;
   linear_kkt_ = terms.residual();
@@ -262,7 +263,7 @@ void OcpNlp::write_hessian(const double* z, const double* multipliers, double fa
     weighted_[row] = multipliers ? factor * multipliers[row] : 0.0;
   linearise(z, weighted_.data(), nullptr, Hessian::exact,
             [&](StageRange piece) { nlp_.hessian(pieces_, piece, values); });
-  limits_.hessian(values + nlp_.hessian().entries());
+  limits_.hessian(z + nlp_.variables(), values + nlp_.hessian().entries());
 }
 
 /// Whether the linearisation is that of this iterate, and the iterate is within its bounds.
