@@ -258,7 +258,8 @@ std::vector<Family> limited_families() {
       .several_optima = true;
   add("rhe_limits_soft", "soft limits on estimates", limited(RheSpec{}, soft(true, true))).several_optima = true;
   add("rhc_limits_redundant", "every limit three times", limited(on_its_path(), with(redundant))).several_optima = true;
-  add("rhc_limits_dependent", "limits that depend on each other linearly", limited(on_its_path(), with(dependent)));
+  add("rhc_limits_dependent", "limits that depend on each other linearly", limited(on_its_path(), with(dependent)))
+      .several_optima = true;
   add("rhc_limits_infeasible", "two limits that contradict each other",
       limited(on_its_path(), with([](const Stage& stage) { return contradiction(stage, infinity); })))
       .answer = Family::Answer::infeasible;
