@@ -151,6 +151,25 @@ def check_problem(prefix, work, arguments):
         expect(told.startswith("solved"), f"the parking problem by {solver}: {told}")
 
 
+def check_minimum_time(prefix, work, arguments):
+    """A problem with limits that derives from Ocp itself: both solvers for it find a manoeuvre, and it is drawn."""
+    settings = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={arguments.cxxflags}", "-DCMAKE_BUILD_TYPE=Debug"]
+    if arguments.cxx:
+        settings.append(f"-DCMAKE_CXX_COMPILER={arguments.cxx}")
+    source, build = work / "minimum_time", work / "build-minimum_time"
+    shutil.copytree(arguments.source / "examples" / "minimum_time", source)
+    run(arguments.cmake, "-S", source, "-B", build, *settings)
+    run(arguments.cmake, "--build", build)
+    for solver in ("ipopt", "sparse_sqp"):
+        picture = work / f"{solver}.svg"
+        told = run(build / "minimum_time", solver, picture, cwd="/")
+        found = re.match(r"solved .* T (\S+) s, (\d+) changes of direction, front axle (\S+) m", told)
+        expect(found is not None, f"minimum time by {solver}: {told}")
+        time, changes, distance = float(found[1]), int(found[2]), float(found[3])
+        expect(10.0 < time < 12.0 and changes >= 2 and distance > 2.0 - 1e-3, f"minimum time by {solver}: {told}")
+        expect(picture.read_text().count("<rect") > 20, f"{picture} shows no car")
+
+
 def check_template(home, arguments):
     """What the README says of a plugin from outside, command by command, as someone whose rhec lies in ~/rhec.
 
@@ -207,6 +226,7 @@ def main():
         headers = check_consumer(moved, work, arguments)
         check_robot(moved, work, arguments)
         check_problem(moved, work, arguments)
+        check_minimum_time(moved, work, arguments)
         check_template(home, arguments)
     print(f"install: moved, {plugins} plugins seen, {headers} headers included from outside, the README's examples run")
 

@@ -62,6 +62,7 @@ UNTESTED = {
 ALONE = {
     "tests/blocking/geometric_test.cpp": "plugins/template/geometric.cpp, a blocking from outside",
     "tests/core/estimation/allocation_test.cpp": "all methods of estimation, which must not allocate",
+    "tests/core/ocp/minimum_time_test.cpp": "a kind of problem that derives from Ocp itself, examples/minimum_time",
     "tests/core/horizon/own_problem_test.cpp": "a kind of problem from outside, examples/problem",
     "tests/models/derivatives_test.cpp": "every model that is found",
     "tests/priors/conformance_test.cpp": "every prior that is found",
