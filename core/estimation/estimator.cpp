@@ -70,6 +70,7 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
   clear_estimates();
   node_times_.assign(remembered_nodes, 0.0);
   mean_.assign(m.input_count(), 0.0);
+  measured_inputs_ = mean_.size() - m.description().noisy_states.size();
   weight_.assign(m.input_count(), 0.0);
   nothing_.assign(m.output_count(), std::numeric_limits<double>::quiet_NaN());
   next_.assign(m.state_count(), 0.0);
@@ -127,7 +128,7 @@ void Estimator::push_measurement(double time, const double* outputs) noexcept {
 
 void Estimator::push_input(double time, const double* inputs) noexcept {
   if (!std::isfinite(time)) return;
-  for (std::size_t j = 0; j < mean_.size(); ++j) values_[j] = cleaned(inputs[j]);
+  for (std::size_t j = 0; j < measured_inputs_; ++j) values_[j] = cleaned(inputs[j]);
   inputs_.insert(time, values_.data());
 }
 
@@ -150,6 +151,7 @@ void Estimator::mean_input(double from, double to) noexcept {
   }
   for (std::size_t j = 0; j < mean_.size(); ++j)
     mean_[j] = weight_[j] > 0.0 ? mean_[j] / weight_[j] : std::numeric_limits<double>::quiet_NaN();
+  std::fill(mean_.begin() + static_cast<std::ptrdiff_t>(measured_inputs_), mean_.end(), 0.0);
 }
 
 void Estimator::add_node(double time, const double* outputs) noexcept {

@@ -11,6 +11,7 @@
 #include "rhec/plugins/robot/integration.hpp"
 #include "rhec/plugins/robot/plugin_option.hpp"
 #include "rhec/plugins/robot/robust_losses.hpp"
+#include "rhec/plugins/robot/state_noise.hpp"
 
 #include "default_solver.hpp"
 
@@ -190,6 +191,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
     return default_solver.make(host, named);
   };
   parts_.make_map = [memory = parts_.memory] { return memory.make_map(); };
+  parts_.context = with_state_noise(parts_.context);
 }
 
 OptionSection EstimatorSection::documentation(const EstimatorMakers& makers) {

@@ -7,6 +7,7 @@
 
 #include "format_parts.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/core/model/state_noise_model.hpp"
 #include "rhec/core/prior/prior.hpp"
 #include "rhec/core/prior/process_model.hpp"
 
@@ -105,6 +106,31 @@ void read_processes(const LineValue& line, ProblemRecord& record) {
   for (const std::vector<double>& row : record.data)
     if (row.size() != count)
       throw line["data"].error(fmt::format("rows of {}, expected {}: {}", row.size(), count, what));
+}
+
+/// The vehicle with the process noise of its states, if the record has some.
+std::shared_ptr<const Model> with_state_noise(const ProblemRecord& record, std::shared_ptr<const Model> model) {
+  if (record.state_noise.empty()) return model;
+  const ModelNames names(record, *model);
+  const std::vector<Variable>& states = model->description().states;
+  std::vector<int> noisy;
+  for (const std::string& name : record.state_noise) {
+    const int state = ModelNames::index_of(states, name);
+    if (state < 0)
+      throw names.error("state_noise", fmt::format("model '{}' has no state '{}'; {}", model->description().name, name,
+                                                   did_you_mean(name, names_of(states))));
+    if (!noisy.empty() && state <= noisy.back())
+      throw names.error("state_noise", fmt::format("expected each state once, in the model's order: {}",
+                                                   fmt::join(names_of(states), ", ")));
+    noisy.push_back(state);
+  }
+  return std::make_shared<StateNoiseModel>(std::move(model), std::move(noisy));
+}
+
+std::vector<std::string> noisy_states(const ModelDescription& about) {
+  std::vector<std::string> names;
+  for (const int state : about.noisy_states) names.push_back(about.states[state].name);
+  return names;
 }
 
 /// The vehicle with its processes, if the record has some.
@@ -244,7 +270,8 @@ class RheFormat final : public ProblemFormat {
             {.kind = "rhe",
              .keys = {"version", "id", "problem", "model", "horizon", "arrival", "outputs", "inputs", "weights",
                       "bounds", "block_starts"},
-             .added = {{2, {"robust", "neighbour_variance", "transition", "guess", "origin", "processes", "data"}}},
+             .added = {{2, {"robust", "neighbour_variance", "transition", "guess", "origin", "processes", "data"}},
+                       {4, {"state_noise"}}},
              .looks_back = true,
              .may_be_empty = true,
              .finds_parameters = true}) {}
@@ -272,6 +299,9 @@ class RheFormat final : public ProblemFormat {
     if (line.has("neighbour_variance")) read_neighbour_variances(line["neighbour_variance"], record);
     if (line.has("robust")) read_robust(line["robust"], record);
     if (line.has("processes")) read_processes(line, record);
+    if (!line.has("state_noise")) return;
+    for (const LineValue& name : line["state_noise"].items("a list of states"))
+      record.state_noise.push_back(name.text());
   }
 
   void write(const ProblemRecord& record, Json& line) const override {
@@ -292,6 +322,7 @@ class RheFormat final : public ProblemFormat {
         return Json(transition == Transition::ramp ? "ramp" : "step");
       });
     if (!record.neighbour_variance.empty()) line["neighbour_variance"] = map_of(record.neighbour_variance, list_of);
+    if (!record.state_noise.empty()) line["state_noise"] = record.state_noise;
     if (record.processes.empty()) return;
     line["processes"] = map_of(record.processes, [](int states) { return Json(states); });
     line["data"] = rows_of(record.data);
@@ -313,6 +344,7 @@ class RheFormat final : public ProblemFormat {
         record.inputs.push_back(copied(problem.measured_input(i), static_cast<int>(about.inputs.size())));
     }
     record.processes = process_counts(about);
+    record.state_noise = noisy_states(about);
     for (int i = 0; i < record.intervals && !record.processes.empty(); ++i)
       record.data.push_back(copied(problem.interval_data(i), problem.model().data_count()));
     record.output_weights = setup.output_weights;
@@ -348,7 +380,7 @@ class RheFormat final : public ProblemFormat {
 
   std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                         int max_intervals, std::vector<int> one_block) const override {
-    model = with_processes(record, std::move(model));
+    model = with_processes(record, with_state_noise(record, std::move(model)));
     RheProblem::Setup setup = estimation_setup_of(record, *model);
     if (record.processes.empty()) setup.one_block = std::move(one_block);
     setup.max_intervals = std::max({record.intervals, max_intervals, 1});
@@ -361,6 +393,7 @@ class RheFormat final : public ProblemFormat {
   bool refill(const ProblemRecord& record, HorizonProblem& filled) const override {
     auto& problem = as_kind<RheProblem>(filled);
     if (process_counts(problem.model().description()) != record.processes) return false;
+    if (noisy_states(problem.model().description()) != record.state_noise) return false;
     if (!fits(estimation_setup_of(record, problem.model()), problem.setup())) return false;
     for (const int parameter : problem.setup().one_block)
       if (!is_one_block(record, problem.model(), parameter)) return false;

@@ -30,7 +30,7 @@ class RHEC_EXPORT Estimator {
 
   /// Measured y (n_y, NaN where missing) at a time [s].
   void push_measurement(double time, const double* outputs) noexcept;
-  /// Measured u (n_u, NaN where missing), which holds from a time [s] on.
+  /// Measured u (n_u, of the vehicle alone; NaN where missing), which holds from a time [s] on.
   void push_input(double time, const double* inputs) noexcept;
 
   /// The estimate at a time [s], from all that was pushed with stamps up to it. Beyond the newest node it is integrated
@@ -97,7 +97,8 @@ class RHEC_EXPORT Estimator {
   Estimate estimate_, predicted_;
   Counts counts_;
   StepError step_error_;
-  double worst_error_ = 0.0;  ///< of the intervals that were coarse
+  double worst_error_ = 0.0;         ///< of the intervals that were coarse
+  std::size_t measured_inputs_ = 0;  ///< all but process noise, which is 0
   std::vector<double> mean_, weight_, nothing_, next_, values_;
 };
 

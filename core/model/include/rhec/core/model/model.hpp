@@ -56,6 +56,9 @@ struct ModelDescription {
   Roles roles;
   /// Of a model that makes another one's parameters states: where these are, in their order; else empty.
   std::vector<int> parameter_states = {};
+  /// Of a model with process noise (StateNoiseModel): the states whose noise the inputs behind the vehicle's own are,
+  /// in their order; else empty. Nothing measures or commands these inputs, and they are expected to be 0.
+  std::vector<int> noisy_states = {};
 };
 
 /// How a vehicle moves and what its sensors measure:

@@ -14,7 +14,8 @@ struct RHEC_EXPORT NoiseSection {
   static OptionSection documentation();
 
   std::vector<double> output_sigmas, input_sigmas;
-  bool adapt = true;  ///< whether estimators that can do so learn the noise of outputs
+  std::vector<double> state_sigmas;  ///< process noise, per square root of a second; 0: none
+  bool adapt = true;                 ///< whether estimators that can do so learn the noise of outputs
 };
 
 /// Default standard deviations of measured variables: a fraction of their typical magnitudes.

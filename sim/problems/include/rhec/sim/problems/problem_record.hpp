@@ -16,7 +16,7 @@
 namespace rhec::sim {
 
 /// The newest version of the format of problem files; a line without `version` is of version 1.
-constexpr int problem_format_version = 3;
+constexpr int problem_format_version = 4;
 
 /// One line of a problem file: a problem with every number that a solver needs, as JSON. Values are stored by name and
 /// resolved later with the model. docs/problem_format.md describes the keys.
@@ -63,6 +63,9 @@ struct ProblemRecord {
   /// By parameter that is a process (ProcessModel): its number of states. Then arrival, weights and bounds are those of
   /// [x; z] and [u; w], and `data` has the processes of each interval (N rows).
   std::map<std::string, int> processes;
+  /// Since version 4: the states with process noise (StateNoiseModel), in the model's order. Then `inputs` and their
+  /// weights are about [u; xi] or [u; xi; w].
+  std::vector<std::string> state_noise;
   Rows data;
 
   // RHC

@@ -1,0 +1,167 @@
+#include "rhec/core/model/state_noise_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/core/base/padded.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "support/error_of.hpp"
+
+namespace rhec {
+namespace state_noise_model_test {
+
+std::shared_ptr<const Model> vehicle(const char* name) {
+  static const Host host;
+  return host.make_model(name);
+}
+
+/// Random values of z = [x; u; xi; p; p_end] for one interval, and what a model makes of them.
+struct Point {
+  std::vector<double> x, u, p, p_end, multipliers;
+  double duration = 0.3;
+  Point(const Model& model, unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> number(0.2, 0.8);
+    for (auto [values, count] : {std::pair{&x, model.state_count()},
+                                 {&u, model.input_count()},
+                                 {&p, model.parameter_count()},
+                                 {&p_end, model.parameter_count()},
+                                 {&multipliers, model.state_count()}})
+      for (int j = 0; j < count; ++j) values->push_back(number(random));
+  }
+  Model::Intervals request(bool ramp) const {
+    return {.count = 1,
+            .states = x.data(),
+            .inputs = u.data(),
+            .parameters = p.data(),
+            .parameters_end = ramp ? p_end.data() : nullptr,
+            .durations = &duration,
+            .substeps = 2,
+            .multipliers = multipliers.data()};
+  }
+};
+
+TEST(StateNoiseModel, AddsNoiseAtTheEndOfAnInterval) {
+  const auto plain = vehicle("bicycle_slip");
+  const StateNoiseModel noisy(plain, {0, 2});
+  ASSERT_EQ(noisy.input_count(), 4);
+  EXPECT_EQ(noisy.description().inputs[3].name, "beta_noise");
+  EXPECT_EQ(noisy.description().inputs[2].unit, "m/sqrt(s)");
+  EXPECT_EQ(noisy.description().noisy_states, (std::vector{0, 2}));
+  const Point at(noisy, 3);
+  std::vector<double> with(4), without(4);
+  Model::Intervals request = at.request(false);
+  request.next_states = with.data();
+  noisy.integrate(request);
+  request.next_states = without.data();
+  plain->integrate(request);
+  for (int j = 0; j < 4; ++j) {
+    const double noise = j == 0 ? at.u[2] : j == 2 ? at.u[3] : 0.0;
+    EXPECT_EQ(with[j], without[j] + std::sqrt(0.3) * noise);
+  }
+  std::vector<double> state(4), inputs(4, 7.0);
+  noisy.straight_motion(2.0, at.p.data(), state.data(), inputs.data());
+  EXPECT_EQ(inputs[2], 0.0);
+  EXPECT_EQ(inputs[3], 0.0);
+}
+
+TEST(StateNoiseModel, DerivativesAreThoseOfItsValues) {
+  for (const char* name : {"bicycle_slip", "tractor_trailer"}) {
+    for (const bool ramp : {false, true}) {
+      const StateNoiseModel noisy(vehicle(name), {1, 3});
+      const int nx = noisy.state_count(), nu = noisy.input_count(), np = noisy.parameter_count();
+      const int nz = nx + nu + (ramp ? 2 : 1) * np;
+      const Point at(noisy, 5);
+      std::vector<double> J(static_cast<std::size_t>(nx) * nz), H(static_cast<std::size_t>(nz) * nz);
+      Model::Intervals request = at.request(ramp);
+      request.jacobians = J.data();
+      request.hessians = H.data();
+      noisy.integrate(request);
+      constexpr double step = 1e-5;
+      for (int c = 0; c < nz; ++c) {
+        std::vector<double> next[2], jacobian[2];
+        for (const int side : {0, 1}) {
+          Point moved = at;
+          std::vector<double>& of = c < nx ? moved.x : c < nx + nu ? moved.u : c < nx + nu + np ? moved.p : moved.p_end;
+          of[c < nx ? c : c < nx + nu ? c - nx : (c - nx - nu) % np] += side == 0 ? -step : step;
+          next[side].resize(nx);
+          jacobian[side].resize(J.size());
+          Model::Intervals there = moved.request(ramp);
+          there.next_states = next[side].data();
+          there.jacobians = jacobian[side].data();
+          noisy.integrate(there);
+        }
+        for (int r = 0; r < nx; ++r)
+          EXPECT_NEAR(J[c * nx + r], (next[1][r] - next[0][r]) / (2.0 * step), 1e-8) << name << c << r;
+        for (int d = 0; d < nz; ++d) {
+          double second = 0.0;
+          for (int r = 0; r < nx; ++r)
+            second += at.multipliers[r] * (jacobian[1][d * nx + r] - jacobian[0][d * nx + r]) / (2.0 * step);
+          EXPECT_NEAR(H[c * nz + d], second, 1e-7) << name << c << d;
+        }
+      }
+    }
+  }
+}
+
+TEST(StateNoiseModel, RowsHoldTheSameNumbers) {
+  for (const bool ramp : {false, true}) {
+    const StateNoiseModel noisy(vehicle("bicycle_slip"), {0, 1, 2, 3});
+    const int nx = 4, nu = 6, np = 2, nz = nx + nu + (ramp ? 2 : 1) * np, row = padded(nz);
+    const Point at(noisy, 7);
+    std::vector<double> next(nx), J(static_cast<std::size_t>(nx) * nz), H(static_cast<std::size_t>(nz) * nz);
+    Model::Intervals dense = at.request(ramp);
+    dense.next_states = next.data();
+    dense.jacobians = J.data();
+    dense.hessians = H.data();
+    noisy.integrate(dense);
+    std::vector<double> z(at.x), rows(row, 9.0), jacobian(static_cast<std::size_t>(nx) * row, 9.0),
+        hessian(static_cast<std::size_t>(nz) * row, 9.0), scratch(noisy.rows_scratch(1));
+    z.insert(z.end(), at.p.begin(), at.p.end());
+    z.insert(z.end(), at.u.begin(), at.u.end());
+    if (ramp) z.insert(z.end(), at.p_end.begin(), at.p_end.end());
+    z.resize(row, 5.0);
+    noisy.integrate_rows({.count = 1,
+                          .z = z.data(),
+                          .z_step = row,
+                          .ramp = ramp,
+                          .durations = &at.duration,
+                          .substeps = 2,
+                          .next_states = rows.data(),
+                          .next_step = row,
+                          .jacobians = jacobian.data(),
+                          .jacobian_step = nx * row,
+                          .jacobian_row = row,
+                          .multipliers = at.multipliers.data(),
+                          .multiplier_step = nx,
+                          .hessians = hessian.data(),
+                          .hessian_step = nz * row,
+                          .hessian_row = row,
+                          .scratch = scratch.data()});
+    // [x; u; p; p_end] -> [x; p; u; p_end].
+    const auto place = [&](int c) { return c < nx || c >= nx + nu + np ? c : c < nx + nu ? c + np : c - nu; };
+    for (int r = 0; r < nx; ++r) EXPECT_NEAR(rows[r], next[r], 1e-14);
+    for (int c = 0; c < nz; ++c) {
+      for (int r = 0; r < nx; ++r) EXPECT_NEAR(jacobian[r * row + place(c)], J[c * nx + r], 1e-13) << ramp << c << r;
+      for (int d = 0; d < nz; ++d) EXPECT_NEAR(hessian[place(c) * row + place(d)], H[c * nz + d], 1e-12) << c << d;
+    }
+    for (int c = nz; c < row; ++c)
+      for (int r = 0; r < nx; ++r) EXPECT_EQ(jacobian[r * row + c], 0.0);
+  }
+}
+
+TEST(StateNoiseModel, RefusesStatesThatAreNotThere) {
+  const auto plain = vehicle("bicycle_slip");
+  EXPECT_THROW(StateNoiseModel(plain, {}), Error);
+  EXPECT_THROW(StateNoiseModel(plain, {2, 2}), Error);
+  EXPECT_NE(error_of([&] { StateNoiseModel(plain, {4}); }).find("indices of 0 .. 3"), std::string::npos);
+  EXPECT_THROW(StateNoiseModel(std::make_shared<StateNoiseModel>(plain, std::vector{0}), {1}), Error);
+}
+
+}  // namespace state_noise_model_test
+}  // namespace rhec
