@@ -93,7 +93,7 @@ class CondensedProblem {
   };
   void add_limits();
   double limit_value(int stage, int limit) const noexcept {
-    return limit_values_[static_cast<std::size_t>(stage * ocp_->capacity().limit_row() + limit)];
+    return limit_values_.data()[static_cast<std::ptrdiff_t>(stage) * ocp_->capacity().limit_row() + limit];
   }
   /// How far a limit is beyond its lower side (negative) or its upper one.
   double excess(int stage, int limit) const noexcept;
