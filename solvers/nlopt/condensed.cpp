@@ -8,9 +8,19 @@
 #include "rhec/core/qp/stage_qp_views.hpp"
 
 namespace rhec::nlopt {
+namespace {
+
+// Of a slack without a quadratic weight, relative to its linear one.
+constexpr double least_slack_curvature = 1e-8;
+
+}  // namespace
 
 CondensedProblem::CondensedProblem(const Ocp& ocp)
-    : point_(ocp.capacity()), adjoint_(ocp.capacity()), qp_(ocp.capacity()), scratch_(ocp.scratch_size()) {}
+    : limit_values_((static_cast<std::size_t>(ocp.capacity().intervals) + 1) * ocp.capacity().limit_row()),
+      point_(ocp.capacity()),
+      adjoint_(ocp.capacity()),
+      qp_(ocp.capacity()),
+      scratch_(ocp.scratch_size()) {}
 
 bool CondensedProblem::add(const Entry& entry, double lower, double upper) {
   if (!(lower <= upper)) return false;
@@ -31,7 +41,10 @@ bool CondensedProblem::add(const Entry& entry, double lower, double upper) {
 bool CondensedProblem::take(const Ocp& ocp) {
   ocp_ = &ocp;
   const int N = ocp.intervals();
-  for (auto* list : {&variables_, &fixed_, &rows_}) list->clear();
+  for (auto* list : {&variables_, &fixed_}) list->clear();
+  rows_.clear();
+  slacks_.clear();
+  penalties_.clear();
   for (auto* list : {&fixed_values_, &lower_list_, &upper_list_, &row_lower_list_, &row_upper_list_}) list->clear();
   const Capacity capacity = ocp.capacity();
   control_columns_.assign(static_cast<std::size_t>(capacity.intervals) * static_cast<std::size_t>(capacity.controls),
@@ -52,11 +65,14 @@ bool CondensedProblem::take(const Ocp& ocp) {
       const double lower = ocp.state_lower(i + 1)[j], upper = ocp.state_upper(i + 1)[j];
       consistent = consistent && lower <= upper;
       if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
-      rows_.push_back({true, i + 1, j});
+      rows_.push_back({false, i + 1, j});
       row_lower_list_.push_back(lower);
       row_upper_list_.push_back(upper);
     }
   }
+  if (capacity.limits > 0) add_limits();
+  for (std::size_t row = 0; row < rows_.size(); ++row)
+    consistent = consistent && row_lower_list_[row] <= row_upper_list_[row];
   const auto copy = [](const std::vector<double>& from) -> Vector {
     return Eigen::Map<const Vector>(from.data(), static_cast<Eigen::Index>(from.size()));
   };
@@ -69,9 +85,80 @@ bool CondensedProblem::take(const Ocp& ocp) {
   return consistent;
 }
 
+/// Rows of limits, with slacks behind the other variables.
+void CondensedProblem::add_limits() {
+  for (int i = 0; i <= ocp_->intervals(); ++i) {
+    for (int r = 0; r < ocp_->limit_count(i); ++r) {
+      const double lower = ocp_->limit_lower(i)[r], upper = ocp_->limit_upper(i)[r], linear = ocp_->limit_linear(i)[r];
+      if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
+      if (linear == 0.0) {
+        penalties_.push_back({i, r});
+        continue;
+      }
+      Row row{true, i, r};
+      const auto add_slack = [&](bool is_above) {
+        slacks_.push_back({i, r, is_above});
+        lower_list_.push_back(0.0);
+        upper_list_.push_back(HUGE_VAL);
+        return variables() - 1;
+      };
+      if (std::isfinite(linear) && std::isfinite(lower)) row.below = add_slack(false);
+      if (std::isfinite(linear) && std::isfinite(upper)) row.above = add_slack(true);
+      rows_.push_back(row);
+      row_lower_list_.push_back(lower);
+      row_upper_list_.push_back(upper);
+    }
+  }
+}
+
+double CondensedProblem::excess(int stage, int limit) const noexcept {
+  const double value = limit_value(stage, limit);
+  if (value > ocp_->limit_upper(stage)[limit]) return value - ocp_->limit_upper(stage)[limit];
+  return std::min(0.0, value - ocp_->limit_lower(stage)[limit]);
+}
+
+/// What a slack costs at the margin.
+double CondensedProblem::slack_weight(const Slack& of, double value) const noexcept {
+  return ocp_->limit_linear(of.stage)[of.component] + ocp_->limit_quadratic(of.stage)[of.component] * value;
+}
+
+double CondensedProblem::row_value(int number) const noexcept {
+  const Row& row = rows_[static_cast<std::size_t>(number)];
+  if (!row.is_limit) return point_.state(row.stage)[row.component];
+  double value = limit_value(row.stage, row.component);
+  if (row.below >= 0) value += x_[row.below];
+  if (row.above >= 0) value -= x_[row.above];
+  return value;
+}
+
+double CondensedProblem::objective_of_iterate() const noexcept {
+  double sum = stage_objective_;
+  for (int i = 0; i <= ocp_->intervals() && !limit_values_.empty(); ++i)
+    sum += limit_costs(*ocp_, i, limit_values_.data() + static_cast<std::ptrdiff_t>(i) * ocp_->capacity().limit_row())
+               .slack;
+  return sum;
+}
+
+CondensedProblem::Vector CondensedProblem::slack_curvature() const {
+  Vector curvature = Vector::Zero(variables());
+  auto column = static_cast<Eigen::Index>(variables_.size());
+  for (const Slack& slack : slacks_) curvature[column++] = slack_weight(slack, 0.0);
+  return curvature;
+}
+
+CondensedProblem::Vector CondensedProblem::with_fitting_slacks() const {
+  Vector x = x_;
+  auto column = static_cast<Eigen::Index>(variables_.size());
+  for (const Slack& slack : slacks_) {
+    const double beyond = excess(slack.stage, slack.component);
+    x[column++] = std::max(0.0, slack.is_above ? beyond : -beyond);
+  }
+  return x;
+}
+
 CondensedProblem::Vector CondensedProblem::read(const Iterate& iterate) const {
-  Vector x(variables());
-  for (int k = 0; k < variables(); ++k) {
+  Vector x = Vector::Zero(variables());
+  for (int k = 0; k < static_cast<int>(variables_.size()); ++k) {
     const Entry& e = variables_[static_cast<std::size_t>(k)];
     const double value = e.is_state ? iterate.state(0)[e.component] : iterate.control(e.stage)[e.component];
     x[k] = std::min(std::max(value, lower_[k]), upper_[k]);
@@ -92,8 +179,23 @@ bool CondensedProblem::move_to(const Vector& x) {
   for (std::size_t k = 0; k < fixed_.size(); ++k) put(fixed_[k], fixed_values_[k]);
   for (std::size_t k = 0; k < variables_.size(); ++k) put(variables_[k], x_[static_cast<Eigen::Index>(k)]);
   ocp_->simulate(point_, scratch_);
-  objective_ = ocp_->evaluate(point_, nullptr, scratch_);
+  objective_ = stage_objective_ = ocp_->evaluate(point_, nullptr, scratch_);
   is_finite_ = std::isfinite(objective_) && rhec::is_finite(*ocp_, point_);
+  if (!limit_values_.empty() && is_finite_) {
+    ocp_->evaluate_limits(point_, limit_values_.data(), scratch_);
+    auto column = static_cast<Eigen::Index>(variables_.size());
+    for (const Slack& slack : slacks_) {
+      const double value = x_[column++];
+      objective_ += 0.5 * (slack_weight(slack, 0.0) + slack_weight(slack, value)) * value;
+    }
+    for (const Penalty& penalty : penalties_) {
+      const double beyond = excess(penalty.stage, penalty.component);
+      objective_ += 0.5 * ocp_->limit_quadratic(penalty.stage)[penalty.component] * beyond * beyond;
+    }
+    for (const Row& row : rows_)
+      if (row.is_limit) is_finite_ = is_finite_ && std::isfinite(limit_value(row.stage, row.component));
+    is_finite_ = is_finite_ && std::isfinite(objective_);
+  }
   return is_finite_;
 }
 
@@ -120,17 +222,33 @@ double CondensedProblem::reduced_gradient(const Entry& e) const noexcept {
     const double* column = qp_.AB(i) + e.component + (e.is_state ? 0 : qp_.capacity().states);
     for (int j = 0; j < qp_.states(i + 1); ++j) sum += column[j * qp_.stride()] * adjoint_.costate(i + 1)[j];
   }
+  if (qp_.limits(i) == 0) return sum;
+  const double* column = qp_.G(i) + e.component + (e.is_state ? 0 : qp_.capacity().states);
+  for (int r = 0; r < qp_.limits(i); ++r) sum += column[r * qp_.stride()] * adjoint_.limit_bound(i)[r];
   return sum;
+}
+
+/// The multipliers of limits whose violation is in f: what it costs at the margin.
+void CondensedProblem::write_penalties(Iterate& multipliers) const noexcept {
+  for (const Penalty& of : penalties_)
+    multipliers.limit_bound(of.stage)[of.component] =
+        ocp_->limit_quadratic(of.stage)[of.component] * excess(of.stage, of.component);
 }
 
 const CondensedProblem::Vector& CondensedProblem::gradient() {
   linearise();
   if (has_gradient_) return gradient_;
   adjoint_.clear_multipliers();
+  write_penalties(adjoint_);
   set_costates(qp_, adjoint_);
   gradient_.resize(variables());
   for (std::size_t k = 0; k < variables_.size(); ++k)
     gradient_[static_cast<Eigen::Index>(k)] = reduced_gradient(variables_[k]);
+  auto column = static_cast<Eigen::Index>(variables_.size());
+  for (const Slack& slack : slacks_) {
+    gradient_[column] = slack_weight(slack, x_[column]);
+    ++column;
+  }
   has_gradient_ = true;
   return gradient_;
 }
@@ -155,11 +273,27 @@ void CondensedProblem::compute_sensitivities() {
   }
   jacobian_.setZero(rows(), variables());
   for (int row = 0; row < rows(); ++row) {
-    const Entry& e = rows_[static_cast<std::size_t>(row)];
-    const Matrix& node = sensitivities_[static_cast<std::size_t>(e.stage)];
-    jacobian_.row(row).head(node.cols()) = node.row(e.component);
+    const Row& of = rows_[static_cast<std::size_t>(row)];
+    const Matrix& node = sensitivities_[static_cast<std::size_t>(of.stage)];
+    if (of.is_limit) {
+      Eigen::RowVectorXd derivatives = Eigen::RowVectorXd::Zero(variables());
+      add_limit_row(of.stage, of.component, derivatives);
+      if (of.below >= 0) derivatives[of.below] = 1.0;
+      if (of.above >= 0) derivatives[of.above] = -1.0;
+      jacobian_.row(row) = derivatives;
+    } else {
+      jacobian_.row(row).head(node.cols()) = node.row(of.component);
+    }
   }
   has_sensitivities_ = true;
+}
+
+void CondensedProblem::add_limit_row(int stage, int limit, Eigen::Ref<Eigen::RowVectorXd> row) {
+  const Matrix& node = sensitivities_[static_cast<std::size_t>(stage)];
+  const double* G = qp_.G(stage) + static_cast<std::ptrdiff_t>(limit) * qp_.stride();
+  row.head(node.cols()) += Eigen::Map<const Eigen::RowVectorXd>(G, node.rows()) * node;
+  for (int j = 0; j < qp_.controls(stage); ++j)
+    if (const int column = column_of(stage, j); column >= 0) row[column] += G[qp_.capacity().states + j];
 }
 
 const CondensedProblem::Matrix& CondensedProblem::jacobian() {
@@ -192,6 +326,19 @@ const CondensedProblem::Matrix& CondensedProblem::hessian(Hessian kind) {
       }
     }
   }
+  auto column = static_cast<Eigen::Index>(variables_.size());
+  for (const Slack& slack : slacks_) {
+    // Without any curvature a slack would have no Newton step where its row is not active.
+    const double linear = slack_weight(slack, 0.0);
+    hessian_(column, column) = std::max(slack_weight(slack, 1.0) - linear, least_slack_curvature * (1.0 + linear));
+    ++column;
+  }
+  for (const Penalty& of : penalties_) {
+    if (excess(of.stage, of.component) == 0.0) continue;
+    Eigen::RowVectorXd derivatives = Eigen::RowVectorXd::Zero(n);
+    add_limit_row(of.stage, of.component, derivatives);
+    hessian_ += ocp_->limit_quadratic(of.stage)[of.component] * derivatives.transpose() * derivatives;
+  }
   return hessian_;
 }
 
@@ -201,16 +348,19 @@ void CondensedProblem::set_multipliers(const Vector& multipliers) {
   const auto put = [&](const Entry& e, double value) {
     (e.is_state ? point_.state_bound(e.stage) : point_.control_bound(e.stage))[e.component] = value;
   };
-  for (int k = 0; k < rows(); ++k) put(rows_[static_cast<std::size_t>(k)], multipliers[variables() + k]);
   // With the rows' multipliers set, those of fixed variables follow from stationarity.
   adjoint_.clear_multipliers();
-  for (int k = 0; k < rows(); ++k) {
-    const Entry& e = rows_[static_cast<std::size_t>(k)];
-    adjoint_.state_bound(e.stage)[e.component] = multipliers[variables() + k];
+  for (Iterate* of : {&point_, &adjoint_}) {
+    write_penalties(*of);
+    for (int k = 0; k < rows(); ++k) {
+      const Row& row = rows_[static_cast<std::size_t>(k)];
+      (row.is_limit ? of->limit_bound(row.stage) : of->state_bound(row.stage))[row.component] =
+          multipliers[variables() + k];
+    }
   }
   set_costates(qp_, adjoint_);
   for (const Entry& e : fixed_) put(e, -reduced_gradient(e));
-  for (int k = 0; k < variables(); ++k) put(variables_[static_cast<std::size_t>(k)], multipliers[k]);
+  for (std::size_t k = 0; k < variables_.size(); ++k) put(variables_[k], multipliers[static_cast<Eigen::Index>(k)]);
   set_costates(qp_, point_);
 }
 

@@ -76,7 +76,12 @@ bool Run::go_to(const double* y, bool with_gradient) {
   Vector x = transformation_.x_of(Eigen::Map<const Vector>(y, problem_.variables()));
   // NLopt keeps bounds in y: a violation in x is rounding.
   if (!transformation_.is_full()) x = x.cwiseMax(problem_.lower()).cwiseMin(problem_.upper());
-  return x.allFinite() && may_count(x, with_gradient) && problem_.move_to(x);
+  if (!x.allFinite()) {
+    // The line search of LD_SLSQP asks for such points for ever.
+    stop(Outcome::ended);
+    return false;
+  }
+  return may_count(x, with_gradient) && problem_.move_to(x);
 }
 
 /// Counts a new iteration, or stops the run if the limit is reached.

@@ -32,6 +32,8 @@ constexpr long iterations_of_few_variables = 15;
 constexpr long longer_runs = 3;
 // Iterations after which an attempt with short runs is abandoned.
 constexpr long patience = 300;
+// Iterations after which a run that restores feasibility has to have removed a part of the violation, with limits.
+constexpr long restoring_iterations = 100;
 // Distances within which a bound may have a multiplier: the one of the smallest residual is taken.
 constexpr double distances[] = {1e-9, 1e-6, 1e-4};
 // Curvature is raised to at least this share of the largest.
@@ -63,10 +65,9 @@ bool NloptSolver::scales_fully() const noexcept {
 }
 
 std::string NloptSolver::why_not(const Ocp& ocp) const {
-  if (ocp.capacity().limits > 0) return "the problem has limits, which nlopt does not take yet";
   const std::string name = "NLopt's " + name_of(options_.algorithm);
   int variables = 0;
-  bool bounded = false, unbounded = false, inequalities = false, equalities = false;
+  bool bounded = false, unbounded = false, inequalities = false, equalities = false, limits = false;
   const auto count = [&](const double* lower, const double* upper, int n) {
     for (int j = 0; j < n; ++j) {
       if (lower[j] == upper[j]) continue;
@@ -88,6 +89,19 @@ std::string NloptSolver::why_not(const Ocp& ocp) const {
       }
     }
   }
+  // A limit without a linear weight is a part of the objective; other soft ones have slacks.
+  for (int i = 0; i <= ocp.intervals() && ocp.capacity().limits > 0; ++i) {
+    for (int r = 0; r < ocp.limit_count(i); ++r) {
+      const double lower = ocp.limit_lower(i)[r], upper = ocp.limit_upper(i)[r], linear = ocp.limit_linear(i)[r];
+      const int sides = (std::isfinite(lower) ? 1 : 0) + (std::isfinite(upper) ? 1 : 0);
+      if (linear == 0.0 || sides == 0) continue;
+      limits = true;
+      (lower == upper ? equalities : inequalities) = true;
+      if (!std::isfinite(linear)) continue;
+      variables += sides;
+      bounded = unbounded = true;
+    }
+  }
   if (variables > options_.max_variables)
     return "single shooting makes a dense problem of " + std::to_string(variables) +
            " decision variables, more than max_variables: " + std::to_string(options_.max_variables) +
@@ -95,10 +109,12 @@ std::string NloptSolver::why_not(const Ocp& ocp) const {
   if (variables > 0 && variables < traits_.fewest_variables)
     return name + " needs at least " + std::to_string(traits_.fewest_variables) + " variables";
   if (equalities && !traits_.equalities)
-    return name + " takes no equality constraints, and this problem fixes states beyond node 0 (their bounds are " +
-           "equal); choose one of " + names_of_those_with(inequalities, true);
+    return name + " takes no equality constraints, and this problem " +
+           (limits ? "has limits, or fixes states beyond node 0" : "fixes states beyond node 0") +
+           " (their bounds are equal); choose one of " + names_of_those_with(inequalities, true);
   if (inequalities && !traits_.inequalities)
-    return name + " takes no inequality constraints, and this problem bounds states beyond node 0; choose one of " +
+    return name + " takes no inequality constraints, and this problem " +
+           (limits ? "has limits, or bounds states" : "bounds states") + " beyond node 0; choose one of " +
            names_of_those_with(true, equalities);
   if (inequalities && traits_.local_optimiser && name_of(options_.algorithm).find("_EQ") != std::string::npos &&
       !traits_of(options_.local_algorithm).inequalities)
@@ -157,6 +173,7 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   // The structure may have changed since setup.
   if (!why_not(ocp).empty() || !find_start(ocp, iterate)) return leave_as_it_was(Status::stalled);
 
+  if (problem_.has_slacks()) problem_.move_to(problem_.with_fitting_slacks());
   Answer answer = assess(problem_.x());
   const Status status = improve(ocp, answer, deadline);
   report.iterations = static_cast<int>(iterations_);
@@ -164,7 +181,7 @@ Report NloptSolver::optimise(const Ocp& ocp, Iterate& iterate, Clock::time_point
   problem_.move_to(answer.x);
   problem_.set_multipliers(answer.multipliers);
   report.status = status;
-  report.objective = problem_.objective();
+  report.objective = problem_.objective_of_iterate();
   report.kkt = problem_.residual();
   iterate = problem_.iterate();
   return report;
@@ -220,7 +237,9 @@ Vector NloptSolver::within_bounds(const Vector& x) const {
 NloptSolver::Answer NloptSolver::assess(const Vector& x) {
   problem_.move_to(x);
   const CondensedQp qp = qp_at(problem_);
-  const Vector scale = problem_.hessian(Hessian::gauss_newton).diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
+  Vector diagonal = problem_.hessian(Hessian::gauss_newton).diagonal();
+  if (problem_.has_slacks()) diagonal += problem_.slack_curvature();
+  const Vector scale = diagonal.cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
   std::optional<Answer> best;
   for (const double distance : distances) {
     const Vector multipliers = recover_multipliers(qp, scale, distance);
@@ -262,9 +281,14 @@ Transformation NloptSolver::transformation_at(const Ocp& ocp, const Answer& answ
     factor.compute(hessian);
     return factor.info() == Eigen::Success && factor.rcond() > least_curvature;
   };
-  const bool exact = ocp.has_second_derivatives() && usable(problem_.hessian(Hessian::exact));
-  const bool positive = exact || usable(problem_.hessian(Hessian::gauss_newton));
-  const Matrix& hessian = problem_.hessian(exact ? Hessian::exact : Hessian::gauss_newton);
+  const auto curvature = [&](Hessian kind) {
+    Matrix hessian = problem_.hessian(kind);
+    if (problem_.has_slacks()) hessian.diagonal() += problem_.slack_curvature();
+    return hessian;
+  };
+  const bool exact = ocp.has_second_derivatives() && usable(curvature(Hessian::exact));
+  const bool positive = exact || usable(curvature(Hessian::gauss_newton));
+  const Matrix hessian = curvature(exact ? Hessian::exact : Hessian::gauss_newton);
   if (!scales_fully()) {
     const double largest = hessian.diagonal().cwiseAbs().maxCoeff();
     t.diagonal = hessian.diagonal().cwiseAbs().cwiseMax(std::max(least_curvature * largest, 1e-300)).cwiseSqrt();
@@ -321,7 +345,7 @@ Status NloptSolver::restore_feasibility(const Ocp& ocp, Answer& answer, Clock::t
     last = answer.violation;
     const Transformation transformation = transformation_at(ocp, answer);
     Run run(problem_, options_, NLOPT_LD_SLSQP, Run::Goal::violation, transformation,
-            {deadline, iterations_left(), 0, 1e-4});
+            {deadline, iterations_left(), problem_.has_limits() ? restoring_iterations : 0, 1e-4});
     const Run::Outcome outcome = run.optimise();
     iterations_ += run.iterations();
     answer = assess(run.x());

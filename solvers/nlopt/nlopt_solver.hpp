@@ -11,8 +11,8 @@ namespace rhec::nlopt {
 
 /// Single shooting with NLopt (docs/method.md, section 7): the decision variables are s_0 (if free) and all controls.
 /// States follow by simulation, so the defects are always zero up to rounding. Bounds of decision variables are NLopt's
-/// bounds (or linear constraints, see the option `scaling`); bounds of later states are nonlinear constraints with
-/// exact Jacobians.
+/// bounds (or linear constraints, see the option `scaling`); bounds of later states, and limits, are nonlinear
+/// constraints with exact Jacobians. Soft limits have slacks among the decision variables.
 ///
 /// NLopt returns neither multipliers nor an optimality measure. So after each run the multipliers of the active bounds
 /// are recovered and the core's KKT residual is computed with them; runs are repeated from the last iterate, with new

@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include "problems.hpp"
+#include "support/limited_ocp.hpp"
 
 namespace rhec::nlopt {
 namespace condensed_test {
 
 using namespace testing;
+using rhec::testing::Limit;
+using rhec::testing::LimitedOcp;
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
@@ -64,6 +67,34 @@ TEST(CondensedProblem, HasTheDerivativesThatDifferencesSay) {
   spec.blocked_inputs = {1};
   const auto rhc = random.rhc(spec);
   check_derivatives(*rhc, RandomProblem::cold_start(*rhc));
+}
+
+TEST(CondensedProblem, LimitsAndTheirSlacksHaveTheDerivativesThatDifferencesSay) {
+  RandomProblem random(bicycle(), 37);
+  RandomProblem::RhcSpec spec;
+  spec.intervals = 5;
+  const auto rhc = random.rhc(spec);
+  const int u = rhc->capacity().states;
+  LimitedOcp limited(*rhc, 3);
+  for (int i = 0; i <= 5; ++i) {
+    limited.add(i, {Limit::Kind::distance, {0, 1}, {0.3 * i, -0.4}, 0.5});
+    limited.add(i, {Limit::Kind::linear, {1, 0}, {1.0, -0.3}, -2.0, 1.0, 10.0, 3.0});
+    // Violated by far, so that differences see one branch: its violation is a part of the objective.
+    if (i < 5) limited.add(i, {Limit::Kind::product, {u, 2}, {0.7}, 5.0, infinity, 0.0, 4.0});
+  }
+  const Iterate start = with_limits(limited, RandomProblem::cold_start(*rhc));
+  check_derivatives(limited, start);
+  CondensedProblem problem(limited);
+  ASSERT_TRUE(problem.take(limited));
+  CondensedProblem without(*rhc);
+  ASSERT_TRUE(without.take(*rhc));
+  EXPECT_EQ(problem.variables(), without.variables() + 6 * 2) << "a slack for each side of the linear ones";
+  EXPECT_EQ(problem.rows(), without.rows() + 6 * 2);
+  problem.move_to(problem.read(start));
+  problem.move_to(problem.with_fitting_slacks());
+  EXPECT_NEAR(problem.objective(), problem.objective_of_iterate(), 1e-12 * problem.objective());
+  for (int row = without.rows(); row < problem.rows(); row += 2)
+    EXPECT_LE(problem.row_value(row + 1), problem.row_upper()[row + 1] + 1e-12) << "a slack makes room";
 }
 
 TEST(CondensedProblem, SharesOneSimulationAndOneLinearisationAtAPoint) {

@@ -6,11 +6,15 @@
 #include <string>
 
 #include "problems.hpp"
+#include "rhec/core/base/infinity.hpp"
+#include "support/limited_ocp.hpp"
 
 namespace rhec::nlopt {
 namespace nlopt_run_test {
 
 using namespace testing;
+using rhec::testing::Limit;
+using rhec::testing::LimitedOcp;
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
@@ -151,6 +155,49 @@ TEST(NloptAlgorithms, AnotherAlgorithmSolvesAVehiclesProblem) {
     const Report report = solver->solve(point);
     EXPECT_NEAR(report.objective, best.objective, 1e-4 * (1.0 + std::abs(best.objective))) << name;
     EXPECT_NE(report.iterations, best.iterations) << name << " went the very way of LD_SLSQP";
+  }
+}
+
+/// An integrator whose position is to stay below what its measurements say, hard, soft, and soft without a linear
+/// weight.
+void add_limits(LimitedOcp& limited, double linear, double quadratic) {
+  for (int i = 1; i <= limited.intervals(); ++i)
+    limited.add(i, {Limit::Kind::squares, {0}, {1.0}, -infinity, 0.01 * i, linear, quadratic});
+}
+
+TEST(NloptAlgorithms, ThoseThatTakeInequalitiesTakeLimits) {
+  const auto plain = integrator(5, unlimited);
+  for (const auto& [linear, quadratic] : {std::pair{infinity, 0.0}, {0.05, 0.5}, {0.0, 2.0}}) {
+    LimitedOcp limited(*plain, 1);
+    add_limits(limited, linear, quadratic);
+    const Iterate start = with_limits(limited, RandomProblem::cold_start(*plain));
+    const auto exact = host().make_solver("sparse_sqp", Settings::map());
+    exact->setup(limited);
+    Iterate expected = start;
+    const Report best = exact->solve(expected);
+    ASSERT_EQ(best.status, Status::solved);
+    int active = 0;
+    for (int i = 1; i <= 5; ++i) active += expected.limit_bound(i)[0] > 1e-3;
+    EXPECT_GT(active, 0) << linear;
+    for (const char* options :
+         {"{algorithm: LD_SLSQP}", "{algorithm: LD_MMA}", "{algorithm: LD_CCSAQ}",
+          "{algorithm: LD_AUGLAG, local_algorithm: LD_LBFGS}", "{algorithm: LN_COBYLA, max_iterations: 20000}"}) {
+      const auto solver = nlopt_with(options);
+      ASSERT_EQ(solver->why_not(limited), "") << options;
+      solver->setup(limited);
+      Iterate point = start;
+      const Report report = solver->solve(point);
+      EXPECT_EQ(report.status, Status::solved) << options << " " << linear << ": " << rhec::name_of(report.status);
+      EXPECT_NEAR(report.objective, best.objective, 1e-5 * (1.0 + best.objective)) << options << " " << linear;
+    }
+    const std::string reason = nlopt_with("{algorithm: LD_LBFGS}")->why_not(limited);
+    if (linear == 0.0) {
+      EXPECT_EQ(reason, "") << "its violation is a part of the objective";
+    } else {
+      EXPECT_NE(reason.find("takes no inequality constraints, and this problem has limits"), std::string::npos)
+          << reason;
+      EXPECT_NE(reason.find("LD_MMA"), std::string::npos) << reason;
+    }
   }
 }
 
