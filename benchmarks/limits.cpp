@@ -26,7 +26,7 @@ enum class Softness { none, linear, quadratic };
 struct Course {
   bool has_limits;
   Softness softness;
-  double obstacle_radius;
+  double obstacle_radius, corridor, acceleration;
 };
 
 /// The state is [x, vx, ax, y, vy, ay]; the reference drives at 1 m/s along y = 0.6 sin(0.5 x).
@@ -64,7 +64,7 @@ void write(StageQp& qp, const Course& course, double time, const double* now, co
       qp.limit_quadratic(i)[r] = course.softness == Softness::quadratic ? 100.0 : 0.0;
     };
     G[3] = 1.0;
-    set(0, -0.55, 0.55);
+    set(0, -course.corridor, course.corridor);
     // Obstacles stand beside the reference, one every 3 m; the next three are looked at.
     const double px = last.state(std::min(i + 1, intervals))[0], py = last.state(std::min(i + 1, intervals))[3];
     for (int o = 0; o < 3; ++o) {
@@ -78,7 +78,7 @@ void write(StageQp& qp, const Course& course, double time, const double* now, co
     }
     double* row = G + 4 * qp.stride();
     row[2] = row[5] = 1.0;
-    set(4, -1.5, 1.5);
+    set(4, -course.acceleration, course.acceleration);
   }
 }
 
@@ -160,10 +160,11 @@ void report(const std::string& name, const Times& t) {
 int main(int count, char** words) {
   using namespace rhec::bench;
   const int samples = count > 1 ? std::atoi(words[1]) : 20000;
-  report("no limits", drive({false, Softness::none, 0.0}, samples));
-  report("hard, none active", drive({true, Softness::none, 0.0}, samples));
-  report("hard", drive({true, Softness::none, 0.4}, samples));
-  report("soft, linear", drive({true, Softness::linear, 0.45}, samples));
-  report("soft, linear and quadratic", drive({true, Softness::quadratic, 0.45}, samples));
+  report("no limits", drive({false, Softness::none, 0.0, 0.0, 0.0}, samples));
+  report("hard, none active", drive({true, Softness::none, -10.0, 5.0, 50.0}, samples));
+  report("hard, corridor", drive({true, Softness::none, -10.0, 0.58, 50.0}, samples));
+  report("hard, corridor and obstacles", drive({true, Softness::none, 0.3, 0.58, 1.5}, samples));
+  report("soft, linear", drive({true, Softness::linear, 0.45, 0.55, 1.5}, samples));
+  report("soft, linear and quadratic", drive({true, Softness::quadratic, 0.45, 0.55, 1.5}, samples));
   return 0;
 }

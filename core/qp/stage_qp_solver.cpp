@@ -223,8 +223,7 @@ StageQpSolver::Outcome StageQpSolver::solve_robustly(const StageQp& given, Itera
   bool is_accurate = true;
   if (!out_of_time_ && !interior_point(qp, step, on_its_own, deadline) && !out_of_time_)
     is_accurate = interior_point(qp, step, ready_to_polish, deadline);
-  // Limits that are violated by less than the first run's accuracy.
-  if (!is_accurate && !out_of_time_ && qp.has_limits()) return Outcome::infeasible;
+  if (!is_accurate && !out_of_time_ && qp.has_limits()) interior_point(qp, step, ready_with_limits, deadline);
   return out_of_time_ ? Outcome::out_of_time : Outcome::interior_point;
 }
 
