@@ -416,7 +416,9 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
   const StepCheck check = check_step(qp, step, bound_tolerance);
   if (!check.is_finite) return Found::nothing;
   pull_tolerance_ = multiplier_tolerance * (1.0 + check.largest_costate);
-  if (!has_limits_ && columns_.empty() && held_places_.empty() && !check.violates) return Found::step;
+  if (columns_.empty() && held_places_.empty() && !check.violates &&
+      !(has_limits_ && (!saturated_.empty() || violates_limits(qp, step))))
+    return Found::solution;
   if (!has_bounds_) take_bounds(qp);
   std::copy_n(step.row(0), places_, value_.begin());
   if (has_limits_) find_limit_values(qp, step);
@@ -442,7 +444,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     const int changes_before = changes_;
     const Found found = find_values(qp, riccati, refinements < max_combined, step);
     if (found == Found::nothing) return Outcome::too_much;
-    if (!has_limits_ && found == Found::step && columns_.empty() && held_places_.empty()) {
+    if (found == Found::solution) {
       write(qp, active, step);
       return Outcome::solved;
     }

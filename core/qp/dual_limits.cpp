@@ -92,6 +92,20 @@ void DualActiveSet::find_limit_values(const StageQp& qp, const Iterate& step) no
   }
 }
 
+/// Whether a step that was found without limits violates one. Leaves the limits' values.
+bool DualActiveSet::violates_limits(const StageQp& qp, const Iterate& step) noexcept {
+  find_limit_values(qp, step);
+  bool violates = false;
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    const double* values = value_.data() + limit_place(i, 0);
+    const double *lower = qp.limit_lower(i), *upper = qp.limit_upper(i);
+    for (int r = 0; r < qp.limits(i); ++r)
+      violates |= values[r] < lower[r] - bound_tolerance * (1.0 + std::abs(lower[r])) ||
+                  values[r] > upper[r] + bound_tolerance * (1.0 + std::abs(upper[r]));
+  }
+  return violates;
+}
+
 /// Sensitivities of the limits' values, from those of the variables. Held controls do not move.
 void DualActiveSet::find_limit_sensitivities(const StageQp& qp, double* values) const noexcept {
   double* limits = values + static_cast<std::ptrdiff_t>(places_) * batch_size;

@@ -59,7 +59,7 @@ class RHEC_EXPORT DualActiveSet {
 
  private:
   enum class Hold : std::uint8_t { free, held, column, saturated };
-  enum class Found { nothing, values, step };
+  enum class Found { nothing, values, step, solution };
   static constexpr int none = -1, batch_size = Riccati::Sensitivities::size;
   /// Enough for all columns and for the bounds that are likely to follow.
   static constexpr int batch_count = max_columns / batch_size + 1;
@@ -141,6 +141,7 @@ class RHEC_EXPORT DualActiveSet {
   bool take_limits(const StageQp& qp) noexcept;
   void saturate(int place) noexcept;
   void add_limit_gradients(const StageQp& qp) noexcept;
+  bool violates_limits(const StageQp& qp, const Iterate& step) noexcept;
   void find_limit_values(const StageQp& qp, const Iterate& step) noexcept;
   void find_limit_sensitivities(const StageQp& qp, double* values) const noexcept;
   bool pass_end(int column, bool grows) noexcept;
