@@ -34,6 +34,9 @@ void GuessShifter::take(const HorizonProblem& problem, const Iterate& iterate) n
   std::copy_n(iterate.row(0), entries, kept_.row(0));
   std::copy_n(iterate.costate(0), entries, kept_.costate(0));
   std::copy_n(iterate.bound_row(0), entries, kept_.bound_row(0));
+  if (const int limits = kept_.capacity().limit_row(); limits > 0)
+    std::copy_n(iterate.limit_bound(0), static_cast<std::ptrdiff_t>(problem.intervals() + 1) * limits,
+                kept_.limit_bound(0));
   take_structure(problem);
 }
 
@@ -92,6 +95,11 @@ void GuessShifter::move_rows(int steps, const HorizonProblem& to, Iterate& guess
   std::fill_n(guess.row(moved) + row, rest, 0.0);
   std::fill_n(guess.bound_row(moved) + row, rest, 0.0);
   std::copy_n(kept_.costate(steps), static_cast<std::ptrdiff_t>(moved + 1) * row, guess.costate(0));
+  // Limits stay with their stages.
+  if (const int limits = kept_.capacity().limit_row(); limits > 0) {
+    std::copy_n(kept_.limit_bound(steps), static_cast<std::ptrdiff_t>(moved + 1) * limits, guess.limit_bound(0));
+    std::fill_n(guess.limit_bound(moved) + limits, static_cast<std::ptrdiff_t>(N - moved) * limits, 0.0);
+  }
   // Beyond the kept horizon an estimator gets zero costates (no residuals), a controller the last ones.
   const bool given = to.initial_state() != nullptr;
   for (int i = moved + 1; i <= N; ++i)

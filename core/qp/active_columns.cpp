@@ -32,8 +32,15 @@ bool DualActiveSet::find_sensitivities(const StageQp& qp, Riccati& riccati, cons
   }
   Batch& batch = batches_[chosen];
   Riccati::Entry gradients[batch_size] = {};
-  for (int c = 0; c < count; ++c) gradients[c] = {places[c] / stride_, places[c] % stride_};
+  for (int c = 0; c < count; ++c) {
+    if (is_limit(places[c])) {
+      gradients[c] = {(places[c] - places_) / limit_row_, 0, row_of(qp, places[c])};
+    } else {
+      gradients[c] = {places[c] / stride_, places[c] % stride_, nullptr};
+    }
+  }
   if (!riccati.find_sensitivities(qp, held_, gradients, count, batch.sensitivities)) return false;
+  if (has_limits_) find_limit_sensitivities(qp, batch.sensitivities.values.data());
   forget(chosen);
   batch.count = count;
   std::copy_n(places, count, batch.of.begin());
@@ -75,7 +82,7 @@ bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& ricca
   std::copy_n(first, count, places.begin());
   const int given = count;
   double least = -infinity;  // smallest violation among the chosen ones, once the batch is full
-  for (int place = 0; place < places_; ++place) {
+  for (int place = 0; place < all_places_; ++place) {
     if (!(violation_[place] > least) || number_[place] != none) continue;
     if (std::find(first, first + given, place) != first + given) continue;
     if (count < batch_size) ++count;
@@ -90,14 +97,16 @@ bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& ricca
 /// sums += weighted sum of the sensitivities.
 void DualActiveSet::add_sensitivities(const Riccati& riccati, const Weights& weights,
                                       std::vector<double>& sums) const noexcept {
-  for_each_weighted(
-      weights, [&](int k) { riccati.add_values(batches_[k].sensitivities, weights[k].data(), places_, sums.data()); });
+  for_each_weighted(weights, [&](int k) {
+    riccati.add_values(batches_[k].sensitivities, weights[k].data(), all_places_, sums.data());
+  });
 }
 
 /// Computes the row that a bound would add to the factor below `count` others. Returns the square of its diagonal
 /// entry, or 0 if it depends on them linearly.
 double DualActiveSet::eliminate(int entering, int count, double* row) const noexcept {
   double left = -sensitivity(entering, entering);
+  if (has_limits_ && relaxed_[entering] != 0) left += softness(entering);
   const double least = dependence * left;
   for (int k = 0; k < count; ++k) {
     const double* above = factor_row(k);

@@ -23,8 +23,21 @@ constexpr int max_refinements = 4, max_combined = 2;
 }  // namespace
 
 DualActiveSet::DualActiveSet(const Capacity& capacity)
-    : states_(capacity.states), stride_(capacity.row()), held_(capacity), claimed_(capacity), policy_step_(capacity) {
-  const std::size_t most = (static_cast<std::size_t>(capacity.intervals) + 1) * capacity.row();
+    : states_(capacity.states),
+      stride_(capacity.row()),
+      limit_row_(capacity.limit_row()),
+      has_limits_(capacity.limits > 0),
+      held_(capacity),
+      claimed_(capacity),
+      policy_step_(capacity) {
+  const std::size_t stages = static_cast<std::size_t>(capacity.intervals) + 1;
+  const std::size_t most = stages * (capacity.row() + capacity.limit_row());
+  if (has_limits_) {
+    for (auto* v : {&own_lower_, &own_upper_}) v->assign(most, 0.0);
+    for (auto* v : {&linear_, &softness_}) v->assign(stages * capacity.limit_row(), 0.0);
+    relaxed_.assign(most, 0);
+    saturated_.reserve(stages * capacity.limits);
+  }
   for (auto* v : {&value_, &direction_, &violation_, &least_, &most_, &h_}) v->assign(most, 0.0);
   hold_.assign(most, Hold::free);
   side_.assign(most, 0);
@@ -37,11 +50,14 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
   factor_.assign(static_cast<std::size_t>(max_columns) * max_columns, 0.0);
 }
 
-bool DualActiveSet::is_equality_bound(int place) const noexcept { return is_equality(lower_[place], upper_[place]); }
+bool DualActiveSet::is_equality_bound(int place) const noexcept {
+  return is_equality(lower_[place], upper_[place]) && !is_soft(place);
+}
 
 /// Makes a bound inactive. Its widened bounds are set by `take_bounds`, or here.
 void DualActiveSet::let_go(int place) noexcept {
   hold_[place] = Hold::free;
+  if (has_limits_) relaxed_[place] = 0;
   if (!has_bounds_) return;
   least_[place] = lower_[place] - bound_tolerance * (1.0 + std::abs(lower_[place]));
   most_[place] = upper_[place] + bound_tolerance * (1.0 + std::abs(upper_[place]));
@@ -64,6 +80,7 @@ void DualActiveSet::take_claims(const StageQp& qp, const ActiveSet& claimed) noe
     }
     side_[place] = side;
   });
+  if (has_limits_) take_limit_claims(qp, claimed);
 }
 
 /// Reads the present bounds; false if an active one no longer exists.
@@ -71,8 +88,8 @@ bool DualActiveSet::take_bounds(const StageQp& qp) noexcept {
   has_bounds_ = true;
   lower_ = qp.lower(0);
   upper_ = qp.upper(0);
-  widen_bounds(lower_, upper_, bound_tolerance, places_, least_.data(), most_.data());
-  bool are_there = true;
+  bool are_there = !has_limits_ || take_limits(qp);
+  widen_bounds(lower_, upper_, bound_tolerance, all_places_, least_.data(), most_.data());
   const auto leave_out = [&](int place) {
     least_[place] = -infinity;
     most_[place] = infinity;
@@ -84,6 +101,9 @@ bool DualActiveSet::take_bounds(const StageQp& qp) noexcept {
     }
   }
   for (int j = 0; qp.initial_state_is_given && j < states_; ++j) leave_out(j);
+  for (int i = 0; has_limits_ && i <= qp.intervals(); ++i)
+    for (int r = qp.limits(i); r < limit_row_; ++r) leave_out(limit_place(i, r));
+  for (const int place : saturated_) saturate(place);
   return are_there;
 }
 
@@ -101,19 +121,21 @@ void DualActiveSet::factor(const StageQp& qp, Riccati& riccati) noexcept {
 void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet* claimed) noexcept {
   factorisations_ = 0;
   has_bounds_ = false;
-  for (const auto* places : {&held_places_, &columns_})
+  for (const auto* places : {&held_places_, &columns_, &saturated_})
     for (const int place : *places) let_go(place);
   held_.clear();
   held_places_.clear();
   columns_.clear();
+  saturated_.clear();
   places_ = (qp.intervals() + 1) * stride_;
+  all_places_ = places_ + (qp.intervals() + 1) * limit_row_;
   if (claimed) take_claims(qp, *claimed);
   factor(qp, riccati);
   if (!claimed || !is_convex_ || !take_bounds(qp)) return;
   // Claims are mostly those of the last sample, and in control further bounds are likely to follow: those to which the
   // last trajectory came closest.
   if (qp.initial_state_is_given && column_count() < batch_size) {
-    std::fill_n(value_.data(), places_, 0.0);
+    std::fill_n(value_.data(), all_places_, 0.0);
     find_violations();
     find_sensitivities_of_next(qp, riccati, columns_.data(), column_count());
   } else {
@@ -147,7 +169,7 @@ bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
 /// Updates a step from the multipliers with which it was found to the present ones; false if some have no
 /// sensitivities.
 bool DualActiveSet::combine(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept {
-  if (!has_base_) return false;
+  if (!has_base_ || base_is_saturated_ || !saturated_.empty()) return false;
   const auto has_sensitivities = [this](int place) { return number_[place] != none; };
   if (!std::all_of(columns_.begin(), columns_.end(), has_sensitivities) ||
       !std::all_of(base_places_.begin(), base_places_.end(), has_sensitivities))
@@ -165,9 +187,11 @@ bool DualActiveSet::combine(const StageQp& qp, Riccati& riccati, Iterate& step) 
 /// none.
 bool DualActiveSet::solve_with_multipliers(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept {
   const double* h = nullptr;
-  if (column_count() > 0) {
+  if (column_count() > 0 || !saturated_.empty()) {
     std::copy_n(qp.h(0), places_, h_.begin());
-    for (int k = 0; k < column_count(); ++k) h_[columns_[k]] += multipliers_[k];
+    for (int k = 0; k < column_count(); ++k)
+      if (!is_limit(columns_[k])) h_[columns_[k]] += multipliers_[k];
+    if (has_limits_) add_limit_gradients(qp);
     h = h_.data();
   }
   has_policy_ = true;
@@ -181,9 +205,11 @@ void DualActiveSet::complete_policy(const StageQp& qp, Riccati& riccati) noexcep
 /// The largest distance of a column from its bound, relative to the tolerance for violations.
 double DualActiveSet::largest_miss() const noexcept {
   double largest = 0.0;
-  for (const int place : columns_)
-    largest =
-        std::max(largest, std::abs(value_[place] - bound(place)) / (bound_tolerance * (1.0 + std::abs(bound(place)))));
+  for (int k = 0; k < column_count(); ++k) {
+    const int place = columns_[k];
+    largest = std::max(largest, std::abs(value_[place] - target(place, multipliers_[k])) /
+                                    (bound_tolerance * (1.0 + std::abs(bound(place)))));
+  }
   return largest;
 }
 
@@ -193,7 +219,7 @@ void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
   const int count = column_count();
   for (int k = 0; k < count; ++k) {
     const double* row = factor_row(k);
-    change[k] = (value_[columns_[k]] - bound(columns_[k]) - dot(row, change, k)) * row[k];
+    change[k] = (value_[columns_[k]] - target(columns_[k], multipliers_[k]) - dot(row, change, k)) * row[k];
   }
   back_substitute(change);
   Weights weights{};
@@ -209,6 +235,12 @@ bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
   Weights weights{};
   for (int k = column_count() - 1; k >= 0; --k) {
     const int place = columns_[k];
+    if (has_limits_ && is_soft(place)) {
+      const bool is_changed = correct_soft_column(k, weights);
+      changes_ += is_changed;
+      any |= is_changed;
+      continue;
+    }
     if (side_[place] * multipliers_[k] >= -pull_tolerance_ || is_equality_bound(place)) continue;
     weight_of(place, weights) = -multipliers_[k];
     drop_column(k);
@@ -237,9 +269,9 @@ bool DualActiveSet::drop_wrong(const Riccati& riccati) noexcept {
 /// Violations of the bounds that are not active.
 DualActiveSet::Violations DualActiveSet::find_violations() noexcept {
   const auto [largest, count] =
-      rhec::find_violations(value_.data(), least_.data(), most_.data(), places_, violation_.data());
+      rhec::find_violations(value_.data(), least_.data(), most_.data(), all_places_, violation_.data());
   if (count == 0) return {};
-  const auto worst = std::find(violation_.begin(), violation_.begin() + places_, largest);
+  const auto worst = std::find(violation_.begin(), violation_.begin() + all_places_, largest);
   return {static_cast<int>(worst - violation_.begin()), count};
 }
 
@@ -277,9 +309,17 @@ void DualActiveSet::append_column(int place, double square, double multiplier) n
 
 DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, int entering,
                                           Clock::time_point deadline) noexcept {
-  const int side = value_[entering] < lower_[entering] ? -1 : 1;
-  side_[entering] = static_cast<std::int8_t>(side);
+  // The multiplier grows towards the violated side; that of a saturated limit which is no longer violated shrinks.
+  const bool was_saturated = hold_[entering] == Hold::saturated, is_capped = has_limits_ && is_soft(entering);
+  const int side = was_saturated ? -side_[entering] : value_[entering] < lower_[entering] ? -1 : 1;
   double multiplier = 0.0;
+  if (was_saturated) {
+    std::erase(saturated_, entering);
+    multiplier = side_[entering] * linear(entering);
+  } else {
+    side_[entering] = static_cast<std::int8_t>(side);
+    if (is_capped && linear(entering) == 0.0) relaxed_[entering] = 1;
+  }
   for (;;) {
     if (++changes_ > max_changes) return Outcome::too_much;
     if (is_past(deadline)) return Outcome::out_of_time;
@@ -296,17 +336,30 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       pull[k] *= side;
       weight_of(columns_[k], weights) = -pull[k];
     }
-    std::fill_n(direction_.data(), places_, 0.0);
+    std::fill_n(direction_.data(), all_places_, 0.0);
     add_sensitivities(riccati, weights, direction_);
     // Until the entering bound is met, or a multiplier reaches zero.
-    double length = square > 0.0 ? side * (value_[entering] - bound(entering)) / square : infinity;
+    double length = square > 0.0 ? side * (value_[entering] - target(entering, multiplier)) / square : infinity;
     int blocking_column = none, blocking_held = none;
+    bool reaches_end = false, grows = false;
+    if (is_capped && relaxed_[entering] == 0) {
+      const double until = was_saturated ? std::abs(multiplier) : linear(entering) - std::abs(multiplier);
+      if (until < length) length = until, reaches_end = true;
+    }
     for (int k = 0; k < count; ++k) {
       const int other = columns_[k];
       const double loss = side_[other] * pull[k];
+      if (has_limits_ && is_soft(other)) {
+        const double size = side_[other] * multipliers_[k], end = linear(other);
+        double until = infinity;
+        if (loss > 0.0) until = std::max(relaxed_[other] != 0 ? size - end : size, 0.0) / loss;
+        if (loss < 0.0 && relaxed_[other] == 0) until = std::max(end - size, 0.0) / -loss;
+        if (until < length) length = until, blocking_column = k, grows = loss < 0.0;
+        continue;
+      }
       if (!(loss > 0.0) || is_equality_bound(other)) continue;
       const double until = std::max(side_[other] * multipliers_[k], 0.0) / loss;
-      if (until < length) length = until, blocking_column = k;
+      if (until < length) length = until, blocking_column = k, grows = false;
     }
     for (const int other : held_places_) {
       const double loss = -side_[other] * direction_[other];
@@ -317,7 +370,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     if (length == infinity) return Outcome::no_solution;
     multiplier += side * length;
     for (int k = 0; k < count; ++k) multipliers_[k] -= length * pull[k];
-    for (int k = 0; k < places_; ++k) value_[k] += length * direction_[k];
+    for (int k = 0; k < all_places_; ++k) value_[k] += length * direction_[k];
     if (blocking_held != none) {
       std::erase(held_places_, blocking_held);
       let_go(blocking_held);
@@ -326,10 +379,22 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       find_violations();
       if (!find_sensitivities_of_columns(qp, riccati, 0) || !factor_columns(0, false)) return Outcome::too_much;
     } else if (blocking_column != none) {
-      drop_column(blocking_column);
+      if (!pass_end(blocking_column, grows)) return Outcome::too_much;
+    } else if (reaches_end) {
+      if (was_saturated) {
+        let_go(entering);
+        return Outcome::solved;
+      }
+      if (softness(entering) == 0.0) {
+        saturated_.push_back(entering);
+        saturate(entering);
+        return Outcome::solved;
+      }
+      relaxed_[entering] = 1;
+      multiplier = side * linear(entering);
     } else {
       if (count == max_columns) return Outcome::too_much;
-      value_[entering] = bound(entering);
+      value_[entering] = target(entering, multiplier);
       std::copy_n(row, count, factor_row(count));
       append_column(entering, square, multiplier);
       return Outcome::solved;
@@ -345,14 +410,18 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
   if (!has_base_) factor_columns(0, true);
   if (!(may_combine && combine(qp, riccati, step)) && !solve_with_multipliers(qp, riccati, step)) return Found::nothing;
   has_base_ = true;
+  base_is_saturated_ = !saturated_.empty();
   base_places_ = columns_;
   std::copy_n(multipliers_.begin(), column_count(), base_multipliers_.begin());
   const StepCheck check = check_step(qp, step, bound_tolerance);
   if (!check.is_finite) return Found::nothing;
   pull_tolerance_ = multiplier_tolerance * (1.0 + check.largest_costate);
-  if (columns_.empty() && held_places_.empty() && !check.violates) return Found::step;
+  if (columns_.empty() && held_places_.empty() && !check.violates &&
+      !(has_limits_ && (!saturated_.empty() || violates_limits(qp, step))))
+    return Found::solution;
   if (!has_bounds_) take_bounds(qp);
   std::copy_n(step.row(0), places_, value_.begin());
+  if (has_limits_) find_limit_values(qp, step);
   for (const int place : held_places_) value_[place] = step.bound_row(0)[place];
   if (largest_miss() <= exactness) return check.violates ? Found::values : Found::step;
   return_to_bounds(riccati);
@@ -361,7 +430,7 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
 
 DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
                                             Clock::time_point deadline) noexcept {
-  const bool has_claims = !columns_.empty() || !held_places_.empty();
+  const bool has_claims = !columns_.empty() || !held_places_.empty() || !saturated_.empty();
   if (has_claims && !take_bounds(qp)) {
     claimed_ = active;
     prepare(qp, riccati, &claimed_);
@@ -375,8 +444,8 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     const int changes_before = changes_;
     const Found found = find_values(qp, riccati, refinements < max_combined, step);
     if (found == Found::nothing) return Outcome::too_much;
-    if (found == Found::step && columns_.empty() && held_places_.empty()) {
-      write(active, step);
+    if (found == Found::solution) {
+      write(qp, active, step);
       return Outcome::solved;
     }
     bool needs_factor = drop_wrong(riccati);
@@ -399,18 +468,21 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     if (needs_factor || changes_ > changes_before) {
       refinements = 0;
     } else if (found == Found::step) {
-      write(active, step);
+      write(qp, active, step);
       return Outcome::solved;
     }
   }
   return Outcome::too_much;
 }
 
-void DualActiveSet::write(ActiveSet& active, Iterate& step) const noexcept {
+void DualActiveSet::write(const StageQp& qp, ActiveSet& active, Iterate& step) const noexcept {
   active.clear();
+  if (has_limits_) write_limits(qp, active, step);
   for (const auto* places : {&held_places_, &columns_})
-    for (const int place : *places) active.row(place / stride_)[place % stride_] = side_[place];
-  for (int k = 0; k < column_count(); ++k) step.bound_row(0)[columns_[k]] = multipliers_[k];
+    for (const int place : *places)
+      if (!is_limit(place)) active.row(place / stride_)[place % stride_] = side_[place];
+  for (int k = 0; k < column_count(); ++k)
+    if (!is_limit(columns_[k])) step.bound_row(0)[columns_[k]] = multipliers_[k];
 }
 
 }  // namespace rhec

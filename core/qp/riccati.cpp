@@ -18,7 +18,9 @@ namespace rhec {
 ActiveSet::ActiveSet(const Capacity& capacity)
     : capacity_(capacity),
       row_(capacity.row()),
-      sides_(static_cast<std::size_t>(capacity.intervals + 1) * capacity.row(), 0) {}
+      limit_row_(capacity.limit_row()),
+      sides_(static_cast<std::size_t>(capacity.intervals + 1) * capacity.row(), 0),
+      limits_(static_cast<std::size_t>(capacity.intervals + 1) * capacity.limit_row(), 0) {}
 
 bool ActiveSet::is_empty() const noexcept {
   // Rows are padded to multiples of eight.
@@ -31,7 +33,9 @@ bool ActiveSet::is_empty() const noexcept {
   return any == 0;
 }
 
-void ActiveSet::clear() noexcept { std::fill(sides_.begin(), sides_.end(), std::int8_t{0}); }
+void ActiveSet::clear() noexcept {
+  for (auto* sides : {&sides_, &limits_}) std::fill(sides->begin(), sides->end(), std::int8_t{0});
+}
 
 Riccati::Riccati(const Capacity& capacity)
     : capacity_(capacity),
@@ -179,8 +183,9 @@ Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iter
 }
 
 Riccati::Sensitivities::Sensitivities(const Capacity& capacity) {
-  for (auto* v : {&values, &costates})
-    v->assign(static_cast<std::size_t>(capacity.intervals + 1) * capacity.row() * size, 0.0);
+  const std::size_t stages = static_cast<std::size_t>(capacity.intervals) + 1;
+  values.assign(stages * (capacity.row() + capacity.limit_row()) * size, 0.0);
+  costates.assign(stages * capacity.row() * size, 0.0);
   control_counts.assign(capacity.intervals, 0);
 }
 
@@ -193,7 +198,9 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
   if (std::any_of(is_special_.data(), is_special_.data() + N, is_set) || reductions_[N].rows > 0) return false;
   double *values = sensitivities.values.data(), *costates = sensitivities.costates.data();
   // Entries that stages do not use stay zero.
-  if (!std::equal(qp.control_counts(), qp.control_counts() + N, sensitivities.control_counts.begin())) {
+  if (!std::equal(qp.control_counts(), qp.control_counts() + N, sensitivities.control_counts.begin()) ||
+      (qp.has_limits() && sensitivities.intervals != N)) {
+    sensitivities.intervals = N;
     for (auto* v : {&sensitivities.values, &sensitivities.costates}) std::fill(v->begin(), v->end(), 0.0);
     std::copy_n(qp.control_counts(), N, sensitivities.control_counts.begin());
   }
@@ -205,10 +212,15 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
     std::fill_n(values + first, (ns_ + qp.controls(stage)) * size, 0.0);
   };
   for (int c = 0; c < count; ++c) {
-    const auto [stage, place] = gradients[c];
+    const auto [stage, place, row] = gradients[c];
     if (has_gradient_[stage] == 0) clear(stage);
     has_gradient_[stage] = 1;
-    values[(static_cast<std::ptrdiff_t>(stage) * stride_ + place) * size + c] = 1.0;
+    double* entries = values + static_cast<std::ptrdiff_t>(stage) * stride_ * size + c;
+    if (!row) {
+      entries[place * size] = 1.0;
+      continue;
+    }
+    for (int j = 0; j < ns_ + qp.controls(stage); ++j) entries[j * size] = row[j];
   }
   const RiccatiView view = view_of(qp, active.row(0));
   kernels_->sensitivities_backward(view, last, has_gradient_.data(), values);

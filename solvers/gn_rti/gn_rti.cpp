@@ -35,6 +35,7 @@ void for_each_dual_row(const Ocp& ocp, Iterate& to, const Iterate& from, const F
     function(to.costate(i), from.costate(i), ocp.state_count(i));
     function(to.state_bound(i), from.state_bound(i), ocp.state_count(i));
     if (i < ocp.intervals()) function(to.control_bound(i), from.control_bound(i), ocp.control_count(i));
+    if (ocp.capacity().limits > 0) function(to.limit_bound(i), from.limit_bound(i), ocp.limit_count(i));
   }
 }
 
@@ -44,6 +45,23 @@ bool has_costates(const Ocp& ocp, const Iterate& iterate) noexcept {
     for (int j = 0; j < ocp.state_count(i); ++j)
       if (iterate.costate(i)[j] != 0.0) return true;
   return false;
+}
+
+/// What the slacks cost after a step, as far as the linearisation knows.
+double slack_costs_after(const StageQp& qp, const Iterate& step) noexcept {
+  double costs = 0.0;
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    for (int r = 0; r < qp.limits(i); ++r) {
+      const double linear = qp.limit_linear(i)[r];
+      if (!std::isfinite(linear)) continue;
+      const double* row = qp.G(i) + static_cast<std::ptrdiff_t>(r) * qp.stride();
+      double value = 0.0;
+      for (int j = 0; j < qp.capacity().states + qp.controls(i); ++j) value += row[j] * step.row(i)[j];
+      const double slack = std::max({0.0, qp.limit_lower(i)[r] - value, value - qp.limit_upper(i)[r]});
+      costs += (linear + 0.5 * qp.limit_quadratic(i)[r] * slack) * slack;
+    }
+  }
+  return costs;
 }
 
 }  // namespace
@@ -71,7 +89,6 @@ const OptionTable<GnRtiOptions>& GnRtiOptions::table() {
 
 std::string GnRti::why_not(const Ocp& ocp) const {
   const Capacity capacity = ocp.capacity();
-  if (capacity.limits > 0) return "the problem has limits, which gn_rti does not take yet";
   if (std::max(capacity.states, capacity.controls) > Riccati::max_width)
     return "a stage has more than " + std::to_string(Riccati::max_width) +
            " states or controls; use sparse_sqp, which is for wide models";
@@ -96,6 +113,7 @@ void GnRti::setup(const Ocp& ocp) {
   for (Iterate* iterate : {&step_, &trial_, &best_, &other_trial_}) *iterate = Iterate(capacity);
   scratch_.assign(ocp.scratch_size(), 0.0);
   if (options_.hessian == Curvature::automatic && options_.mode == Mode::rti) choice_.setup(ocp);
+  limits_.assign((static_cast<std::size_t>(capacity.intervals) + 1) * capacity.limit_row(), 0.0);
   defects_.assign(static_cast<std::size_t>(capacity.intervals) * capacity.states, 0.0);
   reset();
 }
@@ -175,7 +193,22 @@ double GnRti::merit(const Iterate& iterate) noexcept {
   double defect = 0.0;
   for (int i = 0; i < ocp_->intervals(); ++i)
     for (int j = 0; j < ocp_->state_count(i + 1); ++j) defect += std::abs(defects_[i * ocp_->capacity().states + j]);
-  return objective + defect_penalty_ * defect + bound_penalty_ * total_violation(*ocp_, iterate);
+  const double without = objective + defect_penalty_ * defect + bound_penalty_ * total_violation(*ocp_, iterate);
+  if (limits_.empty()) return without;
+  const LimitCosts limits = costs_of_limits(iterate);
+  return without + limits.slack + bound_penalty_ * limits.violation;
+}
+
+LimitCosts GnRti::costs_of_limits(const Iterate& iterate) noexcept {
+  LimitCosts all;
+  ocp_->evaluate_limits(iterate, limits_.data(), scratch_);
+  for (int i = 0; i <= ocp_->intervals(); ++i) {
+    const LimitCosts of_stage =
+        limit_costs(*ocp_, i, limits_.data() + static_cast<std::ptrdiff_t>(i) * ocp_->capacity().limit_row());
+    all.slack += of_stage.slack;
+    all.violation += of_stage.violation;
+  }
+  return all;
 }
 
 Report GnRti::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
@@ -250,7 +283,8 @@ Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
 
 /// Linearises at a new iterate, as the next sample will need it; false if the result is not finite.
 bool GnRti::assess_step(const Iterate& iterate, Report& report) noexcept {
-  const double objective = linearisation_->linearise_for_residual(iterate, hessian());
+  double objective = linearisation_->linearise_for_residual(iterate, hessian());
+  objective += slack_costs(linearisation_->qp(), all_stages(*ocp_));
   const KktResidual kkt = kkt_residual(linearisation_->qp(), iterate);
   if (!std::isfinite(objective) || !std::isfinite(kkt.stationarity)) return false;
   report.objective = objective;
@@ -287,6 +321,7 @@ void GnRti::give_up(const Iterate& iterate, Report& report) noexcept {
   // The first check for numbers that are not finite on this path.
   if (is_sound_start(*ocp_, iterate, scratch_)) {
     report.objective = linearisation_->linearise(iterate, Hessian::none);
+    report.objective += slack_costs(linearisation_->qp(), all_stages(*ocp_));
     report.kkt = kkt_residual(linearisation_->qp(), iterate);
   } else {
     report = {};
@@ -307,6 +342,11 @@ bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
     for (int j = 0; j < ocp_->control_count(i); ++j) slope += qp_->r(i)[j] * step_.control(i)[j];
   }
   slope -= defect_penalty_ * defect + bound_penalty_ * asked_share_ * total_violation(*ocp_, best_);
+  if (!limits_.empty()) {
+    // The slack costs are convex in the step: their change over the full step bounds their slope.
+    slope += slack_costs_after(*qp_, step_) - slack_costs(*qp_, all_stages(*ocp_));
+    slope -= bound_penalty_ * asked_share_ * costs_of_limits(best_).violation;
+  }
   const auto acceptable = [&](double length) {
     merit_after = merit(trial_);
     const double allowed =
@@ -342,8 +382,8 @@ StageQpSolver::Outcome GnRti::solve_qp(Report& report, Clock::time_point deadlin
   return outcome;
 }
 
-/// Powell's relaxation: scales the defects and violated bounds that the step must remove by `share`. At a share of 0
-/// the QP is feasible: the zero step satisfies it.
+/// Powell's relaxation: scales the defects and violated bounds and hard limits that the step must remove by `share`. At
+/// a share of 0 the QP is feasible: the zero step satisfies it.
 void GnRti::relax_qp(double share) noexcept {
   relaxed_qp_ = qp_solver_.solved(*qp_);
   qp_ = &relaxed_qp_;
@@ -356,6 +396,9 @@ void GnRti::relax_qp(double share) noexcept {
   };
   for (int i = 0; i <= relaxed_qp_.intervals(); ++i) {
     relax(relaxed_qp_.state_lower(i), relaxed_qp_.state_upper(i), relaxed_qp_.states(i));
+    for (int r = 0; relaxed_qp_.has_limits() && r < relaxed_qp_.limits(i); ++r)
+      if (std::isinf(relaxed_qp_.limit_linear(i)[r]))
+        relax(relaxed_qp_.limit_lower(i) + r, relaxed_qp_.limit_upper(i) + r, 1);
     if (i == relaxed_qp_.intervals()) break;
     relax(relaxed_qp_.control_lower(i), relaxed_qp_.control_upper(i), relaxed_qp_.controls(i));
     for (int j = 0; j < relaxed_qp_.states(i + 1); ++j) relaxed_qp_.b(i)[j] *= share;
@@ -438,6 +481,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   if (report.status != Status::infeasible && is_finite(*ocp_, best_) && std::isfinite(objective))
     std::swap(iterate, best_);
   report.objective = linearisation_->linearise(iterate, Hessian::none);
+  report.objective += slack_costs(linearisation_->qp(), all_stages(*ocp_));
   report.kkt = kkt_residual(linearisation_->qp(), iterate);
   return report;
 }
@@ -450,4 +494,4 @@ RHEC_PLUGIN(rhec::PluginKind::solver, rhec::gn_rti::GnRti,
              .licence = "BSD-2-Clause",
              .source = "Sequential quadratic programming with a stage-wise Riccati recursion; real-time iteration of "
                        "Diehl et al. (2002)",
-             .capabilities = "rhe, rhc, bounds on states, inputs and parameters, real-time iteration"});
+             .capabilities = "rhe, rhc, bounds on states, inputs and parameters, limits, real-time iteration"});

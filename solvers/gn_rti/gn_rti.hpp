@@ -6,6 +6,7 @@
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/ocp/hessian_choice.hpp"
 #include "rhec/core/ocp/linearisation.hpp"
+#include "rhec/core/ocp/ocp.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/stage_qp_solver.hpp"
 
@@ -68,6 +69,7 @@ class GnRti final : public Solver {
   void add_step(const Iterate& from, double length, Iterate& to) const noexcept;
   void roll_out_step(const Iterate& from, double length, Iterate& to) noexcept;
   double merit(const Iterate& iterate) noexcept;
+  LimitCosts costs_of_limits(const Iterate& iterate) noexcept;
   StageQpSolver::Outcome solve_qp(Report& report, Clock::time_point deadline) noexcept;
   void relax_qp(double share) noexcept;
   bool search_along_step(double residual, double& merit_after) noexcept;
@@ -79,7 +81,7 @@ class GnRti final : public Solver {
   const StageQp* qp_ = nullptr;  ///< the QP being solved: the linearisation's, or `relaxed_qp_`
   StageQpSolver qp_solver_;
   Iterate step_, trial_, best_, other_trial_;
-  std::vector<double> scratch_, defects_;
+  std::vector<double> scratch_, defects_, limits_;
   bool is_prepared_ = false;
   bool is_pending_ = false;  ///< the last step is not assessed yet; `step_` holds the iterate before it
   bool use_exact_ = false;

@@ -16,4 +16,16 @@ StageQp bounded_qp(RandomQp& random, bool given, double tightness);
 /// bounds are active there.
 StageQp feasible_qp(RandomQp& random, bool given, double room);
 
+/// What the limits of a random QP are like. Shares are probabilities.
+struct LimitFamily {
+  double room = 0.5;        ///< beside a trajectory, of bounds and limits
+  double soft = 0.0;        ///< share of soft rows; these may be out of reach
+  double equalities = 0.0;  ///< share of rows whose sides coincide
+  double dependent = 0.0;   ///< share of rows that are those before them
+  bool has_state_bounds = false;
+};
+/// A random strictly convex QP with limits on states, on controls and on both; some rows are zero. Hard ones leave room
+/// around some trajectory (as do bounds on states, but around another one).
+StageQp limited_qp(RandomQp& random, bool given, const LimitFamily& family);
+
 }  // namespace rhec::testing

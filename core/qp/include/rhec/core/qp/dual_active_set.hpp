@@ -10,8 +10,8 @@
 
 namespace rhec {
 
-/// Solves a strictly convex StageQp exactly with all its bounds, by a dual active-set method (Goldfarb & Idnani 1983;
-/// docs/method.md, section 7).
+/// Solves a strictly convex StageQp exactly with all its bounds and limits, by a dual active-set method (Goldfarb &
+/// Idnani 1983; docs/method.md, section 7).
 ///
 /// Bounds whose multipliers have the wrong sign are dropped from the claimed active set (warm start) until all signs
 /// are right. Then the most violated bound is added, one at a time, by a step that keeps the signs: it drops the bound
@@ -24,7 +24,12 @@ namespace rhec {
 /// are computed in batches, together with those of bounds that are likely to follow; for a claimed set already in
 /// `prepare`.
 ///
-/// A variable is identified by its place in the rows of all stages, as in an Iterate.
+/// An active limit adds its row of the stage QP's G, times its multiplier, to the gradient. The multiplier of a soft
+/// limit stops at the slack's linear weight. From there on the limit is violated: with a quadratic weight it remains a
+/// column, with the reciprocal weight on the diagonal of S (`relaxed`), without one its multiplier is constant
+/// (`saturated`).
+///
+/// A variable is identified by its place in the rows of all stages, as in an Iterate; limits follow behind them.
 class RHEC_EXPORT DualActiveSet {
  public:
   enum class Outcome {
@@ -53,8 +58,8 @@ class RHEC_EXPORT DualActiveSet {
   int factorisations() const noexcept { return factorisations_; }
 
  private:
-  enum class Hold : std::uint8_t { free, held, column };
-  enum class Found { nothing, values, step };
+  enum class Hold : std::uint8_t { free, held, column, saturated };
+  enum class Found { nothing, values, step, solution };
   static constexpr int none = -1, batch_size = Riccati::Sensitivities::size;
   /// Enough for all columns and for the bounds that are likely to follow.
   static constexpr int batch_count = max_columns / batch_size + 1;
@@ -73,12 +78,20 @@ class RHEC_EXPORT DualActiveSet {
   void factor(const StageQp& qp, Riccati& riccati) noexcept;
   bool refactor(const StageQp& qp, Riccati& riccati) noexcept;
   void let_go(int place) noexcept;
-  bool is_control(int place) const noexcept { return place % stride_ >= states_; }
+  bool is_limit(int place) const noexcept { return place >= places_; }
+  bool is_control(int place) const noexcept { return place % stride_ >= states_ && !is_limit(place); }
+  int limit_place(int stage, int row) const noexcept { return places_ + stage * limit_row_ + row; }
+  double linear(int place) const noexcept { return linear_[place - places_]; }
+  double softness(int place) const noexcept { return softness_[place - places_]; }
+  bool is_soft(int place) const noexcept;
+  /// The value that a column must have: the bound, beyond it where the limit is violated.
+  double target(int place, double multiplier) const noexcept {
+    const double edge = bound(place);
+    return has_limits_ && relaxed_[place] != 0 ? edge + (multiplier - side_[place] * linear(place)) * softness(place)
+                                               : edge;
+  }
   double bound(int place) const noexcept { return (side_[place] < 0 ? lower_ : upper_)[place]; }
   bool is_equality_bound(int place) const noexcept;
-  double violation(int place) const noexcept {
-    return std::max(least_[place] - value_[place], value_[place] - most_[place]);
-  }
 
   bool find_sensitivities(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept;
   bool is_needed(int batch, const int* places, int count) const noexcept;
@@ -118,10 +131,27 @@ class RHEC_EXPORT DualActiveSet {
   void append_column(int place, double square, double multiplier) noexcept;
   Outcome add(const StageQp& qp, Riccati& riccati, int entering, Clock::time_point deadline) noexcept;
   Found find_values(const StageQp& qp, Riccati& riccati, bool may_combine, Iterate& step) noexcept;
-  void write(ActiveSet& active, Iterate& step) const noexcept;
+  void write(const StageQp& qp, ActiveSet& active, Iterate& step) const noexcept;
+
+  // dual_limits.cpp
+  const double* row_of(const StageQp& qp, int place) const noexcept {
+    return qp.G((place - places_) / limit_row_) + static_cast<std::ptrdiff_t>((place - places_) % limit_row_) * stride_;
+  }
+  void take_limit_claims(const StageQp& qp, const ActiveSet& claimed) noexcept;
+  bool take_limits(const StageQp& qp) noexcept;
+  void saturate(int place) noexcept;
+  void add_limit_gradients(const StageQp& qp) noexcept;
+  bool violates_limits(const StageQp& qp, const Iterate& step) noexcept;
+  void find_limit_values(const StageQp& qp, const Iterate& step) noexcept;
+  void find_limit_sensitivities(const StageQp& qp, double* values) const noexcept;
+  bool pass_end(int column, bool grows) noexcept;
+  bool correct_soft_column(int k, Weights& weights) noexcept;
+  void write_limits(const StageQp& qp, ActiveSet& active, Iterate& step) const noexcept;
 
   int factorisations_ = 0, changes_ = 0;
-  int states_ = 0, stride_ = 0, places_ = 0;  ///< number of places that the QP uses
+  int states_ = 0, stride_ = 0, limit_row_ = 0;
+  int places_ = 0, all_places_ = 0;  ///< number of places that the QP uses: of variables, and of limits too
+  bool has_limits_ = false, base_is_saturated_ = false;
   bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
   double pull_tolerance_ = 0.0;
   const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the QP that is being solved
@@ -134,6 +164,11 @@ class RHEC_EXPORT DualActiveSet {
   std::vector<std::int8_t> side_;  ///< of the active bound
   std::vector<int> number_;        ///< index among the sensitivities, or none
   std::vector<int> held_places_;
+  // With limits only.
+  AlignedDoubles own_lower_, own_upper_;
+  std::vector<double> linear_, softness_;  ///< by limit: weight of the slack, reciprocal quadratic weight (or 0)
+  std::vector<std::uint8_t> relaxed_;
+  std::vector<int> saturated_;
   std::vector<Batch> batches_;
   std::vector<int> columns_;  ///< active bounds that are not held, in the order of the Cholesky factor
   std::vector<double> multipliers_, factor_;

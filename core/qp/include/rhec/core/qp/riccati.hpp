@@ -11,7 +11,8 @@ namespace rhec {
 struct RiccatiKernels;
 struct RiccatiView;
 
-/// Which bounds of a StageQp are active, i.e. hold as equalities: -1 the lower bound, +1 the upper, 0 none.
+/// Which bounds and limits of a StageQp are active, i.e. hold as equalities: -1 the lower one, +1 the upper, 0 none. A
+/// soft limit that is violated has -2 or +2.
 class RHEC_EXPORT ActiveSet {
  public:
   ActiveSet() = default;
@@ -21,9 +22,14 @@ class RHEC_EXPORT ActiveSet {
   std::int8_t* control(int interval) noexcept { return row(interval) + capacity_.states; }
   const std::int8_t* state(int node) const noexcept { return row(node); }
   const std::int8_t* control(int interval) const noexcept { return row(interval) + capacity_.states; }
+  std::int8_t* limit(int stage) noexcept { return limits_.data() + static_cast<std::ptrdiff_t>(stage) * limit_row_; }
+  const std::int8_t* limit(int stage) const noexcept {
+    return limits_.data() + static_cast<std::ptrdiff_t>(stage) * limit_row_;
+  }
   /// States and controls of a stage, in columns as in a row of StageQp.
   std::int8_t* row(int stage) noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
   const std::int8_t* row(int stage) const noexcept { return sides_.data() + static_cast<std::ptrdiff_t>(stage) * row_; }
+  /// Whether no bound is active, whatever limits are.
   bool is_empty() const noexcept;
   void clear() noexcept;
   /// Calls function(stage, column, side) for every active bound, stage by stage, with columns as in a row.
@@ -38,17 +44,17 @@ class RHEC_EXPORT ActiveSet {
         if (const std::int8_t side = sides_[k + j]; side != 0) function(k / row_, k % row_ + j, side);
     }
   }
-  bool operator==(const ActiveSet& other) const noexcept { return sides_ == other.sides_; }
+  bool operator==(const ActiveSet& other) const noexcept { return sides_ == other.sides_ && limits_ == other.limits_; }
 
  private:
   Capacity capacity_;
-  int row_ = 0;
-  std::vector<std::int8_t> sides_;
+  int row_ = 0, limit_row_ = 0;
+  std::vector<std::int8_t> sides_, limits_;
 };
 
-/// Solves a StageQp in which the bounds of an active set hold as equalities and all others are ignored, by a backward
-/// Riccati recursion (docs/method.md, section 7): with the value function
-/// V_{i+1}(s) = 1/2 s'Ps + p's subject to C s = d,
+/// Solves a StageQp in which the bounds of an active set hold as equalities, and all others and the limits are ignored,
+/// by a backward Riccati recursion (docs/method.md, section 7): with the value function V_{i+1}(s) = 1/2 s'Ps + p's
+/// subject to C s = d,
 ///
 ///     G = R + B'PB,  L = S + B'PA,  g = r + B'(Pb + p)
 ///     w = -G^-1 (L s + g),   P_i = Q + A'PA - L'G^-1 L,   p_i = q + A'(Pb + p) - L'G^-1 g
@@ -86,18 +92,21 @@ class RHEC_EXPORT Riccati {
     return solve(qp, active, step, nullptr);
   }
 
-  /// Sensitivities of the minimiser to gradients of one entry each: with h = e_k and all other vectors of the QP zero,
-  /// the values z of all stages, and in place of fixed controls their multipliers. Interleaved: entry c of the row of
-  /// stage i is at values[(i * stride + c) * size + (number of the gradient)].
+  /// Sensitivities of the minimiser to gradients of one entry, or one row of a stage, each: with h = e_k and all other
+  /// vectors of the QP zero, the values z of all stages, and in place of fixed controls their multipliers. Interleaved:
+  /// entry c of the row of stage i is at values[(i * stride + c) * size + (number of the gradient)]. Behind the last
+  /// stage there is room for the values of all limits, which the caller may fill.
   struct Sensitivities {
     static constexpr int size = 8;
     AlignedDoubles values, costates;
     std::vector<int> control_counts;  ///< of the QP that they belong to
+    int intervals = -1;
     Sensitivities() = default;
     explicit Sensitivities(const Capacity& capacity);
   };
   struct Entry {
-    int stage, place;
+    int stage = 0, place = 0;
+    const double* row = nullptr;  ///< the gradient, in place of e_k
   };
   /// For at most Sensitivities::size gradients. False if the last factorisation has active state bounds or was
   /// convexified: sensitivities are not available then.

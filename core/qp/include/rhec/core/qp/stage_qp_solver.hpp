@@ -9,20 +9,21 @@
 
 namespace rhec {
 
-/// Solves a StageQp exactly with all its bounds (docs/method.md, section 7).
+/// Solves a StageQp exactly with all its bounds and limits (docs/method.md, section 7).
 ///
 /// The solver is warm-started with the active set of the last sample's multipliers and corrects it by a dual active-set
 /// method (DualActiveSet). If few bounds of states are in this set, it first tries the set as it is, inside one
 /// factorisation. If the dual method needs too many changes, the primal-dual rule (Hintermueller, Ito & Kunisch 2002:
 /// add violated bounds, drop those with the wrong sign) corrects the set for a few factorisations. If that does not
 /// settle, a primal-dual interior-point method takes over, and its active set is polished to the exact solution. The
-/// interior-point method also decides whether the QP is infeasible.
+/// interior-point method also decides whether the QP is infeasible. With limits the dual method does all of it but
+/// that: limits have no place inside a factorisation.
 class RHEC_EXPORT StageQpSolver {
  public:
   enum class Outcome {
     active_set,      ///< exact, by active-set methods alone
     interior_point,  ///< the interior-point method was needed; exact after polishing, or to its tolerance
-    infeasible,      ///< the bounds cannot be satisfied
+    infeasible,      ///< the bounds and hard limits cannot be satisfied
     out_of_time      ///< the deadline was reached; `step` is not usable
   };
   /// Termination of the interior-point method: complementarity relative to the gradient, and violation of the bounds.
@@ -74,21 +75,36 @@ class RHEC_EXPORT StageQpSolver {
   DualActiveSet::Outcome solve_from_guess(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   Violations correct_active_set(const StageQp& qp, const Iterate& step) noexcept;
   bool try_active_sets(const StageQp& qp, Iterate& step, int rounds, Clock::time_point deadline) noexcept;
+  Outcome solve_limited(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
+  void take_interior_set() noexcept;
+  bool polish(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   Outcome solve_robustly(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted, Clock::time_point deadline) noexcept;
   const StageQp& convexify(const StageQp& qp) noexcept;
 
-  /// One bounded variable in the interior-point method: slacks and multipliers of its two sides.
+  /// One bounded variable or limit in the interior-point method: slacks and multipliers of its two sides. A soft side
+  /// has the slack of its violation too, with a multiplier of its own; it is eliminated from the Newton system.
   struct Side {
     double slack = 0.0, multiplier = 0.0, slack_step = 0.0, multiplier_step = 0.0, correction = 0.0;
+    double excess = 0.0, rest = 0.0, excess_step = 0.0, rest_step = 0.0, excess_correction = 0.0;
   };
   struct Bounded {
     bool is_state = false;
+    const double* row = nullptr;  ///< of a limit
+    double linear = 0.0, quadratic = 0.0;
+    bool is_soft = false;
     int stage = 0, component = 0;
     double lower = 0.0, upper = 0.0, value = 0.0;
     Side below, above;
   };
   void collect_bounded(const StageQp& qp) noexcept;
+  /// A side's multiplier after a Newton step is pull - weight (distance of the new value from the bound).
+  struct Barrier {
+    double weight, pull;
+  };
+  static Barrier barrier_of(const Bounded& v, const Side& side, double target) noexcept;
+  void set_steps(const Bounded& v, Side& side, double distance, double target) const noexcept;
+  double value_of(const Bounded& v, const Iterate& step) const noexcept;
   void barrier_terms(const StageQp& qp, double target) noexcept;
 
   Capacity capacity_;
@@ -96,6 +112,7 @@ class RHEC_EXPORT StageQpSolver {
   ActiveSet active_, no_bounds_;
   DualActiveSet dual_;
   StageQp convexified_;
+  StageQp barrier_;  ///< with limits: the QP plus their barrier terms
   bool factored_ = false;
   bool is_convexified_ = false;   ///< the QP is not convex and `convexified_` replaces it
   bool was_convexified_ = false;  ///< since `guess_from`

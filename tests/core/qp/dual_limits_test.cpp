@@ -1,0 +1,75 @@
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "rhec/core/qp/kkt.hpp"
+#include "rhec/core/qp/stage_qp_solver.hpp"
+#include "support/active_set_attempt.hpp"
+
+namespace rhec {
+namespace dual_limits_test {
+
+using namespace rhec::testing;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+struct Count {
+  int solved = 0, by_sets = 0, infeasible = 0, active = 0, violated = 0;
+};
+
+Count solve_family(unsigned seed, int trials, const LimitFamily& family) {
+  RandomQp random(seed);
+  Count count;
+  for (int trial = 0; trial < trials; ++trial) {
+    const StageQp qp = limited_qp(random, trial % 2 == 0, family);
+    StageQpSolver solver(qp.capacity());
+    Iterate step(qp.capacity());
+    solver.guess_from(qp, step);
+    const auto outcome = solver.solve(qp, step);
+    if (outcome == StageQpSolver::Outcome::infeasible) {
+      ++count.infeasible;
+      continue;
+    }
+    ++count.solved;
+    count.by_sets += outcome == StageQpSolver::Outcome::active_set;
+    EXPECT_LT(kkt_violation(qp, step), 1e-6) << "trial " << trial << ", outcome " << static_cast<int>(outcome);
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int r = 0; r < qp.limits(i); ++r) {
+        const double size = std::abs(step.limit_bound(i)[r]);
+        count.active += size > 0.0;
+        count.violated += size > 0.0 && size >= qp.limit_linear(i)[r];
+      }
+    // The solution's own multipliers lead back to it at once.
+    Iterate again(qp.capacity());
+    solver.guess_from(qp, step);
+    solver.prepare(qp);
+    EXPECT_NE(solver.solve(qp, again), StageQpSolver::Outcome::infeasible) << "trial " << trial;
+    EXPECT_LT(kkt_violation(qp, again), 1e-6) << "trial " << trial << ", warm";
+    EXPECT_LT(distance(qp, step, again), 1e-5) << "trial " << trial;
+  }
+  return count;
+}
+
+TEST(DualLimits, SolvesHardLimits) {
+  const Count count = solve_family(31, 300, {.room = 0.5});
+  EXPECT_GT(count.by_sets, 270);
+  EXPECT_LT(count.infeasible, 3);
+  EXPECT_GT(count.active, 800);
+}
+
+TEST(DualLimits, SolvesSoftLimits) {
+  const Count count = solve_family(32, 300, {.room = 0.5, .soft = 1.0});
+  EXPECT_GT(count.by_sets, 270);
+  EXPECT_EQ(count.infeasible, 0);
+  EXPECT_GT(count.violated, 1000);
+}
+
+TEST(DualLimits, SolvesHardAndSoftLimitsThatDependOnEachOther) {
+  const Count count = solve_family(33, 300, {.room = 0.4, .soft = 0.5, .equalities = 0.1, .dependent = 0.3});
+  EXPECT_GT(count.by_sets, 250);
+  EXPECT_GT(count.active, 1000);
+}
+
+}  // namespace dual_limits_test
+}  // namespace rhec
