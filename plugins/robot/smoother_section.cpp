@@ -78,7 +78,7 @@ std::unique_ptr<Smoother> SmootherSection::make(const EstimatorParts& estimator)
   std::shared_ptr<Solver> solver = smoothing_solver.make(context_->host, options_.solver);
   if (follows_priors(parts)) {
     if (!options_.priors.is_null()) parts.priors = PriorsSection(context_, options_.priors);
-    return std::make_unique<PriorSmoothing>(context_->model, std::move(solver),
+    return std::make_unique<PriorSmoothing>(parts.context->model, std::move(solver),
                                             PriorSmoothing::Setup{.filters = parts.filters(),
                                                                   .priors = parts.priors.given(),
                                                                   .problem = parts.problem(),
@@ -91,7 +91,7 @@ std::unique_ptr<Smoother> SmootherSection::make(const EstimatorParts& estimator)
   setup.walks = parts.walks;
   setup.initial_mean = parts.initial_mean;
   setup.initial_covariance = parts.initial_covariance;
-  return std::make_unique<FullInformationEstimation>(context_->model, std::move(solver), std::move(setup));
+  return std::make_unique<FullInformationEstimation>(parts.context->model, std::move(solver), std::move(setup));
 }
 
 }  // namespace rhec
