@@ -111,7 +111,12 @@ double clamped(const Variable& variable, double value) { return std::clamp(value
 }  // namespace
 
 StepError::StepError(const Model& model)
-    : model_(&model), coarse_(model.state_count()), fine_(model.state_count()), data_(model.data_count(), 0.0) {}
+    : model_(&model), coarse_(model.state_count()), fine_(model.state_count()), data_(model.data_count(), 0.0) {
+  if (!is_implicit(model)) return;
+  const int nx = model.state_count();
+  jacobian_.resize(static_cast<std::size_t>(nx) * (nx + model.input_count() + model.parameter_count()));
+  errors_.resize(static_cast<std::size_t>(nx));
+}
 
 double StepError::operator()(const double* state, const double* inputs, const double* parameters, double duration,
                              int substeps, int* worst_state) noexcept {
@@ -126,10 +131,19 @@ double StepError::operator()(const double* state, const double* inputs, const do
   model_->integrate(request);
   request.substeps = 2 * substeps;
   request.next_states = fine_.data();
+  request.jacobians = jacobian_.empty() ? nullptr : jacobian_.data();
   model_->integrate(request);
+  for (std::size_t j = 0; j < coarse_.size(); ++j) coarse_[j] -= fine_[j];
+  if (!jacobian_.empty()) {
+    const auto nx = static_cast<Eigen::Index>(coarse_.size());
+    Eigen::Map<Eigen::VectorXd> left(errors_.data(), nx);
+    left.noalias() = Eigen::Map<const Eigen::MatrixXd>(jacobian_.data(), nx, nx) *
+                     Eigen::Map<const Eigen::VectorXd>(coarse_.data(), nx);
+    coarse_.swap(errors_);
+  }
   double worst = 0.0;
   for (std::size_t j = 0; j < coarse_.size(); ++j) {
-    double error = std::abs(coarse_[j] - fine_[j]) / model_->description().states[j].scale;
+    double error = std::abs(coarse_[j]) / model_->description().states[j].scale;
     if (!std::isfinite(error)) error = std::numeric_limits<double>::infinity();
     if (error <= worst) continue;
     worst = error;

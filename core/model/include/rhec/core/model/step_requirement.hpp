@@ -53,7 +53,9 @@ RHEC_EXPORT std::vector<OperatingPoint> operating_points(const Model& model, con
                                                          std::optional<double> ground_speed = {});
 
 /// How inexact an interval's steps are, seen from one place: the difference of the next state from that of twice as
-/// many steps, in typical magnitudes of the states. Allocates when it is made only.
+/// many steps, in typical magnitudes of the states. Of implicit steps it is what is left of that difference after
+/// another interval like this one (dF/dx of it): an error in what settles within an interval does not last. Allocates
+/// when it is made only.
 class RHEC_EXPORT StepError {
  public:
   explicit StepError(const Model& model);
@@ -64,6 +66,7 @@ class RHEC_EXPORT StepError {
  private:
   const Model* model_;
   std::vector<double> coarse_, fine_, data_;
+  std::vector<double> jacobian_, errors_;  ///< empty with explicit steps
 };
 
 }  // namespace rhec
