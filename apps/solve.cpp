@@ -49,10 +49,10 @@ class Models {
   explicit Models(const Host& host) : host_(&host) {}
 
   std::shared_ptr<const Model> of(const ProblemRecord& record) {
-    const std::string key = record.model + " " + key_of(record.model_options);
+    const std::string key = record.model + (record.is_implicit ? " implicit " : " ") + key_of(record.model_options);
     std::shared_ptr<const Model>& model = made_[key];
     try {
-      if (!model) model = host_->make_model(record.model, record.model_options);
+      if (!model) model = sim::as_integrated(record, host_->make_model(record.model, record.model_options));
     } catch (const Error& mistake) {
       const std::string text = mistake.what();  // errors in options begin with a place, errors in the name do not
       throw text.starts_with(record.where) ? mistake : Error(fmt::format("{}: model: {}", record.where, text));

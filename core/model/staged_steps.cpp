@@ -21,6 +21,28 @@ std::vector<std::uint32_t> numbered(std::uint32_t first, int count) {
 
 }  // namespace
 
+StoredRows stored_rows(const std::vector<std::uint32_t>& registers, int rows, std::uint32_t zero) {
+  const int columns = rows > 0 ? static_cast<int>(registers.size()) / rows : 0;
+  StoredRows made{.rows = rows, .eights = padded(columns) / 8, .all = {}};
+  for (int r = 0; r < rows; ++r) {
+    for (int from = 0; from < columns; from += 8) {
+      StoredEight eight;
+      int varying = 0;
+      for (int k = 0; k < 8; ++k) {
+        const std::uint32_t source =
+            from + k < columns ? registers[static_cast<std::size_t>(r) * columns + from + k] : zero;
+        if (source != zero) varying = k + 1;
+        eight.sources[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(source) * lanes;
+      }
+      eight.kind = varying == 0   ? StoredEight::Kind::constant
+                   : varying <= 4 ? StoredEight::Kind::first_4
+                                  : StoredEight::Kind::all;
+      made.all.push_back(eight);
+    }
+  }
+  return made;
+}
+
 RatesStructure RatesTapes::structure(int nx, int np, int nu) const {
   RatesStructure found{.nx = nx, .np = np, .nu = nu, .slopes = {}, .bends = {}};
   const int na = found.na();
@@ -37,7 +59,9 @@ RatesStructure RatesTapes::structure(int nx, int np, int nu) const {
 }
 
 StagedSteps::Chain::Chain(const RatesStructure& of, const ChainRulePlaces& at, bool single)
-    : rule(of, at, single), jacobian(rows_of(rule.moved(), at.nx, at)), hessian(rows_of(rule.hessian(), at.nz, at)) {}
+    : rule(of, at, single),
+      jacobian(stored_rows(rule.moved(), at.nx, at.zero)),
+      hessian(stored_rows(rule.hessian(), at.nz, at.zero)) {}
 
 StagedSteps::StagedSteps(std::shared_ptr<const RatesTapes> tapes, int nx, int np, int nu, bool ramp)
     : tapes_(std::move(tapes)),
@@ -45,36 +69,13 @@ StagedSteps::StagedSteps(std::shared_ptr<const RatesTapes> tapes, int nx, int np
       at_(structure_, ramp),
       single_(structure_, at_, true),
       several_(structure_, at_, false),
-      next_(rows_of(numbered(at_.next, nx), 1, at_)) {
+      next_(stored_rows(numbered(at_.next, nx), 1, at_.zero)) {
   const int na = structure_.na();
   for (const auto& [r, c] : structure_.slopes) slopes_.push_back(nx + r * na + c);
   for (const auto& [r, c] : structure_.bends) bends_.push_back(r * na + c);
   const int registers =
       std::max({tapes_->rates.register_count(), tapes_->slopes.register_count(), tapes_->bends.register_count()});
   memory_ = (static_cast<std::size_t>(at_.count) + static_cast<std::size_t>(registers)) * lanes;
-}
-
-/// Rows of registers, as the kernels write them.
-StoredRows StagedSteps::rows_of(const std::vector<std::uint32_t>& registers, int rows, const ChainRulePlaces& at) {
-  const int columns = rows > 0 ? static_cast<int>(registers.size()) / rows : 0;
-  StoredRows made{.rows = rows, .eights = padded(columns) / 8, .all = {}};
-  for (int r = 0; r < rows; ++r) {
-    for (int from = 0; from < columns; from += 8) {
-      StoredEight eight;
-      int varying = 0;
-      for (int k = 0; k < 8; ++k) {
-        const std::uint32_t source =
-            from + k < columns ? registers[static_cast<std::size_t>(r) * columns + from + k] : at.zero;
-        if (source != at.zero) varying = k + 1;
-        eight.sources[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(source) * lanes;
-      }
-      eight.kind = varying == 0   ? StoredEight::Kind::constant
-                   : varying <= 4 ? StoredEight::Kind::first_4
-                                  : StoredEight::Kind::all;
-      made.all.push_back(eight);
-    }
-  }
-  return made;
 }
 
 /// Eight intervals at most.

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -20,6 +21,9 @@ struct RatesTapes {
 
   RatesStructure structure(int nx, int np, int nu) const;
 };
+
+/// Rows of registers of eight lanes, as the kernels write them; `zero` is the one that is always zero.
+StoredRows stored_rows(const std::vector<std::uint32_t>& registers, int rows, std::uint32_t zero);
 
 /// Runge-Kutta steps of a formula that is too long for its steps to be written out: the formula and its derivatives are
 /// evaluated at each stage, for eight intervals at a time, and ChainRule does the rest. Memory does not grow with the
@@ -46,7 +50,6 @@ class StagedSteps {
     ChainRule rule;
     StoredRows jacobian, hessian;
   };
-  static StoredRows rows_of(const std::vector<std::uint32_t>& registers, int rows, const ChainRulePlaces& at);
 
   std::shared_ptr<const RatesTapes> tapes_;
   RatesStructure structure_;

@@ -100,9 +100,10 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
   static const auto rows =
       OptionTable<C>()
           .integer("horizon", &C::horizon, "N_c, intervals", between(1, 100000))
+          .choice("integrator", &C::integrator, integrator_choices(), integrator_meaning)
           .automatic_integer(
               "substeps", &C::substeps,
-              "Runge-Kutta steps per interval; auto: as many as the model's time constants ask for at the "
+              "integration steps per interval; auto: as many as the model's time constants ask for at the "
               "path's speed",
               between(1, 1000))
           .choice("reference_speed", &C::reference_speed,
@@ -141,13 +142,10 @@ OptionSection ControllerSection::documentation() {
 
 PluginChoice ControllerSection::solver_choice() const { return default_solver.choice(options_.solver); }
 
-void ControllerSection::add_problem(Controller::Setup& setup, double top_speed) const {
+void ControllerSection::add_problem(Controller::Setup& setup) const {
   const ModelDescription& about = context_->about;
   RhcProblem::Setup& problem = setup.problem;
   problem.max_intervals = options_.horizon;
-  std::vector<double> parameters;
-  for (const Variable& parameter : about.parameters) parameters.push_back(middle_value(parameter));
-  problem.substeps = substeps_of(options_.substeps, section_, *context_, parameters, top_speed);
   const WeightOptions weights = WeightOptions::table().parse(options_.weights, "controller: weights");
   const std::vector<double> stage = stage_by_name().read(weights.stage, about);
   const auto first_input = stage.begin() + static_cast<std::ptrdiff_t>(about.states.size());
@@ -189,7 +187,12 @@ void ControllerSection::add_blockings(Controller::Setup& setup) const {
 std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks,
                                                     std::shared_ptr<const SlipAhead> ahead) const {
   Controller::Setup setup;
-  add_problem(setup, path.top_speed());
+  std::vector<double> parameters;
+  for (const Variable& parameter : context_->about.parameters) parameters.push_back(middle_value(parameter));
+  const Integration integration =
+      integration_of(options_.integrator, options_.substeps, section_, context_, parameters, path.top_speed());
+  setup.problem.substeps = integration.substeps;
+  add_problem(setup);
   setup.interval = context_->step;
   setup.search.stop_time = context_->step;
   setup.reference_speed = options_.reference_speed;
@@ -199,7 +202,7 @@ std::unique_ptr<Controller> ControllerSection::make(const Path& path, const Robo
   setup.ahead = std::move(ahead);
   add_blockings(setup);
   auto solver = hooks.wrap_solver("rhc", default_solver.make(context_->host, options_.solver));
-  return std::make_unique<Controller>(context_->model, std::move(solver), path, std::move(setup));
+  return std::make_unique<Controller>(integration.context->model, std::move(solver), path, std::move(setup));
 }
 
 }  // namespace rhec

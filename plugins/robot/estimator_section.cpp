@@ -117,8 +117,9 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
   return OptionTable<E>()
       .choice("name", &E::name, std::move(names), std::move(meanings))
       .integer("horizon", &E::horizon, "N_e, intervals", between(1, 100000))
+      .choice("integrator", &E::integrator, integrator_choices(), integrator_meaning)
       .automatic_integer("substeps", &E::substeps,
-                         "Runge-Kutta steps per interval; auto: as many as the model's time constants ask for",
+                         "integration steps per interval; auto: as many as the model's time constants ask for",
                          between(1, 1000))
       .integer("heading_starts", &E::heading_starts,
                "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
@@ -172,8 +173,9 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
   has_initial_state_ = options_.initial.find("state") != nullptr;
   std::vector<double> mean = initial_state_by_name().read(initial.state, about);
   for (const double value : initial_parameters_by_name().read(initial.parameters, about)) mean.push_back(value);
-  parts_.substeps =
-      substeps_of(options_.substeps, section, *parts_.context, std::span(mean).subspan(about.states.size()));
+  Integration integration = integration_of(options_.integrator, options_.substeps, section, parts_.context,
+                                           std::span(mean).subspan(about.states.size()));
+  parts_.substeps = integration.substeps;
   const std::vector<double> sigma = initial_sigma_by_name().read(initial.sigma, about);
   const auto size = static_cast<Eigen::Index>(mean.size());
   parts_.initial_mean = Eigen::Map<const Eigen::VectorXd>(mean.data(), size);
@@ -191,7 +193,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
     return default_solver.make(host, named);
   };
   parts_.make_map = [memory = parts_.memory] { return memory.make_map(); };
-  parts_.context = with_state_noise(parts_.context);
+  parts_.context = with_state_noise(std::move(integration.context));
 }
 
 OptionSection EstimatorSection::documentation(const EstimatorMakers& makers) {

@@ -8,6 +8,7 @@
 
 #include "model_checks.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/model/implicit_model.hpp"
 #include "rhec/sim/check/derivative_check.hpp"
 
 namespace rhec::sim {
@@ -103,6 +104,9 @@ std::vector<Finding> check_derivatives(const CheckedModel& checked) {
   const StagePoints stages = random_stages(checked.about, stages_of_a_range, checked.options.seed);
   WorstOfAll first, second, output_first, output_second, integration;
   int compared = 0, skipped = 0;
+  // Implicit steps are those of the vehicle's formula, whose explicit steps are held against its rates.
+  const auto* const implicit = dynamic_cast<const ImplicitModel*>(&checked.model);
+  const Model& of_rates = implicit ? *implicit->vehicle() : checked.model;
   const std::vector<std::string> sets = checked.model.instruction_sets();
   for (const std::string& set : sets) {
     if (!checked.model.use_instruction_set(set)) {
@@ -119,7 +123,7 @@ std::vector<Finding> check_derivatives(const CheckedModel& checked) {
         second.take(errors.second, under);
         output_first.take(errors.output_first, fmt::format("instruction set {}", set));
         output_second.take(errors.output_second, fmt::format("instruction set {}", set));
-        integration.take(integration_error(checked.model, checked.about, stages, ramp, substeps), under);
+        integration.take(integration_error(of_rates, checked.about, stages, ramp, substeps), under);
         compared += errors.compared;
         skipped += errors.skipped;
       }
@@ -267,7 +271,8 @@ ModelCheck check_model(const Host& host, const Robot& robot, ModelCheckOptions o
   options.blockings = robot.make_blockings();
   // The robot's own model is shared; its instruction set must not change.
   const PluginChoice choice = robot.model_choice();
-  const std::shared_ptr<Model> model = host.make_model(choice.name, choice.options);
+  std::shared_ptr<Model> model = host.make_model(choice.name, choice.options);
+  if (is_implicit(*robot.estimator_model())) model = std::make_shared<ImplicitModel>(std::move(model));
   return check_model(*model, robot.bounded_description(), options);
 }
 

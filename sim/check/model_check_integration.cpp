@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "model_checks.hpp"
+#include "rhec/core/model/implicit_model.hpp"
 
 namespace rhec::sim {
 
@@ -25,25 +26,30 @@ std::vector<Finding> check_integration(const CheckedModel& checked, const StepRe
       std::isfinite(needed.time_constant)
           ? fmt::format("; its shortest time constant is {:.3g} s, in the state '{}'", needed.time_constant, state)
           : "";
+  const bool implicit = is_implicit(checked.model);
+  const char* const kind = implicit ? "implicit" : "Runge-Kutta";
+  const std::string remedy =
+      implicit || !checked.model.graph() ? "" : "give integrator: implicit, whose steps need not be short against it, ";
   if (needed.substeps == 0)
-    findings.fail(state,
-                  fmt::format("{} Runge-Kutta steps do not follow an interval of {:g} s{}",
-                              StepRequirement::most_substeps, interval, cause),
-                  "shorten the interval, or leave out of the model what settles so fast: it then has its steady value",
-                  numbers);
+    findings.fail(
+        state,
+        fmt::format("{} {} steps do not follow an interval of {:g} s{}", StepRequirement::most_substeps, kind, interval,
+                    cause),
+        remedy + "shorten the interval, or leave out of the model what settles so fast: it then has its steady value",
+        numbers);
   else if (checked.options.substeps && *checked.options.substeps < needed.substeps)
     findings.warn(state,
-                  fmt::format("{} Runge-Kutta steps in an interval of {:g} s are inexact{}", *checked.options.substeps,
+                  fmt::format("{} {} steps in an interval of {:g} s are inexact{}", *checked.options.substeps, kind,
                               interval, cause),
                   fmt::format("give substeps: {}, or auto", needed.substeps), numbers);
   else if (needed.substeps > costly_substeps)
-    findings.warn(state,
-                  fmt::format("an interval of {:g} s takes {} Runge-Kutta steps{}", interval, needed.substeps, cause),
-                  "what settles within a small part of an interval costs most of the time and tells little: consider a "
-                  "shorter interval, or a model in which it has its steady value",
-                  numbers);
+    findings.warn(
+        state, fmt::format("an interval of {:g} s takes {} {} steps{}", interval, needed.substeps, kind, cause),
+        std::string("what settles within a small part of an interval costs most of the time and tells little: ") +
+            remedy + "consider a shorter interval, or a model in which it has its steady value",
+        numbers);
   else
-    findings.pass(fmt::format("an interval of {:g} s takes {} Runge-Kutta step{}{}", interval, needed.substeps,
+    findings.pass(fmt::format("an interval of {:g} s takes {} {} step{}{}", interval, needed.substeps, kind,
                               needed.substeps == 1 ? "" : "s", cause),
                   numbers, state);
   return findings.take();

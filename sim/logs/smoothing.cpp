@@ -42,7 +42,7 @@ SmoothedReplay smooth(const std::string& name, const Robot& robot, const Recorde
   result.laws = run.laws;
   result.has_sigmas = !run.covariances.empty();
 
-  const Model& model = *robot.model();
+  const Model& model = *robot.estimator_model();
   const int nx = model.state_count(), np = model.parameter_count();
   const std::ptrdiff_t n = std::ptrdiff_t{nx} + np;
   std::vector<double> outputs(model.output_count());

@@ -26,6 +26,8 @@ Json parse(std::string_view text, const std::string& where) {
   }
 }
 
+constexpr const char *explicit_name = "rk4", *implicit_name = "radau5";
+
 void read_version(const LineValue& line, ProblemRecord& record) {
   if (!line.has("version")) return;
   record.version = line["version"].integer(1);
@@ -53,8 +55,14 @@ void read_horizon(const LineValue& horizon, const ProblemFormat& format, Problem
     if (dt.is_list()) throw dt.mismatch("a number; a list of them is for lines with \"version\": 2");
     record.durations.assign(N, duration(dt));
   }
-  if (horizon["integrator"].text() != "rk4")
-    throw horizon["integrator"].mismatch("\"rk4\", the classical Runge-Kutta step");
+  const std::string integrator = horizon["integrator"].text();
+  record.is_implicit = integrator == implicit_name;
+  if (!record.is_implicit && integrator != explicit_name)
+    throw horizon["integrator"].mismatch(fmt::format(
+        "\"{}\", the classical Runge-Kutta step, or \"{}\", that of Radau IIA", explicit_name, implicit_name));
+  if (record.is_implicit && record.version < 4)
+    throw horizon["integrator"].mismatch(
+        fmt::format("\"{}\"; \"{}\" is for lines with \"version\": 4", explicit_name, implicit_name));
   record.substeps = horizon["substeps"].integer(1);
 }
 
@@ -225,7 +233,7 @@ std::string problem_line(const ProblemRecord& record) {
                                                       [&](double value) { return value == durations.front(); });
   line["horizon"] = {{"intervals", record.intervals},
                      {"dt", same ? number_or_null(durations.front()) : list_of(durations)},
-                     {"integrator", "rk4"},
+                     {"integrator", record.is_implicit ? implicit_name : explicit_name},
                      {"substeps", record.substeps}};
   problem_format(record.kind).write(record, line);
   line["bounds"] = bounds_of(record);

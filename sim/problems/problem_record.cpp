@@ -10,7 +10,11 @@
 
 #include "format_parts.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/control/input_rate_model.hpp"
+#include "rhec/core/control/slip_ahead_model.hpp"
+#include "rhec/core/model/implicit_model.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
+#include "rhec/core/prior/process_model.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -27,6 +31,16 @@ ProblemRecord::Guess guess_of(const HorizonProblem& problem, const Iterate& poin
     guess.control_bounds.push_back(copied(point.control_bound(i), problem.control_count(i)));
   }
   return guess;
+}
+
+/// Of a model that others may be made of.
+bool integrates_implicitly(const Model& model) {
+  if (const auto* with_rates = dynamic_cast<const InputRateModel*>(&model))
+    return integrates_implicitly(with_rates->vehicle());
+  if (const auto* with_processes = dynamic_cast<const ProcessModel*>(&model))
+    return integrates_implicitly(with_processes->vehicle());
+  if (const auto* ahead = dynamic_cast<const SlipAheadModel*>(&model)) return integrates_implicitly(ahead->vehicle());
+  return is_implicit(model);
 }
 
 }  // namespace
@@ -61,6 +75,7 @@ ProblemRecord record_of(const HorizonProblem& problem, const Iterate* guess, std
   record.intervals = problem.intervals();
   for (int i = 0; i < record.intervals; ++i) record.durations.push_back(problem.duration(i));
   record.substeps = problem.substeps();
+  record.is_implicit = integrates_implicitly(problem.model());
   problem_format(record.kind).keep(problem, record);
   if (guess) record.guess = guess_of(problem, *guess);
   return record;
@@ -74,13 +89,21 @@ std::vector<int> one_block_parameters(std::span<const ProblemRecord> records, co
   return found;
 }
 
+std::shared_ptr<const Model> as_integrated(const ProblemRecord& record, std::shared_ptr<const Model> model) {
+  if (record.is_implicit == is_implicit(*model)) return model;
+  if (!record.is_implicit) return dynamic_cast<const ImplicitModel&>(*model).vehicle();
+  return std::make_shared<const ImplicitModel>(std::move(model));
+}
+
 std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                       int max_intervals, std::vector<int> one_block) {
-  return problem_format(record.kind).build(record, std::move(model), max_intervals, std::move(one_block));
+  return problem_format(record.kind)
+      .build(record, as_integrated(record, std::move(model)), max_intervals, std::move(one_block));
 }
 
 bool refill(const ProblemRecord& record, HorizonProblem& problem) {
-  return record.kind == problem.kind() && problem_format(record.kind).refill(record, problem);
+  return record.kind == problem.kind() && record.is_implicit == integrates_implicitly(problem.model()) &&
+         problem_format(record.kind).refill(record, problem);
 }
 
 void cold_start(const ProblemRecord& record, const HorizonProblem& problem, Iterate& guess) {

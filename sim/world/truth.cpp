@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/model/step_requirement.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -61,10 +62,25 @@ TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eig
        {&parameters_, &mean_parameters_, &stage_parameters_, &step_parameters_, &sum_parameters_}) {
     vector->setZero(n_p);
   }
+  shorten_steps();
   position_x_ = description.roles.position_x;
   position_y_ = description.roles.position_y;
   look_up(state_.data(), parameters_.data());
   mean_parameters_ = parameters_;
+}
+
+/// The true vehicle is followed, however short its time constants.
+void TruthVehicle::shorten_steps() {
+  const ModelDescription& about = model_->description();
+  const auto points = operating_points(*model_, about, nominal_values(about.parameters));
+  const StepRequirement needed = step_requirement(*model_, points, options_.step);
+  if (needed.mode_substeps == 0)
+    throw Error(
+        fmt::format("truth vehicle: model '{}' has a time constant of {:.3g} s, in the state '{}', which {} steps in "
+                    "{:g} s do not follow; leave out of the model what settles so fast",
+                    about.name, needed.time_constant, about.states[needed.state].name, StepRequirement::most_substeps,
+                    options_.step));
+  options_.step /= needed.mode_substeps;
 }
 
 void TruthVehicle::look_up(const double* state, double* parameters) const noexcept {

@@ -38,6 +38,15 @@ QUICK = ["--extra-arg=-fdelayed-template-parsing"]
 MOST, FEW = 10, 2
 
 
+def singles(entry):
+    """A command that compiles several sources as one, as that of each of them; any other as it is."""
+    unit = pathlib.Path(entry["directory"], entry["file"])
+    if unit.parent.name != "Unity":
+        return [entry]
+    return [entry | {"file": source, "command": entry["command"].replace(entry["file"], source)}
+            for source in QUOTED.findall(unit.read_text(encoding="utf-8"))]
+
+
 def checks_option(without):
     return f"--checks={','.join(f'-{name}' for name in without)}"
 
@@ -84,6 +93,7 @@ def main():
     # looked at in its generic form. All other files are looked at in each of their forms.
     commands = [entry for entry in json.loads((build / "compile_commands.json").read_text())
                 if "-DRHEC_PACK_NAMESPACE=" not in entry["command"]]
+    commands = [single for entry in commands for single in singles(entry)]
     for entry in commands:
         command = PRECOMPILED.sub("", entry["command"])
         entry["command"] = " ".join(word for word in command.split(" ") if word not in UNKNOWN_TO_CLANG)

@@ -15,6 +15,7 @@ class RHEC_EXPORT SlipAheadModel final : public Model {
  public:
   /// Throws Error if the vehicle has data of its own, or too many parameters.
   explicit SlipAheadModel(std::shared_ptr<const Model> vehicle);
+  const Model& vehicle() const noexcept { return *vehicle_; }
 
   const ModelDescription& description() const noexcept override { return vehicle_->description(); }
   int data_count() const noexcept override { return vehicle_->parameter_count(); }

@@ -15,15 +15,20 @@ struct OperatingPoint {
   std::vector<double> state, inputs, parameters;
 };
 
-/// What the classical Runge-Kutta method needs to follow a model over an interval in equal steps.
+/// What a model's integration needs to follow it over an interval in equal steps: the classical Runge-Kutta method, or
+/// that of an ImplicitModel.
 ///
 /// A mode with eigenvalue lambda of df/dx is multiplied in each step of length d by R(d lambda), with
 /// R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24, instead of exp(d lambda). A mode that decays, or neither decays nor grows,
 /// must not grow: |R| <= 1 (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.2). A step that
 /// is stable can still be inexact; so over the interval R^m must be exp(m d lambda) to `mode_tolerance`, and the next
 /// state that of twice as many steps to `state_tolerance` of each state's typical magnitude.
+///
+/// Implicit steps have R(z) = (1 + 2z/5 + z^2/20) / (1 - 3z/5 + 3z^2/20 - z^3/60), and are stable whatever their
+/// length. Of a mode that the exact motion leaves less than `mode_over` of, they may leave `mode_left`.
 struct RHEC_EXPORT StepRequirement {
   static constexpr double mode_tolerance = 0.01;
+  static constexpr double mode_over = 0.05, mode_left = 0.1;
   static constexpr double state_tolerance = 1e-3;
   static constexpr int most_substeps = 1000;  ///< more are not tried
 
@@ -48,7 +53,9 @@ RHEC_EXPORT std::vector<OperatingPoint> operating_points(const Model& model, con
                                                          std::optional<double> ground_speed = {});
 
 /// How inexact an interval's steps are, seen from one place: the difference of the next state from that of twice as
-/// many steps, in typical magnitudes of the states. Allocates when it is made only.
+/// many steps, in typical magnitudes of the states. Of implicit steps it is what is left of that difference after
+/// another interval like this one (dF/dx of it): an error in what settles within an interval does not last. Allocates
+/// when it is made only.
 class RHEC_EXPORT StepError {
  public:
   explicit StepError(const Model& model);
@@ -59,6 +66,7 @@ class RHEC_EXPORT StepError {
  private:
   const Model* model_;
   std::vector<double> coarse_, fine_, data_;
+  std::vector<double> jacobian_, errors_;  ///< empty with explicit steps
 };
 
 }  // namespace rhec

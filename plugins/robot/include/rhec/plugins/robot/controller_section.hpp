@@ -5,6 +5,7 @@
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/control/controller.hpp"
 #include "rhec/plugins/robot/hooks.hpp"
+#include "rhec/plugins/robot/integration.hpp"
 #include "rhec/plugins/robot/option_section.hpp"
 #include "rhec/plugins/robot/plugin_option.hpp"
 #include "rhec/plugins/robot/robot_context.hpp"
@@ -14,6 +15,7 @@ namespace rhec {
 /// The keys of the section `controller`.
 struct RHEC_EXPORT ControllerOptions {
   int horizon = RhcProblem::Setup{}.max_intervals;
+  Integrator integrator = Integrator::runge_kutta;
   std::optional<int> substeps = {};  ///< none: chosen for the model
   ReferenceSpeed reference_speed = Controller::Setup{}.reference_speed;
   double least_speed_factor = Controller::Setup{}.least_speed_factor;
@@ -36,7 +38,7 @@ class RHEC_EXPORT ControllerSection {
                                    std::shared_ptr<const SlipAhead> ahead = nullptr) const;
 
  private:
-  void add_problem(Controller::Setup& setup, double top_speed) const;
+  void add_problem(Controller::Setup& setup) const;
   void add_blockings(Controller::Setup& setup) const;
 
   std::shared_ptr<const RobotContext> context_;

@@ -9,6 +9,7 @@
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/plugins/robot/estimator_makers.hpp"
 #include "rhec/plugins/robot/hooks.hpp"
+#include "rhec/plugins/robot/integration.hpp"
 
 namespace rhec {
 
@@ -19,6 +20,7 @@ enum class BlockCovariance { bank, blocks };
 struct RHEC_EXPORT EstimatorOptions {
   std::string name = "rhe";
   int horizon = RheProblem::Setup{}.max_intervals;
+  Integrator integrator = Integrator::runge_kutta;
   std::optional<int> substeps = {};  ///< none: chosen for the model
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
   BlockCovariance covariance = BlockCovariance::bank;
@@ -37,7 +39,9 @@ class RHEC_EXPORT EstimatorSection {
 
   const EstimatorOptions& options() const noexcept { return options_; }
   PluginChoice solver_choice() const;
-  /// Runge-Kutta steps of an interval, as given or as the model needs them.
+  /// The model, as the estimator integrates it.
+  const std::shared_ptr<const Model>& model() const noexcept { return parts_.context->model; }
+  /// Integration steps of an interval, as given or as the model needs them.
   int substeps() const noexcept { return parts_.substeps; }
   /// The priors of a parameter as written, e.g. "auto" or "walk, matern".
   std::string priors_text(int parameter) const { return parts_.priors.text(parameter); }

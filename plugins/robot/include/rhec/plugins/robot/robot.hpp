@@ -57,7 +57,9 @@ class RHEC_EXPORT Robot {
   PluginChoice blocking_choice(int parameter) const { return blocking_.choice(parameter); }
   double step() const noexcept { return context_->step; }
   const EstimatorOptions& estimator_options() const noexcept { return estimator_.options(); }
-  /// Runge-Kutta steps in which the estimator integrates an interval.
+  /// The model as the estimator integrates it: `model()`, or an ImplicitModel of it.
+  const std::shared_ptr<const Model>& estimator_model() const noexcept { return estimator_.model(); }
+  /// Steps in which the estimator integrates an interval.
   int substeps() const noexcept { return estimator_.substeps(); }
   const SmootherOptions& smoother_options() const noexcept { return smoother_.options(); }
   const std::vector<double>& output_sigmas() const noexcept { return context_->noise.output_sigmas; }

@@ -35,6 +35,7 @@ struct ProblemRecord {
   int intervals = 0;              ///< N
   std::vector<double> durations;  ///< of each interval [s]
   int substeps = 1;
+  bool is_implicit = false;  ///< since version 4: integrated by implicit steps (ImplicitModel)
   std::map<std::string, Interval> bounds;
   std::map<std::string, std::vector<int>> block_starts;  ///< RHE: by parameter. RHC: by blocked input
   std::map<std::string, std::string> origin;             ///< where it comes from; solvers ignore it
@@ -83,9 +84,13 @@ struct ProblemRecord {
   RHEC_EXPORT std::int64_t first_interval() const;
 };
 
+/// The model with the integrator of a record: an ImplicitModel, or none. Throws Error if there is none.
+RHEC_EXPORT std::shared_ptr<const Model> as_integrated(const ProblemRecord& record, std::shared_ptr<const Model> model);
+
 /// Builds the problem of a record, ready for a solver, with capacity for `max_intervals` (at least the record's own,
 /// and 1). For estimation, `one_block` lists parameters that always remain a single block. Variables without an entry
-/// under `bounds` are unbounded. Throws Error if names or dimensions do not fit the model.
+/// under `bounds` are unbounded. The model gets the integrator of the record (`as_integrated`). Throws Error if names
+/// or dimensions do not fit the model.
 RHEC_EXPORT std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                                   int max_intervals = 0, std::vector<int> one_block = {});
 

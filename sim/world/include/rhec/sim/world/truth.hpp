@@ -13,7 +13,8 @@
 namespace rhec::sim {
 
 struct TruthOptions {
-  double step = 0.01;            ///< Runge-Kutta step [s]: at most 20 in an interval of 0.2 s
+  double step = 0.01;  ///< Runge-Kutta step [s]: at most 20 in an interval of 0.2 s; shorter where the model has time
+                       ///< constants that ask for it
   bool mechanical_stops = true;  ///< bounded states (the steering angle) cannot leave their bounds, whatever the input
 };
 
@@ -27,7 +28,8 @@ struct TruthOptions {
 class RHEC_EXPORT TruthVehicle {
  public:
   /// `model` and `field` must outlive the vehicle. Throws Error if the field does not have one channel per parameter,
-  /// if the model has no position, or if the initial state has the wrong size, is not finite or violates its bounds.
+  /// if the model has no position, or if the initial state has the wrong size, is not finite or violates its bounds,
+  /// or if the model has a time constant below some 1e-5 s.
   TruthVehicle(const Model& model, const SlipField& field, const Eigen::VectorXd& initial_state,
                const TruthOptions& options = {});
 
@@ -43,6 +45,7 @@ class RHEC_EXPORT TruthVehicle {
   const Eigen::VectorXd& mean_parameters() const noexcept { return mean_parameters_; }
 
  private:
+  void shorten_steps();
   void look_up(const double* state, double* parameters) const noexcept;
   bool stop(double* state) const noexcept;
   bool step(const double* inputs, double duration, bool must_fit) noexcept;
