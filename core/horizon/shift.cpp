@@ -34,6 +34,8 @@ void GuessShifter::take(const HorizonProblem& problem, const Iterate& iterate) n
   std::copy_n(iterate.row(0), entries, kept_.row(0));
   std::copy_n(iterate.costate(0), entries, kept_.costate(0));
   std::copy_n(iterate.bound_row(0), entries, kept_.bound_row(0));
+  if (problem.capacity().limits > 0)
+    std::copy_n(iterate.limit_bound(0), (problem.intervals() + 1) * kept_.capacity().limit_row(), kept_.limit_bound(0));
   take_structure(problem);
 }
 
@@ -56,6 +58,7 @@ void GuessShifter::take_structure(const HorizonProblem& problem) noexcept {
 bool GuessShifter::apply(int steps, HorizonProblem& to, Iterate& guess) noexcept {
   if (intervals_ == 0 || steps < 0 || steps > intervals_ || to.intervals() > kept_.capacity().intervals) return false;
   move_rows(steps, to, guess);
+  if (to.capacity().limits > 0) move_limits(steps, to, guess);
   const bool reaches_end = to.intervals() >= intervals_ - steps;
   for (int c = 0; c < lifted_; ++c) {
     if (reaches_end && is_one_block(c, to) && kept_.costate(intervals_)[nx_ + c] == 0.0) {
@@ -97,6 +100,23 @@ void GuessShifter::move_rows(int steps, const HorizonProblem& to, Iterate& guess
   for (int i = moved + 1; i <= N; ++i)
     for (int j = 0; j < row; ++j) guess.costate(i)[j] = given ? kept_.costate(intervals_)[j] : 0.0;
   for (int j = 0; !given && j < ns; ++j) guess.costate(0)[j] = 0.0;
+}
+
+/// The multipliers of limits. Stages have other limits at the ends of the horizon: those that were not there get zero.
+void GuessShifter::move_limits(int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
+  const bool given = to.initial_state() != nullptr;
+  for (int i = 0; i <= to.intervals(); ++i) {
+    const TermFunctions::Rows* const rows = to.terms().rows(i, to.intervals(), given);
+    double* const multipliers = guess.limit_bound(i);
+    std::fill_n(multipliers, kept_.capacity().limit_row(), 0.0);
+    if (!rows || i + steps > intervals_) continue;
+    const TermFunctions::Rows* const kept = to.terms().rows(i + steps, intervals_, given);
+    for (int r = 0; kept && r < rows->limits; ++r) {
+      const int from = rows->first_limit + r - kept->first_limit;
+      if (from < 0 || from >= kept->limits) continue;
+      multipliers[r] = multiplier_of(kept_.limit_bound(i + steps)[from], to.limit_lower(i)[r], to.limit_upper(i)[r]);
+    }
+  }
 }
 
 bool GuessShifter::is_one_block(int lifted, const HorizonProblem& to) const noexcept {
