@@ -120,6 +120,8 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
     for (int i = 1; held_state_[input] >= 0 && i < N; ++i)
       if (!begins_[i]) problem_.input_lower(i, input) = problem_.input_upper(i, input) = 0.0;
   }
+  if (const TermFunctions* terms = problem_.terms().functions())
+    obstacles_.resize(static_cast<std::size_t>(terms->most_obstacles()));
   scratch_.assign(problem_.scratch_size(), 0.0);
   problem_.finish(scratch_);
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
@@ -146,12 +148,20 @@ void Controller::reset() noexcept {
   has_plan_ = prepared_ = false;
   is_finished_ = true;
   fallbacks_ = 0;
+  obstacle_count_ = 0;
   std::fill(last_inputs_.begin(), last_inputs_.end(), std::numeric_limits<double>::quiet_NaN());
 }
 
 void Controller::applied(const double* inputs) noexcept {
   for (std::size_t j = 0; j < last_inputs_.size(); ++j)
     if (!std::isnan(inputs[j])) last_inputs_[j] = inputs[j];
+}
+
+int Controller::set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept {
+  obstacle_count_ = std::min(obstacles.size(), obstacles_.size());
+  std::copy_n(obstacles.begin(), obstacle_count_, obstacles_.begin());
+  seen_ = time;
+  return static_cast<int>(obstacle_count_);
 }
 
 void Controller::plan_inputs(int interval, double* inputs) const noexcept {
@@ -197,7 +207,7 @@ void Controller::choose_straight_motion(double ground_speed, const double* param
 }
 
 /// References and bounds of the horizon that starts at an arc length of the path.
-void Controller::set_reference(double arc_length, const double* parameters) noexcept {
+void Controller::set_reference(double arc_length, const double* parameters, double time) noexcept {
   const Model& vehicle = *vehicle_;
   const Roles& roles = vehicle.description().roles;
   const int N = problem_.intervals(), nx = vehicle.state_count(), nu = vehicle.input_count();
@@ -219,6 +229,14 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
+    problem_.terms().place(i, {.time = time + i * setup_.interval,
+                               .x = target.x,
+                               .y = target.y,
+                               .heading = target.heading,
+                               .speed = target.speed,
+                               .arc_length = arc_length + i * distance,
+                               .obstacles = {obstacles_.data(), obstacle_count_},
+                               .seen = seen_});
     for (int j = 0; j < nu && i < N; ++j) {
       // The inputs on an interval are states at its end.
       const int held = held_state_[j];
@@ -331,7 +349,8 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
   // What is prepared is linearised with the slip that was expected then.
   if (!prepared_) look_ahead(follower_.arc_length(), estimate.parameters.data());
-  set_reference(follower_.arc_length(), estimate.parameters.data());
+  now_ = estimate.time;
+  set_reference(follower_.arc_length(), estimate.parameters.data(), now_);
   write_held_inputs();
   command_.relaxed = problem_.finish(scratch_) > 0;
   bool from_plan = has_plan_;
@@ -383,7 +402,7 @@ void Controller::prepare() noexcept {
   const PathPoint reference = command_.reference;
   const double next = follower_.arc_length() + setup_.interval * std::abs(reference.speed);
   look_ahead(next, reference_parameters_.data());
-  set_reference(next, reference_parameters_.data());
+  set_reference(next, reference_parameters_.data(), now_ + setup_.interval);
   command_.reference = reference;
   problem_.finish(scratch_);
   if (!shifter_.apply(1, problem_, point_)) return;

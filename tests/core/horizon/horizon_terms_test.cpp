@@ -35,11 +35,11 @@ class Everything final : public Term {
     writer.residual(writer.position_x() * sin(writer.heading()), {.weight = 0.3}, "product");
   }
   void write_data(const TermPlace& place, double* data, double* lower, double* upper) const noexcept override {
-    data[0] = 0.3 + 0.1 * place.ahead;
+    data[0] = 0.3 + 0.1 * place.time;
     data[1] = 0.8;
     lower[0] = -0.5;
     upper[0] = 0.5;
-    lower[1] = 0.4 + place.ahead;
+    lower[1] = 0.4 + place.time;
     upper[1] = infinity;
   }
 };
@@ -70,7 +70,7 @@ std::unique_ptr<RhcProblem> make_problem(Layers layers, int intervals = 5) {
     problem->set_duration(i, 0.2 + 0.05 * i);
     if (looks_ahead) problem->interval_data(i)[0] = 0.02 * i - 0.05;
   }
-  for (int i = 0; i <= intervals; ++i) problem->terms().place(i, {.ahead = 0.2 * i});
+  for (int i = 0; i <= intervals; ++i) problem->terms().place(i, {.time = 0.2 * i});
   problem->given_parameters()[0] = 0.9;
   std::vector<double> scratch(problem->scratch_size());
   problem->finish(scratch);
@@ -174,7 +174,7 @@ TEST_P(HorizonTermsTest, ACacheGivesWhatALinearisationGives) {
     for (int sample = 0; sample < 3; ++sample) {
       cache->prepare(point, hessian);
       // Data that are known late.
-      for (int i = 0; i <= 5; ++i) problem->terms().place(i, {.ahead = 0.2 * i + 0.05 * (sample + 1)});
+      for (int i = 0; i <= 5; ++i) problem->terms().place(i, {.time = 0.2 * i + 0.05 * (sample + 1)});
       cache->refresh(point);
       StageQp expected(problem->capacity());
       problem->linearise(all_stages(*problem), point, hessian, expected, scratch);
@@ -239,7 +239,7 @@ TEST(HorizonTerms, MultipliersMoveAlongWithTheHorizon) {
 
 TEST(HorizonTerms, DataAreTakenFromAnotherProblem) {
   const auto from = make_problem(Layers::none), to = make_problem(Layers::none);
-  from->terms().place(3, {.ahead = 7.0});
+  from->terms().place(3, {.time = 7.0});
   to->take_data(*from);
   EXPECT_EQ(to->limit_lower(3)[0], from->limit_lower(3)[0]);
   EXPECT_EQ(to->terms().data(3)[0], from->terms().data(3)[0]);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "rhec/core/control/path.hpp"
@@ -29,7 +30,10 @@ enum class ReferenceSpeed {
 ///
 /// Rates of inputs, (u_i - u_{i-1}) / dt with the input applied last as u_{-1}, can have weights and bounds. The
 /// problem is then that of an InputRateModel. Before the first command u_{-1} is what drives straight ahead, unless
-/// `applied` has said what it is. Allocates in its constructor only.
+/// `applied` has said what it is.
+///
+/// Terms of the problem (RhcProblem::Setup) get the reference of each node, and the obstacles of `set_obstacles`.
+/// Allocates in its constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {
@@ -68,6 +72,9 @@ class RHEC_EXPORT Controller {
   /// Says which inputs (n_u) the vehicle has had until now, where they are not the last command: at the start, or after
   /// it was driven by hand. Matters to rates alone. NaN: the last command, or what drives straight ahead.
   void applied(const double* inputs) noexcept;
+  /// Says which obstacles there are from now on, as they were at a time on the clock of the estimates [s]: those that
+  /// the terms have room for, the first ones. Returns how many that are. They move on with their velocities.
+  int set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept;
   /// Does work for the next sample in advance; calling it is optional.
   void prepare() noexcept;
   void reset() noexcept;
@@ -91,7 +98,7 @@ class RHEC_EXPORT Controller {
   void go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept;
   void choose_straight_motion(double ground_speed, const double* parameters) noexcept;
   void bound_speed(double most) noexcept;
-  void set_reference(double arc_length, const double* parameters) noexcept;
+  void set_reference(double arc_length, const double* parameters, double time) noexcept;
   void look_ahead(double arc_length, const double* parameters) noexcept;
   void write_held_inputs() noexcept;
   void start_cold() noexcept;
@@ -117,6 +124,10 @@ class RHEC_EXPORT Controller {
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
   std::vector<double> last_inputs_;  ///< n_u, applied last; NaN: not known
   std::vector<std::uint8_t> begins_;
+  std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
+  std::size_t obstacle_count_ = 0;
+  double seen_ = 0.0;  ///< when these were there [s]
+  double now_ = 0.0;   ///< time of the last estimate [s]
 };
 
 }  // namespace rhec

@@ -20,12 +20,12 @@ struct Obstacle {
 /// Where and when a node of the horizon is expected: what the data of terms are made of.
 struct TermPlace {
   double time = 0.0;                      ///< of the node, on the clock of the estimates [s]
-  double ahead = 0.0;                     ///< the same, from now on [s]
   double x = 0.0, y = 0.0;                ///< reference position [m]
   double heading = 0.0;                   ///< of the path there [rad]
   double speed = 0.0;                     ///< reference speed over ground [m/s]
   double arc_length = 0.0;                ///< along the path [m]
-  std::span<const Obstacle> obstacles{};  ///< where they are now
+  std::span<const Obstacle> obstacles{};  ///< that were seen at run time, as they were then
+  double seen = 0.0;                      ///< when, on the same clock [s]
 };
 
 /// Formulas of the state, inputs, parameters and data of a node (TermWriter) that are part of a control problem, at
