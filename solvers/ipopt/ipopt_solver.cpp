@@ -26,7 +26,7 @@ constexpr int most_polishes = 2;
 /// Iterations after which another kind of start is more promising. Runs that take longer are mostly those that wander
 /// in directions of negative curvature.
 constexpr int patience = 150;
-/// A violation of the dynamics too large for rounding.
+/// A violation of the dynamics, or of limits, too large for rounding.
 constexpr double clear_violation = 1e-6;
 /// Initial barrier parameter of a warm start, relative to the guess' residual, and its limits.
 constexpr double warm_barrier_share = 1e-4;
@@ -139,7 +139,6 @@ IpoptSolver::~IpoptSolver() {
 }
 
 std::string IpoptSolver::why_not(const Ocp& ocp) const {
-  if (ocp.capacity().limits > 0) return "the problem has limits, which ipopt does not take yet";
   if (options_.hessian == Curvature::exact && !ocp.has_second_derivatives())
     return "the model has no second derivatives; set hessian: gauss_newton or limited_memory";
   return {};
@@ -229,6 +228,11 @@ void IpoptSolver::see_last(const PrimalDual& iterate) noexcept {
   if (best_kkt_.largest() > options_.tolerance) keep_if_better(iterate);
 }
 
+/// Of the constraints; Ipopt's iterates are within their bounds.
+double IpoptSolver::violation_of(const KktResidual& kkt) const noexcept {
+  return ocp_->capacity().limits > 0 ? std::max(kkt.defect, kkt.bound_violation) : kkt.defect;
+}
+
 IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   double barrier = 0.0;
   if (start == Start::warm)
@@ -247,7 +251,7 @@ IpoptSolver::Ending IpoptSolver::run(Start start, const Iterate& from) {
   if (stopped_late_ || outcome == Ipopt::Maximum_CpuTime_Exceeded) return Ending::out_of_time;
   if (iterations_ >= options_.max_iterations) return Ending::out_of_iterations;
   if ((outcome == Ipopt::Infeasible_Problem_Detected || outcome == Ipopt::Restoration_Failed) &&
-      seen_kkt_.defect > clear_violation)
+      violation_of(seen_kkt_) > clear_violation)
     return Ending::infeasible;
   return best_kkt_.largest() <= near_solution ? Ending::near : Ending::lost;
 }
@@ -292,7 +296,7 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
     }
     // A claim stands if no later run has come near to refuting it, also where that run was cut off.
     const bool is_open = ending != Ending::converged && ending != Ending::out_of_time;
-    if (is_open && claimed_infeasible && best_kkt_.defect > clear_violation) ending = Ending::infeasible;
+    if (is_open && claimed_infeasible && violation_of(best_kkt_) > clear_violation) ending = Ending::infeasible;
   }
   switch (ending) {
     case Ending::converged:

@@ -74,6 +74,7 @@ class IpoptSolver final : public Solver, private Spectator {
   void set_run_options(Start start, double barrier);
   bool see(int iteration, const PrimalDual* iterate) noexcept override;
   void see_last(const PrimalDual& iterate) noexcept override;
+  double violation_of(const KktResidual& kkt) const noexcept;
   void keep_if_better(const PrimalDual& iterate) noexcept;
   bool is_late() const noexcept { return deadline_ != Clock::time_point::max() && Clock::now() > deadline_; }
 

@@ -55,6 +55,7 @@ void write_pattern(const SparseNlp::Pattern& pattern, int* rows, int* columns) {
 
 OcpNlp::OcpNlp(const Ocp& ocp, Curvature curvature)
     : curvature_(curvature),
+      limit_values_((static_cast<std::size_t>(ocp.capacity().intervals) + 1) * ocp.capacity().limit_row()),
       scratch_(ocp.scratch_size()),
       trial_(ocp.capacity()),
       defects_(static_cast<std::size_t>(ocp.capacity().intervals) * ocp.capacity().states),
@@ -64,17 +65,22 @@ OcpNlp::OcpNlp(const Ocp& ocp, Curvature curvature)
 void OcpNlp::take(const Ocp& ocp) {
   ocp_ = &ocp;
   evaluated_.is_known = linearised_.is_known = false;
-  if (nlp_.take_structure(ocp)) {
+  const int variables_before = static_cast<int>(lower_.size());
+  const bool is_new = nlp_.take_structure(ocp);
+  limits_.take(ocp, nlp_);
+  if (is_new || variables() != variables_before) {
     for (auto* vector : {&lower_, &upper_, &start_.z, &start_lower_, &start_upper_, &seen_.z, &evaluated_.z,
                          &linearised_.z, &gradient_, &clipped_})
-      vector->resize(nlp_.variables());
+      vector->resize(variables());
     for (auto* vector :
          {&start_.multipliers.of_constraints, &seen_.multipliers.of_constraints, &constraints_, &weighted_})
       vector->resize(nlp_.constraints());
-    jacobian_.resize(nlp_.jacobian().entries());
-    for (auto* vector : {&hessian_, &hessian_part_}) vector->resize(nlp_.hessian().entries());
+    jacobian_.resize(nlp_.jacobian().entries() + limits_.count());
+    for (auto* vector : {&hessian_, &hessian_part_}) vector->resize(nlp_.hessian().entries() + limits_.count());
   }
   nlp_.bounds(ocp, lower_.data(), upper_.data());
+  limits_.bounds(lower_.data() + nlp_.variables(), upper_.data() + nlp_.variables());
+  limits_.jacobian(jacobian_.data() + nlp_.jacobian().entries());
   any_fixed_ = false;
   bounded_.clear();
   for (int j = 0; j < variables(); ++j) {
@@ -105,6 +111,12 @@ void OcpNlp::set_start(const Iterate& iterate, double barrier) noexcept {
   std::vector<double>& z = start_.z;
   Multipliers& multipliers = start_.multipliers;
   nlp_.read(*ocp_, iterate, z.data(), multipliers.of_constraints.data(), multipliers.of_bounds.data());
+  if (limits_.count() > 0) {
+    evaluate_limits(iterate, constraints_.data());
+    evaluated_.is_known = false;
+    limits_.start(constraints_.data(), multipliers.of_constraints.data(), z.data() + nlp_.variables(),
+                  multipliers.of_bounds.data() + nlp_.variables());
+  }
   for (auto* vector : {&start_lower_, &start_upper_}) std::fill(vector->begin(), vector->end(), 1.0);
   if (barrier <= 0.0) return;
   for (const int j : bounded_) {
@@ -141,12 +153,24 @@ bool OcpNlp::evaluate_at(const double* z, unsigned visit) noexcept {
   evaluated_.move_to(z, visit);
   nlp_.write(*ocp_, z, nullptr, nullptr, trial_);
   // If every node has as many states as the capacity allows, the defects are the constraints.
-  const bool is_full = constraints() == ocp_->intervals() * ocp_->capacity().states;
+  const bool is_full = limits_.count() == 0 && constraints() == ocp_->intervals() * ocp_->capacity().states;
   double* const defects = is_full ? constraints_.data() : defects_.data();
   objective_ = ocp_->evaluate(trial_, defects, scratch_);
-  if (!is_full) nlp_.constraints(*ocp_, defects, constraints_.data());
+  if (!is_full) nlp_.constraints(*ocp_, defects, nullptr, constraints_.data());
+  if (limits_.count() > 0) {
+    const double* values = z + nlp_.variables();
+    evaluate_limits(trial_, constraints_.data());
+    limits_.add_to(values, constraints_.data());
+    objective_ += limits_.cost(values);
+  }
   evaluated_.is_sound = std::isfinite(objective_) && all_finite(constraints_);
   return evaluated_.is_sound;
+}
+
+/// Writes the values of limits to their places in c.
+void OcpNlp::evaluate_limits(const Iterate& iterate, double* c) noexcept {
+  ocp_->evaluate_limits(iterate, limit_values_.data(), scratch_);
+  nlp_.limits(*ocp_, limit_values_.data(), c);
 }
 
 bool OcpNlp::linearise_at(const double* z, unsigned visit) {
@@ -176,6 +200,7 @@ double OcpNlp::linearise(const double* z, const double* multipliers, const doubl
     pieces_.look_at(piece.first);
     nlp_.write(*ocp_, {piece.first, behind}, z, multipliers, bound_multipliers, linear_);
     objective += ocp_->linearise(piece, linear_, hessian, pieces_, scratch_);
+    objective += slack_costs(pieces_, piece);
     if (piece.last < N) pieces_.set_sizes(behind, ocp_->state_count(behind), 0);
     take(piece);
   }
@@ -199,6 +224,9 @@ void OcpNlp::linearise_all(const PrimalDual& iterate, bool has_multipliers) noex
     terms.add(pieces_, linear_, piece);
   };
   linear_objective_ = linearise(linearised_.z.data(), of_constraints.data(), of_bounds.data(), hessian, take);
+  const double* of_limits = linearised_.z.data() + nlp_.variables();
+  limits_.gradient(of_limits, gradient_.data() + nlp_.variables());
+  limits_.hessian(of_limits, hessian_.data() + nlp_.hessian().entries());
   linear_iterate_ = &iterate;
   linear_tag_ = are_equal(linearised_.z, iterate.z.data()) ? iterate.tag : 0;
   linear_kkt_ = terms.residual();
@@ -217,6 +245,8 @@ void OcpNlp::set_fixed_multipliers(StageRange piece) noexcept {
         for (int r = 0; r < ocp_->state_count(i + 1); ++r)
           pull += pieces_.AB(i)[r * pieces_.stride() + k] * linear_.costate(i + 1)[r];
       if (k < ocp_->state_count(i)) pull -= linear_.costate(i)[k];
+      for (int r = 0; r < nlp_.limit_count(i); ++r)
+        pull += pieces_.G(i)[r * pieces_.stride() + k] * linear_.limit_bound(i)[r];
       linear_.bound_row(i)[k] = -pull;
     }
   };
@@ -233,6 +263,7 @@ void OcpNlp::write_hessian(const double* z, const double* multipliers, double fa
     weighted_[row] = multipliers ? factor * multipliers[row] : 0.0;
   linearise(z, weighted_.data(), nullptr, Hessian::exact,
             [&](StageRange piece) { nlp_.hessian(pieces_, piece, values); });
+  limits_.hessian(z + nlp_.variables(), values + nlp_.hessian().entries());
 }
 
 /// Whether the linearisation is that of this iterate, and the iterate is within its bounds.
@@ -272,10 +303,10 @@ double OcpNlp::complementarity_gap() const noexcept {
 bool OcpNlp::get_nlp_info(Ipopt::Index& n, Ipopt::Index& m, Ipopt::Index& jacobian_entries,
                           Ipopt::Index& hessian_entries, IndexStyleEnum& index_style) {
   const Timer timer(microseconds_);
-  n = nlp_.variables();
-  m = nlp_.constraints();
-  jacobian_entries = nlp_.jacobian().entries();
-  hessian_entries = nlp_.hessian().entries();
+  n = variables();
+  m = constraints();
+  jacobian_entries = static_cast<int>(jacobian_.size());
+  hessian_entries = static_cast<int>(hessian_.size());
   index_style = C_STYLE;
   return true;
 }
@@ -334,6 +365,8 @@ bool OcpNlp::eval_jac_g(Ipopt::Index, const double* z, bool new_z, Ipopt::Index,
   const Timer timer(microseconds_);
   if (!values) {
     write_pattern(nlp_.jacobian(), rows, columns);
+    const int first = nlp_.jacobian().entries();
+    limits_.jacobian_pattern(nlp_.variables(), rows + first, columns + first);
     return true;
   }
   visit(new_z);
@@ -348,6 +381,8 @@ bool OcpNlp::eval_h(Ipopt::Index, const double* z, bool new_z, double objective_
   const Timer timer(microseconds_);
   if (!values) {
     write_pattern(nlp_.hessian(), rows, columns);
+    const int first = nlp_.hessian().entries();
+    limits_.hessian_pattern(nlp_.variables(), rows + first, columns + first);
     return true;
   }
   visit(new_z);

@@ -6,6 +6,7 @@
 #include <IpTNLP.hpp>
 #include <IpTaggedObject.hpp>
 
+#include "limit_variables.hpp"
 #include "rhec/core/ocp/ocp.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/ocp/sparse_nlp.hpp"
@@ -42,9 +43,9 @@ class Spectator {
   virtual void see_last(const PrimalDual& iterate) noexcept = 0;
 };
 
-/// An Ocp as the sparse NLP that Ipopt solves. Every iterate is evaluated only once: objective and constraints
-/// together, then, in one pass over the stages, the gradient, the Jacobian, the Hessian for the iterate's multipliers
-/// and the KKT residual.
+/// An Ocp as the sparse NLP that Ipopt solves, with limits as equations (LimitVariables). Every iterate is evaluated
+/// only once: objective and constraints together, then, in one pass over the stages, the gradient, the Jacobian, the
+/// Hessian for the iterate's multipliers and the KKT residual.
 class OcpNlp final : public Ipopt::TNLP {
  public:
   /// A long horizon is evaluated in pieces of so many stages, the stage after the piece included, which fit the
@@ -58,7 +59,7 @@ class OcpNlp final : public Ipopt::TNLP {
   /// Forgets the problem and all evaluations.
   void release() noexcept { ocp_ = nullptr; }
 
-  int variables() const noexcept { return nlp_.variables(); }
+  int variables() const noexcept { return nlp_.variables() + limits_.count(); }
   int constraints() const noexcept { return nlp_.constraints(); }
   bool has_empty_bounds() const noexcept;
 
@@ -78,6 +79,7 @@ class OcpNlp final : public Ipopt::TNLP {
   void exchange_assessed(Iterate& iterate) noexcept;
   /// Sum of |bound multiplier| x distance from the bound: the barrier's remaining contribution to the objective.
   double complementarity_gap() const noexcept;
+  /// With the costs of slacks.
   double objective() const noexcept { return linear_objective_; }
   /// Time spent in Ipopt's calls of this object since construction [us].
   double microseconds() const noexcept { return microseconds_; }
@@ -133,6 +135,7 @@ class OcpNlp final : public Ipopt::TNLP {
   bool evaluate_at(const double* z, unsigned visit) noexcept;
   bool linearise_at(const double* z, unsigned visit);
   void linearise_all(const PrimalDual& iterate, bool has_multipliers) noexcept;
+  void evaluate_limits(const Iterate& iterate, double* c) noexcept;
   void write_hessian(const double* z, const double* multipliers, double factor, double* values) noexcept;
   template <class Take>
   double linearise(const double* z, const double* multipliers, const double* bound_multipliers, Hessian hessian,
@@ -146,6 +149,8 @@ class OcpNlp final : public Ipopt::TNLP {
   Curvature curvature_;
   Spectator* spectator_ = nullptr;
   SparseNlp nlp_;
+  LimitVariables limits_;
+  std::vector<double> limit_values_;  ///< of all stages, by Ocp::evaluate_limits
   std::vector<double> lower_, upper_;
   std::vector<int> bounded_;  ///< variables that have a bound
   PrimalDual start_;

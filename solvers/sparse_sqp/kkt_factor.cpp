@@ -245,6 +245,11 @@ void KktFactor::scatter() noexcept {
   const int* starts = symbolic_->starts.data();
   for (int r = 0; r < m_; ++r)
     values[starts[symbolic_->place[n_ + r] + 1] - 1] = numbers_.dual ? -numbers_.dual[r] : 0.0;
+  if (!numbers_.off) return;
+  for (int k = 0; k < J.entries(); ++k)
+    if (numbers_.off[J.row_indices[k]]) values[symbolic_->jacobian_entries[k]] = 0.0;
+  for (int r = 0; r < m_; ++r)
+    if (numbers_.off[r]) values[starts[symbolic_->place[n_ + r] + 1] - 1] = -1.0;
 }
 
 /// Scales rows and columns so that their largest entries are close to one (Ruiz 2001), by powers of two, which is

@@ -14,7 +14,8 @@ namespace rhec::sparse_sqp {
 ///         [ J                 -diag(dual)  ]      with primal, dual >= 0,
 ///
 /// as L D L' without pivoting, in an order that CHOLMOD chooses (AMD); docs/method.md, section 7. Rows and columns of
-/// fixed variables are replaced by those of the identity, so the pattern never changes. K is equilibrated, and a small
+/// fixed variables are replaced by those of the identity, those of constraints that are off by those of the negative
+/// identity, so the pattern never changes. K is equilibrated, and a small
 /// regularisation makes it quasi-definite: then any ordering is stable enough for iterative refinement against K itself
 /// [13, 14]. The reduced Hessian is positive definite if and only if D has as many negative entries as there are
 /// constraints.
@@ -45,6 +46,7 @@ class KktFactor {
     const double* primal = nullptr;       ///< n; null: zero
     const double* dual = nullptr;         ///< m; null: zero
     const std::uint8_t* fixed = nullptr;  ///< n flags; null: none
+    const std::uint8_t* off = nullptr;    ///< m flags; null: none
     double regularisation = 1e-9;         ///< relative to the equilibrated matrix
   };
   /// True if the inertia is right (n positive, m negative pivots). False also if a pivot is zero or not finite.

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <new>
 #include <utility>
 
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/plugins/kit/sdk.hpp"
+#include "sparse_products.hpp"
 #include "stage_convexity.hpp"
 #include "stage_covariances.hpp"
 
@@ -27,6 +28,11 @@ constexpr double merit_rounding = 1e-13;
 // If the relaxed QP leaves more than this share of |c|_1, there is no progress.
 constexpr double stuck = 1.0 - 1e-6;
 constexpr double largest_penalty = 1e10;
+// With limits: after a step shorter than this the next QP is relaxed, until one leaves less than a small share of
+// |c|_1. There is no progress if so many relaxed steps have left more than this share of it; those that promise to
+// remove less than the small one count ten times.
+constexpr double short_step = 1e-2, small_share = 1e-2, most_left = 0.9;
+constexpr int most_futile = 50;
 // Share of a solution's objective that the remaining defects may account for.
 constexpr double negligible_share = 1e-9;
 constexpr int corrections = 4;
@@ -40,12 +46,6 @@ constexpr double least_rise = 1e-6;
 constexpr double steepest_passage = 0.05;
 constexpr int most_penalty_cuts = 20;
 constexpr int stages_at_once = 64;
-
-double norm1(const std::vector<double>& v) {
-  double sum = 0.0;
-  for (const double value : v) sum += std::abs(value);
-  return sum;
-}
 
 bool is_step(SparseQp::Outcome outcome) {
   return outcome == SparseQp::Outcome::solved || outcome == SparseQp::Outcome::feasible ||
@@ -63,12 +63,6 @@ double linearise_stages(const Ocp& ocp, const Iterate& iterate, Hessian hessian,
   return objective;
 }
 
-double max_abs(const std::vector<double>& v) {
-  double largest = 0.0;
-  for (const double value : v) largest = std::max(largest, std::abs(value));
-  return largest;
-}
-
 }  // namespace
 
 const OptionTable<SparseSqpOptions>& SparseSqpOptions::table() {
@@ -84,7 +78,6 @@ const OptionTable<SparseSqpOptions>& SparseSqpOptions::table() {
 }
 
 std::string SparseSqp::why_not(const Ocp& ocp) const {
-  if (ocp.capacity().limits > 0) return "the problem has limits, which sparse_sqp does not take yet";
   if (options_.hessian == Curvature::exact && !ocp.has_second_derivatives())
     return "the model has no second derivatives; set hessian: gauss_newton";
   return {};
@@ -98,6 +91,7 @@ void SparseSqp::setup(const Ocp& ocp) {
   for (Iterate* iterate : {&current_, &trial_}) *iterate = Iterate(capacity);
   scratch_.assign(ocp.scratch_size(), 0.0);
   defects_.assign(static_cast<std::size_t>(capacity.intervals) * capacity.states, 0.0);
+  limit_values_.assign((static_cast<std::size_t>(capacity.intervals) + 1) * capacity.limit_row(), 0.0);
   reset();
 }
 
@@ -115,14 +109,13 @@ void SparseSqp::take_structure(const Ocp& ocp) {
     v->assign(n, 0.0);
   for (auto* v : {&constraints_, &multipliers_, &step_multipliers_, &trial_multipliers_, &trial_constraints_})
     v->assign(m, 0.0);
+  rows_.take_structure(ocp, nlp_);
   hessian_.assign(nlp_.hessian().entries(), 0.0);
   const int N = ocp.intervals();
   stage_of_variable_.clear();
-  stage_of_row_.clear();
   for (int i = 0; i <= N; ++i) {
     const int count = (nlp_.state_start(i) >= 0 ? ocp.state_count(i) : 0) + (i < N ? ocp.control_count(i) : 0);
     stage_of_variable_.insert(stage_of_variable_.end(), count, i);
-    if (i < N) stage_of_row_.insert(stage_of_row_.end(), ocp.state_count(i + 1), i);
   }
   for (auto* v : {&stage_merits_, &merits_before_, &lengths_}) v->assign(static_cast<std::size_t>(N) + 1, 0.0);
   merit_sums_.assign(static_cast<std::size_t>(N) + 2, 0.0);
@@ -130,8 +123,15 @@ void SparseSqp::take_structure(const Ocp& ocp) {
 }
 
 SparseQp::Data SparseSqp::qp_data() const noexcept {
-  return {hessian_.data(), jacobian_.data(), gradient_.data(),  constraints_.data(),
-          lower_.data(),   upper_.data(),    hessian_is_convex_};
+  return {hessian_.data(), jacobian_.data(), gradient_.data(),   constraints_.data(),
+          lower_.data(),   upper_.data(),    hessian_is_convex_, rows_.limits()};
+}
+
+/// Writes the values of limits to their places in the constraints.
+void SparseSqp::evaluate_limits(const Ocp& ocp, const Iterate& iterate, std::vector<double>& constraints) noexcept {
+  if (!rows_.has_limits()) return;
+  ocp.evaluate_limits(iterate, limit_values_.data(), scratch_);
+  nlp_.limits(ocp, limit_values_.data(), constraints.data());
 }
 
 void SparseSqp::linearise(const Ocp& ocp, Hessian hessian) {
@@ -141,6 +141,7 @@ void SparseSqp::linearise(const Ocp& ocp, Hessian hessian) {
   nlp_.jacobian(stages_, jacobian_.data());
   nlp_.gradient(stages_, gradient_.data());
   nlp_.constraints(stages_, constraints_.data());
+  evaluate_limits(ocp, current_, constraints_);
   for (std::size_t k = 0; k < z_.size(); ++k) {
     lower_[k] = lower_z_[k] - z_[k];
     upper_[k] = upper_z_[k] - z_[k];
@@ -149,10 +150,9 @@ void SparseSqp::linearise(const Ocp& ocp, Hessian hessian) {
 
 double SparseSqp::merit(const Ocp& ocp, const Iterate& iterate) noexcept {
   const double objective = ocp.evaluate_stages(iterate, defects_.data(), stage_merits_.data(), scratch_);
-  nlp_.constraints(ocp, defects_.data(), trial_constraints_.data());
-  for (std::size_t r = 0; r < trial_constraints_.size(); ++r)
-    stage_merits_[stage_of_row_[r]] += penalty_ * std::abs(trial_constraints_[r]);
-  return objective + penalty_ * norm1(trial_constraints_);
+  nlp_.constraints(ocp, defects_.data(), nullptr, trial_constraints_.data());
+  evaluate_limits(ocp, iterate, trial_constraints_);
+  return objective + rows_.merit(trial_constraints_, penalty_, stage_merits_);
 }
 
 /// `trial_` = `current_` + the step, scaled by the length of each stage.
@@ -163,7 +163,7 @@ void SparseSqp::move(const Ocp& ocp) {
     trial_bound_multipliers_[k] = bound_multipliers_[k] + length * (step_bound_multipliers_[k] - bound_multipliers_[k]);
   }
   for (std::size_t r = 0; r < multipliers_.size(); ++r)
-    trial_multipliers_[r] = multipliers_[r] + lengths_[stage_of_row_[r]] * (step_multipliers_[r] - multipliers_[r]);
+    trial_multipliers_[r] = multipliers_[r] + lengths_[rows_.stage_of(r)] * (step_multipliers_[r] - multipliers_[r]);
   nlp_.write(ocp, trial_z_.data(), trial_multipliers_.data(), trial_bound_multipliers_.data(), trial_);
 }
 
@@ -179,6 +179,10 @@ void SparseSqp::convexify(const Ocp& ocp, int round) {
 
 /// Solves the QP for the step, with relaxed equations if it is infeasible.
 SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::time_point deadline) {
+  if (is_elastic_) {
+    report.fallback_used = true;
+    return find_relaxed_step(deadline);
+  }
   auto outcome = qp_.solve(qp_data(), step_.data(), step_multipliers_.data(), step_bound_multipliers_.data(), deadline);
   for (int round = 1; outcome == SparseQp::Outcome::indefinite && round <= convexifications; ++round) {
     if (Clock::now() > deadline) return SparseQp::Outcome::deadline;
@@ -188,14 +192,24 @@ SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::ti
   predicted_defect_ = 0.0;
   if (outcome != SparseQp::Outcome::failed) {
     report.fallback_used |= qp_.used_interior_point();
+    predict();
     return outcome;
   }
   report.fallback_used = true;
-  const double defect = norm1(constraints_);
-  double penalty = std::max(penalty_, 1e2 * (1.0 + max_abs(gradient_)));
-  outcome = solve_relaxed(penalty, deadline);
+  return find_relaxed_step(deadline);
+}
+
+SparseQp::Outcome SparseSqp::find_relaxed_step(Clock::time_point deadline) {
+  const double defect = rows_.defect(constraints_);
+  const double least = 1e2 * (1.0 + max_abs(gradient_));
+  // What multipliers of steps that led nowhere have left.
+  if (is_elastic_) penalty_ = std::min(penalty_, least);
+  double penalty = std::max(penalty_, least);
+  auto outcome = solve_relaxed(penalty, deadline);
   // The penalty is high enough if the step removes most of the defect, or if a higher penalty would hardly remove more.
-  while (outcome == SparseQp::Outcome::relaxed && predicted_defect_ > 0.1 * defect && penalty < largest_penalty) {
+  // Linearised limits can be met by steps that are much too long: there some of the defect is enough.
+  const double enough = rows_.has_limits() ? 0.9 * defect : 0.1 * defect;
+  while (outcome == SparseQp::Outcome::relaxed && predicted_defect_ > enough && penalty < largest_penalty) {
     penalty *= 100.0;
     const double last = predicted_defect_;
     relaxed_step_ = step_;
@@ -210,7 +224,17 @@ SparseQp::Outcome SparseSqp::find_step(const Ocp& ocp, Report& report, Clock::ti
     predicted_defect_ = last;
     break;
   }
+  predict();
   return outcome;
+}
+
+/// What slacks will cost if the linearised limits are right.
+void SparseSqp::predict() noexcept {
+  predicted_slack_cost_ = 0.0;
+  if (!rows_.has_limits()) return;
+  trial_constraints_ = constraints_;
+  add_product(nlp_.jacobian(), jacobian_.data(), step_.data(), trial_constraints_.data());
+  predicted_slack_cost_ = rows_.slack_cost(trial_constraints_);
 }
 
 /// Solves the QP with relaxed equations; `predicted_defect_` gets their remaining residual.
@@ -218,11 +242,9 @@ SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point dea
   const auto outcome = qp_.solve_relaxed(qp_data(), penalty, step_.data(), step_multipliers_.data(),
                                          step_bound_multipliers_.data(), deadline);
   if (outcome != SparseQp::Outcome::relaxed) return outcome;
-  const auto& J = nlp_.jacobian();
   trial_constraints_ = constraints_;
-  for (int c = 0; c < J.columns; ++c)
-    for (int k = J.starts[c]; k < J.starts[c + 1]; ++k) trial_constraints_[J.row_indices[k]] += jacobian_[k] * step_[c];
-  predicted_defect_ = norm1(trial_constraints_);
+  add_product(nlp_.jacobian(), jacobian_.data(), step_.data(), trial_constraints_.data());
+  predicted_defect_ = rows_.defect(trial_constraints_);
   return outcome;
 }
 
@@ -231,9 +253,9 @@ SparseQp::Outcome SparseSqp::solve_relaxed(double penalty, Clock::time_point dea
 bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
   // Nothing determines a step this long: no step length is worth trying.
   if (!(max_abs(step_) <= longest_step * (1.0 + max_abs(z_)))) return false;
-  const double defect = norm1(constraints_);
+  const double defect = rows_.defect(constraints_);
   // Multipliers of relaxed equations reach the QP's penalty, which is large enough already.
-  const double least_penalty = (predicted_defect_ > 0.0 ? 1.0 : 1.5) * max_abs(step_multipliers_);
+  const double least_penalty = (predicted_defect_ > 0.0 ? 1.0 : 1.5) * rows_.largest_price(step_multipliers_);
   if (penalty_ < least_penalty) {
     penalty_ = least_penalty;
   } else if (penalty_ > 4.0 * least_penalty && penalty_cuts_left_ > 0 && predicted_defect_ == 0.0) {
@@ -241,8 +263,9 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
     penalty_ = 2.0 * least_penalty;
     --penalty_cuts_left_;
   }
-  const double before = objective_ + penalty_ * defect;
-  double slope = penalty_ * (predicted_defect_ - defect);
+  const double slack_cost = rows_.slack_cost(constraints_);
+  const double before = objective_ + slack_cost + penalty_ * defect;
+  double slope = penalty_ * (predicted_defect_ - defect) + predicted_slack_cost_ - slack_cost;
   for (std::size_t k = 0; k < z_.size(); ++k) slope += gradient_[k] * step_[k];
   const auto acceptable = [&](double length) {
     after = merit(ocp, trial_);
@@ -252,7 +275,7 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
   // The merit rejects the step because of the equations' curvature: second-order corrections with the same matrix.
   const auto correct = [&](double length) {
     if (!std::isfinite(after) || predicted_defect_ > 0.0) return false;
-    double remaining = norm1(trial_constraints_);
+    double remaining = rows_.defect(trial_constraints_);
     for (int round = 0; round < corrections; ++round) {
       if (!qp_.correct(qp_data(), trial_constraints_.data(), correction_.data())) break;
       // A correction longer than the step itself is useless, e.g. if equations and active bounds are linearly
@@ -262,7 +285,7 @@ bool SparseSqp::search(const Ocp& ocp, double residual, double& after) {
         trial_z_[k] = std::clamp(trial_z_[k] + correction_[k], lower_z_[k], upper_z_[k]);
       nlp_.write(ocp, trial_z_.data(), nullptr, nullptr, trial_);
       if (acceptable(length)) return true;
-      const double last = std::exchange(remaining, norm1(trial_constraints_));
+      const double last = std::exchange(remaining, rows_.defect(trial_constraints_));
       if (!(remaining < 0.5 * last)) break;
     }
     return false;
@@ -321,7 +344,7 @@ bool SparseSqp::shorten_locally() {
 /// The remaining defects may be within the tolerance and yet, weighted with large multipliers, change the objective by
 /// more than is acceptable. Then one more step is taken, and kept if it reduces the defects.
 void SparseSqp::polish(const Ocp& ocp, Report& report, Clock::time_point deadline) {
-  const double price = report.kkt.defect * max_abs(multipliers_);
+  const double price = violation_of(report.kkt) * max_abs(multipliers_);
   if (price <= negligible_share * std::abs(objective_)) return;
   if (report.iterations == options_.max_iterations || Clock::now() > deadline) return;
   const auto outcome = find_step(ocp, report, deadline);
@@ -332,18 +355,36 @@ void SparseSqp::polish(const Ocp& ocp, Report& report, Clock::time_point deadlin
   linearise_stages(ocp, trial_, Hessian::gauss_newton, other_stages_, scratch_);
   SparseNlp::set_costate_0(other_stages_, trial_);
   const KktResidual after = kkt_residual(other_stages_, trial_);
-  if (after.largest() <= options_.tolerance && after.defect < report.kkt.defect) std::swap(current_, trial_);
+  if (after.largest() <= options_.tolerance && violation_of(after) < violation_of(report.kkt))
+    std::swap(current_, trial_);
+}
+
+/// Looks back at a step that was accepted: what comes next, and whether so many relaxed ones have removed so little
+/// that the limits cannot be met.
+bool SparseSqp::is_futile(SparseQp::Outcome outcome, const Report& report) noexcept {
+  const double defect = rows_.defect(constraints_);
+  const bool was_short = *std::min_element(lengths_.begin(), lengths_.end()) < short_step;
+  is_elastic_ = was_short || (is_elastic_ && predicted_defect_ > small_share * defect);
+  if (outcome != SparseQp::Outcome::relaxed || defect < most_left * defect_before_) {
+    defect_before_ = defect;
+    futile_ = 0;
+  }
+  futile_ += predicted_defect_ > (1.0 - small_share) * defect ? most_futile / 10 : 1;
+  return futile_ >= most_futile && violation_of(report.kkt) > options_.tolerance;
 }
 
 Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point deadline) {
   bool use_exact = options_.hessian == Curvature::exact ||
                    (options_.hessian == Curvature::automatic && ocp.preferred_hessian() == Hessian::exact);
-  double last_residual = std::numeric_limits<double>::infinity();
+  double last_residual = infinity;
   int slow = 0;
   bool has_costates = max_abs(multipliers_) > 0.0;
   // The active set of the first QP is guessed from the iterate's multipliers, that of each later QP from the previous
   // QP.
   step_bound_multipliers_ = bound_multipliers_;
+  step_multipliers_ = multipliers_;
+  is_elastic_ = false;
+  defect_before_ = infinity;
   for (;; ++report.iterations) {
     if (use_exact && !has_costates) {
       // The exact Hessian needs costates: those that fit the start.
@@ -364,7 +405,7 @@ Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point dea
     if (Clock::now() > deadline) return Status::deadline;
     // If Gauss-Newton makes little progress the residuals are large: there the exact Hessian does better.
     if (options_.hessian == Curvature::automatic && !use_exact && ocp.has_second_derivatives()) {
-      slow = report.kkt.defect < near_enough && residual > 0.3 * last_residual ? slow + 1 : 0;
+      slow = violation_of(report.kkt) < near_enough && residual > 0.3 * last_residual ? slow + 1 : 0;
       if (slow >= 4) {
         use_exact = true;
         linearise(ocp, Hessian::exact);
@@ -386,10 +427,11 @@ Status SparseSqp::converge(const Ocp& ocp, Report& report, Clock::time_point dea
       if (outcome == SparseQp::Outcome::deadline) return Status::deadline;
       accepted = is_step(outcome) && search(ocp, residual, after);
     }
-    if (outcome == SparseQp::Outcome::relaxed && report.kkt.defect > options_.tolerance &&
-        predicted_defect_ >= stuck * norm1(constraints_))
+    if (outcome == SparseQp::Outcome::relaxed && violation_of(report.kkt) > options_.tolerance &&
+        predicted_defect_ >= stuck * rows_.defect(constraints_))
       return Status::infeasible;
     if (!accepted) return Status::stalled;
+    if (rows_.has_limits() && is_futile(outcome, report)) return Status::infeasible;
     std::swap(current_, trial_);
     nlp_.read(ocp, current_, z_.data(), multipliers_.data(), bound_multipliers_.data());
   }
@@ -407,7 +449,7 @@ Report SparseSqp::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
     penalty_ = 0.0;
     penalty_cuts_left_ = most_penalty_cuts;
     nlp_.bounds(ocp, lower_z_.data(), upper_z_.data());
-    bool bounds_cross = false;
+    bool bounds_cross = !rows_.take_limits(ocp, nlp_);
     for (std::size_t k = 0; k < z_.size(); ++k) bounds_cross = bounds_cross || lower_z_[k] > upper_z_[k];
     if (bounds_cross) {
       report.status = Status::infeasible;

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "rhec/core/config/options.hpp"
+#include "row_costs.hpp"
 #include "sparse_qp.hpp"
 
 namespace rhec::sparse_sqp {
@@ -26,10 +28,11 @@ struct SparseSqpOptions {
 /// of intervals and for vehicles with many states. The cost of a step is linear in the horizon.
 ///
 /// Every iterate satisfies the bounds. Steps come from a sparse QP (SparseQp) and are accepted by the l1 merit function
-/// f + penalty * |c|_1. Step lengths are shorter around stages where the merit would rise, and second-order corrections
-/// account for the curvature of the equations. Where the exact Hessian is not convex enough, stages take the
-/// Gauss-Newton Hessian (convexify_by_stages). If linearised equations contradict the bounds, they are relaxed (Sl1QP
-/// [15]); an iterate at which no step reduces |c|_1 is reported as infeasible.
+/// f + penalty * |c|_1, where f includes the slacks of soft limits, and |c|_1 the violation of hard ones. Step lengths
+/// are shorter around stages where the merit would rise, and second-order corrections account for the curvature of the
+/// equations. Where the exact Hessian is not convex enough, stages take the Gauss-Newton Hessian (convexify_by_stages).
+/// If linearised equations contradict the bounds, they are relaxed (Sl1QP [15]); an iterate at which no step reduces
+/// |c|_1 is reported as infeasible.
 class SparseSqp final : public Solver {
  public:
   using Options = SparseSqpOptions;
@@ -54,8 +57,16 @@ class SparseSqp final : public Solver {
   void polish(const Ocp& ocp, Report& report, Clock::time_point deadline);
   Status converge(const Ocp& ocp, Report& report, Clock::time_point deadline);
   SparseQp::Outcome find_step(const Ocp& ocp, Report& report, Clock::time_point deadline);
+  SparseQp::Outcome find_relaxed_step(Clock::time_point deadline);
   SparseQp::Outcome solve_relaxed(double penalty, Clock::time_point deadline);
   SparseQp::Data qp_data() const noexcept;
+  void evaluate_limits(const Ocp& ocp, const Iterate& iterate, std::vector<double>& constraints) noexcept;
+  void predict() noexcept;
+  bool is_futile(SparseQp::Outcome outcome, const Report& report) noexcept;
+  /// Of the constraints: the iterates are within their bounds.
+  double violation_of(const KktResidual& kkt) const noexcept {
+    return rows_.has_limits() ? std::max(kkt.defect, kkt.bound_violation) : kkt.defect;
+  }
 
   Options options_;
   const Ocp* ocp_ = nullptr;
@@ -63,7 +74,7 @@ class SparseSqp final : public Solver {
   SparseQp qp_;
   StageQp stages_, other_stages_;
   Iterate current_, trial_;
-  std::vector<double> scratch_, defects_;
+  std::vector<double> scratch_, defects_, limit_values_;
   std::vector<double> hessian_, jacobian_, gradient_, constraints_, lower_, upper_;
   std::vector<double> z_, multipliers_, bound_multipliers_;               ///< of `current_`
   std::vector<double> step_, step_multipliers_, step_bound_multipliers_;  ///< solution of the QP
@@ -72,13 +83,18 @@ class SparseSqp final : public Solver {
   std::vector<double> relaxed_step_, relaxed_multipliers_, relaxed_bound_multipliers_;
   double objective_ = 0.0;  ///< at `current_`
   bool hessian_is_convex_ = false;
-  std::vector<int> stage_of_variable_, stage_of_row_;  ///< a defect belongs to the stage that its interval starts at
-  std::vector<double> stage_merits_, merits_before_;   ///< of the last iterate evaluated, and of `current_`
-  std::vector<double> merit_sums_;                     ///< prefix sums of their differences
-  std::vector<double> lengths_;                        ///< step length of each stage
+  RowCosts rows_;
+  std::vector<int> stage_of_variable_;
+  std::vector<double> stage_merits_, merits_before_;  ///< of the last iterate evaluated, and of `current_`
+  std::vector<double> merit_sums_;                    ///< prefix sums of their differences
+  std::vector<double> lengths_;                       ///< step length of each stage
   double penalty_ = 0.0;
   int penalty_cuts_left_ = 0;
   double predicted_defect_ = 0.0;  ///< |J step + c|_1
+  double predicted_slack_cost_ = 0.0;
+  bool is_elastic_ = false;  ///< the next QP is relaxed from the start
+  int futile_ = 0;           ///< relaxed steps since |c|_1 was this:
+  double defect_before_ = 0.0;
 };
 
 }  // namespace rhec::sparse_sqp

@@ -14,11 +14,14 @@
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/stage_qp_views.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "support/limited_ocp.hpp"
 #include "support/random_problem.hpp"
 
 namespace rhec {
 namespace sparse_nlp_test {
 
+using testing::Limit;
+using testing::LimitedOcp;
 using testing::RandomProblem;
 
 std::shared_ptr<const Model> bicycle() {
@@ -40,7 +43,7 @@ Eigen::MatrixXd dense(const SparseNlp::Pattern& pattern, const std::vector<doubl
 }
 
 struct View {
-  explicit View(const HorizonProblem& of) : problem(of), qp(of.capacity()), scratch(of.scratch_size()) {
+  explicit View(const Ocp& of) : problem(of), qp(of.capacity()), scratch(of.scratch_size()) {
     nlp.take_structure(problem);
     n = nlp.variables();
     m = nlp.constraints();
@@ -49,11 +52,13 @@ struct View {
     nlp.write(problem, z.data(), nullptr, nullptr, point);
     std::vector<double> defects(static_cast<std::size_t>(problem.capacity().intervals) * problem.capacity().states);
     objective = problem.evaluate(point, defects.data(), scratch);
+    std::vector<double> limits((static_cast<std::size_t>(problem.intervals()) + 1) * problem.capacity().limit_row());
+    if (!limits.empty()) problem.evaluate_limits(point, limits.data(), scratch);
     Eigen::VectorXd c(m);
-    nlp.constraints(problem, defects.data(), c.data());
+    nlp.constraints(problem, defects.data(), limits.empty() ? nullptr : limits.data(), c.data());
     return c;
   }
-  const HorizonProblem& problem;
+  const Ocp& problem;
   SparseNlp nlp;
   StageQp qp;
   std::vector<double> scratch;
@@ -62,9 +67,9 @@ struct View {
 };
 
 /// Compares the view's derivatives with central differences of its functions.
-void check_view(const HorizonProblem& problem, RandomProblem& random) {
+void check_view(const Ocp& problem, const Iterate& start, RandomProblem& random) {
   View view(problem);
-  Iterate point = RandomProblem::cold_start(problem);
+  Iterate point = start;
   Eigen::VectorXd z(view.n), multipliers(view.m);
   view.nlp.read(problem, point, z.data(), nullptr, nullptr);
   for (double& value : z) value += 0.01 * random.normal();
@@ -79,8 +84,10 @@ void check_view(const HorizonProblem& problem, RandomProblem& random) {
   H.triangularView<Eigen::StrictlyUpper>() = H.transpose();
   Eigen::VectorXd g(view.n), c(view.m);
   view.nlp.gradient(view.qp, g.data());
-  view.nlp.constraints(view.qp, c.data());
-  EXPECT_LT((view.constraints(z, point) - c).cwiseAbs().maxCoeff(), 1e-12);
+  c = view.constraints(z, point);
+  Eigen::VectorXd of_linearisation = c;  // which has the defects alone
+  view.nlp.constraints(view.qp, of_linearisation.data());
+  EXPECT_LT((of_linearisation - c).cwiseAbs().maxCoeff(), 1e-12);
 
   const auto lagrangian_gradient = [&](const Eigen::VectorXd& at) {
     view.nlp.write(problem, at.data(), multipliers.data(), nullptr, point);
@@ -107,6 +114,10 @@ void check_view(const HorizonProblem& problem, RandomProblem& random) {
   }
 }
 
+void check_view(const HorizonProblem& problem, RandomProblem& random) {
+  check_view(problem, RandomProblem::cold_start(problem), random);
+}
+
 TEST(SparseNlp, HasTheDerivativesOfItsFunctionsInEstimation) {
   for (const Transition transition : {Transition::step, Transition::ramp}) {
     RandomProblem random(bicycle(), 3);
@@ -125,6 +136,99 @@ TEST(SparseNlp, HasTheDerivativesOfItsFunctionsInControl) {
   spec.intervals = 5;
   spec.blocked_inputs = {1};
   check_view(*random.rhc(spec), random);
+}
+
+/// Limits of every kind, more and other ones from stage to stage: at node 0, on states alone, on controls alone, on
+/// both, at the last node, and stages that have none.
+void add_limits(const Ocp& on, LimitedOcp& limited) {
+  const int N = on.intervals(), u = on.capacity().states;
+  for (int i = 0; i <= N; ++i) {
+    if (i % 4 == 3) continue;
+    limited.add(i, {Limit::Kind::distance, {0, 1}, {0.3 * i, -0.4}, 0.5});
+    limited.add(i, {Limit::Kind::linear, {1, 0}, {1.0, -0.3}, -2.0, 1.0, 10.0});
+    if (i == N) break;
+    limited.add(i, {Limit::Kind::product, {u, 2}, {0.7}, -1.0, 1.0, 0.0, 4.0});
+    if (i % 2 == 1) limited.add(i, {Limit::Kind::squares, {u, u + 1}, {1.0, 0.5}, -infinity, 3.0});
+  }
+}
+
+TEST(SparseNlp, HasTheDerivativesOfItsLimits) {
+  RandomProblem random(bicycle(), 12);
+  RandomProblem::RhcSpec of_control;
+  of_control.intervals = 7;
+  RandomProblem::RheSpec of_estimation;
+  of_estimation.intervals = 6;
+  of_estimation.block = 2;
+  const std::unique_ptr<HorizonProblem> problems[] = {random.rhc(of_control), random.rhe(of_estimation)};
+  for (const auto& problem : problems) {
+    LimitedOcp limited(*problem, 4);
+    add_limits(*problem, limited);
+    check_view(limited, with_limits(limited, RandomProblem::cold_start(*problem)), random);
+  }
+}
+
+TEST(SparseNlp, EqualStagesWithLimitsHaveThePatternsOfEachByItself) {
+  // Stages that repeat the one before are written faster than others: the same flags, one stage after the other.
+  RandomProblem random(bicycle(), 13);
+  const auto problem = random.rhc({});
+  for (const int first : {0, 1, 4}) {
+    LimitedOcp limited(*problem, 3);
+    int rows = 0;
+    for (int i = first; i <= problem->intervals(); ++i, ++rows) limited.add(i, {Limit::Kind::linear, {0}, {1.0}, 0.0});
+    limited.add(9, {Limit::Kind::linear, {1}, {1.0}, 0.0});
+    SparseNlp nlp;
+    nlp.take_structure(limited);
+    ASSERT_EQ(nlp.constraints(), problem->intervals() * problem->capacity().states + rows + 1);
+    for (int i = 1; i <= problem->intervals(); ++i) {
+      const auto& J = nlp.jacobian();
+      for (int c = 0; c < 2; ++c) {
+        const int column = nlp.state_start(i) + c;
+        const auto begin = J.row_indices.begin() + J.starts[column], end = J.row_indices.begin() + J.starts[column + 1];
+        int of_limits = 0;
+        for (int r = 0; r < nlp.limit_count(i); ++r)
+          of_limits += static_cast<int>(std::count(begin, end, nlp.limit_start(i) + r));
+        EXPECT_EQ(of_limits, c == 0 ? i >= first : i == 9) << "stage " << i << ", state " << c << " from " << first;
+        if (of_limits > 0) {
+          EXPECT_LT(*(end - 1), nlp.limit_start(i) + nlp.limit_count(i));
+        }
+      }
+    }
+  }
+}
+
+TEST(SparseNlp, LimitsGoThereAndBackWithTheirBounds) {
+  RandomProblem random(bicycle(), 14);
+  const auto problem = random.rhc({});
+  LimitedOcp limited(*problem, 4);
+  add_limits(*problem, limited);
+  SparseNlp nlp;
+  nlp.take_structure(limited);
+  const auto signature = nlp.signature();
+  Iterate point(limited.capacity()), back(limited.capacity());
+  for (int i = 0; i <= problem->intervals(); ++i)
+    for (int r = 0; r < limited.limit_count(i); ++r) point.limit_bound(i)[r] = random.normal();
+  std::vector<double> multipliers(nlp.constraints()), z(nlp.variables());
+  nlp.read(limited, point, z.data(), multipliers.data(), nullptr);
+  nlp.write(limited, z.data(), multipliers.data(), nullptr, back);
+  std::vector<double> lower(nlp.constraints(), 7.0), upper = lower, linear = lower, quadratic = lower;
+  nlp.row_bounds(limited, lower.data(), upper.data(), linear.data(), quadratic.data());
+  int rows = 0;
+  for (int i = 0; i <= problem->intervals(); ++i) {
+    ASSERT_EQ(nlp.limit_count(i), limited.limit_count(i));
+    for (int r = 0; r < limited.limit_count(i); ++r, ++rows) {
+      EXPECT_EQ(back.limit_bound(i)[r], point.limit_bound(i)[r]);
+      const int row = nlp.limit_start(i) + r;
+      EXPECT_EQ(lower[row], limited.limit_lower(i)[r]);
+      EXPECT_EQ(upper[row], limited.limit_upper(i)[r]);
+      EXPECT_EQ(linear[row], limited.limit_linear(i)[r]);
+      EXPECT_EQ(quadratic[row], limited.limit_quadratic(i)[r]);
+    }
+  }
+  EXPECT_EQ(rows, nlp.constraints() - problem->intervals() * problem->capacity().states);
+  EXPECT_FALSE(nlp.take_structure(limited));
+  limited.add(3, {Limit::Kind::linear, {0}, {1.0}, 0.0});
+  EXPECT_TRUE(nlp.take_structure(limited));
+  EXPECT_NE(nlp.signature(), signature);
 }
 
 TEST(SparseNlp, ASmallerPatternThanAllOnesIsStillEnough) {

@@ -15,7 +15,7 @@ struct Assessment {
   double milliseconds = 0.0;
   Iterate point;
   KktResidual kkt;         ///< by the core
-  double objective = 0.0;  ///< by the core
+  double objective = 0.0;  ///< by the core, with the costs of slacks
   /// The Lagrangian less what its bound terms are at the bounds: the objective without what defects and violations
   /// within the tolerance gain. Near an optimum it is that of the optimum to second order.
   double corrected_objective = 0.0;
@@ -23,14 +23,14 @@ struct Assessment {
 };
 
 /// Prepares and solves from a guess. `tolerance` is the solver's.
-Assessment solve_and_assess(Solver& solver, const HorizonProblem& problem, const Iterate& guess, double tolerance,
+Assessment solve_and_assess(Solver& solver, const Ocp& problem, const Iterate& guess, double tolerance,
                             Clock::time_point deadline = Clock::time_point::max());
 
 /// The KKT residual of a point.
-KktResidual residual_at(const HorizonProblem& problem, const Iterate& point);
+KktResidual residual_at(const Ocp& problem, const Iterate& point);
 
 /// All that the problem uses of two points is the same to the last bit; what it does not use is not compared.
-bool same_bits(const HorizonProblem& problem, const Iterate& a, const Iterate& b);
+bool same_bits(const Ocp& problem, const Iterate& a, const Iterate& b);
 
 /// The states and controls of a point that the problem uses, each over its variable's scale.
 std::vector<double> scaled_primal(const HorizonProblem& problem, const Iterate& point);

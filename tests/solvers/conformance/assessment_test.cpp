@@ -24,8 +24,7 @@ using Lie = std::function<void(const Ocp&, Iterate&, Report&)>;
 /// An honest solver whose answers are changed afterwards.
 class Liar final : public SolverDecorator {
  public:
-  explicit Liar(Lie lie)
-      : SolverDecorator(make_solver(host().names(PluginKind::solver).front())), lie_(std::move(lie)) {}
+  Liar(std::shared_ptr<Solver> solver, Lie lie) : SolverDecorator(std::move(solver)), lie_(std::move(lie)) {}
   using Solver::solve;
   void setup(const Ocp& ocp) override {
     ocp_ = &ocp;
@@ -42,15 +41,21 @@ class Liar final : public SolverDecorator {
   Lie lie_;
 };
 
-std::vector<std::string> complaints_about(const std::string& family_name, Lie lie) {
+std::vector<std::string> complaints_about(const std::string& family_name, const Lie& lie) {
   const Problem problem = family(family_name).make(make_model(host().names(PluginKind::model).front()), 1);
-  Liar solver(std::move(lie));
-  solver.setup(*problem.ocp);
-  return solve_and_assess(solver, *problem.ocp, problem.guess, 1e-8).complaints;
+  // The first solver that takes the problem.
+  for (const std::string& name : host().names(PluginKind::solver)) {
+    Liar solver(make_solver(name), lie);
+    if (!solver.why_not(problem.posed()).empty()) continue;
+    solver.setup(problem.posed());
+    return solve_and_assess(solver, problem.posed(), problem.guess, 1e-8).complaints;
+  }
+  return {"no solver takes it"};
 }
 
 TEST(Assessment, HasNothingToSayAboutAnHonestSolver) {
-  for (const char* name : {"rhe_all_at_bounds", "rhc_inputs_at_bounds", "rhe_infeasible"})
+  for (const char* name : {"rhe_all_at_bounds", "rhc_inputs_at_bounds", "rhe_infeasible", "rhc_limits",
+                           "rhc_limits_soft", "rhc_limits_soft_quadratic"})
     EXPECT_THAT(complaints_about(name, [](const Ocp&, Iterate&, Report&) {}), IsEmpty()) << name;
 }
 
@@ -93,6 +98,38 @@ TEST(Assessment, SeesASolutionThatIsNone) {
   EXPECT_THAT(
       complaints_about("rhc_near", [](const Ocp&, Iterate& point, Report&) { point.control_bound(2)[0] = 1.0; }),
       Contains(HasSubstr("a multiplier is not at its bound")));
+}
+
+/// The first stage with a limit, past the first node, whose multiplier is at least that.
+int stage_with_multiplier(const Ocp& ocp, const Iterate& point, double least) {
+  for (int i = 1; i < ocp.intervals(); ++i)
+    if (ocp.limit_count(i) > 0 && std::abs(point.limit_bound(i)[0]) >= least) return i;
+  ADD_FAILURE() << "no limit has a multiplier";
+  return 1;
+}
+
+TEST(Assessment, SeesLimitsThatAreNotKept) {
+  EXPECT_THAT(complaints_about("rhc_limits",
+                               [](const Ocp& ocp, Iterate& point, Report&) {
+                                 const int i = stage_with_multiplier(ocp, point, 1e-3);
+                                 point.limit_bound(i)[0] *= -1.0;
+                               }),
+              Contains(HasSubstr("a multiplier is not at its bound")));
+  EXPECT_THAT(complaints_about("rhc_limits_soft_quadratic",
+                               [](const Ocp& ocp, Iterate& point, Report&) {
+                                 const int i = stage_with_multiplier(ocp, point, 1e-3);
+                                 point.limit_bound(i)[0] *= 1.5;
+                               }),
+              Contains(HasSubstr("not the price of its slack")));
+  EXPECT_THAT(
+      complaints_about("rhc_limits_corridor",
+                       [](const Ocp& ocp, Iterate& point, Report&) {
+                         const int i = stage_with_multiplier(ocp, point, 1e-3);
+                         const testing::Limit& limit = dynamic_cast<const testing::LimitedOcp&>(ocp).limits(i)[0];
+                         for (std::size_t k = 0; k < limit.of.size(); ++k)
+                           point.row(i)[limit.of[k]] += (point.limit_bound(i)[0] > 0.0 ? 1e-3 : -1e-3) * limit.with[k];
+                       }),
+      Contains("it violates a bound by 1.0e-03"));
 }
 
 }  // namespace assessment_test

@@ -38,19 +38,19 @@ class Behaviour : public ::testing::TestWithParam<Pair> {
   Problem problem(const std::string& name, unsigned seed = 1) const { return family(name).make(model_, seed); }
 
   Assessment solve(Solver& solver, const Problem& of) const {
-    return solve_and_assess(solver, *of.ocp, of.guess, tolerance_);
+    return solve_and_assess(solver, of.posed(), of.guess, tolerance_);
   }
 
   /// The same with a solver that was busy with another problem.
   Assessment set_up_and_solve(Solver& solver, const Problem& of) const {
-    solver.setup(*of.ocp);
+    solver.setup(of.posed());
     return solve(solver, of);
   }
 
   /// What a new instance makes of a problem.
   Assessment by_new_instance(const Problem& of) const {
     const auto solver = make();
-    solver->setup(*of.ocp);
+    solver->setup(of.posed());
     return solve(*solver, of);
   }
 
@@ -68,7 +68,8 @@ class Behaviour : public ::testing::TestWithParam<Pair> {
   }
 
   bool applies(const std::string& name) const {
-    return conformance::applies(family(name), GetParam().model, *model_) && make()->why_not(*problem(name).ocp).empty();
+    return conformance::applies(family(name), GetParam().model, *model_) &&
+           make()->why_not(problem(name).posed()).empty();
   }
 
   std::shared_ptr<const Model> model_ = make_model(GetParam().model);

@@ -141,7 +141,7 @@ class SolverAlone : public ::testing::TestWithParam<std::string> {};
 TEST_P(SolverAlone, SaysInfeasibleOfAVehicleThatCannotStayWhereItMust) {
   const auto cold = [](std::unique_ptr<HorizonProblem> ocp) {
     Iterate guess = RandomProblem::cold_start(*ocp);
-    return Problem{std::move(ocp), std::move(guess)};
+    return Problem{std::move(ocp), std::move(guess), nullptr};
   };
   const Problem impossible = cold(integrator_in_a_box(2.0, 3.0)), possible = cold(integrator_in_a_box(-1.0, 3.0));
   const double tolerance = tolerance_of(GetParam());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -293,6 +294,8 @@ std::vector<Family> make_families() {
                 problem.input_upper(3, 0) = problem.input_reference(3)[0] - 0.2;
               }))
       .answer = Family::Answer::infeasible;
+  std::vector<Family> with_limits = limited_families();
+  std::move(with_limits.begin(), with_limits.end(), std::back_inserter(all));
   return all;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rhec/core/horizon/horizon_problem.hpp"
+#include "support/limited_ocp.hpp"
 
 namespace rhec::conformance {
 
@@ -15,6 +16,10 @@ namespace rhec::conformance {
 struct Problem {
   std::unique_ptr<HorizonProblem> ocp;
   Iterate guess;
+  std::unique_ptr<testing::LimitedOcp> limited;  ///< the problem with limits, where it has some
+
+  /// What solvers get.
+  const Ocp& posed() const noexcept { return limited ? static_cast<const Ocp&>(*limited) : *ocp; }
 };
 
 struct Family {
@@ -38,6 +43,8 @@ struct Family {
 int problem_count(const Family& family);
 
 const std::vector<Family>& families();
+/// Those with limits (limited_families.cpp), which `families` includes.
+std::vector<Family> limited_families();
 /// Throws std::out_of_range where there is none.
 const Family& family(const std::string& name);
 

@@ -29,7 +29,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 inline Problem cold(std::unique_ptr<HorizonProblem> ocp) {
   Iterate guess = RandomProblem::cold_start(*ocp);
-  return {std::move(ocp), std::move(guess)};
+  return {std::move(ocp), std::move(guess), nullptr};
 }
 
 using Make = std::function<Problem(ModelPointer, unsigned)>;

@@ -6,11 +6,14 @@
 #include <limits>
 
 #include "problems.hpp"
+#include "support/limited_ocp.hpp"
 
 namespace rhec::ipopt {
 namespace ocp_nlp_test {
 
 using namespace testing;
+using rhec::testing::Limit;
+using rhec::testing::LimitedOcp;
 using Vector = std::vector<double>;
 
 /// The NLP at a point near a problem's cold start, with multipliers of the size of its gradient.
@@ -63,8 +66,8 @@ struct TestNlp {
   std::vector<int> rows, columns, jacobian_rows, jacobian_columns;
 };
 
-void check_derivatives(const HorizonProblem& problem, RandomProblem& random) {
-  TestNlp test(problem, RandomProblem::cold_start(problem), random, Curvature::exact);
+void check_derivatives(const Ocp& problem, const Iterate& start, RandomProblem& random) {
+  TestNlp test(problem, start, random, Curvature::exact);
   constexpr double step = 1e-6;
   // 1e-4: where the weight is too small to be divided by.
   for (const double factor : {0.0, 1e-4, 1.0, 2.0}) {
@@ -90,6 +93,10 @@ void check_derivatives(const HorizonProblem& problem, RandomProblem& random) {
   }
 }
 
+void check_derivatives(const HorizonProblem& problem, RandomProblem& random) {
+  check_derivatives(problem, RandomProblem::cold_start(problem), random);
+}
+
 TEST(IpoptProgram, DerivativesAreThoseOfItsFunctionsWithAnyWeightOfTheObjective) {
   RandomProblem random(bicycle(), 1);
   check_derivatives(*random.rhe(blocks_of(3, 5)), random);
@@ -98,6 +105,21 @@ TEST(IpoptProgram, DerivativesAreThoseOfItsFunctionsWithAnyWeightOfTheObjective)
   spec.intervals = 5;
   spec.blocked_inputs = {0};
   check_derivatives(*random.rhc(spec), random);
+}
+
+TEST(IpoptProgram, LimitsAndTheirSlacksHaveTheDerivativesOfTheirFunctions) {
+  RandomProblem random(bicycle(), 11);
+  RandomProblem::RhcSpec spec;
+  spec.intervals = 4;
+  const auto problem = random.rhc(spec);
+  const int u = problem->capacity().states;
+  LimitedOcp limited(*problem, 4);
+  for (int i = 0; i <= 4; ++i) {
+    limited.add(i, {Limit::Kind::distance, {0, 1}, {0.3 * i, -0.4}, 0.5});
+    limited.add(i, {Limit::Kind::linear, {1, 0}, {1.0, -0.3}, -2.0, 1.0, 10.0, 3.0});
+    if (i < 4) limited.add(i, {Limit::Kind::product, {u, 2}, {0.7}, -1.0, 1.0, 0.0, 4.0});
+  }
+  check_derivatives(limited, with_limits(limited, RandomProblem::cold_start(*problem)), random);
 }
 
 TEST(IpoptProgram, GaussNewtonCurvatureIsOfTheObjectiveAlone) {

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <span>
+#include <utility>
 
 #include <Eigen/Dense>
 
@@ -25,6 +27,11 @@ class Shape final : public Ocp {
   const double* state_upper(int node) const noexcept override { return qp_.state_upper(node); }
   const double* control_lower(int interval) const noexcept override { return qp_.control_lower(interval); }
   const double* control_upper(int interval) const noexcept override { return qp_.control_upper(interval); }
+  int limit_count(int stage) const noexcept override { return qp_.limits(stage); }
+  const double* limit_lower(int stage) const noexcept override { return qp_.limit_lower(stage); }
+  const double* limit_upper(int stage) const noexcept override { return qp_.limit_upper(stage); }
+  const double* limit_linear(int stage) const noexcept override { return qp_.limit_linear(stage); }
+  const double* limit_quadratic(int stage) const noexcept override { return qp_.limit_quadratic(stage); }
   bool has_second_derivatives() const noexcept override { return true; }
   bool has_small_residuals() const noexcept override { return true; }
   std::size_t scratch_size() const noexcept override { return 0; }
@@ -69,6 +76,10 @@ TestQp::TestQp(const StageQp& stages) : qp(stages) {
   nlp.gradient(qp, gradient.data());
   nlp.constraints(qp, constraints.data());
   nlp.bounds(shape, lower.data(), upper.data());
+  for (auto* v : {&row_lower, &row_upper, &row_linear, &row_quadratic}) v->assign(m, 0.0);
+  nlp.row_bounds(shape, row_lower.data(), row_upper.data(), row_linear.data(), row_quadratic.data());
+  for (int i = 0; i <= qp.intervals(); ++i)
+    for (int r = 0; r < qp.limits(i); ++r) limits.push_back(nlp.limit_start(i) + r);
   H = dense(nlp.hessian(), hessian).selfadjointView<Eigen::Lower>();
   J = dense(nlp.jacobian(), jacobian);
 }
@@ -98,6 +109,40 @@ double TestQp::least_reduced_eigenvalue() const {
 
 StageQp random_stages(RandomQp& random) {
   return random.make(random.integer(1, 12), random.integer(1, 5), random.integer(1, 4), random.integer(0, 1) == 1);
+}
+
+StageQp with_limits(const StageQp& from, RandomQp& random, double room) {
+  Capacity capacity = from.capacity();
+  capacity.limits = 3;
+  StageQp to(capacity);
+  const int N = from.intervals(), stride = from.stride(), wide = capacity.states + capacity.controls;
+  to.set_intervals(N);
+  to.initial_state_is_given = from.initial_state_is_given;
+  for (int i = 0; i <= N; ++i) {
+    to.set_sizes(i, from.states(i), from.controls(i));
+    std::copy_n(from.AB(i), capacity.states * stride, to.AB(i));
+    std::copy_n(from.H(i), wide * stride, to.H(i));
+    for (const auto& [source, target] : {std::pair{from.h(i), to.h(i)},
+                                         {from.b(i), to.b(i)},
+                                         {from.lower(i), to.lower(i)},
+                                         {from.upper(i), to.upper(i)}})
+      std::copy_n(source, stride, target);
+    to.set_limits(i, i == 0 && to.initial_state_is_given && from.controls(0) == 0 ? 0 : random.integer(0, 3));
+    for (int r = 0; r < to.limits(i); ++r) {
+      for (int j = 0; j < from.states(i); ++j) to.G(i)[r * stride + j] = random.uniform(-1.0, 1.0);
+      for (int j = 0; j < from.controls(i); ++j) to.G(i)[r * stride + capacity.states + j] = random.uniform(-1.0, 1.0);
+      const int kind = random.integer(0, 5);
+      to.limit_lower(i)[r] = kind == 0 ? -infinity : -room * random.uniform(0.01, 1.0);
+      to.limit_upper(i)[r] = kind == 1 ? infinity : room * random.uniform(0.01, 1.0);
+      // Soft ones may also be far from what is possible, or demand equality.
+      const bool is_soft = kind >= 3;
+      to.limit_linear(i)[r] = !is_soft ? infinity : kind == 3 ? 0.0 : std::pow(10.0, random.uniform(-2.0, 1.0));
+      to.limit_quadratic(i)[r] = kind == 3 || kind == 4 ? std::pow(10.0, random.uniform(-1.0, 1.0)) : 0.0;
+      if (is_soft && random.integer(0, 2) == 0)
+        to.limit_upper(i)[r] = to.limit_lower(i)[r] += random.uniform(-1.0, 1.0);
+    }
+  }
+  return to;
 }
 
 Eigen::MatrixXd dense_kkt(const TestQp& test, const Eigen::VectorXd& primal, const Eigen::VectorXd& dual,
