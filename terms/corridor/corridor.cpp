@@ -49,8 +49,9 @@ class Corridor final : public Term {
     for (std::size_t k = 0; k < std::max<std::size_t>(count, 1); ++k)
       if (at(k, options_.left_along, options_.left) + at(k, options_.right_along, options_.right) <=
           2.0 * options_.margin)
-        throw Error("left, right: no room is left between the edges and their margins; expected left + right above "
-                    "2 margin");
+        throw Error(
+            "left, right: no room is left between the edges and their margins; expected left + right above "
+            "2 margin");
   }
 
   /// The signed distance from the tangent of the path at the reference position.

@@ -20,7 +20,8 @@ struct Line {
         OptionTable<Line>()
             .number("x", &Line::x, "of a point on the line [m]")
             .number("y", &Line::y, "of a point on the line [m]")
-            .number("direction", &Line::direction, "in which one looks along the line with the vehicle's side on the left [rad]");
+            .number("direction", &Line::direction,
+                    "in which one looks along the line with the vehicle's side on the left [rad]");
     return options;
   }
 };
@@ -31,11 +32,11 @@ struct KeepOutOptions : LimitOptions {
 
   static const OptionTable<KeepOutOptions>& table() {
     using K = KeepOutOptions;
-    static const auto options =
-        with_limit_options(OptionTable<K>()
-                               .number("vehicle_radius", &K::vehicle_radius,
-                                       "how far the point that follows the path stays from the lines [m]", at_least(0.0))
-                               .map("lines", &K::lines, Line::table().schema()));
+    static const auto options = with_limit_options(
+        OptionTable<K>()
+            .number("vehicle_radius", &K::vehicle_radius,
+                    "how far the point that follows the path stays from the lines [m]", at_least(0.0))
+            .map("lines", &K::lines, Line::table().schema()));
     return options;
   }
 };
@@ -55,8 +56,8 @@ class KeepOut final : public Term {
     for (std::size_t k = 0; k < lines_.size(); ++k) {
       const Line& line = lines_[k];
       const double sine = std::sin(line.direction), cosine = std::cos(line.direction);
-      writer.limit(cosine * (writer.position_y() - line.y) - sine * (writer.position_x() - line.x),
-                   options_.softness(), "line " + std::to_string(k + 1));
+      writer.limit(cosine * (writer.position_y() - line.y) - sine * (writer.position_x() - line.x), options_.softness(),
+                   "line " + std::to_string(k + 1));
     }
   }
   void write_data(const TermPlace&, double*, double* lower, double* upper) const noexcept override {

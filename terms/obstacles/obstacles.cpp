@@ -92,11 +92,13 @@ class Obstacles final : public Term {
     const Expression &x = writer.position_x(), &y = writer.position_y();
     for (int k = 0; k < most_; ++k) {
       const Expression dx = x - writer.data("x"), dy = y - writer.data("y");
-      const Expression along = writer.data("along x") * dx + writer.data("along y") * dy;
-      const Expression across = writer.data("across x") * dx + writer.data("across y") * dy;
+      const Expression along_x = writer.data("along x"), along_y = writer.data("along y");
+      const Expression across_x = writer.data("across x"), across_y = writer.data("across y");
+      const Expression along = along_x * dx + along_y * dy, across = across_x * dx + across_y * dy;
       const Expression beyond =
           sqrt(along * along + across * across + rounding * rounding) - std::sqrt(1.0 + rounding * rounding);
-      writer.limit(writer.data("size") * beyond, options_.softness(), "obstacle " + std::to_string(k + 1));
+      const Expression size = writer.data("size");
+      writer.limit(size * beyond, options_.softness(), "obstacle " + std::to_string(k + 1));
     }
   }
 

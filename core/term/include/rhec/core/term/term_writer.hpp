@@ -61,7 +61,8 @@ class RHEC_EXPORT TermWriter {
   /// That of the heading [rad/s].
   Expression heading_rate();
 
-  /// One more number that Term::write_data writes for each node.
+  /// One more number that Term::write_data writes for each node. Ask for one after the other: within an expression the
+  /// order of calls is not defined in C++.
   Expression data(std::string name);
   /// One more limit lower <= value <= upper, whose bounds Term::write_data writes.
   void limit(const Expression& value, const Softness& softness, std::string name);
