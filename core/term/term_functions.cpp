@@ -93,7 +93,7 @@ TermFunctions::TermFunctions(const Model& model, std::vector<NamedTerm> terms)
   std::vector<int> data;
   std::vector<TermWriter> written;
   for (std::size_t t = 0; t < terms_.size(); ++t) {
-    const auto& [name, term] = terms_[t];
+    const auto& [name, term, options] = terms_[t];
     TermWriter& writer = written.emplace_back(name, *vehicle, graph, variables);
     term->write(writer);
     first_data_.push_back(static_cast<int>(data.size()));

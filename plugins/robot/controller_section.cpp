@@ -206,7 +206,7 @@ void ControllerSection::add_terms(Controller::Setup& setup) const {
   for (const Settings& item : list.items()) {
     const PluginChoice choice = in_list.choice(item);
     if (choice.name.empty()) throw item.error("a term without a name; expected the key 'name' with that of a term");
-    setup.problem.terms.push_back({choice.name, in_list.make(context_->host, item)});
+    setup.problem.terms.push_back({choice.name, in_list.make(context_->host, item), choice.options});
     // One by one, so that a vehicle that does not suit is told where the term stands.
     try {
       TermFunctions(*context_->model, {setup.problem.terms.back()});

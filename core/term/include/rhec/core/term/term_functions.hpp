@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rhec/core/base/export.hpp"
+#include "rhec/core/config/settings.hpp"
 #include "rhec/core/formula/tape.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/term/term.hpp"
@@ -13,10 +14,11 @@
 
 namespace rhec {
 
-/// A term, and what messages call it.
+/// A term, what messages call it, and with which options a plugin of that name makes it again (a map, for files).
 struct NamedTerm {
   std::string name;
   std::shared_ptr<const Term> term;
+  Settings options = {};
 };
 
 /// The formulas of some terms over the stages of a model, with exact first and second derivatives, by the interpreter
@@ -61,6 +63,10 @@ class RHEC_EXPORT TermFunctions {
   const std::vector<std::string>& limit_names() const noexcept { return limit_names_; }
   const std::vector<Loss>& losses() const noexcept { return losses_; }
   /// Numbers of limits and data of a term, and where its data begin.
+  int data_of(std::size_t term) const noexcept {
+    const std::size_t next = term + 1;
+    return (next < first_data_.size() ? first_data_[next] : data_count_) - first_data_[term];
+  }
   int limits_of(std::size_t term) const noexcept { return static_cast<int>(places_[term].size()); }
   int first_data_of(std::size_t term) const noexcept { return first_data_[term]; }
   /// The place in the order of limits of a term's own limit.
