@@ -6,10 +6,10 @@
 // plugins slow_zone
 #include <limits>
 
-#include <rhec/core/term/term.hpp>
-#include <rhec/core/term/term_options.hpp>
-#include <rhec/core/term/term_writer.hpp>
-#include <rhec/plugins/kit/sdk.hpp>
+#include "rhec/core/term/term.hpp"
+#include "rhec/core/term/term_options.hpp"
+#include "rhec/core/term/term_writer.hpp"
+#include "rhec/plugins/kit/sdk.hpp"
 
 namespace {
 
