@@ -111,6 +111,7 @@ HorizonTerms::Horizon HorizonProblem::horizon_of_terms() const noexcept {
 }
 
 int HorizonProblem::limit_count(int stage) const noexcept {
+  if (!terms_.has_limits()) return 0;
   const TermFunctions::Rows* const rows = terms_.rows(stage, intervals(), initial_state() != nullptr);
   return rows ? rows->limits : 0;
 }
