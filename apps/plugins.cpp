@@ -274,16 +274,16 @@ int show(const PluginsArguments& arguments) {
 
 void add_plugins(Program& program) {
   auto arguments = std::make_shared<PluginsArguments>();
-  Command command =
-      program.add("plugins", "Lists the models, blockings, priors and solvers that are found, or says all of one.",
-                  "Examples:\n"
-                  "  rhec plugins\n"
-                  "  rhec plugins gn_rti\n"
-                  "  rhec plugins my_vehicle.yaml       a vehicle's equations\n"
-                  "  rhec plugins my_vehicle.yaml --graph vehicle.svg\n"
-                  "  rhec plugins --doctor              why each file was or was not accepted\n"
-                  "  rhec plugins --json --plugin-path my/plugins",
-                  [arguments] { return show(*arguments); });
+  Command command = program.add(
+      "plugins", "Lists the models, blockings, solvers, priors and terms that are found, or says all of one.",
+      "Examples:\n"
+      "  rhec plugins\n"
+      "  rhec plugins gn_rti\n"
+      "  rhec plugins my_vehicle.yaml       a vehicle's equations\n"
+      "  rhec plugins my_vehicle.yaml --graph vehicle.svg\n"
+      "  rhec plugins --doctor              why each file was or was not accepted\n"
+      "  rhec plugins --json --plugin-path my/plugins",
+      [arguments] { return show(*arguments); });
   command
       .add("name", arguments->name,
            "show this plugin, its options, and what a model has; or a vehicle's equations (*.yaml); a plugin or a file "

@@ -255,7 +255,7 @@ int solve(const SolveArguments& arguments) {
   const bool piped = arguments.problems == "-";
   const std::string name = piped ? "standard input" : arguments.problems;
   const std::string text = piped ? read_standard_input() : sim::read_text(arguments.problems);
-  const std::vector<ProblemRecord> records = sim::read_problems(text, name);
+  std::vector<ProblemRecord> records = sim::read_problems(text, name);
   if (records.empty()) throw Error(fmt::format("{}: no problem in it; expected one on each line", name));
   std::map<std::string, int> longest;
   if (arguments.sequence) longest = longest_of_each(records);
@@ -264,6 +264,7 @@ int solve(const SolveArguments& arguments) {
   Settings options;
   apply_assignments(options, arguments.assignments);
   Destination destination(arguments.out);
+  sim::make_terms(records, host);
   Models models(host);
   std::map<std::string, Bench> benches;  // one for all, or one per sequence
   std::map<std::string, Group> groups;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -116,6 +117,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   problem_.set_intervals(N);
   begins_.assign(N, 0);
   points_.resize(static_cast<std::size_t>(N) + 1);
+  arc_lengths_.assign(points_.size(), 0.0);
   for (int i = 0; i < N; ++i) problem_.set_duration(i, setup_.interval);
   // Move blocking is counted from the start of the horizon, so it is the same in every sample.
   for (std::size_t b = 0; b < setup_.blockings.size(); ++b) {
@@ -126,6 +128,8 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
     for (int i = 1; held_state_[input] >= 0 && i < N; ++i)
       if (!begins_[i]) problem_.input_lower(i, input) = problem_.input_upper(i, input) = 0.0;
   }
+  if (const TermFunctions* terms = problem_.terms().functions())
+    obstacles_.resize(static_cast<std::size_t>(terms->most_obstacles()));
   scratch_.assign(problem_.scratch_size(), 0.0);
   problem_.finish(scratch_);
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
@@ -153,12 +157,20 @@ void Controller::reset() noexcept {
   has_plan_ = prepared_ = false;
   is_finished_ = true;
   fallbacks_ = 0;
+  obstacle_count_ = 0;
   std::fill(last_inputs_.begin(), last_inputs_.end(), std::numeric_limits<double>::quiet_NaN());
 }
 
 void Controller::applied(const double* inputs) noexcept {
   for (std::size_t j = 0; j < last_inputs_.size(); ++j)
     if (!std::isnan(inputs[j])) last_inputs_[j] = inputs[j];
+}
+
+int Controller::set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept {
+  obstacle_count_ = std::min(obstacles.size(), obstacles_.size());
+  std::copy_n(obstacles.begin(), obstacle_count_, obstacles_.begin());
+  seen_ = time;
+  return static_cast<int>(obstacle_count_);
 }
 
 void Controller::plan_inputs(int interval, double* inputs) const noexcept {
@@ -215,17 +227,19 @@ void Controller::choose_straight_motion_within_bounds(double ground_speed) noexc
 void Controller::find_points(double arc_length) noexcept {
   int segment = reference_segment_;
   points_[0] = path_.point_at(arc_length, segment);
+  arc_lengths_[0] = arc_length;
   reference_segment_ = segment;
   const int N = problem_.intervals();
   for (int i = 1; i <= N; ++i) {
     segment = reference_segment_;
     const double there = path_.arc_length_after(arc_length, i * setup_.interval, segment);
     points_[i] = path_.point_at(there, segment);
+    arc_lengths_[i] = there;
   }
 }
 
 /// References and bounds of the horizon that starts at an arc length of the path.
-void Controller::set_reference(double arc_length, const double* parameters) noexcept {
+void Controller::set_reference(double arc_length, const double* parameters, double time) noexcept {
   const Model& vehicle = *vehicle_;
   const Roles& roles = vehicle.description().roles;
   const int N = problem_.intervals(), nx = vehicle.state_count(), nu = vehicle.input_count();
@@ -250,6 +264,16 @@ void Controller::set_reference(double arc_length, const double* parameters) noex
     double* x = problem_.state_reference(i);
     std::copy_n(straight_.data(), nx, x);
     roles.place(target.x, target.y, target.heading, x);
+    problem_.terms().place(i, {.time = time + i * setup_.interval,
+                               .x = target.x,
+                               .y = target.y,
+                               .heading = target.heading + (target.in_reverse ? std::numbers::pi : 0.0),
+                               .speed = target.speed,
+                               .arc_length = arc_lengths_[i],
+                               .left = target.left,
+                               .right = target.right,
+                               .obstacles = {obstacles_.data(), obstacle_count_},
+                               .seen = seen_});
     if (i < N) choose(0.5 * (target.speed + points_[i + 1].speed));
     for (int j = 0; j < nu && i < N; ++j) {
       // The inputs on an interval are states at its end.
@@ -393,7 +417,8 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   std::copy_n(estimate.parameters.data(), np, problem_.given_parameters());
   // What is prepared is linearised with the slip that was expected then.
   if (!prepared_) look_ahead(follower_.arc_length(), estimate.parameters.data());
-  set_reference(follower_.arc_length(), estimate.parameters.data());
+  now_ = estimate.time;
+  set_reference(follower_.arc_length(), estimate.parameters.data(), now_);
   const int heading = vehicle_->description().roles.heading;
   command_.heading_error = heading >= 0 ? angle_difference(estimate.state[heading], command_.reference.heading) : 0.0;
   write_held_inputs();
@@ -448,7 +473,7 @@ void Controller::prepare() noexcept {
   int segment = reference_segment_;
   const double next = path_.arc_length_after(follower_.arc_length(), setup_.interval, segment);
   look_ahead(next, reference_parameters_.data());
-  set_reference(next, reference_parameters_.data());
+  set_reference(next, reference_parameters_.data(), now_ + setup_.interval);
   command_.reference = reference;
   problem_.finish(scratch_);
   if (!shifter_.apply(1, problem_, point_)) return;

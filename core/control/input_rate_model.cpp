@@ -102,6 +102,17 @@ InputRateModel::InputRateModel(std::shared_ptr<const Model> vehicle, std::vector
   description_ = with_rates(about, rated_);
 }
 
+StageVariables InputRateModel::variables_below(const StageVariables& own) const {
+  StageVariables below = own;
+  const auto nx = static_cast<std::size_t>(vehicle_->state_count());
+  below.states.resize(nx);
+  for (std::size_t k = 0; k < rated_.size(); ++k) {
+    Expression& input = below.inputs[static_cast<std::size_t>(rated_[k])];
+    input = own.states[nx + k] + own.duration * input;
+  }
+  return below;
+}
+
 /// The vehicle's inputs, of those that are held before an interval and the inputs of this model.
 void InputRateModel::write_inputs(const double* held, const double* given, double duration,
                                   double* inputs) const noexcept {

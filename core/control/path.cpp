@@ -205,6 +205,7 @@ PathPoint Path::point_on(int i, double arc_length) const noexcept {
           .heading = headings_[i],
           .speed = directions_[i] * speed_on(i, along),
           .curvature = between(curvatures_[i], curvatures_[i + 1], fraction),
+          .in_reverse = directions_[i] < 0.0,
           .left = between(left_[i], left_[i + 1], fraction),
           .right = between(right_[i], right_[i + 1], fraction)};
 }

@@ -26,6 +26,13 @@ SlipAheadModel::SlipAheadModel(std::shared_ptr<const Model> vehicle) : vehicle_(
                             vehicle_->parameter_count(), room));
 }
 
+StageVariables SlipAheadModel::variables_below(const StageVariables& own) const {
+  StageVariables below = own;
+  for (std::size_t j = 0; j < below.parameters.size(); ++j) below.parameters[j] = own.parameters[j] + own.data[j];
+  below.data.clear();
+  return below;
+}
+
 std::size_t SlipAheadModel::rows_scratch(int count) const noexcept {
   const int nz = padded(state_count() + input_count() + 2 * parameter_count());
   return std::max(Model::rows_scratch(count), vehicle_->rows_scratch(count)) + static_cast<std::size_t>(count) * nz + 7;

@@ -69,7 +69,7 @@ void HorizonLinearisation::prepare(const Iterate& iterate, Hessian hessian) noex
 }
 
 void HorizonLinearisation::refresh(const Iterate& iterate) noexcept {
-  if (problem_.has_late_bounds()) problem_.write_bounds(iterate, all_stages(problem_), qp_);
+  if (problem_.has_late_bounds()) problem_.write_bounds(iterate, all_stages(problem_), qp_, scratch_);
   write_cost(all_stages(problem_), iterate, Hessian::none, CostParts::vectors);
 }
 
@@ -109,7 +109,7 @@ void HorizonLinearisation::linearise_stages(const Iterate& iterate, Hessian hess
     options.extension = &extension;
   }
   if (N > 0) dynamics.linearise({0, N - 1}, iterate, options, qp_, scratch_.data());
-  problem_.write_bounds(iterate, all, qp_);
+  problem_.write_bounds(iterate, all, qp_, scratch_);
 }
 
 /// Records that AB and b belong to this iterate; its rows before `first` are already in the cache.
@@ -225,7 +225,7 @@ bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) n
   }
   evaluate_unknown(iterate, hessian, unknown.data(), unknown_count);
   if (is_exact && N != known_intervals_) write_cost({N, N}, iterate, hessian, CostParts::matrices);
-  problem_.write_bounds(iterate, all_stages(problem_), qp_);
+  problem_.write_bounds(iterate, all_stages(problem_), qp_, scratch_);
   move_nodes(steps);
   remember(iterate, count);
   is_extended_ = false;

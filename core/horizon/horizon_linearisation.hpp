@@ -34,7 +34,7 @@ class HorizonLinearisation : public Linearisation {
 
   /// Writes the cost of a range of stages, as HorizonProblem::write_cost.
   virtual double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts) noexcept {
-    return problem_.write_cost(range, iterate, hessian, parts, qp_, scratch_);
+    return problem_.write_costs(range, iterate, hessian, parts, qp_, scratch_);
   }
   /// Data kept for nodes move `steps` nodes towards the front; `same_node(i)` says whether node i still has the same
   /// state.

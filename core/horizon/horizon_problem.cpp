@@ -30,7 +30,10 @@ void assert_ready([[maybe_unused]] const HorizonProblem& problem, [[maybe_unused
 }  // namespace
 
 HorizonProblem::HorizonProblem(std::shared_ptr<const Model> model, const Setup& setup)
-    : model_(std::move(model)), structure_(*model_, setup.structure), substeps_(setup.substeps) {
+    : model_(std::move(model)),
+      structure_(*model_, setup.structure),
+      substeps_(setup.substeps),
+      terms_(setup.terms, *model_, setup.structure.max_intervals) {
   if (substeps_ < 1) throw Error("substeps: expected at least 1 integration step per interval");
   const auto nodes = static_cast<std::size_t>(structure_.capacity().intervals) + 1;
   durations_.assign(nodes, 0.0);
@@ -54,6 +57,7 @@ void HorizonProblem::take_horizon(const HorizonProblem& from) noexcept {
   data_ = from.data_;
   lower_ = from.lower_;
   upper_ = from.upper_;
+  terms_.take_data(from.terms_);
 }
 
 Ocp::StepOperations HorizonProblem::step_operations() const noexcept {
@@ -71,7 +75,8 @@ Ocp::StepOperations HorizonProblem::step_operations() const noexcept {
 
 std::size_t HorizonProblem::scratch_size() const noexcept {
   const auto nodes = static_cast<std::size_t>(structure_.capacity().intervals) + 1;
-  return IntervalDynamics::scratch_size(*model_, structure_, nodes) + cost_scratch_size();
+  const std::size_t of_terms = terms_.scratch_size(structure_);
+  return IntervalDynamics::scratch_size(*model_, structure_, nodes) + std::max(cost_scratch_size(), of_terms);
 }
 
 void HorizonProblem::mark_dynamics(int i, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept {
@@ -96,7 +101,56 @@ double HorizonProblem::evaluate_stages(const Iterate& iterate, double* defects, 
     IntervalDynamics{*model_, structure_, durations_.data(), data_.data(), substeps_}.write_defects(iterate, defects,
                                                                                                     scratch.data());
   if (stage_costs) std::fill_n(stage_costs, intervals() + 1, 0.0);
-  return cost(iterate, stage_costs, scratch);
+  const double total = cost(iterate, stage_costs, scratch);
+  if (!terms_.has_residuals()) return total;
+  return total + terms_.cost(horizon_of_terms(), iterate, stage_costs, scratch.data());
+}
+
+HorizonTerms::Horizon HorizonProblem::horizon_of_terms() const noexcept {
+  return {structure_, durations_.data(), data_.data(), model_->data_count(), initial_state() != nullptr};
+}
+
+int HorizonProblem::limit_count(int stage) const noexcept {
+  if (!terms_.has_limits()) return 0;
+  const TermFunctions::Rows* const rows = terms_.rows(stage, intervals(), initial_state() != nullptr);
+  return rows ? rows->limits : 0;
+}
+
+int HorizonProblem::first_limit(int stage) const noexcept {
+  const TermFunctions::Rows* const rows = terms_.rows(stage, intervals(), initial_state() != nullptr);
+  return rows ? rows->first_limit : 0;
+}
+
+const double* HorizonProblem::limit_linear(int stage) const noexcept {
+  return terms_.functions() ? terms_.functions()->linear() + first_limit(stage) : nullptr;
+}
+
+const double* HorizonProblem::limit_quadratic(int stage) const noexcept {
+  return terms_.functions() ? terms_.functions()->quadratic() + first_limit(stage) : nullptr;
+}
+
+void HorizonProblem::evaluate_limits(const Iterate& iterate, double* values, std::span<double> scratch) const noexcept {
+  assert_ready(*this, iterate, scratch);
+  if (terms_.has_limits()) terms_.evaluate_limits(horizon_of_terms(), iterate, values, scratch.data());
+}
+
+void HorizonProblem::mark_limits(int stage, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept {
+  terms_.mark_limits(horizon_of_terms(), stage, state_flags, control_flags);
+}
+
+double HorizonProblem::write_costs(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts,
+                                   StageQp& qp, std::span<double> scratch) const noexcept {
+  const double total = write_cost(range, iterate, hessian, parts, qp, scratch);
+  return terms_.functions() ? total + add_terms(range, iterate, hessian, parts, qp, scratch) : total;
+}
+
+double HorizonProblem::add_terms(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts,
+                                 StageQp& qp, std::span<double> scratch) const noexcept {
+  return terms_.add_cost(horizon_of_terms(), range, iterate,
+                         {.vectors = parts != CostParts::matrices,
+                          .matrices = parts != CostParts::vectors,
+                          .exact = hessian == Hessian::exact},
+                         qp, scratch.data());
 }
 
 void HorizonProblem::simulate_interval(int interval, Iterate& iterate, std::span<double> scratch) const noexcept {
@@ -115,19 +169,20 @@ double HorizonProblem::linearise(StageRange range, const Iterate& iterate, Hessi
   dynamics.write_sizes(range, initial_state() != nullptr, qp);
   const StageRange steps{range.first, std::min(range.last, intervals() - 1)};
   if (steps.last >= steps.first) dynamics.linearise(steps, iterate, {.hessian = hessian}, qp, scratch.data());
-  write_bounds(iterate, range, qp);
-  return write_cost(range, iterate, hessian, hessian == Hessian::none ? CostParts::vectors : CostParts::all, qp,
-                    scratch);
+  write_bounds(iterate, range, qp, scratch);
+  return write_costs(range, iterate, hessian, hessian == Hessian::none ? CostParts::vectors : CostParts::all, qp,
+                     scratch);
 }
 
 void HorizonProblem::refresh(const Iterate& iterate, StageQp& qp, std::span<double> scratch) const noexcept {
   assert_ready(*this, iterate, scratch);
   RHEC_ASSERT(qp.capacity() == capacity() && qp.intervals() == intervals(), "the QP that `linearise` has filled");
-  if (has_late_bounds()) write_bounds(iterate, all_stages(*this), qp);
-  write_cost(all_stages(*this), iterate, Hessian::none, CostParts::vectors, qp, scratch);
+  if (has_late_bounds()) write_bounds(iterate, all_stages(*this), qp, scratch);
+  write_costs(all_stages(*this), iterate, Hessian::none, CostParts::vectors, qp, scratch);
 }
 
-void HorizonProblem::write_bounds(const Iterate& iterate, StageRange range, StageQp& qp) const noexcept {
+void HorizonProblem::write_bounds(const Iterate& iterate, StageRange range, StageQp& qp,
+                                  std::span<double> scratch) const noexcept {
   const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(range.first) * stride(),
                        count = static_cast<std::ptrdiff_t>(range.last - range.first + 1) * stride();
   transcription_kernels().write_bounds(lower_.data() + first, upper_.data() + first, iterate.row(range.first),
@@ -135,6 +190,7 @@ void HorizonProblem::write_bounds(const Iterate& iterate, StageRange range, Stag
   if (range.first == 0 && initial_state())
     for (int j = 0; j < structure_.capacity().states; ++j)
       qp.initial_step()[j] = initial_state()[j] - iterate.state(0)[j];
+  if (terms_.has_limits()) terms_.write_limits(horizon_of_terms(), range, iterate, qp, scratch.data());
 }
 
 void HorizonProblem::clear_cost(StageRange range, Hessian hessian, CostParts parts, StageQp& qp) const noexcept {
@@ -153,7 +209,8 @@ std::unique_ptr<Linearisation> HorizonProblem::make_linearisation() const {
 }
 
 bool HorizonProblem::keeps_curvature() const noexcept {
-  return has_constant_cost_hessian() && structure_.is_direct() && !structure_.any_start();
+  // With terms, the exact Hessian depends on their data and on multipliers of limits.
+  return !terms_.functions() && has_constant_cost_hessian() && structure_.is_direct() && !structure_.any_start();
 }
 
 void HorizonProblem::simulate_new_interval(int interval, Iterate& iterate, std::span<double> scratch) noexcept {

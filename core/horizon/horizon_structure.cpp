@@ -12,7 +12,7 @@ HorizonStructure::HorizonStructure(const Model& model, const Setup& setup)
       np_(model.parameter_count()),
       lifted_(np_ + static_cast<int>(setup.blocked_inputs.size())) {
   if (setup.max_intervals < 1) throw Error("horizon: expected at least 1 interval; set it to 1 or more");
-  capacity_ = {setup.max_intervals, nx_ + lifted_, nu_};
+  capacity_ = {setup.max_intervals, nx_ + lifted_, nu_, setup.limits};
   for (int j = 0; setup.parameters_are_decided && j < np_; ++j)
     capacity_.controls += std::ranges::count(setup.one_block, j) == 0;
   const auto nodes = static_cast<std::size_t>(setup.max_intervals) + 1;

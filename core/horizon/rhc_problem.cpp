@@ -17,12 +17,25 @@
 #include "rhec/core/kernels/transcription_kernels.hpp"
 
 namespace rhec {
+namespace {
+
+std::shared_ptr<const TermFunctions> functions_of(const Model& model, const std::vector<NamedTerm>& terms) {
+  return terms.empty() ? nullptr : std::make_shared<const TermFunctions>(model, terms);
+}
+
+}  // namespace
+
 RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup)
+    : RhcProblem(model, setup, functions_of(*model, setup.terms)) {}
+
+RhcProblem::RhcProblem(std::shared_ptr<const Model> model, Setup setup, std::shared_ptr<const TermFunctions> terms)
     : HorizonProblem(std::move(model), {{.max_intervals = setup.max_intervals,
                                          .blocked_inputs = setup.blocked_inputs,
                                          .parameters_are_decided = false,
-                                         .one_block = {}},
-                                        setup.substeps}),
+                                         .one_block = {},
+                                         .limits = terms ? terms->limit_count() : 0},
+                                        setup.substeps,
+                                        terms}),
       setup_(std::move(setup)) {
   const ModelDescription& about = this->model().description();
   check_weights("state weights", setup_.state_weights, about.states);

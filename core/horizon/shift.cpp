@@ -59,6 +59,7 @@ void GuessShifter::take_structure(const HorizonProblem& problem) noexcept {
 bool GuessShifter::apply(int steps, HorizonProblem& to, Iterate& guess) noexcept {
   if (intervals_ == 0 || steps < 0 || steps > intervals_ || to.intervals() > kept_.capacity().intervals) return false;
   move_rows(steps, to, guess);
+  if (to.capacity().limits > 0) move_limits(steps, to, guess);
   const bool reaches_end = to.intervals() >= intervals_ - steps;
   for (int c = 0; c < lifted_; ++c) {
     if (reaches_end && is_one_block(c, to) && kept_.costate(intervals_)[nx_ + c] == 0.0) {
@@ -95,16 +96,28 @@ void GuessShifter::move_rows(int steps, const HorizonProblem& to, Iterate& guess
   std::fill_n(guess.row(moved) + row, rest, 0.0);
   std::fill_n(guess.bound_row(moved) + row, rest, 0.0);
   std::copy_n(kept_.costate(steps), static_cast<std::ptrdiff_t>(moved + 1) * row, guess.costate(0));
-  // Limits stay with their stages.
-  if (const int limits = kept_.capacity().limit_row(); limits > 0) {
-    std::copy_n(kept_.limit_bound(steps), static_cast<std::ptrdiff_t>(moved + 1) * limits, guess.limit_bound(0));
-    std::fill_n(guess.limit_bound(moved) + limits, static_cast<std::ptrdiff_t>(N - moved) * limits, 0.0);
-  }
   // Beyond the kept horizon an estimator gets zero costates (no residuals), a controller the last ones.
   const bool given = to.initial_state() != nullptr;
   for (int i = moved + 1; i <= N; ++i)
     for (int j = 0; j < row; ++j) guess.costate(i)[j] = given ? kept_.costate(intervals_)[j] : 0.0;
   for (int j = 0; !given && j < ns; ++j) guess.costate(0)[j] = 0.0;
+}
+
+/// The multipliers of limits. Stages have other limits at the ends of the horizon: those that were not there get zero.
+void GuessShifter::move_limits(int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
+  const bool given = to.initial_state() != nullptr;
+  for (int i = 0; i <= to.intervals(); ++i) {
+    const TermFunctions::Rows* const rows = to.terms().rows(i, to.intervals(), given);
+    double* const multipliers = guess.limit_bound(i);
+    std::fill_n(multipliers, kept_.capacity().limit_row(), 0.0);
+    if (!rows || i + steps > intervals_) continue;
+    const TermFunctions::Rows* const kept = to.terms().rows(i + steps, intervals_, given);
+    for (int r = 0; kept && r < rows->limits; ++r) {
+      const int from = rows->first_limit + r - kept->first_limit;
+      if (from < 0 || from >= kept->limits) continue;
+      multipliers[r] = multiplier_of(kept_.limit_bound(i + steps)[from], to.limit_lower(i)[r], to.limit_upper(i)[r]);
+    }
+  }
 }
 
 bool GuessShifter::is_one_block(int lifted, const HorizonProblem& to) const noexcept {

@@ -13,6 +13,7 @@
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/model/chosen_outputs.hpp"
 #include "rhec/core/prior/prior.hpp"
+#include "rhec/core/term/term.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 
 namespace rhec {
@@ -313,6 +314,9 @@ PluginTrial Host::try_out(const PluginRecord& plugin) const {
       case PluginKind::prior:
         make_prior(plugin.name);
         break;
+      case PluginKind::term:
+        make_term(plugin.name);
+        break;
     }
   } catch (const Error& error) {
     const bool needs = std::any_of(rows.begin(), rows.end(),
@@ -342,6 +346,10 @@ std::shared_ptr<Prior> Host::make_prior(std::string_view name, const Settings& s
   return search_->make<Prior>(PluginKind::prior, name, settings, *this);
 }
 
+std::shared_ptr<Term> Host::make_term(std::string_view name, const Settings& settings) const {
+  return search_->make<Term>(PluginKind::term, name, settings, *this);
+}
+
 std::string_view word_of(PluginKind kind) {
   switch (kind) {
     case PluginKind::model:
@@ -352,6 +360,8 @@ std::string_view word_of(PluginKind kind) {
       return "solver";
     case PluginKind::prior:
       return "prior";
+    case PluginKind::term:
+      return "term";
   }
   return "plugin of an unknown kind";
 }

@@ -103,6 +103,7 @@ Refusal why_contents_not_usable(const Manifest& manifest, const std::string& tit
     case PluginKind::blocking:
     case PluginKind::solver:
     case PluginKind::prior:
+    case PluginKind::term:
       break;
     default:
       return {fmt::format("its kind {} is unknown to this rhec", static_cast<int>(manifest.kind)), kRebuild};

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/infinity.hpp"
+#include "rhec/core/term/term.hpp"
 #include "rhec/plugins/robot/bounds_section.hpp"
 #include "rhec/plugins/robot/by_name.hpp"
 #include "rhec/plugins/robot/integration.hpp"
@@ -19,6 +20,7 @@ namespace {
 
 constexpr double position_weight = 1.0, terminal_weight = 10.0, input_weight = 5.0;
 constexpr PluginOption<Blocking> of_input{.otherwise = "unblocked"};
+constexpr PluginOption<Term> in_list{.otherwise = ""};
 
 bool is_position(const ModelDescription& about, std::size_t state) {
   const int j = static_cast<int>(state);
@@ -86,6 +88,16 @@ struct WeightOptions {
   }
 };
 
+OptionRow terms_row() {
+  OptionRow row = in_list.row(
+      "limits and further costs, each a map of its name and its options; see docs/terms.md and 'rhec plugins'");
+  row.name = "";
+  row.type = "list of maps";
+  row.default_value = "[]";
+  row.constraint = "terms by name";
+  return row;
+}
+
 OptionRow blocking_row() {
   OptionRow row = of_input.row(
       "move blocking; its options stand beside the name; an input that is not named is free on every interval");
@@ -117,6 +129,7 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
           .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", at_least(0.0))
           .map("weights", &C::weights, WeightOptions::table().schema())
           .map("rate_bounds", &C::rate_bounds, rate_bounds_by_name().rows())
+          .map("terms", &C::terms, {terms_row()})
           .map("blocking", &C::blocking, {blocking_row()})
           .map("solver", &C::solver,
                {default_solver.row(
@@ -184,6 +197,23 @@ void ControllerSection::add_blockings(Controller::Setup& setup) const {
   }
 }
 
+void ControllerSection::add_terms(Controller::Setup& setup) const {
+  const Settings& list = options_.terms;
+  if (!list.is_null() && list.kind() != Settings::Kind::list)
+    throw list.mismatch("a list of terms, e.g. [{name: corridor, left: 1.5}]");
+  for (const Settings& item : list.items()) {
+    const PluginChoice choice = in_list.choice(item);
+    if (choice.name.empty()) throw item.error("a term without a name; expected the key 'name' with that of a term");
+    setup.problem.terms.push_back({choice.name, in_list.make(context_->host, item), choice.options});
+    // One by one, so that a vehicle that does not suit is told where the term stands.
+    try {
+      TermFunctions(*context_->model, {setup.problem.terms.back()});
+    } catch (const Error& mistake) {
+      throw item.error(mistake.what());
+    }
+  }
+}
+
 std::unique_ptr<Controller> ControllerSection::make(const Path& path, const RobotHooks& hooks,
                                                     std::shared_ptr<const SlipAhead> ahead) const {
   Controller::Setup setup;
@@ -201,6 +231,7 @@ std::unique_ptr<Controller> ControllerSection::make(const Path& path, const Robo
   setup.speed_bound_offset = options_.speed_bound_offset;
   setup.ahead = std::move(ahead);
   add_blockings(setup);
+  add_terms(setup);
   auto solver = hooks.wrap_solver("rhc", default_solver.make(context_->host, options_.solver));
   return std::make_unique<Controller>(integration.context->model, std::move(solver), path, std::move(setup));
 }

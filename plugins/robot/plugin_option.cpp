@@ -14,6 +14,7 @@
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/prior/prior.hpp"
+#include "rhec/core/term/term.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 
 namespace rhec {
@@ -42,6 +43,12 @@ template <>
 struct Maker<Prior> {
   static constexpr auto make = &Host::make_prior;
   static constexpr const char* word = "a prior plugin";
+};
+
+template <>
+struct Maker<Term> {
+  static constexpr auto make = &Host::make_term;
+  static constexpr const char* word = "a term plugin";
 };
 
 /// The name of a model whose equations stand in the configuration, among its options.
@@ -122,5 +129,6 @@ template struct PluginOption<Model>;
 template struct PluginOption<Blocking>;
 template struct PluginOption<Solver>;
 template struct PluginOption<Prior>;
+template struct PluginOption<Term>;
 
 }  // namespace rhec

@@ -80,6 +80,9 @@ void check_guess(const ProblemRecord& record, const HorizonProblem& problem) {
   check("costates", record.guess->costates, states, state);
   check("state_bounds", record.guess->state_bounds, states, state);
   check("control_bounds", record.guess->control_bounds, controls, control);
+  check(
+      "limit_bounds", record.guess->limit_bounds, [&](int node) { return problem.limit_count(node); },
+      "the limits of the terms at this node");
 }
 
 int ModelNames::index_of(const std::vector<Variable>& variables, const std::string& name) {

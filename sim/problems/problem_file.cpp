@@ -104,7 +104,8 @@ void read_bounds(const LineValue& bounds, const ProblemFormat& format, ProblemRe
 }
 
 void read_guess(const LineValue& guess, ProblemRecord& record) {
-  guess.allow({"states", "controls", "costates", "state_bounds", "control_bounds"});
+  guess.allow({"states", "controls", "costates", "state_bounds", "control_bounds"}, {{4, {"limit_bounds"}}},
+              record.version);
   const auto N = static_cast<std::size_t>(record.intervals);
   constexpr std::string_view by_node = "one for each node of the horizon", by_interval = "one for each interval";
   ProblemRecord::Guess rows;
@@ -113,6 +114,7 @@ void read_guess(const LineValue& guess, ProblemRecord& record) {
   if (guess.has("costates")) rows.costates = guess["costates"].ragged(N + 1, by_node);
   if (guess.has("state_bounds")) rows.state_bounds = guess["state_bounds"].ragged(N + 1, by_node);
   if (guess.has("control_bounds")) rows.control_bounds = guess["control_bounds"].ragged(N, by_interval);
+  if (guess.has("limit_bounds")) rows.limit_bounds = guess["limit_bounds"].ragged(N + 1, by_node);
   record.guess = std::move(rows);
 }
 
@@ -250,6 +252,7 @@ std::string problem_line(const ProblemRecord& record) {
     add("costates", record.guess->costates);
     add("state_bounds", record.guess->state_bounds);
     add("control_bounds", record.guess->control_bounds);
+    add("limit_bounds", record.guess->limit_bounds);
   }
   if (!record.origin.empty())
     line["origin"] = map_of(record.origin, [](const std::string& text) { return Json(text); });

@@ -15,6 +15,7 @@
 #include "rhec/core/model/implicit_model.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/prior/process_model.hpp"
+#include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -26,6 +27,8 @@ ProblemRecord::Guess guess_of(const HorizonProblem& problem, const Iterate& poin
     guess.states.push_back(copied(point.state(i), states));
     guess.costates.push_back(copied(point.costate(i), states));
     guess.state_bounds.push_back(copied(point.state_bound(i), states));
+    if (problem.capacity().limits > 0)
+      guess.limit_bounds.push_back(copied(point.limit_bound(i), problem.limit_count(i)));
     if (i == problem.intervals()) break;
     guess.controls.push_back(copied(point.control(i), problem.control_count(i)));
     guess.control_bounds.push_back(copied(point.control_bound(i), problem.control_count(i)));
@@ -95,6 +98,21 @@ std::shared_ptr<const Model> as_integrated(const ProblemRecord& record, std::sha
   return std::make_shared<const ImplicitModel>(std::move(model));
 }
 
+void make_terms(std::span<ProblemRecord> records, const Host& host) {
+  std::map<std::string, std::shared_ptr<const Term>> made;
+  for (ProblemRecord& record : records)
+    for (std::size_t k = 0; k < record.terms.size(); ++k) {
+      NamedTerm& wanted = record.terms[k].made;
+      std::shared_ptr<const Term>& term = made[wanted.name + json_text(wanted.options)];
+      try {
+        if (!term) term = host.make_term(wanted.name, wanted.options);
+      } catch (const Error& mistake) {
+        throw Error(at_key(record.where, fmt::format("terms[{}]", k), mistake.what()));
+      }
+      wanted.term = term;
+    }
+}
+
 std::unique_ptr<HorizonProblem> build(const ProblemRecord& record, std::shared_ptr<const Model> model,
                                       int max_intervals, std::vector<int> one_block) {
   return problem_format(record.kind)
@@ -136,6 +154,7 @@ void start(const ProblemRecord& record, const HorizonProblem& problem, Iterate& 
   copy(record.guess->costates, [&](int node) { return guess.costate(node); });
   copy(record.guess->state_bounds, [&](int node) { return guess.state_bound(node); });
   copy(record.guess->control_bounds, [&](int interval) { return guess.control_bound(interval); });
+  copy(record.guess->limit_bounds, [&](int node) { return guess.limit_bound(node); });
 }
 
 }  // namespace rhec::sim

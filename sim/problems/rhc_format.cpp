@@ -92,6 +92,10 @@ RhcProblem::Setup control_setup_of(const ProblemRecord& record, const Model& mod
     setup.blocked_inputs.push_back(ModelNames::index_of(about.inputs, name));
   std::sort(setup.blocked_inputs.begin(), setup.blocked_inputs.end());
   setup.rates = rates_of(model);
+  for (const ProblemRecord::PosedTerm& term : record.terms) {
+    if (!term.made.term) throw Error(fmt::format("{}: terms that were not made; call make_terms first", record.where));
+    setup.terms.push_back(term.made);
+  }
   return setup;
 }
 
@@ -100,6 +104,61 @@ ProblemRecord::Interval input_bounds(const ProblemRecord& record, const std::str
     return at->second[interval];
   const auto at = record.bounds.find(name);
   return at == record.bounds.end() ? ProblemRecord::Interval{-unbounded, unbounded} : at->second;
+}
+
+/// Data and bounds of terms at every node, which have to fit the terms.
+void fill_terms(const ProblemRecord& record, RhcProblem& problem) {
+  for (std::size_t t = 0; t < record.terms.size(); ++t) {
+    const ProblemRecord::PosedTerm& term = record.terms[t];
+    const TermFunctions& functions = *problem.terms().functions();
+    const auto numbers = static_cast<std::size_t>(functions.data_of(t)),
+               limits = static_cast<std::size_t>(functions.limits_of(t));
+    for (int i = 0; i <= record.intervals; ++i) {
+      const auto node = static_cast<std::size_t>(i);
+      const auto check = [&](const char* key, const std::vector<double>& row, std::size_t count) {
+        if (row.size() != count)
+          throw Error(at_key(record.where, fmt::format("terms[{}].{}[{}]", t, key, i),
+                             fmt::format("{} numbers, expected {} for the term '{}' with these options", row.size(),
+                                         count, term.made.name)));
+      };
+      check("data", term.data[node], numbers);
+      check("lower", term.lower[node], limits);
+      check("upper", term.upper[node], limits);
+      std::copy_n(term.data[node].begin(), numbers, problem.terms().data(i) + functions.first_data_of(t));
+      for (int k = 0; k < functions.limits_of(t); ++k) {
+        problem.terms().lower(i)[functions.place_of(t, k)] = term.lower[node][static_cast<std::size_t>(k)];
+        problem.terms().upper(i)[functions.place_of(t, k)] = term.upper[node][static_cast<std::size_t>(k)];
+      }
+    }
+  }
+}
+
+std::vector<ProblemRecord::PosedTerm> terms_of(const RhcProblem& problem) {
+  std::vector<ProblemRecord::PosedTerm> all;
+  for (std::size_t t = 0; t < problem.setup().terms.size(); ++t) {
+    ProblemRecord::PosedTerm& term = all.emplace_back(ProblemRecord::PosedTerm{problem.setup().terms[t], {}, {}, {}});
+    const TermFunctions& functions = *problem.terms().functions();
+    for (int i = 0; i <= problem.intervals(); ++i) {
+      term.data.push_back(copied(problem.terms().data(i) + functions.first_data_of(t), functions.data_of(t)));
+      std::vector<double>&lower = term.lower.emplace_back(), &upper = term.upper.emplace_back();
+      for (int k = 0; k < functions.limits_of(t); ++k) {
+        lower.push_back(problem.terms().lower(i)[functions.place_of(t, k)]);
+        upper.push_back(problem.terms().upper(i)[functions.place_of(t, k)]);
+      }
+    }
+  }
+  return all;
+}
+
+/// Rows whose null stands for no bound.
+ProblemRecord::Rows read_rows_of_bounds(const LineValue& rows, double none, std::size_t count) {
+  ProblemRecord::Rows all;
+  for (const LineValue& row : rows.items("a list of rows")) {
+    std::vector<double>& to = all.emplace_back();
+    for (const LineValue& item : row.items("a list of numbers")) to.push_back(item.number_or(none));
+  }
+  if (all.size() != count) throw rows.error(fmt::format("{} rows, expected {}: one for each node", all.size(), count));
+  return all;
 }
 
 void fill(const ProblemRecord& record, RhcProblem& problem) {
@@ -122,6 +181,7 @@ void fill(const ProblemRecord& record, RhcProblem& problem) {
       problem.input_upper(i, static_cast<int>(j)) = upper;
     }
   }
+  fill_terms(record, problem);
   for (const int input : problem.setup().blocked_inputs)
     problem.set_blocks(input, begins_of(record, about.inputs[input].name).data());
   std::vector<double> scratch(problem.scratch_size());
@@ -134,7 +194,8 @@ bool fits(const RhcProblem::Setup& wanted, const RhcProblem::Setup& there) {
          wanted.state_weights == there.state_weights && wanted.input_weights == there.input_weights &&
          wanted.terminal_weights == there.terminal_weights && wanted.state_lower == there.state_lower &&
          wanted.state_upper == there.state_upper && wanted.blocked_inputs == there.blocked_inputs &&
-         wanted.rates == there.rates;
+         wanted.rates == there.rates &&
+         std::ranges::equal(wanted.terms, there.terms, {}, &NamedTerm::term, &NamedTerm::term);
 }
 
 class RhcFormat final : public ProblemFormat {
@@ -143,7 +204,7 @@ class RhcFormat final : public ProblemFormat {
       : ProblemFormat({.kind = "rhc",
                        .keys = {"version", "id", "problem", "model", "horizon", "initial_state", "parameters",
                                 "reference", "weights", "bounds", "block_starts"},
-                       .added = {{2, {"guess", "origin"}}, {3, {"rates"}}},
+                       .added = {{2, {"guess", "origin"}}, {3, {"rates"}}, {4, {"terms"}}},
                        .has_interval_bounds = true}) {}
 
   void read(const LineValue& line, ProblemRecord& record) const override {
@@ -156,8 +217,19 @@ class RhcFormat final : public ProblemFormat {
     record.stage_weights = read_named_weights(weights["stage"]);
     record.terminal_weights = read_named_weights(weights["terminal"]);
     if (line.has("block_starts")) read_block_starts(line["block_starts"], record);
-    if (!line.has("rates")) return;
-    for (const LineValue& name : line["rates"].items("a list of inputs")) record.rates.push_back(name.text());
+    if (line.has("rates"))
+      for (const LineValue& name : line["rates"].items("a list of inputs")) record.rates.push_back(name.text());
+    if (!line.has("terms")) return;
+    const auto nodes = static_cast<std::size_t>(record.intervals) + 1;
+    for (const LineValue& item : line["terms"].items("a list of terms")) {
+      item.allow({"name", "options", "data", "lower", "upper"});
+      ProblemRecord::PosedTerm& term = record.terms.emplace_back();
+      term.made.name = item["name"].text();
+      term.made.options = item["options"].settings();
+      term.data = item["data"].ragged(nodes, "one for each node of the horizon");
+      term.lower = read_rows_of_bounds(item["lower"], -unbounded, nodes);
+      term.upper = read_rows_of_bounds(item["upper"], unbounded, nodes);
+    }
   }
 
   void write(const ProblemRecord& record, Json& line) const override {
@@ -167,6 +239,12 @@ class RhcFormat final : public ProblemFormat {
     line["weights"] = {{"stage", map_of(record.stage_weights, number_or_null)},
                        {"terminal", map_of(record.terminal_weights, number_or_null)}};
     if (!record.rates.empty()) line["rates"] = record.rates;
+    for (const ProblemRecord::PosedTerm& term : record.terms)
+      line["terms"].push_back({{"name", term.made.name},
+                               {"options", json_of(term.made.options)},
+                               {"data", rows_of(term.data)},
+                               {"lower", rows_of(term.lower)},
+                               {"upper", rows_of(term.upper)}});
     if (!record.block_starts.empty())
       line["block_starts"] = map_of(record.block_starts, [](const std::vector<int>& starts) { return Json(starts); });
   }
@@ -184,6 +262,7 @@ class RhcFormat final : public ProblemFormat {
           "{}: the problem's rates are not those of its model; give RhcProblem::Setup::rates the inputs and "
           "states of an InputRateModel, in their order",
           record.id));
+    record.terms = terms_of(problem);
     record.initial_state = copied(problem.initial_state(), nx);
     record.parameters = copied(problem.initial_state() + nx, np);
     for (int j = 0; j < nx; ++j) {

@@ -27,11 +27,12 @@ MAY_USE = {
     "models": ("core", "plugins"),
     "blocking": ("core", "plugins"),
     "priors": ("core", "plugins"),
+    "terms": ("core", "plugins"),
     "sim": ("core", "plugins", "sim"),
     "apps": ("core", "plugins", "sim", "apps"),
     "benchmarks": ("core", "plugins", "sim"),
 }
-PLUGIN_FOLDERS = ("solvers", "models", "blocking", "priors")
+PLUGIN_FOLDERS = ("solvers", "models", "blocking", "priors", "terms")
 CORE_THIRD_PARTY = ("Eigen", "unsupported/Eigen", "fmt", "xsimd")
 CORE_LIBRARIES = ("libfmt", "libstdc++", "libm.", "libgcc_s", "libc.", "ld-linux", "libasan", "libubsan", "libtsan")
 STANDARD = set("""

@@ -192,7 +192,7 @@ def check_template(home, arguments):
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     expect(result.returncode == 0, f"the README's page on plugins from outside ends with {result.returncode}:\n{result.stdout}")
     expect(not arguments.source.resolve().joinpath("my_robot").exists(), "the page wrote into the source tree")
-    for name in ("articulated", "geometric", "plain_sqp"):
+    for name in ("articulated", "geometric", "plain_sqp", "slow_zone"):
         expect(re.search(rf"^\w+ +{name} .*my_robot/build/{name}\.so$", result.stdout, re.MULTILINE),
                f"'rhec plugins' did not list {name} from where it was built:\n{result.stdout}")
     for out in ("field", "installed", "my_vehicle"):

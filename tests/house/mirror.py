@@ -16,7 +16,7 @@ import tempfile
 import house
 
 # The floors whose sources and tests must mirror each other.
-FLOORS = ("core", "plugins", "solvers", "models", "blocking", "priors", "sim", "apps")
+FLOORS = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "sim", "apps")
 # Folders of tests that are about more than one source: whole suites, and programs in other languages.
 SUITES = {
     "cli": "the commands of apps/, from outside: apps/check.cpp is tested by tests/cli/check.py",
@@ -67,6 +67,7 @@ ALONE = {
     "tests/models/derivatives_test.cpp": "every model that is found",
     "tests/priors/conformance_test.cpp": "every prior that is found",
     "tests/solvers/gn_rti/limits_test.cpp": "limits in both modes of gn_rti",
+    "tests/terms/conformance_test.cpp": "every term that is found, on every model that is found",
     "tests/sim/world/allocation_test.cpp": "paths, ground and the true vehicle, which must not allocate",
 }
 

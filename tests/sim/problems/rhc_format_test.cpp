@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "sim/support/problem_lines.hpp"
 
 namespace rhec::sim {
@@ -56,6 +58,70 @@ TEST(RhcFormat, BuildsTheRatesOfInputs) {
   const ProblemRecord kept = record_of(rhc, nullptr, record.id, record.model, record.model_options);
   EXPECT_THAT(kept.rates, ElementsAre("push"));
   EXPECT_EQ(problem_line(read_problem(problem_line(kept), "set.jsonl", 3)), problem_line(kept));
+}
+
+/// A bicycle in a corridor with an obstacle, and multipliers at its limits.
+TEST(RhcFormat, StoresTermsWithTheirOptionsAndData) {
+  const Host host;
+  const std::shared_ptr<const Model> model = host.make_model("bicycle_slip");
+  RhcProblem::Setup setup;
+  setup.max_intervals = 4;
+  setup.state_weights = setup.terminal_weights = {1.0, 1.0, 0.0, 0.0};
+  setup.input_weights = {5.0, 0.8};
+  for (const auto& [name, options] : {std::pair("lateral_acceleration", "{most: 3, hard: true}"),
+                                      std::pair("obstacles", "{most: 2, obstacles: [{x: 3, radius: 0.5}]}"),
+                                      std::pair("effort", "{weights: {u2: 0.25}}")}) {
+    const Settings made = parse_yaml(options, "test");
+    setup.terms.push_back({name, host.make_term(name, made), made});
+  }
+  RhcProblem problem(model, setup);
+  problem.set_intervals(4);
+  for (int i = 0; i < 4; ++i) problem.set_duration(i, 0.2);
+  for (int i = 0; i <= 4; ++i) problem.terms().place(i, {.time = 0.2 * i, .x = 0.4 * i});
+  problem.given_parameters()[0] = problem.given_parameters()[1] = 0.9;
+  std::vector<double> scratch(problem.scratch_size());
+  problem.finish(scratch);
+  Iterate point(problem.capacity());
+  for (int i = 0; i <= 4; ++i) {
+    point.state(i)[0] = 0.4 * i;
+    if (i < 4) point.control(i)[0] = 2.0 + 0.1 * i;
+    for (int r = 0; r < problem.limit_count(i); ++r) point.limit_bound(i)[r] = 0.1 * (r - i);
+  }
+  const ProblemRecord kept = record_of(problem, &point, "run/rhc/3", "bicycle_slip", Settings::map());
+  const std::string line = problem_line(kept);
+  std::vector<ProblemRecord> read{read_problem(line, "set.jsonl", 3), read_problem(line, "set.jsonl", 4)};
+  EXPECT_THAT(error_of([&] { build(read[0], model); }), ::testing::HasSubstr("make_terms"));
+  make_terms(read, host);
+  EXPECT_EQ(problem_line(read[0]), line);
+  const auto built = build(read[0], model);
+  EXPECT_TRUE(refill(read[1], *built)) << "the same terms";
+  Iterate guess(built->capacity());
+  start(read[0], *built, guess);
+  StageQp expected(problem.capacity()), found(problem.capacity());
+  EXPECT_EQ(problem.linearise(all_stages(problem), point, Hessian::exact, expected, scratch),
+            built->linearise(all_stages(*built), guess, Hessian::exact, found, scratch));
+  for (int i = 0; i <= 4; ++i) {
+    ASSERT_EQ(found.limits(i), expected.limits(i));
+    const auto same = [](const double* a, const double* b, int count) { return std::equal(a, a + count, b); };
+    const int row = expected.stride();
+    EXPECT_TRUE(same(found.G(i), expected.G(i), found.limits(i) * row));
+    EXPECT_TRUE(same(found.limit_lower(i), expected.limit_lower(i), found.limits(i)));
+    EXPECT_TRUE(same(found.limit_upper(i), expected.limit_upper(i), found.limits(i)));
+    EXPECT_TRUE(same(found.limit_linear(i), expected.limit_linear(i), found.limits(i)));
+    EXPECT_TRUE(same(found.H(i), expected.H(i), problem.state_count(i) * row));
+  }
+  const auto wrong = [&](const std::string& from, const std::string& to) {
+    std::vector<ProblemRecord> bad;
+    return error_of([&] {
+      bad.push_back(read_problem(replaced(line, from, to), "set.jsonl", 3));
+      make_terms(bad, host);
+      build(bad[0], model);
+    });
+  };
+  EXPECT_THAT(wrong("\"version\":4", "\"version\":3"), ::testing::HasSubstr("is a key of version 4"));
+  EXPECT_THAT(wrong("\"name\":\"effort\"", "\"name\":\"efort\""), ::testing::HasSubstr("set.jsonl:3: terms[2]: "));
+  EXPECT_THAT(wrong("\"most\":2", "\"most\":3"),
+              ::testing::HasSubstr("terms[1].data[0]: 14 numbers, expected 21 for the term 'obstacles'"));
 }
 
 TEST(RhcFormat, RefillsInPlaceWhatFits) {

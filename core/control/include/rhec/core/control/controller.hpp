@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "rhec/core/control/path.hpp"
@@ -32,7 +33,10 @@ enum class ReferenceSpeed {
 ///
 /// Rates of inputs, (u_i - u_{i-1}) / dt with the input applied last as u_{-1}, can have weights and bounds. The
 /// problem is then that of an InputRateModel. Before the first command u_{-1} is what drives straight ahead, unless
-/// `applied` has said what it is. Allocates in its constructor only.
+/// `applied` has said what it is.
+///
+/// Terms of the problem (RhcProblem::Setup) get the reference of each node, and the obstacles of `set_obstacles`.
+/// Allocates in its constructor only.
 class RHEC_EXPORT Controller {
  public:
   struct Setup {
@@ -75,6 +79,9 @@ class RHEC_EXPORT Controller {
   void applied(const double* inputs) noexcept;
   /// Searches the whole path for the vehicle at the next call, as at the first one.
   void locate() noexcept { is_located_ = false; }
+  /// Says which obstacles there are from now on, as they were at a time on the clock of the estimates [s]: those that
+  /// the terms have room for, the first ones. Returns how many that are. They move on with their velocities.
+  int set_obstacles(std::span<const Obstacle> obstacles, double time) noexcept;
   /// Does work for the next sample in advance; calling it is optional.
   void prepare() noexcept;
   void reset() noexcept;
@@ -101,7 +108,7 @@ class RHEC_EXPORT Controller {
   void choose_straight_motion_within_bounds(double ground_speed) noexcept;
   void find_points(double arc_length) noexcept;
   void bound_speed() noexcept;
-  void set_reference(double arc_length, const double* parameters) noexcept;
+  void set_reference(double arc_length, const double* parameters, double time) noexcept;
   void look_ahead(double arc_length, const double* parameters) noexcept;
   void write_held_inputs() noexcept;
   void start_cold() noexcept;
@@ -123,13 +130,18 @@ class RHEC_EXPORT Controller {
   bool is_located_ = false;  ///< where the vehicle is on the path is known
   // For which the inputs' bounds were made [m/s].
   double bounded_forwards_ = std::numeric_limits<double>::quiet_NaN(), bounded_in_reverse_ = bounded_forwards_;
-  int reference_segment_ = 0;      ///< segment of the path where the last reference began
-  std::vector<PathPoint> points_;  ///< N_c + 1: the reference
+  int reference_segment_ = 0;        ///< segment of the path where the last reference began
+  std::vector<PathPoint> points_;    ///< N_c + 1: the reference
+  std::vector<double> arc_lengths_;  ///< of these [m]
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_, smallest_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
   std::vector<double> last_inputs_;  ///< n_u, applied last; NaN: not known
   std::vector<std::uint8_t> begins_;
+  std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
+  std::size_t obstacle_count_ = 0;
+  double seen_ = 0.0;  ///< when these were there [s]
+  double now_ = 0.0;   ///< time of the last estimate [s]
 };
 
 }  // namespace rhec

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rhec/core/model/model.hpp"
+#include "rhec/core/term/model_layer.hpp"
 
 namespace rhec {
 
@@ -17,7 +18,7 @@ namespace rhec {
 /// limit of rates are a weight and bounds of inputs, and bounds of the vehicle's inputs are bounds of states. States
 /// are [x; c]. Inputs keep their order; one that is a rate is called NAME_rate. Thread-safe and allocation-free as any
 /// model.
-class RHEC_EXPORT InputRateModel final : public Model {
+class RHEC_EXPORT InputRateModel final : public Model, public ModelLayer {
  public:
   /// `rated` are indices of the vehicle's inputs, increasing. Throws Error if there are none, if they are not that, or
   /// if the vehicle has too many variables.
@@ -25,6 +26,8 @@ class RHEC_EXPORT InputRateModel final : public Model {
 
   const Model& vehicle() const noexcept { return *vehicle_; }
   const std::vector<int>& rated() const noexcept { return rated_; }
+  const Model& below() const noexcept override { return *vehicle_; }
+  StageVariables variables_below(const StageVariables& own) const override;
 
   const ModelDescription& description() const noexcept override { return description_; }
   int data_count() const noexcept override { return vehicle_->data_count(); }

@@ -20,12 +20,13 @@ struct Waypoint {
 
 /// A point of the path with the vehicle's reference there.
 struct PathPoint {
-  double x = 0.0;          ///< [m]
-  double y = 0.0;          ///< [m]
-  double heading = 0.0;    ///< of the vehicle [rad], in (-pi, pi]: along the segment, or against it in reverse; at a
-                           ///< waypoint that of the next segment
-  double speed = 0.0;      ///< reference speed over ground [m/s]; negative in reverse
-  double curvature = 0.0;  ///< change of the heading per metre of the path [1/m]
+  double x = 0.0;           ///< [m]
+  double y = 0.0;           ///< [m]
+  double heading = 0.0;     ///< of the vehicle [rad], in (-pi, pi]: along the segment, or against it in reverse; at a
+                            ///< waypoint that of the next segment
+  double speed = 0.0;       ///< reference speed over ground [m/s]; negative in reverse
+  double curvature = 0.0;   ///< change of the heading per metre of the path [1/m]
+  bool in_reverse = false;  ///< the path leads against the heading
   // Room beside the path, as seen along it [m].
   double left = infinity;
   double right = infinity;

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "rhec/core/model/model.hpp"
+#include "rhec/core/term/model_layer.hpp"
 
 namespace rhec {
 
@@ -11,11 +12,14 @@ namespace rhec {
 ///     x_{i+1} = F(x_i, u_i, p + data_i, dt_i).
 ///
 /// So a controller that is given p now plans with the slip that is ahead. Thread-safe and allocation-free as any model.
-class RHEC_EXPORT SlipAheadModel final : public Model {
+class RHEC_EXPORT SlipAheadModel final : public Model, public ModelLayer {
  public:
   /// Throws Error if the vehicle has data of its own, or too many parameters.
   explicit SlipAheadModel(std::shared_ptr<const Model> vehicle);
   const Model& vehicle() const noexcept { return *vehicle_; }
+
+  const Model& below() const noexcept override { return *vehicle_; }
+  StageVariables variables_below(const StageVariables& own) const override;
 
   const ModelDescription& description() const noexcept override { return vehicle_->description(); }
   int data_count() const noexcept override { return vehicle_->parameter_count(); }

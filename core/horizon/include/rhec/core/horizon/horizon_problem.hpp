@@ -9,6 +9,7 @@
 
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/horizon/horizon_structure.hpp"
+#include "rhec/core/horizon/horizon_terms.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/ocp/ocp.hpp"
 
@@ -18,8 +19,8 @@ namespace rhec {
 ///
 /// Stages are those of HorizonStructure; interval i leads from s_i to s_{i+1} by integrating the model over
 /// `duration(i)` in `substeps` Runge-Kutta steps. A kind of problem is defined by its cost: a derived class implements
-/// `cost` and `write_cost`. RheProblem and RhcProblem are such classes; others can be written outside of rhec with this
-/// header alone.
+/// `cost` and `write_cost`. Terms add limits, and further costs. RheProblem and RhcProblem are such classes; others can
+/// be written outside of rhec with this header alone.
 ///
 /// Data are set in place, without allocation. A problem can be copied, but not assigned or moved, since solvers and
 /// linearisations that were set up with it keep a reference.
@@ -42,6 +43,9 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   const double* interval_data(int interval) const noexcept { return data_.data() + at_data(interval); }
   /// The known inputs of an interval (n_u, NaN where unknown), for an initial guess; null if none is known.
   virtual const double* known_inputs(int /*interval*/) const noexcept { return nullptr; }
+  /// The terms of the problem, and their data and bounds at every node.
+  HorizonTerms& terms() noexcept { return terms_; }
+  const HorizonTerms& terms() const noexcept { return terms_; }
   /// The inputs that a guess goes on with behind the end of a plan (n_u, NaN for the last ones); null: the last ones.
   virtual const double* inputs_behind() const noexcept { return nullptr; }
 
@@ -53,6 +57,13 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   const double* state_upper(int node) const noexcept override { return at(upper_, node); }
   const double* control_lower(int i) const noexcept override { return at(lower_, i) + structure_.capacity().states; }
   const double* control_upper(int i) const noexcept override { return at(upper_, i) + structure_.capacity().states; }
+  int limit_count(int stage) const noexcept override;
+  const double* limit_lower(int stage) const noexcept override { return terms_.lower(stage) + first_limit(stage); }
+  const double* limit_upper(int stage) const noexcept override { return terms_.upper(stage) + first_limit(stage); }
+  const double* limit_linear(int stage) const noexcept override;
+  const double* limit_quadratic(int stage) const noexcept override;
+  void evaluate_limits(const Iterate& iterate, double* values, std::span<double> scratch) const noexcept override;
+  void mark_limits(int stage, std::uint8_t* state_flags, std::uint8_t* control_flags) const noexcept override;
   bool has_second_derivatives() const noexcept override { return model_->has_second_derivatives(); }
   /// From the operations of the model (Model::operations) and of a Riccati recursion.
   StepOperations step_operations() const noexcept override;
@@ -76,6 +87,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   struct Setup {
     HorizonStructure::Setup structure;
     int substeps = 1;
+    std::shared_ptr<const TermFunctions> terms = nullptr;  ///< with as many limits as the structure
   };
   /// Throws Error if a number of the set-up is out of range.
   HorizonProblem(std::shared_ptr<const Model> model, const Setup& setup);
@@ -86,7 +98,7 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   int np() const noexcept { return structure_.parameters(); }
   int stride() const noexcept { return structure_.stride(); }
   HorizonStructure& changing_structure() noexcept { return structure_; }
-  /// Copies structure, durations, known data and bounds of a problem of the same capacity.
+  /// Copies structure, durations, known data, bounds and data of terms of a problem of the same capacity.
   void take_horizon(const HorizonProblem& from) noexcept;
 
   /// Bounds of z = [s; w] at every stage, as rows of `stride()` entries. Initially there are none.
@@ -127,11 +139,20 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
     return static_cast<std::ptrdiff_t>(interval) * model_->data_count();
   }
   bool keeps_curvature() const noexcept;
-  void write_bounds(const Iterate& iterate, StageRange range, StageQp& qp) const noexcept;
+  /// Bounds, the initial step, and limits.
+  void write_bounds(const Iterate& iterate, StageRange range, StageQp& qp, std::span<double> scratch) const noexcept;
+  /// `write_cost`, with what terms add.
+  double write_costs(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
+                     std::span<double> scratch) const noexcept;
+  double add_terms(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
+                   std::span<double> scratch) const noexcept;
+  HorizonTerms::Horizon horizon_of_terms() const noexcept;
+  int first_limit(int stage) const noexcept;
 
   std::shared_ptr<const Model> model_;
   HorizonStructure structure_;
   int substeps_;
+  HorizonTerms terms_;
   AlignedDoubles lower_, upper_;
   std::vector<double> durations_, data_;
   /// The interval that `simulate_new_interval` has simulated, with its derivatives.

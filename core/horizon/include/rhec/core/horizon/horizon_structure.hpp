@@ -32,6 +32,7 @@ class RHEC_EXPORT HorizonStructure {
     std::vector<int> blocked_inputs;      ///< inputs that are lifted variables
     bool parameters_are_decided = false;  ///< blocks of parameters may start within the horizon,
     std::vector<int> one_block;           ///< except for these parameters
+    int limits = 0;                       ///< rows of a stage, at most
   };
   /// Throws Error if the horizon has no interval.
   HorizonStructure(const Model& model, const Setup& setup);

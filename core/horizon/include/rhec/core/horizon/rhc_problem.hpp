@@ -17,6 +17,8 @@ struct CostView;
 ///     minimise  sum_{i=0}^{N-1} || x_i - xref_i ||^2_Vx + || u_i - uref_i ||^2_Vu  +  || x_N - xref_N ||^2_VN
 ///     subject to the dynamics, bounds on the states of nodes 1 .. N and on the inputs.
 ///
+/// Terms add limits and further costs; their data are set node by node (HorizonProblem::terms).
+///
 /// p is embedded like the initial state: it is part of the given initial stage state, so that both may arrive after the
 /// problem has been linearised. Inputs may be blocked. Data are set in place, without allocation; call `finish` after
 /// changing the structure, the initial state, or the bounds.
@@ -37,6 +39,7 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
     std::vector<double> input_lower, input_upper;  ///< n_u; empty: the model's own bounds
     std::vector<int> blocked_inputs;               ///< inputs that are blocked
     std::vector<Rate> rates = {};                  ///< inputs that are rates; beyond the horizon they are 0
+    std::vector<NamedTerm> terms = {};             ///< limits and further costs
   };
   RhcProblem(std::shared_ptr<const Model> model, Setup setup);
 
@@ -73,6 +76,8 @@ class RHEC_EXPORT RhcProblem final : public HorizonProblem {
   const double* inputs_behind() const noexcept override { return behind_.empty() ? nullptr : behind_.data(); }
 
  private:
+  RhcProblem(std::shared_ptr<const Model> model, Setup setup, std::shared_ptr<const TermFunctions> terms);
+
   std::ptrdiff_t at(int stage) const noexcept { return static_cast<std::ptrdiff_t>(stage) * stride(); }
 
   double cost(const Iterate& iterate, double* stage_costs, std::span<double> scratch) const noexcept override;

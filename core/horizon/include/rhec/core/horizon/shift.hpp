@@ -41,6 +41,7 @@ class RHEC_EXPORT GuessShifter {
   double gradient(int interval, int lifted) const noexcept;
   int kept_control(int interval, int lifted) const noexcept { return controls_[interval * lifted_ + lifted]; }
   void move_rows(int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
+  void move_limits(int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
   bool is_one_block(int lifted, const HorizonProblem& to) const noexcept;
   void extend_lifted(int lifted, int steps, const HorizonProblem& to, Iterate& guess) const noexcept;
   void move_lifted(int lifted, int steps, const HorizonProblem& to, Iterate& guess) const noexcept;

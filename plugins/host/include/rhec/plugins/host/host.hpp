@@ -15,6 +15,7 @@ class Model;
 class Blocking;
 class Solver;
 class Prior;
+class Term;
 
 /// A directory that is searched for plugins.
 struct PluginPlace {
@@ -86,6 +87,7 @@ class RHEC_EXPORT Host {
   std::shared_ptr<Solver> make_solver(std::string_view name, const Settings& settings = {}) const;
   /// To be set up for a parameter.
   std::shared_ptr<Prior> make_prior(std::string_view name, const Settings& settings = {}) const;
+  std::shared_ptr<Term> make_term(std::string_view name, const Settings& settings = {}) const;
 
   /// The options of a plugin. Throws Error as above.
   std::vector<OptionRow> options(PluginKind kind, std::string_view name) const;
@@ -103,7 +105,7 @@ class RHEC_EXPORT Host {
   std::shared_ptr<Search> search_;
 };
 
-/// "model", "blocking", "solver" or "prior".
+/// "model", "blocking", "solver", "prior" or "term".
 RHEC_EXPORT std::string_view word_of(PluginKind kind);
 
 }  // namespace rhec

@@ -15,7 +15,8 @@ enum class PluginKind : std::int32_t {
   model = 1,     ///< rhec::Model
   blocking = 2,  ///< rhec::Blocking
   solver = 3,    ///< rhec::Solver
-  prior = 4      ///< rhec::Prior
+  prior = 4,     ///< rhec::Prior
+  term = 5       ///< rhec::Term
 };
 
 /// "RHECPLUG", in memory order.
@@ -23,8 +24,8 @@ inline constexpr std::uint64_t kManifestMagic = 0x47554C5043454852u;
 /// Incremented when the layout of Manifest changes.
 inline constexpr std::uint32_t kManifestAbi = 1;
 /// Incremented when an interface that plugins implement or receive changes: Model, Blocking, Solver, Prior,
-/// Settings, OptionRow.
-inline constexpr std::uint32_t kInterfaceRevision = 4;
+/// Term, Settings, OptionRow.
+inline constexpr std::uint32_t kInterfaceRevision = 5;
 /// The name of the one symbol that a plugin exports.
 inline constexpr const char* kManifestSymbol = "rhec_plugin_manifest";
 

@@ -26,13 +26,14 @@
 /// searches. A class whose name contains a comma needs an alias. A plugin without options declares `using Options =
 /// rhec::NoOptions`. The constructor throws rhec::Error if its options are inconsistent; destructors do not throw. The
 /// file with this line includes the interface that the plugin implements (rhec/core/model/model.hpp, blocking.hpp,
-/// solver.hpp or prior.hpp).
+/// solver.hpp, prior.hpp, or rhec/core/term/term.hpp).
 namespace rhec {
 
 class Model;
 class Blocking;
 class Solver;
 class Prior;
+class Term;
 
 /// The author's description of a plugin; see Manifest for the meaning. `name` and `version` are required.
 struct PluginInfo {
@@ -74,6 +75,11 @@ template <>
 struct PluginInterface<PluginKind::prior> {
   using Type = Prior;
   static constexpr const char* word = "prior";
+};
+template <>
+struct PluginInterface<PluginKind::term> {
+  using Type = Term;
+  static constexpr const char* word = "term";
 };
 
 /// The functions of a manifest for a class `Product`; they turn every exception into a message.

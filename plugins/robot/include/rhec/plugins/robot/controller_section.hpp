@@ -21,7 +21,7 @@ struct RHEC_EXPORT ControllerOptions {
   double least_speed_factor = Controller::Setup{}.least_speed_factor;
   double speed_bound_factor = Controller::Setup{}.speed_bound_factor;
   double speed_bound_offset = Controller::Setup{}.speed_bound_offset;
-  Settings weights, rate_bounds, blocking, solver;
+  Settings weights, rate_bounds, terms, blocking, solver;
   static const OptionTable<ControllerOptions>& table();
 };
 
@@ -40,6 +40,7 @@ class RHEC_EXPORT ControllerSection {
  private:
   void add_problem(Controller::Setup& setup) const;
   void add_blockings(Controller::Setup& setup) const;
+  void add_terms(Controller::Setup& setup) const;
 
   std::shared_ptr<const RobotContext> context_;
   Settings section_;  ///< as written, for error messages

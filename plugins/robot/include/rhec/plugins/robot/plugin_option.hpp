@@ -16,7 +16,7 @@ struct PluginChoice {
 };
 
 /// A part of a configuration that names a plugin: a map of `name` and the plugin's options, or just the name. Product
-/// is Model, Blocking, Solver or Prior.
+/// is Model, Blocking, Solver, Prior or Term.
 template <class Product>
 struct RHEC_EXPORT PluginOption {
   const char* otherwise;  ///< the plugin if none is named

@@ -12,6 +12,7 @@
 #include "rhec/core/config/settings.hpp"
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/horizon/horizon_problem.hpp"
+#include "rhec/plugins/host/host.hpp"
 
 namespace rhec::sim {
 
@@ -43,6 +44,7 @@ struct ProblemRecord {
   /// control_bounds N, each as long as its stage; empty multipliers are zero.
   struct Guess {
     Rows states, controls, costates, state_bounds, control_bounds;
+    Rows limit_bounds;  ///< N+1 rows, or empty
   };
   std::optional<Guess> guess;
 
@@ -77,6 +79,12 @@ struct ProblemRecord {
   /// Inputs that are states, with their rates as inputs (InputRateModel). Then states, inputs, reference, weights and
   /// bounds are those of that model.
   std::vector<std::string> rates;
+  /// Terms with their data and the bounds of their limits at each node (N+1 rows), in their own order.
+  struct PosedTerm {
+    NamedTerm made;  ///< without a term until `make_terms`
+    Rows data, lower, upper;
+  };
+  std::vector<PosedTerm> terms;
 
   /// Sets the id, and derives prefix and step from it.
   RHEC_EXPORT void set_id(std::string text);
@@ -86,6 +94,9 @@ struct ProblemRecord {
 
 /// The model with the integrator of a record: an ImplicitModel, or none. Throws Error if there is none.
 RHEC_EXPORT std::shared_ptr<const Model> as_integrated(const ProblemRecord& record, std::shared_ptr<const Model> model);
+/// Makes the terms of records that were read; those with the same name and options are one. Throws Error with the line
+/// of a term that is not found, or does not accept its options. Needed before `build`, if a record has terms.
+RHEC_EXPORT void make_terms(std::span<ProblemRecord> records, const Host& host);
 
 /// Builds the problem of a record, ready for a solver, with capacity for `max_intervals` (at least the record's own,
 /// and 1). For estimation, `one_block` lists parameters that always remain a single block. Variables without an entry

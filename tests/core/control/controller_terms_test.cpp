@@ -1,0 +1,163 @@
+// A controller whose problem has terms.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "rhec/core/control/controller.hpp"
+#include "rhec/plugins/robot/robot.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+#include "support/allocations.hpp"
+#include "support/error_of.hpp"
+
+namespace rhec {
+namespace controller_terms_test {
+
+using testing::HasSubstr;
+
+constexpr double step = 0.2;
+
+const Host& host() {
+  static const Host found;
+  return found;
+}
+
+/// A bicycle on a straight path that knows where it is and how much it slips.
+struct Drive {
+  explicit Drive(const std::string& controller_section)
+      : robot(host(),
+              RobotOptions::table().parse(
+                  parse_yaml("{model: bicycle_slip, step: 0.2, controller: {" + controller_section + "}}", "test"),
+                  "robot")),
+        controller(robot.make_controller(Path({{0.0, 0.0, 2.0}, {60.0, 0.0, 2.0}}))) {
+    now.state = Eigen::Vector4d(0.0, 0.0, 0.0, 0.0);
+    now.parameters = Eigen::Vector2d(0.9, 0.9);
+  }
+  const Controller::Command& advance() {
+    const Controller::Command& command = controller->control(now);
+    const std::vector<double> inputs = command.inputs;
+    Eigen::VectorXd next(4);
+    robot.model()->integrate({.count = 1,
+                              .states = now.state.data(),
+                              .inputs = inputs.data(),
+                              .parameters = now.parameters.data(),
+                              .durations = &step,
+                              .next_states = next.data()});
+    now.state = next;
+    now.time += step;
+    controller->finish();
+    return command;
+  }
+  double distance(double x, double y) const { return std::hypot(now.state[0] - x, now.state[1] - y); }
+
+  Robot robot;
+  std::unique_ptr<Controller> controller;
+  Estimate now;
+};
+
+constexpr const char* sparse = ", solver: {name: sparse_sqp}";
+
+/// The least distance from an obstacle that starts at (15, 0.2) and moves.
+double least_distance(Drive& drive, double velocity_x) {
+  double least = HUGE_VAL;
+  for (int k = 0; k < 60; ++k) {
+    EXPECT_FALSE(drive.advance().fallback) << k;
+    least = std::min(least, drive.distance(15.0 + velocity_x * drive.now.time, 0.2));
+  }
+  return least;
+}
+
+TEST(ControllerTerms, KeepTheVehicleOutOfObstaclesAndInItsCorridor) {
+  Drive without("horizon: 15"),
+      with(
+          "terms: [{name: obstacles, vehicle_radius: 0.5, obstacles: [{x: 15, y: 0.2, radius: "
+          "1, velocity_x: -0.3}]}, {name: corridor, left: 3, right: 3}]" +
+          std::string(sparse));
+  EXPECT_LT(least_distance(without, -0.3), 0.5);
+  const double least = least_distance(with, -0.3);
+  EXPECT_GT(least, 1.5 - 0.02) << "between nodes it may be a little closer";
+  EXPECT_LT(least, 1.7) << "and it goes no further around than it must";
+  EXPECT_LT(std::abs(with.now.state[1]), 0.2) << "back on the path";
+}
+
+TEST(ControllerTerms, KnowObstaclesThatAreSeenAtRunTime) {
+  Drive drive("terms: [{name: obstacles, vehicle_radius: 0.5, most: 2}]" + std::string(sparse));
+  const Obstacle seen{.x = 15.0, .y = 0.2, .semi_axis_along = 1.0, .semi_axis_across = 1.0, .velocity_x = -0.3};
+  const std::vector<Obstacle> three{seen, {.x = 500.0, .semi_axis_along = 1.0, .semi_axis_across = 1.0}, seen};
+  drive.advance();
+  const long before = allocation_count();
+  EXPECT_EQ(drive.controller->set_obstacles(three, 0.0), 2) << "there is room for two";
+  EXPECT_EQ(allocation_count(), before);
+  EXPECT_GT(least_distance(drive, -0.3), 1.5 - 0.02);
+  EXPECT_EQ(drive.controller->set_obstacles({}, 0.0), 0);
+}
+
+TEST(ControllerTerms, DataThatAreNewSinceThePreparationCount) {
+  const std::string section = "terms: [{name: obstacles, most: 1}], solver: {name: sparse_sqp, hessian: gauss_newton}";
+  Drive plain(section), prepared(section);
+  for (int k = 0; k < 40; ++k) {
+    for (Drive* drive : {&plain, &prepared}) {
+      // It is seen late, and then somewhere else at each sample.
+      const Obstacle seen{.x = 12.0, .y = 0.4 + 0.01 * k, .semi_axis_along = 0.8, .semi_axis_across = 0.8};
+      drive->controller->set_obstacles({&seen, k > 5 ? 1u : 0u}, drive->now.time);
+      drive->advance();
+    }
+    prepared.controller->prepare();
+    EXPECT_NEAR((plain.now.state - prepared.now.state).cwiseAbs().maxCoeff(), 0.0, 2e-3) << k;
+  }
+}
+
+TEST(ControllerTerms, GoWithRatesOfInputsAndBlocks) {
+  for (const char* more :
+       {", weights: {rates: {u2: 0.3}}", ", blocking: {u2: {name: structured, size: 3, anchor: horizon}}"}) {
+    Drive drive(
+        "terms: [{name: obstacles, obstacles: [{x: 15, y: 0.2, radius: 1}]}, {name: lateral_acceleration, most: "
+        "1}, {name: effort, weights: {u2: 0.1}}]" +
+        std::string(sparse) + more);
+    EXPECT_GT(least_distance(drive, 0.0), 1.5 - 0.05) << more;
+  }
+}
+
+TEST(ControllerTerms, DoNotAllocateInTheLoop) {
+  Drive drive("terms: [{name: effort, weights: {u2: 0.5}, delta: 1}], solver: {name: gn_rti}");
+  for (int k = 0; k < 3; ++k) drive.advance();
+  for (int k = 0; k < 5; ++k) {
+    const long before = allocation_count();
+    drive.controller->control(drive.now);
+    drive.controller->prepare();
+    EXPECT_EQ(allocation_count(), before);
+  }
+  // Rows: as a solver evaluates them.
+  const Drive rows(
+      "terms: [{name: obstacles, most: 3, obstacles: [{x: 3}]}, {name: corridor}, {name: "
+      "lateral_acceleration}]" +
+      std::string(sparse));
+  RhcProblem problem(rows.controller->problem());
+  std::vector<double> scratch(problem.scratch_size());
+  problem.finish(scratch);
+  Iterate point = rows.controller->plan();
+  StageQp qp(problem.capacity());
+  std::vector<double> values(static_cast<std::size_t>(problem.intervals() + 1) * problem.capacity().limit_row());
+  const long before = allocation_count();
+  for (int i = 0; i <= problem.intervals(); ++i) problem.terms().place(i, {.time = 0.2 * i, .x = 1.0 * i});
+  problem.linearise(all_stages(problem), point, Hessian::exact, qp, scratch);
+  problem.refresh(point, qp, scratch);
+  problem.evaluate_limits(point, values.data(), scratch);
+  EXPECT_EQ(allocation_count(), before);
+}
+
+TEST(ControllerTerms, AreReadOneByOneAndRefusedInWords) {
+  const auto refused = [](const std::string& section) { return error_of([&] { Drive drive(section); }); };
+  EXPECT_THAT(refused("terms: {name: corridor}"), HasSubstr("controller.terms: found a map, expected a list of terms"));
+  EXPECT_THAT(refused("terms: [{left: 3}]"), HasSubstr("controller.terms[0]: a term without a name"));
+  EXPECT_THAT(refused("terms: [{name: corridr}]"), HasSubstr("did you mean 'corridor'?"));
+  EXPECT_THAT(refused("terms: [{name: corridor, lefft: 3}]"), HasSubstr("did you mean 'left'?"));
+  EXPECT_THAT(refused("terms: [{name: corridor, soft: {liner: 3}}]"), HasSubstr("did you mean 'linear'?"));
+  EXPECT_THAT(refused("terms: [corridor, {name: effort, weights: {u3: 1}}]" + std::string(sparse)),
+              HasSubstr("controller.terms[1]: term 'effort': the model 'bicycle_slip' has no input 'u3'"));
+}
+
+}  // namespace controller_terms_test
+}  // namespace rhec
