@@ -9,12 +9,11 @@
 
 #include <fmt/format.h>
 
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/prior/parameter_law.hpp"
 
 namespace rhec {
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// How often each parameter's law is chosen anew, given those of the others.
 constexpr int rounds = 2;

@@ -16,7 +16,6 @@ std::shared_ptr<const ProcessModel> make_process_model(const std::shared_ptr<con
 }
 
 RheProblem make_process_problem(std::shared_ptr<const ProcessModel> model, RheProblem::Setup setup) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   const ModelDescription& vehicle = model->vehicle().description();
   const auto fill_up = [](std::vector<double>& bounds, const std::vector<Variable>& variables, auto bound) {
     if (bounds.empty())

@@ -1,4 +1,5 @@
 #include "rhec/plugins/robot/by_name.hpp"
+#include "rhec/core/base/infinity.hpp"
 
 #include <cmath>
 #include <limits>
@@ -16,7 +17,6 @@ double FiniteValue::read(const Settings& from, const OptionContext& context) con
 std::pair<double, double> BoundsValue::read(const Settings& from, const OptionContext&) const {
   if (from.kind() != Settings::Kind::list || from.items().size() != 2)
     throw from.mismatch("a list [lower, upper]; null for no bound");
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   const Settings &first = from.items()[0], &second = from.items()[1];
   const double low = first.is_null() ? -infinity : first.as_number();
   const double high = second.is_null() ? infinity : second.as_number();

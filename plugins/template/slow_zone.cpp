@@ -6,6 +6,7 @@
 // plugins slow_zone
 #include <limits>
 
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/term/term.hpp"
 #include "rhec/core/term/term_options.hpp"
 #include "rhec/core/term/term_writer.hpp"
@@ -38,9 +39,8 @@ class SlowZone final : public rhec::Term {
   }
   /// What differs from node to node: no data here, but the bounds.
   void write_data(const rhec::TermPlace& place, double*, double* lower, double* upper) const noexcept override {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
     const bool is_inside = place.arc_length >= options_.from && place.arc_length <= options_.to;
-    *lower = -infinity;
+    *lower = -rhec::infinity;
     *upper = is_inside ? options_.most : infinity;
   }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/base/infinity.hpp"
 #include "rhec/core/term/term.hpp"
 #include "rhec/core/term/term_options.hpp"
 #include "rhec/core/term/term_writer.hpp"
@@ -103,7 +104,6 @@ class Obstacles final : public Term {
   }
 
   void write_data(const TermPlace& place, double* data, double* lower, double* upper) const noexcept override {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
     std::fill_n(upper, most_, infinity);
     int k = 0;
     const auto add = [&](const Obstacle& obstacle, double seconds) {

@@ -1,4 +1,5 @@
 #include "rhec/plugins/robot/bounds_section.hpp"
+#include "rhec/core/base/infinity.hpp"
 
 #include <gmock/gmock.h>
 
@@ -26,7 +27,6 @@ TEST(BoundsSection, AreTheModelsOwnWhereNoneAreGiven) {
 }
 
 TEST(BoundsSection, AreReadByNameOfAnyKind) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   const ModelDescription bounded =
       BoundsSection(settings("{y_pos: [-3, null], u1: [0, 4], mu: [0.25, 0.75]}"), own()).bounded();
   EXPECT_THAT(lower_bounds_of(bounded.states), ElementsAre(-infinity, -3.0, -infinity, own().states[3].lower));

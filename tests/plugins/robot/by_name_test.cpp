@@ -1,5 +1,6 @@
 // Options by the names of variables: read, checked and documented from one table.
 #include "rhec/plugins/robot/by_name.hpp"
+#include "rhec/core/base/infinity.hpp"
 
 #include <gmock/gmock.h>
 
@@ -73,7 +74,6 @@ TEST(NumbersByName, DocumentsEachKind) {
 }
 
 TEST(BoundsValue, ReadsPairsOfWhichNullIsNone) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   EXPECT_THAT(BoundsValue{}.read(settings("[-1, 2]"), {}), Pair(-1.0, 2.0));
   EXPECT_THAT(BoundsValue{}.read(settings("[null, 2]"), {}), Pair(-infinity, 2.0));
   EXPECT_THAT(BoundsValue{}.read(settings("[1, null]"), {}), Pair(1.0, infinity));

@@ -1,4 +1,5 @@
 #include "rhec/sim/numbers/spread.hpp"
+#include "rhec/core/base/infinity.hpp"
 
 #include <gtest/gtest.h>
 
@@ -41,7 +42,6 @@ TEST(Spread, WhatIsMissingDoesNotCount) {
 }
 
 TEST(Spread, WhatIsInfiniteCounts) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   const Spread spread = spread_of({infinity, 1.0, 2.0});
   EXPECT_EQ(spread.median, 2.0);
   EXPECT_EQ(spread.max, infinity);
