@@ -146,7 +146,7 @@ class Test(cli.Findings):
         line = lines_of(good)[1]
         file = self.work / "bad.jsonl"
         for change, words in [
-                ({"version": 4}, ["version: found 4, expected 1 .. 3"]),
+                ({"version": 5}, ["version: found 5, expected 1 .. 4"]),
                 ({"version": 1}, ["is a key of version 2; add \"version\": 2"]),
                 ({"gues": {}}, ["gues: unknown key; did you mean 'guess'?"]),
                 ({"guess": {"states": line["guess"]["states"]}}, ["guess.controls: missing"]),
