@@ -61,7 +61,7 @@ class Test(cli.Findings):
         self.expect(len(problems) == len(solutions) > 0, name, f"{len(problems)} problems, {len(solutions)} solutions")
         for problem, solution in zip(problems, solutions):
             origin = problem["origin"]
-            self.expect(problem["version"] == 3 and problem["id"] == solution["id"], name, f"{problem['id']}")
+            self.expect(problem["version"] == 4 and problem["id"] == solution["id"], name, f"{problem['id']}")
             self.expect(solution["objective"] == float(origin["objective"]) and solution["status"] == origin["status"]
                         and solution["iterations"] == int(origin["iterations"]), name,
                         f"{problem['id']} was {origin}, is {solution['objective']!r}, {solution['status']}")
