@@ -340,8 +340,7 @@ void RadauPlan::plan_sensitivities() {
   for (int i = 0; i < nx; ++i) {
     const int q = unknown(i, stages - 1);
     for (int c = 0; c < nz_; ++c)
-      if (pattern_at(reached_, q)[static_cast<std::size_t>(c)])
-        moved_[static_cast<std::size_t>(i * nz_ + c)] = row(at_.moved, q) + number(c);
+      if (pattern_at(reached_, q)[static_cast<std::size_t>(c)]) moved_[cell(i, c)] = row(at_.moved, q) + number(c);
   }
 }
 
@@ -396,6 +395,7 @@ void RadauPlan::plan_curvature() {
   for (int s = 0; s < stages; ++s) {
     List& list = curvature_[number(s)];
     std::vector<std::vector<Part>> rows;
+    rows.reserve(na);
     for (int a = 0; a < of_.na(); ++a) rows.push_back(argument_row(a, s));
     std::vector<Pattern> bent(na, Pattern(static_cast<std::size_t>(nz_), 0));
     List products;
@@ -430,8 +430,7 @@ void RadauPlan::plan_curvature() {
   for (int r = 0; r < nz_; ++r)
     for (int c = 0; c <= r; ++c)
       if (filled[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)])
-        hessian_[static_cast<std::size_t>(r * nz_ + c)] = hessian_[static_cast<std::size_t>(c * nz_ + r)] =
-            row(at_.hessian, r) + number(c);
+        hessian_[cell(r, c)] = hessian_[cell(c, r)] = row(at_.hessian, r) + number(c);
 }
 
 long RadauPlan::count(const List& list) {

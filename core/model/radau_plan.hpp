@@ -129,6 +129,9 @@ class RadauPlan {
   std::uint32_t offset(int q, int r) const;
   bool has(int q, int r) const { return fill_[static_cast<std::size_t>(q)][static_cast<std::size_t>(r)] != 0; }
   std::uint32_t row(std::uint32_t matrix, int r) const { return matrix + static_cast<std::uint32_t>(r * nz_); }
+  std::size_t cell(int r, int c) const {
+    return static_cast<std::size_t>(r) * static_cast<std::size_t>(nz_) + static_cast<std::size_t>(c);
+  }
   static std::vector<Part> parts(const Pattern& pattern, std::uint32_t first);
   static void add(List& to, std::uint32_t factor, const std::vector<Part>& row, std::uint32_t sum, int limit);
   std::vector<Part> argument_row(int a, int s) const;

@@ -154,14 +154,24 @@ class RadauSteps::Run {
     }
   }
 
+  /// Without a search for pivots: one of which little is left has lost its digits, and becomes NaN, so that no step is
+  /// found. That takes a mode that grows by e^3 in a step, or more.
   void factor() {
     multiply(plan_.matrix());
+    for (int q = 0; q < plan_.unknowns(); ++q) {
+      const auto s = static_cast<std::size_t>(q % stages);
+      const double own = plan_.method().inverse[s][s];
+      const double* const diagonal = at(plan_.diagonal(q));
+      double* const scale = at(at_.pivots + static_cast<std::uint32_t>(q));
+      for (int i = 0; i < lanes; ++i) scale[i] = own + std::abs(diagonal[i] - own);
+    }
     for (int q = 0; q < plan_.unknowns(); ++q) {
       const double* const diagonal = at(plan_.diagonal(q));
       double* const pivots = at(at_.pivots + static_cast<std::uint32_t>(q));
       double* const minus = at(at_.minus_pivots + static_cast<std::uint32_t>(q));
       for (int i = 0; i < lanes; ++i) {
-        pivots[i] = 1.0 / diagonal[i];
+        const bool is_lost = std::abs(diagonal[i]) < least_pivot * pivots[i];
+        pivots[i] = is_lost ? std::numeric_limits<double>::quiet_NaN() : 1.0 / diagonal[i];
         minus[i] = -pivots[i];
       }
       multiply(plan_.eliminate(q));
@@ -219,7 +229,7 @@ class RadauSteps::Run {
       for (std::uint32_t q = 0; q < static_cast<std::uint32_t>(unknowns); ++q) at(at_.moves + q)[i] = nothing;
     }
   }
-  static constexpr double least_share = 1.0 / 64.0;
+  static constexpr double least_share = 1.0 / 64.0, least_pivot = 1e-6;
 
   void move(std::size_t lane, std::uint32_t step, double share) const {
     for (std::uint32_t q = 0; q < static_cast<std::uint32_t>(plan_.unknowns()); ++q)

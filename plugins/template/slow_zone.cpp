@@ -41,7 +41,7 @@ class SlowZone final : public rhec::Term {
   void write_data(const rhec::TermPlace& place, double*, double* lower, double* upper) const noexcept override {
     const bool is_inside = place.arc_length >= options_.from && place.arc_length <= options_.to;
     *lower = -rhec::infinity;
-    *upper = is_inside ? options_.most : infinity;
+    *upper = is_inside ? options_.most : rhec::infinity;
   }
 
  private:

@@ -69,8 +69,10 @@ TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eig
   mean_parameters_ = parameters_;
 }
 
-/// The true vehicle is followed, however short its time constants.
+/// The true vehicle is followed, however short its time constants. A model that is no formula is asked for its rates
+/// alone.
 void TruthVehicle::shorten_steps() {
+  if (!model_->graph()) return;
   const ModelDescription& about = model_->description();
   const auto points = operating_points(*model_, about, nominal_values(about.parameters));
   const StepRequirement needed = step_requirement(*model_, points, options_.step);

@@ -191,11 +191,24 @@ class Test(cli.Findings):
         self.expect(summary["completed"] is True and summary["mae"]["tracking"] < 1.5, "a fast lag", f"{summary}")
         self.expect(summary["integration"]["checked"] > 0 and summary["integration"]["coarse"] == 0, "a fast lag",
                     f"{summary['integration']}")
+        implicit = ["estimator.integrator=implicit", "controller.integrator=implicit"]
+        (self.work / "stiff.yaml").write_text(LAG.replace("/ 0.01", "/ 0.001"))
+        stiff = "model={equations: stiff.yaml}"
+        for name, settings in {
+                "a fast lag, implicit": [vehicle, *implicit], "a lag of 1 ms, implicit": [stiff, *implicit],
+                "a lag of 1 ms, auto": [stiff, "estimator.integrator=auto", "controller.integrator=auto"],
+                "a lag of 1 ms, ekf": [stiff, "estimator.name=ekf", *implicit],
+                "a lag of 1 ms, bank": [stiff, "estimator.name=bank", *implicit],
+                "a lag of 1 ms, blocks": [stiff, "blocking.kappa=full_horizon", "blocking.mu=full_horizon", *implicit],
+                "a lag of 1 ms, rates": [stiff, "controller.weights.rates.u2=0.1", *implicit]}.items():
+            summary = json.loads((self.run(name, settings) / "summary.json").read_text())
+            self.expect(summary["completed"] is True and summary["mae"]["tracking"] < 1.5, name, f"{summary}")
+            self.expect(summary["integration"]["coarse"] == 0, name, f"{summary['integration']}")
         for section in ("estimator", "controller"):
             result = self.rhec("run", FIGURE8, "--out", self.work / "refused",
                                *assignments(*SHORT, vehicle, f"{section}.substeps=2"), cwd=self.work)
             self.expect(result.returncode != FINE, section, "a step that is unstable was taken")
-            for words in ("substeps", "unstable", "0.01 s", "'rate'", "expected at least", "auto"):
+            for words in ("substeps", "unstable", "0.01 s", "'rate'", "expected at least", "auto", "integrator: implicit"):
                 self.expect(words in result.stderr, section, f"no '{words}' in: {result.stderr}")
             self.expect(not (self.work / "refused").exists(), section, "files of a run that was refused")
         self.count_of_runs += 1

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "rhec/core/model/formula_model.hpp"
+#include "rhec/core/model/implicit_model.hpp"
 #include "support/cart.hpp"
 
 namespace rhec {
@@ -68,6 +69,28 @@ TEST(StepRequirement, ALagIsStableBelow2Point785TimeConstants) {
     EXPECT_EQ(needed.state, 1) << tau;
     EXPECT_GE(needed.substeps, needed.stable_substeps);
   }
+}
+
+TEST(StepRequirement, ImplicitStepsAreStableWhateverTheirLength) {
+  for (const double tau : {10.0, 0.05, 0.01, 1e-3, 1e-5}) {
+    const StepRequirement needed = of(ImplicitModel(lagging(tau)), 0.2);
+    EXPECT_EQ(needed.stable_substeps, 1) << tau;
+    EXPECT_EQ(needed.mode_substeps, 1) << tau;
+  }
+  // What neither decays nor grows is followed: 40 rad in an interval take several steps.
+  const StepRequirement needed = of(ImplicitModel(lagging(10.0)), 0.2, 0.005);
+  EXPECT_EQ(needed.stable_substeps, 1);
+  EXPECT_GT(needed.mode_substeps, 5);
+  EXPECT_LT(needed.mode_substeps, of(*lagging(10.0), 0.2, 0.005).mode_substeps);
+}
+
+TEST(StepError, OfImplicitStepsIsWhatLasts) {
+  const ImplicitModel implicit(lagging(1e-4));
+  StepError error(implicit);
+  const std::vector<double> state{0, 0, 0, 0}, far{0, 0, 0, 1};
+  const double input = 5.0, slow = 1e3, fast = 0.02;
+  EXPECT_LT(error(state.data(), &input, &slow, 0.2, 1), 1e-3) << "the speed has jumped, and settled";
+  EXPECT_GT(error(far.data(), &input, &fast, 0.2, 1), 1e-3) << "an oscillation of 10 rad";
 }
 
 TEST(StepRequirement, AStepThatIsExactEnoughIsAskedForToo) {

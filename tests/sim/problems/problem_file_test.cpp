@@ -90,6 +90,7 @@ TEST(ProblemFile, NamesThePlaceAndTheRemedy) {
       {rhe_line, "\"dt\": 0.1, ", "", "horizon.dt", "missing"},
       {rhe_line, "\"intervals\": 3", "\"intervals\": 2.5", "horizon.intervals", "an integer, at least 1"},
       {rhe_line, "rk4", "euler", "horizon.integrator", "\"rk4\""},
+      {rhe_line, "rk4", "radau5", "horizon.integrator", "is for lines with \"version\": 4"},
       {rhe_line, "\"substeps\": 2", "\"substeps\": 0", "horizon.substeps", "at least 1"},
       {rhe_line, "[null, 3]", "[4, 3]", "bounds.speed", "lower <= upper"},
       {rhe_line, "[null, 3]", "[4]", "bounds.speed", "[lower, upper]"},

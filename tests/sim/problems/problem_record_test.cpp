@@ -13,6 +13,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/control/input_rate_model.hpp"
+#include "rhec/core/model/implicit_model.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/files/json.hpp"
@@ -267,6 +268,34 @@ TEST(ProblemRecord, BoundsOfABicycleAreMovedAlike) {
   round_trip(*problem, RandomProblem::cold_start(*problem));
 }
 
+TEST_P(EveryModel, TheIntegratorIsKept) {
+  const auto implicit = std::make_shared<const ImplicitModel>(model);
+  for (const bool with_rates : {false, true}) {
+    std::shared_ptr<const Model> decided = implicit;
+    if (with_rates) decided = std::make_shared<InputRateModel>(implicit, std::vector<int>{0});
+    RandomProblem random(decided, 5);
+    RandomProblem::RhcSpec spec;
+    spec.intervals = 6;
+    spec.adjust = [&](RhcProblem::Setup& setup, const RandomProblem::Drive&) {
+      if (with_rates) setup.rates.push_back({0, model->state_count()});
+    };
+    const auto problem = random.rhc(spec);
+    const Iterate guess = perturbed(*problem, RandomProblem::cold_start(*problem), random);
+    const ProblemRecord record = round_trip(*problem, guess, model);
+    EXPECT_TRUE(record.is_implicit);
+    EXPECT_FALSE(is_implicit(*as_integrated({}, implicit)));
+    const auto again = build(record, model);
+    EXPECT_TRUE(refill(record, *again));
+    ProblemRecord other = record;
+    other.is_implicit = false;
+    EXPECT_FALSE(refill(other, *again)) << "it would be another problem";
+    ASSERT_FALSE(HasFailure());
+  }
+  RandomProblem random(implicit, 6);
+  const auto problem = random.rhe({});
+  EXPECT_TRUE(round_trip(*problem, RandomProblem::cold_start(*problem), model).is_implicit);
+}
+
 TEST(ProblemRecord, RefusesWhatTheFormatHasNoWordsFor) {
   const auto model = host().make_model("bicycle_slip");
   RandomProblem random(model, 3);
@@ -303,7 +332,8 @@ INSTANTIATE_TEST_SUITE_P(
         "{controller: {blocking: {u1: {name: pattern, lengths: [1, 2, 4, 8]}}}}",
         "{blocking: {kappa: {name: structured}}, estimator: {heading_starts: 4, initial: {sigma: {beta: 3}}}}",
         "{estimator: {robust: {outputs: [x_gps, y_gps]}, solver: {mode: converge}}}",
-        "{estimator: {robust: {outputs: [x_gps, y_gps]}}}", impossible));
+        "{estimator: {robust: {outputs: [x_gps, y_gps]}}}",
+        "{estimator: {integrator: implicit}, controller: {integrator: implicit}}", impossible));
 
 TEST_P(Replayed, GivesTheSameBits) {
   Settings settings = parse_yaml("{speed: 10, path: {laps: 1, radius: 12}}", "scenario");

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/model/formula_model.hpp"
 #include "sim/support/bicycle.hpp"
 
 namespace rhec::sim {
@@ -44,6 +45,37 @@ TEST(TruthVehicle, ConvergesWithFourthOrder) {
   const double coarse = (end(0.2) - exact).norm(), fine = (end(0.1) - exact).norm();
   EXPECT_GT(coarse / fine, 10.0) << "slip is looked up at every stage, else the order is lower";
   EXPECT_LT((end(0.01) - exact).norm(), 1e-7);
+}
+
+/// A point on a line whose speed follows the input with a lag of a millisecond.
+template <class Scalar>
+struct Lagging {
+  static constexpr int state_count = 3, input_count = 1, parameter_count = 1, output_count = 1;
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const {
+    dxdt[0] = p[0] * x[2];
+    dxdt[1] = 0.0 * x[2];
+    dxdt[2] = (u[0] - x[2]) / 1e-3;
+  }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
+};
+
+TEST(TruthVehicle, IsFollowedHoweverShortItsTimeConstants) {
+  ModelDescription about;
+  about.name = "lagging";
+  about.states = {{.name = "x", .unit = "m", .meaning = "position"},
+                  {.name = "y", .unit = "m", .meaning = "position"},
+                  {.name = "v", .unit = "m/s", .meaning = "speed"}};
+  about.inputs = {{.name = "u", .unit = "m/s", .meaning = "wanted speed"}};
+  about.parameters = {{.name = "kappa", .unit = "1", .meaning = "speed factor"}};
+  about.outputs = {{.name = "x", .unit = "m", .meaning = "position"}};
+  about.roles = {.position_x = 0, .position_y = 1};
+  const FormulaModel<Lagging> model(Lagging<double>(), about);
+  const auto field = constant_field({1.0});
+  TruthVehicle vehicle(model, *field, Eigen::Vector3d(0.0, 0.0, 0.0));
+  const double input = 2.0;
+  for (int i = 0; i < 5; ++i) vehicle.advance(&input, 0.2);
+  EXPECT_NEAR(vehicle.state()[2], 2.0, 1e-9);
+  EXPECT_NEAR(vehicle.state()[0], 2.0 * (1.0 - 1e-3), 1e-4);
 }
 
 TEST(TruthVehicle, FeelsTheSlipWhereItIs) {

@@ -13,8 +13,8 @@
 namespace rhec::sim {
 
 struct TruthOptions {
-  double step = 0.01;  ///< Runge-Kutta step [s]: at most 20 in an interval of 0.2 s; shorter where the model has time
-                       ///< constants that ask for it
+  double step = 0.01;  ///< Runge-Kutta step [s]: at most 20 in an interval of 0.2 s; shorter where a model's formula
+                       ///< has time constants that ask for it
   bool mechanical_stops = true;  ///< bounded states (the steering angle) cannot leave their bounds, whatever the input
 };
 
