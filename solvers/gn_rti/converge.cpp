@@ -27,7 +27,7 @@ constexpr double low_share = 0.1, little_less = 0.9, stuck = 0.999;
 // limits.
 constexpr int most_futile = 15;
 constexpr double most_left = 0.9;
-// How often penalties that a relaxed step has left are forgotten.
+// How often penalties fall.
 constexpr int most_penalty_cuts = 20;
 
 /// The distance of a limit's value beyond its side after a step, as far as the linearisation knows.
@@ -114,14 +114,22 @@ LimitCosts GnRti::costs_of_limits(const Iterate& iterate) noexcept {
   return all;
 }
 
+/// Raises a penalty to what a step's multipliers ask for. With limits, these can be huge far from the solution, and a
+/// penalty that stayed that large would shorten every later step: there it falls, too, some times.
+void GnRti::raise(double& penalty, double least) noexcept {
+  if (!limits_.empty() && penalty > 4.0 * least && penalty_cuts_left_ > 0 && !is_elastic_) {
+    penalty = 2.0 * least;
+    --penalty_cuts_left_;
+  }
+  penalty = std::max(penalty, least);
+}
+
 /// Line search along the step from `best_` on the l1 merit function; the accepted iterate goes to `trial_`. False if no
 /// step length is acceptable.
 bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
-  // Multipliers of priced limits are huge, and penalties that stayed that large would shorten every later step.
-  if (was_elastic_ && !is_elastic_ && penalty_cuts_left_-- > 0) defect_penalty_ = bound_penalty_ = 0.0;
   was_elastic_ = is_elastic_;
-  defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(*ocp_, step_));
-  bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(*ocp_, step_));
+  raise(defect_penalty_, 1.5 * largest_costate(*ocp_, step_));
+  raise(bound_penalty_, 1.5 * largest_bound_multiplier(*ocp_, step_));
   const double before = merit(best_);
   double defect = 0.0, slope = 0.0;
   for (int i = 0; i <= ocp_->intervals(); ++i) {
@@ -272,13 +280,20 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       is_elastic_ = false;
       qp_solver_.guess_from(*qp_, best_);
       auto outcome = solve_qp(report, deadline);
+      if (outcome == StageQpSolver::Outcome::infeasible && !limits_.empty()) {
+        if (!may_be_elastic) return false;
+        outcome = solve_elastic(report, deadline);
+        if (outcome == StageQpSolver::Outcome::infeasible) {
+          is_elastic_ = false;
+          qp_ = &linearisation_->qp();
+        }
+      }
       // Linearised equations can contradict bounds even if the nonlinear ones do not: then a single step has to remove
       // less.
       for (asked_share_ = 1.0; outcome == StageQpSolver::Outcome::infeasible && asked_share_ > least_asked_share;) {
         relax_qp(0.5);
         outcome = solve_qp(report, deadline);
       }
-      if (outcome == StageQpSolver::Outcome::infeasible && may_be_elastic) outcome = solve_elastic(report, deadline);
       late = outcome == StageQpSolver::Outcome::out_of_time;
       if (late || outcome == StageQpSolver::Outcome::infeasible || !is_finite(*ocp_, step_)) return false;
       feasible = true;

@@ -72,6 +72,7 @@ class GnRti final : public Solver {
   LimitCosts costs_of_limits(const Iterate& iterate) noexcept;
   StageQpSolver::Outcome solve_qp(Report& report, Clock::time_point deadline) noexcept;
   void relax_qp(double share) noexcept;
+  void raise(double& penalty, double least) noexcept;
   bool is_futile() noexcept;
   StageQpSolver::Outcome solve_elastic(Report& report, Clock::time_point deadline) noexcept;
   bool search_along_step(double residual, double& merit_after) noexcept;

@@ -1,4 +1,4 @@
-// gn_rti with limits, nonlinear ones and soft ones too.
+// Mode converge, with limits: nonlinear ones and soft ones too; and that real-time steps come to the same.
 
 #include <cmath>
 #include <limits>
@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/kkt.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -16,7 +17,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec {
-namespace limits_test {
+namespace converge_test {
 
 using testing::Limit;
 using testing::LimitedOcp;
@@ -179,5 +180,5 @@ TEST(GnRtiLimits, GetsPastLinearisedLimitsThatContradictEachOther) {
   }
 }
 
-}  // namespace limits_test
+}  // namespace converge_test
 }  // namespace rhec
