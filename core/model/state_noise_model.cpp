@@ -18,8 +18,8 @@ constexpr std::size_t room = 4096;  ///< doubles on the stack
 
 /// The vehicle's derivatives of one interval.
 std::size_t dense_size(const Model& vehicle) {
-  const auto nz =
-      static_cast<std::size_t>(vehicle.state_count() + vehicle.input_count() + 2 * vehicle.parameter_count());
+  const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count()),
+             np = static_cast<std::size_t>(vehicle.parameter_count()), nz = nx + nu + 2 * np;
   return nz * nz;
 }
 

@@ -34,7 +34,10 @@ StageQpSolver::StageQpSolver(const Capacity& capacity)
   const auto nodes = static_cast<std::size_t>(capacity.intervals) + 1;
   marks_.assign(nodes, 0);
   bounded_.reserve(nodes * (capacity.states + capacity.controls + capacity.limits));
-  if (capacity.limits > 0) barrier_ = StageQp(capacity);
+  if (capacity.limits > 0) {
+    barrier_ = StageQp(capacity);
+    augmented_ = guessed_ = ActiveSet(capacity);
+  }
   for (auto* v : {&diagonal_, &h_}) v->assign(nodes * capacity.row(), 0.0);
 }
 
@@ -180,6 +183,8 @@ StageQpSolver::Outcome StageQpSolver::solve_limited(const StageQp& qp, Iterate& 
   auto outcome = solve_from_guess(qp, step, deadline);
   if (outcome == DualActiveSet::Outcome::not_convex) {
     if (is_past(deadline)) return Outcome::out_of_time;
+    if (solve_augmented(qp, step, deadline)) return Outcome::active_set;
+    if (out_of_time_) return Outcome::out_of_time;
     const StageQp& convex = convexify(qp);
     prepared_ = false;
     outcome = solve_from_guess(convex, step, deadline);

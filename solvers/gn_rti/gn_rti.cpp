@@ -12,15 +12,6 @@
 namespace rhec::gn_rti {
 namespace {
 
-constexpr double sufficient_decrease = 1e-4;
-constexpr double shortest_step = 1e-6;
-// Below this KKT residual Newton's method is trusted more than the merit function.
-constexpr double near_solution = 1e-3;
-// Relative differences of the merit below this are rounding.
-constexpr double merit_rounding = 1e-13;
-// If no step can remove even this share of the defects and violations, there is no solution nearby.
-constexpr double least_asked_share = 0.1;
-
 /// Visits corresponding rows of two iterates, of states and controls alike: function(destination, source, length).
 template <class Function>
 void for_each_primal_row(const Ocp& ocp, Iterate& to, const Iterate& from, const Function& function) {
@@ -45,23 +36,6 @@ bool has_costates(const Ocp& ocp, const Iterate& iterate) noexcept {
     for (int j = 0; j < ocp.state_count(i); ++j)
       if (iterate.costate(i)[j] != 0.0) return true;
   return false;
-}
-
-/// What the slacks cost after a step, as far as the linearisation knows.
-double slack_costs_after(const StageQp& qp, const Iterate& step) noexcept {
-  double costs = 0.0;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    for (int r = 0; r < qp.limits(i); ++r) {
-      const double linear = qp.limit_linear(i)[r];
-      if (!std::isfinite(linear)) continue;
-      const double* row = qp.G(i) + static_cast<std::ptrdiff_t>(r) * qp.stride();
-      double value = 0.0;
-      for (int j = 0; j < qp.capacity().states + qp.controls(i); ++j) value += row[j] * step.row(i)[j];
-      const double slack = std::max({0.0, qp.limit_lower(i)[r] - value, value - qp.limit_upper(i)[r]});
-      costs += (linear + 0.5 * qp.limit_quadratic(i)[r] * slack) * slack;
-    }
-  }
-  return costs;
 }
 
 }  // namespace
@@ -165,50 +139,6 @@ void GnRti::add_step(const Iterate& from, double length, Iterate& to) const noex
   for_each_dual_row(*ocp_, to, step_, [&](double* row, const double* value, int n) {
     for (int j = 0; j < n; ++j) row[j] += length * (value[j] - row[j]);
   });
-}
-
-/// Applies the step as a feedback policy in a simulation: controls move by the given step length and react to the
-/// deviation of the simulated from the linearised states, so the result has no defects. Far from the solution this
-/// makes much more progress than the linearised states do.
-void GnRti::roll_out_step(const Iterate& from, double length, Iterate& to) noexcept {
-  add_step(from, length, to);
-  qp_solver_.prepare_feedback(*qp_);
-  double deviation[Riccati::max_width], policy[Riccati::max_width];
-  for (int i = 0; i < ocp_->intervals(); ++i) {
-    const int n = ocp_->state_count(i), m = ocp_->control_count(i);
-    // The feedforward part of the policy is scaled by the step length; its feedback on the deviation is not.
-    for (int j = 0; j < n; ++j)
-      deviation[j] = step_.state(i)[j] + (to.state(i)[j] - from.state(i)[j] - length * step_.state(i)[j]);
-    qp_solver_.feedback(*qp_, i, deviation, policy);
-    for (int j = 0; j < m; ++j) {
-      const double value = from.control(i)[j] + length * step_.control(i)[j] + (policy[j] - step_.control(i)[j]);
-      to.control(i)[j] = std::min(std::max(value, ocp_->control_lower(i)[j]), ocp_->control_upper(i)[j]);
-    }
-    ocp_->simulate_interval(i, to, scratch_);
-  }
-}
-
-double GnRti::merit(const Iterate& iterate) noexcept {
-  const double objective = ocp_->evaluate(iterate, defects_.data(), scratch_);
-  double defect = 0.0;
-  for (int i = 0; i < ocp_->intervals(); ++i)
-    for (int j = 0; j < ocp_->state_count(i + 1); ++j) defect += std::abs(defects_[i * ocp_->capacity().states + j]);
-  const double without = objective + defect_penalty_ * defect + bound_penalty_ * total_violation(*ocp_, iterate);
-  if (limits_.empty()) return without;
-  const LimitCosts limits = costs_of_limits(iterate);
-  return without + limits.slack + bound_penalty_ * limits.violation;
-}
-
-LimitCosts GnRti::costs_of_limits(const Iterate& iterate) noexcept {
-  LimitCosts all;
-  ocp_->evaluate_limits(iterate, limits_.data(), scratch_);
-  for (int i = 0; i <= ocp_->intervals(); ++i) {
-    const LimitCosts of_stage =
-        limit_costs(*ocp_, i, limits_.data() + static_cast<std::ptrdiff_t>(i) * ocp_->capacity().limit_row());
-    all.slack += of_stage.slack;
-    all.violation += of_stage.violation;
-  }
-  return all;
 }
 
 Report GnRti::solve(Iterate& iterate, Clock::time_point deadline) noexcept {
@@ -328,162 +258,11 @@ void GnRti::give_up(const Iterate& iterate, Report& report) noexcept {
   }
 }
 
-/// Line search along the step from `best_` on the l1 merit function; the accepted iterate goes to `trial_`. False if no
-/// step length is acceptable.
-bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
-  defect_penalty_ = std::max(defect_penalty_, 1.5 * largest_costate(*ocp_, step_));
-  bound_penalty_ = std::max(bound_penalty_, 1.5 * largest_bound_multiplier(*ocp_, step_));
-  const double before = merit(best_);
-  double defect = 0.0, slope = 0.0;
-  for (int i = 0; i <= ocp_->intervals(); ++i) {
-    for (int j = 0; j < ocp_->state_count(i); ++j) slope += qp_->q(i)[j] * step_.state(i)[j];
-    if (i == ocp_->intervals()) break;
-    for (int j = 0; j < ocp_->state_count(i + 1); ++j) defect += std::abs(qp_->b(i)[j]);
-    for (int j = 0; j < ocp_->control_count(i); ++j) slope += qp_->r(i)[j] * step_.control(i)[j];
-  }
-  slope -= defect_penalty_ * defect + bound_penalty_ * asked_share_ * total_violation(*ocp_, best_);
-  if (!limits_.empty()) {
-    // The slack costs are convex in the step: their change over the full step bounds their slope.
-    slope += slack_costs_after(*qp_, step_) - slack_costs(*qp_, all_stages(*ocp_));
-    slope -= bound_penalty_ * asked_share_ * costs_of_limits(best_).violation;
-  }
-  const auto acceptable = [&](double length) {
-    merit_after = merit(trial_);
-    const double allowed =
-        before + sufficient_decrease * length * std::min(slope, 0.0) + merit_rounding * (1.0 + std::abs(before));
-    return std::isfinite(merit_after) && merit_after <= allowed;
-  };
-  // Control starts from a given state and follows the policy. Estimation has measurements at every node and takes the
-  // linearised states; it tries the policy only if they are not acceptable.
-  const bool policy_first = ocp_->can_roll_out();
-  for (double length = 1.0; length >= shortest_step; length *= 0.5) {
-    if (policy_first) {
-      roll_out_step(best_, length, trial_);
-    } else {
-      add_step(best_, length, trial_);
-    }
-    if (acceptable(length)) return true;
-    // Near the solution the merit function may reject a good Newton step.
-    if (length == 1.0 && residual < near_solution && std::isfinite(merit_after)) {
-      ocp_->linearise(all_stages(*ocp_), trial_, Hessian::gauss_newton, trial_qp_, scratch_);
-      if (kkt_residual(trial_qp_, trial_).largest() < 0.5 * residual) return true;
-    }
-    if (policy_first) continue;
-    roll_out_step(best_, length, trial_);
-    if (acceptable(length)) return true;
-  }
-  return false;
-}
-
 StageQpSolver::Outcome GnRti::solve_qp(Report& report, Clock::time_point deadline) noexcept {
   const auto outcome = qp_solver_.solve(*qp_, step_, deadline);
   report.factorisations += qp_solver_.factorisations();
   report.fallback_used |= outcome == StageQpSolver::Outcome::interior_point;
   return outcome;
-}
-
-/// Powell's relaxation: scales the defects and violated bounds and hard limits that the step must remove by `share`. At
-/// a share of 0 the QP is feasible: the zero step satisfies it.
-void GnRti::relax_qp(double share) noexcept {
-  relaxed_qp_ = qp_solver_.solved(*qp_);
-  qp_ = &relaxed_qp_;
-  asked_share_ *= share;
-  const auto relax = [share](double* lower, double* upper, int count) {
-    for (int j = 0; j < count; ++j) {
-      if (lower[j] > 0.0) lower[j] *= share;
-      if (upper[j] < 0.0) upper[j] *= share;
-    }
-  };
-  for (int i = 0; i <= relaxed_qp_.intervals(); ++i) {
-    relax(relaxed_qp_.state_lower(i), relaxed_qp_.state_upper(i), relaxed_qp_.states(i));
-    for (int r = 0; relaxed_qp_.has_limits() && r < relaxed_qp_.limits(i); ++r)
-      if (std::isinf(relaxed_qp_.limit_linear(i)[r]))
-        relax(relaxed_qp_.limit_lower(i) + r, relaxed_qp_.limit_upper(i) + r, 1);
-    if (i == relaxed_qp_.intervals()) break;
-    relax(relaxed_qp_.control_lower(i), relaxed_qp_.control_upper(i), relaxed_qp_.controls(i));
-    for (int j = 0; j < relaxed_qp_.states(i + 1); ++j) relaxed_qp_.b(i)[j] *= share;
-  }
-}
-
-Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
-  Report report;
-  defect_penalty_ = bound_penalty_ = 0.0;
-  best_ = iterate;
-  // The line search does not vary a given initial state.
-  if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
-  report.status = Status::iteration_limit;
-  double least_residual = std::numeric_limits<double>::infinity();
-  int slow = 0;
-  for (;; ++report.iterations) {
-    linearise(best_);
-    report.kkt = kkt_residual(*qp_, best_);
-    const double residual = report.kkt.largest();
-    if (residual <= options_.tolerance) {
-      report.status = Status::solved;
-      break;
-    }
-    if (report.iterations == options_.max_iterations) break;
-    if (is_past(deadline)) {
-      report.status = Status::deadline;
-      break;
-    }
-    // If Gauss-Newton makes little progress or cycles, the residuals are large: from here on the exact Hessian does
-    // better.
-    if (options_.hessian == Curvature::automatic && !use_exact_ && ocp_->has_second_derivatives()) {
-      slow = residual > 0.3 * least_residual ? slow + 1 : 0;
-      if (slow >= 4) {
-        use_exact_ = true;
-        linearise(best_);
-      }
-    }
-    least_residual = std::min(least_residual, residual);
-
-    double merit_after = 0.0;
-    bool feasible = false, accepted = false, late = false;
-    const auto try_step = [&] {
-      qp_solver_.guess_from(*qp_, best_);
-      auto outcome = solve_qp(report, deadline);
-      // Linearised equations can contradict bounds even if the nonlinear ones do not: then a single step has to remove
-      // less.
-      for (asked_share_ = 1.0; outcome == StageQpSolver::Outcome::infeasible && asked_share_ > least_asked_share;) {
-        relax_qp(0.5);
-        outcome = solve_qp(report, deadline);
-      }
-      late = outcome == StageQpSolver::Outcome::out_of_time;
-      if (late || outcome == StageQpSolver::Outcome::infeasible || !is_finite(*ocp_, step_)) return false;
-      feasible = true;
-      return search_along_step(residual, merit_after);
-    };
-    accepted = try_step();
-    // Where the exact Hessian had to be convexified its step is unreliable, so the Gauss-Newton step is tried too and
-    // the better one is taken. Near the solution merits differ by rounding only, and it is the exact Hessian that
-    // converges.
-    if (!late && hessian() == Hessian::exact &&
-        (!accepted || (qp_solver_.was_convexified() && residual > near_solution))) {
-      std::swap(trial_, other_trial_);
-      const bool exact_accepted = accepted;
-      const double exact_merit = merit_after;
-      linearisation_->linearise(best_, Hessian::gauss_newton);
-      qp_ = &linearisation_->qp();
-      accepted = try_step();
-      if (exact_accepted && (!accepted || exact_merit < merit_after)) {
-        std::swap(trial_, other_trial_);
-        accepted = true;
-      }
-    }
-    if (!accepted) {
-      report.status = late ? Status::deadline : feasible ? Status::stalled : Status::infeasible;
-      break;
-    }
-    std::swap(best_, trial_);
-  }
-  const double objective = ocp_->evaluate(best_, nullptr, scratch_);
-  if (report.status != Status::infeasible && is_finite(*ocp_, best_) && std::isfinite(objective))
-    std::swap(iterate, best_);
-  report.objective = linearisation_->linearise(iterate, Hessian::none);
-  report.objective += slack_costs(linearisation_->qp(), all_stages(*ocp_));
-  report.kkt = kkt_residual(linearisation_->qp(), iterate);
-  return report;
 }
 
 }  // namespace rhec::gn_rti

@@ -72,6 +72,9 @@ class GnRti final : public Solver {
   LimitCosts costs_of_limits(const Iterate& iterate) noexcept;
   StageQpSolver::Outcome solve_qp(Report& report, Clock::time_point deadline) noexcept;
   void relax_qp(double share) noexcept;
+  void raise(double& penalty, double least) noexcept;
+  bool is_futile() noexcept;
+  StageQpSolver::Outcome solve_elastic(Report& report, Clock::time_point deadline) noexcept;
   bool search_along_step(double residual, double& merit_after) noexcept;
 
   Options options_;
@@ -87,7 +90,10 @@ class GnRti final : public Solver {
   bool use_exact_ = false;
   HessianChoice choice_;  ///< of mode rti
   double defect_penalty_ = 0.0, bound_penalty_ = 0.0;
-  double asked_share_ = 1.0;  ///< share of the defects and violations that the step must remove
+  bool is_elastic_ = false, was_elastic_ = false;  ///< hard limits have a price in the QP, and had in the last step's
+  int penalty_cuts_left_ = 0, futile_ = 0;
+  double violation_before_ = 0.0;  ///< of the hard limits before the last `futile_` steps
+  double asked_share_ = 1.0;       ///< share of the defects and violations that the step must remove
 };
 
 }  // namespace rhec::gn_rti

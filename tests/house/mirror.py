@@ -66,7 +66,6 @@ ALONE = {
     "tests/core/horizon/own_problem_test.cpp": "a kind of problem from outside, examples/problem",
     "tests/models/derivatives_test.cpp": "every model that is found",
     "tests/priors/conformance_test.cpp": "every prior that is found",
-    "tests/solvers/gn_rti/limits_test.cpp": "limits in both modes of gn_rti",
     "tests/terms/conformance_test.cpp": "every term that is found, on every model that is found",
     "tests/sim/world/allocation_test.cpp": "paths, ground and the true vehicle, which must not allocate",
 }

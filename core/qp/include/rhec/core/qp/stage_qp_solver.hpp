@@ -76,6 +76,13 @@ class RHEC_EXPORT StageQpSolver {
   Violations correct_active_set(const StageQp& qp, const Iterate& step) noexcept;
   bool try_active_sets(const StageQp& qp, Iterate& step, int rounds, Clock::time_point deadline) noexcept;
   Outcome solve_limited(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
+  template <class OfState, class OfLimit>
+  void for_each_augmented(const StageQp& qp, double relative, const OfState& of_state,
+                          const OfLimit& of_limit) const noexcept;
+  void augment(const StageQp& qp, double relative) noexcept;
+  bool augmentation_fits(const StageQp& qp, double relative) const noexcept;
+  void shift_multipliers(const StageQp& qp, double relative, Iterate& step) const noexcept;
+  bool solve_augmented(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   void take_interior_set() noexcept;
   bool polish(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   Outcome solve_robustly(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
@@ -111,6 +118,7 @@ class RHEC_EXPORT StageQpSolver {
   Riccati riccati_;
   ActiveSet active_, no_bounds_;
   DualActiveSet dual_;
+  ActiveSet augmented_, guessed_;  ///< with limits: the set for which the QP was augmented, and the first one
   StageQp convexified_;
   StageQp barrier_;  ///< with limits: the QP plus their barrier terms
   bool factored_ = false;

@@ -1,4 +1,4 @@
-// gn_rti with limits, nonlinear ones and soft ones too.
+// Mode converge, with limits: nonlinear ones and soft ones too; and that real-time steps come to the same.
 
 #include <cmath>
 #include <limits>
@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "rhec/core/horizon/rhc_problem.hpp"
+#include "rhec/core/ocp/solver.hpp"
 #include "rhec/core/qp/kkt.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -16,7 +17,7 @@
 #include "support/random_problem.hpp"
 
 namespace rhec {
-namespace limits_test {
+namespace converge_test {
 
 using testing::Limit;
 using testing::LimitedOcp;
@@ -153,5 +154,31 @@ TEST(GnRtiLimits, SaysSoWhereHardLimitsContradictEachOtherAndSoftOnesDoNot) {
   }
 }
 
-}  // namespace limits_test
+TEST(GnRtiLimits, GetsPastLinearisedLimitsThatContradictEachOther) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    Case one(seed, 0.1, infinity, 0.0);
+    const int ns = one.problem->capacity().states;
+    one.limited->clear_limits();
+    const double now = one.start.control(2)[0];
+    Iterate iterate = one.start;
+    iterate.control(2)[0] = 0.01 * now;
+    // From here the first one's linearisation asks for about 50 times as much as is possible, the second one forbids
+    // it.
+    Limit square{.kind = Limit::Kind::squares, .of = {ns}, .with = {1.0}};
+    square.lower = now * now;
+    Limit side{.kind = Limit::Kind::linear, .of = {ns}, .with = {1.0}};
+    side.lower = -1.5 * std::abs(now);
+    side.upper = 1.5 * std::abs(now);
+    one.limited->add(2, square);
+    one.limited->add(2, side);
+    const auto solver = gn_rti("{mode: converge}");
+    solver->setup(*one.limited);
+    const Report report = solver->solve(iterate);
+    EXPECT_EQ(report.status, Status::solved) << "seed " << seed << ", residual " << report.kkt.largest();
+    EXPECT_TRUE(report.fallback_used) << "seed " << seed;
+    EXPECT_GT(std::abs(iterate.control(2)[0]), (1.0 - 1e-6) * std::abs(now));
+  }
+}
+
+}  // namespace converge_test
 }  // namespace rhec
