@@ -124,28 +124,28 @@ def check_consumer(prefix, work, arguments):
     return len(headers)
 
 
-def check_robot(prefix, work, arguments):
-    """The program of the README with a robot in it, built as a reader would."""
+def build_example(name, prefix, work, arguments):
+    """A folder of examples/, copied and built as a reader would; the copy and its build."""
     settings = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={arguments.cxxflags}", "-DCMAKE_BUILD_TYPE=Debug"]
     if arguments.cxx:
         settings.append(f"-DCMAKE_CXX_COMPILER={arguments.cxx}")
-    source, build = work / "robot", work / "build-robot"
-    shutil.copytree(arguments.source / "examples" / "robot", source)
+    source, build = work / name, work / f"build-{name}"
+    shutil.copytree(arguments.source / "examples" / name, source)
     run(arguments.cmake, "-S", source, "-B", build, *settings)
     run(arguments.cmake, "--build", build)
+    return source, build
+
+
+def check_robot(prefix, work, arguments):
+    """The program of the README with a robot in it."""
+    source, build = build_example("robot", prefix, work, arguments)
     lines = run(build / "robot", source / "robot.yaml", cwd="/").splitlines()
     expect(len(lines) > 20 and "kappa 0.7" in lines[-1], "the robot did not learn its slip:\n" + "\n".join(lines))
 
 
 def check_problem(prefix, work, arguments):
     """A kind of problem that rhec does not know, against the installed headers, with every solver that is installed."""
-    settings = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={arguments.cxxflags}", "-DCMAKE_BUILD_TYPE=Debug"]
-    if arguments.cxx:
-        settings.append(f"-DCMAKE_CXX_COMPILER={arguments.cxx}")
-    source, build = work / "problem", work / "build-problem"
-    shutil.copytree(arguments.source / "examples" / "problem", source)
-    run(arguments.cmake, "-S", source, "-B", build, *settings)
-    run(arguments.cmake, "--build", build)
+    _, build = build_example("problem", prefix, work, arguments)
     for solver in ("sparse_sqp", "ipopt", "nlopt"):
         told = run(build / "parking", solver, cwd="/")
         expect(told.startswith("solved"), f"the parking problem by {solver}: {told}")
@@ -153,13 +153,7 @@ def check_problem(prefix, work, arguments):
 
 def check_minimum_time(prefix, work, arguments):
     """A problem with limits that derives from Ocp itself: both solvers for it find a manoeuvre, and it is drawn."""
-    settings = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={arguments.cxxflags}", "-DCMAKE_BUILD_TYPE=Debug"]
-    if arguments.cxx:
-        settings.append(f"-DCMAKE_CXX_COMPILER={arguments.cxx}")
-    source, build = work / "minimum_time", work / "build-minimum_time"
-    shutil.copytree(arguments.source / "examples" / "minimum_time", source)
-    run(arguments.cmake, "-S", source, "-B", build, *settings)
-    run(arguments.cmake, "--build", build)
+    _, build = build_example("minimum_time", prefix, work, arguments)
     for solver in ("ipopt", "sparse_sqp"):
         picture = work / f"{solver}.svg"
         told = run(build / "minimum_time", solver, picture, cwd="/")
