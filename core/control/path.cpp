@@ -140,14 +140,13 @@ std::string Path::find_obstacle() {
   return {};
 }
 
-int Path::segment_at(double arc_length) const noexcept {
+/// The segment on which `of`, which increases from waypoint to waypoint, has a value.
+int Path::segment_of(const std::vector<double>& of, double value) noexcept {
   // The first and the last waypoint are not searched, so that the end segments extend beyond the ends.
-  const auto after = std::upper_bound(arc_lengths_.begin() + 1, arc_lengths_.end() - 1, arc_length);
-  return static_cast<int>(after - arc_lengths_.begin()) - 1;
+  return static_cast<int>(std::upper_bound(of.begin() + 1, of.end() - 1, value) - of.begin()) - 1;
 }
 
-/// The segment on which `of`, which increases from waypoint to waypoint, has a value: by a few steps from the segment
-/// expected if all segments were as long as the known one, or by a binary search.
+/// The same by a few steps from the segment expected if all segments were as long as the known one.
 int Path::segment_near(int known, const std::vector<double>& of, double value) const noexcept {
   const int last = size() - 2;
   known = std::clamp(known, 0, last);
@@ -155,8 +154,7 @@ int Path::segment_near(int known, const std::vector<double>& of, double value) c
   int i = static_cast<int>(std::min(std::max(0.0, known + on), static_cast<double>(last))), steps = near;
   while (steps > 0 && i < last && of[i + 1] <= value) ++i, --steps;
   while (steps > 0 && i > 0 && of[i] > value) --i, --steps;
-  if (steps > 0) return i;
-  return static_cast<int>(std::upper_bound(of.begin() + 1, of.end() - 1, value) - of.begin()) - 1;
+  return steps > 0 ? i : segment_of(of, value);
 }
 
 double Path::speed_on(int i, double along) const noexcept {
@@ -191,7 +189,7 @@ double Path::arc_length_after(double arc_length, double time, int& segment) cons
 
 double Path::time_to_section_end(double arc_length, int section) const noexcept {
   const auto time_at = [this](double at) {
-    const int i = segment_at(at);
+    const int i = segment_of(arc_lengths_, at);
     return times_[i] + time_on(i, at - arc_lengths_[i]);
   };
   return time_at(section_ends_[section]) - time_at(arc_length);
@@ -212,7 +210,9 @@ PathPoint Path::point_on(int i, double arc_length) const noexcept {
 
 double Path::top_speed() const noexcept { return *std::max_element(speeds_.begin(), speeds_.end()); }
 
-PathPoint Path::point_at(double arc_length) const noexcept { return point_on(segment_at(arc_length), arc_length); }
+PathPoint Path::point_at(double arc_length) const noexcept {
+  return point_on(segment_of(arc_lengths_, arc_length), arc_length);
+}
 
 PathPoint Path::point_at(double arc_length, int& segment) const noexcept {
   segment = segment_near(segment, arc_lengths_, arc_length);

@@ -1,10 +1,10 @@
 #include "staged_steps.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "graph_steps.hpp"
+#include "interval_lanes.hpp"
 #include "rhec/core/base/padded.hpp"
 
 namespace rhec {
@@ -13,10 +13,15 @@ namespace {
 constexpr int lanes = StagedSteps::lanes;
 constexpr std::array<double, 4> reach{0.0, 0.5, 0.5, 1.0}, share{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
 
-std::vector<std::uint32_t> numbered(std::uint32_t first, int count) {
-  std::vector<std::uint32_t> all(static_cast<std::size_t>(count));
-  std::iota(all.begin(), all.end(), first);
-  return all;
+IntervalLanes interval_lanes(const ChainRulePlaces& at) {
+  return {.nx = at.nx,
+          .np = at.np,
+          .nu = at.nu,
+          .nz = at.nz,
+          .ramp = at.ramp,
+          .z = at.z,
+          .weights = at.weights,
+          .next = at.next};
 }
 
 }  // namespace
@@ -186,17 +191,8 @@ class StagedSteps::Run {
     std::copy_n(at(at_.pull_next), matrix(), at(at_.pull));
   }
 
-  /// A tape leaves lanes without a row as they were.
   void take_result(const Tape& tape, int which, std::uint32_t place) const {
-    const std::ptrdiff_t source = tape.results()[static_cast<std::size_t>(which)];
-    double* const to = at(place);
-    if (source < 0) {
-      std::fill_n(to, lanes, tape.uniforms()[static_cast<std::size_t>(~source)]);
-      return;
-    }
-    const double* const from = registers_ + source * lanes;
-    std::copy_n(from, lanes, to);
-    if (count_ < lanes) std::fill(to + count_, to + lanes, from[count_ - 1]);
+    rhec::take_result(tape, which, registers_, count_, at(place));
   }
 
   const StagedSteps& of_;
@@ -211,60 +207,13 @@ class StagedSteps::Run {
 void StagedSteps::integrate_rows(const IntervalRows& q, const TapeKernels& kernels, double* memory) const noexcept {
   Run run(*this, kernels, memory, q.substeps, {q.jacobians != nullptr, q.hessians != nullptr});
   const Chain& chain = q.substeps == 1 ? single_ : several_;
-  for (int first = 0; first < q.count; first += lanes) {
-    const int count = std::min(lanes, q.count - first);
-    kernels.load_rows(q.z + first * q.z_step, q.z_step, count, at_.nz, run.at(at_.z), lanes, lanes);
-    if (q.hessians)
-      kernels.load_rows(q.multipliers + first * q.multiplier_step, q.multiplier_step, count, at_.nx,
-                        run.at(at_.weights), lanes, lanes);
-    const auto store = [&](const StoredRows& what, const RowPlaces& places) {
-      kernels.store_rows(what.all.data(), what.rows, what.eights, memory, lanes, places, count);
-    };
-    run.integrate(q.durations + first, count, [&] {
-      if (q.next_states) store(next_, {q.next_states + first * q.next_step, q.next_step, 0});
-      if (q.jacobians) store(chain.jacobian, {q.jacobians + first * q.jacobian_step, q.jacobian_step, q.jacobian_row});
-    });
-    if (q.hessians) store(chain.hessian, {q.hessians + first * q.hessian_step, q.hessian_step, q.hessian_row});
-  }
+  integrate_rows_in_lanes(q, interval_lanes(at_), kernels, run, next_, chain.jacobian, chain.hessian);
 }
 
 void StagedSteps::integrate(const Model::Intervals& q, const TapeKernels& kernels, double* memory) const noexcept {
   Run run(*this, kernels, memory, q.substeps, {q.jacobians != nullptr, q.hessians != nullptr});
   const ChainRule& rule = (q.substeps == 1 ? single_ : several_).rule;
-  const int nx = at_.nx, np = at_.np, nu = at_.nu, nz = at_.nz;
-  // From [x; p; u; p_end] to [x; u; p; p_end].
-  const auto column = [&](int c) { return c < nx || c >= nx + np + nu ? c : c < nx + np ? c + nu : c - np; };
-  for (int first = 0; first < q.count; first += lanes) {
-    const int count = std::min(lanes, q.count - first);
-    double* to = run.at(at_.z);
-    const auto load = [&](const double* rows, int columns) {
-      if (columns > 0) load_columns(rows + static_cast<std::ptrdiff_t>(first) * columns, columns, count, to);
-      to += static_cast<std::ptrdiff_t>(columns) * lanes;
-    };
-    load(q.states, nx);
-    load(q.parameters, np);
-    load(q.inputs, nu);
-    if (at_.ramp) load(q.parameters_end, np);
-    if (q.hessians) {
-      to = run.at(at_.weights);
-      load(q.multipliers, nx);
-    }
-    run.integrate(q.durations + first, count, [&] {
-      for (std::ptrdiff_t i = 0; i < count; ++i) {
-        for (int r = 0; q.next_states && r < nx; ++r)
-          q.next_states[(first + i) * nx + r] = run.at(at_.next)[r * lanes + i];
-        for (int r = 0; q.jacobians && r < nx; ++r)
-          for (int c = 0; c < nz; ++c)
-            q.jacobians[((first + i) * nz + column(c)) * nx + r] =
-                run.at(rule.moved()[static_cast<std::size_t>(r) * nz + c])[i];
-      }
-    });
-    for (std::ptrdiff_t i = 0; q.hessians && i < count; ++i)
-      for (int r = 0; r < nz; ++r)
-        for (int c = 0; c < nz; ++c)
-          q.hessians[((first + i) * nz + column(r)) * nz + column(c)] =
-              run.at(rule.hessian()[static_cast<std::size_t>(r) * nz + c])[i];
-  }
+  integrate_in_lanes(q, interval_lanes(at_), run, rule.moved(), rule.hessian());
 }
 
 long StagedSteps::operations(bool with_jacobian, bool with_hessian) const {

@@ -112,7 +112,7 @@ class RHEC_EXPORT Path {
   Place locate(double x, double y, double heading) const noexcept { return locate(x, y, heading, Search{}); }
 
  private:
-  int segment_at(double arc_length) const noexcept;
+  static int segment_of(const std::vector<double>& of, double value) noexcept;
   int segment_near(int known, const std::vector<double>& of, double value) const noexcept;
   PathPoint point_on(int segment, double arc_length) const noexcept;
   double speed_on(int segment, double along) const noexcept;

@@ -66,7 +66,7 @@ struct ModelDescription {
 ///     dx/dt = f(x, u, p),    y = h(x)
 ///
 /// with state x (n_x), input u (n_u), parameter p (n_p) and output y (n_y). Between two nodes the input is constant,
-/// and x_{i+1} = F(x_i, u_i, p_i, dt_i) is computed by classical Runge-Kutta steps. All calls are const and
+/// and x_{i+1} = F(x_i, u_i, p_i, dt_i) is computed by steps of an integrator. All calls are const and
 /// thread-safe, and neither allocate nor throw. They take a range of stages, so that an implementation may evaluate
 /// several at once.
 class RHEC_EXPORT Model {
