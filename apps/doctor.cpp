@@ -126,6 +126,7 @@ void print(const std::vector<PlaceFindings>& places, const std::string& name) {
   for (const PlaceFindings& each : places) {
     fmt::print("{} ({}){}\n", each.place.directory.empty() ? "''" : each.place.directory.string(),
                origin_of(each.place), each.place.skipped.empty() ? "" : ": not searched: " + each.place.skipped);
+    if (!each.place.warning.empty()) fmt::print("  warning: {}\n", each.place.warning);
     for (const Finding& finding : each.findings) print(finding);
     if (each.findings.empty() && each.place.skipped.empty())
       fmt::print("  no file {}\n", name.empty() ? "that ends in .so" : fmt::format("or plugin called '{}'", name));
@@ -168,6 +169,7 @@ void print_json(const std::vector<PlaceFindings>& places) {
                               {"origin", origin_of(each.place)},
                               {"searched", each.place.skipped.empty()},
                               {"why_not_searched", each.place.skipped},
+                              {"warning", each.place.warning},
                               {"candidates", candidates}});
   }
   const Counts counts = count(places);

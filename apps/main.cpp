@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "commands.hpp"
@@ -80,14 +83,30 @@ int run(int count, char** words) {
   return program.run(count, words);
 }
 
+std::string why_not_written(const std::string& reason) {
+  return fmt::format("standard output could not be written: {}; is there room where it goes?", reason);
+}
+
+/// What is printed waits in a buffer: whether it could be written is known when that is emptied.
+void finish_output() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) throw Error(why_not_written(std::strerror(errno)));
+}
+
 }  // namespace
 }  // namespace rhec::apps
 
 int main(int count, char** words) {
   try {
-    return rhec::apps::run(count, words);
+    const int code = rhec::apps::run(count, words);
+    rhec::apps::finish_output();
+    return code;
   } catch (const rhec::Error& mistake) {
     fmt::print(stderr, "rhec: error: {}\n", mistake.what());
+  } catch (const std::system_error& failure) {
+    if (std::ferror(stdout) != 0)
+      fmt::print(stderr, "rhec: error: {}\n", rhec::apps::why_not_written(failure.code().message()));
+    else
+      fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());
   } catch (const std::exception& failure) {
     fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());
   }

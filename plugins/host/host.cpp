@@ -30,6 +30,8 @@ fs::path installed_directory() {
   return problem ? fs::path() : library.parent_path() / "rhec" / "plugins";
 }
 
+bool has_any(fs::perms given, fs::perms wanted) { return (given & wanted) != fs::perms::none; }
+
 class PlaceList {
  public:
   void add(const fs::path& directory, const std::string& origin) {
@@ -37,18 +39,28 @@ class PlaceList {
     const fs::path canonical = fs::canonical(directory, problem);
     if (problem == std::errc::no_such_file_or_directory) return skip(directory, origin, "no such directory");
     if (problem) return skip(directory, origin, problem.message());
-    if (!fs::is_directory(canonical, problem)) return skip(canonical, origin, "a file, not a directory");
+    const fs::file_status status = fs::status(canonical, problem);
+    if (!fs::is_directory(status)) return skip(canonical, origin, "a file, not a directory");
+    if (has_any(status.permissions(), fs::perms::others_write))
+      return skip(canonical, origin,
+                  fmt::format("every user may write to it, and so have their code run here; run 'chmod o-w {}', and "
+                              "look at what is in it",
+                              canonical.string()));
     const fs::directory_iterator readable(canonical, problem);
     if (problem) return skip(canonical, origin, problem.message());
     const bool seen = std::any_of(places_.begin(), places_.end(), [&](const PluginPlace& place) {
       return place.skipped.empty() && place.directory == canonical;
     });
     if (seen) return skip(canonical, origin, "searched already");
-    places_.push_back({canonical, origin, {}});
+    std::string warning;
+    if (has_any(status.permissions(), fs::perms::group_write))
+      warning = fmt::format("its group may write to it; if these are not all trusted, run 'chmod g-w {}'",
+                            canonical.string());
+    places_.push_back({canonical, origin, {}, std::move(warning)});
   }
 
   void skip(const fs::path& directory, const std::string& origin, const std::string& reason) {
-    places_.push_back({directory, origin, reason});
+    places_.push_back({directory, origin, reason, {}});
   }
 
   std::vector<PluginPlace> take() { return std::move(places_); }
@@ -271,6 +283,7 @@ std::string Host::diagnosis() const {
   for (const PluginPlace& place : places()) {
     text += fmt::format("{} ({}){}\n", place.directory.empty() ? "''" : place.directory.string(), place.origin,
                         place.skipped.empty() ? "" : ": " + place.skipped);
+    if (!place.warning.empty()) text += fmt::format("  warning: {}\n", place.warning);
     if (!place.skipped.empty()) continue;
     const std::vector<PluginRecord> found = found_in(place);
     for (const PluginRecord& record : found) {

@@ -160,6 +160,15 @@ Refusal refused_by_loader(const std::string& words) {
   return {reason, kRebuild};
 }
 
+/// Whoever can write to a library has their code run here.
+Refusal writable_by_all(const std::filesystem::path& file) {
+  std::error_code problem;
+  const std::filesystem::perms permissions = std::filesystem::status(file, problem).permissions();
+  if (problem || (permissions & std::filesystem::perms::others_write) == std::filesystem::perms::none) return {};
+  return {"every user may write to it, and so have their code run here",
+          fmt::format("run 'chmod o-w {}', and build it again if you do not know who wrote it", file.string())};
+}
+
 /// Keeps the library loaded until the process ends, whoever closes it.
 void pin(const std::filesystem::path& file) {
   if (void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_NOLOAD | RTLD_NODELETE)) dlclose(handle);
@@ -175,6 +184,7 @@ Library load_library(const std::filesystem::path& file) {
     result.record.remedy = refusal.remedy;
     return !refusal.empty();
   };
+  if (refused(writable_by_all(file))) return result;
   if (refused(why_not_loadable(file, kManifestSymbol, sizeof(ManifestHead)))) return result;
   auto library = std::make_shared<boost::dll::shared_library>();
   try {

@@ -56,6 +56,11 @@ class Converter {
   }
 
   Settings convert_map(const YAML::Node& node, const Origin& origin) {
+    // Each key is looked for among those before it.
+    constexpr std::size_t most_keys = 10000;
+    if (node.size() > most_keys)
+      throw source_.error(node.Mark(), fmt::format("a map of {} keys, expected at most {}; is this a configuration?",
+                                                   node.size(), most_keys));
     Settings map = Settings::map(origin);
     for (const auto& member : node) {
       const YAML::Node& key = member.first;
@@ -145,7 +150,12 @@ Settings load_yaml(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) throw Error(fmt::format("{}: cannot be read; check its permissions", file.string()));
-  return parse_yaml(text, file.string());
+  Settings read = parse_yaml(text, file.string());
+  if (read.is_null())
+    throw Error(
+        fmt::format("{}: there is nothing in it; expected keys and values, such as 'speed: 4'; is the file cut off?",
+                    file.string()));
+  return read;
 }
 
 Settings parse_yaml(const std::string& text, const std::string& name) { return parse(text, {name, true}); }

@@ -1,5 +1,7 @@
 #include "rhec/sim/loop/closed_loop.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,6 +18,9 @@ namespace {
 
 // A vehicle farther than this from its path is lost [m].
 constexpr double lost = 50.0;
+// A vehicle whose controller takes it to be at the end of its path is there if it is no farther from it than this [m]:
+// far more than an estimate that is right errs by.
+constexpr double near_the_end = 5.0;
 
 /// Sums of absolute and squared errors.
 class Errors {
@@ -146,9 +151,19 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     if (hooks.sampled) hooks.sampled({k, time, estimator.get(), &estimate, controller.get(), &command});
     if (hooks.progress) hooks.progress(std::min(1.0, true_follower.arc_length() / scenario.path().length()));
 
-    if (controller->finished() || true_follower.finished()) {
+    if (true_follower.finished()) {
       log.completed = true;
       log.ended = "the end of the path was reached";
+      break;
+    }
+    if (controller->finished()) {  // by what the robot knows
+      const PathPoint end = scenario.path().point_at(scenario.path().length(), path_segment);
+      const double left = std::hypot(truth.state()[roles.position_x] - end.x, truth.state()[roles.position_y] - end.y);
+      log.completed = left < near_the_end;
+      log.ended =
+          log.completed
+              ? "the end of the path was reached"
+              : fmt::format("the robot takes itself to be at the end of the path, which is {:.3g} m away", left);
       break;
     }
     if (!truth.state().allFinite() || !(std::abs(true_follower.lateral()) < lost)) {

@@ -41,6 +41,9 @@ void read_horizon(const LineValue& horizon, const ProblemFormat& format, Problem
   // Before an estimator's second node its window has no intervals.
   const bool may_be_empty = record.version >= 2 && format.traits().may_be_empty;
   record.intervals = horizon["intervals"].integer(may_be_empty ? 0 : 1);
+  constexpr int most_intervals = 1000000;  // a line with a wrong number must not take the machine's memory
+  if (record.intervals > most_intervals)
+    throw horizon["intervals"].mismatch(fmt::format("at most {} intervals", most_intervals));
   const auto N = static_cast<std::size_t>(record.intervals);
   const LineValue dt = horizon["dt"];
   const auto duration = [](const LineValue& value) {

@@ -7,6 +7,7 @@ import json
 import math
 import pathlib
 import re
+import subprocess
 import sys
 import tempfile
 
@@ -283,6 +284,8 @@ class Test(cli.Findings):
             result = self.rhec("run", scenario, "--out", self.out)
             self.refused(text, result, ERROR, message, f"{scenario}:{line}")
             self.expect(re.search(r"scenario\.yaml:[1-9]", result.stderr), text, f"no line is named: {result.stderr}")
+        scenario.write_text("")
+        self.refused("an empty file", self.rhec("run", scenario, "--out", self.out), ERROR, f"{scenario}: there is nothing in it")
         missing = self.work / "missing.yaml"
         self.refused("missing file", self.run(scenario=missing), ERROR, str(missing), "no such file")
         self.refused("folder", self.run(scenario=self.work), ERROR, str(self.work), "is a directory")
@@ -307,6 +310,11 @@ class Test(cli.Findings):
         self.refused("options SECTION", self.rhec("options", "estimater"), ERROR, "estimater")
 
     def outputs(self):
+        with open("/dev/full", "w") as full:
+            for words in (["plugins"], ["options"], ["--version"]):
+                result = subprocess.run([sys.argv[1], *words], stdout=full, stderr=subprocess.PIPE, text=True)
+                self.expect(result.returncode == ERROR, "a full disk", f"exit code {result.returncode} of {words}")
+                self.expect("standard output could not be written: No space left" in result.stderr, "a full disk", result.stderr)
         file = self.work / "file"
         file.write_text("precious")
         self.refused("a file in the place of the folder", self.run(out=file), ERROR, str(file), "is a file")

@@ -167,6 +167,35 @@ TEST(Host, PlacesThatCannotBeSearchedAreToldWithTheReason) {
   EXPECT_THAT(host.found_in(host.places()[0]), testing::IsEmpty());
 }
 
+TEST(Host, WhatEveryUserMayWriteToIsRefused) {
+  TemporaryFolder folder;
+  // A folder for each case: a library that is loaded must not be written over.
+  const auto copy_with = [&](const char* name, fs::perms of_folder, fs::perms of_file) {
+    const fs::path place = folder.path() / name;
+    fs::copy(fixture("good"), place, fs::copy_options::recursive);
+    for (const auto& entry : fs::directory_iterator(place))
+      fs::permissions(entry.path(), fs::perms::owner_all | of_file);
+    fs::permissions(place, fs::perms::owner_all | of_folder);
+    return Host({place});
+  };
+  const Host safe = copy_with("safe", fs::perms::none, fs::perms::none);
+  EXPECT_THAT(safe.names(PluginKind::blocking), Contains("toy"));
+  EXPECT_EQ(safe.places()[0].warning, "");
+
+  const Host open = copy_with("open", fs::perms::others_write, fs::perms::none);
+  EXPECT_THAT(open.names(PluginKind::blocking), Not(Contains("toy")));
+  EXPECT_THAT(open.places()[0].skipped, HasSubstr("chmod o-w " + fs::canonical(folder.path() / "open").string()));
+
+  const Host shared = copy_with("shared", fs::perms::group_write, fs::perms::none);
+  EXPECT_THAT(shared.names(PluginKind::blocking), Contains("toy"));
+  EXPECT_THAT(shared.places()[0].warning, HasSubstr("chmod g-w"));
+  EXPECT_THAT(shared.diagnosis(), HasSubstr("warning: its group may write to it"));
+
+  const Host open_file = copy_with("open_file", fs::perms::none, fs::perms::others_write);
+  EXPECT_THAT(open_file.names(PluginKind::blocking), Not(Contains("toy")));
+  EXPECT_THAT(open_file.diagnosis(), HasSubstr("every user may write to it"));
+}
+
 TEST(Host, TheWorkingDirectoryIsNotSearched) {
   const fs::path before = fs::current_path();
   fs::current_path(fixture("good"));

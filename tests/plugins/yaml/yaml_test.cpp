@@ -103,6 +103,12 @@ TEST(Yaml, AliasesCannotMakeATreeWithoutEnd) {
   EXPECT_THAT(mistake(bomb), HasSubstr("does an alias"));
 }
 
+TEST(Yaml, AMapThatIsNoConfigurationIsRefusedAtOnce) {
+  std::string text = "speed: 4\n";
+  for (int i = 0; i < 10000; ++i) text += "k" + std::to_string(i) + ": 1\n";
+  EXPECT_THAT(mistake(text), HasSubstr("a map of 10001 keys, expected at most 10000"));
+}
+
 TEST(Yaml, FilesAreNamedInErrors) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "rhec_yaml_test";
   std::filesystem::create_directories(folder);
@@ -113,6 +119,10 @@ TEST(Yaml, FilesAreNamedInErrors) {
   EXPECT_THAT(error_of([&] { load_yaml(folder / "gone.yaml"); }),
               AllOf(HasSubstr("gone.yaml"), HasSubstr("no such file")));
   EXPECT_THAT(error_of([&] { load_yaml(folder); }), HasSubstr("is a directory"));
+  for (const char* nothing : {"", "\n\n", "# speed: 4\n", "---\n"}) {
+    std::ofstream(file) << nothing;
+    EXPECT_THAT(error_of([&] { load_yaml(file); }), StartsWith(file.string() + ": there is nothing in it")) << nothing;
+  }
   std::filesystem::remove_all(folder);
 }
 

@@ -1,4 +1,5 @@
 // What a closed loop tells of its parts: each sample's in their order, and nothing of the run changes.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,6 +48,22 @@ TEST(LoopTimes, FeedbackIsPartOfTheEstimatorsTime) {
     EXPECT_GT(sample.estimator_feedback_us, 0.0);
     EXPECT_GE(sample.estimator_us, sample.estimator_feedback_us);
   }
+}
+
+TEST(Ends, ARobotThatOnlyTakesItselfToBeAtTheEndIsNotThere) {
+  // Dead reckoning, on wheels that slip more than it believes.
+  Settings settings = parse_yaml(R"(
+speed: 4
+model: {name: bicycle_slip, outputs: [delta]}
+noise: {outputs: {delta: 0.001}, inputs: {u1: 0.001, u2: 0.001}}
+estimator: {name: ekf, initial: {parameters: {kappa: 0.9, mu: 1}, sigma: {kappa: 0.001, mu: 0.001}}}
+path: {name: zigzag}
+terrain: {name: constant, values: {kappa: 0.87, mu: 1}}
+)",
+                                 "blind.yaml");
+  const RunLog log = run_closed_loop({Host(), settings});
+  EXPECT_FALSE(log.completed);
+  EXPECT_THAT(log.ended, testing::HasSubstr("takes itself to be at the end of the path, which is "));
 }
 
 TEST(Headlands, AreDrivenInReverse) {

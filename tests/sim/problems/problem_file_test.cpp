@@ -89,6 +89,7 @@ TEST(ProblemFile, NamesThePlaceAndTheRemedy) {
       {rhe_line, "\"dt\": 0.1", "\"dt\": 0.1, \"dt\": 0.2", "dt", "written twice"},
       {rhe_line, "\"dt\": 0.1, ", "", "horizon.dt", "missing"},
       {rhe_line, "\"intervals\": 3", "\"intervals\": 2.5", "horizon.intervals", "an integer, at least 1"},
+      {rhe_line, "\"intervals\": 3", "\"intervals\": 300000000", "horizon.intervals", "at most 1000000 intervals"},
       {rhe_line, "rk4", "euler", "horizon.integrator", "\"rk4\""},
       {rhe_line, "rk4", "radau5", "horizon.integrator", "is for lines with \"version\": 4"},
       {rhe_line, "\"substeps\": 2", "\"substeps\": 0", "horizon.substeps", "at least 1"},

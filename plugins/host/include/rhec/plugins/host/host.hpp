@@ -22,6 +22,7 @@ struct PluginPlace {
   std::filesystem::path directory;
   std::string origin;   ///< "given", "RHEC_PLUGIN_PATH" or "installed"
   std::string skipped;  ///< why it was not searched; empty if it was
+  std::string warning;  ///< what is better changed although it is searched; empty if nothing
 };
 
 /// A candidate file, and whether it is used as a plugin.
@@ -57,6 +58,9 @@ struct PluginTrial {
 /// separated by colons; empty and relative entries are skipped, since they would refer to the working directory); and
 /// `rhec/plugins` next to the library that contains this class. Of two plugins of the same kind and name, the first one
 /// found is used.
+///
+/// A directory, or a file, that every user may write to is refused: anybody could put code there that then runs as the
+/// user of this program. One that its group may write to is searched, with a warning.
 ///
 /// A candidate is any entry whose name ends in `.so`. It is passed to the loader only if it is a complete shared
 /// library for this machine that exports a manifest. Loading runs the constructors of a library and of its dependencies
