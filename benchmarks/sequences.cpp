@@ -79,6 +79,7 @@ void set_newest(const RhcProblem& from, RhcProblem& to, std::span<double> scratc
       to.input_upper(i, j) = from.input_upper(i, j);
     }
   }
+  to.terms().take_data(from.terms());
   to.finish(scratch);
 }
 
@@ -203,6 +204,12 @@ const std::vector<Drive>& usual_drives() {
   static const std::string full = "{name: full_horizon}", blocks = "{name: structured, size: 5, overlap: 3}";
   static const std::string figure8 = RHEC_SOURCE_DIRECTORY "/scenarios/figure8.yaml";
   static const std::string zigzag = RHEC_SOURCE_DIRECTORY "/scenarios/zigzag.yaml";
+  static const std::string obstacles = RHEC_SOURCE_DIRECTORY "/scenarios/obstacles.yaml";
+  static const std::string limits =
+      "[{name: corridor, left: 4, right: 4, margin: 0.5}, {name: obstacles, vehicle_radius: 1, obstacles: ["
+      "{x: 19.6, y: 30.7, radius: 1, velocity_x: 0.1, velocity_y: -0.3},"
+      "{x: -18.5, y: -5.5, radius: 1.2, velocity_x: 0.2, velocity_y: 0.3},"
+      "{x: 30.7, y: -38, length: 4, width: 1.5, heading: 0.2, velocity_x: -0.5, velocity_y: -0.1}]}]";
   static const std::vector<Drive> drives = {
       {"figure8/fhb", figure8, {"path.laps=1", "blocking.kappa=" + full}},
       {"figure8/rates",
@@ -213,6 +220,8 @@ const std::vector<Drive>& usual_drives() {
       {"figure8/sbo_5_3_both", figure8, {"path.laps=1", "blocking.kappa=" + blocks, "blocking.mu=" + blocks}},
       {"zigzag/fhb", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4", "blocking.kappa=" + full}},
       {"zigzag/sbo_2_4", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4"}},
+      {"obstacles/free", obstacles, {"estimator={name: truth}", "controller.terms=[]"}},
+      {"obstacles/limits", obstacles, {"estimator={name: truth}", "controller.terms=" + limits}},
   };
   return drives;
 }

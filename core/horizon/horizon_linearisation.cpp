@@ -25,6 +25,7 @@ HorizonLinearisation::HorizonLinearisation(const HorizonProblem& problem) : Line
   rows_.assign(nodes * qp_.stride(), 0.0);
   costates_.assign((nodes + 1) * qp_.stride(), 0.0);
   curvature_behind_.assign(static_cast<std::size_t>(capacity.states + capacity.controls) * qp_.stride(), 0.0);
+  if (problem.terms().functions()) without_terms_.assign(nodes * curvature_behind_.size(), 0.0);
   durations_.assign(nodes, 0.0);
   data_.assign(nodes * problem.model().data_count(), 0.0);
   starts_.assign(nodes * structure.lifted_count(), 0);
@@ -51,26 +52,45 @@ void HorizonLinearisation::forget() noexcept {
 }
 
 double HorizonLinearisation::linearise(const Iterate& iterate, Hessian hessian) noexcept {
+  const CostParts parts = hessian == Hessian::none ? CostParts::vectors : CostParts::all;
   linearise_stages(iterate, hessian);
-  return write_cost(all_stages(problem_), iterate, hessian,
-                    hessian == Hessian::none ? CostParts::vectors : CostParts::all);
+  const double total = write_cost(all_stages(problem_), iterate, hessian, parts);
+  return total + add_terms(iterate, hessian, parts);
 }
 
 double HorizonLinearisation::linearise_for_residual(const Iterate& iterate, Hessian next) noexcept {
-  const bool is_kept = next == Hessian::exact && problem_.keeps_curvature();
-  return linearise(iterate, is_kept ? Hessian::exact : Hessian::none);
+  if (next != Hessian::exact || !problem_.keeps_curvature()) return linearise(iterate, Hessian::none);
+  linearise_stages(iterate, Hessian::exact);
+  const double total = write_cost(all_stages(problem_), iterate, Hessian::exact, CostParts::all);
+  // The next sample has other data for the terms, and so another Hessian of theirs.
+  keep_curvature();
+  return total + add_terms(iterate, Hessian::none, CostParts::vectors);
 }
 
 void HorizonLinearisation::prepare(const Iterate& iterate, Hessian hessian) noexcept {
   const bool has_moved = move_along(iterate, hessian);
-  if (has_moved && hessian == Hessian::exact) return;
   if (!has_moved) linearise_stages(iterate, hessian);
-  write_cost(all_stages(problem_), iterate, hessian, CostParts::matrices);
+  if (!has_moved || hessian != Hessian::exact) write_cost(all_stages(problem_), iterate, hessian, CostParts::matrices);
+  add_terms(iterate, hessian, CostParts::matrices);
 }
 
 void HorizonLinearisation::refresh(const Iterate& iterate) noexcept {
   if (problem_.has_late_bounds()) problem_.write_bounds(iterate, all_stages(problem_), qp_, scratch_);
   write_cost(all_stages(problem_), iterate, Hessian::none, CostParts::vectors);
+  add_terms(iterate, Hessian::none, CostParts::vectors);
+}
+
+/// Adds what terms cost to a QP that has all other costs. Returns these costs, if vectors are wanted.
+double HorizonLinearisation::add_terms(const Iterate& iterate, Hessian hessian, CostParts parts) noexcept {
+  if (!problem_.terms().functions()) return 0.0;
+  if (parts != CostParts::vectors) keep_curvature();
+  return problem_.add_terms(all_stages(problem_), iterate, hessian, parts, qp_, scratch_);
+}
+
+/// Keeps a Hessian to which terms are about to be added: theirs depends on data and on the multipliers of limits.
+void HorizonLinearisation::keep_curvature() noexcept {
+  if (!has_curvature_ || without_terms_.empty()) return;
+  std::copy_n(qp_.H(0), (known_intervals_ + 1) * std::ssize(curvature_behind_), without_terms_.data());
 }
 
 bool HorizonLinearisation::is_at(const Iterate& iterate) const noexcept {
@@ -185,8 +205,8 @@ bool HorizonLinearisation::is_known(int interval, int steps, int count, bool is_
   return std::equal(known, known + lifted, problem_.structure_.block_starts(interval));
 }
 
-/// As `linearise_stages`, but from the cache: only unknown intervals are evaluated. The exact Hessian is then complete,
-/// including costs. Returns false and does nothing if too many intervals are unknown.
+/// As `linearise_stages`, but from the cache: only unknown intervals are evaluated. The exact Hessian is then complete
+/// but for terms. Returns false and does nothing if too many intervals are unknown.
 bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) noexcept {
   const HorizonStructure& structure = problem_.structure_;
   const bool is_exact = hessian == Hessian::exact;
@@ -205,6 +225,8 @@ bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) n
   }
   const bool was_behind = end < N && is_known(end, steps, count, is_exact);
   const std::ptrdiff_t curvature_size = static_cast<std::ptrdiff_t>(curvature_behind_.size());
+  if (is_exact && !without_terms_.empty())
+    std::copy_n(without_terms_.data(), (known_intervals_ + 1) * curvature_size, qp_.H(0));
   if (steps > 0) qp_.drop_first(steps);
   // The last node remains the last one.
   if (steps > 0 && is_exact) std::copy_n(qp_.H(end), curvature_size, qp_.H(known_intervals_));
@@ -225,7 +247,12 @@ bool HorizonLinearisation::move_along(const Iterate& iterate, Hessian hessian) n
   }
   evaluate_unknown(iterate, hessian, unknown.data(), unknown_count);
   if (is_exact && N != known_intervals_) write_cost({N, N}, iterate, hessian, CostParts::matrices);
-  problem_.write_bounds(iterate, all_stages(problem_), qp_, scratch_);
+  if (problem_.has_late_bounds()) {
+    problem_.write_own_bounds(iterate, all_stages(problem_), qp_);
+    write_new_limits(iterate, end, unknown.data(), unknown_count);
+  } else {
+    problem_.write_bounds(iterate, all_stages(problem_), qp_, scratch_);
+  }
   move_nodes(steps);
   remember(iterate, count);
   is_extended_ = false;
@@ -246,6 +273,18 @@ void HorizonLinearisation::evaluate_unknown(const Iterate& iterate, Hessian hess
     dynamics().linearise(together, iterate, {.hessian = hessian}, qp_, scratch_.data());
     if (is_exact) write_cost(together, iterate, hessian, CostParts::matrices);
   }
+}
+
+/// Limits of the stages that have none of the last horizon's, which ended at node `end`. Those of the others move
+/// along, with data that held for the same time; `refresh` writes all of them once the newest data are known.
+void HorizonLinearisation::write_new_limits(const Iterate& iterate, int end, const int* unknown, int count) noexcept {
+  const int N = problem_.intervals();
+  const auto write = [&](int first, int last) { problem_.write_limits(iterate, {first, last}, qp_, scratch_); };
+  const int first_kept = 1, last_kept = std::min(end, N) - 1;  // the first and the last node have rows of their own
+  write(0, std::min(first_kept - 1, N));
+  for (int k = 0; k < count; ++k)
+    if (unknown[k] >= first_kept && unknown[k] <= last_kept) write(unknown[k], unknown[k]);
+  if (std::max(last_kept + 1, first_kept) <= N) write(std::max(last_kept + 1, first_kept), N);
 }
 
 /// Whether the problem has simulated this interval from the same numbers.

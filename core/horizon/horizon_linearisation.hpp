@@ -17,7 +17,7 @@ struct IntervalDynamics;
 ///
 /// If the exact Hessian depends on no data (HorizonProblem::has_constant_cost_hessian), it is cached too, and the
 /// interval behind the horizon is evaluated in advance, with the last inputs, as a shifted plan of a controller has
-/// them.
+/// them. What terms add to it is evaluated anew each time.
 class HorizonLinearisation : public Linearisation {
  public:
   explicit HorizonLinearisation(const HorizonProblem& problem);
@@ -32,9 +32,9 @@ class HorizonLinearisation : public Linearisation {
  protected:
   using CostParts = HorizonProblem::CostParts;
 
-  /// Writes the cost of a range of stages, as HorizonProblem::write_cost.
+  /// Writes the cost of a range of stages without terms, as HorizonProblem::write_cost.
   virtual double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts) noexcept {
-    return problem_.write_costs(range, iterate, hessian, parts, qp_, scratch_);
+    return problem_.write_cost(range, iterate, hessian, parts, qp_, scratch_);
   }
   /// Data kept for nodes move `steps` nodes towards the front; `same_node(i)` says whether node i still has the same
   /// state.
@@ -50,6 +50,8 @@ class HorizonLinearisation : public Linearisation {
   const double* row(const AlignedDoubles& rows, int stage) const noexcept;
   std::uint8_t* starts(int interval) noexcept;
   void linearise_stages(const Iterate& iterate, Hessian hessian) noexcept;
+  double add_terms(const Iterate& iterate, Hessian hessian, CostParts parts) noexcept;
+  void keep_curvature() noexcept;
   bool has_structure() const noexcept;
   bool has_lifted_rows() const noexcept;
   void remember(const Iterate& iterate, int first) noexcept;
@@ -60,6 +62,7 @@ class HorizonLinearisation : public Linearisation {
   int match(const Iterate& iterate, int steps, bool is_exact) noexcept;
   bool move_along(const Iterate& iterate, Hessian hessian) noexcept;
   void evaluate_unknown(const Iterate& iterate, Hessian hessian, const int* unknown, int count) noexcept;
+  void write_new_limits(const Iterate& iterate, int end, const int* unknown, int count) noexcept;
   bool has_simulated(int interval, const Iterate& iterate) noexcept;
   void take_simulated(int interval, const Iterate& iterate) noexcept;
 
@@ -69,6 +72,7 @@ class HorizonLinearisation : public Linearisation {
   bool has_curvature_ = false;       ///< H holds all costs and the curvature of the dynamics at `costates_`
   AlignedDoubles rows_, costates_;   ///< of the iterate at which the QP was made
   AlignedDoubles curvature_behind_;  ///< H of the interval behind the horizon
+  AlignedDoubles without_terms_;     ///< H without what terms add to it; empty if there are none
   std::vector<double> durations_, data_;  ///< of the intervals
   std::vector<std::uint8_t> starts_;      ///< of each interval's lifted variables
   /// Per node: 2 if the whole row matches, 1 if the state does; per interval, the same for costates.

@@ -183,6 +183,11 @@ void HorizonProblem::refresh(const Iterate& iterate, StageQp& qp, std::span<doub
 
 void HorizonProblem::write_bounds(const Iterate& iterate, StageRange range, StageQp& qp,
                                   std::span<double> scratch) const noexcept {
+  write_own_bounds(iterate, range, qp);
+  write_limits(iterate, range, qp, scratch);
+}
+
+void HorizonProblem::write_own_bounds(const Iterate& iterate, StageRange range, StageQp& qp) const noexcept {
   const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(range.first) * stride(),
                        count = static_cast<std::ptrdiff_t>(range.last - range.first + 1) * stride();
   transcription_kernels().write_bounds(lower_.data() + first, upper_.data() + first, iterate.row(range.first),
@@ -190,6 +195,10 @@ void HorizonProblem::write_bounds(const Iterate& iterate, StageRange range, Stag
   if (range.first == 0 && initial_state())
     for (int j = 0; j < structure_.capacity().states; ++j)
       qp.initial_step()[j] = initial_state()[j] - iterate.state(0)[j];
+}
+
+void HorizonProblem::write_limits(const Iterate& iterate, StageRange range, StageQp& qp,
+                                  std::span<double> scratch) const noexcept {
   if (terms_.has_limits()) terms_.write_limits(horizon_of_terms(), range, iterate, qp, scratch.data());
 }
 
@@ -209,8 +218,7 @@ std::unique_ptr<Linearisation> HorizonProblem::make_linearisation() const {
 }
 
 bool HorizonProblem::keeps_curvature() const noexcept {
-  // With terms, the exact Hessian depends on their data and on multipliers of limits.
-  return !terms_.functions() && has_constant_cost_hessian() && structure_.is_direct() && !structure_.any_start();
+  return has_constant_cost_hessian() && structure_.is_direct() && !structure_.any_start();
 }
 
 void HorizonProblem::simulate_new_interval(int interval, Iterate& iterate, std::span<double> scratch) noexcept {

@@ -22,6 +22,13 @@ LossAt loss_at(const Loss& loss, double r) noexcept {
   return {2.0 * square * (root - 1.0), 1.0 / root, -0.5 / (square * root * root * root)};
 }
 
+bool any_pull(const Iterate& iterate, StageRange stages, int limits) noexcept {
+  const auto is_set = [](double multiplier) { return multiplier != 0.0; };
+  for (int i = stages.first; i <= stages.last; ++i)
+    if (std::any_of(iterate.limit_bound(i), iterate.limit_bound(i) + limits, is_set)) return true;
+  return false;
+}
+
 }  // namespace
 
 HorizonTerms::HorizonTerms(std::shared_ptr<const TermFunctions> functions, const Model& model, int max_intervals)
@@ -170,20 +177,25 @@ void HorizonTerms::write_limits(const Horizon& horizon, StageRange range, const 
     double* const slopes = memory.take(count * slope_count);
     gather(horizon, stages, iterate, arguments);
     functions_->evaluate(stage, count, arguments, values, slopes, memory.rest());
+    const double *linear = functions_->linear() + rows.first_limit,
+                 *quadratic = functions_->quadratic() + rows.first_limit;
     for (int i = stages.first; i <= stages.last; ++i) {
       const std::ptrdiff_t k = i - stages.first;
+      const double *least = lower(i) + rows.first_limit, *most = upper(i) + rows.first_limit;
+      double *to_lower = qp.limit_lower(i), *to_upper = qp.limit_upper(i), *G = qp.G(i);
+      double *to_linear = qp.limit_linear(i), *to_quadratic = qp.limit_quadratic(i);
       for (int r = 0; r < rows.limits; ++r) {
-        const int which = rows.first_limit + r;
         const double value = values[k * rows.count() + r];
-        qp.limit_lower(i)[r] = lower(i)[which] - value;
-        qp.limit_upper(i)[r] = upper(i)[which] - value;
-        qp.limit_linear(i)[r] = functions_->linear()[which];
-        qp.limit_quadratic(i)[r] = functions_->quadratic()[which];
-        std::fill_n(qp.G(i) + at(r, stride), stride, 0.0);
+        to_lower[r] = least[r] - value;
+        to_upper[r] = most[r] - value;
+        to_linear[r] = linear[r];
+        to_quadratic[r] = quadratic[r];
       }
-      for (std::ptrdiff_t e = 0; e < slope_count; ++e) {
-        const auto& [r, c] = rows.slopes[static_cast<std::size_t>(e)];
-        if (r < rows.limits) qp.G(i)[at(r, stride) + column(horizon.structure, i, c)] += slopes[k * slope_count + e];
+      std::fill_n(G, at(rows.limits, stride), 0.0);
+      const double* slope = slopes + k * slope_count;
+      for (const auto& [r, c] : rows.slopes) {
+        if (r < rows.limits) G[at(r, stride) + column(horizon.structure, i, c)] += *slope;
+        ++slope;
       }
     }
   });
@@ -222,6 +234,8 @@ double HorizonTerms::add_cost(const Horizon& horizon, StageRange range, const It
   const int stride = qp.stride();
   for_each_kind(horizon, range, [&](TermFunctions::Stage stage, StageRange stages) {
     const TermFunctions::Rows& rows = functions_->rows(stage);
+    // Without residuals there is only the curvature of limits, which that of limits without multipliers is no part of.
+    if (rows.residuals.empty() && !(curves && any_pull(iterate, stages, rows.limits))) return;
     const int count = stages.last - stages.first + 1, row_count = rows.count();
     const auto slope_count = static_cast<std::ptrdiff_t>(rows.slopes.size());
     const auto bend_count = static_cast<std::ptrdiff_t>(rows.bends.size());
@@ -232,7 +246,7 @@ double HorizonTerms::add_cost(const Horizon& horizon, StageRange range, const It
     double* const slopes = memory.take(count * slope_count);
     double* const bends = memory.take(count * bend_count);
     gather(horizon, stages, iterate, arguments);
-    functions_->evaluate(stage, count, arguments, values, slopes, memory.rest());
+    if (!rows.residuals.empty()) functions_->evaluate(stage, count, arguments, values, slopes, memory.rest());
     for (int i = stages.first; i <= stages.last; ++i) {
       const std::ptrdiff_t k = i - stages.first;
       double* const weight = weights + k * row_count;

@@ -112,10 +112,11 @@ void GuessShifter::move_limits(int steps, const HorizonProblem& to, Iterate& gue
     std::fill_n(multipliers, kept_.capacity().limit_row(), 0.0);
     if (!rows || i + steps > intervals_) continue;
     const TermFunctions::Rows* const kept = to.terms().rows(i + steps, intervals_, given);
+    const double *lower = to.limit_lower(i), *upper = to.limit_upper(i), *before = kept_.limit_bound(i + steps);
     for (int r = 0; kept && r < rows->limits; ++r) {
       const int from = rows->first_limit + r - kept->first_limit;
-      if (from < 0 || from >= kept->limits) continue;
-      multipliers[r] = multiplier_of(kept_.limit_bound(i + steps)[from], to.limit_lower(i)[r], to.limit_upper(i)[r]);
+      if (from < 0 || from >= kept->limits || before[from] == 0.0) continue;
+      multipliers[r] = multiplier_of(before[from], lower[r], upper[r]);
     }
   }
 }

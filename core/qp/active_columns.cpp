@@ -125,6 +125,23 @@ void DualActiveSet::back_substitute(double* x) const noexcept {
   }
 }
 
+/// Changes the multipliers of the columns so that their bounds are met.
+void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
+  double change[max_columns];
+  const int count = column_count();
+  for (int k = 0; k < count; ++k) {
+    const double* row = factor_row(k);
+    change[k] = (value_[columns_[k]] - target(columns_[k], multipliers_[k]) - dot(row, change, k)) * row[k];
+  }
+  back_substitute(change);
+  Weights weights{};
+  for (int k = 0; k < count; ++k) {
+    multipliers_[k] += change[k];
+    weight_of(columns_[k], weights) = change[k];
+  }
+  add_sensitivities(riccati, weights, value_);
+}
+
 /// Computes the Cholesky factor of S from row `first` on, with reciprocals on its diagonal. Linearly dependent columns
 /// are omitted, or make this fail.
 bool DualActiveSet::factor_columns(int first, bool may_leave_out) noexcept {

@@ -34,6 +34,7 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
   const std::size_t most = stages * (capacity.row() + capacity.limit_row());
   if (has_limits_) {
     for (auto* v : {&own_lower_, &own_upper_}) v->assign(most, 0.0);
+    rows_.assign(stages * capacity.limits * stride_, 0.0);
     for (auto* v : {&linear_, &softness_}) v->assign(stages * capacity.limit_row(), 0.0);
     relaxed_.assign(most, 0);
     saturated_.reserve(stages * capacity.limits);
@@ -131,7 +132,14 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   all_places_ = places_ + (qp.intervals() + 1) * limit_row_;
   if (claimed) take_claims(qp, *claimed);
   factor(qp, riccati);
+  if (has_limits_) keep_rows(qp);
   if (!claimed || !is_convex_ || !take_bounds(qp)) return;
+  // Where rows change with the newest data, their sensitivities are not worth finding before.
+  const auto is_of_row = [this](int place) { return is_limit(place); };
+  if (rows_change_ && std::any_of(columns_.begin(), columns_.end(), is_of_row)) {
+    has_bounds_ = false;
+    return;
+  }
   // Claims are mostly those of the last sample, and in control further bounds are likely to follow: those to which the
   // last trajectory came closest.
   if (qp.initial_state_is_given && column_count() < batch_size) {
@@ -211,23 +219,6 @@ double DualActiveSet::largest_miss() const noexcept {
                                     (bound_tolerance * (1.0 + std::abs(bound(place)))));
   }
   return largest;
-}
-
-/// Changes the multipliers of the columns so that their bounds are met.
-void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
-  double change[max_columns];
-  const int count = column_count();
-  for (int k = 0; k < count; ++k) {
-    const double* row = factor_row(k);
-    change[k] = (value_[columns_[k]] - target(columns_[k], multipliers_[k]) - dot(row, change, k)) * row[k];
-  }
-  back_substitute(change);
-  Weights weights{};
-  for (int k = 0; k < count; ++k) {
-    multipliers_[k] += change[k];
-    weight_of(columns_[k], weights) = change[k];
-  }
-  add_sensitivities(riccati, weights, value_);
 }
 
 bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
@@ -405,9 +396,11 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
 /// Finds the values at the present multipliers.
 DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& riccati, bool may_combine,
                                                 Iterate& step) noexcept {
-  if (column_count() > 0 && number_[columns_[0]] == none && !find_sensitivities_of_columns(qp, riccati, 0))
-    return Found::nothing;
-  if (!has_base_) factor_columns(0, true);
+  // A few claims without multipliers get their sensitivities together with those of the bounds that are violated then.
+  const bool lacks_sensitivities = column_count() > 0 && number_[columns_[0]] == none;
+  const bool may_wait = lacks_sensitivities && !has_base_ && changes_ == 0 && column_count() < batch_size;
+  if (lacks_sensitivities && !may_wait && !find_sensitivities_of_columns(qp, riccati, 0)) return Found::nothing;
+  if (!has_base_ && !may_wait) factor_columns(0, true);
   if (!(may_combine && combine(qp, riccati, step)) && !solve_with_multipliers(qp, riccati, step)) return Found::nothing;
   has_base_ = true;
   base_is_saturated_ = !saturated_.empty();
@@ -423,6 +416,14 @@ DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& ricc
   std::copy_n(step.row(0), places_, value_.begin());
   if (has_limits_) find_limit_values(qp, step);
   for (const int place : held_places_) value_[place] = step.bound_row(0)[place];
+  if (may_wait) {
+    find_violations();
+    if (!find_sensitivities_of_next(qp, riccati, columns_.data(), column_count())) return Found::nothing;
+    factor_columns(0, true);
+    // `base_places_` may have columns that are left out now; their multipliers are zero.
+    base_places_ = columns_;
+    std::copy_n(multipliers_.begin(), column_count(), base_multipliers_.begin());
+  }
   if (largest_miss() <= exactness) return check.violates ? Found::values : Found::step;
   return_to_bounds(riccati);
   return Found::values;
@@ -436,6 +437,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     prepare(qp, riccati, &claimed_);
     take_bounds(qp);
   }
+  if (has_limits_) compare_rows(qp);
   changes_ = 0;
   pull_tolerance_ = multiplier_tolerance;
   bool may_add_together = true;

@@ -2,6 +2,7 @@
 // ones.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "rhec/core/base/infinity.hpp"
@@ -84,12 +85,26 @@ void DualActiveSet::find_limit_values(const StageQp& qp, const Iterate& step) no
   for (int i = 0; i <= qp.intervals(); ++i) {
     double* values = value_.data() + limit_place(i, 0);
     const double *G = qp.G(i), *z = step.row(i);
+    const int used = states_ + qp.controls(i);
     for (int r = 0; r < qp.limits(i); ++r, G += stride_) {
-      values[r] = 0.0;
-      for (int j = 0; j < states_ + qp.controls(i); ++j) values[r] += G[j] * z[j];
+      double sum = 0.0;
+      for (int j = 0; j < used; ++j) sum += G[j] * z[j];
+      values[r] = sum;
     }
     std::fill(values + qp.limits(i), values + limit_row_, 0.0);
   }
+}
+
+void DualActiveSet::keep_rows(const StageQp& qp) noexcept {
+  const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(stride_) * qp.capacity().limits;
+  std::copy_n(qp.G(0), (qp.intervals() + 1) * row, rows_.data());
+}
+
+/// Sensitivities to rows of G, and those of the values of these rows, hold for the G with which they were found.
+void DualActiveSet::compare_rows(const StageQp& qp) noexcept {
+  const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(stride_) * qp.capacity().limits * (qp.intervals() + 1);
+  rows_change_ = std::memcmp(qp.G(0), rows_.data(), static_cast<std::size_t>(count) * sizeof(double)) != 0;
+  for (int batch = 0; rows_change_ && batch < batch_count; ++batch) forget(batch);
 }
 
 /// Whether a step that was found without limits violates one. Leaves the limits' values.

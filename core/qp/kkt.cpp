@@ -16,6 +16,8 @@ double KktResidual::largest() const noexcept {
 
 namespace {
 
+constexpr int columns_at_once = 8;  // divides the length of a row
+
 /// Column `c` of stage i's AB, times the next node's costate.
 double pull_of(const StageQp& qp, int i, int c, const double* costate) noexcept {
   const double* AB = qp.AB(i) + c;
@@ -55,32 +57,64 @@ void add_side(double excess, double pull, double linear, double quadratic, KktTe
   take(terms.complementarity, product(pull, std::abs(excess - slack)));
 }
 
-/// What the kernel gives, for a stage with limits.
-void add_limited_stage(const StageQp& qp, const Iterate& iterate, int i, KktTerms& terms) noexcept {
+/// h - costates + AB' next costates + G' multipliers of limits, eight columns of a stage from `first` on.
+void gradient_of(const StageQp& qp, const Iterate& iterate, int i, int first, double* sums) noexcept {
+  const int stride = qp.stride(), ns = qp.capacity().states;
+  std::copy_n(qp.h(i) + first, columns_at_once, sums);
+  for (int j = first; j < std::min(ns, first + columns_at_once); ++j) sums[j - first] -= iterate.costate(i)[j];
+  const auto add_rows = [&](const double* rows, const double* factors, int count) {
+    for (int r = 0; r < count; ++r, rows += stride)
+      for (int c = 0; c < columns_at_once; ++c) sums[c] += rows[c] * factors[r];
+  };
+  if (i < qp.intervals()) add_rows(qp.AB(i) + first, iterate.costate(i + 1), qp.states(i + 1));
+  add_rows(qp.G(i) + first, iterate.limit_bound(i), qp.limits(i));
+}
+
+/// What the kernel gives, for a stage whose limits have multipliers.
+void add_pulled_stage(const StageQp& qp, const Iterate& iterate, int i, KktTerms& terms) noexcept {
   const int ns = qp.capacity().states;
-  const bool is_last = i == qp.intervals();
+  const double *h = qp.h(i), *bounds = iterate.bound_row(i), *lower = qp.lower(i), *upper = qp.upper(i);
+  const double* costates = iterate.costate(i);
+  double sums[columns_at_once];
+  int summed = -columns_at_once;  // the first column of the sums
+  // Comparisons lose NaN, a sum does not.
+  double stationarity = 0.0, largest_term = 0.0, all = 0.0, violation = -infinity;
   const auto add_column = [&](int c, double costate) {
-    const double gradient = qp.h(i)[c], bound = iterate.bound_row(i)[c];
-    double sum = gradient + bound - costate + pull_of_limits(qp, i, c, iterate.limit_bound(i));
-    if (!is_last) sum += pull_of(qp, i, c, iterate.costate(i + 1));
-    take(terms.stationarity, std::abs(sum));
-    for (const double term : {gradient, bound, costate}) take(terms.largest_term, std::abs(term));
-    const double lower = qp.lower(i)[c], upper = qp.upper(i)[c];
-    take(terms.bound_violation, std::max(lower, -upper));
-    take(terms.complementarity, std::abs(bound) * std::min(1.0, std::abs(bound > 0.0 ? upper : lower)));
+    if (c >= summed + columns_at_once) gradient_of(qp, iterate, i, summed = c - c % columns_at_once, sums);
+    const double bound = bounds[c], sum = std::abs(sums[c - summed] + bound);
+    all += sum;
+    stationarity = std::max(stationarity, sum);
+    largest_term = std::max(largest_term, std::max(std::abs(h[c]), std::abs(costate)));
+    violation = std::max(violation, std::max(lower[c], -upper[c]));
+    if (bound == 0.0) return;
+    largest_term = std::max(largest_term, std::abs(bound));
+    take(terms.complementarity, std::abs(bound) * std::min(1.0, std::abs(bound > 0.0 ? upper[c] : lower[c])));
   };
   for (int j = 0; j < qp.states(i); ++j) {
-    add_column(j, iterate.costate(i)[j]);
-    if (i == 0 && !qp.initial_state_is_given) take(terms.stationarity, std::abs(iterate.costate(0)[j]));
+    add_column(j, costates[j]);
+    if (i == 0 && !qp.initial_state_is_given) stationarity = std::max(stationarity, std::abs(costates[j]));
   }
   for (int j = 0; j < qp.controls(i); ++j) add_column(ns + j, 0.0);
-  for (int j = 0; !is_last && j < qp.states(i + 1); ++j) take(terms.defect, std::abs(qp.b(i)[j]));
+  take(terms.stationarity, std::isnan(all) ? all : stationarity);
+  take(terms.largest_term, largest_term);
+  take(terms.bound_violation, violation);
+  for (int j = 0; i < qp.intervals() && j < qp.states(i + 1); ++j) take(terms.defect, std::abs(qp.b(i)[j]));
+}
+
+bool limits_pull(const StageQp& qp, const Iterate& iterate, int i) noexcept {
+  const double* multipliers = iterate.limit_bound(i);
+  return std::any_of(multipliers, multipliers + qp.limits(i), [](double each) { return each != 0.0; });
+}
+
+void add_limits(const StageQp& qp, const Iterate& iterate, int i, KktTerms& terms) noexcept {
+  const double *most = qp.limit_upper(i), *least = qp.limit_lower(i), *multipliers = iterate.limit_bound(i);
+  const double *linear = qp.limit_linear(i), *quadratic = qp.limit_quadratic(i);
   for (int r = 0; r < qp.limits(i); ++r) {
-    const double multiplier = iterate.limit_bound(i)[r];
-    const double linear = qp.limit_linear(i)[r], quadratic = qp.limit_quadratic(i)[r];
+    const double multiplier = multipliers[r];
+    if (multiplier == 0.0 && least[r] <= 0.0 && most[r] >= 0.0) continue;  // met, without a multiplier
     take(terms.largest_term, std::abs(multiplier));
-    add_side(-qp.limit_upper(i)[r], std::max(0.0, multiplier), linear, quadratic, terms);
-    add_side(qp.limit_lower(i)[r], std::max(0.0, -multiplier), linear, quadratic, terms);
+    add_side(-most[r], std::max(0.0, multiplier), linear[r], quadratic[r], terms);
+    add_side(least[r], std::max(0.0, -multiplier), linear[r], quadratic[r], terms);
     if (std::isnan(multiplier)) terms.stationarity = multiplier;
   }
 }
@@ -99,15 +133,23 @@ void KktTerms::add(const StageQp& qp, const Iterate& iterate, StageRange range) 
   RHEC_ASSERT(qp.capacity() == iterate.capacity(), "an iterate of the QP's capacity");
   RHEC_ASSERT(range.first >= 0 && range.last <= qp.intervals(), "stages of the QP");
   KktTerms found;
-  if (qp.has_limits()) {
-    for (int i = range.first; i <= range.last; ++i) add_limited_stage(qp, iterate, i, found);
-  } else {
+  const auto add_others = [&](int first, int last) {
+    if (first > last) return;
     QpView view = view_of(qp, iterate);
-    view.first = range.first;
-    view.last = range.last;
+    view.first = first;
+    view.last = last;
     const KktParts parts = qp_kernels().kkt(view);
-    found = {parts.stationarity, parts.defect, parts.bound_violation, parts.complementarity, parts.largest_term};
+    found.add({parts.stationarity, parts.defect, parts.bound_violation, parts.complementarity, parts.largest_term});
+  };
+  int first = range.first;
+  for (int i = range.first; qp.has_limits() && i <= range.last; ++i) {
+    add_limits(qp, iterate, i, found);
+    if (!limits_pull(qp, iterate, i)) continue;
+    add_others(first, i - 1);
+    add_pulled_stage(qp, iterate, i, found);
+    first = i + 1;
   }
+  add_others(first, range.last);
   if (range.first == 0 && qp.initial_state_is_given)
     for (int j = 0; j < qp.states(0); ++j) found.defect = std::max(found.defect, std::abs(qp.initial_step()[j]));
   add(found);

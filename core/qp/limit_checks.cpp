@@ -1,6 +1,8 @@
 #include "limit_checks.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "rhec/core/base/infinity.hpp"
 #include "tolerances.hpp"
@@ -26,18 +28,21 @@ bool guess_limits(const StageQp& qp, const Iterate& iterate, ActiveSet& active) 
 }
 
 bool limits_cross(const StageQp& qp, double tolerance) noexcept {
-  double sum = 0.0;  // stays 0 as long as all entries are finite
+  double sums[8] = {};  // stay 0 as long as all entries are finite
   for (int i = 0; i <= qp.intervals(); ++i) {
+    const double *least = qp.limit_lower(i), *most = qp.limit_upper(i), *linears = qp.limit_linear(i);
     for (int r = 0; r < qp.limits(i); ++r) {
-      const double lower = qp.limit_lower(i)[r], upper = qp.limit_upper(i)[r], linear = qp.limit_linear(i)[r];
+      const double lower = least[r], upper = most[r], linear = linears[r];
       const bool is_soft = linear < infinity, is_empty = lower == infinity || upper == -infinity;
       if (std::isnan(lower) || std::isnan(upper) || is_empty || !(linear >= 0.0)) return true;
       if (is_soft && !(linear + qp.limit_quadratic(i)[r] > 0.0)) return true;
       if (lower - upper > tolerance * (1.0 + std::abs(lower))) return true;
-      for (int j = 0; j < qp.stride(); ++j) sum += 0.0 * qp.G(i)[r * qp.stride() + j];
     }
+    const double *G = qp.G(i), *end = G + static_cast<std::ptrdiff_t>(qp.limits(i)) * qp.stride();
+    for (; G < end; G += 8)
+      for (int j = 0; j < 8; ++j) sums[j] += 0.0 * G[j];
   }
-  return sum != 0.0;
+  return std::any_of(sums, sums + 8, [](double sum) { return sum != 0.0; });
 }
 
 void add_row(const double* row, double weight, double gradient, int stride, double* H, double* h) noexcept {

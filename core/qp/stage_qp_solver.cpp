@@ -43,6 +43,7 @@ StageQpSolver::StageQpSolver(const Capacity& capacity)
 
 void StageQpSolver::reset() noexcept {
   active_.clear();
+  dual_.reset();
   factored_ = prepared_ = false;
   factorisations_ = 0;
 }

@@ -71,5 +71,29 @@ TEST(DualLimits, SolvesHardAndSoftLimitsThatDependOnEachOther) {
   EXPECT_GT(count.active, 1000);
 }
 
+TEST(DualLimits, SolvesWithRowsThatChangeAfterThePreparation) {
+  RandomQp random(34);
+  int active = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    StageQp qp = limited_qp(random, trial % 2 == 0, {.room = 0.5, .soft = 0.5});
+    StageQpSolver solver(qp.capacity());
+    Iterate step(qp.capacity());
+    solver.guess_from(qp, step);
+    if (solver.solve(qp, step) == StageQpSolver::Outcome::infeasible) continue;
+    // Twice: the second time the solver expects the change.
+    for (int sample = 0; sample < 2; ++sample) {
+      solver.guess_from(qp, step);
+      solver.prepare(qp);
+      for (int i = 0; i <= qp.intervals(); ++i)
+        for (int k = 0; k < qp.limits(i) * qp.stride(); ++k) qp.G(i)[k] *= k % 3 == 0 ? 0.9 : 1.05;
+      if (solver.solve(qp, step) == StageQpSolver::Outcome::infeasible) break;
+      EXPECT_LT(kkt_violation(qp, step), 1e-6) << "trial " << trial << ", sample " << sample;
+      for (int i = 0; i <= qp.intervals(); ++i)
+        for (int r = 0; r < qp.limits(i); ++r) active += step.limit_bound(i)[r] != 0.0;
+    }
+  }
+  EXPECT_GT(active, 500);
+}
+
 }  // namespace dual_limits_test
 }  // namespace rhec

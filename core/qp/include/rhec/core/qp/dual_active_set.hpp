@@ -52,6 +52,8 @@ class RHEC_EXPORT DualActiveSet {
   /// its costates and multipliers to `step`. Checks the deadline before every change of the active set.
   Outcome solve(const StageQp& qp, Riccati& riccati, ActiveSet& active, Iterate& step,
                 Clock::time_point deadline) noexcept;
+  /// Forgets what was learnt from earlier solves.
+  void reset() noexcept { rows_change_ = false; }
   /// After `solve`: also computes the policy (Riccati::feedback), which `solve` may omit.
   void complete_policy(const StageQp& qp, Riccati& riccati) noexcept;
   /// Number since the last `prepare`.
@@ -141,6 +143,8 @@ class RHEC_EXPORT DualActiveSet {
   bool take_limits(const StageQp& qp) noexcept;
   void saturate(int place) noexcept;
   void add_limit_gradients(const StageQp& qp) noexcept;
+  void keep_rows(const StageQp& qp) noexcept;
+  void compare_rows(const StageQp& qp) noexcept;
   bool violates_limits(const StageQp& qp, const Iterate& step) noexcept;
   void find_limit_values(const StageQp& qp, const Iterate& step) noexcept;
   void find_limit_sensitivities(const StageQp& qp, double* values) const noexcept;
@@ -166,6 +170,8 @@ class RHEC_EXPORT DualActiveSet {
   std::vector<int> held_places_;
   // With limits only.
   AlignedDoubles own_lower_, own_upper_;
+  AlignedDoubles rows_;                    ///< G at the last `prepare`
+  bool rows_change_ = false;               ///< the last `solve` found another one
   std::vector<double> linear_, softness_;  ///< by limit: weight of the slack, reciprocal quadratic weight (or 0)
   std::vector<std::uint8_t> relaxed_;
   std::vector<int> saturated_;
