@@ -20,14 +20,12 @@ BlockingSection::BlockingSection(std::shared_ptr<const RobotContext> context, co
   std::vector<std::string> names = names_of(context_->about.parameters);
   for (std::size_t j = 0; j < context_->about.states.size(); ++j) {
     const Variable& state = context_->about.states[j];
-    if (context_->noise.state_sigmas[j] > 0.0) {
-      names.push_back(noise_name(state));
-    } else if (const Settings* asked = section_.find(noise_name(state))) {
+    const Settings* asked = section_.find(noise_name(state));
+    if (asked && !asked->is_null() && !(context_->noise.state_sigmas[j] > 0.0))
       throw asked->error(
-          fmt::format("state '{0}' has no process noise that could be blocked; set noise.states.{0}, or "
-                      "take this out",
+          fmt::format("state '{0}' has no process noise that could be blocked; set noise.states.{0}, or take this out",
                       state.name));
-    }
+    if (asked || context_->noise.state_sigmas[j] > 0.0) names.push_back(noise_name(state));
   }
   check_keys(section_, names, "blocking");
   make();  // reports mistakes now
@@ -65,7 +63,8 @@ OptionRow BlockingSection::noise_row() {
 }
 
 const Settings* BlockingSection::section_of_noise(std::size_t state) const {
-  return section_.find(noise_name(context_->about.states[state]));
+  const Settings* section = section_.find(noise_name(context_->about.states[state]));
+  return section && !section->is_null() ? section : nullptr;
 }
 
 bool BlockingSection::blocks_noise() const {
