@@ -98,7 +98,11 @@ void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept
   // Where a column of the vehicle's [x; p; u; p_end] is in [x; p; w; u; xi; p_end; w_end]: never before its own place.
   const auto place = [&](std::ptrdiff_t c) { return c < nx + np ? c : c < nx + np + nu ? c + nw : c + nw + ni; };
   const auto spread = [&](double* row) {
-    for (std::ptrdiff_t c = narrow; !in_place && c-- > nx + np;) row[place(c)] = row[c];
+    if (in_place) {  // a few numbers, for which a call of a library takes longer
+      for (std::ptrdiff_t c = noise.inputs; c < width; ++c) row[c] = 0.0;
+      return;
+    }
+    for (std::ptrdiff_t c = narrow; c-- > nx + np;) row[place(c)] = row[c];
     std::fill_n(row + noise.parameters, nw, 0.0);
     std::fill_n(row + noise.inputs, ni, 0.0);
     std::fill(row + (request.ramp ? noise.ends : wide), row + width, 0.0);

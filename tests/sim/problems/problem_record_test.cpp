@@ -217,7 +217,8 @@ TEST_P(EveryModel, BlocksOfProcessNoiseKeepEveryBit) {
   problem->set_block_weight(0, noise, 2.0 / 3.0);
   problem->set_block_weight(3, noise, 0.7);
   problem->finish();
-  const ProblemRecord record = round_trip(*problem, perturbed(*problem, RandomProblem::cold_start(*problem), random));
+  const ProblemRecord record =
+      round_trip(*problem, perturbed(*problem, RandomProblem::cold_start(*problem), random), model);
   const auto& states = model->description().states;
   EXPECT_EQ(record.state_noise, std::vector{states[0].name});
   EXPECT_EQ(record.blocked_noise, std::vector{states[1].name});
