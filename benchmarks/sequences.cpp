@@ -47,6 +47,7 @@ void set_blocks(const RheProblem& from, RheProblem& to) noexcept {
     to.set_blocks(j, begins.data(), from.structure().is_ramp(j) ? Transition::ramp : Transition::step);
     for (int i = 0; i < from.intervals(); ++i)
       if (begins[i]) to.link(i, j, from.link_variance(i, j));
+    for (int i = 0; i < from.intervals(); ++i) to.set_block_weight(i, j, from.block_weight(i, j));
   }
 }
 
@@ -218,6 +219,17 @@ const std::vector<Drive>& usual_drives() {
         "controller.weights.rates.u2=0.02"}},
       {"figure8/sbo_5_3", figure8, {"path.laps=1", "blocking.kappa=" + blocks}},
       {"figure8/sbo_5_3_both", figure8, {"path.laps=1", "blocking.kappa=" + blocks, "blocking.mu=" + blocks}},
+      {"figure8/noise_one", figure8, {"path.laps=1", "blocking.kappa=" + full, "noise.states.y_pos=0.02"}},
+      {"figure8/noise_two",
+       figure8,
+       {"path.laps=1", "blocking.kappa=" + full, "noise.states={x_pos: 0.02, y_pos: 0.02}"}},
+      {"figure8/noise_all",
+       figure8,
+       {"path.laps=1", "blocking.kappa=" + full, "noise.states={x_pos: 0.02, y_pos: 0.02, beta: 0.005, delta: 0.005}"}},
+      {"figure8/noise_blocks",
+       figure8,
+       {"path.laps=1", "blocking.kappa=" + full, "noise.states={x_pos: 0.02, y_pos: 0.02}",
+        "blocking.x_pos_noise=" + blocks, "blocking.y_pos_noise=" + blocks}},
       {"zigzag/fhb", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4", "blocking.kappa=" + full}},
       {"zigzag/sbo_2_4", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4"}},
       {"obstacles/free", obstacles, {"estimator={name: truth}", "controller.terms=[]"}},

@@ -105,6 +105,10 @@ void ArrivalCost::write(RheProblem& problem) noexcept {
   problem.arrival_mean = filter_.mean;
   if (kind_ == ArrivalKind::off) {
     problem.arrival_information.setZero();
+    const int nx = filter_.model().state_count();
+    for (int j = 0; j < n - nx; ++j)
+      if (const double sigma = walks_[j].noise_sigma; sigma > 0.0)
+        problem.arrival_information(nx + j, nx + j) = 1.0 / (sigma * sigma);
     return;
   }
   factor_covariance();
@@ -151,12 +155,22 @@ void ArrivalCost::slide(const RheProblem& problem, const Iterate& solution, cons
       break;
     case ArrivalKind::constant:
     case ArrivalKind::off:
-      for (int j = 0; j < nx + np; ++j) filter_.mean[j] = solution.state(1)[j];
+      for (int j = 0; j < nx + np; ++j)
+        filter_.mean[j] = j >= nx && walks_[j - nx].noise_sigma > 0.0 ? 0.0 : solution.state(1)[j];
       filter_.covariance = initial_covariance_;
       return;
   }
   for (int j = 0; j < np; ++j) {
     const Border& border = borders[j];
+    if (const double sigma = walks_[j].noise_sigma; sigma > 0.0) {
+      if (border.reached) {
+        filter_.restart_parameter(j, sigma * sigma);
+        filter_.mean[nx + j] = 0.0;
+      } else {
+        filter_.expect_zero(j, sigma * sigma);
+      }
+      continue;
+    }
     filter_.add_parameter_variance(j, walks_[j].process_noise * walks_[j].process_noise);
     if (!border.reached) continue;
     if (border.neighbour_sigma) {

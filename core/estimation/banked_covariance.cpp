@@ -6,8 +6,9 @@
 
 namespace rhec {
 
-BankedCovariance::BankedCovariance(std::unique_ptr<WindowedEstimation> blocks, const BankEstimation::Setup& bank)
-    : blocks_(std::move(blocks)), bank_(blocks_->problem().shared_model(), bank) {
+BankedCovariance::BankedCovariance(std::unique_ptr<WindowedEstimation> blocks, const BankEstimation::Setup& bank,
+                                   std::shared_ptr<const Model> bank_model)
+    : blocks_(std::move(blocks)), bank_(bank_model ? std::move(bank_model) : blocks_->problem().shared_model(), bank) {
   const Eigen::Index n = model().state_count() + model().parameter_count();
   mean_ = difference_ = Eigen::VectorXd::Zero(n);
   covariance_ = own_ = Eigen::MatrixXd::Zero(n, n);

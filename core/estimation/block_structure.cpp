@@ -3,6 +3,20 @@
 #include <algorithm>
 
 namespace rhec {
+namespace {
+
+/// Process noise: each interval costs the square of its block's value; the horizon's first interval does so in the
+/// arrival cost.
+void weigh_blocks(int intervals, int parameter, double sigma, const std::vector<std::uint8_t>& begins,
+                  RheProblem& problem) noexcept {
+  for (int first = 0, end = 1; first < intervals; first = end++) {
+    while (end < intervals && !begins[end]) ++end;
+    const int counted = first == 0 ? end - 1 : end - first;
+    problem.set_block_weight(first, parameter, counted / (sigma * sigma));
+  }
+}
+
+}  // namespace
 
 void set_block_structure(const Window& window, const std::vector<std::shared_ptr<const Blocking>>& blockings,
                          const std::vector<ParameterWalk>& walks, std::vector<std::int64_t>& first_starts,
@@ -16,6 +30,11 @@ void set_block_structure(const Window& window, const std::vector<std::shared_ptr
     // A ramp can start at the start of the horizon, but not before the run itself.
     begins[0] = ramp && first_start == window.first && window.first > 0;
     problem.set_blocks(j, begins.data(), blocking.transition());
+    if (const double sigma = walks[k].noise_sigma; sigma > 0.0) {
+      weigh_blocks(window.intervals, j, sigma, begins, problem);
+      first_starts[k] = first_start;
+      continue;
+    }
     std::int64_t block = begins[0] ? first_starts[k] : first_start;
     const double alone = walks[k].block_sigma;
     const auto sigma = blocking.neighbour_sigma();

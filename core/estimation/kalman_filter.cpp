@@ -208,6 +208,17 @@ void KalmanFilter::differentiate(double duration) noexcept {
   }
 }
 
+void KalmanFilter::expect_zero(int parameter, double variance) noexcept {
+  const int i = nx_ + parameter;
+  const double total = covariance(i, i) + variance;
+  if (!(total > 0.0)) return;
+  gain_ = covariance.col(i);
+  mean -= gain_ * (mean[i] / total);
+  for (Eigen::Index c = 0; c < gain_.size(); ++c)
+    for (Eigen::Index r = 0; r < gain_.size(); ++r) covariance(r, c) -= gain_[r] * gain_[c] / total;
+  clip();
+}
+
 void KalmanFilter::add_parameter_variance(int parameter, double variance) noexcept {
   covariance(nx_ + parameter, nx_ + parameter) += variance;
 }

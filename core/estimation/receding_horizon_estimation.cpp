@@ -10,6 +10,7 @@
 
 #include "block_structure.hpp"
 #include "node_covariance.hpp"
+#include "noise_blocks.hpp"
 #include "prior_restart.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/base/error.hpp"
@@ -46,8 +47,9 @@ RheProblem make_problem(std::shared_ptr<const Model> model, const RecedingHorizo
 
 RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver,
                                                      Setup setup)
-    : setup_(std::move(setup)),
-      problem_(make_problem(std::move(model), setup_)),
+    : model_(std::move(model)),
+      setup_(with_noise_blocks(*model_, std::move(setup))),
+      problem_(make_problem(with_noise_blocks(model_, setup_), setup_)),
       arrival_(setup_.arrival, problem_, setup_.walks),
       solver_(std::move(solver)),
       shifter_(problem_),
@@ -66,8 +68,15 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
   first_starts_.assign(np, 0);
   borders_.resize(np);
   scratch_.assign(problem_.scratch_size(), 0.0);
-  inputs_.assign(problem_.model().input_count(), 0.0);
+  inputs_.assign(model_->input_count(), 0.0);  // those that are given; blocked noise is expected to be 0
   outputs_.assign(problem_.model().output_count(), 0.0);
+  const std::vector<int>& noisy = model_->description().noisy_states;
+  const int first_noise = model_->input_count() - static_cast<int>(noisy.size());
+  for (int j = 0; j < model_->input_count(); ++j) {
+    const int state = j < first_noise ? -1 : noisy[j - first_noise];
+    const auto blocks = [&](const Setup::BlockedNoise& noise) { return noise.state == state; };
+    if (std::ranges::none_of(setup_.noises, blocks)) given_inputs_.push_back(j);
+  }
   last_state_ = setup_.initial_mean;
   reset();
 }
@@ -89,6 +98,7 @@ void RecedingHorizonEstimation::start(const double* outputs) noexcept {
   reset();
   started_ = true;
   problem_.set_intervals(0);
+  for (int j = 0; j < problem_.model().parameter_count(); ++j) problem_.set_block_weight(0, j, 0.0);
   take_outputs(0, outputs);
   arrival_.write(problem_);
   problem_.finish();
@@ -100,7 +110,8 @@ void RecedingHorizonEstimation::take_outputs(int node, const double* outputs) no
 }
 
 void RecedingHorizonEstimation::take_inputs(int interval, const double* inputs) noexcept {
-  std::copy_n(inputs, inputs_.size(), problem_.measured_input(interval));
+  double* const measured = problem_.measured_input(interval);
+  for (std::size_t j = 0; j < given_inputs_.size(); ++j) measured[j] = inputs[given_inputs_[j]];
 }
 
 /// Cold start: the prior, rolled out with the measured inputs.
@@ -113,11 +124,11 @@ void RecedingHorizonEstimation::start_cold(Iterate& point) noexcept {
     point.state(0)[nx + j] = std::min(std::max(problem_.arrival_mean[nx + j], lower[j]), upper[j]);
   for (int i = 0; i < window_.intervals; ++i) {
     double* w = point.control(i);
-    for (std::size_t j = 0; j < inputs_.size(); ++j) {
+    for (std::size_t j = 0; j < given_inputs_.size(); ++j) {
       const double measured = problem_.measured_input(i)[j];
       w[j] = std::isnan(measured) ? 0.0 : measured;
     }
-    for (int j = static_cast<int>(inputs_.size()), c = 0; c < np; ++c)
+    for (int j = static_cast<int>(given_inputs_.size()), c = 0; c < np; ++c)
       if (problem_.structure().starts_block(i, c)) w[j++] = point.state(0)[nx + c];
   }
   point.clear_multipliers();
@@ -186,7 +197,7 @@ void RecedingHorizonEstimation::advance_window(double duration, const double* in
   set_block_structure(window_, setup_.blockings, setup_.walks, first_starts_, begins_, problem_);
   arrival_.write(problem_);
   if (was_empty) {
-    for (std::size_t j = 0; j < inputs_.size(); ++j) {
+    for (std::size_t j = 0; j < given_inputs_.size(); ++j) {
       const double measured = problem_.measured_input(0)[j];
       point_.control(0)[j] = std::isnan(measured) ? 0.0 : measured;
     }
@@ -221,8 +232,8 @@ void RecedingHorizonEstimation::add_node(double duration, const double* inputs, 
   bool fits = same_duration && setup_.problem.robust.empty();
   for (std::size_t j = 0; j < outputs_.size(); ++j)
     fits = fits && std::isnan(problem_.output(last)[j]) == std::isnan(outputs[j]);
-  for (std::size_t j = 0; j < inputs_.size(); ++j)
-    fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) == std::isnan(inputs[j]);
+  for (std::size_t j = 0; j < given_inputs_.size(); ++j)
+    fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) == std::isnan(inputs[given_inputs_[j]]);
   take_inputs(last - 1, inputs);
   take_outputs(last, outputs);
   if (fits) return;
@@ -248,7 +259,8 @@ bool RecedingHorizonEstimation::amend(int back, const double* outputs) noexcept 
 void RecedingHorizonEstimation::prepare() noexcept {
   if (!started_ || prepared_ || window_.intervals == 0 || !solved_) return;
   const int last = window_.intervals;
-  std::copy_n(problem_.measured_input(last - 1), inputs_.size(), inputs_.data());
+  for (std::size_t j = 0; j < given_inputs_.size(); ++j)
+    inputs_[given_inputs_[j]] = problem_.measured_input(last - 1)[j];
   // Placeholders with zero residuals and the previous mask.
   Model::Nodes request;
   request.count = 1;
@@ -265,7 +277,7 @@ void RecedingHorizonEstimation::prepare() noexcept {
 
 bool RecedingHorizonEstimation::arrival(double* mean, double* sigma) const noexcept {
   const bool is_known = arrival_.kind() != ArrivalKind::off;
-  for (Eigen::Index j = 0; j < arrival_.mean().size(); ++j) {
+  for (Eigen::Index j = 0; j < model_->state_count() + model_->parameter_count(); ++j) {
     mean[j] = arrival_.mean()[j];
     sigma[j] =
         is_known ? std::sqrt(std::max(0.0, arrival_.covariance()(j, j))) : std::numeric_limits<double>::infinity();
@@ -298,7 +310,7 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
 }
 
 void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
-  const int nx = problem_.model().state_count(), np = problem_.model().parameter_count(), N = window_.intervals;
+  const int nx = model_->state_count(), np = model_->parameter_count(), N = window_.intervals;
   const int heading = roles().heading;
   result.state.resize(nx);
   result.parameters.resize(np);
@@ -327,9 +339,9 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   result.predicted = false;
   if (result.fallback) recover();
   solved_ = true;
-  std::copy_n(point_.state(newest), nx + np, last_state_.data());
+  std::copy_n(point_.state(newest), last_state_.size(), last_state_.data());
   result.state = last_state_.head(nx);
-  result.parameters = last_state_.tail(np);
+  result.parameters = last_state_.segment(nx, np);
   write_covariance(newest, result);
   RHEC_ASSERT(result.state.allFinite() && result.parameters.allFinite(), "an estimate is finite");
   // An arrival cost without memory never determines the heading; use the covariance of the estimate instead.
@@ -338,7 +350,8 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
 
 /// Covariance of the state of a node and the parameters before it. If it is not finite, the last one is kept.
 void RecedingHorizonEstimation::write_covariance(int node, Estimate& result) noexcept {
-  const int n = static_cast<int>(last_state_.size()), ns = problem_.capacity().states;
+  const auto n = static_cast<int>(result.covariance.rows());
+  const int ns = problem_.capacity().states;
   if (const double* found = covariance_->find(problem_, *solver_, point_, node))
     result.covariance =
         Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(found, n, n, Eigen::OuterStride<>(ns));

@@ -92,7 +92,7 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   measured_inputs_.assign(nodes * stride(), missing);
   input_weights_.assign(stride(), 0.0);
   std::copy(setup_.input_weights.begin(), setup_.input_weights.end(), input_weights_.begin() + capacity().states);
-  link_information_.assign(nodes * np(), 0.0);
+  for (auto* v : {&link_information_, &block_weights_}) v->assign(nodes * np(), 0.0);
   arrival_mean = Eigen::VectorXd::Zero(nx() + np());
   arrival_information = Eigen::MatrixXd::Zero(nx() + np(), nx() + np());
 }
@@ -102,6 +102,7 @@ void RheProblem::set_blocks(int parameter, const std::uint8_t* begins, Transitio
   const bool ramp = transition == Transition::ramp && !is_one_block;
   HorizonStructure& structure = changing_structure();
   structure.set_ramp(parameter, ramp);
+  for (int i = 0; i < intervals(); ++i) block_weights_[i * np() + parameter] = 0.0;
   if (is_one_block) return;  // no interval has ever been marked
   // Node 0 holds the first block's value, so the first interval has no block control unless a ramp starts there.
   for (int i = 0; i < intervals(); ++i) structure.set_block_start(i, parameter, begins[i] && (i > 0 || ramp));
@@ -159,6 +160,7 @@ void RheProblem::take_data(const RheProblem& from) noexcept {
   outputs_ = from.outputs_;
   measured_inputs_ = from.measured_inputs_;
   link_information_ = from.link_information_;
+  block_weights_ = from.block_weights_;
   bounded_intervals_ = from.bounded_intervals_;
   has_block_bounds_ = from.has_block_bounds_;
 }
@@ -258,20 +260,23 @@ double RheProblem::write_cost(StageRange range, const Iterate& iterate, Hessian 
         for (int c = 0; c < n; ++c, H += stride(), information += n)
           for (int r = 0; r < n; ++r) H[r] += 2.0 * information[r];
       });
+      for (int j = 0; j < np(); ++j) qp.H(0)[(nx() + j) * (stride() + 1)] += 2.0 * first_block_weight(j);
     }
   }
   if (structure().any_start())
     for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i) {
-      const double* information = link_information_.data() + static_cast<std::ptrdiff_t>(i) * np();
-      const auto is_link = [](double value) { return value != 0.0; };
-      if (control_count(i) == nu() || std::none_of(information, information + np(), is_link)) continue;
+      const auto has_any = [&](const std::vector<double>& values) {
+        const double* of_interval = values.data() + static_cast<std::ptrdiff_t>(i) * np();
+        return std::any_of(of_interval, of_interval + np(), [](double value) { return value != 0.0; });
+      };
+      if (control_count(i) == nu() || !(has_any(link_information_) || has_any(block_weights_))) continue;
       if (known && matrices) known->is_clean()[i] = 0;
       total += links(i, iterate, matrices ? qp.H(i) : nullptr, vectors ? qp.h(i) : nullptr);
     }
   return total;
 }
 
-/// The arrival cost; adds its gradient to q, if not null.
+/// The arrival cost, and that of the first blocks' values; adds its gradient to q, if not null.
 double RheProblem::arrival_term(const Iterate& iterate, double* q) const noexcept {
   const int n = nx() + np();
   double total = 0.0;
@@ -282,7 +287,17 @@ double RheProblem::arrival_term(const Iterate& iterate, double* q) const noexcep
     total += pull * (iterate.state(0)[c] - arrival_mean[c]);
     if (q) q[c] += 2.0 * pull;
   }
+  for (int j = 0; j < np(); ++j) {
+    const double value = iterate.state(0)[nx() + j], pull = first_block_weight(j) * value;
+    total += pull * value;
+    if (q) q[nx() + j] += 2.0 * pull;
+  }
   return total;
+}
+
+/// Weight of a value that is decided at node 0; a ramp's first block is decided by its control.
+double RheProblem::first_block_weight(int parameter) const noexcept {
+  return structure().control_of_lifted(0, parameter) < 0 ? block_weight(0, parameter) : 0.0;
 }
 
 std::unique_ptr<Linearisation> RheProblem::make_linearisation() const {
@@ -421,15 +436,21 @@ double RheProblem::inputs(int i, const Iterate& iterate, double* H, double* h) c
   return total;
 }
 
-/// The same for the links of blocks that start there.
+/// The same for the blocks that start there: their links, and what their values cost.
 double RheProblem::links(int i, const Iterate& iterate, double* H, double* h) const noexcept {
   const int ns = capacity().states;
   const double* u = iterate.control(i);
   double total = 0.0;
   for (int j = 0; j < np(); ++j) {
     const int control = structure().control_of_lifted(i, j), state = nx() + j;
-    const double information = link_information_[i * np() + j];
-    if (control < 0 || information == 0.0) continue;
+    const double information = link_information_[i * np() + j], weight = block_weight(i, j);
+    if (control < 0) continue;
+    if (weight != 0.0) {
+      total += weight * u[control] * u[control];
+      if (h) h[ns + control] += 2.0 * weight * u[control];
+      if (H) H[(ns + control) * (stride() + 1)] += 2.0 * weight;
+    }
+    if (information == 0.0) continue;
     const double jump = u[control] - iterate.state(i)[state];
     total += information * jump * jump;
     const double pull = 2.0 * information * jump;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,6 +11,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/padded.hpp"
+#include "rhec/core/base/scratch.hpp"
 
 namespace rhec {
 namespace {
@@ -23,29 +25,50 @@ std::size_t dense_size(const Model& vehicle) {
   return nz * nz;
 }
 
+/// Noise as a variable of the model, which stands for a state of the vehicle.
+Variable noise_of(const Variable& state) {
+  Variable noise;
+  noise.name = state.name + "_noise";
+  noise.unit = state.unit == "1" ? "1/sqrt(s)" : state.unit + "/sqrt(s)";
+  noise.meaning = "process noise of " + state.name;
+  noise.scale = state.scale;
+  noise.nominal = 0.0;
+  return noise;
+}
+
+/// Where the noises stand in the z of a request, and how much of each an interval adds to its state per sqrt(dt).
+struct Columns {
+  std::ptrdiff_t inputs, parameters, ends;  ///< the first xi, w and w at the end of the interval
+  double share;                             ///< of a w: half with one at the end
+};
+
 }  // namespace
 
-StateNoiseModel::StateNoiseModel(std::shared_ptr<const Model> vehicle, std::vector<int> states)
-    : vehicle_(std::move(vehicle)), states_(std::move(states)), description_(vehicle_->description()) {
+StateNoiseModel::StateNoiseModel(std::shared_ptr<const Model> vehicle, std::vector<int> states,
+                                 std::vector<int> blocked)
+    : vehicle_(std::move(vehicle)),
+      states_(std::move(states)),
+      blocked_(std::move(blocked)),
+      description_(vehicle_->description()) {
   const int nx = vehicle_->state_count();
-  if (!description_.noisy_states.empty())
+  if (!description_.noisy_states.empty() || !description_.blocked_noises.empty())
     throw Error(fmt::format("model '{}' has process noise already; name all its states at once", description_.name));
-  if (states_.empty())
+  if (states_.empty() && blocked_.empty())
     throw Error(fmt::format("model '{}': process noise of no state; expected one at least", description_.name));
-  for (std::size_t k = 0; k < states_.size(); ++k)
-    if (states_[k] < 0 || states_[k] >= nx || (k > 0 && states_[k] <= states_[k - 1]))
-      throw Error(fmt::format("model '{}': process noise of the states {}; expected indices of 0 .. {} that increase",
-                              description_.name, fmt::join(states_, ", "), nx - 1));
-  for (const int j : states_) {
-    const Variable& state = description_.states[j];
-    Variable noise;
-    noise.name = state.name + "_noise";
-    noise.unit = state.unit == "1" ? "1/sqrt(s)" : state.unit + "/sqrt(s)";
-    noise.meaning = "process noise of " + state.name;
-    noise.scale = state.scale;
-    description_.inputs.push_back(std::move(noise));
+  for (const auto* chosen : {&states_, &blocked_}) {
+    for (std::size_t k = 0; k < chosen->size(); ++k)
+      if ((*chosen)[k] < 0 || (*chosen)[k] >= nx || (k > 0 && (*chosen)[k] <= (*chosen)[k - 1]))
+        throw Error(fmt::format("model '{}': process noise of the states {}; expected indices of 0 .. {} that increase",
+                                description_.name, fmt::join(*chosen, ", "), nx - 1));
   }
+  for (const int j : states_)
+    if (std::ranges::count(blocked_, j) > 0)
+      throw Error(fmt::format("model '{}': process noise of state {} as an input and as a parameter; expected one",
+                              description_.name, j));
+  for (const int j : states_) description_.inputs.push_back(noise_of(description_.states[j]));
+  for (const int j : blocked_) description_.parameters.push_back(noise_of(description_.states[j]));
   description_.noisy_states = states_;
+  description_.blocked_noises = blocked_;
   if (dense_size(*vehicle_) > room) reserve_ = std::make_unique<Reserve>(dense_size(*vehicle_));
 }
 
@@ -56,30 +79,75 @@ void StateNoiseModel::straight_motion(double ground_speed, const double* p, doub
 }
 
 std::size_t StateNoiseModel::rows_scratch(int count) const noexcept {
-  return std::max(Model::rows_scratch(count), vehicle_->rows_scratch(count));
+  const int z = vehicle_->state_count() + vehicle_->input_count() + 2 * vehicle_->parameter_count();
+  return static_cast<std::size_t>(count) * padded(z) + 8 + vehicle_->rows_scratch(count);
 }
 
-/// The vehicle writes its rows to where they are wanted, since noise stands behind them; but before p_end of a ramp.
+/// The vehicle writes its rows to where they are wanted. Where noise stands between its columns, it is given rows of z
+/// without noise, and its results are moved apart.
 void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept {
-  if (request.ramp) return Model::integrate_rows(request);
-  const int nx = state_count(), first = nx + parameter_count() + vehicle_->input_count();
-  const int noises = static_cast<int>(states_.size()), used = first + noises;
-  vehicle_->integrate_rows(request);
+  const std::ptrdiff_t nx = state_count(), nu = vehicle_->input_count(), np = vehicle_->parameter_count(),
+                       ni = std::ssize(states_), nw = std::ssize(blocked_);
+  const std::ptrdiff_t narrow = nx + np + nu + (request.ramp ? np : 0),
+                       wide = narrow + ni + nw + (request.ramp ? nw : 0), width = padded(static_cast<int>(wide));
+  const Columns noise{.inputs = nx + np + nw + nu,
+                      .parameters = nx + np,
+                      .ends = nx + 2 * np + nw + nu + ni,
+                      .share = request.ramp ? 0.5 : 1.0};
+  const bool in_place = is_in_place(request.ramp);
+  // Where a column of the vehicle's [x; p; u; p_end] is in [x; p; w; u; xi; p_end; w_end]: never before its own place.
+  const auto place = [&](std::ptrdiff_t c) { return c < nx + np ? c : c < nx + np + nu ? c + nw : c + nw + ni; };
+  const auto spread = [&](double* row) {
+    if (in_place) {  // a few numbers, for which a call of a library takes longer
+      for (std::ptrdiff_t c = noise.inputs; c < width; ++c) row[c] = 0.0;
+      return;
+    }
+    for (std::ptrdiff_t c = narrow; c-- > nx + np;) row[place(c)] = row[c];
+    std::fill_n(row + noise.parameters, nw, 0.0);
+    std::fill_n(row + noise.inputs, ni, 0.0);
+    std::fill(row + (request.ramp ? noise.ends : wide), row + width, 0.0);
+  };
+  IntervalRows of_vehicle = request;
+  Scratch memory(request.scratch);
+  if (!in_place) {
+    const std::ptrdiff_t step = padded(static_cast<int>(narrow));
+    double* const z = memory.take(request.count * step);
+    for (int i = 0; i < request.count; ++i)
+      for (std::ptrdiff_t c = 0; c < narrow; ++c) z[i * step + c] = request.z[i * request.z_step + place(c)];
+    of_vehicle.z = z;
+    of_vehicle.z_step = step;
+    of_vehicle.scratch = memory.rest();
+  }
+  vehicle_->integrate_rows(of_vehicle);
   for (int i = 0; i < request.count; ++i) {
-    const double root = std::sqrt(request.durations[i]);
-    const double* const noise = request.z + i * request.z_step + first;
-    for (int k = 0; k < noises && request.next_states; ++k)
-      request.next_states[i * request.next_step + states_[k]] += root * noise[k];
-    for (int r = 0; r < nx && request.jacobians; ++r)
-      std::fill(request.jacobians + i * request.jacobian_step + r * request.jacobian_row + first,
-                request.jacobians + i * request.jacobian_step + r * request.jacobian_row + padded(used), 0.0);
-    for (int k = 0; k < noises && request.jacobians; ++k)
-      request.jacobians[i * request.jacobian_step + states_[k] * request.jacobian_row + first + k] = root;
+    const double root = std::sqrt(request.durations[i]), part = noise.share * root;
+    const double* const z = request.z + i * request.z_step;
+    if (request.next_states) {
+      double* const next = request.next_states + i * request.next_step;
+      for (std::ptrdiff_t k = 0; k < ni; ++k) next[states_[k]] += root * z[noise.inputs + k];
+      for (std::ptrdiff_t k = 0; k < nw; ++k)
+        next[blocked_[k]] += part * (z[noise.parameters + k] + (request.ramp ? z[noise.ends + k] : 0.0));
+    }
+    if (request.jacobians) {
+      double* const J = request.jacobians + i * request.jacobian_step;
+      const std::ptrdiff_t row = request.jacobian_row;
+      for (std::ptrdiff_t r = 0; r < nx; ++r) spread(J + r * row);
+      for (std::ptrdiff_t k = 0; k < ni; ++k) J[states_[k] * row + noise.inputs + k] = root;
+      for (std::ptrdiff_t k = 0; k < nw; ++k) {
+        J[blocked_[k] * row + noise.parameters + k] = part;
+        if (request.ramp) J[blocked_[k] * row + noise.ends + k] = part;
+      }
+    }
     if (!request.hessians) continue;
-    double* const rows = request.hessians + i * request.hessian_step;
-    for (int r = 0; r < used; ++r)
-      std::fill(rows + r * request.hessian_row + (r < first ? first : 0), rows + r * request.hessian_row + padded(used),
-                0.0);
+    double* const H = request.hessians + i * request.hessian_step;
+    const std::ptrdiff_t row = request.hessian_row;
+    for (std::ptrdiff_t r = narrow; r-- > 0;) {
+      if (place(r) != r) std::copy_n(H + r * row, narrow, H + place(r) * row);
+      spread(H + place(r) * row);
+    }
+    for (std::ptrdiff_t k = 0; k < nw; ++k) std::fill_n(H + (noise.parameters + k) * row, width, 0.0);
+    for (std::ptrdiff_t k = 0; k < ni; ++k) std::fill_n(H + (noise.inputs + k) * row, width, 0.0);
+    for (std::ptrdiff_t k = 0; request.ramp && k < nw; ++k) std::fill_n(H + (noise.ends + k) * row, width, 0.0);
   }
 }
 
@@ -93,30 +161,44 @@ void StateNoiseModel::integrate(const Intervals& request) const noexcept {
 }
 
 void StateNoiseModel::integrate_one(const Intervals& request, std::ptrdiff_t i, double* memory) const noexcept {
-  const std::ptrdiff_t nx = state_count(), nu = vehicle_->input_count(), np = parameter_count();
-  const auto noises = static_cast<std::ptrdiff_t>(states_.size());
-  const std::ptrdiff_t narrow = nx + nu + np + (request.parameters_end ? np : 0), wide = narrow + noises;
-  const double root = std::sqrt(request.durations[i]);
-  const double* const inputs = request.inputs + i * (nu + noises);
+  const std::ptrdiff_t nx = state_count(), nu = vehicle_->input_count(), np = vehicle_->parameter_count(),
+                       ni = std::ssize(states_), nw = std::ssize(blocked_);
+  const bool ramp = request.parameters_end != nullptr;
+  const std::ptrdiff_t narrow = nx + nu + np + (ramp ? np : 0), wide = narrow + ni + nw + (ramp ? nw : 0);
+  const Columns noise{.inputs = nx + nu,
+                      .parameters = nx + nu + ni + np,
+                      .ends = nx + nu + ni + 2 * np + nw,
+                      .share = ramp ? 0.5 : 1.0};
+  const double root = std::sqrt(request.durations[i]), part = noise.share * root;
+  const double *const inputs = request.inputs + i * (nu + ni), *const parameters = request.parameters + i * (np + nw),
+                      *const ends = ramp ? request.parameters_end + i * (np + nw) : nullptr;
   Model::Intervals one{.count = 1,
                        .states = request.states + i * nx,
                        .inputs = inputs,
-                       .parameters = request.parameters + i * np,
-                       .parameters_end = request.parameters_end ? request.parameters_end + i * np : nullptr,
+                       .parameters = parameters,
+                       .parameters_end = ends,
                        .durations = request.durations + i,
                        .data = request.data ? request.data + i * data_count() : nullptr,
                        .substeps = request.substeps,
                        .next_states = request.next_states ? request.next_states + i * nx : nullptr};
   if (request.jacobians) one.jacobians = memory;
   vehicle_->integrate(one);
-  // Where a column of the vehicle's z = [x; u; p; p_end] is in ours, which has noise behind u.
-  const auto place = [&](std::ptrdiff_t column) { return column < nx + nu ? column : column + noises; };
-  for (std::ptrdiff_t k = 0; k < noises && one.next_states; ++k) one.next_states[states_[k]] += root * inputs[nu + k];
+  // Where a column of the vehicle's [x; u; p; p_end] is in [x; u; xi; p; w; p_end; w_end].
+  const auto place = [&](std::ptrdiff_t c) { return c < nx + nu ? c : c < nx + nu + np ? c + ni : c + ni + nw; };
+  if (one.next_states) {
+    for (std::ptrdiff_t k = 0; k < ni; ++k) one.next_states[states_[k]] += root * inputs[nu + k];
+    for (std::ptrdiff_t k = 0; k < nw; ++k)
+      one.next_states[blocked_[k]] += part * (parameters[np + k] + (ramp ? ends[np + k] : 0.0));
+  }
   if (request.jacobians) {
     double* const J = request.jacobians + i * nx * wide;
+    std::fill_n(J, nx * wide, 0.0);
     for (std::ptrdiff_t c = 0; c < narrow; ++c) std::copy_n(memory + c * nx, nx, J + place(c) * nx);
-    std::fill_n(J + (nx + nu) * nx, noises * nx, 0.0);
-    for (std::ptrdiff_t k = 0; k < noises; ++k) J[(nx + nu + k) * nx + states_[k]] = root;
+    for (std::ptrdiff_t k = 0; k < ni; ++k) J[(noise.inputs + k) * nx + states_[k]] = root;
+    for (std::ptrdiff_t k = 0; k < nw; ++k) {
+      J[(noise.parameters + k) * nx + blocked_[k]] = part;
+      if (ramp) J[(noise.ends + k) * nx + blocked_[k]] = part;
+    }
   }
   if (!request.hessians) return;
   one.next_states = one.jacobians = nullptr;

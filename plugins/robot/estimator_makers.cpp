@@ -47,6 +47,7 @@ std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& pa
   setup.problem = parts.problem();
   setup.arrival = parts.arrival;
   setup.blockings = parts.blocking.make_for(parts.horizon, "estimator.horizon");
+  setup.noises = parts.blocking.make_noises_for(parts.horizon, "estimator.horizon");
   setup.walks = parts.walks;
   setup.initial_mean = parts.initial_mean;
   setup.initial_covariance = parts.initial_covariance;
@@ -54,7 +55,7 @@ std::unique_ptr<EstimationMethod> make_receding_horizon(const EstimatorParts& pa
   auto blocks =
       std::make_unique<RecedingHorizonEstimation>(parts.context->model, parts.make_solver(), std::move(setup));
   if (!parts.has_bank_beside_blocks) return blocks;
-  return std::make_unique<BankedCovariance>(std::move(blocks), parts.filters());
+  return std::make_unique<BankedCovariance>(std::move(blocks), parts.filters(), parts.context->model);
 }
 
 std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts) {

@@ -46,7 +46,9 @@ SmootherSection::SmootherSection(std::shared_ptr<const RobotContext> context, co
     : context_(std::move(context)), options_(SmootherOptions::table().parse(section, "smoother")) {
   // Reports mistakes now.
   robust_losses(options_.robust, context_->about, "smoother");
-  if (!options_.blocking.is_null()) BlockingSection(context_, options_.blocking);
+  if (!options_.blocking.is_null() && BlockingSection(context_, options_.blocking).blocks_noise())
+    throw options_.blocking.error(
+        "found blocks of process noise; a smoother estimates it on each interval: expected parameters alone");
   PriorsSection(context_, options_.priors);
   if (!options_.blocking.is_null() && !options_.priors.is_null())
     throw options_.priors.error(

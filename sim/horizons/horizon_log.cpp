@@ -210,7 +210,9 @@ struct HorizonLog::Parts {
     for (int j = 0; j < nx; ++j) line.column(N + 1, state_decimals[j], [&](int i) { return point.state(i)[j]; });
     line.close(']');
     const int decided = problem.model().input_count();
-    row.resize(static_cast<std::size_t>(N) * std::max(decided, np));
+    // Behind those of the vehicle, a problem may have inputs and parameters that are process noise.
+    const int shared = std::max(np, problem.model().parameter_count());
+    row.resize(static_cast<std::size_t>(N) * std::max(decided, shared));
     line.key("input");
     line.open('[');
     for (int i = 0; i < N; ++i)
@@ -221,11 +223,11 @@ struct HorizonLog::Parts {
     line.open('[');
     const std::vector<int>& among_states = problem.model().description().parameter_states;
     for (int i = 0; i < N && among_states.empty(); ++i)
-      problem.structure().parameters_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * np);
+      problem.structure().parameters_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * shared);
     for (int j = 0; j < np && N > 0; ++j) {
       const int entry = among_states.empty() ? nx + j : among_states[j];
       // A parameter that is a state has a value at every node: that at the end of an interval.
-      for (int i = 0; i < N && !among_states.empty(); ++i) row[i * np + j] = point.state(i + 1)[entry];
+      for (int i = 0; i < N && !among_states.empty(); ++i) row[i * shared + j] = point.state(i + 1)[entry];
       const BlocksInView view = among_states.empty() ? blocks_of(problem, window, j) : every_interval(window);
       const int count = static_cast<int>(view.starts.size());
       const auto interval = [&](int block) { return static_cast<int>(view.starts[block] - window.first); };
@@ -233,7 +235,7 @@ struct HorizonLog::Parts {
       line.key("starts");
       line.integers(view.starts);
       line.key("values");
-      line.column(count, parameter_decimals[j], [&](int b) { return row[interval(b) * np + j]; });
+      line.column(count, parameter_decimals[j], [&](int b) { return row[interval(b) * shared + j]; });
       line.key("sigmas");
       line.column(count, parameter_decimals[j] + 1, [&](int b) { return sigma(interval(b) + 1, entry, ns); });
       line.key("first_start");

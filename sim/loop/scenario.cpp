@@ -122,12 +122,29 @@ const OptionTable<TerrainOptions>& terrain_table() {
   return rows;
 }
 
-const OptionTable<TruthOptions>& vehicle_table() {
+struct VehicleOptions {
+  double step = TruthOptions{}.step;
+  bool mechanical_stops = TruthOptions{}.mechanical_stops;
+  Settings noise;
+};
+
+const NumbersByName& vehicle_noise_by_name() {
+  static const NumbersByName map(
+      "noise of the vehicle", {at_least(0.0)},
+      {{"STATE", &ModelDescription::states, constant_default(0.0),
+        "what disturbs it: white noise, by whose integral it strays in a second; per square root of a second. "
+        "`noise.states` is what the estimator knows of it"}});
+  return map;
+}
+
+const OptionTable<VehicleOptions>& vehicle_table() {
+  using V = VehicleOptions;
   static const auto rows =
-      OptionTable<TruthOptions>()
-          .number("step", &TruthOptions::step,
-                  "integration step of the truth; on smooth ground it may take longer ones [s]", between(1e-6, 1.0))
-          .flag("mechanical_stops", &TruthOptions::mechanical_stops, "bounded states cannot leave their bounds");
+      OptionTable<V>()
+          .number("step", &V::step, "integration step of the truth; on smooth ground it may take longer ones [s]",
+                  between(1e-6, 1.0))
+          .flag("mechanical_stops", &V::mechanical_stops, "bounded states cannot leave their bounds")
+          .map("noise", &V::noise, vehicle_noise_by_name().rows());
   return rows;
 }
 
@@ -282,7 +299,7 @@ const OptionTable<ScenarioOptions>& ScenarioOptions::table() {
         .subtree("path", &ScenarioOptions::path, "name: figure8 | zigzag | file, and its options")
         .subtree("terrain", &ScenarioOptions::terrain,
                  "name: gaussian | constant | patches | raster | split, and its options")
-        .subtree("vehicle", &ScenarioOptions::vehicle, "the true vehicle: step, mechanical_stops");
+        .subtree("vehicle", &ScenarioOptions::vehicle, "the true vehicle: step, mechanical_stops, noise");
     RobotOptions::add_to(table);
     return table;
   }();
@@ -305,7 +322,12 @@ Scenario::Scenario(const Host& host, const Settings& settings)
       robot_(host, options_, scenario_estimators()),
       path_(make_path(options_)),
       terrain_(make_terrain(options_.terrain, options_.seed, robot_.model()->description())) {
-  vehicle_ = vehicle_table().parse(options_.vehicle, "vehicle");
+  const VehicleOptions vehicle = vehicle_table().parse(options_.vehicle, "vehicle");
+  vehicle_ = {.step = vehicle.step, .mechanical_stops = vehicle.mechanical_stops};
+  if (!vehicle.noise.is_null()) {
+    vehicle_.noise = vehicle_noise_by_name().read(vehicle.noise, robot_.model()->description());
+    vehicle_.seed = static_cast<std::uint64_t>(options_.seed);
+  }
   const double samples = path_.duration() / options_.step;
   if (!(samples >= 1.0 && samples <= most_samples))
     throw key_or_section(settings, "step")

@@ -45,6 +45,28 @@ void read_neighbour_variances(const LineValue& map, ProblemRecord& record) {
   });
 }
 
+std::vector<double> read_weights(const LineValue& list) {
+  std::vector<double> weights;
+  for (const LineValue& item : list.items("a list of weights")) {
+    weights.push_back(item.number());
+    if (!(weights.back() >= 0.0)) throw item.mismatch("a weight of at least 0");
+  }
+  return weights;
+}
+
+void read_block_weights(const LineValue& map, ProblemRecord& record) {
+  map.for_each([&](const std::string& name, const LineValue& list) {
+    const auto starts = record.block_starts.find(name);
+    if (starts == record.block_starts.end())
+      throw list.error(fmt::format("there is no block_starts.{} that it could belong to", name));
+    std::vector<double> weights = read_weights(list);
+    if (weights.size() != starts->second.size())
+      throw list.error(fmt::format("{} weights, expected {}: one for each of block_starts.{}", weights.size(),
+                                   starts->second.size(), name));
+    record.block_weights[name] = std::move(weights);
+  });
+}
+
 void read_robust(const LineValue& list, ProblemRecord& record) {
   for (const LineValue& item : list.items("a list of {outputs, delta}")) {
     item.allow({"outputs", "delta"});
@@ -110,26 +132,35 @@ void read_processes(const LineValue& line, ProblemRecord& record) {
 
 /// The vehicle with the process noise of its states, if the record has some.
 std::shared_ptr<const Model> with_state_noise(const ProblemRecord& record, std::shared_ptr<const Model> model) {
-  if (record.state_noise.empty()) return model;
+  if (record.state_noise.empty() && record.blocked_noise.empty()) return model;
   const ModelNames names(record, *model);
   const std::vector<Variable>& states = model->description().states;
-  std::vector<int> noisy;
-  for (const std::string& name : record.state_noise) {
-    const int state = ModelNames::index_of(states, name);
-    if (state < 0)
-      throw names.error("state_noise", fmt::format("model '{}' has no state '{}'; {}", model->description().name, name,
-                                                   did_you_mean(name, names_of(states))));
-    if (!noisy.empty() && state <= noisy.back())
-      throw names.error("state_noise", fmt::format("expected each state once, in the model's order: {}",
-                                                   fmt::join(names_of(states), ", ")));
-    noisy.push_back(state);
-  }
-  return std::make_shared<StateNoiseModel>(std::move(model), std::move(noisy));
+  const auto states_of = [&](const char* key, const std::vector<std::string>& named) {
+    std::vector<int> noisy;
+    for (const std::string& name : named) {
+      const int state = ModelNames::index_of(states, name);
+      if (state < 0)
+        throw names.error(key, fmt::format("model '{}' has no state '{}'; {}", model->description().name, name,
+                                           did_you_mean(name, names_of(states))));
+      if (!noisy.empty() && state <= noisy.back())
+        throw names.error(
+            key, fmt::format("expected each state once, in the model's order: {}", fmt::join(names_of(states), ", ")));
+      noisy.push_back(state);
+    }
+    return noisy;
+  };
+  std::vector<int> noisy = states_of("state_noise", record.state_noise),
+                   blocked = states_of("blocked_noise", record.blocked_noise);
+  for (const int state : blocked)
+    if (std::ranges::count(noisy, state) > 0)
+      throw names.error("blocked_noise", fmt::format("'{}' is in state_noise already; name each state once",
+                                                     states[static_cast<std::size_t>(state)].name));
+  return std::make_shared<StateNoiseModel>(std::move(model), std::move(noisy), std::move(blocked));
 }
 
-std::vector<std::string> noisy_states(const ModelDescription& about) {
+std::vector<std::string> state_names(const ModelDescription& about, const std::vector<int>& states) {
   std::vector<std::string> names;
-  for (const int state : about.noisy_states) names.push_back(about.states[state].name);
+  for (const int state : states) names.push_back(about.states[static_cast<std::size_t>(state)].name);
   return names;
 }
 
@@ -157,15 +188,6 @@ std::map<std::string, int> process_counts(const ModelDescription& about) {
     counts[about.states[first[j]].name] = static_cast<int>(end) - first[j];
   }
   return counts;
-}
-
-std::vector<double> read_weights(const LineValue& list) {
-  std::vector<double> weights;
-  for (const LineValue& item : list.items("a list of weights")) {
-    weights.push_back(item.number());
-    if (!(weights.back() >= 0.0)) throw item.mismatch("a weight of at least 0");
-  }
-  return weights;
 }
 
 std::vector<RobustLoss> robust_losses(const ProblemRecord& record, const ModelNames& names,
@@ -203,6 +225,7 @@ RheProblem::Setup estimation_setup_of(const ProblemRecord& record, const Model& 
   names.check("bounds", record.bounds, {&about.states, &about.inputs, &about.parameters});
   names.check("block_starts", record.block_starts, {&about.parameters});
   names.check("transition", record.transition, {&about.parameters});
+  names.check("block_weights", record.block_weights, {&about.parameters});
   for (const Variable& parameter : about.parameters)
     if (!record.block_starts.contains(parameter.name))
       throw names.error("block_starts." + parameter.name, "missing; say where its blocks begin, [0] for one block");
@@ -238,9 +261,12 @@ void fill(const ProblemRecord& record, RheProblem& problem) {
     const std::string& name = about.parameters[j].name;
     problem.set_blocks(static_cast<int>(j), begins_of(record, name).data(),
                        is_ramp(record, name) ? Transition::ramp : Transition::step);
+    const std::vector<int>& starts = record.block_starts.at(name);
+    if (const auto weights = record.block_weights.find(name); weights != record.block_weights.end())
+      for (std::size_t k = 0; k < starts.size(); ++k)
+        if (starts[k] < record.intervals) problem.set_block_weight(starts[k], static_cast<int>(j), weights->second[k]);
     const auto variances = record.neighbour_variance.find(name);
     if (variances == record.neighbour_variance.end()) continue;
-    const std::vector<int>& starts = record.block_starts.at(name);
     for (std::size_t k = 0; k < starts.size(); ++k)
       if (starts[k] < record.intervals) problem.link(starts[k], static_cast<int>(j), variances->second[k]);
   }
@@ -271,7 +297,7 @@ class RheFormat final : public ProblemFormat {
              .keys = {"version", "id", "problem", "model", "horizon", "arrival", "outputs", "inputs", "weights",
                       "bounds", "block_starts"},
              .added = {{2, {"robust", "neighbour_variance", "transition", "guess", "origin", "processes", "data"}},
-                       {4, {"state_noise"}}},
+                       {4, {"state_noise", "blocked_noise", "block_weights"}}},
              .looks_back = true,
              .may_be_empty = true,
              .finds_parameters = true}) {}
@@ -299,9 +325,12 @@ class RheFormat final : public ProblemFormat {
     if (line.has("neighbour_variance")) read_neighbour_variances(line["neighbour_variance"], record);
     if (line.has("robust")) read_robust(line["robust"], record);
     if (line.has("processes")) read_processes(line, record);
-    if (!line.has("state_noise")) return;
-    for (const LineValue& name : line["state_noise"].items("a list of states"))
-      record.state_noise.push_back(name.text());
+    if (line.has("block_weights")) read_block_weights(line["block_weights"], record);
+    for (const auto& [key, names] :
+         {std::pair{"state_noise", &record.state_noise}, std::pair{"blocked_noise", &record.blocked_noise}}) {
+      if (!line.has(key)) continue;
+      for (const LineValue& name : line[key].items("a list of states")) names->push_back(name.text());
+    }
   }
 
   void write(const ProblemRecord& record, Json& line) const override {
@@ -322,7 +351,9 @@ class RheFormat final : public ProblemFormat {
         return Json(transition == Transition::ramp ? "ramp" : "step");
       });
     if (!record.neighbour_variance.empty()) line["neighbour_variance"] = map_of(record.neighbour_variance, list_of);
+    if (!record.block_weights.empty()) line["block_weights"] = map_of(record.block_weights, list_of);
     if (!record.state_noise.empty()) line["state_noise"] = record.state_noise;
+    if (!record.blocked_noise.empty()) line["blocked_noise"] = record.blocked_noise;
     if (record.processes.empty()) return;
     line["processes"] = map_of(record.processes, [](int states) { return Json(states); });
     line["data"] = rows_of(record.data);
@@ -344,7 +375,8 @@ class RheFormat final : public ProblemFormat {
         record.inputs.push_back(copied(problem.measured_input(i), static_cast<int>(about.inputs.size())));
     }
     record.processes = process_counts(about);
-    record.state_noise = noisy_states(about);
+    record.state_noise = state_names(about, about.noisy_states);
+    record.blocked_noise = state_names(about, about.blocked_noises);
     for (int i = 0; i < record.intervals && !record.processes.empty(); ++i)
       record.data.push_back(copied(problem.interval_data(i), problem.model().data_count()));
     record.output_weights = setup.output_weights;
@@ -360,19 +392,23 @@ class RheFormat final : public ProblemFormat {
     for (int j = 0; j < static_cast<int>(about.parameters.size()); ++j) {
       const std::string& name = about.parameters[j].name;
       std::vector<int>& starts = record.block_starts[name];
-      std::vector<double> variances;
+      std::vector<double> variances, weights;
       if (problem.structure().is_ramp(j)) {
         record.transition[name] = Transition::ramp;
       } else {
         starts.push_back(0);
         variances.push_back(unbounded);
+        weights.push_back(problem.block_weight(0, j));
       }
       for (int i = 0; i < record.intervals; ++i) {
         if (!problem.structure().starts_block(i, j)) continue;
         starts.push_back(i);
         // The problem stores the reciprocal. Taking the reciprocal three times gives the same bits as taking it once.
         variances.push_back(problem.link_variance(i, j));
+        weights.push_back(problem.block_weight(i, j));
       }
+      if (std::any_of(weights.begin(), weights.end(), [](double weight) { return weight > 0.0; }))
+        record.block_weights[name] = std::move(weights);
       if (std::any_of(variances.begin(), variances.end(), [](double variance) { return std::isfinite(variance); }))
         record.neighbour_variance[name] = std::move(variances);
     }
@@ -393,7 +429,9 @@ class RheFormat final : public ProblemFormat {
   bool refill(const ProblemRecord& record, HorizonProblem& filled) const override {
     auto& problem = as_kind<RheProblem>(filled);
     if (process_counts(problem.model().description()) != record.processes) return false;
-    if (noisy_states(problem.model().description()) != record.state_noise) return false;
+    const ModelDescription& about = problem.model().description();
+    if (state_names(about, about.noisy_states) != record.state_noise) return false;
+    if (state_names(about, about.blocked_noises) != record.blocked_noise) return false;
     if (!fits(estimation_setup_of(record, problem.model()), problem.setup())) return false;
     for (const int parameter : problem.setup().one_block)
       if (!is_one_block(record, problem.model(), parameter)) return false;

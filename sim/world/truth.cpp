@@ -16,6 +16,19 @@ constexpr int longest = 5;
 // Error tolerance of merged steps, in typical magnitudes of a state.
 constexpr double seen = 1e-8;
 
+void check_sigmas(const char* kind, const std::vector<double>& sigmas, const std::vector<Variable>& variables) {
+  if (!sigmas.empty() && sigmas.size() != variables.size()) {
+    throw Error(fmt::format("simulation: {} standard deviation(s) for {} {}(s); give one each, or none at all",
+                            sigmas.size(), variables.size(), kind));
+  }
+  for (std::size_t i = 0; i < sigmas.size(); ++i) {
+    if (!(std::isfinite(sigmas[i]) && sigmas[i] >= 0.0)) {
+      throw Error(fmt::format("simulation: the standard deviation of {} '{}' is {}; expected 0 or more", kind,
+                              variables[i].name, sigmas[i]));
+    }
+  }
+}
+
 }  // namespace
 
 TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eigen::VectorXd& initial_state,
@@ -62,6 +75,9 @@ TruthVehicle::TruthVehicle(const Model& model, const SlipField& field, const Eig
        {&parameters_, &mean_parameters_, &stage_parameters_, &step_parameters_, &sum_parameters_}) {
     vector->setZero(n_p);
   }
+  check_sigmas("process noise of state", options.noise, description.states);
+  for (std::size_t j = 0; j < options.noise.size(); ++j)
+    noise_.emplace_back(options.seed, fmt::format("process noise of {}", description.states[j].name));
   shorten_steps();
   position_x_ = description.roles.position_x;
   position_y_ = description.roles.position_y;
@@ -157,24 +173,16 @@ void TruthVehicle::advance(const double* inputs, double duration) noexcept {
   }
   time_ += duration;
   mean_parameters_ = sum_parameters_ / duration;
+  if (!noise_.empty()) disturb(duration);
 }
 
-namespace {
-
-void check_sigmas(const char* kind, const std::vector<double>& sigmas, const std::vector<Variable>& variables) {
-  if (!sigmas.empty() && sigmas.size() != variables.size()) {
-    throw Error(fmt::format("sensors: {} standard deviation(s) for {} {}(s); give one each, or none at all",
-                            sigmas.size(), variables.size(), kind));
-  }
-  for (std::size_t i = 0; i < sigmas.size(); ++i) {
-    if (!(std::isfinite(sigmas[i]) && sigmas[i] >= 0.0)) {
-      throw Error(fmt::format("sensors: the standard deviation of {} '{}' is {}; expected 0 or more", kind,
-                              variables[i].name, sigmas[i]));
-    }
-  }
+/// Every state has its own random stream, whether it is disturbed or not.
+void TruthVehicle::disturb(double duration) noexcept {
+  for (std::size_t j = 0; j < noise_.size(); ++j)
+    state_[static_cast<Eigen::Index>(j)] += std::sqrt(duration) * options_.noise[j] * noise_[j].normal();
+  stop(state_.data());
+  look_up(state_.data(), parameters_.data());
 }
-
-}  // namespace
 
 Sensors::Sensors(const Model& model, const SensorNoise& noise, std::uint64_t seed) : model_(&model) {
   const ModelDescription& description = model.description();

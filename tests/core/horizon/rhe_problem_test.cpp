@@ -83,6 +83,37 @@ TEST(RheProblem, LinksBlocksByTheirVariance) {
   EXPECT_NEAR(cost_of(*problem, point), estimation_cost(*problem, point), 1e-12) << "it is not linked";
 }
 
+TEST(RheProblem, WeighsTheSquareOfABlocksValue) {
+  const auto problem = cart_estimation(4);
+  const std::uint8_t begins[] = {1, 0, 1, 0};
+  problem->set_blocks(0, begins, Transition::step);
+  problem->set_block_weight(0, 0, 3.0);
+  problem->set_block_weight(2, 0, 2.0);
+  problem->finish();
+  const Iterate point = scattered_point(*problem);
+  const double first = point.state(0)[2], second = point.control(2)[problem->structure().control_of_lifted(2, 0)];
+  ASSERT_NE(first, second);
+  EXPECT_NEAR(cost_of(*problem, point), estimation_cost(*problem, point) + 3.0 * first * first + 2.0 * second * second,
+              1e-10);
+  StageQp qp(problem->capacity());
+  std::vector<double> scratch(problem->scratch_size());
+  const auto linearise = [&] {
+    return problem->linearise(all_stages(*problem), point, Hessian::gauss_newton, qp, scratch);
+  };
+  linearise();
+  const int at = qp.stride() + 1,
+            control = problem->capacity().states + problem->structure().control_of_lifted(2, 0);
+  const double H0 = qp.H(0)[2 * at], H2 = qp.H(2)[control * at], h0 = qp.h(0)[2], h2 = qp.h(2)[control];
+  problem->set_blocks(0, begins, Transition::step);
+  problem->finish();
+  EXPECT_EQ(problem->block_weight(2, 0), 0.0) << "blocks that are set anew cost nothing";
+  linearise();
+  EXPECT_NEAR(H0 - qp.H(0)[2 * at], 6.0, 1e-12);
+  EXPECT_NEAR(H2 - qp.H(2)[control * at], 4.0, 1e-12);
+  EXPECT_NEAR(h0 - qp.h(0)[2], 6.0 * first, 1e-12);
+  EXPECT_NEAR(h2 - qp.h(2)[control], 4.0 * second, 1e-12);
+}
+
 TEST(RheProblem, WeighsAGroupOfOutputsByItsRobustLoss) {
   RheProblem::Setup setup;
   setup.robust = {{.outputs = {0, 1}, .delta = 1.5}};

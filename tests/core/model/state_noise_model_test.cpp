@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
@@ -46,6 +47,20 @@ struct Point {
   }
 };
 
+/// With and without ramps: states whose noise is an input, and those whose noise is a parameter.
+struct Case {
+  bool ramp;
+  std::vector<int> states, blocked;
+};
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const bool ramp : {false, true})
+    for (const auto& [states, blocked] :
+         {std::pair<std::vector<int>, std::vector<int>>{{1, 3}, {}}, {{0, 1, 2, 3}, {}}, {{}, {2}}, {{1}, {0, 3}}})
+      all.push_back({ramp, states, blocked});
+  return all;
+}
+
 TEST(StateNoiseModel, AddsNoiseAtTheEndOfAnInterval) {
   const auto plain = vehicle("bicycle_slip");
   const StateNoiseModel noisy(plain, {0, 2});
@@ -70,10 +85,29 @@ TEST(StateNoiseModel, AddsNoiseAtTheEndOfAnInterval) {
   EXPECT_EQ(inputs[3], 0.0);
 }
 
+TEST(StateNoiseModel, TakesNoiseAsAParameterToo) {
+  const auto plain = vehicle("bicycle_slip");
+  const StateNoiseModel noisy(plain, {0}, {1, 3}), inputs(plain, {0, 1, 3});
+  ASSERT_EQ(noisy.input_count(), 3);
+  ASSERT_EQ(noisy.parameter_count(), 4);
+  EXPECT_EQ(noisy.description().parameters[3].name, "delta_noise");
+  EXPECT_EQ(noisy.description().blocked_noises, (std::vector{1, 3}));
+  const Point at(noisy, 4);
+  std::vector<double> with(4), as_inputs(4), u(at.u);
+  u.insert(u.end(), at.p.begin() + 2, at.p.end());
+  Model::Intervals request = at.request(false);
+  request.next_states = with.data();
+  noisy.integrate(request);
+  request.inputs = u.data();
+  request.next_states = as_inputs.data();
+  inputs.integrate(request);
+  EXPECT_EQ(with, as_inputs);
+}
+
 TEST(StateNoiseModel, DerivativesAreThoseOfItsValues) {
   for (const char* name : {"bicycle_slip", "tractor_trailer"}) {
-    for (const bool ramp : {false, true}) {
-      const StateNoiseModel noisy(vehicle(name), {1, 3});
+    for (const auto& [ramp, states, blocked] : cases()) {
+      const StateNoiseModel noisy(vehicle(name), states, blocked);
       const int nx = noisy.state_count(), nu = noisy.input_count(), np = noisy.parameter_count();
       const int nz = nx + nu + (ramp ? 2 : 1) * np;
       const Point at(noisy, 5);
@@ -110,9 +144,10 @@ TEST(StateNoiseModel, DerivativesAreThoseOfItsValues) {
 }
 
 TEST(StateNoiseModel, RowsHoldTheSameNumbers) {
-  for (const bool ramp : {false, true}) {
-    const StateNoiseModel noisy(vehicle("bicycle_slip"), {0, 1, 2, 3});
-    const int nx = 4, nu = 6, np = 2, nz = nx + nu + (ramp ? 2 : 1) * np, row = padded(nz);
+  for (const auto& [ramp, states, blocked] : cases()) {
+    const StateNoiseModel noisy(vehicle("bicycle_slip"), states, blocked);
+    const int nx = 4, nu = noisy.input_count(), np = noisy.parameter_count(), nz = nx + nu + (ramp ? 2 : 1) * np,
+              row = padded(nz);
     const Point at(noisy, 7);
     std::vector<double> next(nx), J(static_cast<std::size_t>(nx) * nz), H(static_cast<std::size_t>(nz) * nz);
     Model::Intervals dense = at.request(ramp);
@@ -161,6 +196,10 @@ TEST(StateNoiseModel, RefusesStatesThatAreNotThere) {
   EXPECT_THROW(StateNoiseModel(plain, {2, 2}), Error);
   EXPECT_NE(error_of([&] { StateNoiseModel(plain, {4}); }).find("indices of 0 .. 3"), std::string::npos);
   EXPECT_THROW(StateNoiseModel(std::make_shared<StateNoiseModel>(plain, std::vector{0}), {1}), Error);
+  EXPECT_NE(error_of([&] {
+              StateNoiseModel(plain, {1, 2}, {2});
+            }).find("as an input and as a parameter"),
+            std::string::npos);
 }
 
 }  // namespace state_noise_model_test

@@ -2,6 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <memory>
+#include <string>
+#include <utility>
+
 #include "plugins/robot/robots.hpp"
 #include "support/error_of.hpp"
 
@@ -42,6 +46,35 @@ TEST(BlockingSection, SaysWhichHorizonDoesNotFit) {
   EXPECT_EQ(section.make_for(20, "estimator.horizon").size(), 2U);
   EXPECT_THAT(error_of([&] { section.make_for(15, "estimator.horizon"); }),
               AllOf(StartsWith("robot.yaml:1: kappa: "), HasSubstr("change it or estimator.horizon")));
+}
+
+BlockingSection of_noisy(const std::string& text) {
+  const auto plain = context_with();
+  RobotContext noisy = *plain;
+  noisy.noise.state_sigmas[1] = 0.2;
+  return {std::make_shared<const RobotContext>(std::move(noisy)), settings(text)};
+}
+
+TEST(BlockingSection, BlocksProcessNoise) {
+  const BlockingSection section = of_noisy("{y_pos_noise: {name: structured, size: 3, overlap: 16}}");
+  EXPECT_TRUE(section.blocks_noise());
+  EXPECT_EQ(section.make().size(), 2U) << "noise is no parameter";
+  const auto noises = section.make_noises_for(20, "estimator.horizon");
+  ASSERT_EQ(noises.size(), 1U);
+  EXPECT_EQ(noises[0].state, 1);
+  EXPECT_FALSE(of_noisy("mu: structured").blocks_noise());
+  EXPECT_THAT(error_of([&] { section.make_noises_for(15, "estimator.horizon"); }),
+              AllOf(StartsWith("robot.yaml:1: y_pos_noise: "), HasSubstr("change it or estimator.horizon")));
+  EXPECT_THAT(error_of([] { of_noisy("x_pos_noise: structured"); }),
+              AllOf(StartsWith("robot.yaml:1: x_pos_noise: "), HasSubstr("set noise.states.x_pos")));
+  EXPECT_THAT(error_of([] { of_noisy("y_pos_noise:\n  name: structured\n  size: 0"); }),
+              StartsWith("robot.yaml:3: y_pos_noise.size"));
+  for (const char* linked : {"transition: ramp", "neighbour_sigma: 0.1", "anchor: horizon"})
+    EXPECT_THAT(
+        error_of([&] {
+          of_noisy("y_pos_noise: {name: structured, size: 2, " + std::string(linked) + "}").make_noises_for(9, "k");
+        }),
+        AllOf(StartsWith("robot.yaml:1: y_pos_noise: "), HasSubstr("blocks of process noise")));
 }
 
 }  // namespace blocking_section_test

@@ -58,6 +58,36 @@ TEST(StateNoise, IsTheBusinessOfEstimatorsAlone) {
   EXPECT_EQ(estimator->model().description().noisy_states, (std::vector{1, 3}));
 }
 
+// With nothing measured, a block's value is its prior: its motion has the variance of free noise.
+TEST(StateNoise, InBlocksGrowsAsMuch) {
+  const auto variance_with = [](const char* blocking, const char* covariance) {
+    static const Host host;
+    const Robot robot(host,
+                      RobotOptions::table().parse(
+                          parse_yaml(std::string("{model: bicycle_slip, noise: {states: {y_pos: 0.3}}, blocking: {mu: "
+                                                 "full_horizon") +
+                                         blocking + "}, estimator: {covariance: " + covariance + "}}",
+                                     "robot.yaml"),
+                          "robot"));
+    const auto made = robot.make_estimator();
+    EXPECT_EQ(made->model().input_count(), 3) << "as if there were no blocks";
+    const double fix[] = {0.0, 0.0, 0.0}, still[] = {0.0, 0.0};
+    const std::vector<double> none(3, std::numeric_limits<double>::quiet_NaN());
+    made->push_measurement(0.0, fix);
+    made->push_input(0.0, still);
+    for (int k = 1; k <= 50; ++k) {
+      made->push_measurement(0.2 * k, none.data());
+      made->estimate(0.2 * k);
+    }
+    return made->estimate(10.0).covariance(1, 1);
+  };
+  for (const char* covariance : {"bank", "blocks"}) {
+    const double free = variance_with("", covariance);
+    for (const char* blocks : {"{name: structured, size: 5}", "unblocked"})
+      EXPECT_NEAR(variance_with((std::string(", y_pos_noise: ") + blocks).c_str(), covariance), free, 1e-6) << blocks;
+  }
+}
+
 TEST(StateNoise, MistakesAreToldWithTheirKey) {
   const auto told = [](const char* noise) { return error_of([&] { robot_with(noise, "rhe"); }); };
   EXPECT_NE(told("{states: {y_pos: 0.3}, adapt: true}").find("adapt: found true, beside process noise"),

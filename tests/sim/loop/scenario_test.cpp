@@ -81,6 +81,10 @@ TEST(Scenario, TheVehicleIsTheTruth) {
   const Scenario scenario = figure8_with({"vehicle={step: 0.005, mechanical_stops: false}"});
   EXPECT_EQ(scenario.vehicle().step, 0.005);
   EXPECT_FALSE(scenario.vehicle().mechanical_stops);
+  EXPECT_TRUE(scenario.vehicle().noise.empty());
+  const Scenario disturbed = figure8_with({"vehicle.noise.y_pos=0.1", "seed=4"});
+  EXPECT_EQ(disturbed.vehicle().noise, (std::vector{0.0, 0.1, 0.0, 0.0}));
+  EXPECT_EQ(disturbed.vehicle().seed, 4U);
 }
 
 class ScenarioFileTest : public FolderTest {};

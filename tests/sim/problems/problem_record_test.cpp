@@ -14,6 +14,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/control/input_rate_model.hpp"
 #include "rhec/core/model/implicit_model.hpp"
+#include "rhec/core/model/state_noise_model.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/files/json.hpp"
@@ -202,6 +203,26 @@ TEST_P(EveryModel, ARampThatStartsAtTheWindowsEdgeOrNot) {
     EXPECT_EQ(record.block_starts.at(first), at_edge ? std::vector<int>({0, 4}) : std::vector<int>({4}));
     EXPECT_EQ(record.neighbour_variance.at(first).back(), 1.0 / 3.0);
   }
+}
+
+TEST_P(EveryModel, BlocksOfProcessNoiseKeepEveryBit) {
+  const auto noisy = std::make_shared<StateNoiseModel>(model, std::vector{0}, std::vector{1});
+  RandomProblem random(noisy, 6);
+  RandomProblem::RheSpec spec;
+  spec.intervals = 6;
+  const auto problem = random.rhe(spec);
+  const int noise = noisy->parameter_count() - 1;
+  const std::uint8_t begins[] = {1, 0, 0, 1, 0, 0};
+  problem->set_blocks(noise, begins, Transition::step);
+  problem->set_block_weight(0, noise, 2.0 / 3.0);
+  problem->set_block_weight(3, noise, 0.7);
+  problem->finish();
+  const ProblemRecord record =
+      round_trip(*problem, perturbed(*problem, RandomProblem::cold_start(*problem), random), model);
+  const auto& states = model->description().states;
+  EXPECT_EQ(record.state_noise, std::vector{states[0].name});
+  EXPECT_EQ(record.blocked_noise, std::vector{states[1].name});
+  EXPECT_EQ(record.block_weights.at(states[1].name + "_noise"), (std::vector{2.0 / 3.0, 0.7}));
 }
 
 TEST_P(EveryModel, ControlKeepsEveryBit) {

@@ -115,6 +115,26 @@ TEST(TruthVehicle, SteeringStopsAtItsStop) {
   EXPECT_NEAR(stopped.state()[3], steering_limit - 0.1, 1e-12) << "it leaves the stop at once";
 }
 
+TEST(TruthVehicle, IsDisturbedByNoiseOfItsOwn) {
+  const Bicycle model;
+  const auto field = constant_field({1.0, 1.0});
+  const std::array<double, 2> still{0.0, 0.0};
+  const auto variance_of = [&](double duration) {
+    TruthVehicle vehicle(model, *field, state(0, 0, 0, 0), {.noise = {0.0, 0.3, 0.0, 0.0}, .seed = 5});
+    double sum = 0.0, before = 0.0;
+    constexpr int steps = 4000;
+    for (int k = 0; k < steps; ++k) {
+      vehicle.advance(still.data(), duration);
+      sum += std::pow(vehicle.state()[1] - before, 2);
+      before = vehicle.state()[1];
+    }
+    EXPECT_EQ(vehicle.state()[0], 0.0);
+    return sum / steps;
+  };
+  EXPECT_NEAR(variance_of(0.1), 0.09 * 0.1, 0.1 * 0.009);
+  EXPECT_NEAR(variance_of(0.4), 0.09 * 0.4, 0.1 * 0.036);
+}
+
 /// Counts the look-ups in another field, and may hide that it is smooth.
 class CountedField final : public SlipField {
  public:

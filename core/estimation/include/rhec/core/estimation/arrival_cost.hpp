@@ -24,9 +24,14 @@ struct ParameterWalk {
   double restart_sigma = 1.0;   ///< standard deviation with which an unlinked block starts
   /// Standard deviation between an unlinked block inside the horizon and the previous block; infinite: none.
   double block_sigma = 0.25;
+  /// Above 0, the parameter is process noise, constant over each block: its blocks know nothing of each other, and each
+  /// interval of a block costs (w / noise_sigma)^2. The other numbers do not matter then.
+  double noise_sigma = 0.0;
 };
 
-/// The prior [xbar; pbar], Pi of the horizon's first node as the horizon slides. Allocates in its constructor only.
+/// The prior [xbar; pbar], Pi of the horizon's first node as the horizon slides. Of process noise it contains what the
+/// horizon's first interval costs, since a block of which nothing is known would have no covariance. Allocates in its
+/// constructor only.
 class RHEC_EXPORT ArrivalCost {
  public:
   ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<ParameterWalk> walks);

@@ -13,8 +13,10 @@ namespace rhec {
 /// own covariance stays readable in `own_covariance`.
 class RHEC_EXPORT BankedCovariance final : public WindowedEstimation {
  public:
-  /// Throws Error as BankEstimation does.
-  BankedCovariance(std::unique_ptr<WindowedEstimation> blocks, const BankEstimation::Setup& bank);
+  /// `bank_model`: the bank's, where that of the window's problem has blocked noise; null: the problem's. Throws Error
+  /// as BankEstimation does.
+  BankedCovariance(std::unique_ptr<WindowedEstimation> blocks, const BankEstimation::Setup& bank,
+                   std::shared_ptr<const Model> bank_model = nullptr);
 
   const Model& model() const noexcept override { return blocks_->model(); }
   int substeps() const noexcept override { return blocks_->substeps(); }

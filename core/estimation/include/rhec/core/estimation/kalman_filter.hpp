@@ -34,6 +34,8 @@ class RHEC_EXPORT KalmanFilter {
   /// The same if parameters jump or ramp during the interval: variances (n_p, 0 without a jump) of the change.
   void predict(const double* measured_input, const double* input_guess, double duration,
                const double* ramp_variances) noexcept;
+  /// Measurement update with the knowledge that a parameter is 0 up to this variance.
+  void expect_zero(int parameter, double variance) noexcept;
   /// Adds random-walk variance to a parameter.
   void add_parameter_variance(int parameter, double variance) noexcept;
   /// Restarts a parameter: it keeps its mean and gets this variance, without correlation to anything else.

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "rhec/core/estimation/arrival_cost.hpp"
@@ -33,12 +34,25 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
     /// If the initial heading is unknown: this many headings around the circle are tried while the horizon still grows,
     /// and the best is kept.
     int heading_starts = 1;
+    /// Process noise of a state (ModelDescription::noisy_states) that is constant over blocks of intervals. Each
+    /// interval costs what it does without blocks, so that the variance of what a block adds to its state stays the
+    /// same.
+    struct BlockedNoise {
+      int state = 0;
+      std::shared_ptr<const Blocking> blocking;
+    };
+    std::vector<BlockedNoise> noises;  ///< in the order of their states
   };
+  /// Why a blocking is not one of process noise over such a horizon, whose blocks are independent, and have their
+  /// borders where the run has them; empty if it is one.
+  static std::string why_not_noise(const Blocking& blocking, int horizon);
+
   /// Throws Error if sizes do not match or a blocking cannot take the horizon.
   RecedingHorizonEstimation(std::shared_ptr<const Model> model, std::shared_ptr<Solver> solver, Setup setup);
   ~RecedingHorizonEstimation() override;
 
-  const Model& model() const noexcept override { return problem_.model(); }
+  /// As it was given: all process noise is an input. In that of the problem, blocked noises are parameters, the last.
+  const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return problem_.substeps(); }
   void start(const double* outputs) noexcept override;
   void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
@@ -65,6 +79,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   void recover() noexcept;
   void write_covariance(int node, Estimate& result) noexcept;
 
+  std::shared_ptr<const Model> model_;
   Setup setup_;
   RheProblem problem_;
   ArrivalCost arrival_;
@@ -76,6 +91,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   bool searching_ = false;  ///< the heading has not been determined yet
   std::vector<std::uint8_t> begins_, next_begins_;
   std::vector<std::int64_t> first_starts_;
+  std::vector<int> given_inputs_;  ///< which of the given inputs the problem has
   std::vector<ArrivalCost::Border> borders_;
   std::vector<double> scratch_, inputs_, outputs_;
   std::unique_ptr<NodeCovariance> covariance_;

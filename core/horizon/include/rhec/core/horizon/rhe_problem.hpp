@@ -29,6 +29,7 @@ struct RobustLoss {
 ///             + sum over nodes      || h(chi_i) - y_i ||^2_Ry          missing outputs (NaN) are skipped
 ///             + sum over intervals  || nu_i - u_meas_i ||^2_Ru
 ///             + sum over block starts (rho_b - rho_a)^2 / variance     where neighbouring blocks are linked
+///             + sum over blocks       weight rho_b^2                   where their values are expected to be 0
 ///     subject to the dynamics, bounds on states at every node, on inputs, and on every parameter block.
 ///
 /// Data are set in place, without allocation. After a change of the structure (the number of intervals or the block
@@ -73,6 +74,14 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void link(int interval, int parameter, double variance) noexcept;
   double link_variance(int interval, int parameter) const noexcept {
     return 1.0 / link_information_[interval * np() + parameter];
+  }
+  /// Weight of the squared value of the block that starts at an interval; at interval 0, of the horizon's first block,
+  /// which has no control of its own. For process noise that is constant over a block (StateNoiseModel).
+  void set_block_weight(int interval, int parameter, double weight) noexcept {
+    block_weights_[interval * np() + parameter] = weight;
+  }
+  double block_weight(int interval, int parameter) const noexcept {
+    return block_weights_[interval * np() + parameter];
   }
   void finish() noexcept;
   /// Copies data, output weights and structure of a problem with the same model and otherwise the same set-up, without
@@ -124,6 +133,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   double links(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
   void write_bounds(int stage) noexcept;
   double arrival_term(const Iterate& iterate, double* q) const noexcept;
+  double first_block_weight(int parameter) const noexcept;
 
   Setup setup_;
   int ny_, output_row_;
@@ -135,7 +145,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   AlignedDoubles outputs_;                        ///< one row per node, NaN where nothing was measured
   AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period of angles, else 0
   AlignedDoubles measured_inputs_, input_weights_;  ///< rows as in Iterate; NaN and 0 outside of the inputs
-  std::vector<double> link_information_;
+  std::vector<double> link_information_, block_weights_;
 };
 
 }  // namespace rhec

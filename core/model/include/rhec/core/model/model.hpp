@@ -59,6 +59,8 @@ struct ModelDescription {
   /// Of a model with process noise (StateNoiseModel): the states whose noise the inputs behind the vehicle's own are,
   /// in their order; else empty. Nothing measures or commands these inputs, and they are expected to be 0.
   std::vector<int> noisy_states = {};
+  /// The same for noises that are parameters, the last ones, so that intervals can share a value of theirs.
+  std::vector<int> blocked_noises = {};
 };
 
 /// How a vehicle moves and what its sensors measure:

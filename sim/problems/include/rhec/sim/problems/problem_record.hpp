@@ -69,6 +69,10 @@ struct ProblemRecord {
   /// Since version 4: the states with process noise (StateNoiseModel), in the model's order. Then `inputs` and their
   /// weights are about [u; xi] or [u; xi; w].
   std::vector<std::string> state_noise;
+  /// Since version 4: the states whose process noise is a parameter, in the model's order. Then parameters are [p; w].
+  std::vector<std::string> blocked_noise;
+  /// By parameter, for each of its block_starts: the weight of the block's squared value.
+  std::map<std::string, std::vector<double>> block_weights;
   Rows data;
 
   // RHC

@@ -16,6 +16,9 @@ struct TruthOptions {
   double step = 0.01;  ///< Runge-Kutta step [s]: at most 20 in an interval of 0.2 s; shorter where a model's formula
                        ///< has time constants that ask for it
   bool mechanical_stops = true;  ///< bounded states (the steering angle) cannot leave their bounds, whatever the input
+  /// Process noise of each state, in its unit per square root of a second; empty: none.
+  std::vector<double> noise = {};
+  std::uint64_t seed = 0;  ///< of that noise
 };
 
 /// The simulated true vehicle:
@@ -24,7 +27,8 @@ struct TruthOptions {
 ///
 /// integrated with classical Runge-Kutta steps that look up the slip at each stage; the input is held between two
 /// calls. On smooth ground, away from the stops, one step replaces up to five if the difference from the embedded
-/// third-order method is below 1e-8 of every state's typical magnitude. `advance` does not allocate or throw.
+/// third-order method is below 1e-8 of every state's typical magnitude. What disturbs a state is added at the end of
+/// each `advance`: white noise whose variance grows with the duration. `advance` does not allocate or throw.
 class RHEC_EXPORT TruthVehicle {
  public:
   /// `model` and `field` must outlive the vehicle. Throws Error if the field does not have one channel per parameter,
@@ -46,6 +50,7 @@ class RHEC_EXPORT TruthVehicle {
 
  private:
   void shorten_steps();
+  void disturb(double duration) noexcept;
   void look_up(const double* state, double* parameters) const noexcept;
   bool stop(double* state) const noexcept;
   bool step(const double* inputs, double duration, bool must_fit) noexcept;
@@ -53,6 +58,7 @@ class RHEC_EXPORT TruthVehicle {
   const Model* model_;
   const SlipField* field_;
   TruthOptions options_;
+  std::vector<RandomStream> noise_;
   int position_x_ = -1, position_y_ = -1;
   Eigen::VectorXd lower_, upper_, scales_;
   double time_ = 0.0;
