@@ -176,30 +176,42 @@ std::vector<int> ModelFunctions::results(ModelFunction function) {
 
 std::uint64_t fingerprint_of(const VehicleGraph& vehicle) {
   const Graph& graph = *vehicle.graph;
-  Hash hash;
-  std::map<int, int> numbers;
-  // Independent variables first, in the order that they have for a model.
+  Hash all;
+  // What a node means. Its number does not count: compilers evaluate the operands of a formula in one order or the
+  // other, so that kernels written on one machine may be of another order than the formula on their target.
+  std::map<int, std::uint64_t> meanings;
+  // Independent variables mean their place among those of a model.
+  const auto add_variable = [&](int node) {
+    Hash hash;
+    hash.add(static_cast<int>(Operation::input));
+    hash.add(static_cast<int>(meanings.size()));
+    meanings.emplace(node, hash.value());
+  };
   for (const auto* list : {&vehicle.states, &vehicle.parameters, &vehicle.inputs}) {
-    hash.add(static_cast<int>(list->size()));
-    for (const int node : *list) numbers.emplace(node, static_cast<int>(numbers.size()));
+    all.add(static_cast<int>(list->size()));
+    for (const int node : *list) add_variable(node);
   }
-  hash.add(static_cast<int>(vehicle.options.size()));
-  for (const auto& [node, value] : vehicle.options) numbers.emplace(node, static_cast<int>(numbers.size()));
+  all.add(static_cast<int>(vehicle.options.size()));
+  for (const auto& [node, value] : vehicle.options) add_variable(node);
   const std::vector<int> results = joined(vehicle.rates, vehicle.outputs);
   for (const int node : graph.reach(results)) {
-    if (numbers.contains(node)) continue;
+    if (meanings.contains(node)) continue;
     const Graph::Node& of = graph[node];
     const int operands = operand_count(of.operation);
+    std::uint64_t first = operands > 0 ? meanings.at(of.a) : 0, second = operands > 1 ? meanings.at(of.b) : 0;
+    if ((of.operation == Operation::add || of.operation == Operation::multiply) && second < first)
+      std::swap(first, second);
+    Hash hash;
     hash.add(static_cast<int>(of.operation));
     if (of.operation == Operation::constant) hash.add(std::bit_cast<std::uint64_t>(of.value));
-    if (operands > 0) hash.add(numbers.at(of.a));
-    if (operands > 1) hash.add(numbers.at(of.b));
+    hash.add(first);
+    hash.add(second);
     if (of.operation == Operation::power) hash.add(of.b);
-    numbers.emplace(node, static_cast<int>(numbers.size()));
+    meanings.emplace(node, hash.value());
   }
-  hash.add(static_cast<int>(vehicle.rates.size()));
-  for (const int node : results) hash.add(numbers.at(node));
-  return hash.value();
+  all.add(static_cast<int>(vehicle.rates.size()));
+  for (const int node : results) all.add(meanings.at(node));
+  return all.value();
 }
 
 ModelCode write_model_code(const VehicleGraph& given, const std::string& prefix, const std::string& formula,

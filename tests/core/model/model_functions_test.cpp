@@ -66,6 +66,33 @@ TEST(Fingerprint, IsThatOfTheFormulaAndNotOfItsOptions) {
   EXPECT_EQ(fingerprint_of(trace<BicycleSlip>()), fingerprint_of(trace<BicycleSlip>({}, {{"a", "b"}, {}, {}})));
 }
 
+/// x' = a (b + c) + d / e of sines, whose operands are recorded from the left or from the right.
+VehicleGraph recorded(bool from_the_left) {
+  VehicleGraph made;
+  Graph& graph = *made.graph;
+  for (int j = 0; j < 5; ++j) made.states.push_back(graph.input("x"));
+  std::vector<int> sines(5);
+  for (int k = 0; k < 5; ++k) {
+    const auto j = static_cast<std::size_t>(from_the_left ? k : 4 - k);
+    sines[j] = graph.function(Operation::sine, made.states[j]);
+  }
+  const auto product = [&] { return graph.multiply(sines[0], graph.add(sines[1], sines[2])); };
+  const auto quotient = [&] { return graph.divide(sines[3], sines[4]); };
+  int first = 0, second = 0;
+  if (from_the_left) first = product(), second = quotient();
+  if (!from_the_left) second = quotient(), first = product();
+  made.rates.assign(5, graph.add(first, second));
+  made.outputs = {graph.subtract(first, second)};
+  return made;
+}
+
+TEST(Fingerprint, DoesNotDependOnTheOrderOfRecording) {
+  EXPECT_EQ(fingerprint_of(recorded(true)), fingerprint_of(recorded(false)));
+  VehicleGraph other = recorded(true);
+  other.outputs = {other.graph->negate(other.outputs[0])};
+  EXPECT_NE(fingerprint_of(recorded(true)), fingerprint_of(other)) << "a - b is not b - a";
+}
+
 // Kernels that were compiled of another formula are not used.
 TEST(FormulaModel, LeavesAnotherStructureToTheInterpreter) {
   static constexpr StraightCode other{.fingerprint = 1};
