@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "rhec/core/config/options.hpp"
 #include "rhec/plugins/robot/by_name.hpp"
 
@@ -56,20 +58,29 @@ DefaultByName<SensorError> no_error() {
   return {"none", [](const ModelDescription&, const Variable&, std::size_t) { return SensorError{}; }};
 }
 
+ByName<SensorErrorValue> sensor_errors(const char* owner) {
+  return {owner, {}, {{"OUTPUT", &ModelDescription::outputs, no_error(), ""}}};
+}
 const ByName<SensorErrorValue>& biases_by_name() {
-  static const ByName<SensorErrorValue> map("biases of outputs", {},
-                                            {{"OUTPUT", &ModelDescription::outputs, no_error(),
-                                              "the sensor reads a bias more, which is estimated: {sigma: at the start, "
-                                              "drift: per square root of a second, 0 by default}"}});
+  static const auto map = sensor_errors("biases of outputs");
+  return map;
+}
+const ByName<SensorErrorValue>& scales_by_name() {
+  static const auto map = sensor_errors("scale errors of outputs");
   return map;
 }
 
-const ByName<SensorErrorValue>& scales_by_name() {
-  static const ByName<SensorErrorValue> map("scale errors of outputs", {},
-                                            {{"OUTPUT", &ModelDescription::outputs, no_error(),
-                                              "the sensor reads (1 + k) times as much, and k is estimated: {sigma: at "
-                                              "the start, drift: per square root of a second, 0 by default}"}});
-  return map;
+/// Of a sensor's sigma and drift.
+std::vector<OptionRow> sensor_error_rows(const char* meaning) {
+  std::vector<OptionRow> rows = SensorErrorValue::table().schema();
+  for (OptionRow& row : rows) {
+    row.name = "OUTPUT." + row.name;
+    if (row.name == "OUTPUT.sigma") {
+      row.default_value = "none";
+      row.meaning = fmt::format("{}: {}", meaning, row.meaning);
+    }
+  }
+  return rows;
 }
 
 struct NoiseOptions {
@@ -82,8 +93,9 @@ struct NoiseOptions {
             .map("outputs", &NoiseOptions::outputs, outputs_by_name().rows())
             .map("inputs", &NoiseOptions::inputs, inputs_by_name().rows())
             .map("states", &NoiseOptions::states, states_by_name().rows())
-            .map("biases", &NoiseOptions::biases, biases_by_name().rows())
-            .map("scales", &NoiseOptions::scales, scales_by_name().rows())
+            .map("biases", &NoiseOptions::biases, sensor_error_rows("the sensor reads a bias more, which is estimated"))
+            .map("scales", &NoiseOptions::scales,
+                 sensor_error_rows("the sensor reads (1 + k) times as much, and k is estimated"))
             .flag("adapt", &NoiseOptions::adapt,
                   "bank, and rhe with priors: learn the noise of outputs while driving, from a fifth to five "
                   "times what is stated; not beside noise of states or drifting sensors, from which it cannot be told");
