@@ -28,6 +28,7 @@ FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Se
     throw Error(fmt::format("filter: the initial mean and covariance must have the size {} of [x; p]", n));
   const int count = model->description().roles.heading >= 0 ? std::max(1, setup_.heading_starts) : 1;
   for (int i = 0; i < count; ++i) bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps), 0.0});
+  for (const double sigma : setup_.walk) ramp_variances_.push_back(sigma * sigma);
   no_input_.assign(model->input_count(), 0.0);
   predicted_.assign(model->output_count(), 0.0);
   jacobian_.assign(static_cast<std::size_t>(model->output_count()) * model->state_count(), 0.0);
@@ -108,6 +109,10 @@ void FilterEstimation::add_node(double duration, const double* inputs, const dou
     return;
   }
   for (std::size_t i = 0; i < alive_; ++i) {
+    if (setup_.has_ramps) {
+      bank_[i].filter.predict(inputs, no_input_.data(), duration, ramp_variances_.data());
+      continue;
+    }
     bank_[i].filter.predict(inputs, no_input_.data(), duration);
     for (std::size_t j = 0; j < setup_.walk.size(); ++j)
       bank_[i].filter.add_parameter_variance(static_cast<int>(j), setup_.walk[j] * setup_.walk[j]);

@@ -1,5 +1,6 @@
 #include "rhec/core/estimation/kalman_filter.hpp"
 #include "rhec/core/base/angle.hpp"
+#include "rhec/core/model/motion_outputs.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,6 +20,7 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
       nu_(model_->input_count()),
       np_(model_->parameter_count()),
       ny_(model_->output_count()) {
+  refuse_outputs_of_motion(*model_, "filter");
   const int n = nx_ + np_;
   mean = Eigen::VectorXd::Zero(n);
   covariance = Eigen::MatrixXd::Identity(n, n);

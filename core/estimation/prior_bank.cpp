@@ -12,6 +12,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/kernels/bank_kernels.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
+#include "rhec/core/model/motion_outputs.hpp"
 
 #include "prior_bank_views.hpp"
 
@@ -83,6 +84,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
       nu_(model_->input_count()),
       np_(model_->parameter_count()),
       ny_(model_->output_count()) {
+  refuse_outputs_of_motion(*model_, "bank");
   if (members_ < 1) throw Error("bank: expected at least 1 member");
   for (const PriorCombination& member : setup_.members)
     if (static_cast<int>(member.size()) != np_)

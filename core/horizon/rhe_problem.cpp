@@ -1,5 +1,6 @@
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/base/angle.hpp"
+#include "rhec/core/model/motion_outputs.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -48,6 +49,7 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
       setup_(std::move(setup)),
       ny_(this->model().output_count()),
       output_row_(padded(ny_)) {
+  refuse_outputs_of_motion(this->model(), "estimation problem");
   const ModelDescription& about = this->model().description();
   check_weights("output weights", setup_.output_weights, about.outputs);
   check_weights("input weights", setup_.input_weights, about.inputs);

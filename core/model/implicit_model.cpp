@@ -13,6 +13,7 @@
 #include "rhec/core/model/formula_copy.hpp"
 #include "rhec/core/model/graph_model.hpp"
 #include "rhec/core/model/model_functions.hpp"
+#include "rhec/core/model/sensor_model.hpp"
 #include "rhec/core/model/state_noise_model.hpp"
 
 namespace rhec {
@@ -92,6 +93,7 @@ bool ImplicitModel::use_instruction_set(const std::string& name) {
 
 bool is_implicit(const Model& model) noexcept {
   if (const auto* noisy = dynamic_cast<const StateNoiseModel*>(&model)) return is_implicit(noisy->vehicle());
+  if (const auto* sensors = dynamic_cast<const SensorModel*>(&model)) return is_implicit(sensors->vehicle());
   return dynamic_cast<const ImplicitModel*>(&model) != nullptr;
 }
 

@@ -10,6 +10,7 @@
 
 #include "rhec/core/formula/straight_code.hpp"
 #include "rhec/core/model/formula_copy.hpp"
+#include "rhec/core/model/motion_outputs.hpp"
 #include "staged_steps.hpp"
 
 namespace rhec {
@@ -59,6 +60,13 @@ void keep_lower(Graph& graph, NodeMatrix& matrix) {
     for (int c = r + 1; c < matrix.columns; ++c) matrix.at(r, c) = zero;
 }
 
+/// Outputs of motion are evaluated elsewhere (MotionOutputs): they are 0 here.
+std::vector<int> outputs_of_state(const VehicleGraph& vehicle) {
+  std::vector<int> outputs = vehicle.outputs;
+  for (const int j : outputs_of_motion(vehicle)) outputs[static_cast<std::size_t>(j)] = vehicle.graph->constant(0.0);
+  return outputs;
+}
+
 std::vector<int> arguments_of(const VehicleGraph& vehicle) {
   return joined(joined(vehicle.states, vehicle.parameters), vehicle.inputs);
 }
@@ -81,9 +89,10 @@ const ModelFunctions::Outputs& ModelFunctions::outputs() {
   if (outputs_) return *outputs_;
   Graph& graph = *vehicle_.graph;
   Outputs made;
-  made.jacobian = jacobian(graph, vehicle_.outputs, vehicle_.states);
+  made.values = outputs_of_state(vehicle_);
+  made.jacobian = jacobian(graph, made.values, vehicle_.states);
   for (std::size_t j = 0; j < vehicle_.outputs.size(); ++j) made.weights.push_back(graph.input("weight"));
-  made.hessian = weighted_hessian(graph, vehicle_.outputs, made.weights, vehicle_.states);
+  made.hessian = weighted_hessian(graph, made.values, made.weights, vehicle_.states);
   keep_lower(graph, made.hessian);
   return outputs_.emplace(std::move(made));
 }
@@ -153,9 +162,9 @@ std::vector<int> ModelFunctions::inputs(ModelFunction function) {
 std::vector<int> ModelFunctions::results(ModelFunction function) {
   switch (function) {
     case ModelFunction::outputs:
-      return vehicle_.outputs;
+      return outputs().values;
     case ModelFunction::output_jacobian:
-      return joined(vehicle_.outputs, outputs().jacobian.nodes);
+      return joined(outputs().values, outputs().jacobian.nodes);
     case ModelFunction::output_hessian:
       return outputs().hessian.nodes;
     case ModelFunction::rates:

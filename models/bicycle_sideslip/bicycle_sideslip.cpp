@@ -61,6 +61,12 @@ ModelDescription describe() {
       {.name = "y_gps", .unit = "m", .meaning = "GPS antenna, y", .scale = 10.0},
       {.name = "delta", .unit = "rad", .meaning = "measured steering angle", .scale = 0.3, .is_angle = true},
       {.name = "heading", .unit = "rad", .meaning = "measured heading", .is_angle = true},
+      {.name = "yaw_rate", .unit = "rad/s", .meaning = "rate of turn, of a gyro", .scale = 0.5, .usual = false},
+      {.name = "ground_speed",
+       .unit = "m/s",
+       .meaning = "speed over ground, of a radar or of GPS",
+       .scale = 5.0,
+       .usual = false},
   };
   model.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0};
   return model;

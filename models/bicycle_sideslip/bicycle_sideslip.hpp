@@ -13,10 +13,10 @@ namespace rhec {
 ///
 /// with state [x, y, psi, delta], u = [v, delta_rate], p = [beta_front, beta_rear]. v is the speed of the rear axle's
 /// centre; each axle's velocity points beta_front or beta_rear to the left of its wheels. The source gives the same
-/// model in path coordinates. Outputs: the position of an antenna with lever arm (a_x, a_y), delta, psi.
+/// model in path coordinates. Outputs: the position of an antenna with lever arm (a_x, a_y), delta, psi, psi', v.
 template <class Scalar>
 struct BicycleSideslip {
-  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 4;
+  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 6;
 
   Scalar wheelbase{2.8};  ///< L [m]
   Scalar antenna_x{0.0};  ///< a_x: distance of the GPS antenna ahead of the rear axle [m]
@@ -38,13 +38,15 @@ struct BicycleSideslip {
     dxdt[3] = u[1];
   }
 
-  void outputs(const Scalar* x, Scalar* y) const {
-    using std::cos, std::sin;
+  void outputs(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* y) const {
+    using std::cos, std::sin, std::tan;
     const Scalar cosine = cos(x[2]), sine = sin(x[2]);
     y[0] = x[0] + antenna_x * cosine - antenna_y * sine;
     y[1] = x[1] + antenna_x * sine + antenna_y * cosine;
     y[2] = x[3];
     y[3] = x[2];
+    y[4] = u[0] * cos(p[1]) * (tan(x[3] + p[0]) - tan(p[1])) / wheelbase;
+    y[5] = u[0];
   }
 };
 

@@ -10,12 +10,12 @@ namespace rhec {
 ///
 ///     x_pos' = kappa u1 cos(beta)      beta'  = kappa u1 / l tan(mu delta)
 ///     y_pos' = kappa u1 sin(beta)      delta' = u2
-///     h(x)   = [x_pos - d cos(beta), y_pos - d sin(beta), delta, beta]
+///     h      = [x_pos - d cos(beta), y_pos - d sin(beta), delta, beta, beta', kappa u1]
 ///
 /// with x = [x_pos, y_pos, beta, delta], u = [u1, u2], p = [kappa, mu].
 template <class Scalar>
 struct BicycleSlip {
-  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 4;
+  static constexpr int state_count = 4, input_count = 2, parameter_count = 2, output_count = 6;
 
   Scalar wheelbase{1.4};   ///< l [m]
   Scalar gps_offset{0.4};  ///< d: distance of the GPS antenna behind the rear axle [m]
@@ -36,13 +36,15 @@ struct BicycleSlip {
     dxdt[3] = u[1];
   }
 
-  void outputs(const Scalar* x, Scalar* y) const {
-    using std::cos, std::sin;
+  void outputs(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* y) const {
+    using std::cos, std::sin, std::tan;
     const Scalar& beta = x[2];
     y[0] = x[0] - gps_offset * cos(beta);
     y[1] = x[1] - gps_offset * sin(beta);
     y[2] = x[3];
     y[3] = beta;
+    y[4] = p[0] * u[0] * tan(p[1] * x[3]) / wheelbase;
+    y[5] = p[0] * u[0];
   }
 };
 

@@ -47,6 +47,12 @@ ModelDescription describe() {
       {.name = "x_gps", .unit = "m", .meaning = "GPS antenna, x", .scale = 5.0},
       {.name = "y_gps", .unit = "m", .meaning = "GPS antenna, y", .scale = 5.0},
       {.name = "heading", .unit = "rad", .meaning = "measured heading", .is_angle = true},
+      {.name = "yaw_rate", .unit = "rad/s", .meaning = "rate of turn, of a gyro", .scale = 1.0, .usual = false},
+      {.name = "ground_speed",
+       .unit = "m/s",
+       .meaning = "speed over ground, of a radar or of GPS",
+       .scale = 1.0,
+       .usual = false},
   };
   model.roles = {.position_x = 0, .position_y = 1, .heading = 2};
   return model;

@@ -13,10 +13,10 @@ namespace rhec {
 ///     v_r  = r omega_r (1 - lambda_r)      psi' = (v_r - v_l) / W          y' = v sin(psi) - s psi' cos(psi)
 ///
 /// with state [x, y, psi], u = [omega_l, omega_r], p = [lambda_l, lambda_r, s]. Outputs: the position of an antenna
-/// with lever arm (a_x, a_y) from the centre, and psi.
+/// with lever arm (a_x, a_y) from the centre, psi, psi', v.
 template <class Scalar>
 struct SkidSteer {
-  static constexpr int state_count = 3, input_count = 2, parameter_count = 3, output_count = 3;
+  static constexpr int state_count = 3, input_count = 2, parameter_count = 3, output_count = 5;
 
   Scalar wheel_radius{0.14};  ///< r [m]
   Scalar track_width{0.6};    ///< W: between the left and right wheels [m]
@@ -42,12 +42,15 @@ struct SkidSteer {
     dxdt[2] = yaw_rate;
   }
 
-  void outputs(const Scalar* x, Scalar* y) const {
+  void outputs(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* y) const {
     using std::cos, std::sin;
     const Scalar cosine = cos(x[2]), sine = sin(x[2]);
     y[0] = x[0] + antenna_x * cosine - antenna_y * sine;
     y[1] = x[1] + antenna_x * sine + antenna_y * cosine;
     y[2] = x[2];
+    const Scalar left = wheel_radius * u[0] * (1.0 - p[0]), right = wheel_radius * u[1] * (1.0 - p[1]);
+    y[3] = (right - left) / track_width;
+    y[4] = 0.5 * (left + right);
   }
 };
 

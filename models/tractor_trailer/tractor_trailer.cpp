@@ -68,6 +68,21 @@ ModelDescription describe() {
        .meaning = "measured heading of the tractor",
        .is_angle = true,
        .usual = false},
+      {.name = "tractor_yaw_rate",
+       .unit = "rad/s",
+       .meaning = "rate of turn of the tractor, of a gyro",
+       .scale = 0.5,
+       .usual = false},
+      {.name = "trailer_yaw_rate",
+       .unit = "rad/s",
+       .meaning = "rate of turn of the trailer, of a gyro",
+       .scale = 0.5,
+       .usual = false},
+      {.name = "ground_speed",
+       .unit = "m/s",
+       .meaning = "speed over ground, of a radar or of GPS",
+       .scale = 5.0,
+       .usual = false},
   };
   model.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0, .speed_factor = 0, .other_headings = {3}};
   return model;

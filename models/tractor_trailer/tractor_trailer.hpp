@@ -22,10 +22,11 @@ namespace rhec {
 /// tractor's speed, which holds for small beta only.
 ///
 /// With state [x_i, y_i, psi_i, psi_t, delta], u = [v, delta_rate], p = [mu, kappa, eta]. Outputs: the positions of
-/// antennas on the trailer and on the tractor (each with a lever arm from its axle), delta, beta, and both headings.
+/// antennas on the trailer and on the tractor (each with a lever arm from its axle), delta, beta, both headings, both
+/// rates of turn, and the tractor's speed mu v.
 template <class Scalar>
 struct TractorTrailer {
-  static constexpr int state_count = 5, input_count = 2, parameter_count = 3, output_count = 8;
+  static constexpr int state_count = 5, input_count = 2, parameter_count = 3, output_count = 11;
 
   Scalar wheelbase{1.4};          ///< L_t [m]
   Scalar trailer_length{1.3};     ///< L_i: distance from the hitch to the trailer's axle [m]
@@ -60,8 +61,8 @@ struct TractorTrailer {
     dxdt[4] = u[1];
   }
 
-  void outputs(const Scalar* x, Scalar* y) const {
-    using std::cos, std::sin;
+  void outputs(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* y) const {
+    using std::cos, std::sin, std::tan;
     const Scalar &psi_i = x[2], &psi_t = x[3];
     const Scalar sine_i = sin(psi_i), cosine_i = cos(psi_i), sine_t = sin(psi_t), cosine_t = cos(psi_t);
     const Scalar tractor_x = hitch + tractor_antenna_x;
@@ -73,6 +74,11 @@ struct TractorTrailer {
     y[5] = psi_t - psi_i;
     y[6] = psi_i;
     y[7] = psi_t;
+    const Scalar speed = p[0] * u[0], slipping = p[2] * (psi_t - psi_i);
+    const Scalar rate_t = speed * tan(p[1] * x[4]) / wheelbase;
+    y[8] = rate_t;
+    y[9] = (speed * sin(slipping) - hitch * rate_t * cos(slipping)) / trailer_length;
+    y[10] = speed;
   }
 };
 

@@ -46,6 +46,12 @@ ModelDescription describe() {
       {.name = "x_gps", .unit = "m", .meaning = "GPS antenna, x", .scale = 2.0},
       {.name = "y_gps", .unit = "m", .meaning = "GPS antenna, y", .scale = 2.0},
       {.name = "heading", .unit = "rad", .meaning = "measured heading", .is_angle = true, .usual = false},
+      {.name = "yaw_rate", .unit = "rad/s", .meaning = "rate of turn, of a gyro", .scale = 0.5, .usual = false},
+      {.name = "ground_speed",
+       .unit = "m/s",
+       .meaning = "speed over ground, of a radar or of GPS",
+       .scale = 0.5,
+       .usual = false},
   };
   model.roles = {.position_x = 0, .position_y = 1, .heading = 2, .speed = 0, .speed_factor = 0};
   return model;

@@ -149,7 +149,6 @@ class VehicleBuilder {
       if (node < 0)
         throw error_at(file_.name(), file_.place("outputs", output.name),
                        fmt::format("the output '{0}' has no equation; expected {0} = ... in 'equations'", output.name));
-      check_output(output.name, node);
       vehicle_.outputs.push_back(node);
     }
   }
@@ -167,18 +166,6 @@ class VehicleBuilder {
                                               : fmt::format("; did you mean '{}'?", near)));
     }
   }
-  /// Sensors see the state alone.
-  void check_output(const std::string& output, int node) {
-    for (const int reached : graph().reach({&node, 1})) {
-      const auto is_reached = [&](int of) { return of == reached; };
-      for (const auto* nodes : {&vehicle_.inputs, &vehicle_.parameters})
-        if (std::any_of(nodes->begin(), nodes->end(), is_reached))
-          throw error_at(file_.name(), file_.place("outputs", output),
-                         fmt::format("the output '{}' depends on '{}'; expected states and options alone", output,
-                                     graph().name_of(reached)));
-    }
-  }
-
   void build_straight_motion() {
     if (!file_.has_straight_motion()) return;
     std::map<std::string, int> known = options_.nodes();

@@ -280,14 +280,13 @@ class Writer {
       return is_used ? array : fmt::format("/*{}*/", array);
     };
     const std::string x = add(description_.states, state_);
-    std::string head;
-    if (is_dynamics) {
-      const std::string u = add(description_.inputs, input_), p = add(description_.parameters, parameter_);
-      head = fmt::format("  void dynamics(const Scalar* {}, const Scalar* {}, const Scalar* {}, Scalar* {}) const {{\n",
-                         x, u, p, rate_);
-    } else {
-      head = fmt::format("  void outputs(const Scalar* {}, Scalar* {}) const {{\n", x, output_);
-    }
+    const std::string u = add(description_.inputs, input_), p = add(description_.parameters, parameter_);
+    // Outputs of the state alone have the shorter form.
+    const bool is_of_state = !is_dynamics && u.starts_with("/*") && p.starts_with("/*");
+    const std::string of_motion = is_of_state ? "" : fmt::format(", const Scalar* {}, const Scalar* {}", u, p);
+    const std::string head =
+        fmt::format("  void {}(const Scalar* {}{}, Scalar* {}) const {{\n", is_dynamics ? "dynamics" : "outputs", x,
+                    of_motion, is_dynamics ? rate_ : output_);
     return head + using_line(calls, "    ") + cpp_aligned(variables, "//") + lines + "  }\n";
   }
 

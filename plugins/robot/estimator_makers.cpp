@@ -10,6 +10,7 @@
 #include "rhec/core/estimation/filter_estimation.hpp"
 #include "rhec/core/estimation/prior_horizon_estimation.hpp"
 #include "rhec/plugins/robot/bounds_section.hpp"
+#include "rhec/plugins/robot/sensors.hpp"
 
 namespace rhec {
 namespace {
@@ -67,6 +68,7 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
   setup.noise.parameter_lower = lower_bounds_of(context.about.parameters);
   setup.noise.parameter_upper = upper_bounds_of(context.about.parameters);
   for (const ParameterWalk& walk : parts.walks) setup.walk.push_back(walk.process_noise);
+  setup.has_ramps = senses_motion(*context.model);
   setup.initial_mean = parts.initial_mean;
   setup.initial_covariance = parts.initial_covariance;
   setup.substeps = parts.substeps;

@@ -11,6 +11,7 @@
 #include "rhec/plugins/robot/integration.hpp"
 #include "rhec/plugins/robot/plugin_option.hpp"
 #include "rhec/plugins/robot/robust_losses.hpp"
+#include "rhec/plugins/robot/sensors.hpp"
 #include "rhec/plugins/robot/state_noise.hpp"
 
 #include "default_solver.hpp"
@@ -193,7 +194,25 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
     return default_solver.make(host, named);
   };
   parts_.make_map = [memory = parts_.memory] { return memory.make_map(); };
-  parts_.context = with_state_noise(std::move(integration.context));
+  const std::shared_ptr<const RobotContext> vehicle = std::move(integration.context), sensing = with_sensors(vehicle);
+  add_states(initial_sensor_sigmas(*vehicle, *sensing));
+  parts_.context = with_state_noise(sensing);
+}
+
+/// Behind the vehicle's states, with a mean of 0.
+void EstimatorSection::add_states(const std::vector<double>& sigmas) {
+  if (sigmas.empty()) return;
+  const Eigen::Index nx = parts_.context->model->state_count(), np = parts_.context->model->parameter_count(),
+                     more = std::ssize(sigmas);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(nx + more + np);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(mean.size(), mean.size());
+  mean.head(nx) = parts_.initial_mean.head(nx);
+  mean.tail(np) = parts_.initial_mean.tail(np);
+  covariance.topLeftCorner(nx, nx) = parts_.initial_covariance.topLeftCorner(nx, nx);
+  covariance.bottomRightCorner(np, np) = parts_.initial_covariance.bottomRightCorner(np, np);
+  for (Eigen::Index j = 0; j < more; ++j) covariance(nx + j, nx + j) = sigmas[j] * sigmas[j];
+  parts_.initial_mean = std::move(mean);
+  parts_.initial_covariance = std::move(covariance);
 }
 
 OptionSection EstimatorSection::documentation(const EstimatorMakers& makers) {
@@ -204,8 +223,7 @@ PluginChoice EstimatorSection::solver_choice() const { return default_solver.cho
 
 EstimatorParts EstimatorSection::parts(const std::optional<Eigen::VectorXd>& initial_state) const {
   EstimatorParts parts = parts_;
-  if (initial_state && !has_initial_state_)
-    parts.initial_mean.head(parts.context->model->state_count()) = *initial_state;
+  if (initial_state && !has_initial_state_) parts.initial_mean.head(initial_state->size()) = *initial_state;
   return parts;
 }
 

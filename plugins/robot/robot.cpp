@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "rhec/plugins/robot/bounds_section.hpp"
+#include "rhec/plugins/robot/sensors.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec {
@@ -39,6 +40,7 @@ std::vector<OptionSection> robot_sections(const EstimatorMakers& estimators) {
 Robot::Robot(const Host& host, const RobotOptions& options, EstimatorMakers estimators)
     : model_(host, options.model),
       context_(context_of(host, options, model_.model())),
+      estimated_(with_sensor_errors(*context_)),
       blocking_(context_, options.blocking),
       estimator_(context_, blocking_, options.estimator, std::move(estimators)),
       controller_(context_, options.controller),

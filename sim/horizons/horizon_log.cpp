@@ -198,7 +198,8 @@ struct HorizonLog::Parts {
     const Iterate& point = method.solution();
     const Window& window = method.window();
     const int N = window.intervals, nx = model->state_count(), nu = model->input_count(), np = model->parameter_count();
-    const int ns = problem.capacity().states;
+    // Of the vehicle's states; errors of sensors stand behind them.
+    const int ns = problem.capacity().states, all = method.model().state_count();
     find_covariances(method);
     line.open('{');
     line.key("first");
@@ -225,7 +226,7 @@ struct HorizonLog::Parts {
     for (int i = 0; i < N && among_states.empty(); ++i)
       problem.structure().parameters_on(point, i, row.data() + static_cast<std::ptrdiff_t>(i) * shared);
     for (int j = 0; j < np && N > 0; ++j) {
-      const int entry = among_states.empty() ? nx + j : among_states[j];
+      const int entry = among_states.empty() ? all + j : among_states[j];
       // A parameter that is a state has a value at every node: that at the end of an interval.
       for (int i = 0; i < N && !among_states.empty(); ++i) row[i * shared + j] = point.state(i + 1)[entry];
       const BlocksInView view = among_states.empty() ? blocks_of(problem, window, j) : every_interval(window);
@@ -251,21 +252,22 @@ struct HorizonLog::Parts {
       line.close('}');
     }
     line.close(']');
-    row.resize(2 * static_cast<std::size_t>(nx + np));
-    const bool has_arrival = method.arrival(row.data(), row.data() + nx + np);
+    row.resize(2 * static_cast<std::size_t>(all + np));
+    const bool has_arrival = method.arrival(row.data(), row.data() + all + np);
+    const auto place = [&](int j) { return j < nx ? j : j - nx + all; };
     const auto decimals = [&](int j) { return j < nx ? state_decimals[j] : parameter_decimals[j - nx]; };
     line.key("arrival");
     line.open('{');
     line.key("mean");
     line.open('[');
-    for (int j = 0; j < nx + np; ++j) line.number(row[j], decimals(j));
+    for (int j = 0; j < nx + np; ++j) line.number(row[place(j)], decimals(j));
     line.close(']');
     line.key("sigma");
     if (!has_arrival) {
       line.null();
     } else {
       line.open('[');
-      for (int j = 0; j < nx + np; ++j) line.number(row[nx + np + j], decimals(j) + 1);
+      for (int j = 0; j < nx + np; ++j) line.number(row[all + np + place(j)], decimals(j) + 1);
       line.close(']');
     }
     line.close('}');

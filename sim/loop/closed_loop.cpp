@@ -72,6 +72,12 @@ Spread spread_of_times(std::vector<double> times) {
   return times.empty() ? Spread{0.0, 0.0, 0.0} : spread_of(std::move(times));
 }
 
+std::vector<SensorDrift> drifts_of(const std::vector<SensorError>& errors) {
+  std::vector<SensorDrift> drifts;
+  for (const auto& [sigma, drift] : errors) drifts.push_back({sigma, drift});
+  return drifts;
+}
+
 /// Counts the states and parameters whose truth is within two standard deviations.
 void count_inside(const Sample& sample, const ModelDescription& about, std::vector<std::int64_t>& inside) {
   const auto states = static_cast<Eigen::Index>(about.states.size());
@@ -94,7 +100,12 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   const auto seed = static_cast<std::uint64_t>(scenario.options().seed);
   TruthVehicle truth(model, scenario.terrain(), scenario.initial_state(), scenario.vehicle());
   robot.use_estimators(scenario_estimators(&truth));
-  Sensors sensors(model, {robot.output_sigmas(), robot.input_sigmas()}, seed);
+  Sensors sensors(model,
+                  {.outputs = robot.output_sigmas(),
+                   .inputs = robot.input_sigmas(),
+                   .biases = drifts_of(robot.output_biases()),
+                   .scales = drifts_of(robot.output_scales())},
+                  seed);
   const auto estimator = robot.make_estimator(scenario.initial_state());
   const auto controller = robot.make_controller(scenario.path(), estimator->slip_ahead());
   PathFollower true_follower(scenario.path());
@@ -103,7 +114,8 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   // Three times the path's nominal duration, enough for a vehicle that lags behind its literal reference.
   const auto limit = static_cast<std::int64_t>(3.0 * scenario.path().duration() / step) + 100;
   std::vector<double> outputs(model.output_count()), measured(model.input_count());
-  Consistency consistency(model.description());
+  Consistency consistency(robot.estimated_description());
+  std::vector<double> held(model.input_count());  // input before the node
   int path_segment = 0;
   true_follower.locate(truth.state()[roles.position_x], truth.state()[roles.position_y],
                        roles.heading >= 0 ? truth.state()[roles.heading] : std::numeric_limits<double>::quiet_NaN());
@@ -115,7 +127,8 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   begin(LoopPart::simulate);
   for (;; ++k) {
     const double time = static_cast<double>(k) * step;
-    sensors.observe(truth.state().data(), outputs.data());
+    const Sensors::Motion motion{held.data(), truth.parameters().data()};
+    sensors.observe(truth.state().data(), outputs.data(), k > 0 ? &motion : nullptr);
     begin(LoopPart::estimate);
     estimator->push_measurement(time, outputs.data());
     const Estimate& estimate = estimator->estimate(time);
@@ -128,9 +141,13 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     Sample sample;
     sample.step = k;
     sample.time = time;
-    sample.true_state = truth.state();
+    sample.true_state.resize(truth.state().size() + sensors.errors().size());
+    sample.true_state << truth.state(), sensors.errors();
     sample.true_parameters = truth.parameters();
-    sample.state = estimate.state;
+    // Behind the biases and scale errors there are values of motion, which are no result.
+    sample.state = sample.true_state;
+    const Eigen::Index known = std::min(estimate.state.size(), sample.state.size());
+    sample.state.head(known) = estimate.state.head(known);
     sample.parameters = estimate.parameters;
     consistency.write(estimate.covariance, sample);
     sample.inputs = command.inputs;
@@ -176,6 +193,8 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     }
     begin(LoopPart::simulate);
     truth.advance(command.inputs.data(), step);
+    sensors.advance(step);
+    held = command.inputs;
     sensors.measure_inputs(command.inputs.data(), measured.data());
     begin(LoopPart::prepare_control);
     controller->prepare();
@@ -218,7 +237,7 @@ std::string_view name_of(Certainty certainty) noexcept {
 }
 
 RunSummary summarise(const RunLog& log, const Scenario& scenario) {
-  const ModelDescription& about = scenario.robot().model()->description();
+  const ModelDescription& about = scenario.robot().estimated_description();
   RunSummary summary;
   summary.steps = static_cast<std::int64_t>(log.samples.size());
   summary.completed = log.completed;

@@ -19,10 +19,19 @@ Consistency::Consistency(const ModelDescription& about)
       factor_(error_.size(), error_.size()),
       solved_(error_.size()) {}
 
-void Consistency::write(const Eigen::MatrixXd& covariance, Sample& sample) {
+void Consistency::write(const Eigen::MatrixXd& given, Sample& sample) {
   sample.nees = std::numeric_limits<double>::quiet_NaN();
   sample.sigma.resize(0);
-  if (covariance.size() == 0) return;
+  if (given.size() == 0) return;
+  // Without the states behind those that are results.
+  const auto states = std::ssize(about_.states), parameters = std::ssize(about_.parameters);
+  const bool has_more = given.rows() > states + parameters;
+  if (has_more) {
+    results_.resize(states + parameters, states + parameters);
+    results_ << given.topLeftCorner(states, states), given.topRightCorner(states, parameters),
+        given.bottomLeftCorner(parameters, states), given.bottomRightCorner(parameters, parameters);
+  }
+  const Eigen::MatrixXd& covariance = has_more ? results_ : given;
   sample.sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   error_ << sample.state - sample.true_state, sample.parameters - sample.true_parameters;
   for (std::size_t j = 0; j < about_.states.size(); ++j)

@@ -11,7 +11,8 @@ class Consistency {
  public:
   explicit Consistency(const ModelDescription& about);
   /// Writes standard deviations and NEES of a sample whose truth and estimate are known; without a covariance (empty)
-  /// no standard deviations, and NaN.
+  /// no standard deviations, and NaN. States of the
+  /// covariance behind those described are left out.
   void write(const Eigen::MatrixXd& covariance, Sample& sample);
 
  private:
@@ -22,6 +23,7 @@ class Consistency {
   Eigen::VectorXd error_;
   Eigen::MatrixXd factor_;  // L below the diagonal, D on it, L D above
   Eigen::VectorXd solved_;
+  Eigen::MatrixXd results_;  // the covariance of what is described
 };
 
 }  // namespace rhec::sim

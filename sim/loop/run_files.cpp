@@ -27,6 +27,18 @@ Json json_of(const ErrorSummary& errors) {
 
 Json json_of(const Spread& times) { return {{"median", times.median}, {"p99", times.p99}, {"max", times.max}}; }
 
+/// The range of the truth and nearly all estimates; the first, uninformed ones would dwarf the rest.
+void set_range(Panel& panel, double lower, double upper, std::vector<double> estimates) {
+  std::sort(estimates.begin(), estimates.end());
+  const std::size_t few = estimates.size() / 50;
+  if (!estimates.empty()) {
+    lower = std::min(lower, estimates[few]);
+    upper = std::max(upper, estimates[estimates.size() - 1 - few]);
+  }
+  panel.lower = lower - 0.3 * (upper - lower);
+  panel.upper = upper + 0.3 * (upper - lower);
+}
+
 /// The smallest and largest true value of a parameter during the run, slightly apart if it was constant.
 std::pair<double, double> true_range(const RunLog& log, Eigen::Index parameter) {
   double lower = std::numeric_limits<double>::infinity(), upper = -lower;
@@ -63,7 +75,7 @@ Curve curve_of(const RunLog& log, std::string label, CurveRole role, const Funct
 }  // namespace
 
 std::string steps_csv(const RunLog& log, const Scenario& scenario) {
-  const ModelDescription& about = scenario.robot().model()->description();
+  const ModelDescription& about = scenario.robot().estimated_description();
   std::string text = "step,time";
   const auto head = [&](const char* prefix, const std::vector<Variable>& variables) {
     for (const Variable& variable : variables) text += fmt::format(",{}{}", prefix, variable.name);
@@ -171,7 +183,8 @@ std::string run_svg(const RunLog& log, const Scenario& scenario, const RunLog* c
     };
     picture.base = base;
   }
-  const auto states = static_cast<Eigen::Index>(about.states.size());
+  const std::vector<Variable>& known = scenario.robot().estimated_description().states;
+  const auto states = std::ssize(known);
   for (std::size_t j = 0; j < about.parameters.size(); ++j) {
     Panel panel;
     panel.title = about.parameters[j].meaning.empty()
@@ -189,19 +202,30 @@ std::string run_svg(const RunLog& log, const Scenario& scenario, const RunLog* c
     for (const Sample& sample : log.samples)
       if (sample.sigma.size() > 0) estimate.sigmas.push_back(sample.sigma[states + index]);
     panel.curves.push_back(std::move(estimate));
-    // The range of the ground truth and nearly all estimates; the first, uninformed ones would dwarf the rest.
-    auto [lower, upper] = true_range(log, index);
+    const auto [lower, upper] = true_range(log, index);
     std::vector<double> estimates;
     for (const Sample& sample : log.samples)
       if (std::isfinite(sample.parameters[index])) estimates.push_back(sample.parameters[index]);
-    std::sort(estimates.begin(), estimates.end());
-    const std::size_t few = estimates.size() / 50;
-    if (!estimates.empty()) {
-      lower = std::min(lower, estimates[few]);
-      upper = std::max(upper, estimates[estimates.size() - 1 - few]);
+    set_range(panel, lower, upper, std::move(estimates));
+    picture.panels.push_back(std::move(panel));
+  }
+  for (std::ptrdiff_t index = std::ssize(about.states); index < states; ++index) {
+    const Variable& variable = known[static_cast<std::size_t>(index)];
+    Panel panel;
+    panel.title = fmt::format("{} ({})", variable.name, variable.meaning);
+    panel.unit = variable.unit;
+    panel.curves.push_back(
+        curve_of(log, "true", CurveRole::truth, [=](const Sample& s) { return s.true_state[index]; }));
+    Curve estimate = curve_of(log, "estimated", CurveRole::estimate, [=](const Sample& s) { return s.state[index]; });
+    std::vector<double> values = panel.curves.front().values, estimates;
+    for (const Sample& sample : log.samples) {
+      if (sample.sigma.size() > 0) estimate.sigmas.push_back(sample.sigma[index]);
+      if (std::isfinite(sample.state[index])) estimates.push_back(sample.state[index]);
     }
-    panel.lower = lower - 0.3 * (upper - lower);
-    panel.upper = upper + 0.3 * (upper - lower);
+    panel.curves.push_back(std::move(estimate));
+    const auto [lower, upper] = std::minmax_element(values.begin(), values.end());
+    const double least = 1e-3 * variable.scale;
+    set_range(panel, *lower - least, *upper + least, std::move(estimates));
     picture.panels.push_back(std::move(panel));
   }
   Panel tracking;

@@ -33,12 +33,12 @@ SmoothedDrive smooth_closed_loop(const Scenario& scenario, const LoopHooks& hook
   drive.has_sigmas = !run.covariances.empty();
   drive.solve_seconds = run.solve_seconds;
   drive.smoothed = drive.causal;
-  const ModelDescription& about = robot.model()->description();
-  const auto nx = std::ssize(about.states), np = std::ssize(about.parameters), n = nx + np;
+  const ModelDescription& about = robot.estimated_description();
+  const std::ptrdiff_t nx = robot.estimator_model()->state_count(), np = std::ssize(about.parameters), n = nx + np;
   Consistency consistency(about);
   for (std::ptrdiff_t i = 0; i < samples; ++i) {
     Sample& sample = drive.smoothed.samples[static_cast<std::size_t>(i)];
-    sample.state = Eigen::Map<const Eigen::VectorXd>(run.states.data() + i * nx, nx);
+    sample.state = Eigen::Map<const Eigen::VectorXd>(run.states.data() + i * nx, std::ssize(about.states));
     sample.parameters = Eigen::Map<const Eigen::VectorXd>(run.node_parameters.data() + i * np, np);
     Eigen::MatrixXd covariance;
     if (drive.has_sigmas) covariance = Eigen::Map<const Eigen::MatrixXd>(run.covariances.data() + i * n * n, n, n);

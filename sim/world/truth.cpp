@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/step_requirement.hpp"
@@ -184,7 +185,8 @@ void TruthVehicle::disturb(double duration) noexcept {
   look_up(state_.data(), parameters_.data());
 }
 
-Sensors::Sensors(const Model& model, const SensorNoise& noise, std::uint64_t seed) : model_(&model) {
+Sensors::Sensors(const Model& model, const SensorNoise& noise, std::uint64_t seed)
+    : model_(&model), motion_(model), values_(motion_.count()) {
   const ModelDescription& description = model.description();
   const auto fill = [&](std::vector<Channel>& channels, const char* kind, const std::vector<double>& sigmas,
                         const std::vector<Variable>& variables) {
@@ -196,10 +198,42 @@ Sensors::Sensors(const Model& model, const SensorNoise& noise, std::uint64_t see
   };
   fill(outputs_, "output", noise.outputs, description.outputs);
   fill(inputs_, "input", noise.inputs, description.inputs);
+  std::vector<double> errors;
+  const auto draw = [&](const char* kind, const std::vector<SensorDrift>& given) {
+    for (std::size_t j = 0; j < given.size(); ++j) {
+      if (!(given[j].sigma > 0.0)) continue;
+      walks_.push_back({static_cast<int>(j), given[j].drift,
+                        RandomStream(seed, fmt::format("{} of output {}", kind, description.outputs[j].name))});
+      errors.push_back(given[j].sigma * walks_.back().random.normal());
+    }
+  };
+  draw("bias", noise.biases);
+  biases_ = std::ssize(walks_);
+  draw("scale error", noise.scales);
+  errors_ = Eigen::Map<const Eigen::VectorXd>(errors.data(), std::ssize(errors));
 }
 
-void Sensors::observe(const double* state, double* outputs) noexcept {
+void Sensors::advance(double duration) noexcept {
+  const double root = std::sqrt(duration);
+  for (std::size_t k = 0; k < walks_.size(); ++k)
+    errors_[static_cast<Eigen::Index>(k)] += root * walks_[k].drift * walks_[k].random.normal();
+}
+
+void Sensors::observe(const double* state, double* outputs, const Motion* motion) noexcept {
   model_->observe({.count = 1, .states = state, .outputs = outputs});
+  values_.setConstant(std::numeric_limits<double>::quiet_NaN());
+  if (motion)
+    motion_.evaluate({.count = 1,
+                      .states = state,
+                      .inputs = motion->inputs,
+                      .parameters = motion->parameters,
+                      .outputs = values_.data()});
+  for (std::size_t k = 0; k < motion_.which().size(); ++k) outputs[motion_.which()[k]] = values_[std::ptrdiff_t(k)];
+  // Scale errors first, then biases.
+  for (std::ptrdiff_t k = std::ssize(walks_); k-- > 0;) {
+    double& output = outputs[walks_[static_cast<std::size_t>(k)].output];
+    output = k < biases_ ? output + errors_[k] : (1.0 + errors_[k]) * output;
+  }
   for (Channel& channel : outputs_) *outputs++ += channel.sigma * channel.random.normal();
 }
 

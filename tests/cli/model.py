@@ -47,7 +47,6 @@ MISTAKES = [
     ("kappa * u1", "kappa u1", 0, "a product is written with '*'"),
     ("kappa * u1", "kappa * u1;", 0, "an equation ends with its line"),
     ("equations: |", "equations: >", 0, "write 'equations: |', with one equation on each line below it"),
-    ("heading = beta", "heading = u1", None, "the output 'heading' depends on 'u1'; expected states and options alone"),
     ("  mu: {", "  u1: {", None, "'u1' is a variable or an option already; choose another name"),
     ("  mu: {", "  x_pos: {}\n  x_pos: {", 1, "the key is written twice"),
     ("  mu: {", "  sin: {", 0, "'sin' is a function or a constant; choose another name"),

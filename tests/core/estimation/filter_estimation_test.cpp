@@ -8,6 +8,9 @@
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/estimator.hpp"
+#include "rhec/core/model/formula_model.hpp"
+#include "rhec/core/model/sensor_model.hpp"
+#include "rhec/core/model/state_noise_model.hpp"
 #include "support/linear_case.hpp"
 
 namespace rhec {
@@ -94,6 +97,103 @@ TEST(FilterEstimation, RefusesASetUpThatDoesNotFit) {
   setup = bicycle_setup(0.0, 0.1, 1);
   setup.initial_covariance = Eigen::MatrixXd::Identity(6, 4);
   EXPECT_THROW(FilterEstimation(model, setup), Error);
+}
+
+/// A trolley whose position and acceleration are measured.
+template <class Scalar>
+struct SensingTrolley {
+  static constexpr int state_count = 2, input_count = 1, parameter_count = 0, output_count = 2;
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar*, Scalar* dxdt) const {
+    dxdt[0] = x[1];
+    dxdt[1] = u[0] - 0.4 * x[0] - 0.2 * x[1];
+  }
+  void outputs(const Scalar* x, const Scalar* u, const Scalar*, Scalar* y) const {
+    y[0] = x[0];
+    y[1] = u[0] - 0.4 * x[0] - 0.2 * x[1];
+  }
+};
+
+/// The filter on [x; bias; input before the node], written by hand: the accelerometer sees input and state together.
+struct BiasFilter {
+  Eigen::Vector4d mean{0.0, 0.0, 0.0, 0.0};
+  Eigen::Matrix4d covariance = Eigen::Vector4d(1.0, 1.0, 0.25, 0.0).asDiagonal();
+  void predict(const Model& trolley, double duration, double input, double input_sigma, double drift) {
+    const double zero[] = {0.0, 0.0};
+    double J[6];
+    trolley.integrate(
+        {.count = 1, .states = zero, .inputs = zero, .parameters = zero, .durations = &duration, .jacobians = J});
+    Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
+    A.topLeftCorner<2, 2>() = Eigen::Map<const Eigen::Matrix2d>(J);
+    A(2, 2) = 1.0;
+    const Eigen::Vector4d B(J[4], J[5], 0.0, 1.0);
+    mean = (A * mean + B * input).eval();
+    covariance = (A * covariance * A.transpose() + input_sigma * input_sigma * B * B.transpose()).eval();
+    covariance(2, 2) += drift * drift * duration;
+  }
+  void update(const Eigen::RowVector4d& H, double measured, double sigma) {
+    const double variance = H * covariance * H.transpose() + sigma * sigma;
+    const Eigen::Vector4d gain = covariance * H.transpose() / variance;
+    mean += gain * (measured - H * mean);
+    covariance = (covariance - gain * H * covariance).eval();
+  }
+};
+
+TEST(FilterEstimation, FindsABiasThatDriftsAsTheFilterByHandDoes) {
+  ModelDescription about;
+  about.states.resize(2);
+  about.inputs.resize(1);
+  about.outputs.resize(2);
+  about.states[0].name = "x";
+  about.states[1].name = "v";
+  about.inputs[0].name = "u";
+  about.outputs[0].name = "position";
+  about.outputs[1].name = "acceleration";
+  const auto trolley = std::make_shared<FormulaModel<SensingTrolley>>(SensingTrolley<double>{}, about);
+  EXPECT_THROW(KalmanFilter(trolley, {{1.0, 1.0}, {1.0}, {}, {}}, 1), Error) << "an output depends on the input";
+  const auto sensors = std::make_shared<SensorModel>(trolley, SensorModel::Errors{.biased = {1}, .scaled = {}});
+  const auto model = std::make_shared<StateNoiseModel>(sensors, std::vector{2});
+  constexpr double drift = 0.05, of_input = 0.3, of_position = 0.05, of_acceleration = 0.1;
+  const Eigen::VectorXd mean = Eigen::VectorXd::Zero(4);
+  const Eigen::MatrixXd covariance = Eigen::Vector4d(1.0, 1.0, 0.25, 9.0).asDiagonal();
+
+  FilterEstimation::Setup of_filter;
+  of_filter.noise = {
+      {of_position * of_position, of_acceleration * of_acceleration}, {of_input * of_input, drift * drift}, {}, {}};
+  of_filter.initial_mean = mean;
+  of_filter.initial_covariance = covariance;
+  FilterEstimation filter(model, of_filter);
+  RecedingHorizonEstimation::Setup of_window;
+  of_window.problem.max_intervals = 6;
+  of_window.problem.output_weights = {1.0 / (of_position * of_position), 1.0 / (of_acceleration * of_acceleration)};
+  of_window.problem.input_weights = {1.0 / (of_input * of_input), 1.0 / (drift * drift)};
+  of_window.initial_mean = mean;
+  of_window.initial_covariance = covariance;
+  RecedingHorizonEstimation window(model, gn_rti(), of_window);
+
+  BiasFilter by_hand;
+  Estimate of_both[] = {empty_estimate(*model), empty_estimate(*model)};
+  const double first[] = {0.1, nan};
+  filter.start(first);
+  window.start(first);
+  by_hand.update({1.0, 0.0, 0.0, 0.0}, 0.1, of_position);
+  for (int k = 1; k <= 40; ++k) {
+    const double duration = 0.1 + 0.02 * (k % 5), inputs[] = {std::sin(0.4 * k), 0.0},
+                 outputs[] = {0.3 * std::sin(0.2 * k), k % 7 == 3 ? nan : 0.4 + 0.2 * std::cos(0.3 * k)};
+    filter.add_node(duration, inputs, outputs);
+    window.add_node(duration, inputs, outputs);
+    by_hand.predict(*trolley, duration, inputs[0], of_input, drift);
+    by_hand.update({1.0, 0.0, 0.0, 0.0}, outputs[0], of_position);
+    if (!std::isnan(outputs[1])) by_hand.update({-0.4, -0.2, 1.0, 1.0}, outputs[1], of_acceleration);
+    filter.estimate(of_both[0], Clock::time_point::max());
+    window.estimate(of_both[1], Clock::time_point::max());
+    for (const Estimate& estimate : of_both) {
+      EXPECT_LT((estimate.state.head(3) - by_hand.mean.head(3)).cwiseAbs().maxCoeff(), 1e-9) << k;
+      EXPECT_LT(
+          (estimate.covariance.topLeftCorner(3, 3) - by_hand.covariance.topLeftCorner(3, 3)).cwiseAbs().maxCoeff(),
+          1e-9)
+          << k;
+    }
+  }
 }
 
 }  // namespace filter_estimation_test

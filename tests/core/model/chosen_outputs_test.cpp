@@ -52,7 +52,7 @@ TEST(ChosenOutputs, AreThoseOfAllOutputsInTheOrderAskedFor) {
   const auto some = model_with("outputs: [tractor_heading, x_trailer_gps, articulation]");
   ASSERT_THAT(names_of(some->description().outputs), ElementsAre("tractor_heading", "x_trailer_gps", "articulation"));
   const std::size_t nx = all->state_count(), ny = all->output_count(), chosen = picked.size();
-  ASSERT_EQ(ny, 8U);
+  ASSERT_EQ(ny, 11U);
   testing::RandomProblem random(all, 1);
   // More nodes than are evaluated in one batch.
   for (const std::size_t count : {0U, 1U, 3U, 72U, 73U, 500U}) {
@@ -122,7 +122,7 @@ TEST(ChosenOutputs, AreTheUsualOnesWhereNoneAreNamed) {
               ElementsAre("x_gps", "y_gps", "delta"));
   EXPECT_THAT(
       names_of(host().make_model("bicycle_slip", parse_yaml("outputs: all", "robot.yaml"))->description().outputs),
-      ElementsAre("x_gps", "y_gps", "delta", "heading"));
+      ElementsAre("x_gps", "y_gps", "delta", "heading", "yaw_rate", "ground_speed"));
 }
 
 TEST(ChosenOutputs, LeaveTheVehicleAsItIs) {

@@ -18,7 +18,7 @@ namespace model_functions_test {
 TEST(ModelFunctions, ResultsStandInTheirOrder) {
   const VehicleGraph vehicle = trace<BicycleSlip>();
   ModelFunctions functions(vehicle);
-  const std::size_t nx = 4, np = 2, nu = 2, ny = 4, nz = nx + np + nu;
+  const std::size_t nx = 4, np = 2, nu = 2, ny = 6, nz = nx + np + nu;
   const auto sizes = [&](ModelFunction function) {
     return std::pair(functions.inputs(function).size(), functions.results(function).size());
   };
@@ -151,7 +151,7 @@ TEST(FormulaModel, TwoRobotsHaveTheirOwnLengths) {
   about.states.resize(4);
   about.inputs.resize(2);
   about.parameters.resize(2);
-  about.outputs.resize(4);
+  about.outputs.resize(6);
   BicycleSlip<double> longer;
   longer.wheelbase = 2.8;
   const FormulaModel<BicycleSlip> one({}, about), other(longer, about);

@@ -28,7 +28,7 @@ TEST(Trace, RecordsAFormula) {
   double rates[TractorTrailer<double>::state_count], outputs[TractorTrailer<double>::output_count];
   const double* const u = values.data() + TractorTrailer<double>::state_count;
   formula.dynamics(values.data(), u, u + TractorTrailer<double>::input_count, rates);
-  formula.outputs(values.data(), outputs);
+  formula.outputs(values.data(), u, u + TractorTrailer<double>::input_count, outputs);
   const auto traced_rates = vehicle.graph->evaluate(vehicle.rates, arguments, values),
              traced_outputs = vehicle.graph->evaluate(vehicle.outputs, arguments, values);
   for (std::size_t j = 0; j < traced_rates.size(); ++j) EXPECT_NEAR(traced_rates[j], rates[j], 1e-14) << j;

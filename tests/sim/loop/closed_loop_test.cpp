@@ -97,5 +97,39 @@ TEST(Headlands, StartsMayBeAnywhereOnThePath) {
   for (const Sample& sample : log.samples) EXPECT_LT(std::abs(sample.tracking), 2.0) << sample.time;
 }
 
+/// Of a sensor's bias over a drive: the share of samples that are within two standard deviations, and the last sigma.
+struct Recovery {
+  double inside, sigma;
+};
+Recovery recovery_of(const char* file, std::vector<std::string> assignments) {
+  Settings settings = load_yaml(std::string(SCENARIOS) + "/" + file);
+  for (const std::string& assignment : assignments) apply_assignment(settings, assignment);
+  const Scenario scenario(Host(), settings);
+  const RunLog log = run_closed_loop(scenario);
+  EXPECT_TRUE(log.completed) << log.ended;
+  const auto bias = std::ssize(scenario.robot().model()->description().states);
+  EXPECT_EQ(scenario.robot().estimated_description().states.back().name, "yaw_rate_bias");
+  EXPECT_EQ(log.samples.back().state.size(), bias + 1);
+  return {summarise(log, scenario).within_two_sigma.at("yaw_rate_bias"), log.samples.back().sigma[bias]};
+}
+
+TEST(Gyros, HaveTheirDriftingBiasRecovered) {
+  for (const char* estimator : {"rhe", "bank", "ekf"}) {
+    double inside = 0.0;
+    for (const int seed : {1, 2, 3}) {
+      const Recovery found = recovery_of(
+          "gyro.yaml", {"path.laps=1", "seed=" + std::to_string(seed), std::string("estimator.name=") + estimator});
+      inside += found.inside / 3.0;
+      EXPECT_LT(found.sigma, 0.005) << "a tenth of what it was";
+    }
+    EXPECT_GT(inside, 0.88) << estimator;
+  }
+  const Recovery found =
+      recovery_of("skid_steer.yaml", {"model.outputs=[x_gps, y_gps, heading, yaw_rate]", "noise.outputs.yaw_rate=0.01",
+                                      "noise.biases={yaw_rate: {sigma: 0.05, drift: 0.002}}"});
+  EXPECT_LT(found.sigma, 0.005);
+  EXPECT_GT(found.inside, 0.88);
+}
+
 }  // namespace closed_loop_test
 }  // namespace rhec::sim

@@ -10,6 +10,8 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/formula_model.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
 #include "sim/support/bicycle.hpp"
 
 namespace rhec::sim {
@@ -222,6 +224,45 @@ TEST(Sensors, AddNoiseOfTheGivenSize) {
     EXPECT_NEAR(mean[k], 0.0, 4.0 * sigmas[k] / std::sqrt(count)) << k;
     EXPECT_NEAR(std::sqrt(square[k]), sigmas[k], 4.0 * sigmas[k] / std::sqrt(2.0 * count)) << k;
   }
+}
+
+TEST(Sensors, HaveBiasesAndScaleErrorsThatDrift) {
+  const Bicycle model;
+  constexpr int count = 2000;
+  const SensorNoise noise{.outputs = {}, .inputs = {}, .biases = {{}, {}, {0.2, 0.1}}, .scales = {{0.5, 0.0}, {}, {}}};
+  const Eigen::VectorXd x = state(1.0, 2.0, 0.5, 0.1);
+  double squares[3] = {};
+  for (int seed = 0; seed < count; ++seed) {
+    Sensors sensors(model, noise, static_cast<std::uint64_t>(seed));
+    ASSERT_EQ(sensors.errors().size(), 2);
+    const Eigen::Vector2d before = sensors.errors();
+    sensors.advance(4.0);
+    const Eigen::Vector2d after = sensors.errors();
+    EXPECT_EQ(after[1], before[1]);
+    std::array<double, 3> y{};
+    sensors.observe(x.data(), y.data());
+    EXPECT_DOUBLE_EQ(y[2], 0.1 + after[0]);
+    EXPECT_DOUBLE_EQ(y[0], (1.0 + after[1]) * (1.0 - antenna * std::cos(0.5)));
+    squares[0] += before[0] * before[0] / count;
+    squares[1] += (after[0] - before[0]) * (after[0] - before[0]) / count;
+    squares[2] += before[1] * before[1] / count;
+  }
+  const double sigmas[] = {0.2, 0.2, 0.5};
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(std::sqrt(squares[k]), sigmas[k], 4.0 * sigmas[k] / std::sqrt(2.0 * count)) << k;
+}
+
+TEST(Sensors, SeeTheMotionThatHasLedToAState) {
+  const auto model = Host().make_model("bicycle_slip", parse_yaml("outputs: [yaw_rate, x_gps]", "test"));
+  Sensors sensors(*model, {}, 1);
+  const Eigen::VectorXd x = state(1.0, 2.0, 0.5, 0.1);
+  const std::array<double, 2> u{3.0, 0.4}, p{0.9, 0.7};
+  std::array<double, 2> y{};
+  sensors.observe(x.data(), y.data());
+  EXPECT_TRUE(std::isnan(y[0])) << "nothing has led to the first one";
+  const Sensors::Motion motion{u.data(), p.data()};
+  sensors.observe(x.data(), y.data(), &motion);
+  EXPECT_DOUBLE_EQ(y[0], 0.9 * 3.0 * std::tan(0.7 * 0.1) / 1.4);
 }
 
 TEST(Sensors, OneSensorDoesNotShiftTheNoiseOfAnother) {

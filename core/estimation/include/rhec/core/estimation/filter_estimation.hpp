@@ -16,6 +16,9 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   struct Setup {
     KalmanFilter::Noise noise;
     std::vector<double> walk;  ///< n_p, process noise: standard deviation of a parameter per square root of a step
+    /// A parameter runs linearly to its next value on an interval, as outputs of motion need it, which see the value at
+    /// the end; else it is constant on an interval.
+    bool has_ramps = false;
     Eigen::VectorXd initial_mean;
     Eigen::MatrixXd initial_covariance;
     int substeps = 1;
@@ -44,7 +47,7 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   Setup setup_;
   std::vector<Hypothesis> bank_;
   std::size_t alive_ = 1, best_ = 0;
-  std::vector<double> no_input_, predicted_, jacobian_;
+  std::vector<double> ramp_variances_, no_input_, predicted_, jacobian_;
 };
 
 }  // namespace rhec

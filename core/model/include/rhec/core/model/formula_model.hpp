@@ -15,13 +15,14 @@ namespace rhec {
 ///       Scalar length{1.0};                          // options, shown by options(): formula_options.hpp
 ///       template <class Visitor> void options(Visitor&& option) { option("length", length, "of the drawbar [m]"); }
 ///       void dynamics(const Scalar* x, const Scalar* u, const Scalar* p, Scalar* dxdt) const;
-///       void outputs(const Scalar* x, Scalar* y) const;
+///       void outputs(const Scalar* x, Scalar* y) const;  // or (x, u, p, y)
 ///     };
 ///
 /// where Scalar behaves like a double: + - * /, sqrt exp log sin cos tan tanh asin acos atan atan2 hypot pow, called
 /// without `std::` after a `using std::sin;`. It is not always a double: a formula does not compare values or branch on
 /// them (smooth_min, smooth_max, smooth_abs). Everything else (integration, first and second derivatives, evaluation of
-/// several stages at once) follows from its graph. `rhec_add_model(<name> ...)` in CMake compiles that, and defines
+/// several stages at once) follows from its graph. Outputs that depend on u or p are outputs of motion (MotionOutputs).
+/// `rhec_add_model(<name> ...)` in CMake compiles that, and defines
 /// `const rhec::StraightCode& rhec::<name>_kernels()`; without them, the interpreter evaluates it.
 template <template <class> class Formula>
 class FormulaModel : public GraphModel {

@@ -59,6 +59,7 @@ class RHEC_EXPORT ModelFunctions {
  private:
   const StepGraph& step(bool ramp);
   struct Outputs {
+    std::vector<int> values;
     NodeMatrix jacobian, hessian;
     std::vector<int> weights;
   };

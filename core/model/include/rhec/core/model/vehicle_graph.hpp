@@ -14,7 +14,7 @@
 
 namespace rhec {
 
-/// A vehicle's formula as nodes of a graph: dx/dt = f(x, u, p) and y = h(x).
+/// A vehicle's formula as nodes of a graph: dx/dt = f(x, u, p) and y = h(x, u, p).
 struct RHEC_EXPORT VehicleGraph {
   std::shared_ptr<Graph> graph = std::make_shared<Graph>();
   std::vector<int> states, inputs, parameters;  ///< independent variables
@@ -67,7 +67,10 @@ VehicleGraph trace(const Formula<double>& values = {}, const VariableNames& name
   made.options = trace_options(graph, values, formula);
   std::vector<Expression> rates = room_for_results(n.states), outputs = room_for_results(n.outputs);
   std::as_const(formula).dynamics(x.data(), u.data(), p.data(), rates.data());
-  std::as_const(formula).outputs(x.data(), outputs.data());
+  if constexpr (requires { std::as_const(formula).outputs(x.data(), u.data(), p.data(), outputs.data()); })
+    std::as_const(formula).outputs(x.data(), u.data(), p.data(), outputs.data());
+  else
+    std::as_const(formula).outputs(x.data(), outputs.data());
   made.states = written_nodes(graph, x, n.states, "");
   made.inputs = written_nodes(graph, u, n.inputs, "");
   made.parameters = written_nodes(graph, p, n.parameters, "");

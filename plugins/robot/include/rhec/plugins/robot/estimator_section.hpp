@@ -56,6 +56,8 @@ class RHEC_EXPORT EstimatorSection {
                                   const RobotHooks& hooks = {}) const;
 
  private:
+  void add_states(const std::vector<double>& sigmas);
+
   EstimatorMakers makers_;
   EstimatorOptions options_;
   EstimatorParts parts_;

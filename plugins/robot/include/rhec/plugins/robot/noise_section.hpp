@@ -8,14 +8,21 @@
 
 namespace rhec {
 
+/// What a sensor adds to its output, by a factor or as it is: its standard deviation at the start, and by how much it
+/// drifts, per square root of a second. Zeros: none.
+struct SensorError {
+  double sigma = 0.0, drift = 0.0;
+};
+
 /// The section `noise`: standard deviations of the measured variables.
 struct RHEC_EXPORT NoiseSection {
   NoiseSection(const Settings& section, const ModelDescription& about);
   static OptionSection documentation();
 
   std::vector<double> output_sigmas, input_sigmas;
-  std::vector<double> state_sigmas;  ///< process noise, per square root of a second; 0: none
-  bool adapt = true;                 ///< whether estimators that can do so learn the noise of outputs
+  std::vector<double> state_sigmas;         ///< process noise, per square root of a second; 0: none
+  std::vector<SensorError> biases, scales;  ///< by output
+  bool adapt = true;                        ///< whether estimators that can do so learn the noise of outputs
 };
 
 /// Default standard deviations of measured variables: a fraction of their typical magnitudes.

@@ -66,6 +66,11 @@ class RHEC_EXPORT Robot {
   const std::vector<double>& input_sigmas() const noexcept { return context_->noise.input_sigmas; }
   /// The model's description, with the bounds of this configuration.
   const ModelDescription& bounded_description() const noexcept { return context_->about; }
+  /// The same with the biases and scale errors of `noise.biases` and `noise.scales` as states behind the vehicle's: an
+  /// estimate's state begins with these.
+  const ModelDescription& estimated_description() const noexcept { return estimated_; }
+  const std::vector<SensorError>& output_biases() const noexcept { return context_->noise.biases; }
+  const std::vector<SensorError>& output_scales() const noexcept { return context_->noise.scales; }
   /// Whether the section `blocking` gives any; else a window's parameters follow the priors of `estimator.priors`.
   bool has_blockings() const noexcept { return blocking_.is_given(); }
   /// The priors of a parameter as written, e.g. "auto".
@@ -92,6 +97,7 @@ class RHEC_EXPORT Robot {
  private:
   ModelSection model_;
   std::shared_ptr<const RobotContext> context_;
+  ModelDescription estimated_;
   BlockingSection blocking_;
   EstimatorSection estimator_;
   ControllerSection controller_;

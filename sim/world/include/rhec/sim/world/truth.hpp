@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "rhec/core/base/export.hpp"
 #include "rhec/core/model/model.hpp"
+#include "rhec/core/model/motion_outputs.hpp"
 #include "rhec/sim/numbers/random.hpp"
 #include "rhec/sim/world/slip_field.hpp"
 
@@ -67,21 +69,39 @@ class RHEC_EXPORT TruthVehicle {
   Eigen::VectorXd step_parameters_, sum_parameters_;
 };
 
+/// What a sensor adds to its output: the standard deviation from which it is drawn, and that of its random walk, per
+/// square root of a second. Zeros: nothing.
+struct SensorDrift {
+  double sigma = 0.0, drift = 0.0;
+};
+
 /// Standard deviations of the measurement noise, in the units of the model's outputs and inputs; empty: no noise.
 struct SensorNoise {
   std::vector<double> outputs;
   std::vector<double> inputs;
+  std::vector<SensorDrift> biases = {}, scales = {};  ///< by output; empty: none
 };
 
-/// Sensors with Gaussian noise. Every output and input has its own random stream, named after it, so that adding,
-/// removing or reading a sensor less often does not change the noise of the others.
+/// Sensors with Gaussian noise, biases and scale errors. Every output and input has its own random stream, named after
+/// it, so that adding, removing or reading a sensor less often does not change the noise of the others; and each bias
+/// and scale error has one.
 class RHEC_EXPORT Sensors {
  public:
   /// `model` must outlive the sensors. Throws Error for a wrong number of standard deviations or for a negative one.
   Sensors(const Model& model, const SensorNoise& noise, std::uint64_t seed);
 
-  /// outputs = h(state) + noise. Does not allocate or throw.
-  void observe(const double* state, double* outputs) noexcept;
+  /// The motion that has led to a state: the input held until then, and the slip there.
+  struct Motion {
+    const double* inputs;
+    const double* parameters;
+  };
+  /// outputs = (1 + k) h + b + noise. Outputs of motion (MotionOutputs) are NaN without `motion`, as at the start. Does
+  /// not allocate or throw.
+  void observe(const double* state, double* outputs, const Motion* motion = nullptr) noexcept;
+  /// Biases and scale errors drift. Does not allocate or throw.
+  void advance(double duration) noexcept;
+  /// The true biases, then the true scale errors, of the outputs that have them.
+  const Eigen::VectorXd& errors() const noexcept { return errors_; }
   /// measured = inputs + noise; `measured` may be `inputs`.
   void measure_inputs(const double* inputs, double* measured) noexcept;
 
@@ -90,8 +110,17 @@ class RHEC_EXPORT Sensors {
     double sigma;
     RandomStream random;
   };
+  struct Walk {
+    int output;
+    double drift;
+    RandomStream random;
+  };
   const Model* model_;
+  MotionOutputs motion_;
   std::vector<Channel> outputs_, inputs_;
+  std::vector<Walk> walks_;    ///< of biases, then of scale errors
+  std::ptrdiff_t biases_ = 0;  ///< how many of them are biases
+  Eigen::VectorXd errors_, values_;
 };
 
 }  // namespace rhec::sim
