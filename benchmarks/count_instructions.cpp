@@ -1,6 +1,7 @@
 // Takes a number of steps over a recorded drive, for callgrind to count their instructions, in `counted_step` only.
 // scripts/measure/instructions runs it.
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <string>
 
@@ -19,18 +20,20 @@ void counted_step(rhec::bench::RtiLoop& loop) { loop.step(); }
 namespace rhec::bench {
 namespace {
 
-void count(const std::string& name) {
+void count(const std::string& name, int steps) {
   const Host host;
   for (const Drive& how : usual_drives()) {
     if (!name.starts_with(how.name + "/")) continue;
     for (const Sequence& sequence : drive(host, how)) {
       if (sequence.name != name) continue;
       RtiLoop loop(sequence, host.make_solver("gn_rti"));
+      if (steps < 1 || uncounted_steps + steps > static_cast<int>(sequence.samples.size()))
+        throw Error("the sequence '" + name + "' has " + std::to_string(sequence.samples.size()) +
+                    " samples, of which " + std::to_string(uncounted_steps) + " are not counted");
       loop.restart();
       for (int k = 0; k < uncounted_steps; ++k) loop.step();
-      for (int k = 0; k < counted_steps; ++k) counted_step(loop);
-      std::printf("%d steps; %s, %s\n", counted_steps, RHEC_COMPILER,
-                  sequence.model->instruction_sets().back().c_str());
+      for (int k = 0; k < steps; ++k) counted_step(loop);
+      std::printf("%d steps; %s, %s\n", steps, RHEC_COMPILER, sequence.model->instruction_sets().back().c_str());
       return;
     }
   }
@@ -41,11 +44,11 @@ void count(const std::string& name) {
 }  // namespace rhec::bench
 
 int main(int argument_count, char** words) try {
-  if (argument_count != 2) {
-    std::fprintf(stderr, "usage: count_instructions SEQUENCE, such as figure8/fhb/rhe\n");
+  if (argument_count != 2 && argument_count != 3) {
+    std::fprintf(stderr, "usage: count_instructions SEQUENCE [STEPS], such as figure8/fhb/rhe 100\n");
     return 2;
   }
-  rhec::bench::count(words[1]);
+  rhec::bench::count(words[1], argument_count > 2 ? std::atoi(words[2]) : counted_steps);
   return 0;
 } catch (const std::exception& mistake) {
   std::fprintf(stderr, "%s\n", mistake.what());

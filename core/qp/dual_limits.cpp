@@ -103,8 +103,9 @@ void DualActiveSet::keep_rows(const StageQp& qp) noexcept {
 /// Sensitivities to rows of G, and those of the values of these rows, hold for the G with which they were found.
 void DualActiveSet::compare_rows(const StageQp& qp) noexcept {
   const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(stride_) * qp.capacity().limits * (qp.intervals() + 1);
-  rows_change_ = std::memcmp(qp.G(0), rows_.data(), static_cast<std::size_t>(count) * sizeof(double)) != 0;
-  for (int batch = 0; rows_change_ && batch < batch_count; ++batch) forget(batch);
+  if (std::memcmp(qp.G(0), rows_.data(), static_cast<std::size_t>(count) * sizeof(double)) == 0) return;
+  rows_change_ = true;
+  for (int batch = 0; batch < batch_count; ++batch) forget(batch);
 }
 
 /// Whether a step that was found without limits violates one. Leaves the limits' values.
@@ -128,15 +129,17 @@ void DualActiveSet::find_limit_sensitivities(const StageQp& qp, double* values) 
     const double* G = qp.G(i);
     const double* of_stage = values + static_cast<std::ptrdiff_t>(i) * stride_ * batch_size;
     const std::int8_t* held = held_.row(i);
-    for (int r = 0; r < limit_row_; ++r, limits += batch_size) {
+    const int count = qp.limits(i), used = states_ + qp.controls(i);
+    for (int r = 0; r < count; ++r, limits += batch_size, G += stride_) {
       double sums[batch_size] = {};
-      for (int j = 0; r < qp.limits(i) && j < states_ + qp.controls(i); ++j) {
-        const double entry = G[r * stride_ + j];
+      for (int j = 0; j < used; ++j) {
+        const double entry = G[j];
         if (entry == 0.0 || held[j] != 0) continue;
         for (int c = 0; c < batch_size; ++c) sums[c] += entry * of_stage[j * batch_size + c];
       }
       std::copy_n(sums, batch_size, limits);
     }
+    limits = std::fill_n(limits, (limit_row_ - count) * batch_size, 0.0);
   }
 }
 

@@ -171,7 +171,7 @@ class RHEC_EXPORT DualActiveSet {
   // With limits only.
   AlignedDoubles own_lower_, own_upper_;
   AlignedDoubles rows_;                    ///< G at the last `prepare`
-  bool rows_change_ = false;               ///< the last `solve` found another one
+  bool rows_change_ = false;               ///< a `solve` found another one
   std::vector<double> linear_, softness_;  ///< by limit: weight of the slack, reciprocal quadratic weight (or 0)
   std::vector<std::uint8_t> relaxed_;
   std::vector<int> saturated_;
