@@ -539,6 +539,13 @@ inline auto with_shape(const RiccatiView& view, int i, const Function& function)
       if (states == 7 && carried == 2) return function.template operator()<Shape<2, 7, 2, is_written_out, 2, 16>>();
       if (states == 7 && carried == 3) return function.template operator()<Shape<2, 7, 2, is_written_out, 3, 16>>();
       if (states == 8 && carried == 3) return function.template operator()<Shape<2, 8, 2, is_written_out, 3, 16>>();
+      if (states == 8 && carried == 4) return function.template operator()<Shape<2, 8, 2, is_written_out, 4, 16>>();
+    }
+    // Process noise: of one, two or four states, as inputs, beside two inputs of the vehicle.
+    if (states == 6 && carried == 2) {
+      if (controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out, 2, 16>>();
+      if (controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out, 2, 16>>();
+      if (controls == 6) return function.template operator()<Shape<2, 6, 6, is_written_out, 2, 16>>();
     }
     if (states == 6 && controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out, 0, 16>>();
     if (states == 6 && controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out, 0, 16>>();

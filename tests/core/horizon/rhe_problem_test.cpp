@@ -101,8 +101,7 @@ TEST(RheProblem, WeighsTheSquareOfABlocksValue) {
     return problem->linearise(all_stages(*problem), point, Hessian::gauss_newton, qp, scratch);
   };
   linearise();
-  const int at = qp.stride() + 1,
-            control = problem->capacity().states + problem->structure().control_of_lifted(2, 0);
+  const int at = qp.stride() + 1, control = problem->capacity().states + problem->structure().control_of_lifted(2, 0);
   const double H0 = qp.H(0)[2 * at], H2 = qp.H(2)[control * at], h0 = qp.h(0)[2], h2 = qp.h(2)[control];
   problem->set_blocks(0, begins, Transition::step);
   problem->finish();
