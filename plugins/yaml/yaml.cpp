@@ -153,8 +153,7 @@ Settings load_yaml(const std::filesystem::path& file) {
   Settings read = parse_yaml(text, file.string());
   if (read.is_null())
     throw Error(
-        fmt::format("{}: there is nothing in it; expected keys and values, such as 'speed: 4'; is the file cut off?",
-                    file.string()));
+        fmt::format("{}: there is nothing in it; expected keys and values; is the file cut off?", file.string()));
   return read;
 }
 

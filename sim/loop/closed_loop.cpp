@@ -18,9 +18,9 @@ namespace {
 
 // A vehicle farther than this from its path is lost [m].
 constexpr double lost = 50.0;
-// A vehicle whose controller takes it to be at the end of its path is there if it is no farther from it than this [m]:
-// far more than an estimate that is right errs by.
-constexpr double near_the_end = 5.0;
+// A robot that takes itself to be at the end of its path is there if its estimate is no farther off than this [m]: far
+// more than one that is right errs by.
+constexpr double most_off = 5.0;
 
 /// Sums of absolute and squared errors.
 class Errors {
@@ -174,13 +174,12 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
       break;
     }
     if (controller->finished()) {  // by what the robot knows
-      const PathPoint end = scenario.path().point_at(scenario.path().length(), path_segment);
-      const double left = std::hypot(truth.state()[roles.position_x] - end.x, truth.state()[roles.position_y] - end.y);
-      log.completed = left < near_the_end;
-      log.ended =
-          log.completed
-              ? "the end of the path was reached"
-              : fmt::format("the robot takes itself to be at the end of the path, which is {:.3g} m away", left);
+      const double off = std::hypot(truth.state()[roles.position_x] - estimate.state[roles.position_x],
+                                    truth.state()[roles.position_y] - estimate.state[roles.position_y]);
+      log.completed = off < most_off;
+      log.ended = log.completed
+                      ? "the end of the path was reached"
+                      : fmt::format("the robot takes itself to be at the end of the path, and is {:.3g} m off", off);
       break;
     }
     if (!truth.state().allFinite() || !(std::abs(true_follower.lateral()) < lost)) {

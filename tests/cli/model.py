@@ -83,7 +83,7 @@ class Test(cli.Findings):
             file.write_text(text, encoding="utf-8")
             line = text[:text.index(other)].count("\n") + 1
             self.refused(other[:60], file, expected, "" if lines is None else f":{line + lines}:")
-        for title, text, expected in (("an empty file", "", "expected a vehicle: a map with the keys states"),
+        for title, text, expected in (("an empty file", "", "there is nothing in it; expected keys and values"),
                                       ("a list", "- a\n- b\n", "expected a vehicle: a map with the keys states"),
                                       ("a deep list", "states: " + DEEP * "[" + DEEP * "]", "it is nested too deep"),
                                       ("two vehicles", good + "---\n" + good, "remove the lines '---'")):

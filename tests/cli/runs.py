@@ -106,7 +106,7 @@ class Test(cli.Findings):
         (work / "speeds.csv").write_text(circle(200, lambda i: 4 + i % 3))
         for name, values in (("kappa", "0.7,0.9\n0.8,0.6\n"), ("mu", "0.9,0.8\n0.7,0.9\n")):
             (work / f"{name}.csv").write_text(f"origin_x,origin_y,cell_size\n-20,-20,20\n{values}")
-        (work / "empty.yaml").write_text("")
+        (work / "empty.yaml").write_text("{}\n")
 
     def run(self, name, settings, scenario=FIGURE8, words=()):
         """The folder of a run that must go well."""

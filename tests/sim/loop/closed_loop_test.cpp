@@ -63,7 +63,7 @@ terrain: {name: constant, values: {kappa: 0.87, mu: 1}}
                                  "blind.yaml");
   const RunLog log = run_closed_loop({Host(), settings});
   EXPECT_FALSE(log.completed);
-  EXPECT_THAT(log.ended, testing::HasSubstr("takes itself to be at the end of the path, which is "));
+  EXPECT_THAT(log.ended, testing::HasSubstr("takes itself to be at the end of the path, and is "));
 }
 
 TEST(Headlands, AreDrivenInReverse) {
