@@ -58,6 +58,7 @@ MotionOutputs::MotionOutputs(const Model& model)
   slopes.insert(slopes.end(), first.nodes.begin(), first.nodes.end());
   jacobian_ = Tape(graph, z, slopes, vehicle.options);
   std::vector<int> weights;
+  weights.reserve(which_.size());
   for (int j = 0; j < count(); ++j) weights.push_back(graph.input("weight"));
   const NodeMatrix second = weighted_hessian(graph, vehicle.outputs, weights, z);
   z.insert(z.end(), weights.begin(), weights.end());

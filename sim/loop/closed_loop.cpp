@@ -74,6 +74,7 @@ Spread spread_of_times(std::vector<double> times) {
 
 std::vector<SensorDrift> drifts_of(const std::vector<SensorError>& errors) {
   std::vector<SensorDrift> drifts;
+  drifts.reserve(errors.size());
   for (const auto& [sigma, drift] : errors) drifts.push_back({sigma, drift});
   return drifts;
 }

@@ -160,6 +160,7 @@ std::shared_ptr<const Model> with_state_noise(const ProblemRecord& record, std::
 
 std::vector<std::string> state_names(const ModelDescription& about, const std::vector<int>& states) {
   std::vector<std::string> names;
+  names.reserve(states.size());
   for (const int state : states) names.push_back(about.states[static_cast<std::size_t>(state)].name);
   return names;
 }

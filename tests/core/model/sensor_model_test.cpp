@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "support/error_of.hpp"
+#include "support/random_interval.hpp"
 
 namespace rhec {
 namespace sensor_model_test {
@@ -20,32 +20,6 @@ std::shared_ptr<const Model> vehicle(const std::string& name, const std::string&
   static const Host host;
   return host.make_model(name, parse_yaml("outputs: " + outputs, "test"));
 }
-
-struct Point {
-  std::vector<double> x, u, p, p_end, multipliers, weights;
-  double duration = 0.3;
-  Point(const Model& model, unsigned seed) {
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> number(0.2, 0.8);
-    for (auto [values, count] : {std::pair{&x, model.state_count()},
-                                 {&u, model.input_count()},
-                                 {&p, model.parameter_count()},
-                                 {&p_end, model.parameter_count()},
-                                 {&multipliers, model.state_count()},
-                                 {&weights, model.output_count()}})
-      for (int j = 0; j < count; ++j) values->push_back(number(random));
-  }
-  Model::Intervals request(bool ramp) const {
-    return {.count = 1,
-            .states = x.data(),
-            .inputs = u.data(),
-            .parameters = p.data(),
-            .parameters_end = ramp ? p_end.data() : nullptr,
-            .durations = &duration,
-            .substeps = 2,
-            .multipliers = multipliers.data()};
-  }
-};
 
 SensorModel bicycle() {
   // Outputs: x_gps, delta, yaw_rate, ground_speed.
@@ -65,7 +39,7 @@ TEST(SensorModel, HasBiasesScaleErrorsAndValuesOfMotionAsStates) {
 TEST(SensorModel, ValuesOfMotionAreLimitsFromTheLeft) {
   const SensorModel model = bicycle();
   for (const bool ramp : {false, true}) {
-    const Point at(model, 3);
+    const RandomInterval at(model, 3);
     std::vector<double> next(10), plain(4), rates(4);
     Model::Intervals request = at.request(ramp);
     request.next_states = next.data();
@@ -100,7 +74,7 @@ TEST(SensorModel, DerivativesAreThoseOfItsValues) {
     constexpr double step = 1e-5;
     for (const bool ramp : {false, true}) {
       const int nz = nx + nu + (ramp ? 2 : 1) * np;
-      const Point at(model, 5);
+      const RandomInterval at(model, 5);
       std::vector<double> J(static_cast<std::size_t>(nx) * nz), H(static_cast<std::size_t>(nz) * nz);
       Model::Intervals request = at.request(ramp);
       request.jacobians = J.data();
@@ -109,7 +83,7 @@ TEST(SensorModel, DerivativesAreThoseOfItsValues) {
       for (int c = 0; c < nz; ++c) {
         std::vector<double> next[2], jacobian[2];
         for (const int side : {0, 1}) {
-          Point moved = at;
+          RandomInterval moved = at;
           std::vector<double>& of = c < nx ? moved.x : c < nx + nu ? moved.u : c < nx + nu + np ? moved.p : moved.p_end;
           of[c < nx ? c : c < nx + nu ? c - nx : (c - nx - nu) % np] += side == 0 ? -step : step;
           next[side].resize(nx);
@@ -129,7 +103,7 @@ TEST(SensorModel, DerivativesAreThoseOfItsValues) {
         }
       }
     }
-    const Point at(model, 9);
+    const RandomInterval at(model, 9);
     std::vector<double> J(static_cast<std::size_t>(ny) * nx), H(static_cast<std::size_t>(nx) * nx);
     model.observe({.count = 1,
                    .states = at.x.data(),
@@ -139,7 +113,7 @@ TEST(SensorModel, DerivativesAreThoseOfItsValues) {
     for (int c = 0; c < nx; ++c) {
       std::vector<double> y[2], jacobian[2];
       for (const int side : {0, 1}) {
-        Point moved = at;
+        RandomInterval moved = at;
         moved.x[c] += side == 0 ? -step : step;
         y[side].resize(ny);
         jacobian[side].resize(J.size());

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <memory>
-#include <random>
 #include <utility>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "rhec/core/base/padded.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "support/error_of.hpp"
+#include "support/random_interval.hpp"
 
 namespace rhec {
 namespace state_noise_model_test {
@@ -20,32 +20,6 @@ std::shared_ptr<const Model> vehicle(const char* name) {
   static const Host host;
   return host.make_model(name);
 }
-
-/// Random values of z = [x; u; xi; p; p_end] for one interval, and what a model makes of them.
-struct Point {
-  std::vector<double> x, u, p, p_end, multipliers;
-  double duration = 0.3;
-  Point(const Model& model, unsigned seed) {
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> number(0.2, 0.8);
-    for (auto [values, count] : {std::pair{&x, model.state_count()},
-                                 {&u, model.input_count()},
-                                 {&p, model.parameter_count()},
-                                 {&p_end, model.parameter_count()},
-                                 {&multipliers, model.state_count()}})
-      for (int j = 0; j < count; ++j) values->push_back(number(random));
-  }
-  Model::Intervals request(bool ramp) const {
-    return {.count = 1,
-            .states = x.data(),
-            .inputs = u.data(),
-            .parameters = p.data(),
-            .parameters_end = ramp ? p_end.data() : nullptr,
-            .durations = &duration,
-            .substeps = 2,
-            .multipliers = multipliers.data()};
-  }
-};
 
 /// With and without ramps: states whose noise is an input, and those whose noise is a parameter.
 struct Case {
@@ -68,7 +42,7 @@ TEST(StateNoiseModel, AddsNoiseAtTheEndOfAnInterval) {
   EXPECT_EQ(noisy.description().inputs[3].name, "beta_noise");
   EXPECT_EQ(noisy.description().inputs[2].unit, "m/sqrt(s)");
   EXPECT_EQ(noisy.description().noisy_states, (std::vector{0, 2}));
-  const Point at(noisy, 3);
+  const RandomInterval at(noisy, 3);
   std::vector<double> with(4), without(4);
   Model::Intervals request = at.request(false);
   request.next_states = with.data();
@@ -92,7 +66,7 @@ TEST(StateNoiseModel, TakesNoiseAsAParameterToo) {
   ASSERT_EQ(noisy.parameter_count(), 4);
   EXPECT_EQ(noisy.description().parameters[3].name, "delta_noise");
   EXPECT_EQ(noisy.description().blocked_noises, (std::vector{1, 3}));
-  const Point at(noisy, 4);
+  const RandomInterval at(noisy, 4);
   std::vector<double> with(4), as_inputs(4), u(at.u);
   u.insert(u.end(), at.p.begin() + 2, at.p.end());
   Model::Intervals request = at.request(false);
@@ -110,7 +84,7 @@ TEST(StateNoiseModel, DerivativesAreThoseOfItsValues) {
       const StateNoiseModel noisy(vehicle(name), states, blocked);
       const int nx = noisy.state_count(), nu = noisy.input_count(), np = noisy.parameter_count();
       const int nz = nx + nu + (ramp ? 2 : 1) * np;
-      const Point at(noisy, 5);
+      const RandomInterval at(noisy, 5);
       std::vector<double> J(static_cast<std::size_t>(nx) * nz), H(static_cast<std::size_t>(nz) * nz);
       Model::Intervals request = at.request(ramp);
       request.jacobians = J.data();
@@ -120,7 +94,7 @@ TEST(StateNoiseModel, DerivativesAreThoseOfItsValues) {
       for (int c = 0; c < nz; ++c) {
         std::vector<double> next[2], jacobian[2];
         for (const int side : {0, 1}) {
-          Point moved = at;
+          RandomInterval moved = at;
           std::vector<double>& of = c < nx ? moved.x : c < nx + nu ? moved.u : c < nx + nu + np ? moved.p : moved.p_end;
           of[c < nx ? c : c < nx + nu ? c - nx : (c - nx - nu) % np] += side == 0 ? -step : step;
           next[side].resize(nx);
@@ -148,7 +122,7 @@ TEST(StateNoiseModel, RowsHoldTheSameNumbers) {
     const StateNoiseModel noisy(vehicle("bicycle_slip"), states, blocked);
     const int nx = 4, nu = noisy.input_count(), np = noisy.parameter_count(), nz = nx + nu + (ramp ? 2 : 1) * np,
               row = padded(nz);
-    const Point at(noisy, 7);
+    const RandomInterval at(noisy, 7);
     std::vector<double> next(nx), J(static_cast<std::size_t>(nx) * nz), H(static_cast<std::size_t>(nz) * nz);
     Model::Intervals dense = at.request(ramp);
     dense.next_states = next.data();
