@@ -30,8 +30,6 @@ fs::path installed_directory() {
   return problem ? fs::path() : library.parent_path() / "rhec" / "plugins";
 }
 
-bool has_any(fs::perms given, fs::perms wanted) { return (given & wanted) != fs::perms::none; }
-
 class PlaceList {
  public:
   void add(const fs::path& directory, const std::string& origin) {
@@ -41,7 +39,7 @@ class PlaceList {
     if (problem) return skip(directory, origin, problem.message());
     const fs::file_status status = fs::status(canonical, problem);
     if (!fs::is_directory(status)) return skip(canonical, origin, "a file, not a directory");
-    if (has_any(status.permissions(), fs::perms::others_write))
+    if (all_may_write(status.permissions()))
       return skip(canonical, origin,
                   fmt::format("every user may write to it, and so have their code run here; run 'chmod o-w {}', and "
                               "look at what is in it",
@@ -53,7 +51,7 @@ class PlaceList {
     });
     if (seen) return skip(canonical, origin, "searched already");
     std::string warning;
-    if (has_any(status.permissions(), fs::perms::group_write))
+    if ((status.permissions() & fs::perms::group_write) != fs::perms::none)
       warning = fmt::format("its group may write to it; if these are not all trusted, run 'chmod g-w {}'",
                             canonical.string());
     places_.push_back({canonical, origin, {}, std::move(warning)});

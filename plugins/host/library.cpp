@@ -160,11 +160,10 @@ Refusal refused_by_loader(const std::string& words) {
   return {reason, kRebuild};
 }
 
-/// Whoever can write to a library has their code run here.
 Refusal writable_by_all(const std::filesystem::path& file) {
   std::error_code problem;
   const std::filesystem::perms permissions = std::filesystem::status(file, problem).permissions();
-  if (problem || (permissions & std::filesystem::perms::others_write) == std::filesystem::perms::none) return {};
+  if (problem || !all_may_write(permissions)) return {};
   return {"every user may write to it, and so have their code run here",
           fmt::format("run 'chmod o-w {}', and build it again if you do not know who wrote it", file.string())};
 }

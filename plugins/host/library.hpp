@@ -15,6 +15,11 @@ struct Library {
   std::shared_ptr<const void> pinned;  ///< keeps the library loaded
 };
 
+/// Whether every user may write to what has these permissions: whoever can write to a plugin has their code run here.
+inline bool all_may_write(std::filesystem::perms given) {
+  return (given & std::filesystem::perms::others_write) != std::filesystem::perms::none;
+}
+
 /// Loads one file with RTLD_NOW and RTLD_LOCAL, and checks its whole manifest. Reports failures in the result, not by
 /// exceptions.
 Library load_library(const std::filesystem::path& file);

@@ -120,8 +120,7 @@ NoiseSection::NoiseSection(const Settings& section, const ModelDescription& abou
   if (const Settings* asked = section.find("adapt"); asked && options.adapt && has_state_noise)
     throw asked->error(
         "found true, beside process noise in noise.states or a drift of a sensor: measurements do not tell the noise "
-        "of sensors from that of "
-        "the states that they measure; expected false, or neither");
+        "of sensors from that of the states that they measure; expected false, or neither");
   adapt = options.adapt && !has_state_noise;
 }
 

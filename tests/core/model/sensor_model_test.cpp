@@ -69,40 +69,10 @@ TEST(SensorModel, DerivativesAreThoseOfItsValues) {
                                  {.biased = {0}, .scaled = {0, 1}}},
                                 {vehicle("bicycle_slip", "[x_gps, delta]"), {.biased = {1}, .scaled = {}}}};
   for (const SensorModel& model : models) {
-    const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(),
-              ny = model.output_count();
+    const int nx = model.state_count(), ny = model.output_count();
     constexpr double step = 1e-5;
-    for (const bool ramp : {false, true}) {
-      const int nz = nx + nu + (ramp ? 2 : 1) * np;
-      const RandomInterval at(model, 5);
-      std::vector<double> J(static_cast<std::size_t>(nx) * nz), H(static_cast<std::size_t>(nz) * nz);
-      Model::Intervals request = at.request(ramp);
-      request.jacobians = J.data();
-      request.hessians = H.data();
-      model.integrate(request);
-      for (int c = 0; c < nz; ++c) {
-        std::vector<double> next[2], jacobian[2];
-        for (const int side : {0, 1}) {
-          RandomInterval moved = at;
-          std::vector<double>& of = c < nx ? moved.x : c < nx + nu ? moved.u : c < nx + nu + np ? moved.p : moved.p_end;
-          of[c < nx ? c : c < nx + nu ? c - nx : (c - nx - nu) % np] += side == 0 ? -step : step;
-          next[side].resize(nx);
-          jacobian[side].resize(J.size());
-          Model::Intervals there = moved.request(ramp);
-          there.next_states = next[side].data();
-          there.jacobians = jacobian[side].data();
-          model.integrate(there);
-        }
-        for (int r = 0; r < nx; ++r)
-          EXPECT_NEAR(J[c * nx + r], (next[1][r] - next[0][r]) / (2.0 * step), 1e-8) << c << r;
-        for (int d = 0; d < nz; ++d) {
-          double second = 0.0;
-          for (int r = 0; r < nx; ++r)
-            second += at.multipliers[r] * (jacobian[1][d * nx + r] - jacobian[0][d * nx + r]) / (2.0 * step);
-          EXPECT_NEAR(H[c * nz + d], second, 1e-7) << c << ' ' << d;
-        }
-      }
-    }
+    for (const bool ramp : {false, true})
+      expect_derivatives_of_differences(model, RandomInterval(model, 5), ramp, model.description().name);
     const RandomInterval at(model, 9);
     std::vector<double> J(static_cast<std::size_t>(ny) * nx), H(static_cast<std::size_t>(nx) * nx);
     model.observe({.count = 1,

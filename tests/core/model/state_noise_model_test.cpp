@@ -82,37 +82,7 @@ TEST(StateNoiseModel, DerivativesAreThoseOfItsValues) {
   for (const char* name : {"bicycle_slip", "tractor_trailer"}) {
     for (const auto& [ramp, states, blocked] : cases()) {
       const StateNoiseModel noisy(vehicle(name), states, blocked);
-      const int nx = noisy.state_count(), nu = noisy.input_count(), np = noisy.parameter_count();
-      const int nz = nx + nu + (ramp ? 2 : 1) * np;
-      const RandomInterval at(noisy, 5);
-      std::vector<double> J(static_cast<std::size_t>(nx) * nz), H(static_cast<std::size_t>(nz) * nz);
-      Model::Intervals request = at.request(ramp);
-      request.jacobians = J.data();
-      request.hessians = H.data();
-      noisy.integrate(request);
-      constexpr double step = 1e-5;
-      for (int c = 0; c < nz; ++c) {
-        std::vector<double> next[2], jacobian[2];
-        for (const int side : {0, 1}) {
-          RandomInterval moved = at;
-          std::vector<double>& of = c < nx ? moved.x : c < nx + nu ? moved.u : c < nx + nu + np ? moved.p : moved.p_end;
-          of[c < nx ? c : c < nx + nu ? c - nx : (c - nx - nu) % np] += side == 0 ? -step : step;
-          next[side].resize(nx);
-          jacobian[side].resize(J.size());
-          Model::Intervals there = moved.request(ramp);
-          there.next_states = next[side].data();
-          there.jacobians = jacobian[side].data();
-          noisy.integrate(there);
-        }
-        for (int r = 0; r < nx; ++r)
-          EXPECT_NEAR(J[c * nx + r], (next[1][r] - next[0][r]) / (2.0 * step), 1e-8) << name << c << r;
-        for (int d = 0; d < nz; ++d) {
-          double second = 0.0;
-          for (int r = 0; r < nx; ++r)
-            second += at.multipliers[r] * (jacobian[1][d * nx + r] - jacobian[0][d * nx + r]) / (2.0 * step);
-          EXPECT_NEAR(H[c * nz + d], second, 1e-7) << name << c << d;
-        }
-      }
+      expect_derivatives_of_differences(noisy, RandomInterval(noisy, 5), ramp, name);
     }
   }
 }
