@@ -67,6 +67,9 @@ class TimedMethod final : public EstimationMethod {
   }
   void prepare() noexcept override { method_->prepare(); }
   void reset() noexcept override { method_->reset(); }
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override {
+    return method_->rebase(mean, covariance);
+  }
 
  private:
   std::unique_ptr<EstimationMethod> method_;

@@ -108,6 +108,9 @@ class Forwarding final : public EstimationMethod {
   }
   void prepare() noexcept override { inner_->prepare(); }
   void reset() noexcept override { inner_->reset(); }
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override {
+    return inner_->rebase(mean, covariance);
+  }
   void end_drive() noexcept override { inner_->end_drive(); }
   std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return inner_->slip_ahead(); }
 

@@ -113,6 +113,12 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
       shifter_(problem_),
       point_(problem_.capacity()) {
   if (const std::string& reason = path_.why_not_drivable(); !reason.empty()) throw Error(reason);
+  const Setup::Pace& pace = setup_.pace;
+  if (!(pace.degraded >= 0.0 && pace.degraded <= 1.0 && pace.lost >= 0.0 && pace.lost <= 1.0 && pace.seconds > 0.0))
+    throw Error(
+        fmt::format("controller: paces {} and {} within {} s; expected shares of the speed from 0 to 1, and a "
+                    "positive time",
+                    pace.degraded, pace.lost, pace.seconds));
   const int N = setup_.problem.max_intervals;
   problem_.set_intervals(N);
   begins_.assign(N, 0);
@@ -143,6 +149,7 @@ Controller::Controller(std::shared_ptr<const Model> model, std::shared_ptr<Solve
   nominal_parameters_ = nominal_values(vehicle.description().parameters);
   reference_parameters_ = ahead_parameters_ = nominal_parameters_;
   go_straight(1.0, nominal_parameters_.data(), slipless_);
+  for (std::size_t j = 0; j < nu; ++j) drives_.push_back(slipless_[nx + j] != 0.0);
   if (std::all_of(slipless_.begin(), slipless_.end(), [](double value) { return value == 0.0; }))
     throw Error(
         fmt::format("controller: the model '{}' does not say what drives it straight ahead; it cannot follow a path",
@@ -158,6 +165,7 @@ void Controller::reset() noexcept {
   is_finished_ = true;
   fallbacks_ = 0;
   obstacle_count_ = 0;
+  pace_ = wanted_pace_ = 1.0;
   std::fill(last_inputs_.begin(), last_inputs_.end(), std::numeric_limits<double>::quiet_NaN());
 }
 
@@ -229,13 +237,31 @@ void Controller::find_points(double arc_length) noexcept {
   points_[0] = path_.point_at(arc_length, segment);
   arc_lengths_[0] = arc_length;
   reference_segment_ = segment;
+  points_[0].speed *= pace_;
   const int N = problem_.intervals();
+  const double change = setup_.interval / setup_.pace.seconds;
+  double pace = pace_, behind = 0.0;  // time on the path that a slower pace has lost
   for (int i = 1; i <= N; ++i) {
+    const double last = pace;
+    pace += std::min(std::max(wanted_pace_ - pace, -change), change);
+    behind += (1.0 - 0.5 * (last + pace)) * setup_.interval;
     segment = reference_segment_;
-    const double there = path_.arc_length_after(arc_length, i * setup_.interval, segment);
+    const double there = path_.arc_length_after(arc_length, i * setup_.interval - behind, segment);
     points_[i] = path_.point_at(there, segment);
+    points_[i].speed *= pace;
     arc_lengths_[i] = there;
   }
+}
+
+/// The pace moves on by one interval towards what an estimate's health allows.
+void Controller::choose_pace(const Health& health) noexcept {
+  const bool is_starting = (health.reasons & reason::starting) != 0;
+  wanted_pace_ = is_starting || health.level == HealthLevel::ok ? 1.0
+                 : health.level == HealthLevel::degraded        ? setup_.pace.degraded
+                                                                : setup_.pace.lost;
+  const double change = setup_.interval / setup_.pace.seconds;
+  pace_ += std::min(std::max(wanted_pace_ - pace_, -change), change);
+  command_.pace = pace_;
 }
 
 /// References and bounds of the horizon that starts at an arc length of the path.
@@ -388,6 +414,8 @@ void Controller::keep_within_bounds() noexcept {
       upper = std::max(std::min(problem_.setup().state_upper[held], most), least);
     }
     input = std::min(std::max(input, lower), upper);
+    // A vehicle that stands because it is lost does not correct what it believes to be its place.
+    if (pace_ == 0.0 && wanted_pace_ == 0.0 && drives_[k]) input = std::min(std::max(0.0, lower), upper);
     last_inputs_[k] = input;
   }
 }
@@ -418,6 +446,7 @@ const Controller::Command& Controller::control(const Estimate& estimate, Clock::
   // What is prepared is linearised with the slip that was expected then.
   if (!prepared_) look_ahead(follower_.arc_length(), estimate.parameters.data());
   now_ = estimate.time;
+  choose_pace(estimate.health);
   set_reference(follower_.arc_length(), estimate.parameters.data(), now_);
   const int heading = vehicle_->description().roles.heading;
   command_.heading_error = heading >= 0 ? angle_difference(estimate.state[heading], command_.reference.heading) : 0.0;

@@ -57,6 +57,20 @@ void BankEstimation::reset() noexcept {
   searched_ = 0;
 }
 
+bool BankEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+  const Eigen::Index nx = setup_.initial_state.size();
+  const std::int64_t newest = searching_ ? searched_ : history_.newest();
+  if (place_ && !searching_) {
+    place_->finish(history_);
+    place_->reset();
+  }
+  searching_ = false;
+  history_.bank().replace_vehicle(mean.head(nx), covariance.topLeftCorner(nx, nx));
+  history_.start(nothing_.data(), newest);
+  if (place_) place_->add_node(history_);
+  return true;
+}
+
 void BankEstimation::start(const double* outputs) noexcept {
   reset();
   if (!searching_) {

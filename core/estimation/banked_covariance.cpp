@@ -34,6 +34,11 @@ void BankedCovariance::reset() noexcept {
   bank_.reset();
 }
 
+bool BankedCovariance::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+  bank_.rebase(mean, covariance);
+  return blocks_->rebase(mean, covariance);
+}
+
 void BankedCovariance::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   blocks_->estimate(result, deadline);
   own_ = result.covariance;

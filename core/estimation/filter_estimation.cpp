@@ -55,6 +55,14 @@ void FilterEstimation::reset() noexcept {
   }
 }
 
+bool FilterEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+  alive_ = 1;
+  best_ = 0;
+  bank_[0].filter.mean = mean;
+  bank_[0].filter.covariance = covariance;
+  return true;
+}
+
 /// Log-likelihood of the measured outputs given the past, each on its own.
 double FilterEstimation::log_likelihood(const KalmanFilter& filter, const double* outputs) noexcept {
   const Model& m = filter.model();

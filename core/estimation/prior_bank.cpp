@@ -212,6 +212,18 @@ void PriorBank::write_start(int parameter, const Prior& prior, int lane) noexcep
   }
 }
 
+void PriorBank::replace_vehicle(const Eigen::Ref<const Eigen::VectorXd>& state,
+                                const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept {
+  for (int c = 0; c < n_; ++c) {
+    for (int r = 0; r < n_; ++r) {
+      if (c >= nx_ && r >= nx_) continue;
+      const double value = c < nx_ && r < nx_ ? covariance(r, c) : 0.0;
+      std::fill_n(covariance_.begin() + static_cast<std::ptrdiff_t>(c * n_ + r) * lanes_, lanes_, value);
+    }
+  }
+  for (int r = 0; r < nx_; ++r) std::fill_n(mean_.begin() + static_cast<std::ptrdiff_t>(r) * lanes_, lanes_, state[r]);
+}
+
 void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
                       const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept {
   std::fill(mean_.begin(), mean_.end(), 0.0);

@@ -68,6 +68,14 @@ void PriorHorizonEstimation::reset() noexcept {
   std::fill(advances_.begin(), advances_.end(), Advance{});
 }
 
+bool PriorHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+  solver_->reset();
+  shifter_.forget();
+  window_ = {};
+  has_window_ = has_solution_ = false;
+  return filters_.rebase(mean, covariance);
+}
+
 void PriorHorizonEstimation::start(const double* outputs) noexcept {
   reset();
   filters_.start(outputs);

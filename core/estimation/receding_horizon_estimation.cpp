@@ -94,8 +94,27 @@ void RecedingHorizonEstimation::reset() noexcept {
   searching_ = roles().heading >= 0 && setup_.heading_starts > 1;
 }
 
+/// The window begins anew at the newest node.
+bool RecedingHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+  const std::int64_t newest = window_.first + window_.intervals - (prepared_ ? 1 : 0);
+  reset();
+  arrival_.reset(mean, covariance);
+  last_state_ = mean;
+  window_.first = newest;
+  std::fill(first_starts_.begin(), first_starts_.end(), newest);
+  searching_ = false;
+  std::fill(outputs_.begin(), outputs_.end(), missing_value);
+  begin_window(outputs_.data());
+  return true;
+}
+
 void RecedingHorizonEstimation::start(const double* outputs) noexcept {
   reset();
+  begin_window(outputs);
+}
+
+/// A window of one node.
+void RecedingHorizonEstimation::begin_window(const double* outputs) noexcept {
   started_ = true;
   problem_.set_intervals(0);
   for (int j = 0; j < problem_.model().parameter_count(); ++j) problem_.set_block_weight(0, j, 0.0);

@@ -107,6 +107,17 @@ OptionRow blocking_row() {
 
 }  // namespace
 
+const OptionTable<PaceOptions>& PaceOptions::table() {
+  using P = PaceOptions;
+  static const auto rows =
+      OptionTable<P>()
+          .number("degraded", &P::degraded, "share of the path's speed while an estimate's health is degraded",
+                  between(0.0, 1.0))
+          .number("lost", &P::lost, "the same while the vehicle is lost; 0: it stops on the path", between(0.0, 1.0))
+          .number("seconds", &P::seconds, "from the full speed to a stop, and back [s]", greater_than(0.0));
+  return rows;
+}
+
 const OptionTable<ControllerOptions>& ControllerOptions::table() {
   using C = ControllerOptions;
   static const auto rows =
@@ -129,6 +140,7 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
           .number("speed_bound_offset", &C::speed_bound_offset, "[m/s]", at_least(0.0))
           .map("weights", &C::weights, WeightOptions::table().schema())
           .map("rate_bounds", &C::rate_bounds, rate_bounds_by_name().rows())
+          .group("health", &C::health, PaceOptions::table())
           .map("terms", &C::terms, {terms_row()})
           .map("blocking", &C::blocking, {blocking_row()})
           .map("solver", &C::solver,
@@ -225,6 +237,7 @@ std::unique_ptr<Controller> ControllerSection::make(const Path& path, const Robo
   add_problem(setup);
   setup.interval = context_->step;
   setup.search.stop_time = context_->step;
+  setup.pace = {options_.health.degraded, options_.health.lost, options_.health.seconds};
   setup.reference_speed = options_.reference_speed;
   setup.least_speed_factor = options_.least_speed_factor;
   setup.speed_bound_factor = options_.speed_bound_factor;

@@ -63,10 +63,7 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
   refuse_memory(parts, "ekf's random walks");
   const RobotContext& context = *parts.context;
   FilterEstimation::Setup setup;
-  setup.noise.output_variances = variances_of(context.noise.output_sigmas);
-  setup.noise.input_variances = variances_of(context.noise.input_sigmas);
-  setup.noise.parameter_lower = lower_bounds_of(context.about.parameters);
-  setup.noise.parameter_upper = upper_bounds_of(context.about.parameters);
+  setup.noise = parts.filter_noise();
   for (const ParameterWalk& walk : parts.walks) setup.walk.push_back(walk.process_noise);
   setup.has_ramps = senses_motion(*context.model);
   setup.initial_mean = parts.initial_mean;
@@ -103,6 +100,13 @@ RheProblem::Setup EstimatorParts::problem() const {
   setup.parameter_lower = lower_bounds_of(context->about.parameters);
   setup.parameter_upper = upper_bounds_of(context->about.parameters);
   return setup;
+}
+
+KalmanFilter::Noise EstimatorParts::filter_noise() const {
+  return {.output_variances = variances_of(context->noise.output_sigmas),
+          .input_variances = variances_of(context->noise.input_sigmas),
+          .parameter_lower = lower_bounds_of(context->about.parameters),
+          .parameter_upper = upper_bounds_of(context->about.parameters)};
 }
 
 BankEstimation::Setup EstimatorParts::filters() const {

@@ -134,6 +134,7 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
       .map("priors", &E::priors, PriorsSection::rows())
       .map("bank", &E::bank, BankOptions::table().schema())
       .map("memory", &E::memory, MemorySection::rows())
+      .group("health", &E::health, HealthOptions::table())
       .map("initial", &E::initial, InitialOptions::table().schema())
       .map("robust", &E::robust, robust_rows("[]"))
       .map("solver", &E::solver, {default_solver.row()})
@@ -227,6 +228,15 @@ EstimatorParts EstimatorSection::parts(const std::optional<Eigen::VectorXd>& ini
   return parts;
 }
 
+/// A covariance that leaves something out is no measure of what sensors may say, unless somebody asks for it.
+std::unique_ptr<SensorWatch> EstimatorSection::make_watch_for(const EstimatorMaker& maker,
+                                                              const EstimatorParts& parts) const {
+  const bool is_honest = !parts.blocking.is_given() || options_.covariance == BlockCovariance::bank;
+  const Settings* health = parts.section.find("health");
+  if (!maker.is_watched || (!is_honest && !(health && health->find("watch")))) return nullptr;
+  return make_watch(options_.health, parts);
+}
+
 std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::VectorXd>& initial_state,
                                                   const RobotHooks& hooks) const {
   EstimatorParts with_hooks = parts(initial_state);
@@ -234,7 +244,11 @@ std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::Vec
   with_hooks.make_map = [&] { return hooks.provide_map(parts_.memory, parts_.make_map()); };
   Estimator::Timeline timeline;
   timeline.longest_interval = parts_.context->step;
-  return std::make_unique<Estimator>(hooks.wrap_method(makers_.named(options_.name).make(with_hooks)), timeline);
+  const EstimatorMaker& maker = makers_.named(options_.name);
+  auto method = hooks.wrap_method(maker.make(with_hooks));
+  auto watch = make_watch_for(maker, with_hooks);
+  if (!watch) return std::make_unique<Estimator>(std::move(method), timeline);
+  return std::make_unique<Estimator>(std::move(method), timeline, std::move(watch));
 }
 
 }  // namespace rhec

@@ -162,6 +162,9 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.estimator_fallback = estimate.fallback;
     sample.controller_fallback = command.fallback;
     sample.relaxed = command.relaxed;
+    sample.health = estimate.health.level;
+    if (estimate.health.level != HealthLevel::ok && estimator->watch())
+      sample.findings = in_words(estimate.health, estimator->watch()->sensors());
     sample.estimator_us = estimate.report.preparation_us + estimate.report.feedback_us;
     sample.estimator_feedback_us = estimate.report.feedback_us;
     sample.controller_us = command.report.preparation_us + command.report.feedback_us;
@@ -263,6 +266,7 @@ RunSummary summarise(const RunLog& log, const Scenario& scenario) {
       summary.fallbacks += sample.estimator_fallback;
       ++summary.solves;
     }
+    ++summary.health[name_of(sample.health)];
     controller_us.push_back(sample.controller_us);
     ++controller_statuses[sample.controller_status];
     summary.fallbacks += sample.controller_fallback;

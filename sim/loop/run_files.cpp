@@ -90,7 +90,7 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
   text +=
       ",reference_x,reference_y,reference_heading,reference_speed,tracking,heading_error,nees,estimator_status,"
       "controller_status,estimator_fallback,"
-      "controller_fallback,relaxed\n";
+      "controller_fallback,relaxed,health,findings\n";
   const std::size_t sigmas = about.states.size() + about.parameters.size();
   for (const Sample& sample : log.samples) {
     fmt::format_to(std::back_inserter(text), "{}", sample.step);
@@ -115,9 +115,9 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
     } else {
       text += ',';
     }
-    fmt::format_to(std::back_inserter(text), ",{},{},{:d},{:d},{:d}\n", name_of(sample.estimator_status),
+    fmt::format_to(std::back_inserter(text), ",{},{},{:d},{:d},{:d},{},{}\n", name_of(sample.estimator_status),
                    name_of(sample.controller_status), sample.estimator_fallback, sample.controller_fallback,
-                   sample.relaxed);
+                   sample.relaxed, name_of(sample.health), sample.findings);
   }
   return text;
 }
@@ -152,6 +152,10 @@ Json json_of(const RunSummary& summary) {
   json["solves"] = summary.solves;
   json["fallbacks"] = summary.fallbacks;
   json["integration"] = {{"checked", summary.counts.integrated}, {"coarse", summary.counts.coarse}};
+  json["health"] = summary.health;
+  json["measurements"] = {{"late", summary.counts.late},       {"dropped", summary.counts.dropped},
+                          {"missing", summary.counts.missing}, {"rejected", summary.counts.rejected},
+                          {"rebased", summary.counts.rebased}, {"clocks_set", summary.counts.clocks_set}};
   return json;
 }
 

@@ -52,6 +52,9 @@ class InnovationMethod final : public EstimationMethod {
   bool amend(int back, const double* outputs) noexcept override { return method_->amend(back, outputs); }
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override { method_->estimate(result, deadline); }
   void reset() noexcept override { method_->reset(); }
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override {
+    return method_->rebase(mean, covariance);
+  }
 
  private:
   void note(const double* outputs) noexcept {

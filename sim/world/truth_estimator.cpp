@@ -36,12 +36,14 @@ class TruthEstimation final : public EstimationMethod {
 
 EstimatorMakers scenario_estimators(const TruthVehicle* vehicle) {
   EstimatorMakers makers;
-  makers.add({"truth", "what the simulation knows",
-              [vehicle](const EstimatorParts& parts) -> std::unique_ptr<EstimationMethod> {
+  makers.add({.name = "truth",
+              .meaning = "what the simulation knows",
+              .make = [vehicle](const EstimatorParts& parts) -> std::unique_ptr<EstimationMethod> {
                 if (!vehicle)
                   throw parts.section.error("name: 'truth' is known to a simulation only; choose rhe or ekf");
                 return std::make_unique<TruthEstimation>(parts.context->model, parts.substeps, *vehicle);
-              }});
+              },
+              .is_watched = false});
   return makers;
 }
 

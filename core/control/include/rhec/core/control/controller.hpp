@@ -52,6 +52,13 @@ class RHEC_EXPORT Controller {
     std::vector<double> rate_weights;                        ///< n_u, of squared rates; empty: 0
     std::vector<double> rate_lower, rate_upper;  ///< n_u, bounds of rates [unit of the input / s]; empty: none
     PathFollower::Window search;
+    /// Share of the path's speeds while an estimate's health is not `ok`. It changes over time, so that the vehicle
+    /// slows, stops on the path, and starts again. While a heading is searched for the first time, which takes motion,
+    /// all is as with `ok`.
+    struct Pace {
+      double degraded = 0.6, lost = 0.0;
+      double seconds = 3.0;  ///< from the full speed to a stop, and back [s]
+    } pace = {};
     /// What slip to expect ahead; null: that of the estimate, everywhere.
     std::shared_ptr<const SlipAhead> ahead = nullptr;
   };
@@ -68,6 +75,7 @@ class RHEC_EXPORT Controller {
     bool fallback = false;       ///< the solver failed; the last plan is continued, if there is one
     double heading_error = 0.0;  ///< heading of the estimate - that of the reference, in (-pi, pi] [rad]
     bool relaxed = false;        ///< a state bound was out of reach from the estimate and was relaxed
+    double pace = 1.0;           ///< share of the path's speeds that is driven at present
   };
   /// The input for an estimate. Valid until the next call.
   const Command& control(const Estimate& estimate, Clock::time_point deadline = Clock::time_point::max()) noexcept;
@@ -106,6 +114,7 @@ class RHEC_EXPORT Controller {
   void go_straight(double ground_speed, const double* parameters, std::vector<double>& motion) noexcept;
   void choose_straight_motion(double ground_speed, const double* parameters) noexcept;
   void choose_straight_motion_within_bounds(double ground_speed) noexcept;
+  void choose_pace(const Health& health) noexcept;
   void find_points(double arc_length) noexcept;
   void bound_speed() noexcept;
   void set_reference(double arc_length, const double* parameters, double time) noexcept;
@@ -137,10 +146,12 @@ class RHEC_EXPORT Controller {
   std::vector<double> scratch_, straight_, slipless_, largest_, smallest_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
   std::vector<double> last_inputs_;  ///< n_u, applied last; NaN: not known
+  std::vector<std::uint8_t> drives_;   ///< n_u: whether an input moves the vehicle when it drives straight ahead
   std::vector<std::uint8_t> begins_;
   std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
   std::size_t obstacle_count_ = 0;
-  double seen_ = 0.0;  ///< when these were there [s]
+  double pace_ = 1.0, wanted_pace_ = 1.0;  ///< share of the path's speeds
+  double seen_ = 0.0;                      ///< when these were there [s]
   double now_ = 0.0;   ///< time of the last estimate [s]
 };
 

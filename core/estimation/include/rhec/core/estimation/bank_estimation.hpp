@@ -34,6 +34,7 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   bool amend(int back, const double* outputs) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override;
   void end_drive() noexcept override;
   std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return place_; }

@@ -27,6 +27,7 @@ class RHEC_EXPORT BankedCovariance final : public WindowedEstimation {
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void prepare() noexcept override { blocks_->prepare(); }
   void reset() noexcept override;
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
 
   const Eigen::MatrixXd* own_covariance() const noexcept override { return &own_; }
 

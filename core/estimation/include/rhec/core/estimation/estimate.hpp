@@ -1,7 +1,10 @@
 #pragma once
 
+#include <span>
+
 #include <Eigen/Core>
 
+#include "rhec/core/estimation/health.hpp"
 #include "rhec/core/ocp/solver.hpp"
 
 namespace rhec {
@@ -15,8 +18,13 @@ struct Estimate {
   Eigen::MatrixXd covariance;
   Report report;          ///< of the solver; trivial for a filter
   bool fallback = false;  ///< the solver failed; this is the prediction from earlier samples
-  /// The time is beyond the newest node: the state is integrated from there, and the covariance is that node's.
+  /// The time is beyond the newest node: the state is integrated from there. The covariance is predicted too where
+  /// sensors are watched; else it is that node's.
   bool predicted = false;
+  /// Whether it can be used, and why not; `ok` where nobody judges (SensorWatch).
+  Health health;
+  /// Of the measurements since the last call, in their order; empty where nobody judges.
+  std::span<const Innovation> innovations;
 };
 
 }  // namespace rhec

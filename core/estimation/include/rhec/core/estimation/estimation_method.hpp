@@ -31,6 +31,9 @@ class RHEC_EXPORT EstimationMethod {
   /// Does work in advance, before the next node is known; calling it is optional.
   virtual void prepare() noexcept {}
   virtual void reset() noexcept = 0;
+  /// Goes on at the newest node from moments of [x; p] (n, n x n) that contain all that is known of it: what was
+  /// measured before counts no longer. There was a first node. False if the method cannot, and nothing has changed.
+  virtual bool rebase(const Eigen::VectorXd& /*mean*/, const Eigen::MatrixXd& /*covariance*/) noexcept { return false; }
   /// The drive has ended: completes what the method keeps beyond it, such as a map.
   virtual void end_drive() noexcept {}
   /// What slip to expect ahead, of a method that remembers places; else null.

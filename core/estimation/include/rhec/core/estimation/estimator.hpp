@@ -5,7 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include "rhec/core/estimation/clocks.hpp"
 #include "rhec/core/estimation/estimation_method.hpp"
+#include "rhec/core/estimation/sensor_watch.hpp"
 #include "rhec/core/model/step_requirement.hpp"
 
 namespace rhec {
@@ -23,10 +25,14 @@ class RHEC_EXPORT Estimator {
     double longest_interval = 0.2;  ///< [s]; a gap that would need more than 1000 nodes is divided into 1000
     double tolerance = 1e-6;        ///< stamps closer than this belong to one node [s]
     std::size_t capacity = 4096;    ///< rows of inputs, and of measurements, that can wait for processing
+    double behind = 3.0;            ///< how late measurements may come, where clocks are judged [s]
   };
   explicit Estimator(std::unique_ptr<EstimationMethod> method) : Estimator(std::move(method), Timeline{}) {}
   /// Throws Error if a number of the timeline is out of range.
   Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline);
+  /// With a judge of stamps, inputs and measurements, as a robot needs it: see SensorWatch and Clocks. Estimates then
+  /// have a health, innovations, and covariances that grow while nothing is measured.
+  Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline, std::unique_ptr<SensorWatch> watch);
 
   /// Measured y (n_y, NaN where missing) at a time [s].
   void push_measurement(double time, const double* outputs) noexcept;
@@ -42,6 +48,9 @@ class RHEC_EXPORT Estimator {
   /// Does work for the next sample in advance; optional, but always saves time later.
   void prepare() noexcept { method_->prepare(); }
   void reset() noexcept;
+  /// Goes on from moments of [x; p] (n, n x n) at the newest node, e.g. after the vehicle was carried. False if there
+  /// is no node yet, sizes do not match, a number is not finite, or the method cannot.
+  bool reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
   /// The drive has ended: completes what is kept beyond it, such as a map of slip.
   void end_drive() noexcept { method_->end_drive(); }
   /// What slip to expect ahead, of an estimator that remembers places; else null.
@@ -52,12 +61,17 @@ class RHEC_EXPORT Estimator {
     std::int64_t estimates = 0;   ///< estimates computed
     std::int64_t fallbacks = 0;   ///< estimates for which the solver failed
     std::int64_t late = 0;        ///< measurements merged into an older node
-    std::int64_t dropped = 0;     ///< measurements too late, too many, or with a stamp that is not finite
+    std::int64_t dropped = 0;     ///< measurements too late, too many, or with a stamp that cannot be
+    std::int64_t rejected = 0;    ///< measurements of one sensor that failed their gate or were stuck
+    std::int64_t rebased = 0;     ///< times that the estimate has followed a jump, or gone on without inputs
+    std::int64_t clocks_set = 0;  ///< times that the clock of a sensor, or of the inputs, was set
     std::int64_t missing = 0;     ///< single outputs that were NaN or otherwise not valid
     std::int64_t integrated = 0;  ///< intervals whose Runge-Kutta steps were held against twice as many: one in 16
     std::int64_t coarse = 0;      ///< of these, those where a next state was off by more than `coarse_error`
     int coarse_state = -1;        ///< the state that was off most; -1: none
   };
+  /// Null where nobody judges.
+  const SensorWatch* watch() const noexcept { return watch_.get(); }
   const Counts& counts() const noexcept { return counts_; }
   /// In typical magnitudes of a state, of an interval: what noise of sensors will not hide.
   static constexpr double coarse_error = 10.0 * StepRequirement::state_tolerance;
@@ -87,6 +101,14 @@ class RHEC_EXPORT Estimator {
   void predict_to(double time) noexcept;
   void check_integration() noexcept;
   void clear_estimates() noexcept;
+  bool take_late(double time, const double* outputs) noexcept;
+  double place_on_timeline(double stamp, int source) noexcept;
+  double place_on_timeline(double stamp, const double* outputs) noexcept;
+  SensorWatch::Finding judge(double time, double* outputs) noexcept;
+  double longest_silence(int source) const noexcept;
+  template <class Function>
+  void through_unknown_motion(double from, double to, const Function& advance) noexcept;
+  void assess(Estimate& estimate, double time) noexcept;
 
   std::unique_ptr<EstimationMethod> method_;
   Timeline timeline_;
@@ -100,6 +122,11 @@ class RHEC_EXPORT Estimator {
   double worst_error_ = 0.0;         ///< of the intervals that were coarse
   std::size_t measured_inputs_ = 0;  ///< all but process noise, which is 0
   std::vector<double> mean_, weight_, nothing_, next_, values_;
+  std::unique_ptr<SensorWatch> watch_;
+  std::unique_ptr<Clocks> clocks_;  ///< of the sensors, and last of the inputs; with the watch
+  double watched_ = 0.0;            ///< time of the last sample that was judged
+  std::vector<double> late_, input_sigmas_;
+  std::vector<std::uint8_t> silent_;
 };
 
 }  // namespace rhec

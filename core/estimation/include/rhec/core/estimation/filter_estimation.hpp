@@ -33,6 +33,7 @@ class RHEC_EXPORT FilterEstimation final : public EstimationMethod {
   bool amend(int back, const double* outputs) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
   /// More than one heading is left.
   bool is_searching() const noexcept { return alive_ > 1; }
 

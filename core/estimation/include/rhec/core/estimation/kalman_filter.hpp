@@ -41,6 +41,9 @@ class RHEC_EXPORT KalmanFilter {
   /// Restarts a parameter: it keeps its mean and gets this variance, without correlation to anything else.
   void restart_parameter(int parameter, double variance) noexcept;
 
+  /// The noise of a measured input from now on.
+  void set_input_variance(int input, double variance) noexcept { noise_.input_variances[input] = variance; }
+
   const Model& model() const noexcept { return *model_; }
   const Noise& noise() const noexcept { return noise_; }
 

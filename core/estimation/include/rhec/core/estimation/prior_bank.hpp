@@ -65,6 +65,9 @@ class RHEC_EXPORT PriorBank {
   /// Starts all members at a vehicle state (n_x) and its covariance, and their processes at their own starts.
   void reset(const Eigen::Ref<const Eigen::VectorXd>& state,
              const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
+  /// Moves all members to a vehicle state and its covariance. Their processes stay, without correlation to it.
+  void replace_vehicle(const Eigen::Ref<const Eigen::VectorXd>& state,
+                       const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept;
   /// Measurement update with y (n_y, NaN where missing). `robust_weights` (n_y, or null) take the place of those that
   /// the robust losses give to the innovations; NaN: none.
   void update(const double* y, const double* robust_weights = nullptr) noexcept;

@@ -45,6 +45,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   bool amend(int back, const double* outputs) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override { return filters_.output_noise(output); }
   void end_drive() noexcept override { filters_.end_drive(); }
   std::shared_ptr<const SlipAhead> slip_ahead() const noexcept override { return filters_.slip_ahead(); }

@@ -60,6 +60,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void prepare() noexcept override;
   void reset() noexcept override;
+  bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
 
   bool has_window() const noexcept override { return started_; }
   const RheProblem& problem() const noexcept override { return problem_; }
@@ -73,6 +74,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   void advance_window(double duration, const double* inputs, const double* outputs) noexcept;
   void slide_arrival() noexcept;
   void search_heading(Clock::time_point deadline) noexcept;
+  void begin_window(const double* outputs) noexcept;
   void take_outputs(int node, const double* outputs) noexcept;
   void take_inputs(int interval, const double* inputs) noexcept;
   void start_cold(Iterate& point) noexcept;

@@ -12,6 +12,13 @@
 
 namespace rhec {
 
+/// The keys of `controller.health`: how fast the vehicle is while an estimate's health is not `ok`.
+struct RHEC_EXPORT PaceOptions {
+  double degraded = Controller::Setup::Pace{}.degraded, lost = Controller::Setup::Pace{}.lost;
+  double seconds = Controller::Setup::Pace{}.seconds;
+  static const OptionTable<PaceOptions>& table();
+};
+
 /// The keys of the section `controller`.
 struct RHEC_EXPORT ControllerOptions {
   int horizon = RhcProblem::Setup{}.max_intervals;
@@ -21,6 +28,7 @@ struct RHEC_EXPORT ControllerOptions {
   double least_speed_factor = Controller::Setup{}.least_speed_factor;
   double speed_bound_factor = Controller::Setup{}.speed_bound_factor;
   double speed_bound_offset = Controller::Setup{}.speed_bound_offset;
+  PaceOptions health;
   Settings weights, rate_bounds, terms, blocking, solver;
   static const OptionTable<ControllerOptions>& table();
 };

@@ -46,6 +46,8 @@ struct RHEC_EXPORT EstimatorParts {
 
   /// The estimation problem of a window.
   RheProblem::Setup problem() const;
+  /// Of a single Kalman filter.
+  KalmanFilter::Noise filter_noise() const;
   /// A bank of filters with the priors.
   BankEstimation::Setup filters() const;
 };
@@ -56,6 +58,8 @@ struct EstimatorMaker {
   std::string meaning;  ///< one phrase
   /// Throws Error if it cannot be made from these parts.
   std::function<std::unique_ptr<EstimationMethod>(const EstimatorParts& parts)> make;
+  /// Whether its measurements are judged (`estimator.health`).
+  bool is_watched = true;
 };
 
 /// The estimators that `estimator.name` chooses from: `rhe`, `ekf`, `bank`, and those that the application adds.

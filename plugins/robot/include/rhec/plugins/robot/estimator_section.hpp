@@ -8,6 +8,7 @@
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/plugins/robot/estimator_makers.hpp"
+#include "rhec/plugins/robot/health_section.hpp"
 #include "rhec/plugins/robot/hooks.hpp"
 #include "rhec/plugins/robot/integration.hpp"
 
@@ -24,6 +25,7 @@ struct RHEC_EXPORT EstimatorOptions {
   std::optional<int> substeps = {};  ///< none: chosen for the model
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
   BlockCovariance covariance = BlockCovariance::bank;
+  HealthOptions health;
   Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, memory, initial, robust, solver;
   static OptionTable<EstimatorOptions> table(const EstimatorMakers& makers);
 };
@@ -56,6 +58,7 @@ class RHEC_EXPORT EstimatorSection {
                                   const RobotHooks& hooks = {}) const;
 
  private:
+  std::unique_ptr<SensorWatch> make_watch_for(const EstimatorMaker& maker, const EstimatorParts& parts) const;
   void add_states(const std::vector<double>& sigmas);
 
   EstimatorMakers makers_;

@@ -27,6 +27,8 @@ struct Sample {
   double heading_error = 0.0;  ///< true heading - that of the path there, in (-pi, pi]; 0 without a heading [rad]
   Status estimator_status = Status::solved, controller_status = Status::solved;
   bool estimator_fallback = false, controller_fallback = false, relaxed = false;
+  HealthLevel health = HealthLevel::ok;            ///< of the estimate
+  std::string findings = {};                       ///< why it is not ok, in words
   double estimator_us = 0.0, controller_us = 0.0;  ///< preparation and feedback of the solvers [us]
   double estimator_feedback_us = 0.0;              ///< of this, the time after the measurement [us]
 };
@@ -70,7 +72,8 @@ struct RunSummary {
   std::map<std::string, std::int64_t> estimator_statuses, controller_statuses;
   std::int64_t fallbacks = 0;  ///< solves with unusable results
   std::int64_t solves = 0;
-  Estimator::Counts counts;  ///< of the estimator
+  Estimator::Counts counts;                    ///< of the estimator
+  std::map<std::string, std::int64_t> health;  ///< samples by the level of the estimate's health
 };
 /// From where on a covariance is called wrong: mean NEES in units of its expected value, and the share of samples
 /// within two standard deviations.

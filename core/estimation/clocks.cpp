@@ -1,0 +1,134 @@
+#include "rhec/core/estimation/clocks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rhec {
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double usual_room = 1.0;  // [s]
+constexpr double usual_intervals = 10.0;
+constexpr int confirm_gap = 2, confirm_clock = 3;
+// Going through known times again shows only if it lasts: single stamps are late for other reasons.
+constexpr int confirm_repetition = 4;
+constexpr double adaptation = 0.1;  // of the usual interval to a new one
+
+}  // namespace
+
+Clocks::Clocks(int sources, const Setup& setup) : setup_(setup), sources_(sources) { reset(); }
+
+void Clocks::reset() noexcept {
+  now_ = unknown;
+  refused_ = settings_ = 0;
+  for (Source& source : sources_) {
+    source = {};
+    source.newest = unknown;
+    source.usual = setup_.usual_interval;
+  }
+}
+
+double Clocks::room_ahead(const Source& source) const noexcept {
+  return std::max(usual_room, usual_intervals * source.usual);
+}
+
+Clocks::Place Clocks::place(const Source& source, double time) const noexcept {
+  if (std::isnan(now_)) return Place::in_order;
+  if (time > now_ + room_ahead(source)) return Place::far_ahead;
+  if (time < now_ - setup_.behind) return Place::far_behind;
+  if (std::isnan(source.newest) || time >= source.newest - 0.5 * source.usual) return Place::in_order;
+  // Has the source delivered what lies between this time and its newest?
+  const double expected = (source.newest - time) / source.usual;
+  const std::size_t known = std::min(source.count, remembered);
+  const auto later = std::count_if(source.times.begin(), source.times.begin() + static_cast<std::ptrdiff_t>(known),
+                                   [&](double other) { return other > time + 0.25 * source.usual; });
+  const bool is_known = static_cast<double>(later) >= 0.5 * std::min(expected, static_cast<double>(remembered));
+  return is_known ? Place::repeated : Place::late;
+}
+
+double Clocks::use(Source& source, double time) noexcept {
+  if (!(source.newest >= time)) {
+    const double interval = time - source.newest;
+    if (interval > 0.0 && interval < room_ahead(source)) source.usual += adaptation * (interval - source.usual);
+    source.newest = time;
+  }
+  source.times[source.count++ % remembered] = time;
+  if (!(now_ >= time)) now_ = time;
+  return time;
+}
+
+void Clocks::suspect(Source& source, double stamp) noexcept {
+  const double interval = stamp - source.last_suspect;
+  const bool follows = source.suspects > 0 && interval > 0.0 && interval < room_ahead(source);
+  if (!follows) source.first_suspect = stamp;
+  source.suspects = follows ? source.suspects + 1 : 1;
+  source.last_suspect = stamp;
+}
+
+/// The first stamp by the new clock is an interval after the newest by the old one.
+double Clocks::set_clock(Source& source, double stamp) noexcept {
+  const double last = std::isnan(source.newest) ? now_ : source.newest;
+  source.offset = source.first_suspect - (last + source.usual);
+  source.suspects = 0;
+  ++settings_;
+  return use(source, stamp - source.offset);
+}
+
+bool Clocks::take_over_offset(Source& source, double stamp) noexcept {
+  for (const Source& other : sources_) {
+    if (other.offset == source.offset) continue;
+    const Place there = place(source, stamp - other.offset);
+    if (there != Place::in_order) continue;
+    source.offset = other.offset;
+    source.suspects = 0;
+    ++settings_;
+    return true;
+  }
+  return false;
+}
+
+double Clocks::take(int index, double stamp) noexcept {
+  Source& source = sources_[index];
+  if (!std::isfinite(stamp)) {
+    ++refused_;
+    return unknown;
+  }
+  const double time = stamp - source.offset;
+  const Place there = place(source, time);
+  if (there == Place::in_order || there == Place::late) {
+    source.suspects = 0;
+    return use(source, time);
+  }
+  if (take_over_offset(source, stamp)) return use(source, stamp - source.offset);
+  suspect(source, stamp);
+  if (there == Place::repeated) {
+    if (source.suspects >= confirm_repetition) return set_clock(source, stamp);
+    return use(source, time);
+  }
+  const bool is_gap = there == Place::far_ahead && time <= now_ + setup_.longest_gap;
+  if (is_gap && source.suspects >= confirm_gap) {
+    source.suspects = 0;
+    return use(source, time);
+  }
+  if (source.suspects >= confirm_clock) return set_clock(source, stamp);
+  ++refused_;
+  return unknown;
+}
+
+double Clocks::offset_of(double time) const noexcept {
+  double best = 0.0, least = std::numeric_limits<double>::infinity();
+  if (std::isnan(now_)) return best;
+  const auto consider = [&](double offset) {
+    const double distance = std::abs(time - offset - now_);
+    if (distance < least) {
+      least = distance;
+      best = offset;
+    }
+  };
+  consider(0.0);  // without a reason, a clock was not set
+  for (const Source& source : sources_) consider(source.offset);
+  return best;
+}
+
+}  // namespace rhec

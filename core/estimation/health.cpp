@@ -1,0 +1,59 @@
+#include "rhec/core/estimation/health.hpp"
+
+#include <fmt/format.h>
+
+namespace rhec {
+
+const char* name_of(HealthLevel level) noexcept {
+  switch (level) {
+    case HealthLevel::ok:
+      return "ok";
+    case HealthLevel::degraded:
+      return "degraded";
+    case HealthLevel::lost:
+      return "lost";
+  }
+  return "";
+}
+
+const char* name_of_reason(std::uint32_t reason) noexcept {
+  switch (reason) {
+    case reason::rejected:
+      return "rejected";
+    case reason::stuck:
+      return "stuck";
+    case reason::silent:
+      return "silent";
+    case reason::implausible:
+      return "implausible";
+    case reason::moved:
+      return "moved";
+    case reason::clock:
+      return "wrong clock";
+    case reason::uncertain:
+      return "uncertain";
+    case reason::starting:
+      return "starting";
+    default:
+      return "";
+  }
+}
+
+std::string in_words(const Health& health, const std::vector<Sensor>& sensors) {
+  std::string text = name_of(health.level);
+  const char* separator = ": ";
+  const auto add = [&](const std::string& who, std::uint32_t reasons) {
+    std::string words;
+    for (const std::uint32_t each : reason::all)
+      if (reasons & each) words += fmt::format("{}{}", words.empty() ? "" : " and ", name_of_reason(each));
+    if (words.empty()) return;
+    text += fmt::format("{}{}{}{}", separator, who, who.empty() ? "" : " ", words);
+    separator = "; ";
+  };
+  add("", health.reasons);
+  for (std::size_t s = 0; s < health.sensors.size(); ++s) add(sensors[s].name, health.sensors[s].reasons);
+  add("inputs", health.inputs.reasons);
+  return text;
+}
+
+}  // namespace rhec

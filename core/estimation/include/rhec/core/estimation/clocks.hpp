@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "rhec/core/base/export.hpp"
+
+namespace rhec {
+
+/// Brings the stamps of several sources onto one timeline, which no wrong stamp can stop.
+///
+/// A stamp is used as it is where it continues its source's: late within `behind`, or ahead of all others by no more
+/// than a second or ten of the source's usual intervals. Any other is refused until the stamps after it agree with it:
+/// the second one confirms a gap (no longer than `longest_gap`), the third one that the source's clock was set. The
+/// source's stamps then go on from where they were, and its clock's offset is kept; other sources whose clock was
+/// set alike take it over at once. A source whose clock is set back by less than `behind` is recognised by going
+/// through times again for which it has delivered already; data that were only held up fill a gap.
+///
+/// Timeline and stamps in seconds. Allocates in its constructor only.
+class RHEC_EXPORT Clocks {
+ public:
+  struct Setup {
+    double usual_interval = 0.2;  ///< of a source, until its own is known [s]
+    double behind = 3.0;          ///< how late a measurement can be [s]
+    double longest_gap = 60.0;    ///< a longer one is a clock that was set [s]
+  };
+  Clocks(int sources, const Setup& setup);
+
+  /// The place of a stamp on the timeline; NaN if it is refused.
+  double take(int source, double stamp) noexcept;
+  /// Another source has delivered with a stamp whose place on the timeline is known.
+  void also(int source, double time) noexcept { use(sources_[source], time); }
+  /// The place of a time that somebody asks for, by the clock that fits best; NaN if it is not finite. Nothing changes.
+  double place_of(double time) const noexcept { return time - offset_of(time); }
+  /// What to subtract from a time that somebody asks for: the offset of the source that brings it closest to now.
+  double offset_of(double time) const noexcept;
+  /// The newest time on the timeline that a stamp was given; NaN before the first.
+  double now() const noexcept { return now_; }
+  /// Usual interval of a source [s].
+  double usual_interval(int source) const noexcept { return sources_[source].usual; }
+  /// Newest time of a source on the timeline; NaN before its first.
+  double newest(int source) const noexcept { return sources_[source].newest; }
+  /// Whether the source's last stamp was refused, or its clock has just been set.
+  bool is_suspected(int source) const noexcept { return sources_[source].suspects > 0; }
+  std::int64_t refused() const noexcept { return refused_; }
+  /// How often a clock was set.
+  std::int64_t settings() const noexcept { return settings_; }
+  void reset() noexcept;
+
+ private:
+  static constexpr std::size_t remembered = 32;
+  struct Source {
+    double offset = 0.0, newest = 0.0, usual = 0.0;
+    double first_suspect = 0.0, last_suspect = 0.0;  ///< stamps
+    int suspects = 0;
+    std::array<double, remembered> times{};  ///< of its newest stamps, in a ring
+    std::size_t count = 0;
+  };
+  enum class Place { in_order, late, repeated, far_ahead, far_behind };
+  Place place(const Source& source, double time) const noexcept;
+  double room_ahead(const Source& source) const noexcept;
+  double use(Source& source, double time) noexcept;
+  void suspect(Source& source, double stamp) noexcept;
+  double set_clock(Source& source, double stamp) noexcept;
+  bool take_over_offset(Source& source, double stamp) noexcept;
+
+  Setup setup_;
+  std::vector<Source> sources_;
+  double now_;
+  std::int64_t refused_ = 0, settings_ = 0;
+};
+
+}  // namespace rhec

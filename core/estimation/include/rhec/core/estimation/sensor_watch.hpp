@@ -1,0 +1,149 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "rhec/core/estimation/estimate.hpp"
+#include "rhec/core/estimation/health.hpp"
+#include "rhec/core/estimation/kalman_filter.hpp"
+
+namespace rhec {
+
+class WalkingFilter;
+
+/// Judges measurements before an estimator uses them (docs/faults.md).
+///
+/// Beside the estimator a Kalman filter goes on from its last estimate. A sensor's measurement whose innovation is too
+/// large for its covariance (a gate on nu' S^-1 nu) is not used. Who is wrong is then found by filters that assume
+/// different causes, and get all measurements:
+///   - slip has jumped: the parameters are made anew, once. Where this explains a few samples in a row, the
+///     measurements were right, and are given back as late ones;
+///   - what the sensor measures has moved for good: the states that it sees are made anew, once. Where this explains
+///     more samples than a transient may last, the estimate follows;
+///   - the measured inputs are wrong: they count as typical motion, at every sample. Where neither of the others lasts
+///     and this does, the estimate goes on without inputs until they fit again.
+/// A measurement that passes its gate again ends all of this.
+///
+/// Allocates in its constructor only.
+class RHEC_EXPORT SensorWatch {
+ public:
+  struct Setup {
+    KalmanFilter::Noise noise;
+    std::vector<double> walk;              ///< n_p, standard deviation per square root of a step
+    std::vector<double> parameter_sigmas;  ///< n_p, of slip of which nothing is known
+    bool has_ramps = false;                ///< as in FilterEstimation::Setup
+    double step = 0.2;                     ///< [s]
+    int substeps = 1;                      ///< of a step
+    double gate = 5.0;           ///< innovations less probable than this many standard deviations are rejected
+    int proof = 11;              ///< samples that a sensor must have moved for before the estimate follows
+    int slip_proof = 3;          ///< samples that a jump of slip must explain
+    int calm = 5;                ///< samples without a finding after which health is ok again
+    double lost_position = 3.0;  ///< standard deviation above which the vehicle is lost [m]
+    double lost_heading = 0.5;   ///< likewise [rad]
+  };
+  /// Throws Error if sizes do not match.
+  SensorWatch(std::shared_ptr<const Model> model, const Setup& setup);
+  ~SensorWatch();
+
+  const std::vector<Sensor>& sensors() const noexcept { return sensors_; }
+  const Setup& setup() const noexcept { return setup_; }
+  void reset() noexcept;
+
+  /// Marks measured inputs that cannot be as missing (NaN).
+  void clean_inputs(double* inputs) noexcept;
+  /// The time goes on by `duration` [s], with the mean input (n_u). `more_sigmas` (n_u, or null): nobody has said for
+  /// some time what the inputs are, and they may be off by as much.
+  void advance(double duration, const double* inputs, const double* more_sigmas = nullptr) noexcept;
+
+  /// What an estimator has to do beyond using what is left of the outputs.
+  struct Finding {
+    bool release = false;  ///< measurements that were held back are right: see `held`
+    /// The estimate has to go on from `mean` and `covariance`, which contain this measurement.
+    bool rebase = false;
+  };
+  /// Judges outputs (n_y, NaN where missing) of a time [s]; those that must not be used become NaN.
+  Finding judge(double time, double* outputs) noexcept;
+  /// Whether a late measurement of a time passes; those outputs that do not become NaN.
+  void judge_late(double time, double* outputs) noexcept;
+  struct Held {
+    double time = 0.0;            ///< [s]
+    std::vector<double> outputs;  ///< n_y
+  };
+  /// Measurements that were rejected and turned out right, before the last one; after `judge` has said so.
+  const std::vector<Held>& held() const noexcept { return held_; }
+  int held_count() const noexcept { return held_count_; }
+  const Eigen::VectorXd& mean() const noexcept;
+  const Eigen::MatrixXd& covariance() const noexcept;
+
+  /// By sensor.
+  std::span<const SensorHealth> sensor_states() const noexcept { return states_; }
+  /// False while there is nothing to judge by: before the first estimate, and while a heading is searched.
+  bool is_active() const noexcept { return is_active_; }
+  /// Goes on from moments of [x; p] that somebody else has given.
+  void restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
+  /// Goes on from an estimate.
+  void follow(const Estimate& estimate) noexcept;
+  /// Moments of [x; p] after a time without measurements: [mean; covariance] of an estimate, predicted by `duration`
+  /// with an input (n_u), each of which may be off by `input_sigmas` besides its noise (n_u, or null).
+  void predict(double duration, const double* inputs, const double* input_sigmas, Estimate& estimate) noexcept;
+
+  void begin_innovations() noexcept { innovation_count_ = 0; }
+  /// Those judged since then, the first ones if there are very many.
+  std::span<const Innovation> innovations() const noexcept {
+    return {innovations_.data(), static_cast<std::size_t>(innovation_count_)};
+  }
+  /// `silent`: by sensor, whether it has said nothing for too long; `reasons`: those that belong to no sensor.
+  void assess(const Estimate& estimate, std::span<const std::uint8_t> silent, std::uint32_t reasons,
+              Health& health) const noexcept;
+
+ private:
+  struct Hypothesis;
+  struct Memory;
+  /// Of a sensor, in a row.
+  struct Record {
+    int failures = 0, passes = 0;
+  };
+  bool admits(std::size_t sensor, const Innovation& innovation) noexcept;
+  void find_stuck(double* outputs) noexcept;
+  bool is_searching() const noexcept;
+  void start_search(const double* outputs) noexcept;
+  void search_from(WalkingFilter& filter) noexcept;
+  Finding search_heading(const double* outputs) noexcept;
+  void start(Hypothesis& hypothesis) noexcept;
+  void start_moved() noexcept;
+  bool fits(WalkingFilter& filter, const double* outputs) noexcept;
+  void confront(Hypothesis& hypothesis, const double* outputs) noexcept;
+  Finding settle(double time, const double* outputs) noexcept;
+  Finding accept(Hypothesis& hypothesis) noexcept;
+  void hold_back(double time, const double* outputs) noexcept;
+  void end_dispute() noexcept;
+  bool may_follow() const noexcept;
+  void test_inputs(const double* outputs) noexcept;
+  void remember(double time) noexcept;
+  double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;
+
+  Setup setup_;
+  std::vector<Sensor> sensors_;
+  std::vector<double> limits_, close_limits_;  ///< of nu' S^-1 nu, by the number of values
+  std::vector<Record> records_;                ///< by sensor
+  bool is_unobserved_ = false;                 ///< the motion since the last sample is not known
+  std::unique_ptr<Hypothesis> own_, slip_, moved_, blind_;
+  std::unique_ptr<Memory> memory_;
+  bool is_active_ = false, is_disputed_ = false, is_blind_ = false;
+  int disputed_samples_ = 0, trusted_samples_ = 0, calm_samples_ = 0;
+  std::vector<SensorHealth> states_;  ///< by sensor
+  SensorHealth inputs_;
+  std::uint32_t input_findings_ = 0;
+  std::vector<std::uint32_t> findings_;  ///< by sensor, of the last sample
+  std::vector<int> quiet_;               ///< by sensor, samples since the last finding
+  std::vector<double> raw_, input_, believed_input_;
+  std::vector<Held> held_;
+  int held_count_ = 0;
+  std::vector<Innovation> innovations_;
+  int innovation_count_ = 0;
+  Innovation scratch_;
+};
+
+}  // namespace rhec

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+namespace rhec {
+
+/// Finds outputs that give one value again and again while the vehicle moves. A sensor with noise does not, unless it
+/// has coarse steps; then the same value is believed as long as the vehicle has moved by less than the noise hides.
+class StuckValues {
+ public:
+  StuckValues() = default;
+  explicit StuckValues(const std::vector<double>& variances) {
+    for (const double variance : variances) outputs_.push_back({.sigma = std::sqrt(variance)});
+  }
+  void reset() noexcept {
+    for (Output& each : outputs_) each = {.sigma = each.sigma};
+  }
+  /// A measured value (NaN: none), and what was expected before it was used.
+  void take(std::size_t output, double value, double expected) noexcept {
+    Output& each = outputs_[output];
+    if (std::isnan(value)) return;
+    ++each.values;
+    // What the vehicle's motion has added since the last sample, by its own: angles change by little in a sample.
+    each.movement += expected - each.corrected;
+    if (value != each.last) {
+      each.last = value;
+      each.repeats = 0;
+      each.movement = 0.0;
+      return;
+    }
+    ++each.repeats;
+    ++each.all_repeats;
+  }
+  /// What is expected after the sample was used.
+  void corrected(std::size_t output, double expected) noexcept { outputs_[output].corrected = expected; }
+  bool is_stuck(std::size_t output) const noexcept {
+    const Output& each = outputs_[output];
+    const double movement = std::abs(each.movement);
+    // One that never repeated itself is stuck sooner than one with coarse steps.
+    const bool repeats_seldom = each.values > 20 && 50 * (each.all_repeats - each.repeats) < each.values;
+    return (each.repeats >= 2 && repeats_seldom && movement > each.sigma) ||
+           (each.repeats >= 3 && movement > 3.0 * each.sigma);
+  }
+
+ private:
+  struct Output {
+    double sigma = 0.0;
+    double last = std::numeric_limits<double>::quiet_NaN();
+    double corrected = 0.0, movement = 0.0;
+    int repeats = 0;
+    long values = 0, all_repeats = 0;
+  };
+  std::vector<Output> outputs_;
+};
+
+}  // namespace rhec

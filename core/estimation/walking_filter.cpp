@@ -1,0 +1,97 @@
+#include "walking_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "rhec/core/base/angle.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr int most_parts = 1000;
+
+}  // namespace
+
+double chi_square_limit(int degrees, double sigmas) noexcept {
+  const double d = degrees, share = 2.0 / (9.0 * d);
+  const double root = 1.0 - share + sigmas * std::sqrt(share);
+  return d * root * root * root;
+}
+
+WalkingFilter::WalkingFilter(std::shared_ptr<const Model> model, const Setup& setup)
+    : setup_(setup), filter_(std::move(model), setup.noise, setup.substeps) {
+  const Model& m = filter_.model();
+  ramp_variances_.assign(m.parameter_count(), 0.0);
+  guess_.assign(m.input_count(), 0.0);
+  expected_.assign(m.output_count(), 0.0);
+  jacobian_.assign(static_cast<std::size_t>(m.output_count()) * m.state_count(), 0.0);
+  image_ = Eigen::MatrixXd::Zero(m.state_count(), m.output_count());
+}
+
+void WalkingFilter::predict(const double* inputs, double duration, const double* more_sigmas) noexcept {
+  if (!(duration > 0.0) || !std::isfinite(duration)) return;
+  const int parts =
+      static_cast<int>(std::min<double>(most_parts, std::max(1.0, std::ceil(duration / setup_.step - 1e-6))));
+  const double part = duration / parts, steps = part / setup_.step;
+  for (std::size_t j = 0; j < setup_.walk.size(); ++j) ramp_variances_[j] = setup_.walk[j] * setup_.walk[j] * steps;
+  for (std::size_t j = 0; more_sigmas && j < guess_.size(); ++j)
+    filter_.set_input_variance(static_cast<int>(j), setup_.noise.input_variances[j] + more_sigmas[j] * more_sigmas[j]);
+  for (int i = 0; i < parts; ++i) {
+    if (setup_.has_ramps) {
+      filter_.predict(inputs, guess_.data(), part, ramp_variances_.data());
+      continue;
+    }
+    filter_.predict(inputs, guess_.data(), part);
+    for (std::size_t j = 0; j < setup_.walk.size(); ++j)
+      filter_.add_parameter_variance(static_cast<int>(j), ramp_variances_[j]);
+  }
+  for (std::size_t j = 0; more_sigmas && j < guess_.size(); ++j)
+    filter_.set_input_variance(static_cast<int>(j), setup_.noise.input_variances[j]);
+}
+
+void WalkingFilter::expect() noexcept {
+  const Model& m = filter_.model();
+  m.observe({.count = 1, .states = mean().data(), .outputs = expected_.data(), .jacobians = jacobian_.data()});
+  const int nx = m.state_count(), ny = m.output_count();
+  for (int j = 0; j < ny; ++j) {
+    for (int r = 0; r < nx; ++r) {
+      double sum = 0.0;
+      for (int c = 0; c < nx; ++c) sum += covariance()(r, c) * jacobian_[c * ny + j];
+      image_(r, j) = sum;
+    }
+  }
+}
+
+bool WalkingFilter::depends_on(int output, int state) const noexcept {
+  return jacobian_[static_cast<std::size_t>(state) * expected_.size() + output] != 0.0;
+}
+
+bool WalkingFilter::innovation(const Sensor& sensor, const double* outputs, Innovation& result) noexcept {
+  const Model& m = filter_.model();
+  const int nx = m.state_count(), ny = m.output_count();
+  int measured[most_sensor_outputs], count = 0;
+  for (const int j : sensor.outputs)
+    if (!std::isnan(outputs[j])) measured[count++] = j;
+  if (count == 0) return false;
+  result.value.resize(count);
+  result.covariance.resize(count, count);
+  for (int a = 0; a < count; ++a) {
+    const int j = measured[a];
+    result.value[a] =
+        m.description().outputs[j].is_angle ? angle_difference(outputs[j], expected_[j]) : outputs[j] - expected_[j];
+    for (int b = 0; b < count; ++b) {
+      double sum = a == b ? filter_.noise().output_variances[j] : 0.0;
+      for (int c = 0; c < nx; ++c) sum += jacobian_[c * ny + j] * image_(c, measured[b]);
+      result.covariance(a, b) = sum;
+    }
+  }
+  const Eigen::LLT<Innovation::OfSensor<Eigen::Dynamic>> root(result.covariance);
+  Innovation::OfSensor<1> scaled = result.value;
+  root.matrixL().solveInPlace(scaled);
+  result.nis = scaled.squaredNorm();
+  return true;
+}
+
+}  // namespace rhec

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "rhec/core/estimation/health.hpp"
+#include "rhec/core/estimation/kalman_filter.hpp"
+
+namespace rhec {
+
+/// A Kalman filter whose parameters walk, for the judgement of sensors: it predicts over any duration, and tells
+/// innovations before they are used.
+class WalkingFilter {
+ public:
+  struct Setup {
+    KalmanFilter::Noise noise;
+    std::vector<double> walk;  ///< n_p, standard deviation of a parameter per square root of a step
+    bool has_ramps = false;    ///< as in FilterEstimation::Setup
+    double step = 0.2;         ///< longest interval of one prediction [s]
+    int substeps = 1;          ///< of a step
+  };
+  WalkingFilter(std::shared_ptr<const Model> model, const Setup& setup);
+
+  Eigen::VectorXd& mean() noexcept { return filter_.mean; }
+  Eigen::MatrixXd& covariance() noexcept { return filter_.covariance; }
+  const Eigen::VectorXd& mean() const noexcept { return filter_.mean; }
+  const Eigen::MatrixXd& covariance() const noexcept { return filter_.covariance; }
+  const Model& model() const noexcept { return filter_.model(); }
+
+  /// Predicts by `duration` [s] in parts of at most a step, with an input (n_u) that holds all the while.
+  /// `more_sigmas` (n_u, or null): of each part's inputs besides their noise.
+  void predict(const double* inputs, double duration, const double* more_sigmas = nullptr) noexcept;
+  /// Uses outputs (n_y, NaN where missing).
+  void update(const double* outputs) noexcept { filter_.update(outputs, nullptr); }
+  /// Makes a parameter anew: its mean stays, with this standard deviation.
+  void restart_parameter(int parameter, double sigma) noexcept { filter_.restart_parameter(parameter, sigma * sigma); }
+
+  /// Expected outputs and their derivatives, for `innovation`.
+  void expect() noexcept;
+  /// Innovation of a sensor's measured outputs by what was expected last, its covariance and NIS. False, and nothing
+  /// else, where none is measured.
+  bool innovation(const Sensor& sensor, const double* outputs, Innovation& result) noexcept;
+  /// Whether an expected output depends on a state.
+  bool depends_on(int output, int state) const noexcept;
+  double expected(int output) const noexcept { return expected_[output]; }
+
+ private:
+  Setup setup_;
+  KalmanFilter filter_;
+  std::vector<double> ramp_variances_, guess_, expected_, jacobian_;
+  Eigen::MatrixXd image_;  ///< P H'
+};
+
+/// Largest value that a chi-square variable of this many degrees of freedom has with the probability of `sigmas`
+/// standard deviations on one side (Wilson and Hilferty 1931).
+double chi_square_limit(int degrees, double sigmas) noexcept;
+
+}  // namespace rhec

@@ -1,0 +1,115 @@
+#include "rhec/core/estimation/clocks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace rhec {
+namespace clocks_test {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+struct TwoClocks : ::testing::Test {
+  Clocks clocks{2, {.usual_interval = 0.1, .behind = 3.0, .longest_gap = 60.0}};
+  /// Both sources deliver at 10 Hz.
+  double run(double from, int samples, double offset = 0.0) {
+    for (int k = 0; k < samples; ++k) {
+      const double time = from + 0.1 * k;
+      EXPECT_NEAR(clocks.take(0, time + offset), time, 1e-9) << k;
+      EXPECT_NEAR(clocks.take(1, time + offset), time, 1e-9) << k;
+    }
+    return from + 0.1 * samples;
+  }
+};
+
+TEST_F(TwoClocks, StampsInOrderStayAsTheyAre) {
+  const double end = run(1.7e9, 100);
+  EXPECT_EQ(clocks.refused(), 0);
+  EXPECT_EQ(clocks.settings(), 0);
+  EXPECT_NEAR(clocks.now(), end - 0.1, 1e-6);
+  EXPECT_NEAR(clocks.usual_interval(0), 0.1, 1e-6);
+}
+
+TEST_F(TwoClocks, OneWrongStampChangesNothing) {
+  for (const double wrong : {1e9, -1e9, 20.0, infinity, nan, 7.5}) {
+    clocks.reset();
+    const double time = run(10.0, 50);
+    EXPECT_TRUE(std::isnan(clocks.take(0, wrong)) || wrong == 7.5) << wrong;
+    run(time, 20);
+    EXPECT_EQ(clocks.settings(), 0) << wrong;
+  }
+}
+
+TEST_F(TwoClocks, AClockThatIsSetIsRecognisedWithinFiveSamples) {
+  for (const double jump : {1000.0, -1000.0, -5.0, 100.0, -1.0}) {
+    clocks.reset();
+    double time = run(10.0, 50);
+    double place = nan;
+    for (int k = 0; k < 5; ++k, time += 0.1) place = clocks.take(0, time + jump);
+    EXPECT_NEAR(place, time - 0.1, 0.11) << jump;
+    EXPECT_EQ(clocks.settings(), 1) << jump;
+    // The other source's clock was set by as much: it follows at once, and the two stay together.
+    EXPECT_NEAR(clocks.take(1, time + jump), clocks.take(0, time + jump), 1e-9) << jump;
+  }
+}
+
+TEST_F(TwoClocks, TheClockOfOneSourceAloneIsSet) {
+  double time = run(10.0, 50);
+  for (int k = 0; k < 20; ++k, time += 0.1) {
+    clocks.take(0, time - 500.0);
+    EXPECT_NEAR(clocks.take(1, time), time, 1e-9);
+  }
+  EXPECT_NEAR(clocks.take(0, time - 500.0), time, 0.11);
+}
+
+TEST_F(TwoClocks, AGapIsAGap) {
+  const double time = run(10.0, 50) + 20.0;
+  EXPECT_TRUE(std::isnan(clocks.take(0, time)));
+  EXPECT_EQ(clocks.take(0, time + 0.1), time + 0.1);
+  EXPECT_EQ(clocks.settings(), 0);
+}
+
+TEST_F(TwoClocks, DataThatWereHeldUpAreLate) {
+  double time = run(10.0, 50);
+  for (int k = 0; k < 10; ++k) clocks.take(1, time + 0.1 * k);
+  // Source 0 delivers the newest first, then the rest.
+  EXPECT_NEAR(clocks.take(0, time + 0.9), time + 0.9, 1e-9);
+  for (int k = 0; k < 9; ++k) EXPECT_NEAR(clocks.take(0, time + 0.1 * k), time + 0.1 * k, 1e-9) << k;
+  EXPECT_EQ(clocks.settings(), 0);
+  time += 1.0;
+  run(time, 10);
+}
+
+TEST_F(TwoClocks, JitterAndDisorderAreNoReason) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> jitter(0.0, 0.02);
+  for (int k = 0; k < 5000; ++k) {
+    const double time = 5.0 + 0.1 * k + jitter(random) - (k % 7 == 0 ? 0.25 : 0.0);
+    EXPECT_EQ(clocks.take(0, time), time) << k;
+    EXPECT_EQ(clocks.take(1, 5.0 + 0.1 * k), 5.0 + 0.1 * k) << k;
+  }
+  EXPECT_EQ(clocks.settings(), 0);
+  EXPECT_EQ(clocks.refused(), 0);
+}
+
+TEST_F(TwoClocks, AskedTimesAreThoseOfTheClockThatFits) {
+  double time = run(10.0, 50);
+  EXPECT_EQ(clocks.place_of(time), time);
+  for (int k = 0; k < 5; ++k, time += 0.1) clocks.take(0, time - 1000.0);
+  EXPECT_NEAR(clocks.place_of(time - 1000.0), time, 0.11);
+  EXPECT_NEAR(clocks.place_of(time), time, 1e-9);  // of one whose clock was not set
+}
+
+TEST_F(TwoClocks, EvenAWrongFirstStampIsForgotten) {
+  clocks.take(0, 1e12);
+  double place = nan;
+  for (int k = 0; k < 5; ++k) place = clocks.take(0, 3.0 + 0.1 * k);
+  EXPECT_TRUE(std::isfinite(place));
+  EXPECT_NEAR(clocks.take(0, 3.5), place + 0.1, 1e-3);
+}
+
+}  // namespace clocks_test
+}  // namespace rhec

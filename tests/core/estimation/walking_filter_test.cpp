@@ -1,0 +1,78 @@
+#include "core/estimation/walking_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include "support/linear_case.hpp"
+
+namespace rhec {
+namespace walking_filter_test {
+
+using namespace rhec::testing;
+
+WalkingFilter make(double step = 0.1) {
+  const auto model = linear_model<Boat>();
+  WalkingFilter filter(model, {.noise = {.output_variances = {0.04, 0.01},
+                                         .input_variances = {0.09},
+                                         .parameter_lower = {-1e3},
+                                         .parameter_upper = {1e3}},
+                               .walk = {0.05},
+                               .step = step,
+                               .substeps = 4});
+  filter.mean() = initial_mean(*model);
+  filter.covariance() = initial_covariance(*model);
+  return filter;
+}
+
+TEST(ChiSquareLimit, IsCloseToTheTables) {
+  EXPECT_NEAR(chi_square_limit(1, 1.6449), 3.841, 0.15 * 3.841);    // 95 %
+  EXPECT_NEAR(chi_square_limit(2, 2.3263), 9.210, 0.1);             // 99 %
+  EXPECT_NEAR(chi_square_limit(4, 3.0902), 18.467, 0.02 * 18.467);  // 99.9 %
+}
+
+TEST(WalkingFilter, LongPredictionsAreMadeOfSteps) {
+  WalkingFilter once = make(), often = make();
+  const double input = 0.7;
+  once.predict(&input, 1.0);
+  for (int k = 0; k < 10; ++k) often.predict(&input, 0.1);
+  EXPECT_LT((once.mean() - often.mean()).norm(), 1e-12);
+  EXPECT_LT((once.covariance() - often.covariance()).norm(), 1e-12);
+}
+
+TEST(WalkingFilter, WhatIsNotKnownOfInputsCountsOnce) {
+  WalkingFilter filter = make(), other = make();
+  const double input = 0.7, more = 2.0;
+  filter.predict(&input, 0.1, &more);
+  other.predict(&input, 0.1);
+  EXPECT_GT(filter.covariance()(1, 1), other.covariance()(1, 1) + 0.9 * 0.04);
+  // The noise of inputs is as before.
+  WalkingFilter after = other;
+  filter.mean() = other.mean();
+  filter.covariance() = other.covariance();
+  filter.predict(&input, 0.1);
+  after.predict(&input, 0.1);
+  EXPECT_LT((filter.covariance() - after.covariance()).norm(), 1e-14);
+}
+
+TEST(WalkingFilter, InnovationsAreThoseOfTheTextbook) {
+  WalkingFilter filter = make();
+  filter.expect();
+  const Eigen::Matrix<double, 2, 4> H{{1.0, 0.0, 0.0, 0.0}, {0.0, 1.0, -0.2, 0.0}};
+  const Eigen::Vector2d y(3.0, -1.0), expected = H * filter.mean() + Eigen::Vector2d(0.0, 1.0);
+  const Eigen::Matrix2d S =
+      H * filter.covariance() * H.transpose() + Eigen::Matrix2d(Eigen::Vector2d(0.04, 0.01).asDiagonal());
+  Innovation innovation;
+  ASSERT_TRUE(filter.innovation({"both", {0, 1}}, y.data(), innovation));
+  EXPECT_LT((innovation.value - (y - expected)).norm(), 1e-12);
+  EXPECT_LT((innovation.covariance - S).norm(), 1e-12);
+  EXPECT_NEAR(innovation.nis, (y - expected).dot(S.inverse() * (y - expected)), 1e-9);
+  const Eigen::Vector2d second(nan, -1.0);
+  ASSERT_TRUE(filter.innovation({"both", {0, 1}}, second.data(), innovation));
+  EXPECT_EQ(innovation.value.size(), 1);
+  EXPECT_NEAR(innovation.covariance(0, 0), S(1, 1), 1e-12);
+  EXPECT_FALSE(filter.innovation({"first", {0}}, second.data(), innovation));
+  EXPECT_TRUE(filter.depends_on(1, 2));
+  EXPECT_FALSE(filter.depends_on(0, 2));
+}
+
+}  // namespace walking_filter_test
+}  // namespace rhec
