@@ -13,9 +13,26 @@
 namespace rhec {
 namespace {
 
-constexpr std::size_t remembered_nodes = 1024;
 constexpr int checked_interval = 16;  // of so many, the integration of one is checked
-constexpr int most_parts = 1000;      // largest number of parts of one gap, or of one prediction
+constexpr int most_parts = 1000;      // largest number of parts of one prediction
+
+NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Timeline& timeline) {
+  if (!(timeline.longest_interval > 0.0))
+    throw Error(fmt::format("estimator: longest interval {} s; expected a positive number", timeline.longest_interval));
+  if (!(timeline.tolerance >= 0.0 && timeline.tolerance < timeline.longest_interval))
+    throw Error(fmt::format("estimator: tolerance {} s; expected a number from 0 to below the longest interval, {} s",
+                            timeline.tolerance, timeline.longest_interval));
+  if (timeline.capacity < 1) throw Error("estimator: capacity 0; expected room for at least 1 row");
+  const Model& model = method.model();
+  return {.step = timeline.longest_interval,
+          .tolerance = timeline.tolerance,
+          .capacity = timeline.capacity,
+          .outputs = model.output_count(),
+          .inputs = model.input_count(),
+          .noises = static_cast<int>(model.description().noisy_states.size()),
+          .most_between = method.most_between(),
+          .reach = method.most_reach()};
+}
 
 /// Number of equal parts of a duration, each at most `longest`.
 int parts_of(double duration, double longest) noexcept {
@@ -25,54 +42,15 @@ int parts_of(double duration, double longest) noexcept {
 
 }  // namespace
 
-Estimator::Rows::Rows(std::size_t capacity, int width)
-    // Space for twice the rows, so that rows are moved to the front only once in `capacity` drops.
-    : capacity_(capacity), width_(width), times_(2 * capacity), values_(2 * capacity * width) {}
-
-bool Estimator::Rows::insert(double time, const double* values) noexcept {
-  const bool full = count_ == capacity_;
-  if (full) drop_front(1);
-  if (first_ + count_ == times_.size()) {
-    std::move(times_.begin() + first_, times_.end(), times_.begin());
-    std::move(values_.begin() + first_ * width_, values_.end(), values_.begin());
-    first_ = 0;
-  }
-  std::size_t at = first_ + count_;
-  for (; at > first_ && times_[at - 1] > time; --at) {
-    times_[at] = times_[at - 1];
-    std::copy_n(values_.begin() + (at - 1) * width_, width_, values_.begin() + at * width_);
-  }
-  times_[at] = time;
-  std::copy_n(values, width_, values_.begin() + at * width_);
-  ++count_;
-  return !full;
-}
-
-void Estimator::Rows::drop_front(std::size_t rows) noexcept {
-  first_ += rows;
-  count_ -= rows;
-  if (count_ == 0) first_ = 0;
-}
-
 Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline)
     : method_(std::move(method)),
       timeline_(timeline),
-      measurements_(timeline.capacity, method_->model().output_count()),
-      inputs_(timeline.capacity, method_->model().input_count()),
+      grid_(grid_setup(*method_, timeline)),
       step_error_(method_->model()) {
-  if (!(timeline.longest_interval > 0.0))
-    throw Error(fmt::format("estimator: longest interval {} s; expected a positive number", timeline.longest_interval));
-  if (!(timeline.tolerance >= 0.0 && timeline.tolerance < timeline.longest_interval))
-    throw Error(fmt::format("estimator: tolerance {} s; expected a number from 0 to below the longest interval, {} s",
-                            timeline.tolerance, timeline.longest_interval));
-  if (timeline.capacity < 1) throw Error("estimator: capacity 0; expected room for at least 1 row");
   const Model& m = method_->model();
   clear_estimates();
-  node_times_.assign(remembered_nodes, 0.0);
-  mean_.assign(m.input_count(), 0.0);
-  measured_inputs_ = mean_.size() - m.description().noisy_states.size();
-  weight_.assign(m.input_count(), 0.0);
-  nothing_.assign(m.output_count(), std::numeric_limits<double>::quiet_NaN());
+  input_.assign(m.input_count(), 0.0);
+  measured_inputs_ = input_.size() - m.description().noisy_states.size();
   next_.assign(m.state_count(), 0.0);
   values_.assign(std::max(m.output_count(), m.input_count()), 0.0);
 }
@@ -92,109 +70,69 @@ void Estimator::clear_estimates() noexcept {
 
 void Estimator::reset() noexcept {
   method_->reset();
-  measurements_.clear();
-  inputs_.clear();
+  grid_.clear();
   clear_estimates();
-  started_ = stale_ = false;
-  newest_ = 0;
+  stale_ = false;
   counts_ = {};
   worst_error_ = 0.0;
 }
 
 void Estimator::push_measurement(double time, const double* outputs) noexcept {
-  for (std::size_t j = 0; j < nothing_.size(); ++j) {
+  for (int j = 0; j < model().output_count(); ++j) {
     values_[j] = cleaned(outputs[j]);
     counts_.missing += std::isnan(values_[j]);
   }
-  outputs = values_.data();
   if (!std::isfinite(time)) {
     ++counts_.dropped;
     return;
   }
-  const double newest_time = node_times_[newest_ % remembered_nodes];
-  if (!started_ || time > newest_time + timeline_.tolerance) {
-    if (!measurements_.insert(time, outputs)) ++counts_.dropped;
-    return;
-  }
-  for (std::size_t back = 0; back <= std::min(newest_, remembered_nodes - 1); ++back) {
-    if (std::abs(node_times_[(newest_ - back) % remembered_nodes] - time) > timeline_.tolerance) continue;
-    if (!method_->amend(static_cast<int>(back), outputs)) break;
-    ++counts_.late;
-    stale_ = true;
-    return;
-  }
-  ++counts_.dropped;
+  const std::int64_t dropped = grid_.dropped();
+  const NodeGrid::Place place = grid_.push_measurement(time, values_.data(), method_->reach());
+  if (place == NodeGrid::Place::late) ++counts_.late;
+  counts_.dropped += grid_.dropped() - dropped;
 }
 
 void Estimator::push_input(double time, const double* inputs) noexcept {
   if (!std::isfinite(time)) return;
   for (std::size_t j = 0; j < measured_inputs_; ++j) values_[j] = cleaned(inputs[j]);
-  inputs_.insert(time, values_.data());
+  grid_.push_input(time, values_.data());
 }
 
-/// Mean over an interval of inputs that hold from their stamps on; NaN if none is known.
-void Estimator::mean_input(double from, double to) noexcept {
-  std::fill(mean_.begin(), mean_.end(), 0.0);
-  std::fill(weight_.begin(), weight_.end(), 0.0);
-  for (std::size_t i = 0; i < inputs_.size(); ++i) {
-    const double start = std::max(inputs_.time(i), from);
-    const double end = i + 1 < inputs_.size() ? std::min(inputs_.time(i + 1), to) : to;
-    if (inputs_.time(i) >= to - timeline_.tolerance) break;
-    const double seconds = end - start;
-    if (seconds <= 0.0) continue;
-    for (std::size_t j = 0; j < mean_.size(); ++j) {
-      const double value = inputs_.values(i)[j];
-      if (std::isnan(value)) continue;
-      mean_[j] += value * seconds;
-      weight_[j] += seconds;
-    }
+/// Makes the nodes of all that is stamped up to a time, those anew that it has changed.
+void Estimator::take_in(double until) noexcept {
+  if (const int outdated = grid_.outdated(until, method_->reach()); outdated > 0) {
+    method_->rewind(outdated);
+    grid_.take_back(outdated);
+    counts_.nodes -= outdated;
+    stale_ = true;
   }
-  for (std::size_t j = 0; j < mean_.size(); ++j)
-    mean_[j] = weight_[j] > 0.0 ? mean_[j] / weight_[j] : std::numeric_limits<double>::quiet_NaN();
-  std::fill(mean_.begin() + static_cast<std::ptrdiff_t>(measured_inputs_), mean_.end(), 0.0);
+  bool any = false;
+  for (; grid_.make_next(until); any = true) add_node();
+  if (any) grid_.settle(method_->reach());
 }
 
-void Estimator::add_node(double time, const double* outputs) noexcept {
-  if (!started_) {
-    method_->start(outputs);
-    started_ = true;
-    newest_ = 0;
+void Estimator::add_node() noexcept {
+  if (grid_.count() == 1) {
+    method_->start(grid_.outputs());
   } else {
-    const double last = node_times_[newest_ % remembered_nodes];
-    mean_input(last, time);
-    method_->add_node(time - last, mean_.data(), outputs);
-    ++newest_;
+    method_->add(grid_.interval(), grid_.outputs());
   }
-  node_times_[newest_ % remembered_nodes] = time;
   ++counts_.nodes;
   stale_ = true;
-  // Of the input rows before this node, only the last one still holds.
-  std::size_t used = 0;
-  while (used + 1 < inputs_.size() && inputs_.time(used + 1) <= time) ++used;
-  inputs_.drop_front(used);
-}
-
-void Estimator::add_nodes_until(double time, const double* outputs) noexcept {
-  if (started_) {
-    const double last = node_times_[newest_ % remembered_nodes];
-    const int parts = parts_of(time - last, timeline_.longest_interval);
-    for (int i = 1; i < parts; ++i) add_node(last + (time - last) * i / parts, nothing_.data());
-  }
-  add_node(time, outputs);
 }
 
 void Estimator::predict_to(double time) noexcept {
-  const double last = node_times_[newest_ % remembered_nodes];
+  const double last = grid_.time();
   predicted_ = estimate_;
   predicted_.predicted = true;
-  mean_input(last, time);
-  for (double& u : mean_)
+  std::copy_n(grid_.mean_input(last, time), input_.size(), input_.begin());
+  for (double& u : input_)
     if (std::isnan(u)) u = 0.0;
   const double duration = time - last;
   Model::Intervals request;
   request.count = 1;
   request.states = estimate_.state.data();
-  request.inputs = mean_.data();
+  request.inputs = input_.data();
   request.parameters = estimate_.parameters.data();
   request.durations = &duration;
   request.substeps = method_->substeps() * parts_of(duration, timeline_.longest_interval);
@@ -208,13 +146,14 @@ void Estimator::predict_to(double time) noexcept {
 /// Holds the newest interval's steps against twice as many, from the newest node on: what the vehicle does there can be
 /// faster than what was foreseen at set-up.
 void Estimator::check_integration() noexcept {
-  if (newest_ == 0) return;
-  const double duration = node_times_[newest_ % remembered_nodes] - node_times_[(newest_ - 1) % remembered_nodes];
-  for (double& u : mean_)
+  if (grid_.count() < 2) return;
+  const MeasuredInterval interval = grid_.interval();
+  std::copy_n(interval.inputs, input_.size(), input_.begin());
+  for (double& u : input_)
     if (std::isnan(u)) u = 0.0;
   int state = -1;
-  const double error = step_error_(estimate_.state.data(), mean_.data(), estimate_.parameters.data(), duration,
-                                   method_->substeps(), &state);
+  const double error = step_error_(estimate_.state.data(), input_.data(), estimate_.parameters.data(),
+                                   interval.duration, method_->substeps(), &state);
   ++counts_.integrated;
   if (!(error > coarse_error)) return;
   ++counts_.coarse;
@@ -223,24 +162,17 @@ void Estimator::check_integration() noexcept {
   counts_.coarse_state = state;
 }
 
+void Estimator::prepare() noexcept {
+  // A node that gives way to the next measurement is taken back first, and with it what was prepared.
+  if (!grid_.ends_open()) method_->prepare();
+}
+
 const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noexcept {
-  while (measurements_.size() > 0 && measurements_.time(0) <= time + timeline_.tolerance) {
-    const double stamp = measurements_.time(0);
-    // Measurements with the same stamp, e.g. of two sensors, make one node.
-    std::size_t same = 1;
-    double* merged = measurements_.values(0);
-    while (same < measurements_.size() && measurements_.time(same) <= stamp + timeline_.tolerance) {
-      for (std::size_t j = 0; j < nothing_.size(); ++j)
-        if (const double value = measurements_.values(same)[j]; !std::isnan(value)) merged[j] = value;
-      ++same;
-    }
-    add_nodes_until(stamp, merged);
-    measurements_.drop_front(same);
-  }
-  if (!started_) return estimate_;
+  if (has_started() || !std::isnan(time)) take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time);
+  if (!has_started()) return estimate_;
   if (stale_) {
     method_->estimate(estimate_, deadline);
-    estimate_.time = node_times_[newest_ % remembered_nodes];
+    estimate_.time = grid_.time();
     stale_ = false;
     ++counts_.estimates;
     counts_.fallbacks += estimate_.fallback;

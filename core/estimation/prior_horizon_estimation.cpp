@@ -19,8 +19,8 @@ namespace {
 constexpr double advantage = 2.0;
 
 BankEstimation::Setup with_memory(BankEstimation::Setup filters, int horizon) {
-  // Those of the window, and the one that leaves it.
-  filters.remembered_nodes = std::max(filters.remembered_nodes, horizon + 2);
+  // Those of the window, the one that leaves it, and one from where a late measurement at the first of them is used.
+  filters.remembered_nodes = std::max(filters.remembered_nodes, horizon + 3);
   return filters;
 }
 
@@ -73,11 +73,11 @@ void PriorHorizonEstimation::start(const double* outputs) noexcept {
   filters_.start(outputs);
 }
 
-void PriorHorizonEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
-  filters_.add_node(duration, inputs, outputs);
+void PriorHorizonEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+  filters_.add(interval, outputs);
 }
 
-bool PriorHorizonEstimation::amend(int back, const double* outputs) noexcept { return filters_.amend(back, outputs); }
+void PriorHorizonEstimation::rewind(int nodes) noexcept { filters_.rewind(nodes); }
 
 /// What the window has found of the outliers in the nodes that leave it now, which is more than their innovations said,
 /// goes to the bank: the arrival cost shall not bring back what the window had down-weighted.
@@ -109,6 +109,7 @@ void PriorHorizonEstimation::fill_interval(int interval, std::int64_t number) no
   std::copy_n(node.inputs, nu, inputs);
   std::fill(inputs + nu, inputs + process_model_->input_count(), 0.0);
   std::copy_n(node.outputs, model().output_count(), problem_.output(interval + 1));
+  problem_.between(interval).assign(*node.between);
   const auto place = static_cast<std::size_t>(number % static_cast<std::int64_t>(advances_.size()));
   double* const data = known_data_.data() + place * process_model_->data_count();
   const Advance advance{number, law_, node.duration, node.distance};

@@ -122,6 +122,10 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
       .automatic_integer("substeps", &E::substeps,
                          "integration steps per interval; auto: as many as the model's time constants ask for",
                          between(1, 1000))
+      .integer("between", &E::most_between,
+               "measurements that an interval has room for between its two nodes, each at its own time; if there are "
+               "more, it ends early, in a further node",
+               between(0, 10000))
       .integer("heading_starts", &E::heading_starts,
                "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
       .choice("covariance", &E::covariance, {{"bank", BlockCovariance::bank}, {"blocks", BlockCovariance::blocks}},
@@ -149,6 +153,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
              .horizon = options_.horizon,
              .substeps = 1,  // until the parameters at the start are known
              .heading_starts = options_.heading_starts,
+             .most_between = options_.most_between,
              .arrival = ArrivalOptions::table().parse(options_.arrival, "estimator: arrival").name,
              .robust = {},
              .walks = {},

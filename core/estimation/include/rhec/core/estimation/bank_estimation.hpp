@@ -30,8 +30,11 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   const Model& model() const noexcept override { return history_.bank().model(); }
   int substeps() const noexcept override { return setup_.bank.substeps; }
   void start(const double* outputs) noexcept override;
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
-  bool amend(int back, const double* outputs) noexcept override;
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  int most_between() const noexcept override { return setup_.bank.most_between; }
+  int reach() const noexcept override;
+  int most_reach() const noexcept override;
+  void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override;
@@ -55,6 +58,7 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
 
  private:
   void start_bank_if_found() noexcept;
+  int before_bank() const noexcept;
 
   Setup setup_;
   BankHistory history_;

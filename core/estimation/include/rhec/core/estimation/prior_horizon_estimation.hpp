@@ -41,8 +41,11 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   const Model& model() const noexcept override { return filters_.model(); }
   int substeps() const noexcept override { return problem_.substeps(); }
   void start(const double* outputs) noexcept override;
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
-  bool amend(int back, const double* outputs) noexcept override;
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  int most_between() const noexcept override { return filters_.most_between(); }
+  int reach() const noexcept override { return filters_.reach(); }
+  int most_reach() const noexcept override { return filters_.most_reach(); }
+  void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override { return filters_.output_noise(output); }

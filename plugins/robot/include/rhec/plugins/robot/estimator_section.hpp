@@ -22,6 +22,7 @@ struct RHEC_EXPORT EstimatorOptions {
   int horizon = RheProblem::Setup{}.max_intervals;
   Integrator integrator = Integrator::runge_kutta;
   std::optional<int> substeps = {};  ///< none: chosen for the model
+  int most_between = 64;
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
   BlockCovariance covariance = BlockCovariance::bank;
   Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, memory, initial, robust, solver;
