@@ -22,6 +22,11 @@ NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Time
   if (!(timeline.tolerance >= 0.0 && timeline.tolerance < timeline.longest_interval))
     throw Error(fmt::format("estimator: tolerance {} s; expected a number from 0 to below the longest interval, {} s",
                             timeline.tolerance, timeline.longest_interval));
+  if (!timeline.delays.empty() && std::ssize(timeline.delays) != method.model().output_count())
+    throw Error(fmt::format("estimator: {} delays given; expected {}, one an output, or none", timeline.delays.size(),
+                            method.model().output_count()));
+  for (const double delay : timeline.delays)
+    if (!std::isfinite(delay)) throw Error("estimator: a delay that is not finite");
   if (timeline.capacity < 1) throw Error("estimator: capacity 0; expected room for at least 1 row");
   const Model& model = method.model();
   return {.step = timeline.longest_interval,
@@ -53,6 +58,7 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
   measured_inputs_ = input_.size() - m.description().noisy_states.size();
   next_.assign(m.state_count(), 0.0);
   values_.assign(std::max(m.output_count(), m.input_count()), 0.0);
+  delayed_.assign(m.output_count(), 0.0);
 }
 
 void Estimator::clear_estimates() noexcept {
@@ -86,8 +92,24 @@ void Estimator::push_measurement(double time, const double* outputs) noexcept {
     ++counts_.dropped;
     return;
   }
+  // Where delays differ, single outputs go to times of their own.
+  const std::vector<double>& delays = timeline_.delays;
+  if (delays.empty() || std::ranges::all_of(delays, [&](double each) { return each == delays.front(); }))
+    return push(time - (delays.empty() ? 0.0 : delays.front()), values_.data());
+  for (std::size_t first = 0; first < delays.size(); ++first) {
+    if (std::find(delays.begin(), delays.begin() + first, delays[first]) != delays.begin() + first) continue;
+    bool any = false;
+    for (std::size_t j = 0; j < delays.size(); ++j) {
+      delayed_[j] = delays[j] == delays[first] ? values_[j] : missing_value;
+      any = any || !std::isnan(delayed_[j]);
+    }
+    if (any) push(time - delays[first], delayed_.data());
+  }
+}
+
+void Estimator::push(double time, const double* outputs) noexcept {
   const std::int64_t dropped = grid_.dropped();
-  const NodeGrid::Place place = grid_.push_measurement(time, values_.data(), method_->reach());
+  const NodeGrid::Place place = grid_.push_measurement(time, outputs, method_->reach());
   if (place == NodeGrid::Place::late) ++counts_.late;
   counts_.dropped += grid_.dropped() - dropped;
 }

@@ -53,6 +53,7 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   }
   const PriorBank& bank() const noexcept { return history_.bank(); }
   BankHistory& history() noexcept { return history_; }
+  const BankHistory& history() const noexcept { return history_; }
   /// Whether the bank does not work yet, since the heading is unknown.
   bool is_searching() const noexcept { return searching_; }
 

@@ -27,6 +27,9 @@ class RHEC_EXPORT Estimator {
     double longest_interval = 0.2;  ///< [s]; a gap that would need more than 1000 nodes is divided into 1000
     double tolerance = 1e-6;        ///< stamps closer than this are one [s]
     std::size_t capacity = 4096;    ///< rows of inputs, and of measurements: of the horizon, and what waits
+    /// By output, how much later than it was measured it is stamped [s]; none: not at all. Outputs of one measurement
+    /// go to the times at which each was measured.
+    std::vector<double> delays = {};
   };
   explicit Estimator(std::unique_ptr<EstimationMethod> method) : Estimator(std::move(method), Timeline{}) {}
   /// Throws Error if a number of the timeline is out of range.
@@ -69,6 +72,7 @@ class RHEC_EXPORT Estimator {
   const Model& model() const noexcept { return method_->model(); }
 
  private:
+  void push(double time, const double* outputs) noexcept;
   void take_in(double until) noexcept;
   void add_node() noexcept;
   void predict_to(double time) noexcept;
@@ -84,7 +88,7 @@ class RHEC_EXPORT Estimator {
   StepError step_error_;
   double worst_error_ = 0.0;         ///< of the intervals that were coarse
   std::size_t measured_inputs_ = 0;  ///< all but process noise, which is 0
-  std::vector<double> input_, next_, values_;
+  std::vector<double> input_, next_, values_, delayed_;
 };
 
 }  // namespace rhec

@@ -66,6 +66,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   const ProcessModel& processes() const noexcept { return *process_model_; }
   void hand_weights_on() noexcept;
   void choose_law() noexcept;
+  int& law_at(std::int64_t number) noexcept { return laws_[static_cast<std::size_t>(number) % laws_.size()]; }
   void fill_window() noexcept;
   void fill_interval(int interval, std::int64_t number) noexcept;
   void write_arrival(const double* saved) noexcept;
@@ -96,6 +97,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   Window window_;
   bool has_window_ = false, has_solution_ = false;
   int law_ = 0;
+  std::vector<int> laws_;  ///< at the last nodes, in a ring
   Eigen::VectorXd mean_, member_mean_, shift_;
   Eigen::MatrixXd mixture_, member_covariance_, predicted_;
   std::unique_ptr<InformationOf> information_;

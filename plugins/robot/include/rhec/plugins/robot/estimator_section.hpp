@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/estimation/estimator.hpp"
@@ -25,7 +26,7 @@ struct RHEC_EXPORT EstimatorOptions {
   int most_between = 64;
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
   BlockCovariance covariance = BlockCovariance::bank;
-  Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, memory, initial, robust, solver;
+  Settings delays, arrival, process_noise, restart_sigma, block_sigma, priors, bank, memory, initial, robust, solver;
   static OptionTable<EstimatorOptions> table(const EstimatorMakers& makers);
 };
 
@@ -62,6 +63,7 @@ class RHEC_EXPORT EstimatorSection {
   EstimatorMakers makers_;
   EstimatorOptions options_;
   EstimatorParts parts_;
+  std::vector<double> delays_;      ///< by output
   bool has_initial_state_ = false;  ///< the section gives the initial state
 };
 
