@@ -53,12 +53,15 @@ class TimedMethod final : public EstimationMethod {
   const Model& model() const noexcept override { return method_->model(); }
   int substeps() const noexcept override { return method_->substeps(); }
   void start(const double* outputs) noexcept override { method_->start(outputs); }
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override {
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
     const auto begin = Ticks::now();
-    method_->add_node(duration, inputs, outputs);
+    method_->add(interval, outputs);
     times_->add_node.push_back(Ticks::microseconds(begin, Ticks::now()));
   }
-  bool amend(int back, const double* outputs) noexcept override { return method_->amend(back, outputs); }
+  int most_between() const noexcept override { return method_->most_between(); }
+  int reach() const noexcept override { return method_->reach(); }
+  int most_reach() const noexcept override { return method_->most_reach(); }
+  void rewind(int nodes) noexcept override { method_->rewind(nodes); }
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override {
     const auto begin = Ticks::now();
     method_->estimate(result, deadline);

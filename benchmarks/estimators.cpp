@@ -73,9 +73,9 @@ class Forwarding final : public EstimationMethod {
     time_ = 0.0;
     for (Beside& other : others_) other.estimator->push_measurement(time_, outputs);
   }
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override {
-    inner_->add_node(duration, inputs, outputs);
-    const double now = time_ + duration;
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
+    inner_->add(interval, outputs);
+    const double now = time_ + interval.duration;
     Late sample{now, std::vector<double>(outputs, outputs + model().output_count()), {}};
     sample.fixes.assign(sample.others.size(), std::numeric_limits<double>::quiet_NaN());
     const bool is_outlier = trouble_.outliers > 0.0 && random_.uniform() < trouble_.outliers;
@@ -86,7 +86,7 @@ class Forwarding final : public EstimationMethod {
     }
     waiting_.push_back(std::move(sample));
     for (Beside& other : others_) {
-      other.estimator->push_input(time_, inputs);
+      other.estimator->push_input(time_, interval.inputs);
       other.estimator->push_measurement(now, waiting_.back().others.data());
       if (std::ssize(waiting_) > trouble_.late)
         other.estimator->push_measurement(waiting_.front().time, waiting_.front().fixes.data());
@@ -94,7 +94,6 @@ class Forwarding final : public EstimationMethod {
     if (std::ssize(waiting_) > trouble_.late) waiting_.pop_front();
     time_ = now;
   }
-  bool amend(int back, const double* outputs) noexcept override { return inner_->amend(back, outputs); }
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override {
     inner_->estimate(result, deadline);
     for (Beside& other : others_) {

@@ -23,13 +23,13 @@ KalmanFilter make_filter(const RheProblem& like) {
   for (const double w : setup.input_weights) noise.input_variances.push_back(w > 0.0 ? 1.0 / w : 1e12);
   noise.parameter_lower = setup.parameter_lower;
   noise.parameter_upper = setup.parameter_upper;
-  return {like.shared_model(), std::move(noise), like.substeps()};
+  return {like.shared_model(), std::move(noise), like.substeps(), setup.most_between > 0};
 }
 
-/// Householder reduction of all columns but the last, in place: afterwards the upper triangle holds R, and the last
-/// column is multiplied by Q'.
-void triangularise(Eigen::MatrixXd& rows) noexcept {
-  const Eigen::Index m = rows.rows(), n = rows.cols() - 1;
+/// Householder reduction of the first m rows, of all columns but the last, in place: afterwards the upper triangle
+/// holds R, and the last column is multiplied by Q'.
+void triangularise(Eigen::MatrixXd& rows, Eigen::Index m) noexcept {
+  const Eigen::Index n = rows.cols() - 1;
   for (Eigen::Index k = 0; k < n; ++k) {
     double square = 0.0;
     for (Eigen::Index r = k; r < m; ++r) square += rows(r, k) * rows(r, k);
@@ -68,7 +68,11 @@ ArrivalCost::ArrivalCost(ArrivalKind kind, const RheProblem& like, std::vector<P
   scale_ = Eigen::VectorXd::Ones(nx + np);
   factor_ = inverse_ = Eigen::MatrixXd::Identity(nx + np, nx + np);
   const int unknowns = nx + nu + 2 * np;  // x_0, u_0, p_0 and, on a ramp, its change
-  rows_ = Eigen::MatrixXd::Zero(unknowns + ny, unknowns + 1);
+  const int between = like.setup().most_between * ny;
+  between_weights_.assign(between, 1.0);
+  between_rows_.assign(static_cast<std::size_t>(between) * (1 + unknowns), 0.0);
+  between_scratch_.assign(between > 0 ? like.scratch_size() : 0, 0.0);
+  rows_ = Eigen::MatrixXd::Zero(unknowns + ny + between, unknowns + 1);
   map_ = spread_ = Eigen::MatrixXd::Zero(nx + np, unknowns);
   shift_ = Eigen::VectorXd::Zero(unknowns);
   next_mean_ = Eigen::VectorXd::Zero(nx + np);
@@ -186,8 +190,10 @@ void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate
   filter_.update(problem.output(0), robust_.data());
   problem.structure().inputs_on(solution, 0, inputs_.data());
   const bool ramp = std::any_of(ramp_variances_.begin(), ramp_variances_.end(), [](double v) { return v > 0.0; });
-  filter_.predict(problem.measured_input(0), inputs_.data(), problem.duration(0),
-                  ramp ? ramp_variances_.data() : nullptr);
+  if (!problem.setup().robust.empty())
+    problem.linearise_between(0, solution, between_weights_.data(), nullptr, between_scratch_);
+  filter_.predict(problem.between(0).over(problem.duration(0), problem.measured_input(0)), inputs_.data(),
+                  ramp ? ramp_variances_.data() : nullptr, between_weights_.data());
 }
 
 /// Rows in [dx; du; dp; dramp] about the solution: prior, outputs, measured inputs, ramp. Their QR factor R gives the
@@ -258,7 +264,8 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
     for (int c = 0; c < nx; ++c) rows_(row, c) = weight * output_jacobian_[c * ny + j];
     right[row] = weight * difference;
   }
-  triangularise(rows_);
+  row = write_between(problem, solution, row);
+  triangularise(rows_, row);
   for (int r = unknowns - 1; r >= 0; --r) {
     double value = right[r];
     for (int c = r + 1; c < unknowns; ++c) value -= rows_(r, c) * shift_[c];
@@ -295,6 +302,35 @@ void ArrivalCost::smooth_first_interval(const RheProblem& problem, const Iterate
   }
   filter_.mean = next_mean_;
   filter_.covariance = inverse_;
+}
+
+/// Rows of the measurements between the first two nodes, from this row on; returns the row behind them.
+int ArrivalCost::write_between(const RheProblem& problem, const Iterate& solution, int row) noexcept {
+  const BetweenNodes& between = problem.between(0);
+  if (between.count() == 0) return row;
+  const Model& model = problem.model();
+  const int nx = model.state_count(), nu = model.input_count(), np = model.parameter_count(), ny = model.output_count();
+  const bool ramp = problem.structure().any_ramp();
+  problem.linearise_between(0, solution, between_weights_.data(), between_rows_.data(), between_scratch_);
+  const double* from = between_rows_.data();
+  for (int k = 0; k < between.count(); ++k) {
+    for (int j = 0; j < ny; ++j, from += 1 + nx + np + nu + (ramp ? np : 0)) {
+      if (std::isnan(between.outputs(k)[j])) continue;
+      const double weight = std::sqrt(between_weights_[k * ny + j] / filter_.noise().output_variances[j]);
+      // From [x; p; u; p_end] to [dx; du; dp; change].
+      const double* const gradient = from + 1;
+      for (int c = 0; c < nx; ++c) rows_(row, c) = weight * gradient[c];
+      for (int c = 0; c < nu; ++c) rows_(row, nx + c) = weight * gradient[nx + np + c];
+      for (int c = 0; c < np; ++c) {
+        const double by_end = ramp ? gradient[nx + np + nu + c] : 0.0;
+        rows_(row, nx + nu + c) = weight * (gradient[nx + c] + by_end);
+        rows_(row, nx + nu + np + c) = ramp_variances_[c] > 0.0 ? weight * by_end : 0.0;
+      }
+      rows_(row, rows_.cols() - 1) = -weight * from[0];
+      ++row;
+    }
+  }
+  return row;
 }
 
 }  // namespace rhec

@@ -38,6 +38,8 @@ BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup 
     }
     search.substeps = setup_.bank.substeps;
     search.heading_starts = setup_.heading_starts;
+    search.most_between = setup_.bank.most_between;
+    search.remembered_nodes = setup_.remembered_nodes;
     search_ = std::make_unique<FilterEstimation>(model, std::move(search));
     found_.state = setup_.initial_state;
     found_.parameters = mean_.tail(np);
@@ -50,6 +52,7 @@ BankEstimation::BankEstimation(const std::shared_ptr<const Model>& model, Setup 
 }
 
 void BankEstimation::reset() noexcept {
+  is_rebased_ = false;
   history_.bank().reset(setup_.initial_state, setup_.initial_covariance);
   if (place_) place_->reset();
   if (search_) search_->reset();
@@ -65,6 +68,7 @@ bool BankEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
     place_->reset();
   }
   searching_ = false;
+  is_rebased_ = true;
   history_.bank().replace_vehicle(mean.head(nx), covariance.topLeftCorner(nx, nx));
   history_.start(nothing_.data(), newest);
   if (place_) place_->add_node(history_);
@@ -93,29 +97,49 @@ void BankEstimation::start_bank_if_found() noexcept {
   searching_ = false;
 }
 
-void BankEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+void BankEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+  const bool is_new = interval.duration > 0.0 && std::isfinite(interval.duration);
   if (searching_) {
-    search_->add_node(duration, inputs, outputs);
-    if (duration > 0.0 && std::isfinite(duration)) ++searched_;
+    search_->add(interval, outputs);
+    if (is_new) ++searched_;
     return start_bank_if_found();
   }
-  if (!(duration > 0.0 && std::isfinite(duration))) {
-    amend(0, outputs);
-    return;
+  if (!is_new) {
+    history_.amend(0, outputs);
+    return follow_place(history_.newest());
   }
-  history_.add(duration, inputs, outputs);
+  history_.add(interval, outputs);
   if (place_) place_->add_node(history_);
 }
 
-bool BankEstimation::amend(int back, const double* outputs) noexcept {
-  if (!searching_) {
-    if (!history_.amend(back, outputs)) return false;
-    if (place_) place_->amend(history_, history_.newest() - back);
-    return true;
+/// How many nodes before the bank's first one can be taken back, together with that one; 0 if it is forgotten.
+int BankEstimation::before_bank() const noexcept {
+  if (is_rebased_ || history_.newest() - history_.count() + 1 > searched_ || history_.count() > setup_.remembered_nodes)
+    return 0;
+  return search_ ? search_->reach() : 1;
+}
+
+int BankEstimation::reach() const noexcept {
+  if (searching_) return search_->reach();
+  return std::min(history_.count(), std::max(setup_.remembered_nodes, 1)) - 1 + before_bank();
+}
+
+int BankEstimation::most_reach() const noexcept {
+  return std::max(setup_.remembered_nodes, 1) + (search_ ? search_->most_reach() : 0);
+}
+
+void BankEstimation::rewind(int nodes) noexcept {
+  if (!searching_ && history_.rewind(nodes)) {
+    if (place_) place_->rewind(history_);
+    return;
   }
-  if (!search_->amend(back, outputs)) return false;
-  start_bank_if_found();
-  return true;
+  if (!search_) return reset();
+  // The bank's first node was the search's newest.
+  if (!searching_) nodes -= history_.count() - 1;
+  if (place_) place_->reset();
+  searching_ = true;
+  searched_ = std::max<std::int64_t>(0, searched_ - nodes);
+  search_->rewind(nodes);
 }
 
 void BankEstimation::end_drive() noexcept {

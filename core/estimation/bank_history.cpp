@@ -17,6 +17,7 @@ BankHistory::BankHistory(PriorBank bank, int nodes, int filtered)
       ny_(static_cast<std::size_t>(bank_.model().output_count())),
       np_(static_cast<std::size_t>(bank_.model().state_count() + bank_.model().parameter_count())),
       intervals_(static_cast<std::size_t>(std::max(late_nodes_, filtered))),
+      between_(intervals_.size(), BetweenNodes(bank_.model().output_count(), bank_.most_between())),
       inputs_(intervals_.size() * nu_),
       outputs_(intervals_.size() * ny_),
       given_weights_(outputs_.size()),
@@ -41,7 +42,7 @@ void BankHistory::begin_node(const double* outputs) noexcept {
 void BankHistory::update(std::size_t place) noexcept {
   bank_.update(outputs_.data() + place * ny_, given_weights_.data() + place * ny_);
   for (std::size_t j = 0; j < ny_; ++j) used_weights_[place * ny_ + j] = bank_.robust_weight(static_cast<int>(j));
-  intervals_[place].log_likelihood = bank_.log_likelihood();
+  intervals_[place].log_likelihood = bank_.log_likelihood() + intervals_[place].between_log_likelihood;
   if (!keeps_filtered_) return;
   bank_.save(filtered_.data() + place * bank_.state_size());
   bank_.moments(mean_, covariance_);
@@ -53,17 +54,36 @@ void BankHistory::start(const double* outputs, std::int64_t number) noexcept {
   newest_ = number;
   count_ = 0;
   intervals_[place(number)] = {};
+  between_[place(number)].clear();
   begin_node(outputs);
 }
 
-void BankHistory::add(double duration, const double* inputs, const double* outputs) noexcept {
+void BankHistory::add(const MeasuredInterval& interval, const double* outputs) noexcept {
   RHEC_ASSERT(newest_ >= 0, "`start` comes first");
-  bank_.predict(inputs, duration);
-  ++newest_;
-  const std::size_t at = place(newest_);
-  intervals_[at] = {duration, bank_.distance()};
-  std::copy_n(inputs, nu_, inputs_.data() + at * nu_);
+  const std::size_t at = place(++newest_);
+  intervals_[at] = {.duration = interval.duration};
+  between_[at].assign(interval);
+  std::copy_n(interval.inputs, nu_, inputs_.data() + at * nu_);
+  predict(at);
   begin_node(outputs);
+}
+
+/// Over the interval before a node.
+void BankHistory::predict(std::size_t place) noexcept {
+  bank_.predict(between_[place].over(intervals_[place].duration, inputs_.data() + place * nu_));
+  intervals_[place].distance = bank_.distance();
+  intervals_[place].between_log_likelihood = bank_.between_log_likelihood();
+}
+
+bool BankHistory::rewind(int nodes) noexcept {
+  if (nodes < 0 || nodes >= count_) return false;
+  if (nodes == 0) return true;
+  newest_ -= nodes;
+  count_ -= nodes;
+  const std::size_t at = place(newest_);
+  bank_.restore(predicted_.data() + at * bank_.state_size());
+  update(at);
+  return true;
 }
 
 bool BankHistory::amend(int back, const double* outputs) noexcept {
@@ -81,8 +101,7 @@ void BankHistory::filter_from(std::int64_t number) noexcept {
   update(place(number));
   for (++number; number <= newest_; ++number) {
     const std::size_t at = place(number);
-    bank_.predict(inputs_.data() + at * nu_, intervals_[at].duration);
-    intervals_[at].distance = bank_.distance();
+    predict(at);
     bank_.save(predicted_.data() + at * bank_.state_size());
     update(at);
   }
@@ -111,6 +130,7 @@ BankHistory::Node BankHistory::node(std::int64_t number) const noexcept {
           .distance = intervals_[at].distance,
           .inputs = inputs_.data() + at * nu_,
           .outputs = outputs_.data() + at * ny_,
+          .between = &between_[at],
           .predicted = predicted_.data() + at * bank_.state_size(),
           .robust_weights = used_weights_.data() + at * ny_,
           .log_likelihood = intervals_[at].log_likelihood,

@@ -19,14 +19,14 @@ void BankedCovariance::start(const double* outputs) noexcept {
   bank_.start(outputs);
 }
 
-void BankedCovariance::add_node(double duration, const double* inputs, const double* outputs) noexcept {
-  blocks_->add_node(duration, inputs, outputs);
-  bank_.add_node(duration, inputs, outputs);
+void BankedCovariance::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+  blocks_->add(interval, outputs);
+  bank_.add(interval, outputs);
 }
 
-bool BankedCovariance::amend(int back, const double* outputs) noexcept {
-  bank_.amend(back, outputs);
-  return blocks_->amend(back, outputs);
+void BankedCovariance::rewind(int nodes) noexcept {
+  blocks_->rewind(nodes);
+  bank_.rewind(nodes);
 }
 
 void BankedCovariance::reset() noexcept {

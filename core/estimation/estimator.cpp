@@ -13,9 +13,31 @@
 namespace rhec {
 namespace {
 
-constexpr std::size_t remembered_nodes = 1024;
 constexpr int checked_interval = 16;  // of so many, the integration of one is checked
-constexpr int most_parts = 1000;      // largest number of parts of one gap, or of one prediction
+constexpr int most_parts = 1000;      // largest number of parts of one prediction
+
+NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Timeline& timeline) {
+  if (!(timeline.longest_interval > 0.0))
+    throw Error(fmt::format("estimator: longest interval {} s; expected a positive number", timeline.longest_interval));
+  if (!(timeline.tolerance >= 0.0 && timeline.tolerance < timeline.longest_interval))
+    throw Error(fmt::format("estimator: tolerance {} s; expected a number from 0 to below the longest interval, {} s",
+                            timeline.tolerance, timeline.longest_interval));
+  if (!timeline.delays.empty() && std::ssize(timeline.delays) != method.model().output_count())
+    throw Error(fmt::format("estimator: {} delays given; expected {}, one an output, or none", timeline.delays.size(),
+                            method.model().output_count()));
+  for (const double delay : timeline.delays)
+    if (!std::isfinite(delay)) throw Error("estimator: a delay that is not finite");
+  if (timeline.capacity < 1) throw Error("estimator: capacity 0; expected room for at least 1 row");
+  const Model& model = method.model();
+  return {.step = timeline.longest_interval,
+          .tolerance = timeline.tolerance,
+          .capacity = timeline.capacity,
+          .outputs = model.output_count(),
+          .inputs = model.input_count(),
+          .noises = static_cast<int>(model.description().noisy_states.size()),
+          .most_between = method.most_between(),
+          .reach = method.most_reach()};
+}
 
 /// Number of equal parts of a duration, each at most `longest`.
 int parts_of(double duration, double longest) noexcept {
@@ -25,56 +47,18 @@ int parts_of(double duration, double longest) noexcept {
 
 }  // namespace
 
-Estimator::Rows::Rows(std::size_t capacity, int width)
-    // Space for twice the rows, so that rows are moved to the front only once in `capacity` drops.
-    : capacity_(capacity), width_(width), times_(2 * capacity), values_(2 * capacity * width) {}
-
-bool Estimator::Rows::insert(double time, const double* values) noexcept {
-  const bool full = count_ == capacity_;
-  if (full) drop_front(1);
-  if (first_ + count_ == times_.size()) {
-    std::move(times_.begin() + first_, times_.end(), times_.begin());
-    std::move(values_.begin() + first_ * width_, values_.end(), values_.begin());
-    first_ = 0;
-  }
-  std::size_t at = first_ + count_;
-  for (; at > first_ && times_[at - 1] > time; --at) {
-    times_[at] = times_[at - 1];
-    std::copy_n(values_.begin() + (at - 1) * width_, width_, values_.begin() + at * width_);
-  }
-  times_[at] = time;
-  std::copy_n(values, width_, values_.begin() + at * width_);
-  ++count_;
-  return !full;
-}
-
-void Estimator::Rows::drop_front(std::size_t rows) noexcept {
-  first_ += rows;
-  count_ -= rows;
-  if (count_ == 0) first_ = 0;
-}
-
 Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline)
     : method_(std::move(method)),
       timeline_(timeline),
-      measurements_(timeline.capacity, method_->model().output_count()),
-      inputs_(timeline.capacity, method_->model().input_count()),
+      grid_(grid_setup(*method_, timeline)),
       step_error_(method_->model()) {
-  if (!(timeline.longest_interval > 0.0))
-    throw Error(fmt::format("estimator: longest interval {} s; expected a positive number", timeline.longest_interval));
-  if (!(timeline.tolerance >= 0.0 && timeline.tolerance < timeline.longest_interval))
-    throw Error(fmt::format("estimator: tolerance {} s; expected a number from 0 to below the longest interval, {} s",
-                            timeline.tolerance, timeline.longest_interval));
-  if (timeline.capacity < 1) throw Error("estimator: capacity 0; expected room for at least 1 row");
   const Model& m = method_->model();
   clear_estimates();
-  node_times_.assign(remembered_nodes, 0.0);
-  mean_.assign(m.input_count(), 0.0);
-  measured_inputs_ = mean_.size() - m.description().noisy_states.size();
-  weight_.assign(m.input_count(), 0.0);
-  nothing_.assign(m.output_count(), std::numeric_limits<double>::quiet_NaN());
+  input_.assign(m.input_count(), 0.0);
+  measured_inputs_ = input_.size() - m.description().noisy_states.size();
   next_.assign(m.state_count(), 0.0);
   values_.assign(std::max(m.output_count(), m.input_count()), 0.0);
+  delayed_.assign(m.output_count(), 0.0);
 }
 
 Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& timeline,
@@ -82,12 +66,15 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
     : Estimator(std::move(method), timeline) {
   watch_ = std::move(watch);
   const std::size_t sensors = watch_->sensors().size();
-  clocks_ =
-      std::make_unique<Clocks>(static_cast<int>(sensors) + 1,
-                               Clocks::Setup{.usual_interval = timeline.longest_interval, .behind = timeline.behind});
+  constexpr double least_lateness = 1.0;  // [s]
+  clocks_ = std::make_unique<Clocks>(
+      static_cast<int>(sensors) + 1,
+      Clocks::Setup{.usual_interval = timeline.longest_interval,
+                    .behind = std::max(least_lateness, method_->most_reach() * timeline.longest_interval)});
+  waiting_ = std::make_unique<StampedRows>(timeline.capacity, model().output_count());
   silent_.assign(sensors, 0);
-  input_sigmas_.assign(mean_.size(), 0.0);
-  late_ = nothing_;
+  input_sigmas_.assign(input_.size(), 0.0);
+  merged_.assign(model().output_count(), missing_value);
   for (Estimate* e : {&estimate_, &predicted_}) assess(*e, 0.0);
 }
 
@@ -106,31 +93,30 @@ void Estimator::clear_estimates() noexcept {
 
 void Estimator::reset() noexcept {
   method_->reset();
-  measurements_.clear();
-  inputs_.clear();
+  grid_.clear();
   clear_estimates();
-  started_ = stale_ = false;
-  newest_ = 0;
+  stale_ = false;
   counts_ = {};
   worst_error_ = 0.0;
   watched_ = 0.0;
   if (!watch_) return;
   watch_->reset();
   clocks_->reset();
+  waiting_->clear();
 }
 
 bool Estimator::reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
   const Eigen::Index n = model().state_count() + model().parameter_count();
   const bool fits = mean.size() == n && covariance.rows() == n && covariance.cols() == n;
-  if (!started_ || !fits || !mean.allFinite() || !covariance.allFinite()) return false;
+  if (!has_started() || !fits || !mean.allFinite() || !covariance.allFinite()) return false;
   if (!method_->rebase(mean, covariance)) return false;
+  grid_.settle(method_->reach());
   if (watch_) watch_->restart(mean, covariance);
   stale_ = true;
   return true;
 }
 
 double Estimator::place_on_timeline(double stamp, int source) noexcept {
-  if (!clocks_) return stamp;
   const double time = clocks_->take(source, stamp);
   counts_.clocks_set = clocks_->settings();
   return time;
@@ -142,7 +128,7 @@ double Estimator::place_on_timeline(double stamp, const double* outputs) noexcep
   bool is_placed = false;
   for (std::size_t s = 0; s < watch_->sensors().size(); ++s) {
     const std::vector<int>& all = watch_->sensors()[s].outputs;
-    if (std::all_of(all.begin(), all.end(), [&](int j) { return std::isnan(outputs[j]); })) continue;
+    if (std::ranges::all_of(all, [&](int j) { return std::isnan(outputs[j]); })) continue;
     const int source = static_cast<int>(s);
     if (!is_placed) {
       time = place_on_timeline(stamp, source);
@@ -155,108 +141,122 @@ double Estimator::place_on_timeline(double stamp, const double* outputs) noexcep
 }
 
 void Estimator::push_measurement(double time, const double* outputs) noexcept {
-  for (std::size_t j = 0; j < nothing_.size(); ++j) {
+  for (int j = 0; j < model().output_count(); ++j) {
     values_[j] = cleaned(outputs[j]);
     counts_.missing += std::isnan(values_[j]);
   }
-  outputs = values_.data();
-  if (watch_) time = place_on_timeline(time, outputs);
+  if (watch_) time = place_on_timeline(time, values_.data());
   if (!std::isfinite(time)) {
     ++counts_.dropped;
     return;
   }
-  const double newest_time = node_times_[newest_ % remembered_nodes];
-  if (!started_ || time > newest_time + timeline_.tolerance) {
-    if (!measurements_.insert(time, outputs)) ++counts_.dropped;
-    return;
+  // Where delays differ, single outputs go to times of their own.
+  const std::vector<double>& delays = timeline_.delays;
+  if (delays.empty() || std::ranges::all_of(delays, [&](double each) { return each == delays.front(); }))
+    return push(time - (delays.empty() ? 0.0 : delays.front()), values_.data());
+  for (std::size_t first = 0; first < delays.size(); ++first) {
+    if (std::find(delays.begin(), delays.begin() + first, delays[first]) != delays.begin() + first) continue;
+    bool any = false;
+    for (std::size_t j = 0; j < delays.size(); ++j) {
+      delayed_[j] = delays[j] == delays[first] ? values_[j] : missing_value;
+      any = any || !std::isnan(delayed_[j]);
+    }
+    if (any) push(time - delays[first], delayed_.data());
   }
-  if (watch_) watch_->judge_late(time, values_.data());
-  if (!take_late(time, outputs)) ++counts_.dropped;
 }
 
-/// Merges outputs into the node at their time. False if there is none within reach.
-bool Estimator::take_late(double time, const double* outputs) noexcept {
-  for (std::size_t back = 0; back <= std::min(newest_, remembered_nodes - 1); ++back) {
-    if (std::abs(node_times_[(newest_ - back) % remembered_nodes] - time) > timeline_.tolerance) continue;
-    if (!method_->amend(static_cast<int>(back), outputs)) return false;
-    ++counts_.late;
-    stale_ = true;
-    return true;
+void Estimator::push(double time, const double* outputs) noexcept {
+  if (!watch_) return push_judged(time, outputs);
+  if (!has_started() || time > watched_ + timeline_.tolerance) {
+    counts_.dropped += waiting_->is_full();
+    waiting_->insert(time, outputs);
+    return;
   }
-  return false;
+  std::copy_n(outputs, merged_.size(), merged_.begin());
+  watch_->judge_late(time, merged_.data());
+  push_judged(time, merged_.data());
+}
+
+void Estimator::push_judged(double time, const double* outputs) noexcept {
+  const std::int64_t dropped = grid_.dropped();
+  const NodeGrid::Place place = grid_.push_measurement(time, outputs, method_->reach());
+  if (place == NodeGrid::Place::late) ++counts_.late;
+  counts_.dropped += grid_.dropped() - dropped;
 }
 
 void Estimator::push_input(double time, const double* inputs) noexcept {
-  if (clocks_) time = place_on_timeline(time, static_cast<int>(watch_->sensors().size()));
+  if (watch_) time = place_on_timeline(time, inputs_source());
   if (!std::isfinite(time)) return;
   for (std::size_t j = 0; j < measured_inputs_; ++j) values_[j] = cleaned(inputs[j]);
   if (watch_) watch_->clean_inputs(values_.data());
-  inputs_.insert(time, values_.data());
+  grid_.push_input(time, values_.data());
 }
 
-/// Mean over an interval of inputs that hold from their stamps on; NaN if none is known.
-void Estimator::mean_input(double from, double to) noexcept {
-  std::fill(mean_.begin(), mean_.end(), 0.0);
-  std::fill(weight_.begin(), weight_.end(), 0.0);
-  for (std::size_t i = 0; i < inputs_.size(); ++i) {
-    const double start = std::max(inputs_.time(i), from);
-    const double end = i + 1 < inputs_.size() ? std::min(inputs_.time(i + 1), to) : to;
-    if (inputs_.time(i) >= to - timeline_.tolerance) break;
-    const double seconds = end - start;
-    if (seconds <= 0.0) continue;
-    for (std::size_t j = 0; j < mean_.size(); ++j) {
-      const double value = inputs_.values(i)[j];
-      if (std::isnan(value)) continue;
-      mean_[j] += value * seconds;
-      weight_[j] += seconds;
-    }
+/// Makes the nodes of all that is stamped up to a time, those anew that it has changed.
+void Estimator::take_in(double until) noexcept {
+  if (const int outdated = grid_.outdated(until, method_->reach()); outdated > 0) {
+    method_->rewind(outdated);
+    grid_.take_back(outdated);
+    counts_.nodes -= outdated;
+    stale_ = true;
   }
-  for (std::size_t j = 0; j < mean_.size(); ++j)
-    mean_[j] = weight_[j] > 0.0 ? mean_[j] / weight_[j] : std::numeric_limits<double>::quiet_NaN();
-  std::fill(mean_.begin() + static_cast<std::ptrdiff_t>(measured_inputs_), mean_.end(), 0.0);
+  bool any = false;
+  for (; grid_.make_next(until); any = true) add_node();
+  if (any) grid_.settle(method_->reach());
 }
 
-void Estimator::add_node(double time, const double* outputs) noexcept {
-  if (!started_) {
-    method_->start(outputs);
-    started_ = true;
-    newest_ = 0;
+void Estimator::add_node() noexcept {
+  if (grid_.count() == 1) {
+    method_->start(grid_.outputs());
   } else {
-    const double last = node_times_[newest_ % remembered_nodes];
-    mean_input(last, time);
-    method_->add_node(time - last, mean_.data(), outputs);
-    ++newest_;
+    method_->add(grid_.interval(), grid_.outputs());
   }
-  node_times_[newest_ % remembered_nodes] = time;
   ++counts_.nodes;
   stale_ = true;
-  // Of the input rows before this node, only the last one still holds.
-  std::size_t used = 0;
-  while (used + 1 < inputs_.size() && inputs_.time(used + 1) <= time) ++used;
-  inputs_.drop_front(used);
 }
 
-void Estimator::add_nodes_until(double time, const double* outputs) noexcept {
-  if (started_) {
-    const double last = node_times_[newest_ % remembered_nodes];
-    const int parts = parts_of(time - last, timeline_.longest_interval);
-    for (int i = 1; i < parts; ++i) add_node(last + (time - last) * i / parts, nothing_.data());
+/// Judges what is stamped up to a time, in its order, and hands on what passes.
+void Estimator::judge_waiting(double until) noexcept {
+  while (waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance) {
+    const double time = waiting_->time(0);
+    std::fill(merged_.begin(), merged_.end(), missing_value);
+    std::size_t same = 0;  // rows with this stamp, e.g. of two sensors
+    for (; same < waiting_->size() && waiting_->time(same) <= time + timeline_.tolerance; ++same)
+      for (std::size_t j = 0; j < merged_.size(); ++j)
+        if (const double value = waiting_->values(same)[j]; !std::isnan(value)) merged_[j] = value;
+    waiting_->drop_front(same);
+    const SensorWatch::Finding finding = judge(time, merged_.data());
+    push_judged(time, merged_.data());
+    for (int i = 0; finding.release && i < watch_->held_count(); ++i)
+      push_judged(watch_->held()[i].time, watch_->held()[i].outputs.data());
+    if (finding.rebase || !watch_->is_active()) take_in(time);
+    if (finding.rebase) rebase(watch_->mean(), watch_->covariance());
+    const bool is_last = waiting_->size() == 0 || !(waiting_->time(0) <= until + timeline_.tolerance);
+    if (watch_->is_active() || is_last) continue;
+    // There is nothing to judge the next one by yet.
+    method_->estimate(estimate_, Clock::time_point::max());
+    watch_->follow(estimate_);
   }
-  add_node(time, outputs);
+}
+
+void Estimator::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+  if (!method_->rebase(mean, covariance)) return;
+  grid_.settle(method_->reach());
+  ++counts_.rebased;
+  stale_ = true;
 }
 
 /// Judges a row before it is used; what fails becomes NaN.
 SensorWatch::Finding Estimator::judge(double time, double* outputs) noexcept {
-  if (!watch_ || !started_) return {};
-  const double newest_input = clocks_->newest(static_cast<int>(watch_->sensors().size()));
-  if (time - newest_input > longest_silence(static_cast<int>(watch_->sensors().size()))) {
-    through_unknown_motion(watched_, time,
-                           [&](double duration) { watch_->advance(duration, mean_.data(), input_sigmas_.data()); });
-  } else {
-    mean_input(watched_, time);
-    watch_->advance(time - watched_, mean_.data());
-  }
+  const double last = watched_;
   watched_ = time;
+  if (!has_started()) return {};
+  if (time - clocks_->newest(inputs_source()) > longest_silence(inputs_source())) {
+    through_unknown_motion(last, time,
+                           [&](double duration) { watch_->advance(duration, input_.data(), input_sigmas_.data()); });
+  } else {
+    watch_->advance(time - last, grid_.mean_input(last, time));
+  }
   const SensorWatch::Finding finding = watch_->judge(time, outputs);
   counts_.rejected = 0;
   for (const SensorHealth& sensor : watch_->sensor_states()) counts_.rejected += sensor.rejected;
@@ -275,15 +275,14 @@ double Estimator::longest_silence(int source) const noexcept {
 template <class Function>
 void Estimator::through_unknown_motion(double from, double to, const Function& advance) noexcept {
   const int parts = parts_of(to - from, timeline_.longest_interval);
-  const int source = static_cast<int>(watch_->sensors().size());
-  const double newest_input = clocks_->newest(source), usual = clocks_->usual_interval(source);
+  const double newest_input = clocks_->newest(inputs_source()), usual = clocks_->usual_interval(inputs_source());
   const std::vector<Variable>& inputs = model().description().inputs;
   double known = 0.0;  // squared age of the last part, in parts
   for (int i = 0; i < parts; ++i) {
     const double begin = from + (to - from) * i / parts, end = from + (to - from) * (i + 1) / parts;
-    mean_input(begin, end);
+    std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
     for (std::size_t j = 0; j < measured_inputs_; ++j)
-      if (std::isnan(mean_[j])) mean_[j] = 0.0;
+      if (std::isnan(input_[j])) input_[j] = 0.0;
     const double age = std::isnan(newest_input) ? end - from : std::max(0.0, end - newest_input - usual);
     const double aged = age / (end - begin);  // in parts
     for (std::size_t j = 0; j < measured_inputs_; ++j) {
@@ -299,38 +298,37 @@ void Estimator::through_unknown_motion(double from, double to, const Function& a
 void Estimator::assess(Estimate& estimate, double time) noexcept {
   if (!watch_) return;
   const bool is_estimated = estimate.covariance.size() > 0 && estimate.covariance.diagonal().maxCoeff() > 0.0;
-  std::uint32_t reasons = !started_ || (is_estimated && !watch_->is_active()) ? reason::starting : 0;
+  std::uint32_t reasons = !has_started() || (is_estimated && !watch_->is_active()) ? reason::starting : 0;
   for (std::size_t s = 0; s < silent_.size(); ++s) {
     const int source = static_cast<int>(s);
-    silent_[s] = started_ && time - clocks_->newest(source) > longest_silence(source);
+    silent_[s] = has_started() && time - clocks_->newest(source) > longest_silence(source);
     if (clocks_->is_suspected(source)) reasons |= reason::clock;
   }
-  if (clocks_->is_suspected(static_cast<int>(silent_.size()))) reasons |= reason::clock;
+  if (clocks_->is_suspected(inputs_source())) reasons |= reason::clock;
   watch_->assess(estimate, silent_, reasons, estimate.health);
 }
 
 void Estimator::predict_to(double time) noexcept {
-  const double last = node_times_[newest_ % remembered_nodes];
+  const double last = grid_.time();
   predicted_ = estimate_;
   predicted_.predicted = true;
   if (watch_ && watch_->is_active())
     return through_unknown_motion(last, time, [&](double duration) {
-      watch_->predict(duration, mean_.data(), input_sigmas_.data(), predicted_);
+      watch_->predict(duration, input_.data(), input_sigmas_.data(), predicted_);
     });
-  mean_input(last, time);
-  for (double& u : mean_)
+  std::copy_n(grid_.mean_input(last, time), input_.size(), input_.begin());
+  for (double& u : input_)
     if (std::isnan(u)) u = 0.0;
   const double duration = time - last;
   Model::Intervals request;
   request.count = 1;
   request.states = estimate_.state.data();
-  request.inputs = mean_.data();
+  request.inputs = input_.data();
   request.parameters = estimate_.parameters.data();
   request.durations = &duration;
   request.substeps = method_->substeps() * parts_of(duration, timeline_.longest_interval);
   request.next_states = next_.data();
   method_->model().integrate(request);
-  predicted_.time = time;
   if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))
     std::copy(next_.begin(), next_.end(), predicted_.state.data());
 }
@@ -338,13 +336,14 @@ void Estimator::predict_to(double time) noexcept {
 /// Holds the newest interval's steps against twice as many, from the newest node on: what the vehicle does there can be
 /// faster than what was foreseen at set-up.
 void Estimator::check_integration() noexcept {
-  if (newest_ == 0) return;
-  const double duration = node_times_[newest_ % remembered_nodes] - node_times_[(newest_ - 1) % remembered_nodes];
-  for (double& u : mean_)
+  if (grid_.count() < 2) return;
+  const MeasuredInterval interval = grid_.interval();
+  std::copy_n(interval.inputs, input_.size(), input_.begin());
+  for (double& u : input_)
     if (std::isnan(u)) u = 0.0;
   int state = -1;
-  const double error = step_error_(estimate_.state.data(), mean_.data(), estimate_.parameters.data(), duration,
-                                   method_->substeps(), &state);
+  const double error = step_error_(estimate_.state.data(), input_.data(), estimate_.parameters.data(),
+                                   interval.duration, method_->substeps(), &state);
   ++counts_.integrated;
   if (!(error > coarse_error)) return;
   ++counts_.coarse;
@@ -353,32 +352,21 @@ void Estimator::check_integration() noexcept {
   counts_.coarse_state = state;
 }
 
+void Estimator::prepare() noexcept {
+  // A node that gives way to the next measurement is taken back first, and with it what was prepared.
+  if (!grid_.ends_open()) method_->prepare();
+}
+
 const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noexcept {
   double clock_offset = 0.0;
   if (watch_) {
     watch_->begin_innovations();
     clock_offset = clocks_->offset_of(time);
     time -= clock_offset;
+    judge_waiting(time);
   }
-  while (measurements_.size() > 0 && measurements_.time(0) <= time + timeline_.tolerance) {
-    const double stamp = measurements_.time(0);
-    // Measurements with the same stamp, e.g. of two sensors, make one node.
-    std::size_t same = 1;
-    double* merged = measurements_.values(0);
-    while (same < measurements_.size() && measurements_.time(same) <= stamp + timeline_.tolerance) {
-      for (std::size_t j = 0; j < nothing_.size(); ++j)
-        if (const double value = measurements_.values(same)[j]; !std::isnan(value)) merged[j] = value;
-      ++same;
-    }
-    const SensorWatch::Finding finding = judge(stamp, merged);
-    add_nodes_until(stamp, merged);
-    if (!watch_ || !watch_->is_active()) watched_ = stamp;
-    if (finding.rebase) counts_.rebased += method_->rebase(watch_->mean(), watch_->covariance());
-    for (int i = 0; finding.release && i < watch_->held_count(); ++i)
-      take_late(watch_->held()[i].time, watch_->held()[i].outputs.data());
-    measurements_.drop_front(same);
-  }
-  if (!started_) {
+  if (has_started() || !std::isnan(time)) take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time);
+  if (!has_started()) {
     assess(estimate_, time);
     return estimate_;
   }
@@ -390,7 +378,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
     counts_.fallbacks += estimate_.fallback;
     if (counts_.estimates % checked_interval == 0) check_integration();
   }
-  const double newest = node_times_[newest_ % remembered_nodes];
+  const double newest = grid_.time();
   estimate_.time = newest + clock_offset;
   if (watch_) estimate_.innovations = watch_->innovations();
   if (!std::isfinite(time) || time <= newest + timeline_.tolerance) {

@@ -27,7 +27,11 @@ FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Se
   if (setup_.initial_mean.size() != n || setup_.initial_covariance.rows() != n || setup_.initial_covariance.cols() != n)
     throw Error(fmt::format("filter: the initial mean and covariance must have the size {} of [x; p]", n));
   const int count = model->description().roles.heading >= 0 ? std::max(1, setup_.heading_starts) : 1;
-  for (int i = 0; i < count; ++i) bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps), 0.0});
+  for (int i = 0; i < count; ++i)
+    bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps, setup_.most_between > 0), 0.0});
+  if (setup_.remembered_nodes < 0) throw Error("filter: expected 0 remembered nodes or more");
+  const Moments moments{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), 0.0};
+  nodes_.assign(setup_.remembered_nodes + std::size_t{1}, Node{std::vector<Moments>(bank_.size(), moments), 1, 0});
   for (const double sigma : setup_.walk) ramp_variances_.push_back(sigma * sigma);
   no_input_.assign(model->input_count(), 0.0);
   predicted_.assign(model->output_count(), 0.0);
@@ -36,8 +40,11 @@ FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Se
 }
 
 void FilterEstimation::reset() noexcept {
+  is_rebased_ = false;
   alive_ = bank_.size();
   best_ = 0;
+  newest_ = -1;
+  remembered_ = 0;
   for (std::size_t i = 0; i < bank_.size(); ++i) {
     KalmanFilter& filter = bank_[i].filter;
     bank_[i].log_likelihood = 0.0;
@@ -60,6 +67,9 @@ bool FilterEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd
   best_ = 0;
   bank_[0].filter.mean = mean;
   bank_[0].filter.covariance = covariance;
+  is_rebased_ = true;
+  remembered_ = 0;
+  remember();
   return true;
 }
 
@@ -109,29 +119,57 @@ void FilterEstimation::take(const double* outputs) noexcept {
 void FilterEstimation::start(const double* outputs) noexcept {
   reset();
   take(outputs);
+  newest_ = 0;
+  remember();
 }
 
-void FilterEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
-  if (!(duration > 0.0) || !std::isfinite(duration)) {
+void FilterEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+  if (!(interval.duration > 0.0) || !std::isfinite(interval.duration)) {
     take(outputs);
-    return;
+    --remembered_;  // the same node
+    return remember();
   }
   for (std::size_t i = 0; i < alive_; ++i) {
-    if (setup_.has_ramps) {
-      bank_[i].filter.predict(inputs, no_input_.data(), duration, ramp_variances_.data());
-      continue;
-    }
-    bank_[i].filter.predict(inputs, no_input_.data(), duration);
-    for (std::size_t j = 0; j < setup_.walk.size(); ++j)
-      bank_[i].filter.add_parameter_variance(static_cast<int>(j), setup_.walk[j] * setup_.walk[j]);
+    KalmanFilter& filter = bank_[i].filter;
+    filter.predict(interval, no_input_.data(), setup_.has_ramps ? ramp_variances_.data() : nullptr);
+    bank_[i].log_likelihood += filter.between_log_likelihood();
+    for (std::size_t j = 0; !setup_.has_ramps && j < setup_.walk.size(); ++j)
+      filter.add_parameter_variance(static_cast<int>(j), setup_.walk[j] * setup_.walk[j]);
   }
   take(outputs);
+  ++newest_;
+  remember();
 }
 
-bool FilterEstimation::amend(int back, const double* outputs) noexcept {
-  if (back != 0) return false;  // a filter cannot use measurements of older nodes
-  take(outputs);
-  return true;
+/// Keeps what is known at the newest node.
+void FilterEstimation::remember() noexcept {
+  Node& kept = node(newest_);
+  kept.alive = alive_;
+  kept.best = best_;
+  for (std::size_t i = 0; i < alive_; ++i) {
+    kept.moments[i].mean = bank_[i].filter.mean;
+    kept.moments[i].covariance = bank_[i].filter.covariance;
+    kept.moments[i].log_likelihood = bank_[i].log_likelihood;
+  }
+  remembered_ = std::min(remembered_ + 1, static_cast<std::int64_t>(nodes_.size()));
+}
+
+int FilterEstimation::reach() const noexcept {
+  return static_cast<int>(remembered_ == newest_ + 1 && !is_rebased_ ? remembered_ : remembered_ - 1);
+}
+
+void FilterEstimation::rewind(int nodes) noexcept {
+  if (nodes > newest_) return reset();
+  newest_ -= nodes;
+  remembered_ -= nodes;
+  const Node& kept = node(newest_);
+  alive_ = kept.alive;
+  best_ = kept.best;
+  for (std::size_t i = 0; i < alive_; ++i) {
+    bank_[i].filter.mean = kept.moments[i].mean;
+    bank_[i].filter.covariance = kept.moments[i].covariance;
+    bank_[i].log_likelihood = kept.moments[i].log_likelihood;
+  }
 }
 
 void FilterEstimation::estimate(Estimate& result, Clock::time_point) noexcept {

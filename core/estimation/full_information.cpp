@@ -58,11 +58,12 @@ Iterate guess_from(const NodeLog& log, const RheProblem& problem) {
 }  // namespace
 
 SmoothedRun FullInformationEstimation::estimate(NodeLog log, Clock::time_point deadline) const {
-  for (auto* rows : {&log.outputs, &log.inputs}) std::ranges::transform(*rows, rows->begin(), cleaned);
+  clean(log);
   const int N = log.intervals(), nx = model_->state_count(), nu = model_->input_count(), np = model_->parameter_count();
   if (N < 1) throw Error("smoother: the log has fewer than two nodes; there is nothing between them to estimate");
   RheProblem::Setup problem_setup = setup_.problem;
   problem_setup.max_intervals = N;
+  problem_setup.most_between = log.most_between();
   problem_setup.one_block = one_block_parameters(setup_.blockings);
   for (int j = 0; j < np; ++j)
     if (const std::string reason = setup_.blockings[j]->why_not(N); !reason.empty())

@@ -12,7 +12,7 @@
 
 namespace rhec {
 
-KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps)
+KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, bool uses_between)
     : model_(std::move(model)),
       noise_(std::move(noise)),
       substeps_(substeps),
@@ -35,6 +35,12 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   scratch_.assign(model_->rows_scratch(1), 0.0);
   work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
   gain_ = image_ = zeros_ = correction_ = Eigen::VectorXd::Zero(n);
+  if (!uses_between) return;
+  const int wide = n + nu_ + np_;
+  wide_mean_ = wide_before_ = wide_gradient_ = wide_gain_ = wide_image_ = Eigen::VectorXd::Zero(wide);
+  wide_end_ = Eigen::VectorXd::Zero(np_);
+  wide_covariance_ = Eigen::MatrixXd::Zero(wide, wide);
+  transition_ = wide_work_ = Eigen::MatrixXd::Zero(n, wide);
 }
 
 void KalmanFilter::clip() noexcept {
@@ -111,6 +117,11 @@ void KalmanFilter::make_symmetric() noexcept {
   });
 }
 
+double KalmanFilter::input_variance(int input, const double* measured) const noexcept {
+  const double wide = 100.0 * model_->description().inputs[input].scale;
+  return std::isnan(measured[input]) ? wide * wide : noise_.input_variances[input];
+}
+
 void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration) noexcept {
   predict(measured_input, input_guess, duration, nullptr);
 }
@@ -160,8 +171,7 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
   });
   // Noise enters through the inputs and, on a ramp, through the change of the parameter over the interval.
   for (int j = 0; j < nu_; ++j) {
-    const double wide = 100.0 * model_->description().inputs[j].scale;
-    const double variance = std::isnan(measured_input[j]) ? wide * wide : noise_.input_variances[j];
+    const double variance = input_variance(j, measured_input);
     const double* by_input = jacobian_.data() + (nx_ + j) * nx_;
     for (int c = 0; c < nx_; ++c)
       for (int r = 0; r < nx_; ++r) next_covariance_(r, c) += by_input[r] * (variance * by_input[c]);

@@ -162,15 +162,17 @@ class LawSearch {
 }  // namespace
 
 Passage pass(const std::shared_ptr<const Model>& model, BankEstimation::Setup setup, const NodeLog& log) {
-  const std::ptrdiff_t nu = model->input_count(), ny = model->output_count(), N = log.intervals();
+  const int nu = model->input_count();
+  const std::ptrdiff_t ny = model->output_count(), N = log.intervals();
   setup.bank.memory = infinity;
   setup.remembered_nodes = 1;
+  setup.bank.most_between = log.most_between();
   BankEstimation filters(model, std::move(setup));
   Passage passage;
   filters.start(log.outputs.data());
   for (std::ptrdiff_t i = 0; i < N; ++i) {
     const bool is_searched = filters.is_searching();
-    filters.add_node(log.durations[i], log.inputs.data() + i * nu, log.outputs.data() + (i + 1) * ny);
+    filters.add(log.interval(static_cast<int>(i), nu), log.outputs.data() + (i + 1) * ny);
     passage.distances.push_back(is_searched ? std::numeric_limits<double>::quiet_NaN() : filters.bank().distance());
   }
   const auto found = filters.bank().log_likelihoods();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "rhec/core/estimation/measurement.hpp"
+
 namespace rhec {
 
 void fill_gaps(std::vector<double>& rows, int width) {
@@ -18,6 +20,13 @@ void fill_gaps(std::vector<double>& rows, int width) {
     if (!is_known(i)) std::copy_n(rows.begin() + (i + 1) * width, width, rows.begin() + i * width);
 }
 
+void clean(NodeLog& log) {
+  for (auto* rows : {&log.outputs, &log.inputs}) std::ranges::transform(*rows, rows->begin(), cleaned);
+  for (BetweenNodes& each : log.between)
+    for (int i = 0; i < each.count(); ++i)
+      std::transform(each.outputs(i), each.outputs(i) + each.width(), each.outputs(i), cleaned);
+}
+
 void fill_data(const NodeLog& log, int inputs, RheProblem& problem) {
   const int nu = problem.model().input_count(), ny = problem.model().output_count(), N = log.intervals();
   for (std::ptrdiff_t i = 0; i <= N; ++i) {
@@ -27,6 +36,7 @@ void fill_data(const NodeLog& log, int inputs, RheProblem& problem) {
     std::copy_n(log.inputs.data() + i * inputs, inputs, problem.measured_input(node));
     std::fill(problem.measured_input(node) + inputs, problem.measured_input(node) + nu, 0.0);
     problem.set_duration(node, log.durations[i]);
+    problem.between(node).assign(log.interval(node, inputs));
   }
 }
 

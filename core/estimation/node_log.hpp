@@ -11,8 +11,11 @@ namespace rhec {
 /// them).
 void fill_gaps(std::vector<double>& rows, int width);
 
-/// Copies outputs, durations and measured inputs of a log to a problem with as many intervals. The problem's model may
-/// have further inputs behind the log's `inputs`: these are measured as 0.
+/// What cannot be a measurement becomes missing.
+void clean(NodeLog& log);
+
+/// Copies outputs, those between nodes, durations and measured inputs of a log to a problem with as many intervals. The
+/// problem's model may have further inputs behind the log's `inputs`: these are measured as 0.
 void fill_data(const NodeLog& log, int inputs, RheProblem& problem);
 
 }  // namespace rhec

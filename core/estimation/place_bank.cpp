@@ -79,11 +79,12 @@ void PlaceBank::take_node(const BankHistory::Node& before, const BankHistory::No
     probability_ = stays + begins;
     bank_.take_share(begins / probability_, before.mean, before.covariance);
   }
-  bank_.predict(node.inputs, node.duration);
+  bank_.predict(node.between->over(node.duration, node.inputs));
   knows_ = bank_.knows_place();
   if (!knows_) return;
   bank_.update(node.outputs, node.robust_weights);
-  const double odds = std::log(probability_ / (1.0 - probability_)) + bank_.log_likelihood() - node.log_likelihood;
+  const double odds = std::log(probability_ / (1.0 - probability_)) + bank_.log_likelihood() +
+                      bank_.between_log_likelihood() - node.log_likelihood;
   const double probability = 1.0 / (1.0 + std::exp(-odds));
   probability_ = std::isfinite(probability) ? std::clamp(probability, least_probability, 1.0 - least_probability)
                                             : least_probability;

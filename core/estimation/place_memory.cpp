@@ -73,11 +73,17 @@ int PlaceMemory::remembered_nodes(const Setup& setup, int late_nodes) noexcept {
 void PlaceMemory::reset() noexcept {
   places_.reset();
   smoother_.reset();
+  advanced_ = {};
 }
 
 void PlaceMemory::add_node(BankHistory& history) noexcept {
   const BankHistory::Node node = history.node(history.newest());
-  setup_.map->advance(node.duration, node.distance);
+  // A node may come again, behind late measurements, or later than it was at first.
+  if (history.newest() >= advanced_.number) {
+    const Advanced before = history.newest() == advanced_.number ? advanced_ : Advanced{};
+    setup_.map->advance(std::max(0.0, node.duration - before.duration), std::max(0.0, node.distance - before.distance));
+    advanced_ = {history.newest(), node.duration, node.distance};
+  }
   places_.follow(history, history.newest());
   smoother_.work(history, *setup_.map);
 }

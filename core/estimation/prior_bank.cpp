@@ -132,6 +132,14 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   }
   surprises_.assign(setup_.robust.empty() ? 0 : ny_ * M, 0.0);
   find_loss_scales();
+  if (setup_.most_between > 0) {
+    const auto a = static_cast<std::size_t>(wide_count());
+    for (auto* v : {&wide_mean_, &wide_before_}) v->assign(a * M, 0.0);
+    wide_covariance_.assign(a * a * M, 0.0);
+    wide_work_.assign((2 * a * a + 3 * a) * M, 0.0);
+    wide_gradient_.assign(ny_ * a * M, 0.0);
+    transition_.assign(n * a * M, 0.0);
+  }
   next_.assign(nx * M, 0.0);
   jacobian_.assign(nx * columns * M, 0.0);
   predicted_.assign(ny_ * M, 0.0);
@@ -243,31 +251,46 @@ void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
   distance_ = 0.0;
 }
 
+/// Outputs at states (lanes x n_x), with their gradients: `predicted_` in lanes, `gradient_rows_` in rows.
+void PriorBank::observe_members(const double* states) noexcept {
+  model_->observe(
+      {.count = lanes_, .states = states, .outputs = output_rows_.data(), .jacobians = gradient_rows_.data()});
+  for (int m = 0; m < lanes_; ++m)
+    for (int j = 0; j < ny_; ++j) predicted_[j * lanes_ + m] = output_rows_[m * ny_ + j];
+}
+
 void PriorBank::update(const double* y, const double* robust_weights) noexcept {
   for (int m = 0; m < lanes_; ++m)
     for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean_[r * lanes_ + m];
-  model_->observe(
-      {.count = lanes_, .states = states_.data(), .outputs = output_rows_.data(), .jacobians = gradient_rows_.data()});
-  for (int m = 0; m < lanes_; ++m) {
-    for (int j = 0; j < ny_; ++j) {
-      predicted_[j * lanes_ + m] = output_rows_[m * ny_ + j];
+  observe_members(states_.data());
+  for (int m = 0; m < lanes_; ++m)
+    for (int j = 0; j < ny_; ++j)
       for (int c = 0; c < nx_; ++c) gradient_[(j * nx_ + c) * lanes_ + m] = gradient_rows_[(m * nx_ + c) * ny_ + j];
-    }
-  }
-  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
+  log_likelihood_ = take_outputs({.view = {lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()},
+                                  .gradient = gradient_.data(),
+                                  .before = states_.data(),
+                                  .before_entry = 1,
+                                  .before_lane = nx_},
+                                 y, robust_weights);
+}
+
+/// Takes in outputs whose predictions and gradients are known, and weighs the members by them. Returns the logarithm of
+/// their likelihood.
+double PriorBank::take_outputs(const Frame& frame, const double* y, const double* robust_weights) noexcept {
+  const BankView& view = frame.view;
+  const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(view.vehicle_states) * lanes_;
   std::fill(squares_.begin(), squares_.end(), 0.0);
   int taken = 0;
   for (int j = 0; j < ny_; ++j) {
     if (std::isnan(y[j])) continue;
     views_->outputs[taken++] = {.predicted = predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
-                                .gradient = gradient_.data() + static_cast<std::ptrdiff_t>(j) * nx_ * lanes_,
+                                .gradient = frame.gradient + j * entries,
                                 .variance = output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
                                 .measured = y[j],
                                 .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
   }
-  log_likelihood_ = 0.0;
-  if (taken == 0) return;
-  if (!setup_.robust.empty()) weigh_outputs(y, taken, robust_weights);
+  if (taken == 0) return 0.0;
+  if (!setup_.robust.empty()) weigh_outputs(frame, y, taken, robust_weights);
   bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                         innovation_variances_.data());
   double best = -std::numeric_limits<double>::infinity();
@@ -290,12 +313,13 @@ void PriorBank::update(const double* y, const double* robust_weights) noexcept {
     weights_[m] *= std::isfinite(likelihood) ? likelihood : 0.0;
     sum += weights_[m];
   }
-  log_likelihood_ = best + std::log(sum);
+  const double log_likelihood = best + std::log(sum);
   for (int m = 0; m < members_; ++m)
     weights_[m] = sum > 0.0 ? std::max(weights_[m] / sum, least_weight) : 1.0 / members_;
   sum = std::accumulate(weights_.begin(), weights_.begin() + members_, 0.0);
   for (int m = 0; m < members_; ++m) weights_[m] /= sum;
-  if (setup_.adapts_noise) adapt_noise(y);
+  if (setup_.adapts_noise) adapt_noise(frame, y);
+  return log_likelihood;
 }
 
 /// Ground covered on an interval, from the vehicle's motion at the mixture's mean.
@@ -357,37 +381,45 @@ void PriorBank::mix_members() noexcept {
 }
 
 void PriorBank::predict(const double* measured_input, double duration) noexcept {
+  begin_step(measured_input, duration);
+  take_step(duration);
+}
+
+/// All that an interval asks for before the members move: inputs, ground, processes, and another law.
+void PriorBank::begin_step(const double* measured_input, double duration) noexcept {
   for (int j = 0; j < nu_; ++j) {
     const bool missing = std::isnan(measured_input[j]);
     const double wide = 100.0 * model_->description().inputs[j].scale;
     input_[j] = missing ? 0.0 : measured_input[j];
     variances_[j] = missing ? wide * wide : setup_.input_variances[j];
   }
+  between_log_likelihood_ = 0.0;
   find_distance(input_.data(), duration);
   advance_processes(duration);
   if (setup_.map) follow_map();
   if (members_ > 1) mix_members();
-  take_step(input_.data(), duration);
 }
 
-void PriorBank::take_step(const double* input, double duration) noexcept {
+/// Integrates all members from a mean, [x; z] or the wider one, over a share of the interval: next state and Jacobian.
+void PriorBank::integrate_members(const double* mean, bool is_wide, double seconds, double share) noexcept {
   const int columns = nx_ + nu_ + 2 * np_;
   for (int m = 0; m < lanes_; ++m) {
-    for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean_[r * lanes_ + m];
-    for (int j = 0; j < nu_; ++j) inputs_[m * nu_ + j] = input[j];
-    durations_[m] = duration;
+    for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean[r * lanes_ + m];
+    for (int j = 0; j < nu_; ++j) inputs_[m * nu_ + j] = is_wide ? mean[(n_ + j) * lanes_ + m] : input_[j];
+    durations_[m] = seconds;
     for (int j = 0; j < np_; ++j) {
       const Process& process = processes_[j];
-      const double start = mean_[process.first * lanes_ + m];
+      const double start = mean[process.first * lanes_ + m];
       double end = start;
       if (process.ramp[m] != 0.0) {
         end = 0.0;
         for (int k = 0; k < process.count; ++k)
-          end += process.F[k * process.count * lanes_ + m] * mean_[(process.first + k) * lanes_ + m];
+          end += process.F[k * process.count * lanes_ + m] * mean[(process.first + k) * lanes_ + m];
+        if (is_wide) end += mean[(n_ + nu_ + process.first - nx_) * lanes_ + m];
         if (setup_.map) end += process.offset[m];
       }
       parameters_[m * np_ + j] = start;
-      ends_[m * np_ + j] = end;
+      ends_[m * np_ + j] = share == 1.0 ? end : start + share * (end - start);
     }
   }
   model_->integrate({.count = lanes_,
@@ -403,6 +435,10 @@ void PriorBank::take_step(const double* input, double duration) noexcept {
     for (int r = 0; r < nx_; ++r) next_[r * lanes_ + m] = next_rows_[m * nx_ + r];
     for (int e = 0; e < nx_ * columns; ++e) jacobian_[e * lanes_ + m] = jacobian_rows_[m * nx_ * columns + e];
   }
+}
+
+void PriorBank::take_step(double duration) noexcept {
+  integrate_members(mean_.data(), false, duration, 1.0);
   const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
   bank_kernels().predict(view, {.inputs = nu_,
                                 .processes = np_,

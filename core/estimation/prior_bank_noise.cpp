@@ -40,10 +40,10 @@ PriorBank::Noise PriorBank::noise(int output) const noexcept {
 ///
 /// Where a sensor has a robust loss, a function of nu^2 / S that falls again for outliers takes its place, so that they
 /// do not pass for noise (an M-estimator of scale: Huber 1981, chapter 5).
-void PriorBank::adapt_noise(const double* y) noexcept {
+void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
   constexpr double steady_gain = 0.015, most_squares = 9.0, least_information = 1e-3, most_change = 2.0;
   constexpr double drift = 2.0 * steady_gain * steady_gain;
-  const int best = most_probable();
+  const int best = most_probable(), entries = frame.view.vehicle_states, states = frame.view.states;
   for (int sensor = 0; sensor < ny_; ++sensor) {
     if (sensor_[sensor] != sensor) continue;
     // Sums over the sensor's outputs, which do not depend on the axes of a position.
@@ -52,14 +52,16 @@ void PriorBank::adapt_noise(const double* y) noexcept {
     for (int j = sensor; j < ny_; ++j) {
       if (sensor_[j] != sensor || std::isnan(y[j])) continue;
       const auto gradient = [&](int c) {
-        return gradient_[(static_cast<std::ptrdiff_t>(j) * nx_ + c) * lanes_ + best];
+        return frame.gradient[(static_cast<std::ptrdiff_t>(j) * entries + c) * lanes_ + best];
       };
       double residual = y[j] - predicted_[static_cast<std::ptrdiff_t>(j) * lanes_ + best];
       if (model_->description().outputs[j].is_angle) residual = angle_difference(residual, 0.0);
-      for (int c = 0; c < nx_; ++c) {
-        residual -= gradient(c) * (mean_[static_cast<std::ptrdiff_t>(c) * lanes_ + best] - states_[best * nx_ + c]);
-        for (int r = 0; r < nx_; ++r)
-          spread += gradient(c) * gradient(r) * covariance_[(static_cast<std::ptrdiff_t>(c) * n_ + r) * lanes_ + best];
+      for (int c = 0; c < entries; ++c) {
+        residual -= gradient(c) * (frame.view.mean[static_cast<std::ptrdiff_t>(c) * lanes_ + best] -
+                                   frame.before[c * frame.before_entry + best * frame.before_lane]);
+        for (int r = 0; r < entries; ++r)
+          spread += gradient(c) * gradient(r) *
+                    frame.view.covariance[(static_cast<std::ptrdiff_t>(c) * states + r) * lanes_ + best];
       }
       squares += residual * residual;
       used += output_variances_[static_cast<std::ptrdiff_t>(j) * lanes_ + best];
@@ -87,11 +89,10 @@ void PriorBank::adapt_noise(const double* y) noexcept {
 
 /// Pseudo-Huber losses of the innovations, as weights of the outputs: s = sum of r^2 / S over a group, and the loss
 /// 2 delta^2 (sqrt(1 + s / delta^2) - 1) has the slope 1 / sqrt(1 + s / delta^2).
-void PriorBank::weigh_outputs(const double* y, int taken, const double* given) noexcept {
-  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
+void PriorBank::weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept {
   for (int j = 0; j < ny_; ++j)
     std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, learnt_[j]);
-  bank_kernels().surprise(view, views_->outputs.data(), taken, surprises_.data());
+  bank_kernels().surprise(frame.view, views_->outputs.data(), taken, surprises_.data());
   const auto place = [&](int output) {
     return std::count_if(y, y + output, [](double each) { return !std::isnan(each); });
   };

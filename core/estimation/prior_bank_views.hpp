@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "rhec/core/estimation/prior_bank.hpp"
@@ -11,6 +12,15 @@ namespace rhec {
 struct PriorBank::Views {
   std::vector<BankProcess> processes;
   std::vector<BankOutput> outputs;
+};
+
+/// The bank, or the wider vector that it is within an interval, with the outputs' gradients.
+struct PriorBank::Frame {
+  BankView view;
+  const double* gradient;  ///< n_y x view.vehicle_states, lanes
+  /// Means before: entry e of lane m is at e * before_entry + m * before_lane.
+  const double* before;
+  std::ptrdiff_t before_entry, before_lane;
 };
 
 }  // namespace rhec

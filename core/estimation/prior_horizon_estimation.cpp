@@ -19,8 +19,8 @@ namespace {
 constexpr double advantage = 2.0;
 
 BankEstimation::Setup with_memory(BankEstimation::Setup filters, int horizon) {
-  // Those of the window, and the one that leaves it.
-  filters.remembered_nodes = std::max(filters.remembered_nodes, horizon + 2);
+  // Those of the window, the one that leaves it, and one from where a late measurement at the first of them is used.
+  filters.remembered_nodes = std::max(filters.remembered_nodes, horizon + 3);
   return filters;
 }
 
@@ -46,6 +46,7 @@ PriorHorizonEstimation::PriorHorizonEstimation(const std::shared_ptr<const Model
   scratch_.assign(problem_.scratch_size(), 0.0);
   robust_weights_.assign(model->output_count(), 0.0);
   advances_.resize(setup.problem.max_intervals);
+  laws_.assign(filters_.history().capacity() + std::size_t{1}, 0);
   known_data_.assign(advances_.size() * process_model_->data_count(), 0.0);
   for (int j = 0; j < nx; ++j) entries_.push_back(j);
   for (int j = 0; j < np; ++j) entries_.push_back(process_model_->first_state(j));
@@ -79,13 +80,18 @@ bool PriorHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::Ma
 void PriorHorizonEstimation::start(const double* outputs) noexcept {
   reset();
   filters_.start(outputs);
+  choose_law();
 }
 
-void PriorHorizonEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
-  filters_.add_node(duration, inputs, outputs);
+void PriorHorizonEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
+  filters_.add(interval, outputs);
+  choose_law();
 }
 
-bool PriorHorizonEstimation::amend(int back, const double* outputs) noexcept { return filters_.amend(back, outputs); }
+void PriorHorizonEstimation::rewind(int nodes) noexcept {
+  filters_.rewind(nodes);
+  if (!filters_.is_searching()) law_ = law_at(filters_.history().newest());
+}
 
 /// What the window has found of the outliers in the nodes that leave it now, which is more than their innovations said,
 /// goes to the bank: the arrival cost shall not bring back what the window had down-weighted.
@@ -103,10 +109,15 @@ void PriorHorizonEstimation::hand_weights_on() noexcept {
   if (changed >= 0) filters_.follow_place(changed);
 }
 
+/// At each node, so that it does not depend on when the estimate is asked for.
 void PriorHorizonEstimation::choose_law() noexcept {
+  if (filters_.is_searching()) return;
+  const BankHistory& history = filters_.history();
+  law_ = history.count() > 1 ? law_at(history.newest() - 1) : 0;
   const auto weights = bank().weights();
   const auto best = std::max_element(weights.begin(), weights.end());
   if (*best > advantage * weights[law_]) law_ = static_cast<int>(best - weights.begin());
+  law_at(history.newest()) = law_;
 }
 
 void PriorHorizonEstimation::fill_interval(int interval, std::int64_t number) noexcept {
@@ -117,6 +128,7 @@ void PriorHorizonEstimation::fill_interval(int interval, std::int64_t number) no
   std::copy_n(node.inputs, nu, inputs);
   std::fill(inputs + nu, inputs + process_model_->input_count(), 0.0);
   std::copy_n(node.outputs, model().output_count(), problem_.output(interval + 1));
+  problem_.between(interval).assign(*node.between);
   const auto place = static_cast<std::size_t>(number % static_cast<std::int64_t>(advances_.size()));
   double* const data = known_data_.data() + place * process_model_->data_count();
   const Advance advance{number, law_, node.duration, node.distance};

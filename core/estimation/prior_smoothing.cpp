@@ -171,6 +171,7 @@ class LawProblem {
   static RheProblem::Setup problem_setup(const PriorSmoothing::Setup& setup, const NodeLog& log) {
     RheProblem::Setup problem = setup.problem;
     problem.max_intervals = log.intervals();
+    problem.most_between = log.most_between();
     return problem;
   }
   /// Of [x; p] in the stage state.
@@ -278,7 +279,7 @@ PriorSmoothing::PriorSmoothing(std::shared_ptr<const Model> model, std::shared_p
 }
 
 SmoothedRun PriorSmoothing::estimate(NodeLog log, Clock::time_point deadline) const {
-  for (auto* rows : {&log.outputs, &log.inputs}) std::ranges::transform(*rows, rows->begin(), cleaned);
+  clean(log);
   if (log.intervals() < 1)
     throw Error("smoother: the log has fewer than two nodes; there is nothing between them to estimate");
   Setup setup = setup_;

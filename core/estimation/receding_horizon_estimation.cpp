@@ -56,6 +56,7 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
       point_(problem_.capacity()),
       trial_(problem_.capacity()),
       best_(problem_.capacity()),
+      kept_(problem_.capacity()),
       covariance_(std::make_unique<NodeCovariance>(problem_)),
       restart_(std::make_unique<PriorRestart>(problem_)) {
   if (const std::string reason = solver_->why_not(problem_); !reason.empty())
@@ -78,6 +79,10 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
     if (std::ranges::none_of(setup_.noises, blocks)) given_inputs_.push_back(j);
   }
   last_state_ = setup_.initial_mean;
+  // Those of the window and the one before it, one that was prepared, and one to spare.
+  nodes_.assign(intervals + 4, Node{0.0, std::vector<double>(model_->input_count()), outputs_,
+                                    BetweenNodes(model_->output_count(), setup_.problem.most_between)});
+  arrivals_.assign(3, Arrival{-1, arrival_.mean(), arrival_.covariance(), first_starts_});
   reset();
 }
 
@@ -90,18 +95,20 @@ void RecedingHorizonEstimation::reset() noexcept {
   window_ = {};
   std::fill(first_starts_.begin(), first_starts_.end(), 0);
   last_state_ = setup_.initial_mean;
-  started_ = solved_ = prepared_ = false;
+  started_ = solved_ = prepared_ = slid_ = has_kept_ = false;
+  base_ = -1;
+  for (Arrival& each : arrivals_) each.first = -1;
   searching_ = roles().heading >= 0 && setup_.heading_starts > 1;
 }
 
 /// The window begins anew at the newest node.
 bool RecedingHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
-  const std::int64_t newest = window_.first + window_.intervals - (prepared_ ? 1 : 0);
+  const std::int64_t number = newest();
   reset();
   arrival_.reset(mean, covariance);
   last_state_ = mean;
-  window_.first = newest;
-  std::fill(first_starts_.begin(), first_starts_.end(), newest);
+  window_.first = base_ = number;
+  std::fill(first_starts_.begin(), first_starts_.end(), number);
   searching_ = false;
   std::fill(outputs_.begin(), outputs_.end(), missing_value);
   begin_window(outputs_.data());
@@ -116,21 +123,44 @@ void RecedingHorizonEstimation::start(const double* outputs) noexcept {
 /// A window of one node.
 void RecedingHorizonEstimation::begin_window(const double* outputs) noexcept {
   started_ = true;
-  problem_.set_intervals(0);
-  for (int j = 0; j < problem_.model().parameter_count(); ++j) problem_.set_block_weight(0, j, 0.0);
+  remember_arrival();
+  remember({}, outputs, window_.first);
   take_outputs(0, outputs);
-  arrival_.write(problem_);
-  problem_.finish();
+  set_structure();
   start_cold(point_);
+}
+
+void RecedingHorizonEstimation::remember(const MeasuredInterval& interval, const double* outputs,
+                                         std::int64_t number) noexcept {
+  Node& kept = node(number);
+  kept.duration = interval.duration;
+  if (interval.inputs) std::copy_n(interval.inputs, kept.inputs.size(), kept.inputs.data());
+  std::copy_n(outputs, kept.outputs.size(), kept.outputs.data());
+  kept.between.assign(interval);
+}
+
+/// What is known before the window's present first node.
+void RecedingHorizonEstimation::remember_arrival() noexcept {
+  Arrival& kept = arrival_at(window_.first);
+  kept.first = window_.first;
+  kept.mean = arrival_.mean();
+  kept.covariance = arrival_.covariance();
+  kept.starts = first_starts_;
+}
+
+void RecedingHorizonEstimation::restore_arrival() noexcept {
+  const Arrival& kept = arrival_at(window_.first);
+  arrival_.restore(kept.mean, kept.covariance);
 }
 
 void RecedingHorizonEstimation::take_outputs(int node, const double* outputs) noexcept {
   std::copy_n(outputs, outputs_.size(), problem_.output(node));
 }
 
-void RecedingHorizonEstimation::take_inputs(int interval, const double* inputs) noexcept {
-  double* const measured = problem_.measured_input(interval);
-  for (std::size_t j = 0; j < given_inputs_.size(); ++j) measured[j] = inputs[given_inputs_[j]];
+void RecedingHorizonEstimation::take_interval(int place, const MeasuredInterval& interval) noexcept {
+  double* const measured = problem_.measured_input(place);
+  for (std::size_t j = 0; j < given_inputs_.size(); ++j) measured[j] = interval.inputs[given_inputs_[j]];
+  problem_.between(place).assign(interval);
 }
 
 /// Cold start: the prior, rolled out with the measured inputs.
@@ -197,7 +227,20 @@ void RecedingHorizonEstimation::slide_arrival() noexcept {
   arrival_.slide(problem_, point_, borders_, lost);
 }
 
-void RecedingHorizonEstimation::advance_window(double duration, const double* inputs, const double* outputs) noexcept {
+void RecedingHorizonEstimation::set_structure() noexcept {
+  // The same window may be set up again, behind nodes that were taken back.
+  first_starts_ = arrival_at(window_.first).starts;
+  if (window_.intervals == 0) {
+    problem_.set_intervals(0);
+    for (int j = 0; j < problem_.model().parameter_count(); ++j) problem_.set_block_weight(0, j, 0.0);
+    problem_.finish();
+    return arrival_.write(problem_);
+  }
+  set_block_structure(window_, setup_.blockings, setup_.walks, first_starts_, begins_, problem_);
+  arrival_.write(problem_);
+}
+
+void RecedingHorizonEstimation::advance_window(const MeasuredInterval& interval, const double* outputs) noexcept {
   const bool full = window_.intervals == setup_.problem.max_intervals;
   const bool was_empty = window_.intervals == 0;
   if (full) slide_arrival();
@@ -205,16 +248,16 @@ void RecedingHorizonEstimation::advance_window(double duration, const double* in
   if (full) {
     problem_.drop_first_interval();
     ++window_.first;
+    remember_arrival();
   } else {
     ++window_.intervals;
   }
   const int last = window_.intervals;
   problem_.set_intervals(last);
-  problem_.set_duration(last - 1, duration);
-  take_inputs(last - 1, inputs);
+  problem_.set_duration(last - 1, interval.duration);
+  take_interval(last - 1, interval);
   take_outputs(last, outputs);
-  set_block_structure(window_, setup_.blockings, setup_.walks, first_starts_, begins_, problem_);
-  arrival_.write(problem_);
+  set_structure();
   if (was_empty) {
     for (std::size_t j = 0; j < given_inputs_.size(); ++j) {
       const double measured = problem_.measured_input(0)[j];
@@ -227,18 +270,16 @@ void RecedingHorizonEstimation::advance_window(double duration, const double* in
   }
 }
 
-void RecedingHorizonEstimation::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+void RecedingHorizonEstimation::add(const MeasuredInterval& interval, const double* outputs) noexcept {
   if (!started_) {
     start(outputs);
     return;
   }
-  if (!(duration > 0.0) || !std::isfinite(duration)) {
-    amend(0, outputs);
-    return;
-  }
+  if (!(interval.duration > 0.0) || !std::isfinite(interval.duration)) return add_outputs(outputs);
   solved_ = false;
+  remember(interval, outputs, newest() + 1);
   if (!prepared_) {
-    advance_window(duration, inputs, outputs);
+    advance_window(interval, outputs);
     return;
   }
   // The horizon has already moved, with placeholders for the data that are now known. If these fit, the linearisation
@@ -246,33 +287,77 @@ void RecedingHorizonEstimation::add_node(double duration, const double* inputs, 
   prepared_ = false;
   const int last = window_.intervals;
   // Stamps computed as sums or multiples of one step differ in their last digits, which does not matter here.
-  const bool same_duration = std::abs(problem_.duration(last - 1) - duration) <= same_time * duration;
+  const bool same_duration = std::abs(problem_.duration(last - 1) - interval.duration) <= same_time * interval.duration;
   // The weights of robust losses were those of the predicted outputs, so with them the matrices change too.
-  bool fits = same_duration && setup_.problem.robust.empty();
+  bool fits = same_duration && setup_.problem.robust.empty() && interval.between == 0;
   for (std::size_t j = 0; j < outputs_.size(); ++j)
     fits = fits && std::isnan(problem_.output(last)[j]) == std::isnan(outputs[j]);
   for (std::size_t j = 0; j < given_inputs_.size(); ++j)
-    fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) == std::isnan(inputs[given_inputs_[j]]);
-  take_inputs(last - 1, inputs);
+    fits = fits && std::isnan(problem_.measured_input(last - 1)[j]) == std::isnan(interval.inputs[given_inputs_[j]]);
+  take_interval(last - 1, interval);
   take_outputs(last, outputs);
   if (fits) return;
-  problem_.set_duration(last - 1, duration);
+  problem_.set_duration(last - 1, interval.duration);
   if (!same_duration) problem_.simulate_interval(last - 1, point_, scratch_);
   solver_->prepare(point_);
 }
 
-bool RecedingHorizonEstimation::amend(int back, const double* outputs) noexcept {
-  const int node = window_.intervals - (prepared_ ? 1 : 0) - back;
-  if (!started_ || back < 0 || node < 0) return false;
+/// More outputs of the newest node; they replace those that it has.
+void RecedingHorizonEstimation::add_outputs(const double* outputs) noexcept {
+  const int at = window_.intervals - (prepared_ ? 1 : 0);
   bool masks_change = false;
   for (std::size_t j = 0; j < outputs_.size(); ++j) {
     if (std::isnan(outputs[j])) continue;
-    masks_change = masks_change || std::isnan(problem_.output(node)[j]);
-    problem_.output(node)[j] = outputs[j];
+    masks_change = masks_change || std::isnan(problem_.output(at)[j]);
+    problem_.output(at)[j] = node(newest()).outputs[j] = outputs[j];
   }
   solved_ = solved_ && prepared_;
   if (masks_change && prepared_) solver_->prepare(point_);
-  return true;
+}
+
+int RecedingHorizonEstimation::reach() const noexcept {
+  if (!started_) return 0;
+  const std::int64_t first = first_before_preparing();
+  if (first <= base_) return static_cast<int>(newest() - base_);
+  return static_cast<int>(newest() - first) + 1;  // either the node before the window's first, or the start of the run
+}
+
+void RecedingHorizonEstimation::rewind(int nodes) noexcept {
+  const std::int64_t target = newest() - nodes;
+  if (target < 0) return reset();
+  if (nodes <= 0) return;
+  const Window before{first_before_preparing(), static_cast<int>(newest() - first_before_preparing())};
+  // Preparing has left the solution in the shifter.
+  if (!prepared_) shifter_.take(problem_, point_);
+  if (!has_kept_) {
+    kept_ = shifter_.kept();
+    kept_window_ = before;
+    has_kept_ = true;
+  }
+  window_.first = std::min(before.first, target);
+  window_.intervals = static_cast<int>(target - window_.first);
+  prepared_ = slid_ = solved_ = false;
+  restore_arrival();
+  problem_.set_intervals(window_.intervals);
+  for (int i = 0; i <= window_.intervals; ++i) {
+    const Node& kept = node(window_.first + i);
+    take_outputs(i, kept.outputs.data());
+    if (i == 0) continue;
+    problem_.set_duration(i - 1, kept.duration);
+    take_interval(i - 1, kept.between.over(kept.duration, kept.inputs.data()));
+  }
+  set_structure();
+  if (window_.intervals == 0 || window_.first != before.first || !shifter_.apply(0, problem_, point_))
+    start_cold(point_);
+}
+
+/// The nodes that were taken back have come again, with more that was measured: the guess is what was known of them.
+void RecedingHorizonEstimation::take_up_solution() noexcept {
+  if (!std::exchange(has_kept_, false) || prepared_ || window_.first != kept_window_.first ||
+      window_.intervals != kept_window_.intervals || window_.intervals == 0)
+    return;
+  point_ = kept_;
+  problem_.simulate_interval(window_.intervals - 1, point_, scratch_);
 }
 
 void RecedingHorizonEstimation::prepare() noexcept {
@@ -280,6 +365,7 @@ void RecedingHorizonEstimation::prepare() noexcept {
   const int last = window_.intervals;
   for (std::size_t j = 0; j < given_inputs_.size(); ++j)
     inputs_[given_inputs_[j]] = problem_.measured_input(last - 1)[j];
+  slid_ = last == setup_.problem.max_intervals;
   // Placeholders with zero residuals and the previous mask.
   Model::Nodes request;
   request.count = 1;
@@ -289,7 +375,7 @@ void RecedingHorizonEstimation::prepare() noexcept {
   for (std::size_t j = 0; j < outputs_.size(); ++j)
     if (std::isnan(problem_.output(last)[j])) outputs_[j] = missing_value;
   const double duration = problem_.duration(last - 1);
-  advance_window(duration, inputs_.data(), outputs_.data());
+  advance_window({duration, inputs_.data()}, outputs_.data());
   solver_->prepare(point_);
   prepared_ = true;
 }
@@ -334,6 +420,7 @@ void RecedingHorizonEstimation::estimate(Estimate& result, Clock::time_point dea
   result.state.resize(nx);
   result.parameters.resize(np);
   result.covariance.resize(nx + np, nx + np);
+  take_up_solution();
   // A horizon that was moved in advance ends in a node that does not exist yet. Without its outputs, this node does not
   // affect the others.
   const int newest = prepared_ ? N - 1 : N;

@@ -29,25 +29,55 @@ void NodeRecorder::start(const double* outputs) noexcept {
   started_ = true;
 }
 
-void NodeRecorder::add_node(double duration, const double* inputs, const double* outputs) noexcept {
+void NodeRecorder::add(const MeasuredInterval& interval, const double* outputs) noexcept {
   if (!started_) {
     start(outputs);
     return;
   }
-  method_->add_node(duration, inputs, outputs);
-  if (!(duration > 0.0) || !std::isfinite(duration)) return;
-  log_->durations.push_back(duration);
-  log_->inputs.insert(log_->inputs.end(), inputs, inputs + model().input_count());
+  method_->add(interval, outputs);
+  const int ny = model().output_count();
+  if (!(interval.duration > 0.0) || !std::isfinite(interval.duration)) {
+    double* const newest = log_->outputs.data() + static_cast<std::ptrdiff_t>(log_->intervals()) * ny;
+    for (int j = 0; j < ny; ++j)
+      if (!std::isnan(outputs[j])) newest[j] = outputs[j];
+    return;
+  }
+  log_->durations.push_back(interval.duration);
+  log_->inputs.insert(log_->inputs.end(), interval.inputs, interval.inputs + model().input_count());
+  log_->between.emplace_back(ny, interval.between);
+  log_->between.back().assign(interval);
   append_outputs(outputs);
 }
 
-bool NodeRecorder::amend(int back, const double* outputs) noexcept {
-  if (!method_->amend(back, outputs)) return false;
-  const int ny = model().output_count();
-  double* row = log_->outputs.data() + static_cast<std::ptrdiff_t>(log_->intervals() - back) * ny;
-  for (int j = 0; j < ny; ++j)
-    if (!std::isnan(outputs[j])) row[j] = outputs[j];
-  return true;
+void NodeRecorder::rewind(int nodes) noexcept {
+  method_->rewind(nodes);
+  const int left = log_->intervals() - nodes;
+  if (left < 0) {
+    *log_ = {};
+    started_ = false;
+    return;
+  }
+  const auto cut = [](std::vector<double>& rows, int count, int width) {
+    rows.resize(static_cast<std::size_t>(count) * static_cast<std::size_t>(width));
+  };
+  log_->durations.resize(static_cast<std::size_t>(left));
+  log_->between.erase(log_->between.begin() + left, log_->between.end());
+  cut(log_->inputs, left, model().input_count());
+  cut(log_->outputs, left + 1, model().output_count());
+  cut(log_->states, left + 1, model().state_count());
+  cut(log_->parameters, left + 1, model().parameter_count());
+}
+
+int NodeLog::most_between() const noexcept {
+  int most = 0;
+  for (const BetweenNodes& each : between) most = std::max(most, each.count());
+  return most;
+}
+
+MeasuredInterval NodeLog::interval(int i, int input_count) const noexcept {
+  const auto at = static_cast<std::size_t>(i);
+  const double* const of_interval = inputs.data() + static_cast<std::ptrdiff_t>(i) * input_count;
+  return between.empty() ? MeasuredInterval{durations[at], of_interval} : between[at].over(durations[at], of_interval);
 }
 
 void NodeRecorder::estimate(Estimate& result, Clock::time_point deadline) noexcept {

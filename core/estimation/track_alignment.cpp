@@ -29,6 +29,13 @@ Pose chained(const Pose& from, const Pose& motion) {
   return {from.position + std::polar(1.0, from.heading) * motion.position, from.heading + motion.heading};
 }
 
+/// A measured position: where along the nodes, what the chain has there, and how far along it that is [m].
+struct PositionFix {
+  double place = 0.0;
+  Point observed, measured;
+  double gone = 0.0;
+};
+
 class Track {
  public:
   Track(const RheProblem& problem, const Model& vehicle, std::vector<double>& states, std::vector<double>& inputs,
@@ -109,54 +116,69 @@ class Track {
 
   /// Chains the motions to a track, with the outputs observed along it and the distance travelled.
   void chain() {
-    const std::ptrdiff_t nx = model_.state_count(), nu = model_.input_count(), np = model_.parameter_count();
-    std::vector<double> next(nx), outputs(model_.output_count());
     motions_.resize(count_ - 1);
     chain_.resize(count_);
-    observed_.resize(count_);
     gone_.assign(count_, 0.0);
-    for (std::ptrdiff_t k = 0; k < count_; ++k) {
-      const int node = static_cast<int>(k);
-      std::vector<double> moved(state(node), state(node) + nx);
-      moved[roles_.position_x] = chain_[k].position.real();
-      moved[roles_.position_y] = chain_[k].position.imag();
-      roles_.turn(chain_[k].heading - moved[roles_.heading], moved.data());
-      Model::Nodes observation;
-      observation.count = 1;
-      observation.states = moved.data();
-      observation.outputs = outputs.data();
-      model_.observe(observation);
-      observed_[k] = {outputs[x_output_], outputs[y_output_]};
-      const double* measured = problem_.output(node);
-      if (!std::isnan(measured[x_output_]) && !std::isnan(measured[y_output_])) fixes_.push_back(node);
+    for (int k = 0; k < count_; ++k) {
+      add_fix(chain_[k], state(k), problem_.output(k), k, gone_[k]);
       if (k + 1 == count_) break;
-      const double duration = problem_.duration(node);
-      Model::Intervals request;
-      request.count = 1;
-      request.states = state(node);
-      request.inputs = inputs_.data() + k * nu;
-      request.parameters = parameters_.data() + k * np;
-      request.durations = &duration;
-      request.substeps = problem_.substeps();
-      request.next_states = next.data();
-      model_.integrate(request);
-      const Pose from = pose_of(state(node)), to = pose_of(next.data());
-      motions_[k] = {std::polar(1.0, -from.heading) * (to.position - from.position), to.heading - from.heading};
+      const Pose from = pose_of(state(k));
+      const auto motion_after = [&](double seconds) {
+        const Pose to = pose_of(integrated(k, seconds));
+        return Pose{std::polar(1.0, -from.heading) * (to.position - from.position), to.heading - from.heading};
+      };
+      const BetweenNodes& between = problem_.between(k);
+      for (int i = 0; i < between.count(); ++i) {
+        const Pose motion = motion_after(between.time(i));
+        add_fix(chained(chain_[k], motion), next_.data(), between.outputs(i),
+                k + between.time(i) / problem_.duration(k), gone_[k] + std::abs(motion.position));
+      }
+      motions_[k] = motion_after(problem_.duration(k));
       chain_[k + 1] = chained(chain_[k], motions_[k]);
       gone_[k + 1] = gone_[k] + std::abs(motions_[k].position);
     }
   }
 
-  Point measured(int node) const { return {problem_.output(node)[x_output_], problem_.output(node)[y_output_]}; }
+  /// The state so long after a node.
+  const double* integrated(int node, double seconds) {
+    const std::ptrdiff_t nu = model_.input_count(), np = model_.parameter_count();
+    next_.resize(model_.state_count());
+    Model::Intervals request;
+    request.count = 1;
+    request.states = state(node);
+    request.inputs = inputs_.data() + node * nu;
+    request.parameters = parameters_.data() + node * np;
+    request.durations = &seconds;
+    request.substeps = problem_.substeps();
+    request.next_states = next_.data();
+    model_.integrate(request);
+    return next_.data();
+  }
+
+  /// If a position was measured: what is observed of a state with its pose on the chain.
+  void add_fix(const Pose& pose, const double* state, const double* measured, double place, double gone) {
+    if (std::isnan(measured[x_output_]) || std::isnan(measured[y_output_])) return;
+    std::vector<double> moved(state, state + model_.state_count()), outputs(model_.output_count());
+    moved[roles_.position_x] = pose.position.real();
+    moved[roles_.position_y] = pose.position.imag();
+    roles_.turn(pose.heading - moved[roles_.heading], moved.data());
+    Model::Nodes observation;
+    observation.count = 1;
+    observation.states = moved.data();
+    observation.outputs = outputs.data();
+    model_.observe(observation);
+    fixes_.push_back(
+        {place, {outputs[x_output_], outputs[y_output_]}, {measured[x_output_], measured[y_output_]}, gone});
+  }
 
   /// Finds the pose of a node from the position fixes around it.
   bool fit(int node, Pose& pose) {
     for (double reach = shortest_reach; reach <= longest_reach; reach *= 2.0) {
-      const auto from =
-          std::partition_point(fixes_.begin(), fixes_.end(), [&](int fix) { return gone_[fix] < gone_[node] - reach; });
-      const auto to =
-          std::partition_point(from, fixes_.end(), [&](int fix) { return gone_[fix] <= gone_[node] + reach; });
-      if (to - from < fewest_fixes || !surrounds(*from, *(to - 1), node)) continue;
+      const auto from = std::partition_point(fixes_.begin(), fixes_.end(),
+                                             [&](const PositionFix& fix) { return fix.gone < gone_[node] - reach; });
+      const auto to = std::partition_point(from, fixes_.end(),
+                                           [&](const PositionFix& fix) { return fix.gone <= gone_[node] + reach; });
+      if (to - from < fewest_fixes || !surrounds(from->place, (to - 1)->place, node)) continue;
       weights_.assign(static_cast<std::size_t>(to - from), 1.0);
       Point turn, shift;
       double spread = 0.0;
@@ -166,15 +188,15 @@ class Track {
         for (auto fix = from; fix != to; ++fix) {
           const double w = weights_[fix - from];
           sum += w;
-          from_mean += w * observed_[*fix];
-          to_mean += w * measured(*fix);
+          from_mean += w * fix->observed;
+          to_mean += w * fix->measured;
         }
         from_mean /= sum;
         to_mean /= sum;
         for (auto fix = from; fix != to; ++fix) {
           const double w = weights_[fix - from];
-          const Point offset = observed_[*fix] - from_mean;
-          cross += w * std::conj(offset) * (measured(*fix) - to_mean);
+          const Point offset = fix->observed - from_mean;
+          cross += w * std::conj(offset) * (fix->measured - to_mean);
           square += w * std::norm(offset);
         }
         spread = std::sqrt(square / sum);
@@ -183,7 +205,7 @@ class Track {
         shift = to_mean - turn * from_mean;
         for (auto fix = from; fix != to; ++fix)
           weights_[fix - from] =
-              1.0 / std::max(std::abs(turn * observed_[*fix] + shift - measured(*fix)), 1e-3 * least_spread);
+              1.0 / std::max(std::abs(turn * fix->observed + shift - fix->measured), 1e-3 * least_spread);
       }
       if (!(spread > least_spread)) continue;
       if (!(std::abs(turn) > least_stretch && std::abs(turn) < most_stretch)) return false;
@@ -195,8 +217,9 @@ class Track {
   }
 
   /// A piece determines the poses between its fixes, not beyond.
-  bool surrounds(int first, int last, int node) const {
-    return (first <= node || node == 0 || first == fixes_.front()) && (last >= node || last == fixes_.back());
+  bool surrounds(double first, double last, int node) const {
+    return (first <= node || node == 0 || first == fixes_.front().place) &&
+           (last >= node || last == fixes_.back().place);
   }
 
   void close_gap(int start, int end, Point reached, std::vector<Pose>& poses) {
@@ -223,10 +246,9 @@ class Track {
   std::vector<int> driving_states_, driving_inputs_;
   int x_output_ = -1, y_output_ = -1;
   std::vector<Pose> motions_, chain_;  ///< per interval, relative to its start; chained from the origin
-  std::vector<Point> observed_;        ///< position outputs along the chain
   std::vector<double> gone_;           ///< distance travelled along the chain [m]
-  std::vector<int> fixes_;             ///< nodes with a measured position
-  std::vector<double> weights_;
+  std::vector<PositionFix> fixes_;
+  std::vector<double> weights_, next_;
 };
 
 }  // namespace

@@ -238,24 +238,27 @@ void IntervalDynamics::place_starts(int i, Hessian hessian, StageQp& qp) const n
   }
 }
 
+int IntervalDynamics::column_of(int i, int z) const noexcept {
+  const int nx = structure.vehicle_states(), nu = structure.inputs(), np = structure.parameters();
+  if (z < nx) return z;
+  if (z >= nx + np && z < nx + np + nu) return structure.column_of_input(i, z - nx - np);
+  const bool is_end = z >= nx + np + nu;
+  const int parameter = z - nx - (is_end ? np + nu : 0), control = structure.control_of_lifted(i, parameter);
+  // A jump affects the whole interval; of a ramp, only the end is new.
+  return control >= 0 && (is_end || !structure.is_ramp(parameter)) ? structure.capacity().states + control
+                                                                   : nx + parameter;
+}
+
 /// Copies the model's rows to those of the QP, for any lifted variables.
 void IntervalDynamics::scatter(int i, const double* jacobian, const double* hessian, StageQp& qp) const noexcept {
   const int nx = structure.vehicle_states(), nu = structure.inputs(), np = structure.parameters();
-  const int row = row_length(structure), stride = structure.stride(), ns = structure.capacity().states;
+  const int row = row_length(structure), stride = structure.stride();
   const int nz = nx + np + nu + (structure.any_ramp() ? np : 0);
-  const auto column_of = [&](int z) {
-    if (z < nx) return z;
-    if (z >= nx + np && z < nx + np + nu) return structure.column_of_input(i, z - nx - np);
-    const bool is_end = z >= nx + np + nu;
-    const int parameter = z - nx - (is_end ? np + nu : 0), control = structure.control_of_lifted(i, parameter);
-    // A jump affects the whole interval; of a ramp, only the end is new.
-    return control >= 0 && (is_end || !structure.is_ramp(parameter)) ? ns + control : nx + parameter;
-  };
   for (int r = 0; r < nx; ++r)
-    for (int z = 0; z < nz; ++z) qp.AB(i)[r * stride + column_of(z)] += jacobian[r * row + z];
+    for (int z = 0; z < nz; ++z) qp.AB(i)[r * stride + column_of(i, z)] += jacobian[r * row + z];
   if (!hessian) return;
   for (int r = 0; r < nz; ++r)
-    for (int z = 0; z < nz; ++z) qp.H(i)[column_of(r) * stride + column_of(z)] += hessian[r * row + z];
+    for (int z = 0; z < nz; ++z) qp.H(i)[column_of(i, r) * stride + column_of(i, z)] += hessian[r * row + z];
 }
 
 }  // namespace rhec

@@ -54,6 +54,9 @@ struct IntervalDynamics {
   /// z = [x; p; u (; p at the end)] of each interval of a range.
   void gather_rows(const Iterate& iterate, StageRange range, double* rows) const noexcept;
 
+  /// The stage variable of an interval that entry z of the model's [x; p; u (; p at the end)] is.
+  int column_of(int interval, int z) const noexcept;
+
  private:
   const double* data_of(int interval) const noexcept {
     return data + static_cast<std::ptrdiff_t>(interval) * model.data_count();

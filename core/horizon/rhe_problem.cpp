@@ -1,6 +1,7 @@
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/model/motion_outputs.hpp"
+#include "rhec/core/model/parts_of_intervals.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -48,7 +49,8 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
                                         setup.substeps}),
       setup_(std::move(setup)),
       ny_(this->model().output_count()),
-      output_row_(padded(ny_)) {
+      output_row_(padded(ny_)),
+      parts_(dynamic_cast<const PartsOfIntervals*>(&this->model())) {
   refuse_outputs_of_motion(this->model(), "estimation problem");
   const ModelDescription& about = this->model().description();
   check_weights("output weights", setup_.output_weights, about.outputs);
@@ -90,6 +92,8 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   const auto nodes = static_cast<std::size_t>(setup_.max_intervals) + 1;
   const double missing = std::numeric_limits<double>::quiet_NaN();
   has_block_bounds_.assign(nodes, 0);
+  if (setup_.most_between < 0) throw Error("between nodes: expected room for 0 measurements or more");
+  between_.assign(nodes - 1, BetweenNodes(ny_, setup_.most_between));
   outputs_.assign(nodes * output_row_, missing);
   measured_inputs_.assign(nodes * stride(), missing);
   input_weights_.assign(stride(), 0.0);
@@ -160,6 +164,7 @@ void RheProblem::take_data(const RheProblem& from) noexcept {
   setup_.output_weights = from.setup_.output_weights;
   output_weights_ = from.output_weights_;
   outputs_ = from.outputs_;
+  for (std::size_t i = 0; i < between_.size(); ++i) between_[i].assign(from.between_[i]);
   measured_inputs_ = from.measured_inputs_;
   link_information_ = from.link_information_;
   block_weights_ = from.block_weights_;
@@ -173,6 +178,8 @@ void RheProblem::drop_first_interval() noexcept {
     set_duration(i, duration(i + 1));
     std::copy_n(interval_data(i + 1), data_count, interval_data(i));
   }
+  if (setup_.most_between > 0 && intervals() > 0)
+    std::rotate(between_.begin(), between_.begin() + 1, between_.begin() + intervals());
   std::copy(outputs_.begin() + output_row_, outputs_.end(), outputs_.begin());
   std::copy(measured_inputs_.begin() + stride(), measured_inputs_.end(), measured_inputs_.begin());
 }
@@ -182,11 +189,11 @@ std::size_t RheProblem::cost_scratch_size() const noexcept {
                     width = padded(nx());
   // Per node: Jacobians, outputs, their gradients and the model's scratch. Once: the kernels' scratch and three rows of
   // outputs.
-  return nodes * (ny * width + 2 * outputs) + model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 16;
+  return nodes * (ny * width + 2 * outputs) + model().rows_scratch(static_cast<int>(nodes)) + 6 * outputs + 16 +
+         between_scratch_size();
 }
 
-void RheProblem::residual(int node, const double* predicted, double* difference) const noexcept {
-  const double* y = output(node);
+void RheProblem::residual(const double* y, const double* predicted, double* difference) const noexcept {
   for (int j = 0; j < ny_; ++j) {
     if (std::isnan(y[j])) {
       difference[j] = 0.0;
@@ -236,13 +243,15 @@ double RheProblem::cost(const Iterate& iterate, double* stage_costs, std::span<d
   };
   add(0, arrival_term(iterate, nullptr));
   for (int i = 0; i < count; ++i) {
-    residual(i, predicted + i * output_row_, difference);
+    residual(output(i), predicted + i * output_row_, difference);
     add(i, losses(difference, weight, nullptr));
   }
   for (int i = 0; i < intervals(); ++i) {
     add(i, inputs(i, iterate, nullptr, nullptr));
     if (control_count(i) > nu()) add(i, links(i, iterate, nullptr, nullptr));
   }
+  if (has_between())
+    total += add_between({0, intervals()}, iterate, Hessian::none, nullptr, stage_costs, memory.rest());
   return total;
 }
 
@@ -252,6 +261,12 @@ double RheProblem::write_cost(StageRange range, const Iterate& iterate, Hessian 
   const CostView view =
       cost_view(structure(), matrices ? qp.H(0) : nullptr, vectors ? qp.h(0) : nullptr, hessian == Hessian::exact);
   double total = write_measurements(range, iterate, hessian, view, known, scratch);
+  if (has_between()) {
+    const double added = add_between(range, iterate, hessian, &view, nullptr, scratch.data());
+    if (vectors) total += added;
+    for (int i = range.first; known && matrices && i <= std::min(range.last, intervals() - 1); ++i)
+      if (between(i).count() > 0) known->is_clean()[i] = 0;
+  }
   if (range.first == 0) {
     if (known && matrices) known->is_clean()[0] = 0;
     if (vectors) total += arrival_term(iterate, qp.h(0));
@@ -369,11 +384,20 @@ double RheProblem::write_measurements(StageRange range, const Iterate& iterate, 
   return total;
 }
 
+double* RheProblem::H_of(const CostView& view, int stage) const noexcept {
+  const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(capacity().states + capacity().controls) * stride();
+  return view.H ? view.H + stage * size : nullptr;
+}
+
+double* RheProblem::h_of(const CostView& view, int stage) const noexcept {
+  return view.h ? view.h + static_cast<std::ptrdiff_t>(stage) * stride() : nullptr;
+}
+
 /// The same with robust losses, or for the exact Hessian alone.
 double RheProblem::write_general_measurements(StageRange range, const Iterate& iterate, Hessian hessian,
                                               const CostView& view, const double* predicted, const double* jacobians,
                                               double* rest) const noexcept {
-  const int count = range.last - range.first + 1, n = nx(), width = padded(n), ns = capacity().states;
+  const int count = range.last - range.first + 1, n = nx(), width = padded(n);
   const bool exact = hessian == Hessian::exact && view.H;
   CostView fresh = view;
   if (view.adds_to_curvature) fresh.H = nullptr;
@@ -385,25 +409,21 @@ double RheProblem::write_general_measurements(StageRange range, const Iterate& i
   double *difference = memory.take(output_row_), *weight = memory.take(output_row_),
          *curvature = memory.take(output_row_), *w = memory.take(output_row_),
          *multipliers = memory.take(static_cast<std::ptrdiff_t>(count) * output_row_);
-  const auto H_of = [&](int i) {
-    return view.H ? view.H + static_cast<std::ptrdiff_t>(i) * (ns + capacity().controls) * stride() : nullptr;
-  };
-  const auto h_of = [&](int i) { return view.h ? view.h + static_cast<std::ptrdiff_t>(i) * stride() : nullptr; };
   double total = 0.0;
   for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
-    total += inputs(i, iterate, H_of(i), h_of(i));
+    total += inputs(i, iterate, H_of(view, i), h_of(view, i));
   for (int i = 0; i < count; ++i) {
     const int node = range.first + i;
-    residual(node, predicted + i * output_row_, difference);
+    residual(output(node), predicted + i * output_row_, difference);
     total += losses(difference, weight, curvature);
     const double* y = output(node);
     const double* J = jacobians + static_cast<std::ptrdiff_t>(i) * ny_ * width;
-    double* H = H_of(node);
+    double* H = H_of(view, node);
     for (int j = 0; j < ny_; ++j) {
       w[j] = std::isnan(y[j]) ? 0.0 : 2.0 * weight[j] * setup_.output_weights[j];
       multipliers[i * output_row_ + j] = w[j] * difference[j];
     }
-    transcription_kernels().add_products(J, w, multipliers + i * output_row_, ny_, n, stride(), H, h_of(node));
+    transcription_kernels().add_products(J, w, multipliers + i * output_row_, ny_, n, stride(), H, h_of(view, node));
     if (!exact) continue;
     // Second derivative of the loss: 4 rho'' (J' W r)(J' W r)'.
     for (const RobustLoss& loss : setup_.robust) {
@@ -477,7 +497,7 @@ void RheProblem::robust_weights(const Iterate& iterate, int node, double* weight
   request.states = iterate.state(node);
   request.outputs = predicted;
   model().observe(request);
-  residual(node, predicted, difference);
+  residual(output(node), predicted, difference);
   losses(difference, weights, nullptr);
 }
 

@@ -194,6 +194,37 @@ void predict(const BankView& bank, const BankStep& step) {
   }
 }
 
+void narrow(const BankView& bank, const BankView& wide, const double* transition, const double* next_mean) {
+  const int n = bank.states, a = wide.states, M = bank.members;
+  for (int m = 0; m < M; m += lane_count) {
+    const Entries mean(bank.mean, M, m), P(bank.covariance, M, m), W(wide.work, M, m), next(bank.work, M, m);
+    const ConstEntries T(transition, M, m), P_wide(wide.covariance, M, m), given(next_mean, M, m);
+    const Entries new_mean(bank.work + static_cast<long>(n) * n * M, M, m);
+    // W = T P, then W T', lower half.
+    for (int c = 0; c < a; ++c) {
+      for (int r = 0; r < n; ++r) {
+        Lanes sum{};
+        for (int k = 0; k < a; ++k) sum += T[static_cast<long>(k) * n + r] * P_wide[static_cast<long>(c) * a + k];
+        W.set(static_cast<long>(c) * n + r, sum);
+      }
+    }
+    Lanes zeros{};
+    for (int c = 0; c < n; ++c) {
+      new_mean.set(c, given[c]);
+      zeros += 0.0 * given[c];
+      for (int r = c; r < n; ++r) {
+        Lanes sum{};
+        for (int k = 0; k < a; ++k) sum += W[static_cast<long>(k) * n + r] * T[static_cast<long>(k) * n + c];
+        zeros += 0.0 * sum;
+        next.set(static_cast<long>(c) * n + r, sum);
+        next.set(static_cast<long>(r) * n + c, sum);
+      }
+    }
+    commit(new_mean, n, mean, zeros);
+    commit(next, static_cast<long>(n) * n, P, zeros);
+  }
+}
+
 /// Measured minus predicted; of an angle, to the nearest multiple of the period.
 inline Lanes innovation_of(const BankOutput& output, int m) {
   Lanes innovation = output.measured - load(output.predicted + m);
@@ -286,7 +317,7 @@ void update(const BankView& bank, const BankOutput* outputs, int count, double g
 #define RHEC_JOIN(a, b) a##b
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const BankKernels RHEC_TABLE(bank_kernels_, RHEC_SET);
-constinit const BankKernels RHEC_TABLE(bank_kernels_, RHEC_SET) = {&kernels::mix, &kernels::predict, &kernels::update,
-                                                                   &kernels::surprise, &kernels::moments};
+constinit const BankKernels RHEC_TABLE(bank_kernels_, RHEC_SET) = {
+    &kernels::mix, &kernels::predict, &kernels::update, &kernels::narrow, &kernels::surprise, &kernels::moments};
 
 }  // namespace rhec

@@ -97,6 +97,20 @@ ProcessModel::ProcessModel(std::shared_ptr<const Model> vehicle, std::vector<int
   description_.roles.speed_factor = -1;
 }
 
+void ProcessModel::data_of_part(const double* data, double share, double* part) const noexcept {
+  for (int j = 0; j < np_; ++j) {
+    const int n = counts_[j];
+    const double* const from = process_data(j, data);
+    double* const to = process_data(j, part);
+    to[0] = from[0];
+    for (int e = 0; e < n * n; ++e) {
+      const double identity = e % (n + 1) == 0 ? 1.0 : 0.0;
+      to[1 + e] = identity + share * (from[1 + e] - identity);  // F
+      to[1 + n * n + e] = share * from[1 + n * n + e];          // L
+    }
+  }
+}
+
 void ProcessModel::integrate(const Intervals& request) const noexcept {
   RHEC_ASSERT(request.count == 0 || (request.states && request.inputs && request.durations && request.data),
               "where to integrate");

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "rhec/plugins/robot/spans.hpp"
+
 namespace rhec {
 namespace {
 
@@ -16,7 +18,7 @@ std::string noise_name(const Variable& state) { return state.name + "_noise"; }
 }  // namespace
 
 BlockingSection::BlockingSection(std::shared_ptr<const RobotContext> context, const Settings& section)
-    : context_(std::move(context)), section_(section) {
+    : context_(std::move(context)), section_(all_spans_in_intervals(section, context_->step)) {
   std::vector<std::string> names = names_of(context_->about.parameters);
   for (std::size_t j = 0; j < context_->about.states.size(); ++j) {
     const Variable& state = context_->about.states[j];

@@ -12,6 +12,7 @@
 #include "rhec/plugins/robot/bounds_section.hpp"
 #include "rhec/plugins/robot/by_name.hpp"
 #include "rhec/plugins/robot/integration.hpp"
+#include "rhec/plugins/robot/spans.hpp"
 
 #include "default_solver.hpp"
 
@@ -122,7 +123,8 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
   using C = ControllerOptions;
   static const auto rows =
       OptionTable<C>()
-          .integer("horizon", &C::horizon, "N_c, intervals", between(1, 100000))
+          .integer("horizon", &C::horizon,
+                   "N_c, intervals; or a time such as 3 s, which as many intervals of `step` cover", between(1, 100000))
           .choice("integrator", &C::integrator, integrator_choices(), integrator_meaning)
           .automatic_integer(
               "substeps", &C::substeps,
@@ -152,8 +154,9 @@ const OptionTable<ControllerOptions>& ControllerOptions::table() {
 
 ControllerSection::ControllerSection(std::shared_ptr<const RobotContext> context, const Settings& section)
     : context_(std::move(context)),
-      section_(section),
-      options_(ControllerOptions::table().parse(section, "controller")) {
+      section_(with_span_in_intervals(section, "horizon", context_->step)),
+      options_(ControllerOptions::table().parse(section_, "controller")) {
+  options_.blocking = all_spans_in_intervals(options_.blocking, context_->step);
   if (!options_.solver.is_null()) return;
   options_.solver = Settings::map();
   options_.solver.add("name", Settings::scalar(default_solver.otherwise));

@@ -70,6 +70,8 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
   setup.initial_covariance = parts.initial_covariance;
   setup.substeps = parts.substeps;
   setup.heading_starts = parts.heading_starts;
+  setup.most_between = parts.most_between;
+  setup.remembered_nodes = parts.remembered_nodes();
   return std::make_unique<FilterEstimation>(context.model, std::move(setup));
 }
 
@@ -92,6 +94,7 @@ RheProblem::Setup EstimatorParts::problem() const {
   RheProblem::Setup setup;
   setup.max_intervals = horizon;
   setup.substeps = substeps;
+  setup.most_between = most_between;
   for (const double sigma : context->noise.output_sigmas) setup.output_weights.push_back(1.0 / (sigma * sigma));
   for (const double sigma : context->noise.input_sigmas) setup.input_weights.push_back(1.0 / (sigma * sigma));
   setup.robust = robust;
@@ -125,7 +128,8 @@ BankEstimation::Setup EstimatorParts::filters() const {
   setup.initial_state = initial_mean.head(nx);
   setup.initial_covariance = initial_covariance.topLeftCorner(nx, nx);
   setup.heading_starts = heading_starts;
-  setup.remembered_nodes = horizon + 1;
+  setup.bank.most_between = most_between;
+  setup.remembered_nodes = remembered_nodes();
   return setup;
 }
 

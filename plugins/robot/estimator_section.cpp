@@ -12,6 +12,7 @@
 #include "rhec/plugins/robot/plugin_option.hpp"
 #include "rhec/plugins/robot/robust_losses.hpp"
 #include "rhec/plugins/robot/sensors.hpp"
+#include "rhec/plugins/robot/spans.hpp"
 #include "rhec/plugins/robot/state_noise.hpp"
 
 #include "default_solver.hpp"
@@ -57,6 +58,13 @@ const ByName<NumberValue>& block_sigma_by_name() {
       {{"PARAMETER", &ModelDescription::parameters, constant_default(ParameterWalk{}.block_sigma),
         "standard deviation of an unlinked block inside the window about the block before; .inf: none, as in the "
         "paper"}});
+  return map;
+}
+
+const NumbersByName& delays_by_name() {
+  static const NumbersByName map("delays", {between(0.0, 1000.0)},
+                                 {{"OUTPUT", &ModelDescription::outputs, constant_default(0.0),
+                                   "how much later than it was measured it is stamped [s]"}});
   return map;
 }
 
@@ -117,16 +125,22 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
   using E = EstimatorOptions;
   return OptionTable<E>()
       .choice("name", &E::name, std::move(names), std::move(meanings))
-      .integer("horizon", &E::horizon, "N_e, intervals", between(1, 100000))
+      .integer("horizon", &E::horizon, "N_e, intervals; or a time such as 3 s, which as many intervals of `step` cover",
+               between(1, 100000))
       .choice("integrator", &E::integrator, integrator_choices(), integrator_meaning)
       .automatic_integer("substeps", &E::substeps,
                          "integration steps per interval; auto: as many as the model's time constants ask for",
                          between(1, 1000))
+      .integer("between", &E::most_between,
+               "measurements that an interval has room for between its two nodes, each at its own time; if there are "
+               "more, it ends early, in a further node",
+               between(0, 10000))
       .integer("heading_starts", &E::heading_starts,
                "starts around the circle while the heading is unknown; 1: the initial mean is trusted", between(1, 64))
       .choice("covariance", &E::covariance, {{"bank", BlockCovariance::bank}, {"blocks", BlockCovariance::blocks}},
               "of a window with blocks: that of a bank of filters beside it, with the difference of the two estimates, "
               "which holds; or that of the block model, which leaves out that parameters vary within a block")
+      .map("delays", &E::delays, delays_by_name().rows())
       .map("arrival", &E::arrival, ArrivalOptions::table().schema())
       .map("process_noise", &E::process_noise, process_noise_by_name().rows())
       .map("restart_sigma", &E::restart_sigma, restart_sigma_by_name().rows())
@@ -144,12 +158,14 @@ OptionTable<EstimatorOptions> EstimatorOptions::table(const EstimatorMakers& mak
 EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, BlockingSection blocking,
                                    const Settings& section, EstimatorMakers makers)
     : makers_(std::move(makers)),
-      options_(EstimatorOptions::table(makers_).parse(section, "estimator")),
+      options_(EstimatorOptions::table(makers_).parse(with_span_in_intervals(section, "horizon", context->step),
+                                                      "estimator")),
       parts_{.context = std::move(context),
              .section = section,
              .horizon = options_.horizon,
              .substeps = 1,  // until the parameters at the start are known
              .heading_starts = options_.heading_starts,
+             .most_between = options_.most_between,
              .arrival = ArrivalOptions::table().parse(options_.arrival, "estimator: arrival").name,
              .robust = {},
              .walks = {},
@@ -165,6 +181,7 @@ EstimatorSection::EstimatorSection(std::shared_ptr<const RobotContext> context, 
              .make_map = {}} {
   const ModelDescription& about = parts_.context->about;
   parts_.robust = robust_losses(options_.robust, about, "estimator");
+  delays_ = delays_by_name().read(options_.delays, about);
   const auto process_noise = process_noise_by_name().read(options_.process_noise, about);
   const auto restart = restart_sigma_by_name().read(options_.restart_sigma, about);
   const auto alone = block_sigma_by_name().read(options_.block_sigma, about);
@@ -244,6 +261,7 @@ std::unique_ptr<Estimator> EstimatorSection::make(const std::optional<Eigen::Vec
   with_hooks.make_map = [&] { return hooks.provide_map(parts_.memory, parts_.make_map()); };
   Estimator::Timeline timeline;
   timeline.longest_interval = parts_.context->step;
+  timeline.delays = delays_;
   const EstimatorMaker& maker = makers_.named(options_.name);
   auto method = hooks.wrap_method(maker.make(with_hooks));
   auto watch = make_watch_for(maker, with_hooks);

@@ -42,14 +42,14 @@ class InnovationMethod final : public EstimationMethod {
   const Model& model() const noexcept override { return method_->model(); }
   int substeps() const noexcept override { return method_->substeps(); }
   void start(const double* outputs) noexcept override { method_->start(outputs); }
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override {
+  // Without measurements between nodes: each is asked for at a node.
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
     const bool is_fix = std::any_of(places_.begin(), places_.end(), [&](int j) { return !std::isnan(outputs[j]); });
-    if (!is_fix) return method_->add_node(duration, inputs, outputs);
-    if (duration > 0.0) method_->add_node(duration, inputs, nothing_.data());
+    if (!is_fix) return method_->add(interval, outputs);
+    if (interval.duration > 0.0) method_->add(interval, nothing_.data());
     note(outputs);
     method_->add_node(0.0, no_input_.data(), outputs);
   }
-  bool amend(int back, const double* outputs) noexcept override { return method_->amend(back, outputs); }
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override { method_->estimate(result, deadline); }
   void reset() noexcept override { method_->reset(); }
   bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override {

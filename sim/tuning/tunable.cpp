@@ -1,4 +1,5 @@
 #include "rhec/sim/tuning/tunable.hpp"
+#include "rhec/plugins/robot/spans.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/options.hpp"
+#include "rhec/plugins/robot/spans.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::sim {
@@ -265,8 +267,10 @@ std::vector<Tunable> controller_tunables(const Robot& robot, const Settings& set
   if (all.empty())
     throw settings.error("controller.weights: found no positive weight to tune; expected e.g. stage: {u2: 1}");
   const Settings* horizon = settings.find_path("controller.horizon");
-  Tunable length = scale_of({"controller.horizon"}, horizon ? horizon->as_integer() : RhcProblem::Setup{}.max_intervals,
-                            "intervals", std::numbers::ln2);
+  Tunable length =
+      scale_of({"controller.horizon"},
+               horizon ? span_in_intervals(*horizon, robot.step()).as_integer() : RhcProblem::Setup{}.max_intervals,
+               "intervals", std::numbers::ln2);
   length.is_whole = true;
   length.lower = std::max(2.0, std::round(length.value_at(-1.0)));
   length.upper = length.value_at(1.0);

@@ -14,8 +14,7 @@ class TruthEstimation final : public EstimationMethod {
   const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return substeps_; }
   void start(const double*) noexcept override {}
-  void add_node(double, const double*, const double*) noexcept override {}
-  bool amend(int, const double*) noexcept override { return true; }
+  void add(const MeasuredInterval&, const double*) noexcept override {}
   void estimate(Estimate& result, Clock::time_point) noexcept override {
     result.state = vehicle_.state();
     result.parameters = vehicle_.parameters();

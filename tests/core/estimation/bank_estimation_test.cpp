@@ -66,9 +66,11 @@ TEST(BankEstimation, TakesLateOutputsAtTheNodesThatItRemembers) {
   const std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
   BankEstimation bank(model, bicycle_setup(*model, 0.4, 0.1, 1));
   const Estimate before = drive(bank, 0.4, 10);
-  const double fix[] = {before.state[0] + 1.0, nan, nan};
-  EXPECT_FALSE(bank.amend(16, fix));
-  EXPECT_TRUE(bank.amend(2, fix));
+  EXPECT_EQ(bank.reach(), 11) << "the start of the run";
+  const double fix[] = {before.state[0] + 1.0, nan, nan}, inputs[] = {2.0, 0.0}, nothing[] = {nan, nan, nan};
+  bank.rewind(3);
+  bank.add_node(0.2, inputs, fix);
+  for (int k = 0; k < 2; ++k) bank.add_node(0.2, inputs, nothing);
   Estimate after = empty_estimate(*model);
   bank.estimate(after, Clock::time_point::max());
   EXPECT_GT(after.state[0], before.state[0] + 0.05);

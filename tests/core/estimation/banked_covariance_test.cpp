@@ -7,6 +7,7 @@
 
 #include "rhec/core/estimation/receding_horizon_estimation.hpp"
 #include "support/bank_case.hpp"
+#include "support/late_driver.hpp"
 
 namespace rhec {
 namespace banked_covariance_test {
@@ -74,14 +75,15 @@ TEST(BankedCovariance, TakesLateMeasurementsAndStartsAnew) {
   BankedCovariance banked(one_block(model, 8), bank_of(*model));
   const auto run = [&] {
     Estimate estimate = empty_estimate(*model);
-    banked.start(samples[0].outputs.data());
+    LateDriver late(banked);
+    late.start(samples[0].outputs.data());
     const double nothing[] = {nan, nan};
     for (int k = 1; k <= 30; ++k) {
-      banked.add_node(samples[k].duration, samples[k].inputs.data(), nothing);
-      EXPECT_TRUE(k <= 3 || banked.amend(3, samples[k - 3].outputs.data()));
+      late.add_node(samples[k].duration, samples[k].inputs.data(), nothing);
+      EXPECT_TRUE(k <= 3 || late.amend(3, samples[k - 3].outputs.data()));
       banked.estimate(estimate, Clock::time_point::max());
     }
-    EXPECT_FALSE(banked.amend(20, samples[10].outputs.data()));
+    EXPECT_FALSE(late.amend(20, samples[10].outputs.data()));
     return estimate;
   };
   const Estimate first = run(), second = run();

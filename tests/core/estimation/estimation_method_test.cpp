@@ -297,7 +297,7 @@ TEST(EstimationMethods, StampsOfOneStepNeedNoSecondPreparation) {
   const auto model = linear_model<Hovercraft>();
   const std::vector<double> outputs(model->output_count(), 0.1), inputs(model->input_count(), 0.1);
   const auto counter = std::make_shared<PreparationCounter>(gn_rti());
-  Estimator estimator(make_method(false, model, counter));
+  Estimator estimator(make_method(false, model, counter), {.longest_interval = 0.1});
   int rounded = 0;
   for (int k = 0; k < 60; ++k) {
     // Multiples of 0.1 s as they are computed: their differences are not all the same.

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -27,19 +28,23 @@ class Recorder final : public EstimationMethod {
   struct Node {
     double duration;
     std::vector<double> inputs, outputs;
+    std::vector<double> times = {}, between = {};
   };
+  explicit Recorder(int room, int window) : room_(room), window_(window) {}
   const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return 1; }
   void start(const double* outputs) noexcept override { nodes = {{0.0, {}, {outputs, outputs + 2}}}; }
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override {
-    nodes.push_back({duration, {inputs, inputs + 1}, {outputs, outputs + 2}});
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override {
+    nodes.push_back({interval.duration,
+                     {interval.inputs, interval.inputs + 1},
+                     {outputs, outputs + 2},
+                     {interval.times, interval.times + interval.between},
+                     {interval.outputs, interval.outputs + 2 * interval.between}});
   }
-  bool amend(int back, const double* outputs) noexcept override {
-    if (back >= window || back >= static_cast<int>(nodes.size())) return false;
-    for (int j = 0; j < 2; ++j)
-      if (!std::isnan(outputs[j])) nodes[nodes.size() - 1 - back].outputs[j] = outputs[j];
-    return true;
-  }
+  int most_between() const noexcept override { return room_; }
+  int reach() const noexcept override { return std::min(static_cast<int>(nodes.size()), most_reach()); }
+  int most_reach() const noexcept override { return window_; }
+  void rewind(int count) noexcept override { nodes.resize(nodes.size() - static_cast<std::size_t>(count)); }
   void estimate(Estimate& result, Clock::time_point) noexcept override {
     ++estimates;
     result.state = Eigen::Vector2d(static_cast<double>(nodes.size()), 0.0);
@@ -48,18 +53,19 @@ class Recorder final : public EstimationMethod {
   void reset() noexcept override { nodes.clear(); }
 
   std::vector<Node> nodes;
-  int window = 5, estimates = 0;
+  int estimates = 0;
 
  private:
   std::shared_ptr<const Model> model_ = linear_model<Trolley>();
+  int room_, window_;
 };
 
 struct Timeline : ::testing::Test {
   Recorder* recorder = nullptr;
   Estimator estimator = make({.longest_interval = 0.2});
 
-  Estimator make(const Estimator::Timeline& timeline) {
-    auto method = std::make_unique<Recorder>();
+  Estimator make(const Estimator::Timeline& timeline, int room = 8, int window = 5) {
+    auto method = std::make_unique<Recorder>(room, window);
     recorder = method.get();
     return Estimator(std::move(method), timeline);
   }
@@ -75,50 +81,105 @@ struct Timeline : ::testing::Test {
   }
 };
 
-TEST_F(Timeline, NodesLieWhereMeasurementsDo) {
+TEST_F(Timeline, TheNewestMeasurementIsANodeAndGivesWay) {
   measure(10.0, 1.0);
   measure(10.125, 2.0);
-  measure(10.1875, 3.0);
   EXPECT_FALSE(estimator.has_started());
+  estimator.estimate(10.125);
+  EXPECT_THAT(durations(), ElementsAre(0.0, 0.125));
+  EXPECT_EQ(recorder->nodes[1].outputs[0], 2.0);
+  EXPECT_TRUE(recorder->nodes[1].times.empty());
+  measure(10.1875, 3.0);
   const Estimate& estimate = estimator.estimate(10.1875);
   EXPECT_TRUE(estimator.has_started());
   EXPECT_EQ(estimate.time, 10.1875);
   EXPECT_FALSE(estimate.predicted);
-  EXPECT_THAT(durations(), ElementsAre(0.0, 0.125, 0.0625));
-  EXPECT_EQ(recorder->nodes[1].outputs[0], 2.0);
+  EXPECT_THAT(durations(), ElementsAre(0.0, 0.1875));
+  EXPECT_EQ(recorder->nodes[1].outputs[0], 3.0);
   EXPECT_TRUE(std::isnan(recorder->nodes[1].outputs[1]));
-  EXPECT_EQ(estimator.counts().nodes, 3);
-  EXPECT_EQ(estimator.counts().estimates, 1);
+  EXPECT_THAT(recorder->nodes[1].times, ElementsAre(0.125));
+  EXPECT_EQ(recorder->nodes[1].between[0], 2.0);
+  EXPECT_EQ(estimator.counts().nodes, 2);
+  EXPECT_EQ(estimator.counts().estimates, 2);
+  EXPECT_EQ(estimator.counts().late, 0);
+}
+
+/// However often there are measurements, intervals are as long as a step.
+TEST_F(Timeline, RatesOfSensorsDoNotSetTheNumberOfNodes) {
+  estimator = make({.longest_interval = 0.2}, 32);
+  for (int i = 0; i <= 100; ++i) {
+    measure(0.01 * i, i);
+    if (i % 20 == 0) measure(0.01 * i, nan, 2.0);
+    estimator.estimate(0.01 * i);
+  }
+  ASSERT_EQ(recorder->nodes.size(), 6u);
+  for (std::size_t i = 1; i < 6; ++i) {
+    EXPECT_NEAR(recorder->nodes[i].duration, 0.2, 1e-12);
+    EXPECT_EQ(recorder->nodes[i].outputs[0], 20.0 * i);
+    EXPECT_EQ(recorder->nodes[i].outputs[1], 2.0);
+    ASSERT_EQ(recorder->nodes[i].times.size(), 19u);
+    for (int k = 0; k < 19; ++k) {
+      EXPECT_NEAR(recorder->nodes[i].times[k], 0.01 * (k + 1), 1e-12);
+      EXPECT_EQ(recorder->nodes[i].between[2 * k], 20.0 * (i - 1) + k + 1);
+    }
+  }
+}
+
+/// Jitter of a sensor at the step itself makes no measurement lie between nodes.
+TEST_F(Timeline, NodesLieAtMeasurementsThatAreNearToTheGrid) {
+  const std::vector<double> stamps{0.0, 0.195, 0.402, 0.593, 0.8, 1.008};
+  for (const double stamp : stamps) {
+    measure(stamp, 1.0);
+    estimator.estimate(stamp);
+  }
+  ASSERT_EQ(recorder->nodes.size(), stamps.size());
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    EXPECT_NEAR(recorder->nodes[i].duration, stamps[i] - stamps[i - 1], 1e-12);
+    EXPECT_TRUE(recorder->nodes[i].times.empty());
+  }
+}
+
+TEST_F(Timeline, AnIntervalWithoutRoomEndsEarly) {
+  estimator = make({.longest_interval = 1.0}, 2);
+  for (int i = 0; i <= 10; ++i) measure(0.1 * i, i);
+  estimator.estimate(1.0);
+  // 0.1 and 0.2 between, 0.3 a node, and so on.
+  ASSERT_EQ(recorder->nodes.size(), 5u);
+  std::vector<double> seen;
+  for (std::size_t i = 1; i < 5; ++i) {
+    for (std::size_t k = 0; k < recorder->nodes[i].times.size(); ++k) seen.push_back(recorder->nodes[i].between[2 * k]);
+    seen.push_back(recorder->nodes[i].outputs[0]);
+  }
+  EXPECT_THAT(seen, ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9, 10));
 }
 
 TEST_F(Timeline, OnlyWhatIsStampedUpToTheTimeIsUsed) {
   measure(0.0, 1.0);
-  measure(0.1, 2.0);
-  measure(0.2, 3.0);
-  estimator.estimate(0.1);
+  measure(0.2, 2.0);
+  measure(0.4, 3.0);
+  estimator.estimate(0.2);
   EXPECT_EQ(recorder->nodes.size(), 2u);
-  estimator.estimate(0.25);
+  estimator.estimate(0.45);
+  EXPECT_EQ(recorder->nodes.size(), 3u);
+  estimator.estimate(0.1);  // nothing is lost
   EXPECT_EQ(recorder->nodes.size(), 3u);
 }
 
-TEST_F(Timeline, GapsAreFilledWithNodesAtMostTheLongestIntervalApart) {
+TEST_F(Timeline, GapsAreFilledWithNodesAStepApart) {
   input(0.0, 1.0);
   measure(0.0, 1.0);
   measure(0.2, 2.0);  // just fits
-  measure(0.7, 3.0);  // three parts
+  measure(0.7, 3.0);
   input(0.5, 4.0);
   estimator.estimate(0.7);
   ASSERT_EQ(recorder->nodes.size(), 5u);
-  for (std::size_t i = 1; i < 5; ++i) EXPECT_LE(recorder->nodes[i].duration, 0.2 + 1e-9);
-  EXPECT_NEAR(recorder->nodes[1].duration, 0.2, 1e-15);
-  for (std::size_t i = 2; i < 5; ++i) EXPECT_NEAR(recorder->nodes[i].duration, 0.5 / 3.0, 1e-12);
+  for (std::size_t i = 1; i < 4; ++i) EXPECT_NEAR(recorder->nodes[i].duration, 0.2, 1e-12);
+  EXPECT_NEAR(recorder->nodes[4].duration, 0.1, 1e-12);
   for (std::size_t i = 2; i < 4; ++i)
     for (const double output : recorder->nodes[i].outputs) EXPECT_TRUE(std::isnan(output));
   EXPECT_EQ(recorder->nodes[4].outputs[0], 3.0);
-  // From 0.2 on: [0.2, 0.3667] 1; [0.3667, 0.5333] 1 and, from 0.5, 4; [0.5333, 0.7] 4.
   EXPECT_NEAR(recorder->nodes[2].inputs[0], 1.0, 1e-12);
-  const double part = 0.5 / 3.0, late = 0.2 + 2.0 * part - 0.5;
-  EXPECT_NEAR(recorder->nodes[3].inputs[0], (1.0 * (part - late) + 4.0 * late) / part, 1e-12);
+  EXPECT_NEAR(recorder->nodes[3].inputs[0], 0.5 * (1.0 + 4.0), 1e-12);
   EXPECT_NEAR(recorder->nodes[4].inputs[0], 4.0, 1e-12);
 }
 
@@ -149,10 +210,10 @@ TEST_F(Timeline, InputsAreAveragedOverAnInterval) {
 
 TEST_F(Timeline, WhatIsKnownOfAnInputCountsAndNothingIsNothing) {
   measure(0.0, 0.0);
-  measure(0.1, 0.0);
-  input(0.15, 3.0);
   measure(0.2, 0.0);
-  estimator.estimate(0.2);
+  input(0.3, 3.0);
+  measure(0.4, 0.0);
+  estimator.estimate(0.4);
   EXPECT_TRUE(std::isnan(recorder->nodes[1].inputs[0]));
   EXPECT_NEAR(recorder->nodes[2].inputs[0], 3.0, 1e-12);
 }
@@ -177,44 +238,80 @@ TEST_F(Timeline, MeasurementsWithOneStampAreOneNode) {
 }
 
 TEST_F(Timeline, WhatComesOutOfOrderButInTimeIsSorted) {
-  measure(0.2, 3.0);
+  measure(0.4, 3.0);
   measure(0.0, 1.0);
-  measure(0.1, 2.0);
-  estimator.estimate(0.2);
+  measure(0.2, 2.0);
+  estimator.estimate(0.4);
   ASSERT_EQ(recorder->nodes.size(), 3u);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(recorder->nodes[i].outputs[0], 1.0 + i);
   EXPECT_EQ(estimator.counts().late, 0);
 }
 
-TEST_F(Timeline, LateMeasurementsAreMergedOrDropped) {
-  for (int i = 0; i <= 10; ++i) measure(0.1 * i, i);
-  estimator.estimate(1.0);
+TEST_F(Timeline, LateMeasurementsGoToTheirPlaceOrAreDropped) {
+  for (int i = 0; i <= 10; ++i) measure(0.2 * i, i);
+  estimator.estimate(2.0);
   EXPECT_EQ(recorder->estimates, 1);
-  measure(0.8, nan, 7.0);  // two nodes back
+  measure(1.6, nan, 7.0);  // two nodes back
+  measure(1.7, nan, 8.0);  // between nodes
+  measure(2.0, nan, 9.0);  // the newest
+  EXPECT_EQ(estimator.counts().late, 3);
+  EXPECT_EQ(estimator.counts().dropped, 0);
+  estimator.estimate(2.0);
+  EXPECT_EQ(recorder->estimates, 2);
+  ASSERT_EQ(recorder->nodes.size(), 11u);
   EXPECT_EQ(recorder->nodes[8].outputs[1], 7.0);
   EXPECT_EQ(recorder->nodes[8].outputs[0], 8.0);
-  measure(1.0, nan, 9.0);  // the newest
+  ASSERT_EQ(recorder->nodes[9].times.size(), 1u);
+  EXPECT_NEAR(recorder->nodes[9].times[0], 0.1, 1e-12);
+  EXPECT_EQ(recorder->nodes[9].between[1], 8.0);
   EXPECT_EQ(recorder->nodes[10].outputs[1], 9.0);
-  EXPECT_EQ(estimator.counts().late, 2);
-  EXPECT_EQ(estimator.counts().dropped, 0);
-  estimator.estimate(1.0);
-  EXPECT_EQ(recorder->estimates, 2);
-  measure(0.2, nan, 7.0);   // out of reach
-  measure(0.85, nan, 7.0);  // no node there
+  measure(0.4, nan, 7.0);   // out of reach
   measure(-3.0, nan, 7.0);  // before the run
-  EXPECT_EQ(estimator.counts().late, 2);
-  EXPECT_EQ(estimator.counts().dropped, 3);
-  estimator.estimate(1.0);
+  EXPECT_EQ(estimator.counts().late, 3);
+  EXPECT_EQ(estimator.counts().dropped, 2);
+  estimator.estimate(2.0);
   EXPECT_EQ(recorder->estimates, 2);
+  EXPECT_EQ(estimator.counts().nodes, 11);
+}
+
+/// As long as the start of the run can be taken back, it may move.
+TEST_F(Timeline, WhatComesBeforeTheStartIsTheStart) {
+  measure(1.0, 1.0);
+  measure(1.2, 2.0);
+  estimator.estimate(1.2);
+  measure(0.9, 0.0);
+  estimator.estimate(1.2);
+  ASSERT_EQ(recorder->nodes.size(), 3u);
+  EXPECT_EQ(recorder->nodes[0].outputs[0], 0.0);
+  EXPECT_NEAR(recorder->nodes[1].duration, 0.2, 1e-12);
+  EXPECT_EQ(recorder->nodes[1].between[0], 1.0);
+  EXPECT_NEAR(recorder->nodes[2].duration, 0.1, 1e-12);
+  EXPECT_EQ(estimator.counts().dropped, 0);
+}
+
+TEST_F(Timeline, LateInputsCountFromTheirStampOn) {
+  input(0.0, 1.0);
+  for (int i = 0; i <= 10; ++i) measure(0.2 * i, i);
+  estimator.estimate(2.0);
+  input(1.7, 3.0);
+  estimator.estimate(2.0);
+  EXPECT_NEAR(recorder->nodes[8].inputs[0], 1.0, 1e-12);
+  EXPECT_NEAR(recorder->nodes[9].inputs[0], 2.0, 1e-12);
+  EXPECT_NEAR(recorder->nodes[10].inputs[0], 3.0, 1e-12);
+  input(0.1, 5.0);  // of which only the last intervals can be told
+  estimator.estimate(2.0);
+  EXPECT_NEAR(recorder->nodes[5].inputs[0], 1.0, 1e-12);
+  EXPECT_NEAR(recorder->nodes[6].inputs[0], 5.0, 1e-12);
+  EXPECT_NEAR(recorder->nodes[10].inputs[0], 3.0, 1e-12);
 }
 
 TEST_F(Timeline, WhatIsNoNumberIsMaskedAndCounted) {
   measure(0.0, nan, 1.0);
-  measure(0.1, infinity, -infinity);
-  measure(0.2, 1e300, 2.0);
+  measure(0.2, infinity, -infinity);
+  measure(0.4, 1e300, 2.0);
   input(0.0, infinity);
-  input(0.1, 5.0);
-  estimator.estimate(0.2);
+  input(0.2, 5.0);
+  estimator.estimate(0.4);
   ASSERT_EQ(recorder->nodes.size(), 3u);
   for (const double output : recorder->nodes[1].outputs) EXPECT_TRUE(std::isnan(output));
   EXPECT_TRUE(std::isnan(recorder->nodes[2].outputs[0]));
@@ -230,11 +327,11 @@ TEST_F(Timeline, StampsThatAreNoTimesAreDropped) {
   }
   EXPECT_EQ(estimator.counts().dropped, 3);
   measure(0.0, 1.0);
-  measure(0.1, 1.0);
+  measure(0.2, 1.0);
   for (const double time : {nan, -infinity}) EXPECT_EQ(estimator.estimate(time).time, 0.0);
   EXPECT_FALSE(estimator.has_started());
   const Estimate& estimate = estimator.estimate(infinity);  // all there is
-  EXPECT_EQ(estimate.time, 0.1);
+  EXPECT_EQ(estimate.time, 0.2);
   EXPECT_TRUE(estimate.state.allFinite());
   EXPECT_TRUE(std::isnan(recorder->nodes[1].inputs[0]));
 }
@@ -299,7 +396,7 @@ TEST_F(Timeline, RefusesNumbersThatMakeNoSense) {
 TEST(Integration, IsHeldAgainstTwiceAsManySteps) {
   // A trolley that swings with 0.63 rad/s: steps of 0.2 s are exact, those of 5 s are not.
   for (const double interval : {0.2, 5.0}) {
-    Estimator estimator(std::make_unique<Recorder>(), {.longest_interval = 10.0});
+    Estimator estimator(std::make_unique<Recorder>(0, 4), {.longest_interval = 10.0});
     const double outputs[] = {1.0, 2.0};
     for (int k = 0; k < 64; ++k) {
       estimator.push_measurement(interval * k, outputs);

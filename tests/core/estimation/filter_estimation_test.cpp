@@ -11,6 +11,7 @@
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/core/model/sensor_model.hpp"
 #include "rhec/core/model/state_noise_model.hpp"
+#include "support/late_driver.hpp"
 #include "support/linear_case.hpp"
 
 namespace rhec {
@@ -62,7 +63,7 @@ TEST(FilterEstimation, TrustsTheInitialHeadingWithOneStart) {
   EXPECT_LT(heading_error(one, 1.6, 40), 0.05);
 }
 
-TEST(FilterEstimation, AmendsItsNewestNodeOnly) {
+TEST(FilterEstimation, TakesLateOutputsAtTheNodesThatItRemembers) {
   const auto model = linear_model<Trolley>();
   const auto samples = simulate(*model, 5, true, 4);
   FilterEstimation::Setup setup;
@@ -71,19 +72,30 @@ TEST(FilterEstimation, AmendsItsNewestNodeOnly) {
   for (const double sigma : noise.inputs) setup.noise.input_variances.push_back(sigma * sigma);
   setup.initial_mean = initial_mean(*model);
   setup.initial_covariance = initial_covariance(*model);
+  setup.remembered_nodes = 2;
   FilterEstimation at_once(model, setup), in_parts(model, setup);
+  LateDriver late(in_parts);
   Estimate expected = empty_estimate(*model), found = expected;
   const double both[] = {0.4, 0.3}, first[] = {0.4, nan}, second[] = {nan, 0.3}, nothing[] = {nan, nan};
   at_once.start(nothing);
   at_once.add_node(0.2, samples[1].inputs.data(), both);
   at_once.estimate(expected, Clock::time_point::max());
-  in_parts.start(nothing);
-  in_parts.add_node(0.2, samples[1].inputs.data(), first);
-  EXPECT_FALSE(in_parts.amend(1, second)) << "it has no memory of older nodes";
-  EXPECT_TRUE(in_parts.amend(0, second));
+  late.start(nothing);
+  late.add_node(0.2, samples[1].inputs.data(), first);
+  EXPECT_TRUE(late.amend(0, second));
   in_parts.estimate(found, Clock::time_point::max());
-  EXPECT_LT((found.state - expected.state).cwiseAbs().maxCoeff(), 1e-12);
-  EXPECT_LT((found.covariance - expected.covariance).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_EQ(found.state, expected.state);
+  EXPECT_EQ(found.covariance, expected.covariance);
+  for (int k = 2; k <= 4; ++k) {
+    at_once.add_node(0.2, samples[k].inputs.data(), both);
+    late.add_node(0.2, samples[k].inputs.data(), k == 3 ? first : both);
+  }
+  EXPECT_TRUE(late.amend(1, second));
+  EXPECT_FALSE(late.amend(2, second)) << "the node before it is forgotten";
+  at_once.estimate(expected, Clock::time_point::max());
+  in_parts.estimate(found, Clock::time_point::max());
+  EXPECT_EQ(found.state, expected.state);
+  EXPECT_EQ(found.covariance, expected.covariance);
 }
 
 TEST(FilterEstimation, RefusesASetUpThatDoesNotFit) {

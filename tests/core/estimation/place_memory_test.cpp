@@ -7,6 +7,7 @@
 
 #include "rhec/core/estimation/bank_estimation.hpp"
 #include "rhec/core/prior/standard_bank.hpp"
+#include "support/late_driver.hpp"
 #include "support/linear_case.hpp"
 
 namespace rhec {
@@ -58,6 +59,7 @@ struct Drive {
 /// Straight along x at 4 m/s over ground, with steering angle 0. Late: every fourth position comes 3 nodes late.
 Drive drive(BankEstimation& bank, Field field, unsigned seed, bool late = false) {
   std::mt19937 random(seed);
+  LateDriver driver(bank);
   std::normal_distribution<double> normal;
   Eigen::VectorXd state = Eigen::Vector4d::Zero();
   Drive result;
@@ -77,11 +79,11 @@ Drive drive(BankEstimation& bank, Field field, unsigned seed, bool late = false)
       outputs.assign(3, nan);
     }
     if (k == 0)
-      bank.start(outputs.data());
+      driver.start(outputs.data());
     else
-      bank.add_node(step, inputs.data(), outputs.data());
+      driver.add_node(step, inputs.data(), outputs.data());
     if (late && k % 4 == 0 && !pending.empty()) {
-      EXPECT_TRUE(bank.amend(3, pending.back().data()));
+      EXPECT_TRUE(driver.amend(3, pending.back().data()));
       pending.clear();
     }
     bank.estimate(estimate, Clock::time_point::max());

@@ -9,6 +9,7 @@
 
 #include "support/bank_case.hpp"
 #include "support/error_of.hpp"
+#include "support/late_driver.hpp"
 
 namespace rhec {
 namespace prior_horizon_estimation_test {
@@ -140,7 +141,8 @@ TEST(PriorHorizonEstimation, UsesLateMeasurementsAsIfTheyHadComeInTime) {
   const auto model = linear_model<Hovercraft>();
   const auto samples = samples_of(*model, 40, 3);
   PriorHorizonEstimation in_time = estimation_for(model, 8, linear_priors()),
-                         late = estimation_for(model, 8, linear_priors());
+                         behind = estimation_for(model, 8, linear_priors());
+  LateDriver late(behind);
   const std::vector<double> nothing(3, nan);
   in_time.start(samples[0].outputs.data());
   late.start(samples[0].outputs.data());
@@ -153,7 +155,7 @@ TEST(PriorHorizonEstimation, UsesLateMeasurementsAsIfTheyHadComeInTime) {
   EXPECT_FALSE(late.amend(30, samples[10].outputs.data()));
   Estimate a = empty_estimate(*model), b = a;
   in_time.estimate(a, Clock::time_point::max());
-  late.estimate(b, Clock::time_point::max());
+  behind.estimate(b, Clock::time_point::max());
   Eigen::VectorXd mean(6);
   mean << b.state, b.parameters;
   EXPECT_LT(difference(a, mean, b.covariance), 1e-9);

@@ -78,7 +78,8 @@ double worst_of(const Case& run) {
   RecedingHorizonEstimation& direct = *method;
   const bool through_estimator = run.way == Way::estimator || run.way == Way::prepared_estimator;
   const bool prepares = run.way == Way::prepared || run.way == Way::prepared_estimator;
-  Estimator estimator(std::move(method), {.longest_interval = 0.4});
+  // Its nodes are those of the samples, since these are one step apart.
+  Estimator estimator(std::move(method), {.longest_interval = samples[1].duration});
   Estimate own = empty_estimate(model);
   double worst = 0.0, time = 0.0;
   for (int k = 0; k <= run.steps; ++k) {
@@ -121,6 +122,8 @@ void expect_kalman(Case run, int least_horizon = 1) {
           if (run.tolerance > 1e-9 && solver != "{mode: rti}") continue;
           for (const Way way : {Way::method, Way::prepared, Way::estimator, Way::prepared_estimator}) {
             if (horizon > 4 && turn++ % 7 != 0) continue;
+            const bool through_estimator = way == Way::estimator || way == Way::prepared_estimator;
+            if (through_estimator && !equal) continue;
             run.arrival = arrival;
             run.equal_intervals = equal;
             run.solver = solver;

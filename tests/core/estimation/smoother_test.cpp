@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/late_driver.hpp"
 #include "support/linear_case.hpp"
 
 namespace rhec {
@@ -35,10 +36,11 @@ TEST(NodeRecorder, RecordsWhatPassesThrough) {
   NodeRecorder recorder(std::make_unique<RecedingHorizonEstimation>(model, gn_rti(), setup), log);
   Estimate estimate = empty_estimate(*model);
   const auto samples = simulate(*model, 9, false, 3);
+  LateDriver driver(recorder);
   for (int round = 0; round < 2; ++round) {
     for (std::size_t k = 0; k < samples.size(); ++k) {
-      if (k == 0) recorder.start(samples[k].outputs.data());
-      if (k > 0) recorder.add_node(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
+      if (k == 0) driver.start(samples[k].outputs.data());
+      if (k > 0) driver.add_node(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
       recorder.estimate(estimate, Clock::time_point::max());
       EXPECT_EQ(log->states[2 * k], estimate.state[0]);
       EXPECT_EQ(log->states[2 * k + 1], estimate.state[1]);
@@ -52,10 +54,10 @@ TEST(NodeRecorder, RecordsWhatPassesThrough) {
     // A late measurement changes what it has, and what it lacks stays.
     const double before = log->outputs[2 * 7 + 1];
     const double late[] = {0.25, nan};
-    ASSERT_TRUE(recorder.amend(2, late));
+    ASSERT_TRUE(driver.amend(2, late));
     EXPECT_EQ(log->outputs[2 * 7], 0.25);
     EXPECT_TRUE(log->outputs[2 * 7 + 1] == before || std::isnan(before));
-    EXPECT_FALSE(recorder.amend(100, late));
+    EXPECT_FALSE(driver.amend(100, late));
     recorder.reset();
     EXPECT_EQ(log->intervals(), 0);
     EXPECT_TRUE(log->outputs.empty());

@@ -27,8 +27,7 @@ class Stubborn final : public EstimationMethod {
   const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return 1; }
   void start(const double*) noexcept override {}
-  void add_node(double, const double*, const double*) noexcept override {}
-  bool amend(int, const double*) noexcept override { return true; }
+  void add(const MeasuredInterval&, const double*) noexcept override {}
   void estimate(Estimate& result, Clock::time_point) noexcept override {
     result.state = mean_.head(model_->state_count());
     result.parameters = mean_.tail(model_->parameter_count());

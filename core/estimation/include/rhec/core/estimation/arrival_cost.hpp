@@ -38,6 +38,11 @@ class RHEC_EXPORT ArrivalCost {
 
   ArrivalKind kind() const noexcept { return kind_; }
   void reset(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
+  /// Back to what `mean` and `covariance` were.
+  void restore(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
+    filter_.mean = mean;
+    filter_.covariance = covariance;
+  }
   const Eigen::VectorXd& mean() const noexcept { return filter_.mean; }
   const Eigen::MatrixXd& covariance() const noexcept { return filter_.covariance; }
 
@@ -59,6 +64,7 @@ class RHEC_EXPORT ArrivalCost {
 
  private:
   void filter_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
+  int write_between(const RheProblem& problem, const Iterate& solution, int row) noexcept;
   void smooth_first_interval(const RheProblem& problem, const Iterate& solution) noexcept;
   void factor_covariance() noexcept;
   void invert_factor() noexcept;
@@ -67,6 +73,8 @@ class RHEC_EXPORT ArrivalCost {
   std::vector<ParameterWalk> walks_;
   KalmanFilter filter_;  ///< holds mean and covariance for every kind
   Eigen::MatrixXd initial_covariance_;
+  /// For each measurement between the first two nodes: its weights, and its residuals with their gradients.
+  std::vector<double> between_weights_, between_rows_, between_scratch_;
   std::vector<double> robust_, inputs_, ends_, scratch_, ramp_variances_, next_, jacobian_, predicted_,
       output_jacobian_;
   /// Pi = D L L' D with D diagonal, so that the units of one variable do not affect the precision of another.

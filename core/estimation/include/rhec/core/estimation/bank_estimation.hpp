@@ -30,8 +30,11 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   const Model& model() const noexcept override { return history_.bank().model(); }
   int substeps() const noexcept override { return setup_.bank.substeps; }
   void start(const double* outputs) noexcept override;
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
-  bool amend(int back, const double* outputs) noexcept override;
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  int most_between() const noexcept override { return setup_.bank.most_between; }
+  int reach() const noexcept override;
+  int most_reach() const noexcept override;
+  void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
   bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
@@ -51,17 +54,20 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   }
   const PriorBank& bank() const noexcept { return history_.bank(); }
   BankHistory& history() noexcept { return history_; }
+  const BankHistory& history() const noexcept { return history_; }
   /// Whether the bank does not work yet, since the heading is unknown.
   bool is_searching() const noexcept { return searching_; }
 
  private:
   void start_bank_if_found() noexcept;
+  int before_bank() const noexcept;
 
   Setup setup_;
   BankHistory history_;
   std::shared_ptr<PlaceMemory> place_;        ///< null without a map
   std::unique_ptr<FilterEstimation> search_;  ///< null if the heading is known
   bool searching_ = false;
+  bool is_rebased_ = false;      ///< what was known before the history's first node is not
   std::int64_t searched_ = 0;    ///< number of the newest node while searching
   std::vector<double> nothing_;  ///< outputs of a node without measurements
   Eigen::VectorXd mean_;

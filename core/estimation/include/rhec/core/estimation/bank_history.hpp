@@ -24,8 +24,13 @@ class RHEC_EXPORT BankHistory {
 
   /// The first node that is remembered, with its outputs (n_y, NaN where missing). The bank was reset before.
   void start(const double* outputs, std::int64_t number = 0) noexcept;
-  /// The next node, `duration` [s] after the last, with the input measured in between (n_u).
-  void add(double duration, const double* inputs, const double* outputs) noexcept;
+  /// The next node, after what was measured since the last. There is room for as many measurements between nodes as the
+  /// bank was set up for.
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept;
+  void add(double duration, const double* inputs, const double* outputs) noexcept { add({duration, inputs}, outputs); }
+  /// Takes the newest nodes back, as if they had never been added; false, and nothing happens, unless one is left that
+  /// is remembered.
+  bool rewind(int nodes) noexcept;
   /// Adds outputs to the node `back` before the newest one; where there are some already, they are replaced. Returns
   /// false if that node is forgotten.
   bool amend(int back, const double* outputs) noexcept;
@@ -42,9 +47,10 @@ class RHEC_EXPORT BankHistory {
   struct Node {
     double duration = 0.0, distance = 0.0;                ///< of the interval before the node [s, m]
     const double *inputs, *outputs;                       ///< n_u on that interval, n_y
+    const BetweenNodes* between;                          ///< of that interval
     const double* predicted;                              ///< PriorBank::save before the outputs were used
     const double* robust_weights = nullptr;               ///< n_y, that the outputs had
-    double log_likelihood = 0.0;                          ///< of these outputs
+    double log_likelihood = 0.0;                          ///< of these outputs, and those between the nodes
     const double* filtered = nullptr;                     ///< PriorBank::save after that; null if it is not kept
     const double *mean = nullptr, *covariance = nullptr;  ///< of [x; p], the mixture's after that; likewise
   };
@@ -54,11 +60,13 @@ class RHEC_EXPORT BankHistory {
  private:
   struct Interval {
     double duration = 0.0, distance = 0.0, log_likelihood = 0.0;
+    double between_log_likelihood = 0.0;  ///< part of it
   };
   std::size_t place(std::int64_t number) const noexcept {
     return static_cast<std::size_t>(number % static_cast<std::int64_t>(intervals_.size()));
   }
   void begin_node(const double* outputs) noexcept;
+  void predict(std::size_t place) noexcept;
   void update(std::size_t place) noexcept;
   void filter_from(std::int64_t number) noexcept;
 
@@ -67,6 +75,7 @@ class RHEC_EXPORT BankHistory {
   bool keeps_filtered_;
   std::size_t nu_, ny_, np_;
   std::vector<Interval> intervals_;
+  std::vector<BetweenNodes> between_;
   std::vector<double> inputs_, outputs_;
   std::vector<double> given_weights_, used_weights_;  ///< n_y a node
   AlignedDoubles predicted_, filtered_;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 
 #include "rhec/core/estimation/bank_estimation.hpp"
@@ -21,9 +22,11 @@ class RHEC_EXPORT BankedCovariance final : public WindowedEstimation {
   const Model& model() const noexcept override { return blocks_->model(); }
   int substeps() const noexcept override { return blocks_->substeps(); }
   void start(const double* outputs) noexcept override;
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
-  /// False if the node is out of the window's reach. One that only the bank has forgotten is used by the window alone.
-  bool amend(int back, const double* outputs) noexcept override;
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  int most_between() const noexcept override { return std::min(blocks_->most_between(), bank_.most_between()); }
+  int reach() const noexcept override { return std::min(blocks_->reach(), bank_.reach()); }
+  int most_reach() const noexcept override { return std::min(blocks_->most_reach(), bank_.most_reach()); }
+  void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void prepare() noexcept override { blocks_->prepare(); }
   void reset() noexcept override;

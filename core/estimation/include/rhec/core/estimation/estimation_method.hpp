@@ -5,6 +5,7 @@
 
 #include "rhec/core/base/clock.hpp"
 #include "rhec/core/estimation/estimate.hpp"
+#include "rhec/core/horizon/measured_interval.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/place/slip_ahead.hpp"
 
@@ -21,11 +22,20 @@ class RHEC_EXPORT EstimationMethod {
 
   /// The first node, with its measured outputs (n_y).
   virtual void start(const double* outputs) noexcept = 0;
-  /// The next node: `duration` [s] after the last, with the input measured in between (n_u) and the outputs. With a
-  /// duration that is not positive, the outputs belong to the newest node instead.
-  virtual void add_node(double duration, const double* inputs, const double* outputs) noexcept = 0;
-  /// Late outputs for the node `back` before the newest one; false if that node is out of reach.
-  virtual bool amend(int back, const double* outputs) noexcept = 0;
+  /// The next node, after what was measured since the last, with its measured outputs. With a duration that is not
+  /// positive, the outputs belong to the newest node instead.
+  virtual void add(const MeasuredInterval& interval, const double* outputs) noexcept = 0;
+  void add_node(double duration, const double* inputs, const double* outputs) noexcept {
+    add({duration, inputs}, outputs);
+  }
+  /// How many measurements an interval can have between its nodes.
+  virtual int most_between() const noexcept { return 0; }
+  /// How many of the newest nodes `rewind` can take back at present; all nodes: as if nothing had been started. And the
+  /// largest such number that is possible.
+  virtual int reach() const noexcept { return 0; }
+  virtual int most_reach() const noexcept { return 0; }
+  /// Takes back as many of the newest nodes as `reach` allows, as if they had never been added.
+  virtual void rewind(int /*nodes*/) noexcept {}
   /// The estimate at the newest node; always finite.
   virtual void estimate(Estimate& result, Clock::time_point deadline) noexcept = 0;
   /// Does work in advance, before the next node is known; calling it is optional.

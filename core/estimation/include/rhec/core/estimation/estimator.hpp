@@ -7,6 +7,7 @@
 
 #include "rhec/core/estimation/clocks.hpp"
 #include "rhec/core/estimation/estimation_method.hpp"
+#include "rhec/core/estimation/node_grid.hpp"
 #include "rhec/core/estimation/sensor_watch.hpp"
 #include "rhec/core/model/step_requirement.hpp"
 
@@ -14,18 +15,23 @@ namespace rhec {
 
 /// The estimator of a robot: push stamped measurements and inputs as they arrive, and ask for the estimate at a time.
 ///
-/// Nodes are at the times of measurements, and at most `longest_interval` apart. An input holds from its stamp until
-/// the next; an interval uses the mean over its duration. A measurement may lack any of its outputs (NaN). A late
-/// measurement is merged into the node at its time if that is still in the horizon; otherwise it is dropped and
-/// counted. A late input counts from the newest node on; existing intervals keep their means. Works with any
-/// EstimationMethod: RecedingHorizonEstimation or FilterEstimation. Nothing throws after construction.
+/// Nodes lie on a grid of `longest_interval` (NodeGrid), measurements at nodes or between them, at their own times. An
+/// input holds from its stamp until the next; an interval uses the mean over its duration. A measurement may lack any
+/// of its outputs (NaN).
+///
+/// Measurements and inputs may come in any order: nodes from the stamp of a late one on are made anew, so that the
+/// estimate is what it would be had it come in time. That reaches back as far as the method remembers, which is its
+/// horizon at least; what is older is dropped and counted, or, of an input, counts from there on. Works with any
+/// EstimationMethod. Nothing throws after construction.
 class RHEC_EXPORT Estimator {
  public:
   struct Timeline {
     double longest_interval = 0.2;  ///< [s]; a gap that would need more than 1000 nodes is divided into 1000
-    double tolerance = 1e-6;        ///< stamps closer than this belong to one node [s]
-    std::size_t capacity = 4096;    ///< rows of inputs, and of measurements, that can wait for processing
-    double behind = 3.0;            ///< how late measurements may come, where clocks are judged [s]
+    double tolerance = 1e-6;        ///< stamps closer than this are one [s]
+    std::size_t capacity = 4096;    ///< rows of inputs, and of measurements: of the horizon, and what waits
+    /// By output, how much later than it was measured it is stamped [s]; none: not at all. Outputs of one measurement
+    /// go to the times at which each was measured.
+    std::vector<double> delays = {};
   };
   explicit Estimator(std::unique_ptr<EstimationMethod> method) : Estimator(std::move(method), Timeline{}) {}
   /// Throws Error if a number of the timeline is out of range.
@@ -43,10 +49,10 @@ class RHEC_EXPORT Estimator {
   /// with the newest inputs; for an earlier or undefined time it is the newest node's. Before the first measurement it
   /// is empty (see `has_started`).
   const Estimate& estimate(double time, Clock::time_point deadline = Clock::time_point::max()) noexcept;
-  bool has_started() const noexcept { return started_; }
+  bool has_started() const noexcept { return grid_.count() > 0; }
 
   /// Does work for the next sample in advance; optional, but always saves time later.
-  void prepare() noexcept { method_->prepare(); }
+  void prepare() noexcept;
   void reset() noexcept;
   /// Goes on from moments of [x; p] (n, n x n) at the newest node, e.g. after the vehicle was carried. False if there
   /// is no node yet, sizes do not match, a number is not finite, or the method cannot.
@@ -57,13 +63,13 @@ class RHEC_EXPORT Estimator {
   std::shared_ptr<const SlipAhead> slip_ahead() const noexcept { return method_->slip_ahead(); }
 
   struct Counts {
-    std::int64_t nodes = 0;       ///< including those that fill gaps
+    std::int64_t nodes = 0;       ///< up to now, including those without a measurement
     std::int64_t estimates = 0;   ///< estimates computed
     std::int64_t fallbacks = 0;   ///< estimates for which the solver failed
-    std::int64_t late = 0;        ///< measurements merged into an older node
+    std::int64_t late = 0;        ///< measurements that came behind the newest node's
     std::int64_t dropped = 0;     ///< measurements too late, too many, or with a stamp that cannot be
     std::int64_t rejected = 0;    ///< measurements of one sensor that failed their gate or were stuck
-    std::int64_t rebased = 0;     ///< times that the estimate has followed a jump, or gone on without inputs
+    std::int64_t rebased = 0;     ///< times that the estimate went on from a jump, or without knowing the motion
     std::int64_t clocks_set = 0;  ///< times that the clock of a sensor, or of the inputs, was set
     std::int64_t missing = 0;     ///< single outputs that were NaN or otherwise not valid
     std::int64_t integrated = 0;  ///< intervals whose Runge-Kutta steps were held against twice as many: one in 16
@@ -79,53 +85,40 @@ class RHEC_EXPORT Estimator {
   const Model& model() const noexcept { return method_->model(); }
 
  private:
-  /// Stamped rows in the order of their stamps; the oldest are dropped when it is full.
-  class Rows {
-   public:
-    Rows(std::size_t capacity, int width);
-    bool insert(double time, const double* values) noexcept;
-    std::size_t size() const noexcept { return count_; }
-    double time(std::size_t i) const noexcept { return times_[first_ + i]; }
-    const double* values(std::size_t i) const noexcept { return values_.data() + (first_ + i) * width_; }
-    double* values(std::size_t i) noexcept { return values_.data() + (first_ + i) * width_; }
-    void drop_front(std::size_t rows) noexcept;
-    void clear() noexcept { first_ = count_ = 0; }
-
-   private:
-    std::size_t capacity_, width_, first_ = 0, count_ = 0;
-    std::vector<double> times_, values_;
-  };
-  void add_nodes_until(double time, const double* outputs) noexcept;
-  void add_node(double time, const double* outputs) noexcept;
-  void mean_input(double from, double to) noexcept;
-  void predict_to(double time) noexcept;
-  void check_integration() noexcept;
-  void clear_estimates() noexcept;
-  bool take_late(double time, const double* outputs) noexcept;
+  void push(double time, const double* outputs) noexcept;
+  void push_judged(double time, const double* outputs) noexcept;
   double place_on_timeline(double stamp, int source) noexcept;
   double place_on_timeline(double stamp, const double* outputs) noexcept;
+  void judge_waiting(double until) noexcept;
   SensorWatch::Finding judge(double time, double* outputs) noexcept;
+  int inputs_source() const noexcept { return static_cast<int>(silent_.size()); }
   double longest_silence(int source) const noexcept;
   template <class Function>
   void through_unknown_motion(double from, double to, const Function& advance) noexcept;
   void assess(Estimate& estimate, double time) noexcept;
+  void rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
+  void take_in(double until) noexcept;
+  void add_node() noexcept;
+  void predict_to(double time) noexcept;
+  void check_integration() noexcept;
+  void clear_estimates() noexcept;
 
   std::unique_ptr<EstimationMethod> method_;
   Timeline timeline_;
-  Rows measurements_, inputs_;
-  std::vector<double> node_times_;  ///< of the newest nodes, in a ring buffer
-  std::size_t newest_ = 0;
-  bool started_ = false, stale_ = false;
+  NodeGrid grid_;
+  bool stale_ = false;
   Estimate estimate_, predicted_;
   Counts counts_;
   StepError step_error_;
   double worst_error_ = 0.0;         ///< of the intervals that were coarse
   std::size_t measured_inputs_ = 0;  ///< all but process noise, which is 0
-  std::vector<double> mean_, weight_, nothing_, next_, values_;
+  std::vector<double> input_, next_, values_, delayed_;
+  // With a judge:
   std::unique_ptr<SensorWatch> watch_;
-  std::unique_ptr<Clocks> clocks_;  ///< of the sensors, and last of the inputs; with the watch
-  double watched_ = 0.0;            ///< time of the last sample that was judged
-  std::vector<double> late_, input_sigmas_;
+  std::unique_ptr<Clocks> clocks_;        ///< of the sensors, and last of the inputs
+  std::unique_ptr<StampedRows> waiting_;  ///< measurements that are not judged yet
+  double watched_ = 0.0;                  ///< time of the last sample that was judged
+  std::vector<double> merged_, input_sigmas_;
   std::vector<std::uint8_t> silent_;
 };
 

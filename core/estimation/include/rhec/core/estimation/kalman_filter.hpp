@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "rhec/core/base/aligned.hpp"
+#include "rhec/core/horizon/measured_interval.hpp"
 #include "rhec/core/model/model.hpp"
 
 namespace rhec {
@@ -21,7 +22,8 @@ class RHEC_EXPORT KalmanFilter {
     std::vector<double> input_variances;                   ///< n_u, of measured inputs
     std::vector<double> parameter_lower, parameter_upper;  ///< bounds of the mean
   };
-  KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps);
+  /// `uses_between`: whether there can be measurements between two nodes.
+  KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, bool uses_between = false);
 
   Eigen::VectorXd mean;        ///< n_x + n_p
   Eigen::MatrixXd covariance;  ///< symmetric positive semidefinite
@@ -34,6 +36,12 @@ class RHEC_EXPORT KalmanFilter {
   /// The same if parameters jump or ramp during the interval: variances (n_p, 0 without a jump) of the change.
   void predict(const double* measured_input, const double* input_guess, double duration,
                const double* ramp_variances) noexcept;
+  /// The same, and each measurement between the two nodes is used at its own time. The noise of an input, and the
+  /// change of a parameter, is one value over the interval. `robust_weights`: one row for each of them, or null.
+  void predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
+               const double* robust_weights = nullptr) noexcept;
+  /// Log-likelihood of the measurements between the nodes of the last interval, each given those before it.
+  double between_log_likelihood() const noexcept { return between_log_likelihood_; }
   /// Measurement update with the knowledge that a parameter is 0 up to this variance.
   void expect_zero(int parameter, double variance) noexcept;
   /// Adds random-walk variance to a parameter.
@@ -49,6 +57,12 @@ class RHEC_EXPORT KalmanFilter {
 
  private:
   void differentiate(double duration) noexcept;
+  void widen(const double* ramp_variances) noexcept;
+  void integrate_wide(double seconds, double share) noexcept;
+  void take_between(const double* y, const double* robust_weights) noexcept;
+  void take_wide(double innovation, double variance) noexcept;
+  void narrow() noexcept;
+  double input_variance(int input, const double* measured) const noexcept;
   void take_output(int output, double measured, double variance) noexcept;
   void make_symmetric() noexcept;
   void clip() noexcept;
@@ -60,6 +74,10 @@ class RHEC_EXPORT KalmanFilter {
   AlignedDoubles row_, next_row_, jacobian_rows_, scratch_;  ///< for Model::integrate_rows
   Eigen::MatrixXd work_, next_covariance_;
   Eigen::VectorXd gain_, image_, zeros_, correction_;
+  /// Within an interval: [x; p; u; change of p], the gradient of an output, and the transition to [x; p] at its end.
+  Eigen::VectorXd wide_mean_, wide_before_, wide_gradient_, wide_gain_, wide_image_, wide_end_;
+  Eigen::MatrixXd wide_covariance_, transition_, wide_work_;
+  double between_log_likelihood_ = 0.0;
 };
 
 }  // namespace rhec

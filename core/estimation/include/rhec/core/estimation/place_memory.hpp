@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "rhec/core/estimation/place_bank.hpp"
@@ -33,6 +34,8 @@ class RHEC_EXPORT PlaceMemory final : public SlipAhead {
   void add_node(BankHistory& history) noexcept;
   /// The nodes from this number on have changed.
   void amend(const BankHistory& history, std::int64_t from) noexcept { places_.follow(history, from); }
+  /// The history's newest nodes have been taken back.
+  void rewind(const BankHistory& history) noexcept { smoother_.rewind(history.newest()); }
   /// The drive has ended: the map gets what it lacks.
   void finish(BankHistory& history) noexcept;
   void fuse(Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) noexcept { places_.fuse(mean, covariance); }
@@ -47,6 +50,11 @@ class RHEC_EXPORT PlaceMemory final : public SlipAhead {
   int np_;
   PlaceBank places_;
   PlaceSmoother smoother_;
+  /// The newest node that the map has advanced to.
+  struct Advanced {
+    std::int64_t number = -1;
+    double duration = 0.0, distance = 0.0;
+  } advanced_;
   mutable std::vector<double> here_, there_, variances_;
 };
 

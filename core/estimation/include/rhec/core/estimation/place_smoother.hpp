@@ -35,6 +35,8 @@ class RHEC_EXPORT PlaceSmoother {
   PlaceSmoother(const std::shared_ptr<const Model>& model, const PriorBank& bank, Setup setup);
 
   void reset() noexcept;
+  /// The nodes behind this one have been taken back: what began there begins anew.
+  void rewind(std::int64_t newest) noexcept { is_busy_ = is_busy_ && at_ <= newest; }
   /// Goes on with its work; call it once for each node.
   void work(BankHistory& history, SlipMap& map) noexcept;
   /// Writes all nodes that are not written yet, as the drive has ended.

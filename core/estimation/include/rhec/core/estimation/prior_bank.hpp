@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "rhec/core/base/aligned.hpp"
+#include "rhec/core/horizon/measured_interval.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/core/place/slip_map.hpp"
@@ -55,7 +56,8 @@ class RHEC_EXPORT PriorBank {
     /// parameter. Elsewhere the members' priors hold. See `follow_map`.
     std::shared_ptr<const SlipMap> map;
     std::vector<std::vector<MapDeviation>> deviations;
-    double gate = 16.0;  ///< largest squared innovation, in variances, by which one output changes the weights
+    int most_between = 0;  ///< measurements that an interval can have between its nodes
+    double gate = 16.0;    ///< largest squared innovation, in variances, by which one output changes the weights
   };
   /// Throws Error if sizes do not match.
   PriorBank(std::shared_ptr<const Model> model, Setup setup);
@@ -77,9 +79,13 @@ class RHEC_EXPORT PriorBank {
   /// Time update by `duration` [s] with a measured input (n_u, NaN where missing: 0, with a standard deviation of a
   /// hundred times the variable's typical magnitude).
   void predict(const double* measured_input, double duration) noexcept;
+  /// The same with measurements between the two nodes, each used at its own time. The noise of an input and of a
+  /// process is one value over the interval, as a window has it, so that the moments are those of a window.
+  void predict(const MeasuredInterval& interval) noexcept;
 
   const Model& model() const noexcept { return *model_; }
   int member_count() const noexcept { return members_; }
+  int most_between() const noexcept { return setup_.most_between; }
   /// Probability of each member.
   std::span<const double> weights() const noexcept { return {weights_.data(), static_cast<std::size_t>(members_)}; }
   /// Sum over the updates since `reset` of each member's log likelihood (less a constant common to all), which decides
@@ -114,6 +120,8 @@ class RHEC_EXPORT PriorBank {
 
   /// Logarithm of the last update's likelihood, but for a constant that is the same for all banks.
   double log_likelihood() const noexcept { return log_likelihood_; }
+  /// The same of the measurements between the nodes of the last interval.
+  double between_log_likelihood() const noexcept { return between_log_likelihood_; }
   /// Of a bank that follows a map: whether that knew the place where the last interval ended.
   bool knows_place() const noexcept { return knows_place_; }
   /// Every member becomes the mixture of itself with the share 1 - s, and of these moments of [x; p] with the share s.
@@ -148,16 +156,25 @@ class RHEC_EXPORT PriorBank {
   void find_places(Process& process) const;
   void write_start(int parameter, const Prior& prior, int lane) noexcept;
   struct Views;  ///< what the kernels are given
-  void take_step(const double* input, double duration) noexcept;
+  struct Frame;  ///< what outputs are taken in by
+  double take_outputs(const Frame& frame, const double* y, const double* robust_weights) noexcept;
+  void begin_step(const double* measured_input, double duration) noexcept;
+  void take_step(double duration) noexcept;
+  void integrate_members(const double* mean, bool is_wide, double seconds, double share) noexcept;
+  void observe_members(const double* states) noexcept;
+  void widen() noexcept;
+  void take_between(double seconds, double share, const double* y) noexcept;
+  void narrow(double duration) noexcept;
+  int wide_count() const noexcept { return 2 * n_ - nx_ + nu_; }
   void find_distance(const double* input, double duration) noexcept;
   void advance_processes(double duration) noexcept;
   void mix_members() noexcept;
   void find_loss_scales();
-  void weigh_outputs(const double* y, int taken, const double* given) noexcept;
+  void weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept;
   void check_map() const;
   void follow_map() noexcept;
   void add_offsets() noexcept;
-  void adapt_noise(const double* y) noexcept;
+  void adapt_noise(const Frame& frame, const double* y) noexcept;
   static double scale_weight(double s, double delta) noexcept;
   double robust_surplus(const double* y, int sensor, int lane) const noexcept;
   int most_probable() const noexcept;
@@ -177,6 +194,9 @@ class RHEC_EXPORT PriorBank {
   AlignedDoubles learnt_;
   AlignedDoubles mean_, covariance_, work_, weights_, log_likelihoods_, keep_, take_, next_, jacobian_, predicted_,
       gradient_, squares_, innovation_variances_, output_variances_, surprises_;
+  /// Within an interval: [x; z; u; q], with the noise q of the processes (docs/method.md, section 8), and the
+  /// transition to [x; z] at its end.
+  AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, wide_gradient_, transition_;
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;
@@ -185,7 +205,7 @@ class RHEC_EXPORT PriorBank {
   std::vector<double> start_, own_, own_covariance_, filled_, filled_covariance_;  ///< moments of one process
   Eigen::VectorXd full_mean_;
   Eigen::MatrixXd full_covariance_;
-  double distance_ = 0.0, log_likelihood_ = 0.0;
+  double distance_ = 0.0, log_likelihood_ = 0.0, between_log_likelihood_ = 0.0;
   bool knows_place_ = false;
   std::vector<double> map_means_, map_variances_;  ///< at the interval's start, then at its end
   std::unique_ptr<Views> views_;

@@ -41,8 +41,11 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   const Model& model() const noexcept override { return filters_.model(); }
   int substeps() const noexcept override { return problem_.substeps(); }
   void start(const double* outputs) noexcept override;
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
-  bool amend(int back, const double* outputs) noexcept override;
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  int most_between() const noexcept override { return filters_.most_between(); }
+  int reach() const noexcept override { return filters_.reach(); }
+  int most_reach() const noexcept override { return filters_.most_reach(); }
+  void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void reset() noexcept override;
   bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
@@ -64,6 +67,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   const ProcessModel& processes() const noexcept { return *process_model_; }
   void hand_weights_on() noexcept;
   void choose_law() noexcept;
+  int& law_at(std::int64_t number) noexcept { return laws_[static_cast<std::size_t>(number) % laws_.size()]; }
   void fill_window() noexcept;
   void fill_interval(int interval, std::int64_t number) noexcept;
   void write_arrival(const double* saved) noexcept;
@@ -94,6 +98,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   Window window_;
   bool has_window_ = false, has_solution_ = false;
   int law_ = 0;
+  std::vector<int> laws_;  ///< at the last nodes, in a ring
   Eigen::VectorXd mean_, member_mean_, shift_;
   Eigen::MatrixXd mixture_, member_covariance_, predicted_;
   std::unique_ptr<InformationOf> information_;

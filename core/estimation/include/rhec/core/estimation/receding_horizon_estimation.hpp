@@ -55,8 +55,11 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   const Model& model() const noexcept override { return *model_; }
   int substeps() const noexcept override { return problem_.substeps(); }
   void start(const double* outputs) noexcept override;
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
-  bool amend(int back, const double* outputs) noexcept override;
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  int most_between() const noexcept override { return setup_.problem.most_between; }
+  int reach() const noexcept override;
+  int most_reach() const noexcept override { return setup_.problem.max_intervals + 1; }
+  void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void prepare() noexcept override;
   void reset() noexcept override;
@@ -71,12 +74,37 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
 
  private:
   const Roles& roles() const noexcept { return model().description().roles; }
-  void advance_window(double duration, const double* inputs, const double* outputs) noexcept;
+  /// What was measured on the way to a node, and at it.
+  struct Node {
+    double duration = 0.0;
+    std::vector<double> inputs, outputs;
+    BetweenNodes between;
+  };
+  /// What is known before the window's first node, and where the blocks began before it.
+  struct Arrival {
+    std::int64_t first = -1;
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd covariance;
+    std::vector<std::int64_t> starts;
+  };
+  Node& node(std::int64_t number) noexcept { return nodes_[static_cast<std::size_t>(number) % nodes_.size()]; }
+  Arrival& arrival_at(std::int64_t first) noexcept {
+    return arrivals_[static_cast<std::size_t>(first) % arrivals_.size()];
+  }
+  void remember(const MeasuredInterval& interval, const double* outputs, std::int64_t number) noexcept;
+  void remember_arrival() noexcept;
+  void restore_arrival() noexcept;
+  void set_structure() noexcept;
+  void add_outputs(const double* outputs) noexcept;
+  void take_up_solution() noexcept;
+  std::int64_t newest() const noexcept { return window_.first + window_.intervals - (prepared_ ? 1 : 0); }
+  std::int64_t first_before_preparing() const noexcept { return window_.first - (prepared_ && slid_ ? 1 : 0); }
+  void advance_window(const MeasuredInterval& interval, const double* outputs) noexcept;
   void slide_arrival() noexcept;
   void search_heading(Clock::time_point deadline) noexcept;
   void begin_window(const double* outputs) noexcept;
   void take_outputs(int node, const double* outputs) noexcept;
-  void take_inputs(int interval, const double* inputs) noexcept;
+  void take_interval(int place, const MeasuredInterval& interval) noexcept;
   void start_cold(Iterate& point) noexcept;
   void recover() noexcept;
   void write_covariance(int node, Estimate& result) noexcept;
@@ -89,8 +117,15 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   GuessShifter shifter_;
   Iterate point_, trial_, best_;
   Window window_;
+  std::int64_t base_ = -1;  ///< the node from which `rebase` went on; nothing before it is known
   bool started_ = false, solved_ = false, prepared_ = false;
-  bool searching_ = false;  ///< the heading has not been determined yet
+  bool slid_ = false;      ///< preparing has moved the first node, too
+  bool has_kept_ = false;  ///< the solution before `rewind`, with its window
+  Iterate kept_;
+  Window kept_window_;
+  std::vector<Node> nodes_;        ///< the last ones, in a ring
+  std::vector<Arrival> arrivals_;  ///< of the last first nodes
+  bool searching_ = false;         ///< the heading has not been determined yet
   std::vector<std::uint8_t> begins_, next_begins_;
   std::vector<std::int64_t> first_starts_;
   std::vector<int> given_inputs_;  ///< which of the given inputs the problem has

@@ -11,12 +11,17 @@
 namespace rhec {
 
 /// Inputs and results of an estimation method, node by node.
-struct NodeLog {
+struct RHEC_EXPORT NodeLog {
   std::vector<double> durations;           ///< of each interval [s], N
   std::vector<double> inputs;              ///< measured, N x n_u, NaN where missing
   std::vector<double> outputs;             ///< N+1 x n_y, NaN where missing
+  std::vector<BetweenNodes> between;       ///< measurements within each interval, N; or none at all
   std::vector<double> states, parameters;  ///< estimates at each node when it was the newest, N+1 x n_x and n_p
   int intervals() const noexcept { return static_cast<int>(durations.size()); }
+  /// Of any interval.
+  int most_between() const noexcept;
+  /// What was measured on one, of `input_count` inputs.
+  MeasuredInterval interval(int i, int input_count) const noexcept;
 };
 
 /// Wraps an estimation method and records its inputs and results. Its memory grows without limit: for logs, not for a
@@ -30,8 +35,11 @@ class RHEC_EXPORT NodeRecorder final : public EstimationMethod {
   const Model& model() const noexcept override { return method_->model(); }
   int substeps() const noexcept override { return method_->substeps(); }
   void start(const double* outputs) noexcept override;
-  void add_node(double duration, const double* inputs, const double* outputs) noexcept override;
-  bool amend(int back, const double* outputs) noexcept override;
+  void add(const MeasuredInterval& interval, const double* outputs) noexcept override;
+  int most_between() const noexcept override { return method_->most_between(); }
+  int reach() const noexcept override { return method_->reach(); }
+  int most_reach() const noexcept override { return method_->most_reach(); }
+  void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
   void prepare() noexcept override { method_->prepare(); }
   void reset() noexcept override;

@@ -10,10 +10,12 @@
 
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/horizon/horizon_problem.hpp"
+#include "rhec/core/horizon/measured_interval.hpp"
 
 namespace rhec {
 
 class OutputCache;
+class PartsOfIntervals;
 struct CostView;
 
 /// Pseudo-Huber loss on a group of outputs (docs/method.md, section 2): with s the weighted squared residual of the
@@ -27,6 +29,7 @@ struct RobustLoss {
 ///
 ///     minimise  || [chi_0; rho_first] - [xbar; pbar] ||^2_P            arrival cost
 ///             + sum over nodes      || h(chi_i) - y_i ||^2_Ry          missing outputs (NaN) are skipped
+///             + sum between nodes   || h(F(chi_i, nu_i, rho_i; tau)) - y ||^2_Ry
 ///             + sum over intervals  || nu_i - u_meas_i ||^2_Ru
 ///             + sum over block starts (rho_b - rho_a)^2 / variance     where neighbouring blocks are linked
 ///             + sum over blocks       weight rho_b^2                   where their values are expected to be 0
@@ -39,6 +42,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   struct Setup {
     int max_intervals = 15;
     int substeps = 1;
+    int most_between = 0;                ///< measurements that an interval can have between its nodes
     std::vector<double> output_weights;  ///< n_y, diagonal of Ry = 1 / sigma^2
     std::vector<double> input_weights;   ///< n_u, diagonal of Ru
     std::vector<RobustLoss> robust;
@@ -60,6 +64,10 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   double* measured_input(int interval) noexcept { return measured_inputs_.data() + at_input(interval); }
   const double* output(int node) const noexcept { return outputs_.data() + at_output(node); }
   const double* measured_input(int interval) const noexcept { return measured_inputs_.data() + at_input(interval); }
+
+  /// Measurements within an interval, at times of their own.
+  BetweenNodes& between(int interval) noexcept { return between_[interval]; }
+  const BetweenNodes& between(int interval) const noexcept { return between_[interval]; }
 
   /// Weight of an output from now on.
   void set_output_weight(int output, double weight) noexcept {
@@ -94,6 +102,11 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   /// Weights in (0, 1] that the robust losses give to the outputs at an iterate: d loss / d s.
   void robust_weights(const Iterate& iterate, int node, double* weights, std::span<double> scratch) const noexcept;
 
+  /// The same for the measurements between the nodes of an interval: `weights` has a row of n_y for each. And, if not
+  /// null, rows of the residual h - y and its gradient by the model's [x; p; u (; p at the end)], for each output.
+  void linearise_between(int interval, const Iterate& iterate, double* weights, double* rows,
+                         std::span<double> scratch) const noexcept;
+
   std::string_view kind() const noexcept override { return "rhe"; }
   bool has_small_residuals() const noexcept override { return true; }
   const double* known_inputs(int interval) const noexcept override { return measured_input(interval); }
@@ -118,7 +131,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
                     OutputCache* known, std::span<double> scratch) const noexcept;
   std::size_t cost_scratch_size() const noexcept override;
 
-  void residual(int node, const double* predicted, double* difference) const noexcept;
+  void residual(const double* measured, const double* predicted, double* difference) const noexcept;
   double losses(const double* difference, double* weight, double* curvature) const noexcept;
   struct Observed {
     const double *outputs, *jacobians;  ///< rows of the nodes of a range
@@ -129,6 +142,19 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
                             OutputCache* known, std::span<double> scratch) const noexcept;
   double write_general_measurements(StageRange range, const Iterate& iterate, Hessian hessian, const CostView& view,
                                     const double* predicted, const double* jacobians, double* memory) const noexcept;
+  struct BetweenBatch;
+  bool has_between() const noexcept;
+  std::size_t between_scratch_size() const noexcept;
+  double add_between(StageRange range, const Iterate& iterate, Hessian hessian, const CostView* view,
+                     double* stage_costs, double* memory) const noexcept;
+  void gather_between(int interval, int place, const Iterate& iterate, BetweenBatch& batch) const noexcept;
+  void evaluate_batch(BetweenBatch& batch, bool with_gradients) const noexcept;
+  double add_batch(BetweenBatch& batch, Hessian hessian, const CostView* view, double* stage_costs) const noexcept;
+  void turn_ramp(BetweenBatch& batch, int i, bool exact) const noexcept;
+  void add_row(BetweenBatch& batch, int i, const CostView& view) const noexcept;
+  void add_curvature(BetweenBatch& batch, int i, const CostView& view) const noexcept;
+  double* H_of(const CostView& view, int stage) const noexcept;
+  double* h_of(const CostView& view, int stage) const noexcept;
   double inputs(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
   double links(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
   void write_bounds(int stage) noexcept;
@@ -137,11 +163,13 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
 
   Setup setup_;
   int ny_, output_row_;
+  const PartsOfIntervals* parts_;                 ///< the model, if its data depend on where an interval ends
   int bounded_intervals_ = -1;                    ///< for which bounds were written
   std::vector<std::uint8_t> has_block_bounds_;    ///< per stage
   std::vector<std::uint8_t> is_one_block_;        ///< per parameter
   std::vector<int> robust_group_;                 ///< per output, or -1
   AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
+  std::vector<BetweenNodes> between_;             ///< by interval
   AlignedDoubles outputs_;                        ///< one row per node, NaN where nothing was measured
   AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period of angles, else 0
   AlignedDoubles measured_inputs_, input_weights_;  ///< rows as in Iterate; NaN and 0 outside of the inputs

@@ -27,6 +27,8 @@ class RHEC_EXPORT GuessShifter {
   /// The same without a copy: the iterate has no useful content until `apply` has written to it.
   void take(const HorizonProblem& problem, Iterate&& iterate) noexcept;
   void forget() noexcept { intervals_ = 0; }
+  /// What was taken last.
+  const Iterate& kept() const noexcept { return kept_; }
 
   /// Writes into `guess` (which may be the iterate that was taken) the kept solution, shifted by `steps` intervals.
   /// Beyond its end: inputs as measured (RHE, if there is a measurement) or the last ones, clipped to their bounds; the

@@ -47,6 +47,9 @@ struct BankKernels {
   /// keeps what it has; its S is 1.
   void (*update)(const BankView& bank, const BankOutput* outputs, int count, double gate, double* squares,
                  double* variances);
+  /// mean <- next_mean, covariance <- T P T' with the covariance P of a wider vector, `wide`, and T of n rows. A member
+  /// whose result is not finite keeps what it has.
+  void (*narrow)(const BankView& bank, const BankView& wide, const double* transition, const double* next_mean);
   /// r^2 / S of each output on its own (count entries), before any update.
   void (*surprise)(const BankView& bank, const BankOutput* outputs, int count, double* squares);
   /// Mean (n) and covariance (n x n) of the mixture.

@@ -5,6 +5,7 @@
 
 #include "rhec/core/base/reserve.hpp"
 #include "rhec/core/model/model.hpp"
+#include "rhec/core/model/parts_of_intervals.hpp"
 
 namespace rhec {
 
@@ -19,7 +20,7 @@ namespace rhec {
 ///
 /// It has no parameters of its own. Thread-safe and allocation-free as any model; calls for one so wide that its rows
 /// do not fit on the stack wait for each other.
-class RHEC_EXPORT ProcessModel final : public Model {
+class RHEC_EXPORT ProcessModel final : public Model, public PartsOfIntervals {
  public:
   /// `counts`: states of each parameter's process. Throws Error if they do not fit the vehicle.
   ProcessModel(std::shared_ptr<const Model> vehicle, std::vector<int> counts);
@@ -37,6 +38,8 @@ class RHEC_EXPORT ProcessModel final : public Model {
 
   const ModelDescription& description() const noexcept override { return description_; }
   int data_count() const noexcept override { return data_count_; }
+  /// A ramp's processes are there where a straight line has led them.
+  void data_of_part(const double* data, double share, double* part) const noexcept override;
   void integrate(const Intervals& request) const noexcept override;
   void observe(const Nodes& request) const noexcept override;
   /// Of the vehicle, with the parameters at rest.

@@ -30,6 +30,7 @@ struct RHEC_EXPORT EstimatorParts {
   std::shared_ptr<const RobotContext> context;
   Settings section;  ///< `estimator` as written, for error messages
   int horizon, substeps, heading_starts;
+  int most_between;  ///< measurements between two nodes
   ArrivalKind arrival;
   std::vector<RobustLoss> robust;
   std::vector<ParameterWalk> walks;                             ///< one per parameter
@@ -44,6 +45,8 @@ struct RHEC_EXPORT EstimatorParts {
   std::function<std::shared_ptr<Solver>()> make_solver;  ///< makes the solver that the section names
   std::function<std::shared_ptr<SlipMap>()> make_map;    ///< the map of an estimator that remembers places
 
+  /// How many nodes a method remembers: those of the horizon, and from where measurements at its first one are used.
+  int remembered_nodes() const noexcept { return horizon + 3; }
   /// The estimation problem of a window.
   RheProblem::Setup problem() const;
   /// Of a single Kalman filter.

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/estimation/estimator.hpp"
@@ -23,10 +24,11 @@ struct RHEC_EXPORT EstimatorOptions {
   int horizon = RheProblem::Setup{}.max_intervals;
   Integrator integrator = Integrator::runge_kutta;
   std::optional<int> substeps = {};  ///< none: chosen for the model
+  int most_between = 64;
   int heading_starts = RecedingHorizonEstimation::Setup{}.heading_starts;
   BlockCovariance covariance = BlockCovariance::bank;
   HealthOptions health;
-  Settings arrival, process_noise, restart_sigma, block_sigma, priors, bank, memory, initial, robust, solver;
+  Settings delays, arrival, process_noise, restart_sigma, block_sigma, priors, bank, memory, initial, robust, solver;
   static OptionTable<EstimatorOptions> table(const EstimatorMakers& makers);
 };
 
@@ -64,6 +66,7 @@ class RHEC_EXPORT EstimatorSection {
   EstimatorMakers makers_;
   EstimatorOptions options_;
   EstimatorParts parts_;
+  std::vector<double> delays_;      ///< by output
   bool has_initial_state_ = false;  ///< the section gives the initial state
 };
 

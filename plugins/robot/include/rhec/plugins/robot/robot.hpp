@@ -26,7 +26,7 @@ struct RobotOptions {
   template <class Derived>
   static OptionTable<Derived>& add_to(OptionTable<Derived>& rows) {
     return rows
-        .number("step", &Derived::step, "longest interval of the estimator, interval of the controller [s]",
+        .number("step", &Derived::step, "interval of the estimator's nodes, and of the controller [s]",
                 greater_than(0.0))
         .subtree("model", &Derived::model, "the vehicle: name and options of a model plugin")
         .subtree("noise", &Derived::noise, "standard deviations: outputs and inputs, by the variable's name")

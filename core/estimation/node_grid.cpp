@@ -1,0 +1,205 @@
+#include "rhec/core/estimation/node_grid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "rhec/core/base/infinity.hpp"
+
+namespace rhec {
+namespace {
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr int most_parts = 1000;     // of one gap
+constexpr double near_share = 0.05;  // of a step: so far nodes are moved to measurements
+
+}  // namespace
+
+NodeGrid::NodeGrid(const Setup& setup)
+    : setup_(setup),
+      near_(std::max(near_share * setup.step, setup.tolerance)),
+      measurements_(setup.capacity, setup.outputs),
+      inputs_(setup.capacity, setup.inputs),
+      nodes_(static_cast<std::size_t>(setup.reach) + 2),
+      between_(setup.outputs, setup.most_between),
+      outputs_(setup.outputs, missing),
+      mean_(setup.inputs, 0.0),
+      weight_(setup.inputs, 0.0) {
+  clear();
+}
+
+void NodeGrid::clear() noexcept {
+  measurements_.clear();
+  inputs_.clear();
+  count_ = 0;
+  dropped_ = 0;
+  changed_ = changed_input_ = infinity;
+  lost_ = -infinity;
+}
+
+/// The first node that is still in the ring.
+std::int64_t NodeGrid::oldest() const noexcept {
+  return std::max<std::int64_t>(0, count_ - static_cast<std::int64_t>(nodes_.size()));
+}
+
+/// The newest node before a time; one before `oldest()` if there is none.
+std::int64_t NodeGrid::last_before(double time) const noexcept {
+  std::int64_t number = count_ - 1;
+  while (number >= oldest() && !(node(number).time < time)) --number;
+  return number;
+}
+
+NodeGrid::Place NodeGrid::push_measurement(double time, const double* outputs, int reach) noexcept {
+  const bool is_late = count_ > 0 && time <= this->time() + setup_.tolerance;
+  if (is_late) {
+    const std::int64_t kept = last_before(time - setup_.tolerance - 2.0 * near_);
+    if (count_ - 1 - kept > reach || (kept >= 0 && node(kept).time < lost_)) {
+      ++dropped_;
+      return Place::forgotten;
+    }
+  }
+  const bool was_full = measurements_.is_full();
+  const double oldest_row = was_full ? measurements_.time(0) : 0.0;
+  const bool is_taken = measurements_.insert(time, outputs) < measurements_.size();
+  if (was_full) {
+    // What a node has used is not lost, but cannot be used anew.
+    const bool is_used = count_ > 0 && oldest_row <= this->time() + setup_.tolerance;
+    if (is_used && is_taken) lost_ = std::max(lost_, oldest_row);
+    if (!is_used || !is_taken) ++dropped_;
+    if (!is_taken) return Place::forgotten;
+  }
+  if (!is_late) return Place::waits;
+  changed_ = std::min(changed_, time);
+  return Place::late;
+}
+
+void NodeGrid::push_input(double time, const double* inputs) noexcept {
+  inputs_.insert(time, inputs);
+  if (count_ > 0 && time < this->time() - setup_.tolerance) changed_input_ = std::min(changed_input_, time);
+}
+
+int NodeGrid::outdated(double until, int reach) const noexcept {
+  if (count_ == 0) return 0;
+  // What is stamped later than `until` waits, even where it lies behind a node.
+  double first = changed_ <= until + setup_.tolerance ? changed_ : infinity;
+  const std::size_t next = measurements_.first_after(time() + setup_.tolerance);
+  const bool has_next = next < measurements_.size() && measurements_.time(next) <= until + setup_.tolerance;
+  if (has_next) first = std::min(first, measurements_.time(next));
+  std::int64_t kept = count_ - 1;
+  if (has_next && ends_open()) --kept;
+  if (first < infinity) kept = std::min(kept, last_before(first - setup_.tolerance - 2.0 * near_));
+  while (kept >= oldest() && kept >= 0 && node(kept).time > changed_input_ + setup_.tolerance) --kept;
+  return static_cast<int>(std::min<std::int64_t>(count_ - 1 - kept, reach));
+}
+
+void NodeGrid::take_back(int nodes) noexcept { count_ = std::max<std::int64_t>(0, count_ - nodes); }
+
+/// The row behind those that have the stamp of a row.
+std::size_t NodeGrid::group_end(std::size_t row) const noexcept {
+  std::size_t end = row + 1;
+  while (end < measurements_.size() && measurements_.time(end) <= measurements_.time(row) + setup_.tolerance) ++end;
+  return end;
+}
+
+/// Outputs of rows with one stamp; of an output that several have, the last.
+void NodeGrid::merge(std::size_t row, std::size_t end, double* outputs) const noexcept {
+  for (; row < end; ++row)
+    for (int j = 0; j < setup_.outputs; ++j)
+      if (const double value = measurements_.values(row)[j]; !std::isnan(value)) outputs[j] = value;
+}
+
+bool NodeGrid::make_next(double until) noexcept {
+  const std::size_t from = count_ > 0 ? measurements_.first_after(time() + setup_.tolerance) : 0;
+  const std::size_t end = measurements_.first_after(until + setup_.tolerance);
+  if (from >= end) {
+    changed_ = changed_ <= until + setup_.tolerance ? infinity : changed_;
+    changed_input_ = infinity;
+    return false;
+  }
+  Node next{measurements_.time(from), measurements_.time(from), Kind::grid, 0};
+  duration_ = 0.0;
+  if (count_ > 0) {
+    const Node& last = node(count_ - 1);
+    next = next_node(last, from, end);
+    duration_ = next.time - last.time;
+    mean_input(last.time, next.time);
+  }
+  collect(next, from, end);
+  nodes_[static_cast<std::size_t>(count_++) % nodes_.size()] = next;
+  return true;
+}
+
+/// The node that follows, given the measurements behind the last one.
+NodeGrid::Node NodeGrid::next_node(const Node& last, std::size_t from, std::size_t end) const noexcept {
+  const double first = measurements_.time(from);
+  const int parts = last.parts > 0 ? last.parts : first - last.time > most_parts * setup_.step ? most_parts : 0;
+  if (parts == 1) return {first, first, Kind::grid, 0};
+  if (parts > 1) return {last.time + (first - last.time) / parts, last.grid, Kind::gap, parts - 1};
+  const double grid = last.grid + setup_.step;
+  Node next{grid, grid, Kind::grid, 0};
+  double nearest = infinity, newest = last.time;
+  int between = 0;
+  for (std::size_t row = from; row < end; row = group_end(row)) {
+    newest = measurements_.time(row);
+    if (newest > grid + near_) break;
+    if (std::abs(newest - grid) < nearest && std::abs(newest - grid) <= near_) {
+      nearest = std::abs(newest - grid);
+      next.time = next.grid = newest;
+    }
+  }
+  if (newest < grid - near_) next = {newest, last.grid, Kind::end, 0};
+  for (std::size_t row = from; row < end && measurements_.time(row) < next.time - setup_.tolerance;
+       row = group_end(row))
+    if (++between > setup_.most_between) return {measurements_.time(row), last.grid, Kind::extra, 0};
+  return next;
+}
+
+/// What was measured up to a node, and at it.
+void NodeGrid::collect(const Node& next, std::size_t from, std::size_t end) noexcept {
+  const double start = next.time - duration_;
+  between_.clear();
+  std::fill(outputs_.begin(), outputs_.end(), missing);
+  for (std::size_t row = from; row < end && measurements_.time(row) <= next.time + setup_.tolerance;) {
+    const std::size_t behind = std::min(group_end(row), end);
+    if (measurements_.time(row) < next.time - setup_.tolerance) {
+      if (double* const outputs = between_.add(measurements_.time(row) - start)) merge(row, behind, outputs);
+    } else {
+      merge(row, behind, outputs_.data());
+    }
+    row = behind;
+  }
+}
+
+const double* NodeGrid::mean_input(double from, double to) noexcept {
+  std::fill(mean_.begin(), mean_.end(), 0.0);
+  std::fill(weight_.begin(), weight_.end(), 0.0);
+  const std::size_t behind = inputs_.first_after(from);
+  for (std::size_t i = behind > 0 ? behind - 1 : 0; i < inputs_.size(); ++i) {
+    const double start = std::max(inputs_.time(i), from);
+    const double end = i + 1 < inputs_.size() ? std::min(inputs_.time(i + 1), to) : to;
+    if (inputs_.time(i) >= to - setup_.tolerance) break;
+    const double seconds = end - start;
+    if (seconds <= 0.0) continue;
+    for (std::size_t j = 0; j < mean_.size(); ++j) {
+      const double value = inputs_.values(i)[j];
+      if (std::isnan(value)) continue;
+      mean_[j] += value * seconds;
+      weight_[j] += seconds;
+    }
+  }
+  for (std::size_t j = 0; j < mean_.size(); ++j) mean_[j] = weight_[j] > 0.0 ? mean_[j] / weight_[j] : missing;
+  std::fill(mean_.end() - setup_.noises, mean_.end(), 0.0);
+  return mean_.data();
+}
+
+void NodeGrid::settle(int reach) noexcept {
+  const std::int64_t first = count_ - 1 - reach;  // the oldest node that may become the newest
+  if (first < 0) return;
+  const double time = node(first).time;
+  measurements_.drop_front(measurements_.first_after(time + setup_.tolerance));
+  // Of the input rows up to there, only the last one still holds.
+  const std::size_t used = inputs_.first_after(time);
+  if (used > 1) inputs_.drop_front(used - 1);
+}
+
+}  // namespace rhec

@@ -1,0 +1,135 @@
+// How a PriorBank uses measurements between two nodes.
+#include <algorithm>
+
+#include "prior_bank_views.hpp"
+#include "rhec/core/base/assertion.hpp"
+#include "rhec/core/kernels/kernel_sets.hpp"
+
+namespace rhec {
+
+/// Within an interval, what is unknown are the state at its start, the input's noise and that of the processes: a
+/// measurement at a later time tells of all of them. The vector [x; z; u; q] takes such measurements in one after the
+/// other, and only then moves to the interval's end.
+void PriorBank::predict(const MeasuredInterval& interval) noexcept {
+  if (interval.between == 0) return predict(interval.inputs, interval.duration);
+  RHEC_ASSERT(setup_.most_between > 0, "a bank that was set up for measurements between nodes");
+  begin_step(interval.inputs, interval.duration);
+  widen();
+  for (int k = 0; k < interval.between; ++k)
+    take_between(interval.times[k], interval.times[k] / interval.duration,
+                 interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_);
+  narrow(interval.duration);
+}
+
+/// Adds inputs and noise of the processes, which are not correlated with anything yet.
+void PriorBank::widen() noexcept {
+  const std::ptrdiff_t a = wide_count(), M = lanes_;
+  std::copy(mean_.begin(), mean_.end(), wide_mean_.begin());
+  std::fill(wide_mean_.begin() + n_ * M, wide_mean_.end(), 0.0);
+  std::fill(wide_covariance_.begin(), wide_covariance_.end(), 0.0);
+  const auto P = [&](std::ptrdiff_t r, std::ptrdiff_t c) { return wide_covariance_.begin() + (c * a + r) * M; };
+  for (std::ptrdiff_t c = 0; c < n_; ++c)
+    for (std::ptrdiff_t r = 0; r < n_; ++r) std::copy_n(covariance_.begin() + (c * n_ + r) * M, M, P(r, c));
+  for (std::ptrdiff_t j = 0; j < nu_; ++j) {
+    std::fill_n(wide_mean_.begin() + (n_ + j) * M, M, input_[j]);
+    std::fill_n(P(n_ + j, n_ + j), M, variances_[j]);
+  }
+  for (const Process& process : processes_) {
+    const std::ptrdiff_t first = n_ + nu_ + process.first - nx_;
+    for (std::ptrdiff_t c = 0; c < process.count; ++c)
+      for (std::ptrdiff_t r = 0; r < process.count; ++r)
+        std::copy_n(process.Q.begin() + (c * process.count + r) * M, M, P(first + r, first + c));
+  }
+}
+
+/// Takes in outputs at a time within the interval.
+void PriorBank::take_between(double seconds, double share, const double* y) noexcept {
+  const int a = wide_count(), columns = nx_ + nu_ + 2 * np_;
+  integrate_members(wide_mean_.data(), true, seconds, share);
+  observe_members(next_rows_.data());
+  std::fill(wide_gradient_.begin(), wide_gradient_.end(), 0.0);
+  for (int m = 0; m < lanes_; ++m) {
+    const double *J = jacobian_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * columns,
+                 *C = gradient_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * ny_;
+    for (int j = 0; j < ny_; ++j) {
+      const auto by = [&](int column) {
+        double sum = 0.0;
+        for (int r = 0; r < nx_; ++r) sum += C[r * ny_ + j] * J[column * nx_ + r];
+        return sum;
+      };
+      const auto g = [&](int entry) -> double& {
+        return wide_gradient_[(static_cast<std::ptrdiff_t>(j) * a + entry) * lanes_ + m];
+      };
+      for (int c = 0; c < nx_; ++c) g(c) = by(c);
+      for (int c = 0; c < nu_; ++c) g(n_ + c) = by(nx_ + c);
+      for (int p = 0; p < np_; ++p) {
+        const Process& process = processes_[p];
+        const double start = by(nx_ + nu_ + p), end = by(nx_ + nu_ + np_ + p);
+        if (process.ramp[m] == 0.0) {
+          g(process.first) = start + end;
+          continue;
+        }
+        g(process.first) = start + (1.0 - share) * end;
+        for (int k = 0; k < process.count; ++k)
+          g(process.first + k) += share * end * process.F[(k * process.count) * lanes_ + m];
+        g(n_ + nu_ + process.first - nx_) = share * end;
+      }
+    }
+  }
+  if (setup_.adapts_noise) wide_before_ = wide_mean_;
+  between_log_likelihood_ +=
+      take_outputs({.view = {lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()},
+                    .gradient = wide_gradient_.data(),
+                    .before = wide_before_.data(),
+                    .before_entry = lanes_,
+                    .before_lane = 1},
+                   y, nullptr);
+}
+
+/// Moves to the interval's end: z+ = F z + q, and x as integrated.
+void PriorBank::narrow(double duration) noexcept {
+  const std::ptrdiff_t a = wide_count(), M = lanes_;
+  integrate_members(wide_mean_.data(), true, duration, 1.0);
+  std::fill(transition_.begin(), transition_.end(), 0.0);
+  const auto T = [&](std::ptrdiff_t r, std::ptrdiff_t c) { return transition_.data() + (c * n_ + r) * M; };
+  const auto J = [&](std::ptrdiff_t r, std::ptrdiff_t c) { return jacobian_.data() + (c * nx_ + r) * M; };
+  AlignedDoubles& next = wide_before_;  // of the end
+  std::copy(next_.begin(), next_.end(), next.begin());
+  for (std::ptrdiff_t r = 0; r < nx_; ++r) {
+    for (std::ptrdiff_t c = 0; c < nx_; ++c) std::copy_n(J(r, c), M, T(r, c));
+    for (std::ptrdiff_t c = 0; c < nu_; ++c) std::copy_n(J(r, nx_ + c), M, T(r, n_ + c));
+  }
+  for (std::ptrdiff_t p = 0; p < np_; ++p) {
+    const Process& process = processes_[p];
+    const std::ptrdiff_t first = process.first, noise = n_ + nu_ + first - nx_, count = process.count;
+    for (std::ptrdiff_t m = 0; m < M; ++m) {
+      for (std::ptrdiff_t r = 0; r < nx_; ++r) {
+        const double start = J(r, nx_ + nu_ + p)[m], end = J(r, nx_ + nu_ + np_ + p)[m];
+        if (process.ramp[m] == 0.0) {
+          T(r, first)[m] = start + end;
+          continue;
+        }
+        T(r, first)[m] = start;
+        for (std::ptrdiff_t k = 0; k < count; ++k) T(r, first + k)[m] += end * process.F[k * count * M + m];
+        T(r, noise)[m] = end;
+      }
+      for (std::ptrdiff_t r = 0; r < count; ++r) {
+        double value = wide_mean_[(noise + r) * M + m];
+        for (std::ptrdiff_t k = 0; k < count; ++k) {
+          const double F = process.F[(k * count + r) * M + m];
+          T(first + r, first + k)[m] = F;
+          value += F * wide_mean_[(first + k) * M + m];
+        }
+        T(first + r, noise + r)[m] = 1.0;
+        next[(first + r) * M + m] = value;
+      }
+    }
+  }
+  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()},
+      wide{lanes_,           static_cast<int>(a), static_cast<int>(a), wide_mean_.data(), wide_covariance_.data(),
+           wide_work_.data()};
+  bank_kernels().narrow(view, wide, transition_.data(), next.data());
+  if (setup_.map) add_offsets();
+}
+
+}  // namespace rhec
