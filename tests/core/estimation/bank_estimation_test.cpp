@@ -76,6 +76,24 @@ TEST(BankEstimation, TakesLateOutputsAtTheNodesThatItRemembers) {
   EXPECT_GT(after.state[0], before.state[0] + 0.05);
 }
 
+TEST(BankEstimation, KeepsItsSlipWhereTheVehicleIsPutElsewhere) {
+  const std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
+  BankEstimation bank(model, bicycle_setup(*model, 0.4, 0.1, 1));
+  const Estimate before = drive(bank, 0.4, 60);
+  Eigen::VectorXd mean(6);
+  mean << 100.0, -50.0, 1.0, 0.1, 0.0, 0.0;
+  const Eigen::MatrixXd covariance = 0.04 * Eigen::MatrixXd::Identity(6, 6);
+  ASSERT_TRUE(bank.rebase(mean, covariance));
+  EXPECT_EQ(bank.reach(), 0);
+  Estimate after = empty_estimate(*model);
+  bank.estimate(after, Clock::time_point::max());
+  EXPECT_LT((after.state - mean.head(4)).norm(), 1e-9);
+  EXPECT_LT((after.covariance.topLeftCorner(4, 4) - covariance.topLeftCorner(4, 4)).norm(), 1e-9);
+  EXPECT_LT((after.parameters - before.parameters).norm(), 1e-9);
+  EXPECT_LT((after.covariance.bottomRightCorner(2, 2) - before.covariance.bottomRightCorner(2, 2)).norm(), 1e-9);
+  EXPECT_EQ(after.covariance.topRightCorner(4, 2).norm(), 0.0);
+}
+
 TEST(BankEstimation, KeepsItsParametersWithinTheirBounds) {
   const std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
   BankEstimation::Setup setup = bicycle_setup(*model, 0.0, 0.1, 1);

@@ -87,6 +87,55 @@ TEST(EstimationMethods, AfterResetGivesTheBitsOfANewOne) {
   }
 }
 
+/// What is given to a method that has run for a while takes the place of all that it has known.
+TEST(EstimationMethods, GoOnFromWhatTheyAreGiven) {
+  const auto model = linear_model<Hovercraft>();
+  const std::vector<Sample> before = simulate(*model, 20, true, 5), after = simulate(*model, 30, true, 6);
+  Eigen::VectorXd mean = initial_mean(*model);
+  mean.array() += 3.0;
+  const Eigen::MatrixXd covariance = 2.0 * initial_covariance(*model);
+  for (const bool filter : {false, true}) {
+    const auto make = [&](bool fresh) -> std::unique_ptr<EstimationMethod> {
+      RecedingHorizonEstimation::Setup setup = linear_setup(
+          *model, 6, ArrivalKind::ekf,
+          std::vector<std::shared_ptr<const Blocking>>(model->parameter_count(), blocking("full_horizon")));
+      if (fresh) {
+        setup.initial_mean = mean;
+        setup.initial_covariance = covariance;
+      }
+      if (!filter) return std::make_unique<RecedingHorizonEstimation>(model, gn_rti(), setup);
+      FilterEstimation::Setup own;
+      const Noise noise = noise_of(*model);
+      for (const double sigma : noise.outputs) own.noise.output_variances.push_back(sigma * sigma);
+      for (const double sigma : noise.inputs) own.noise.input_variances.push_back(sigma * sigma);
+      own.noise.parameter_lower = setup.problem.parameter_lower;
+      own.noise.parameter_upper = setup.problem.parameter_upper;
+      own.walk.assign(model->parameter_count(), 0.2);
+      own.initial_mean = setup.initial_mean;
+      own.initial_covariance = setup.initial_covariance;
+      return std::make_unique<FilterEstimation>(model, own);
+    };
+    const std::vector<double> nothing(model->output_count(), nan);
+    auto used = make(false), fresh = make(true);
+    used->start(before[0].outputs.data());
+    for (std::size_t k = 1; k < before.size(); ++k)
+      used->add_node(before[k].duration, before[k].inputs.data(), before[k].outputs.data());
+    ASSERT_TRUE(used->rebase(mean, covariance));
+    EXPECT_EQ(used->reach(), 0);
+    fresh->start(nothing.data());
+    Estimate one = empty_estimate(*model), other = one;
+    for (std::size_t k = 1; k < after.size(); ++k) {
+      for (EstimationMethod* method : {used.get(), fresh.get()})
+        method->add_node(after[k].duration, after[k].inputs.data(), after[k].outputs.data());
+      used->estimate(one, Clock::time_point::max());
+      fresh->estimate(other, Clock::time_point::max());
+      EXPECT_LT((one.state - other.state).norm(), 1e-8 * (1.0 + other.state.norm())) << k;
+      EXPECT_LT((one.parameters - other.parameters).norm(), 1e-8) << k;
+      EXPECT_LT((one.covariance - other.covariance).norm(), 1e-8 * other.covariance.norm()) << k;
+    }
+  }
+}
+
 TEST(EstimationMethods, ADeadlineInThePastStillGivesAnEstimate) {
   const auto model = linear_model<Hovercraft>();
   const std::vector<Sample> samples = simulate(*model, 20, true, 5);

@@ -13,7 +13,7 @@ namespace rhec {
 
 class WalkingFilter;
 
-/// Judges measurements before an estimator uses them (docs/faults.md).
+/// Judges measurements before an estimator uses them (docs/health.md).
 ///
 /// Beside the estimator a Kalman filter goes on from its last estimate. A sensor's measurement whose innovation is too
 /// large for its covariance (a gate on nu' S^-1 nu) is not used. Who is wrong is then found by filters that assume
