@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -91,9 +92,9 @@ void say_where(const NamedPlugin* plugin) {
 
 void* instruction_of(const void* context) {
 #if defined(__x86_64__)
-  return reinterpret_cast<void*>(static_cast<const ucontext_t*>(context)->uc_mcontext.gregs[REG_RIP]);
+  return std::bit_cast<void*>(static_cast<const ucontext_t*>(context)->uc_mcontext.gregs[REG_RIP]);
 #elif defined(__aarch64__)
-  return reinterpret_cast<void*>(static_cast<const ucontext_t*>(context)->uc_mcontext.pc);
+  return std::bit_cast<void*>(static_cast<const ucontext_t*>(context)->uc_mcontext.pc);
 #else
   static_cast<void>(context);
   return nullptr;

@@ -115,6 +115,7 @@ class SpawnPlan {
 
   int start(pid_t& process, std::vector<std::string> words, ExaminerEnvironment environment) const {
     std::vector<char*> pointers;
+    pointers.reserve(words.size() + 1);
     for (std::string& word : words) pointers.push_back(word.data());
     pointers.push_back(nullptr);
     return posix_spawn(&process, pointers[0], &actions_, &attributes_, pointers.data(), environment.get());

@@ -28,7 +28,8 @@ struct Sample {
   Status estimator_status = Status::solved, controller_status = Status::solved;
   bool estimator_fallback = false, controller_fallback = false, relaxed = false;
   double estimator_us = 0.0, controller_us = 0.0;  ///< preparation and feedback of the solvers [us]
-  double estimator_feedback_us = 0.0;              ///< of this, the time after the measurement [us]
+  std::string faults = {};             ///< what went wrong since the last sample: kinds joined by '+'; empty: nothing
+  double estimator_feedback_us = 0.0;  ///< of this, the time after the measurement [us]
 };
 
 struct RunLog {
