@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "formula_views.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/equations/equations.hpp"
@@ -144,7 +145,7 @@ sim::FormulaPoint start_of(const Host& host, const CheckArguments& arguments, bo
 }
 
 int check(const CheckArguments& arguments) {
-  const Host host(arguments.plugin_path);
+  const Host host = examined_host(arguments.plugin_path);
   sim::ModelCheckOptions options;
   options.seed = static_cast<std::uint64_t>(arguments.seed);
   options.speed = arguments.speed;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
@@ -329,7 +330,7 @@ void print_notes(const Comparison& comparison, const std::filesystem::path& fold
 int compare(const CompareArguments& arguments) {
   Settings settings = load_yaml(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
-  const Host host(arguments.plugin_path);
+  const Host host = examined_host(arguments.plugin_path);
   sim::ComparisonOptions options;
   options.backends = read_backends(host, arguments.solvers);
   options.reference = read_drive(host, arguments.drive, options.backends);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -12,7 +13,7 @@ namespace rhec::apps {
 sim::LogScenario read_log_scenario(const LogArguments& arguments) {
   Settings settings = load_yaml(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
-  return {Host(arguments.plugin_path), settings, arguments.variants};
+  return {examined_host(arguments.plugin_path), settings, arguments.variants};
 }
 
 sim::HoldOut read_hold_out(const LogArguments& arguments) {

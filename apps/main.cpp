@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
@@ -95,7 +96,9 @@ void finish_output() {
 }  // namespace
 }  // namespace rhec::apps
 
-int main(int count, char** words) {
+namespace {
+
+int run_and_tell(int count, char** words) {
   try {
     const int code = rhec::apps::run(count, words);
     rhec::apps::finish_output();
@@ -111,4 +114,13 @@ int main(int count, char** words) {
     fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());
   }
   return rhec::apps::exit_error;
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+  rhec::apps::install_crash_report();
+  const int code = run_and_tell(count, words);
+  rhec::apps::end_crash_report();
+  return code;
 }

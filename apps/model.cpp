@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/vehicle_graph.hpp"
 #include "rhec/plugins/equations/equations.hpp"
@@ -70,7 +71,7 @@ int show(const ModelArguments& arguments) {
   Settings settings = Settings::map({arguments.file, 0});
   apply_assignments(settings, arguments.assignments);
   settings.set("outputs", Settings::scalar("all"));
-  const std::shared_ptr<Model> model = Host().make_model(arguments.file, settings);
+  const std::shared_ptr<Model> model = examined_host({}).make_model(arguments.file, settings);
   if (arguments.folder)
     write_cpp(arguments);
   else

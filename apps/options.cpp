@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
@@ -92,7 +93,7 @@ int show(const OptionsArguments& arguments) {
     }
     throw Error(fmt::format("there is no section '{}'; expected one of {}", arguments.section, fmt::join(known, ", ")));
   }
-  const Host host(arguments.plugin_path);
+  const Host host = examined_host(arguments.plugin_path);
   std::string text = introduction;
   for (const OptionSection& section : sections) text += "\n" + section_text(section);
   std::vector<PluginRecord> plugins = host.discover();

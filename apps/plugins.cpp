@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "doctor.hpp"
 #include "formula_views.hpp"
 #include "rhec/core/base/error.hpp"
@@ -237,7 +238,7 @@ std::vector<PluginRecord> named(const Host& host, const std::string& name) {
 }
 
 int show(const PluginsArguments& arguments) {
-  const Host host(arguments.plugin_path);
+  const Host host = examined_host(arguments.plugin_path, arguments.doctor);
   if (arguments.doctor) return examine_plugins(host, arguments.name, arguments.json);
   if (arguments.graph) {
     if (arguments.name.empty())

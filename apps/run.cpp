@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "dump.hpp"
 #include "integration_note.hpp"
 #include "progress.hpp"
@@ -110,7 +111,7 @@ void print_map(const sim::MapKeeper& keeper) {
 int run(const RunArguments& arguments) {
   Settings settings = load_yaml(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
-  const sim::Scenario scenario(Host(arguments.plugin_path), settings);
+  const sim::Scenario scenario(examined_host(arguments.plugin_path), settings);
   if (scenario.robot().memory().is_given() && arguments.dump.folder)
     throw Error(
         "--dump: problems of a controller that knows the slip ahead cannot be saved yet; give estimator.memory=none");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
@@ -118,7 +119,7 @@ int smooth_drive(const LogArguments& arguments) {
   if (arguments.hold_out > 0 || arguments.phase >= 0 || !arguments.variants.empty())
     throw Error(fmt::format(
         "--hold-out, --hold-out-phase and --variant are for a recorded drive; {}, or leave them out", give_files));
-  const sim::Scenario scenario(Host(arguments.plugin_path), settings);
+  const sim::Scenario scenario(examined_host(arguments.plugin_path), settings);
   sim::OutputFolder folder(arguments.out);
   ProgressBar bar(scenario.options().name);
   const sim::SmoothedDrive drive =

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/horizon/shift.hpp"
 #include "rhec/core/ocp/solver.hpp"
@@ -260,7 +261,7 @@ int solve(const SolveArguments& arguments) {
   std::map<std::string, int> longest;
   if (arguments.sequence) longest = longest_of_each(records);
 
-  const Host host(arguments.plugin_path);
+  const Host host = examined_host(arguments.plugin_path);
   Settings options;
   apply_assignments(options, arguments.assignments);
   Destination destination(arguments.out);

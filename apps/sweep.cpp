@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
@@ -84,7 +85,7 @@ int serve(const SweepArguments& arguments, const Host& host, SweepRanks& ranks, 
 }
 
 int sweep(const SweepArguments& arguments) {
-  const Host host(arguments.plugin_path);
+  const Host host = examined_host(arguments.plugin_path);
   const int rank_count = started_ranks();
   const std::unique_ptr<SweepRanks> ranks = rank_count > 1 ? start_ranks(host, rank_count) : nullptr;
   // By default, each of several processes uses one core.

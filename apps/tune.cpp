@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "crash_report.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
@@ -87,7 +88,7 @@ int tune_on_log(const TuneArguments& arguments) {
   const sim::LogVariant& variant = scenario.variants().front();
   const sim::LogTables tables = sim::read_log_tables(arguments.dead_reckoning, arguments.gps);
   sim::OutputFolder folder(arguments.out);
-  const Host host(arguments.plugin_path);
+  const Host host = examined_host(arguments.plugin_path);
   sim::LogTuningOptions options;
   options.hold_out = read_hold_out(arguments);
   options.wishes = {arguments.tune, arguments.keep};
@@ -148,7 +149,7 @@ int tune_controller(const TuneArguments& arguments) {
   options.most_evaluations = arguments.evaluations;
   if (arguments.most_seconds > 0) options.most_seconds = arguments.most_seconds;
   sim::OutputFolder folder(arguments.out);
-  const Host host(arguments.plugin_path);
+  const Host host = examined_host(arguments.plugin_path);
   sim::ControllerTuning tuning;
   {
     const StopRequest stop;

@@ -5,13 +5,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <mutex>
 
+#include "examine.hpp"
+#include "examiner_process.hpp"
+#include "factory.hpp"
 #include "library.hpp"
 #include "rhec/core/config/options.hpp"
-#include "rhec/core/model/chosen_outputs.hpp"
 #include "rhec/core/prior/prior.hpp"
 #include "rhec/core/term/term.hpp"
 #include "rhec/plugins/equations/equations.hpp"
@@ -118,60 +119,11 @@ std::string indented(const std::string& text, std::size_t indent) {
   return result;
 }
 
-/// An error about the plugin that `settings` names, with the place of its name.
-Error plugin_error(const Settings& settings, const std::string& text) {
-  const Settings* name = settings.find("name");
-  return name != nullptr ? name->error(text) : Error(text);
-}
-
-/// The model with the outputs that its section names, or the usual ones by default.
-std::shared_ptr<Model> choose_outputs(std::shared_ptr<Model> model, const Settings& section) {
-  const ModelDescription& about = model->description();
-  const Settings* wanted = section.find("outputs");
-  if (!wanted) {
-    const std::vector<int> usual = usual_outputs(about);
-    return with_outputs(std::move(model), usual);
-  }
-  if (wanted->kind() == Settings::Kind::scalar && wanted->text() == "all") return model;
-  const std::vector<std::string> known = names_of(about.outputs);
-  if (wanted->kind() != Settings::Kind::list || wanted->items().empty())
-    throw wanted->mismatch(fmt::format("'all' or a list of outputs: {}", fmt::join(known, ", ")));
-  std::vector<int> chosen;
-  for (const Settings& item : wanted->items()) {
-    const auto found = std::find(known.begin(), known.end(), item.as_text());
-    if (found == known.end())
-      throw item.mismatch(fmt::format("an output of the model '{}': {}", about.name, fmt::join(known, ", ")));
-    const auto output = static_cast<int>(found - known.begin());
-    if (std::find(chosen.begin(), chosen.end(), output) != chosen.end()) throw item.error("this output is named twice");
-    chosen.push_back(output);
-  }
-  return with_outputs(std::move(model), chosen);
-}
-
-/// True if an option has no default, and `error` names it as a key.
-bool is_told_as_missing(const OptionRow& option, std::string_view error) {
-  if (!option.default_value.empty() && option.default_value != "[]") return false;
-  const std::string key = option.name + ": ";
-  const std::size_t place = error.find(key);
-  return place == 0 || (place != std::string_view::npos && error[place - 1] == ' ');
-}
-
-std::string numbers_of_variables(const Model& model) {
-  return fmt::format("{} states, {} inputs, {} parameters, {} outputs", model.state_count(), model.input_count(),
-                     model.parameter_count(), model.output_count());
-}
-
-/// Buffer for the message of a plugin's function that fails.
-using ErrorText = std::array<char, 4096>;
-
-std::string said(const ErrorText& text) {
-  return text[0] != '\0' ? std::string(text.data()) : "it gave no reason; tell its author";
-}
-
 }  // namespace
 
 struct Host::Search {
   std::vector<PluginPlace> places;
+  Examination examination;
 
   const std::vector<PluginRecord>& records() {
     std::call_once(done_, [this] { run(); });
@@ -182,7 +134,7 @@ struct Host::Search {
   const Library& require(PluginKind kind, std::string_view name, const Settings& settings, const Host& host) {
     for (std::size_t i = 0; i < records().size(); ++i) {
       const PluginRecord& record = records_[i];
-      if (record.accepted() && record.kind == kind && record.name == name) return libraries_[i];
+      if (record.accepted() && record.kind == kind && record.name == name) return loaded(i, settings);
     }
     const std::vector<std::string> known = host.names(kind);
     const std::string near = nearest(name, known);
@@ -197,31 +149,58 @@ struct Host::Search {
 
   template <class Interface>
   std::shared_ptr<Interface> make(PluginKind kind, std::string_view name, const Settings& settings, const Host& host) {
-    const Library& library = require(kind, name, settings, host);
-    ErrorText error{};
-    void* object = library.manifest->create(&settings, error.data(), error.size());
-    if (object == nullptr && error[0] != '\0') throw Error(error.data());  // already says which plugin it is about
-    if (object == nullptr) {
-      throw plugin_error(settings, fmt::format("{} '{}' could not be made: {}", word_of(kind), name, said(error)));
+    return std::static_pointer_cast<Interface>(make_object(require(kind, name, settings, host), settings));
+  }
+
+  /// The result of a trial: of the examination if there was one.
+  PluginTrial trial_of(const PluginRecord& plugin) {
+    for (std::size_t i = 0; i < records().size(); ++i) {
+      if (records_[i].path != plugin.path) continue;
+      return examination.apart ? trials_[i] : try_library(loaded(i, {}), ignore_stage);
     }
-    return {static_cast<Interface*>(object),
-            [destroy = library.manifest->destroy, pinned = library.pinned](Interface* made) { destroy(made); }};
+    throw Error(fmt::format("{}: this host has not found it", plugin.path.string()));
   }
 
  private:
+  static void ignore_stage(std::string_view) {}
+
   void run() {
-    records_.clear();
-    libraries_.clear();
+    std::vector<fs::path> files;
     for (const PluginPlace& place : places) {
       if (!place.skipped.empty()) continue;
-      for (const fs::path& file : libraries_in(place.directory)) {
-        Library library = load_library(file);
-        PluginRecord record = std::move(library.record);
-        shadow(record);
-        libraries_.push_back(std::move(library));
-        records_.push_back(std::move(record));
+      for (fs::path& file : libraries_in(place.directory)) files.push_back(std::move(file));
+    }
+    libraries_.resize(files.size());
+    if (examination.apart) {
+      for (Verdict& verdict : examine_apart(files, examination, examiner_program())) {
+        trials_.push_back(std::move(verdict.trial));
+        add(std::move(verdict.record));
+      }
+    } else {
+      for (std::size_t i = 0; i < files.size(); ++i) {
+        libraries_[i] = load_library(files[i], ignore_stage);
+        add(libraries_[i].record);
       }
     }
+  }
+
+  void add(PluginRecord record) {
+    shadow(record);
+    records_.push_back(std::move(record));
+  }
+
+  /// The library of an accepted plugin. One that was examined apart is loaded when it is first needed.
+  const Library& loaded(std::size_t index, const Settings& settings) {
+    const std::scoped_lock lock(loading_);
+    Library& library = libraries_[index];
+    if (library.manifest) return library;
+    library = load_library(records_[index].path, ignore_stage);
+    const PluginRecord& found = library.record;
+    if (library.manifest && found.kind == records_[index].kind && found.name == records_[index].name) return library;
+    library.manifest = nullptr;
+    throw plugin_error(settings, fmt::format("{}: {}", found.path.string(),
+                                             found.accepted() ? "it is not the plugin any more that was examined"
+                                                              : found.explanation()));
   }
 
   void shadow(PluginRecord& record) const {
@@ -240,8 +219,10 @@ struct Host::Search {
   }
 
   std::once_flag done_;
+  std::mutex loading_;
   std::vector<PluginRecord> records_;
-  std::vector<Library> libraries_;  ///< one per record
+  std::vector<Library> libraries_;   ///< one per record
+  std::vector<PluginTrial> trials_;  ///< one per record, if they were examined apart
 };
 
 std::string PluginRecord::explanation() const { return remedy.empty() ? refusal : refusal + "; " + remedy; }
@@ -251,8 +232,9 @@ std::string PluginRecord::title() const {
   return fmt::format("{} '{}'{}{}", word_of(kind), name, version.empty() ? "" : " ", version);
 }
 
-Host::Host(const std::vector<fs::path>& given) : search_(std::make_shared<Search>()) {
+Host::Host(const std::vector<fs::path>& given, const Examination& examination) : search_(std::make_shared<Search>()) {
   search_->places = places_of(given);
+  search_->examination = examination;
 }
 
 const std::vector<PluginPlace>& Host::places() const { return search_->places; }
@@ -297,44 +279,12 @@ std::string Host::diagnosis() const {
 
 std::vector<OptionRow> Host::options(PluginKind kind, std::string_view name) const {
   if (kind == PluginKind::model && is_equations_file(name)) return vehicle_options(name);
-  const Library& library = search_->require(kind, name, {}, *this);
-  std::vector<OptionRow> rows;
-  ErrorText error{};
-  if (!library.manifest->schema(&rows, error.data(), error.size())) {
-    throw Error(fmt::format("the options of {} '{}' cannot be told: {}", word_of(kind), name, said(error)));
-  }
-  if (kind == PluginKind::model)
-    rows.push_back({"outputs", "list of texts", "the usual ones", "all, or outputs of the model", "what is measured"});
-  return rows;
+  return options_of(search_->require(kind, name, {}, *this));
 }
 
 PluginTrial Host::try_out(const PluginRecord& plugin) const {
   if (!plugin.accepted()) throw Error(fmt::format("{}: {}", plugin.path.string(), plugin.explanation()));
-  std::vector<OptionRow> rows;
-  try {
-    rows = options(plugin.kind, plugin.name);
-    switch (plugin.kind) {
-      case PluginKind::model:
-        return {PluginTrial::Outcome::made, numbers_of_variables(*make_model(plugin.name))};
-      case PluginKind::blocking:
-        make_blocking(plugin.name);
-        break;
-      case PluginKind::solver:
-        make_solver(plugin.name);
-        break;
-      case PluginKind::prior:
-        make_prior(plugin.name);
-        break;
-      case PluginKind::term:
-        make_term(plugin.name);
-        break;
-    }
-  } catch (const Error& error) {
-    const bool needs = std::any_of(rows.begin(), rows.end(),
-                                   [&](const OptionRow& row) { return is_told_as_missing(row, error.what()); });
-    return {needs ? PluginTrial::Outcome::needs_options : PluginTrial::Outcome::failed, error.what()};
-  }
-  return {};
+  return search_->trial_of(plugin);
 }
 
 std::shared_ptr<Model> Host::make_model(std::string_view name, const Settings& settings) const {

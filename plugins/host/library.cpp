@@ -8,8 +8,10 @@
 #include <array>
 #include <boost/core/demangle.hpp>
 #include <boost/dll/shared_library.hpp>
+#include <cstring>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "elf_file.hpp"
@@ -37,6 +39,31 @@ Refusal why_head_not_usable(const ManifestHead& head) {
   }
   if (head.size != sizeof(Manifest)) {
     return {fmt::format("its manifest has {} bytes, expected {}", head.size, sizeof(Manifest)), kRebuild};
+  }
+  return {};
+}
+
+/// The texts that a manifest may have, with their names.
+std::array<std::pair<const char*, const char*>, 8> texts_of(const Manifest& manifest) {
+  return {{{"fingerprint", manifest.fingerprint},
+           {"name", manifest.name},
+           {"version", manifest.version},
+           {"licence", manifest.licence},
+           {"source", manifest.source},
+           {"backend", manifest.backend},
+           {"backend_version", manifest.backend_version},
+           {"capabilities", manifest.capabilities}}};
+}
+
+/// A text that does not end, or is none, is told before anything is made of it; null texts are told later.
+Refusal why_texts_not_usable(const Manifest& manifest) {
+  constexpr std::size_t most = 4000;
+  for (const auto& [name, text] : texts_of(manifest)) {
+    if (text == nullptr) continue;
+    const std::size_t length = strnlen(text, most + 1);
+    if (length > most) return {fmt::format("its manifest's {} does not end within {} bytes", name, most), kUseMacro};
+    const bool printable = std::none_of(text, text + length, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+    if (!printable) return {fmt::format("its manifest's {} has control characters: it is no text", name), kUseMacro};
   }
   return {};
 }
@@ -108,8 +135,7 @@ Refusal why_contents_not_usable(const Manifest& manifest, const std::string& tit
     default:
       return {fmt::format("its kind {} is unknown to this rhec", static_cast<int>(manifest.kind)), kRebuild};
   }
-  for (const char* text : {manifest.name, manifest.version, manifest.licence, manifest.source, manifest.backend,
-                           manifest.backend_version, manifest.capabilities}) {
+  for (const auto& [name, text] : texts_of(manifest)) {
     if (text == nullptr) return {fmt::format("the manifest of {} has a null text", title), kUseMacro};
   }
   if (manifest.name[0] == '\0') return {"its manifest has no name", "give it one in RHEC_PLUGIN"};
@@ -160,6 +186,13 @@ Refusal refused_by_loader(const std::string& words) {
   return {reason, kRebuild};
 }
 
+/// Keeps the library loaded until the process ends, whoever closes it.
+void pin(const std::filesystem::path& file) {
+  if (void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_NOLOAD | RTLD_NODELETE)) dlclose(handle);
+}
+
+}  // namespace
+
 Refusal writable_by_all(const std::filesystem::path& file) {
   std::error_code problem;
   const std::filesystem::perms permissions = std::filesystem::status(file, problem).permissions();
@@ -168,14 +201,12 @@ Refusal writable_by_all(const std::filesystem::path& file) {
           fmt::format("run 'chmod o-w {}', and build it again if you do not know who wrote it", file.string())};
 }
 
-/// Keeps the library loaded until the process ends, whoever closes it.
-void pin(const std::filesystem::path& file) {
-  if (void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_NOLOAD | RTLD_NODELETE)) dlclose(handle);
+Refusal why_not_to_load(const std::filesystem::path& file) {
+  Refusal refusal = writable_by_all(file);
+  return refusal.empty() ? why_not_loadable(file, kManifestSymbol, sizeof(ManifestHead)) : refusal;
 }
 
-}  // namespace
-
-Library load_library(const std::filesystem::path& file) {
+Library load_library(const std::filesystem::path& file, const Stage& stage) {
   Library result;
   result.record.path = file;
   const auto refused = [&](const Refusal& refusal) {
@@ -183,15 +214,16 @@ Library load_library(const std::filesystem::path& file) {
     result.record.remedy = refusal.remedy;
     return !refusal.empty();
   };
-  if (refused(writable_by_all(file))) return result;
-  if (refused(why_not_loadable(file, kManifestSymbol, sizeof(ManifestHead)))) return result;
+  if (refused(why_not_to_load(file))) return result;
   auto library = std::make_shared<boost::dll::shared_library>();
   try {
+    stage("load");
     library->load(file, boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local);
   } catch (const std::exception& failure) {
     refused(refused_by_loader(loader_words(failure.what())));
     return result;
   }
+  stage("manifest");
   if (!library->has(kManifestSymbol)) {
     refused(no_manifest(kManifestSymbol));
     return result;
@@ -200,6 +232,7 @@ Library load_library(const std::filesystem::path& file) {
   if (refused(why_head_not_usable(head))) return result;
   // The head has been checked: it starts a complete manifest of this layout.
   const auto& manifest = reinterpret_cast<const Manifest&>(head);
+  if (refused(why_texts_not_usable(manifest))) return result;
   tell(manifest, result.record);
   const std::string title = result.record.title();
   if (refused(why_contents_not_usable(manifest, title))) return result;

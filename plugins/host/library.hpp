@@ -1,8 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <string_view>
 
+#include "refusal.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/kit/manifest.hpp"
 
@@ -20,8 +23,17 @@ inline bool all_may_write(std::filesystem::perms given) {
   return (given & std::filesystem::perms::others_write) != std::filesystem::perms::none;
 }
 
+/// Told what is about to be done with a plugin.
+using Stage = std::function<void(std::string_view)>;
+
+/// The refusal of a file that every user may write to; empty if they may not.
+Refusal writable_by_all(const std::filesystem::path& file);
+
+/// Why a file is refused before it is passed to the loader; empty if it may be.
+Refusal why_not_to_load(const std::filesystem::path& file);
+
 /// Loads one file with RTLD_NOW and RTLD_LOCAL, and checks its whole manifest. Reports failures in the result, not by
-/// exceptions.
-Library load_library(const std::filesystem::path& file);
+/// exceptions. `stage` is called with "load" before the library's constructors run, and with "manifest" after them.
+Library load_library(const std::filesystem::path& file, const Stage& stage);
 
 }  // namespace rhec

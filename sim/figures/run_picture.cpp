@@ -349,7 +349,17 @@ void draw_band(Svg& svg, const Frame& frame, const Curve& curve, std::string_vie
   }
 }
 
-void draw_panel(Svg& svg, const Panel& panel, Point corner, double height, Interval times, bool is_last) {
+void draw_spans(Svg& svg, const Frame& frame, const std::vector<Span>& spans) {
+  constexpr double least_width = 1.0;
+  for (const Span& span : spans) {
+    const double left = frame.at(span.from, frame.y.upper).x, right = frame.at(span.to, frame.y.upper).x;
+    svg.rectangle({left, frame.corner.y}, std::max(right - left, least_width), frame.height,
+                  R"(fill="#d93025" fill-opacity="0.12")");
+  }
+}
+
+void draw_panel(Svg& svg, const Panel& panel, const std::vector<Span>& spans, Point corner, double height,
+                Interval times, bool is_last) {
   const std::vector<LegendEntry> legend = panel_legend(panel);
   const double head = head_height(heading_of(panel), legend, panel_width);
   draw_head(svg, heading_of(panel), legend, corner, panel_width);
@@ -358,6 +368,7 @@ void draw_panel(Svg& svg, const Panel& panel, Point corner, double height, Inter
   draw_y_axis(svg, frame, static_cast<int>(std::clamp(frame.height / 28.0, 3.0, 7.0)), Grid::shown, "");
 
   svg.begin_clip(frame.corner, frame.width, frame.height);
+  draw_spans(svg, frame, spans);
   for (std::size_t i = 0; i < panel.curves.size(); ++i) {
     if (panel.curves[i].sigmas.empty()) continue;
     // The colour of the line, thinned: its style begins with stroke="#rrggbb".
@@ -426,7 +437,7 @@ std::string draw_run(const RunPicture& picture) {
   const double panel_height = (body - panel_gap * (panel_count - 1.0)) / panel_count;
   for (std::size_t i = 0; i < picture.panels.size(); ++i) {
     const Point corner{panel_corner, top + static_cast<double>(i) * (panel_height + panel_gap)};
-    draw_panel(svg, picture.panels[i], corner, panel_height, times, i + 1 == picture.panels.size());
+    draw_panel(svg, picture.panels[i], picture.spans, corner, panel_height, times, i + 1 == picture.panels.size());
   }
   return svg.document();
 }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "consistency.hpp"
+#include "loop_world.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
@@ -98,15 +99,13 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   Robot robot = with_hooks(scenario.robot(), hooks, [&k] { return k; });
   const Model& model = *robot.model();
   const Roles& roles = model.description().roles;
-  const auto seed = static_cast<std::uint64_t>(scenario.options().seed);
-  TruthVehicle truth(model, scenario.terrain(), scenario.initial_state(), scenario.vehicle());
+  LoopWorld world(scenario, {.outputs = robot.output_sigmas(),
+                             .inputs = robot.input_sigmas(),
+                             .biases = drifts_of(robot.output_biases()),
+                             .scales = drifts_of(robot.output_scales())});
+  const TruthVehicle& truth = world.truth();
+  const Sensors& sensors = world.sensors();
   robot.use_estimators(scenario_estimators(&truth));
-  Sensors sensors(model,
-                  {.outputs = robot.output_sigmas(),
-                   .inputs = robot.input_sigmas(),
-                   .biases = drifts_of(robot.output_biases()),
-                   .scales = drifts_of(robot.output_scales())},
-                  seed);
   const auto estimator = robot.make_estimator(scenario.initial_state());
   const auto controller = robot.make_controller(scenario.path(), estimator->slip_ahead());
   PathFollower true_follower(scenario.path());
@@ -114,9 +113,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   const double step = robot.step();
   // Three times the path's nominal duration, enough for a vehicle that lags behind its literal reference.
   const auto limit = static_cast<std::int64_t>(3.0 * scenario.path().duration() / step) + 100;
-  std::vector<double> outputs(model.output_count()), measured(model.input_count());
   Consistency consistency(robot.estimated_description());
-  std::vector<double> held(model.input_count());  // input before the node
   int path_segment = 0;
   true_follower.locate(truth.state()[roles.position_x], truth.state()[roles.position_y],
                        roles.heading >= 0 ? truth.state()[roles.heading] : std::numeric_limits<double>::quiet_NaN());
@@ -128,11 +125,10 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   begin(LoopPart::simulate);
   for (;; ++k) {
     const double time = static_cast<double>(k) * step;
-    const Sensors::Motion motion{held.data(), truth.parameters().data()};
-    sensors.observe(truth.state().data(), outputs.data(), k > 0 ? &motion : nullptr);
+    world.measure(time);
     begin(LoopPart::estimate);
-    estimator->push_measurement(time, outputs.data());
-    const Estimate& estimate = estimator->estimate(time);
+    world.deliver(time, *estimator);
+    const Estimate& estimate = estimator->estimate(world.on_robots_clock(time));
     begin(LoopPart::control);
     const Controller::Command& command = controller->control(estimate);
     begin(LoopPart::log_sample);
@@ -165,6 +161,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     sample.health = estimate.health.level;
     if (estimate.health.level != HealthLevel::ok && estimator->watch())
       sample.findings = in_words(estimate.health, estimator->watch()->sensors());
+    sample.faults = world.take_faults();
     sample.estimator_us = estimate.report.preparation_us + estimate.report.feedback_us;
     sample.estimator_feedback_us = estimate.report.feedback_us;
     sample.controller_us = command.report.preparation_us + command.report.feedback_us;
@@ -195,14 +192,12 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
       break;
     }
     begin(LoopPart::simulate);
-    truth.advance(command.inputs.data(), step);
-    sensors.advance(step);
-    held = command.inputs;
-    sensors.measure_inputs(command.inputs.data(), measured.data());
+    world.drive(command.inputs, time, step);
+    const std::vector<double>& measured = world.measured_inputs(command.inputs);
     begin(LoopPart::prepare_control);
     controller->prepare();
     begin(LoopPart::prepare_estimate);
-    estimator->push_input(time, measured.data());
+    estimator->push_input(world.on_robots_clock(time), measured.data());
     estimator->prepare();
     begin(LoopPart::simulate);
   }

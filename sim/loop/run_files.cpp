@@ -60,6 +60,20 @@ void append_number(double value, std::string& text) {
   text.append(digits.begin(), end);
 }
 
+/// From each sample at which something went wrong to the next at which nothing did; half a step on either side.
+std::vector<Span> fault_spans(const RunLog& log) {
+  std::vector<Span> spans;
+  const double half = log.samples.size() > 1 ? 0.5 * (log.samples[1].time - log.samples[0].time) : 0.0;
+  bool is_open = false;
+  for (const Sample& sample : log.samples) {
+    const bool is_faulty = !sample.faults.empty();
+    if (is_faulty && !is_open) spans.push_back({sample.time - half, sample.time + half});
+    if (is_faulty) spans.back().to = sample.time + half;
+    is_open = is_faulty;
+  }
+  return spans;
+}
+
 template <class Function>
 Curve curve_of(const RunLog& log, std::string label, CurveRole role, const Function& value_of) {
   Curve curve;
@@ -90,7 +104,7 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
   text +=
       ",reference_x,reference_y,reference_heading,reference_speed,tracking,heading_error,nees,estimator_status,"
       "controller_status,estimator_fallback,"
-      "controller_fallback,relaxed,health,findings\n";
+      "controller_fallback,relaxed,faults,health,findings\n";
   const std::size_t sigmas = about.states.size() + about.parameters.size();
   for (const Sample& sample : log.samples) {
     fmt::format_to(std::back_inserter(text), "{}", sample.step);
@@ -115,9 +129,9 @@ std::string steps_csv(const RunLog& log, const Scenario& scenario) {
     } else {
       text += ',';
     }
-    fmt::format_to(std::back_inserter(text), ",{},{},{:d},{:d},{:d},{},{}\n", name_of(sample.estimator_status),
+    fmt::format_to(std::back_inserter(text), ",{},{},{:d},{:d},{:d},{},{},{}\n", name_of(sample.estimator_status),
                    name_of(sample.controller_status), sample.estimator_fallback, sample.controller_fallback,
-                   sample.relaxed, name_of(sample.health), sample.findings);
+                   sample.relaxed, sample.faults, name_of(sample.health), sample.findings);
   }
   return text;
 }
@@ -176,6 +190,7 @@ std::string run_svg(const RunLog& log, const Scenario& scenario, const RunLog* c
     picture.driven.push_back({sample.true_state[roles.position_x], sample.true_state[roles.position_y]});
     picture.estimated.push_back({sample.state[roles.position_x], sample.state[roles.position_y]});
   }
+  picture.spans = fault_spans(log);
   if (!about.parameters.empty()) {
     const int shown = std::max(0, roles.speed_factor);
     BaseMap base;

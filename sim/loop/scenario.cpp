@@ -125,7 +125,7 @@ const OptionTable<TerrainOptions>& terrain_table() {
 struct VehicleOptions {
   double step = TruthOptions{}.step;
   bool mechanical_stops = TruthOptions{}.mechanical_stops;
-  Settings noise;
+  Settings noise, actuators;
 };
 
 const NumbersByName& vehicle_noise_by_name() {
@@ -144,7 +144,10 @@ const OptionTable<VehicleOptions>& vehicle_table() {
           .number("step", &V::step, "integration step of the truth; on smooth ground it may take longer ones [s]",
                   between(1e-6, 1.0))
           .flag("mechanical_stops", &V::mechanical_stops, "bounded states cannot leave their bounds")
-          .map("noise", &V::noise, vehicle_noise_by_name().rows());
+          .map("noise", &V::noise, vehicle_noise_by_name().rows())
+          .map("actuators", &V::actuators,
+               {{"INPUT", "map", "{}", "",
+                 "lag, lower and upper of what the vehicle gets of it: see vehicle.actuators.INPUT"}});
   return rows;
 }
 
@@ -299,7 +302,10 @@ const OptionTable<ScenarioOptions>& ScenarioOptions::table() {
         .subtree("path", &ScenarioOptions::path, "name: figure8 | zigzag | file, and its options")
         .subtree("terrain", &ScenarioOptions::terrain,
                  "name: gaussian | constant | patches | raster | split, and its options")
-        .subtree("vehicle", &ScenarioOptions::vehicle, "the true vehicle: step, mechanical_stops, noise");
+        .subtree("vehicle", &ScenarioOptions::vehicle, "the true vehicle: step, mechanical_stops, noise, actuators")
+        .map("sensors", &ScenarioOptions::sensors,
+             {{"OUTPUT", "map", "{}", "", "rate, phase and latency of a simulated sensor: see sensors.OUTPUT"}})
+        .map("faults", &ScenarioOptions::faults, {{"", "list of maps", "[]", "", "what goes wrong: see faults"}});
     RobotOptions::add_to(table);
     return table;
   }();
@@ -312,6 +318,12 @@ std::vector<OptionSection> scenario_sections() {
       {"path", "What the robot shall follow.", path_table().schema()},
       {"terrain", "The ground: the true parameters of the model as a function of position.", terrain_table().schema()},
       {"vehicle", "The vehicle as it really moves.", vehicle_table().schema()},
+      {"vehicle.actuators.INPUT",
+       "What an actuator makes of an input that it is asked for. What is measured of the input is what was asked for.",
+       ActuatorOptions::table().schema()},
+      {"sensors.OUTPUT", "When a simulated sensor measures, and when that arrives.", SensorTiming::table().schema()},
+      {"faults", "A fault of the simulated sensors, stamps or wheels: one entry of the list, docs/faults.md.",
+       FaultOptions::table().schema()},
   };
   for (OptionSection& section : robot_sections(scenario_estimators())) sections.push_back(std::move(section));
   return sections;
@@ -328,6 +340,10 @@ Scenario::Scenario(const Host& host, const Settings& settings)
     vehicle_.noise = vehicle_noise_by_name().read(vehicle.noise, robot_.model()->description());
     vehicle_.seed = static_cast<std::uint64_t>(options_.seed);
   }
+  const ModelDescription& about = robot_.model()->description();
+  actuators_ = read_actuators(vehicle.actuators, about);
+  sensor_timings_ = read_sensor_timings(options_.sensors, about);
+  faults_ = read_faults(options_.faults, about);
   const double samples = path_.duration() / options_.step;
   if (!(samples >= 1.0 && samples <= most_samples))
     throw key_or_section(settings, "step")

@@ -89,6 +89,7 @@ class RunReport {
     inputs();
     errors();
     statuses();
+    faults();
     map();
     solve_times();
     horizons();
@@ -289,6 +290,21 @@ class RunReport {
     for (std::int64_t row = 0; row < steps_.rows(); ++row)
       if (steps_.text(row, index) != "0") list.push_back({row, seen(time_[static_cast<std::size_t>(row)])});
     return list;
+  }
+
+  /// What went wrong, as spans of time; runs of older programs do not say.
+  void faults() {
+    Json& spans = document_["faults"] = Json::array();
+    if (!steps_.has("faults") || time_.size() < 2) return;
+    const std::size_t index = steps_.column("faults");
+    const double half = 0.5 * (time_[1] - time_[0]);
+    std::string_view last;
+    for (std::size_t row = 0; row < time_.size(); ++row) {
+      const std::string_view now = steps_.text(static_cast<std::int64_t>(row), index);
+      if (!now.empty() && now != last) spans.push_back({{"from", seen(time_[row] - half)}, {"what", std::string(now)}});
+      if (!now.empty()) spans.back()["to"] = seen(time_[row] + half);
+      last = now;
+    }
   }
 
   Json status_of(const char* name, const Json& counts, const char* who) {

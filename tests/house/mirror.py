@@ -34,6 +34,8 @@ SUITES = {
 UNTESTED = {
     "apps/command.cpp": "tests/cli/bad_input.py: wrong commands and arguments; tests/cli/runs.py: the help",
     "apps/estimate.cpp": "tests/cli/report_log.py: the files of an estimation are those that its report is held against",
+    "apps/examine_plugin/main.cpp": "tests/plugins/host/examiner_test.cpp: plugins that do harm, each in another way",
+    "apps/examine_plugin/walls.cpp": "tests/plugins/host/examiner_test.cpp: memory, time, other processes",
     "apps/integration_note.cpp": "tests/cli/runs.py: a vehicle with a fast lag",
     "apps/log_arguments.cpp": "tests/cli/smooth.py: `rhec smooth` has the arguments that `rhec estimate` has",
     "apps/main.cpp": "tests/cli/bad_input.py: commands, usage and exit codes",
@@ -46,6 +48,7 @@ UNTESTED = {
     "apps/solve.cpp": "tests/cli/dump.py: problems that were saved are solved again; tests/cli/bad_input.py has mistakes",
     "apps/stop_request.cpp": "tests/cli/tune.py: a command that is stopped",
     "apps/sweep_ranks.cpp": "tests/cli/sweep_mpi.py: sweeps under mpirun, and of a build without MPI",
+    "plugins/host/examiner_process.cpp": "tests/plugins/host/examine_test.cpp: runs it; examiner_test.cpp has how it may end",
     "sim/comparison/bench.cpp": "tests/sim/comparison/comparison_test.cpp: every answer is of a bench; refusals, too",
     "sim/problems/problem_dump.cpp": "tests/cli/dump.py: what a loop saves, attempts and failures, and its replay",
     "sim/report/report_comparison.cpp": "tests/cli/report_study.py: needs a comparison's files, which that test makes",

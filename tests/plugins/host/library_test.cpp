@@ -64,6 +64,11 @@ TEST(Library, IncompleteManifestsAreRefused) {
   EXPECT_THAT(refusal_of("null_factory"), HasSubstr("schema, create or destroy is null"));
 }
 
+TEST(Library, TextsThatAreNoneAreRefused) {
+  EXPECT_EQ(refusal_of("endless_text"), "its manifest's licence does not end within 4000 bytes");
+  EXPECT_EQ(refusal_of("no_text"), "its manifest's source has control characters: it is no text");
+}
+
 TEST(Library, AMissingDependencyIsNamed) {
   const auto records = records_in(fixture("missing_dependency"));
   ASSERT_EQ(records.size(), 1u);

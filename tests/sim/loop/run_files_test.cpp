@@ -48,6 +48,7 @@ RunLog two_samples() {
   log.samples[1].nees = 6.25;
   log.samples[1].true_state[0] = 1.0 / 3.0;
   log.samples[1].relaxed = true;
+  log.samples[1].faults = "spike+late";
   log.completed = true;
   log.ended = "the end of the path was reached";
   return log;
@@ -63,11 +64,11 @@ TEST(StepsCsv, HasARowForEachSample) {
           "step,time,true_x_pos,true_y_pos,true_beta,true_delta,true_kappa,true_mu,x_pos,y_pos,beta,"
           "delta,kappa,mu,sigma_x_pos,sigma_y_pos,sigma_beta,sigma_delta,sigma_kappa,sigma_mu,u1,u2,"
           "reference_x,reference_y,reference_heading,reference_speed,tracking,heading_error,nees,estimator_status,"
-          "controller_status,estimator_fallback,controller_fallback,relaxed,health,findings",
+          "controller_status,estimator_fallback,controller_fallback,relaxed,faults,health,findings",
           "0,0,1,2,0.5,0.25,0.8,0.9,1.5,2.5,0.25,0.125,0.75,0.875,,,,,,,4,-0.5,1,2.25,0.5,8,-0.25,0.0625,,"
-          "solved,iteration_limit,0,1,0",
+          "solved,iteration_limit,0,1,0,,ok,",
           "3,0.6,0.3333333333,2,0.5,0.25,0.8,0.9,1.5,2.5,0.25,0.125,0.75,0.875,0.125,0.125,0.125,"
-          "0.125,0.125,0.125,4,-0.5,1,2.25,0.5,8,-0.25,0.0625,6.25,solved,iteration_limit,0,1,1"));
+          "0.125,0.125,0.125,4,-0.5,1,2.25,0.5,8,-0.25,0.0625,6.25,solved,iteration_limit,0,1,1,spike+late,ok,"));
 }
 
 TEST(TimesCsv, HasTheTimesOfBothSolvers) {

@@ -37,9 +37,12 @@ function extentWithBand(lines, low, high) {
   return [Math.max(Math.min(bandLow, least), least - 0.6 * span), Math.min(Math.max(bandHigh, most), most + 0.6 * span)];
 }
 
+/// Spans of time that figures shade: where a log has no fix, and where a simulation had a fault.
 export function gapStripes(document) {
-  return document.gaps || [];
+  return document.gaps || document.faults || [];
 }
+
+const stripeName = (document) => (document.gaps ? "no fix" : "fault");
 
 /// A figure of one state or parameter: above its values, below what it is wrong by where the truth is known.
 function estimateFigure(document, column, variable, kind, prefix) {
@@ -57,12 +60,13 @@ function estimateFigure(document, column, variable, kind, prefix) {
     time: () => times[column.time],
     frames: hasError ? 2 : 1,
     height: (width) => (hasError ? (width < 500 ? 330 : 380) : 240),
-    option: (look, {width, height, view}) => estimateOption(look, width, height, view, column, times[column.time], unit, gapStripes(document)),
+    option: (look, {width, height, view}) =>
+      estimateOption(look, width, height, view, column, times[column.time], unit, gapStripes(document), stripeName(document)),
     table: () => estimateTable(column, times[column.time], unit),
   };
 }
 
-function estimateOption(look, width, height, view, column, wholeTime, unit, gaps) {
+function estimateOption(look, width, height, view, column, wholeTime, unit, gaps, gapName) {
   const option = base(look);
   const {time, estimate, sigma, error, truth} =
     inView(wholeTime, view, {estimate: column.estimate, sigma: column.sigma, error: column.error, truth: column.true});
@@ -73,7 +77,7 @@ function estimateOption(look, width, height, view, column, wholeTime, unit, gaps
   const range = axisRange(extentWithBand([estimate, truth], low, high));
   const frame = addFrame(option, look, {top: TOP, height: upper, width, y: {name: withUnit(column.name, unit), ...range},
     x: error ? {...axis, name: "", axisLabel: {show: false}} : axis});
-  addStripes(option, frame, "no fix", gaps, look.gap, [range.min, range.max]);
+  addStripes(option, frame, gapName, gaps, look.gap, [range.min, range.max]);
   if (sigma) {
     addBand(option, frame, "± 2σ", time, low, high, look.band);
     names.push("± 2σ");
@@ -84,7 +88,7 @@ function estimateOption(look, width, height, view, column, wholeTime, unit, gaps
   }
   addLine(option, frame, "estimate", pairs(time, estimate), {color: look.estimate});
   names.push("estimate");
-  if (gaps.length) names.push("no fix");
+  if (gaps.length) names.push(gapName);
   if (error) {
     const below = sigma && sigma.map((value) => (isKnown(value) ? -2 * value : null));
     const above = sigma && sigma.map((value) => (isKnown(value) ? 2 * value : null));
@@ -125,7 +129,7 @@ export function columnFigure(document, {name, title, caption, about, label, unit
       const range = log ? powersOf(part.values) : axisRange(extentOf(part.values), {zero});
       const frame = addFrame(option, look, {top: 12, height: height - 12 - BOTTOM, width, x: timeAxis(time, view),
         y: {name: withUnit(label, unit), ...range}});
-      addStripes(option, frame, "no fix", gapStripes(document), look.gap, [range.min, range.max]);
+      addStripes(option, frame, stripeName(document), gapStripes(document), look.gap, [range.min, range.max]);
       if (dots) addDots(option, frame, label, pairs(part.time, part.values), look[colour], {symbolSize: 3});
       else addLine(option, frame, label, pairs(part.time, part.values), {color: look[colour]});
       option.tooltip = tooltip(look);

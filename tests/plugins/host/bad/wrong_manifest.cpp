@@ -1,4 +1,5 @@
 // Manifests that are wrong in one field, chosen by a macro. None of its functions may be called.
+#include <array>
 #include <cstdlib>
 
 #include "rhec/plugins/kit/fingerprint.hpp"
@@ -9,6 +10,14 @@ namespace {
 bool never_schema(std::vector<rhec::OptionRow>*, char*, std::size_t) noexcept { std::abort(); }
 void* never_create(const rhec::Settings*, char*, std::size_t) noexcept { std::abort(); }
 void never_destroy(void*) noexcept { std::abort(); }
+
+#if defined(ENDLESS_TEXT)
+constexpr auto endless = [] {
+  std::array<char, 8000> text{};
+  text.fill('x');
+  return text;
+}();
+#endif
 
 constexpr rhec::Manifest wrong() {
   rhec::Manifest manifest;
@@ -37,6 +46,10 @@ constexpr rhec::Manifest wrong() {
   manifest.licence = nullptr;
 #elif defined(NULL_FACTORY)
   manifest.create = nullptr;
+#elif defined(ENDLESS_TEXT)
+  manifest.licence = endless.data();
+#elif defined(NO_TEXT)
+  manifest.source = "\x1b[2J\x01";
 #endif
   return manifest;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rhec/core/config/settings.hpp"
+#include "rhec/plugins/host/examination.hpp"
 #include "rhec/plugins/kit/manifest.hpp"
 
 namespace rhec {
@@ -66,12 +67,15 @@ struct PluginTrial {
 /// library for this machine that exports a manifest. Loading runs the constructors of a library and of its dependencies
 /// before anything in it can be checked, so list only directories whose files you trust. Everything else is checked
 /// after loading and before any function of the plugin is called. Accepted libraries stay loaded until the process
-/// ends, since their objects, texts and types may still be in use; refused ones are unloaded.
+/// ends, since their objects, texts and types may still be in use; refused ones are unloaded. With `Examination::apart`
+/// all of this happens in another process first, and what does harm there is not loaded into this one:
+///
+///     const rhec::Host host({}, {.apart = true});
 ///
 /// The search runs once, on first use. All calls are const and thread-safe; copies share one search.
 class RHEC_EXPORT Host {
  public:
-  explicit Host(const std::vector<std::filesystem::path>& given = {});
+  explicit Host(const std::vector<std::filesystem::path>& given = {}, const Examination& examination = {});
 
   const std::vector<PluginPlace>& places() const;
   /// All candidates, accepted or not, in search order.
@@ -96,9 +100,10 @@ class RHEC_EXPORT Host {
   /// The options of a plugin. Throws Error as above.
   std::vector<OptionRow> options(PluginKind kind, std::string_view name) const;
 
-  /// Reads the options of an accepted plugin, and makes an object with their defaults. An option has no default if its
-  /// default is an empty text or list; it counts as missing if the error names it as a key ("lengths: ..."). Throws
-  /// Error for a plugin that is not accepted, without calling it.
+  /// Reads the options of an accepted plugin, and makes an object with their defaults; with `Examination::apart`, what
+  /// that came to in the examination. An option has no default if its default is an empty text or list; it counts as
+  /// missing if the error names it as a key ("lengths: ..."). Throws Error for a plugin that is not accepted, without
+  /// calling it.
   PluginTrial try_out(const PluginRecord& plugin) const;
 
   /// Every place and what was found there, as human-readable lines.

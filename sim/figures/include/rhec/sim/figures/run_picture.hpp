@@ -39,6 +39,11 @@ struct BaseMap {
   double lower = 0.0, upper = 1.0;                  ///< values at the ends of the colour bar
 };
 
+/// A part of the time.
+struct Span {
+  double from, to;  ///< [s]
+};
+
 /// What a run looked like: the map on the left, diagrams over time on the right.
 struct RunPicture {
   std::string title;
@@ -49,6 +54,7 @@ struct RunPicture {
   std::vector<Point> fixes;      ///< measured positions [m]; may be empty
   std::optional<BaseMap> base;
   std::vector<Panel> panels;
+  std::vector<Span> spans = {};  ///< shaded in all panels: when something went wrong
 };
 
 /// The picture as an SVG document. `thin_curve` and `thin_track` thin the curves, so that files of long runs stay

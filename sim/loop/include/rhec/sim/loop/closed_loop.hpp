@@ -30,7 +30,8 @@ struct Sample {
   HealthLevel health = HealthLevel::ok;            ///< of the estimate
   std::string findings = {};                       ///< why it is not ok, in words
   double estimator_us = 0.0, controller_us = 0.0;  ///< preparation and feedback of the solvers [us]
-  double estimator_feedback_us = 0.0;              ///< of this, the time after the measurement [us]
+  std::string faults = {};             ///< what went wrong since the last sample: kinds joined by '+'; empty: nothing
+  double estimator_feedback_us = 0.0;  ///< of this, the time after the measurement [us]
 };
 
 struct RunLog {

@@ -7,6 +7,9 @@
 
 #include "rhec/core/control/path.hpp"
 #include "rhec/plugins/robot/robot.hpp"
+#include "rhec/sim/world/actuators.hpp"
+#include "rhec/sim/world/faults.hpp"
+#include "rhec/sim/world/sensor_schedule.hpp"
 #include "rhec/sim/world/slip_field.hpp"
 #include "rhec/sim/world/truth.hpp"
 
@@ -17,7 +20,7 @@ struct ScenarioOptions : RobotOptions {
   std::string name = "run";
   double speed = 8.0;  ///< reference ground speed [m/s]
   int seed = 1;
-  Settings path, terrain, vehicle;
+  Settings path, terrain, vehicle, sensors, faults;
   RHEC_EXPORT static const OptionTable<ScenarioOptions>& table();
 };
 
@@ -35,6 +38,11 @@ class RHEC_EXPORT Scenario {
   const Path& path() const noexcept { return path_; }
   const SlipField& terrain() const noexcept { return *terrain_; }
   const TruthOptions& vehicle() const noexcept { return vehicle_; }
+  /// By input of the model.
+  const std::vector<ActuatorOptions>& actuators() const noexcept { return actuators_; }
+  /// By output of the model.
+  const std::vector<SensorTiming>& sensor_timings() const noexcept { return sensor_timings_; }
+  const std::vector<FaultOptions>& faults() const noexcept { return faults_; }
   /// Initial state: at the path's first point, heading along the path, all else zero.
   const Eigen::VectorXd& initial_state() const noexcept { return initial_state_; }
 
@@ -44,6 +52,9 @@ class RHEC_EXPORT Scenario {
   Path path_;
   std::unique_ptr<const SlipField> terrain_;
   TruthOptions vehicle_;
+  std::vector<ActuatorOptions> actuators_;
+  std::vector<SensorTiming> sensor_timings_;
+  std::vector<FaultOptions> faults_;
   Eigen::VectorXd initial_state_;
 };
 

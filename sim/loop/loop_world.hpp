@@ -1,0 +1,52 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rhec/core/estimation/estimator.hpp"
+#include "rhec/sim/loop/scenario.hpp"
+#include "rhec/sim/world/actuators.hpp"
+#include "rhec/sim/world/deliveries.hpp"
+#include "rhec/sim/world/faults.hpp"
+#include "rhec/sim/world/sensor_schedule.hpp"
+#include "rhec/sim/world/truth.hpp"
+
+namespace rhec::sim {
+
+/// The world of a closed loop: the true vehicle with its actuators, its sensors, what goes wrong with them, and the way
+/// of what they measure to the estimator.
+class LoopWorld {
+ public:
+  LoopWorld(const Scenario& scenario, const SensorNoise& noise);
+
+  const TruthVehicle& truth() const noexcept { return truth_; }
+  const Sensors& sensors() const noexcept { return sensors_; }
+  /// The sensors that are due measure, at a sample of the loop.
+  void measure(double time) { measure(time, true); }
+  /// Pushes what has arrived by now. What is measured before the vehicle moves arrives at once: a drive begins with an
+  /// estimate.
+  void deliver(double time, Estimator& estimator);
+  /// Drives for `duration` with constant inputs; sensors with a rate of their own measure on the way.
+  void drive(const std::vector<double>& inputs, double time, double duration);
+  /// The inputs as they are measured.
+  const std::vector<double>& measured_inputs(const std::vector<double>& inputs);
+  /// Now, by the robot's clock [s].
+  double on_robots_clock(double time) const { return time + faults_.clock(); }
+  /// What has gone wrong since the last call; empty: nothing.
+  std::string take_faults() { return faults_.take_names(); }
+
+ private:
+  void measure(double time, bool is_sample);
+
+  TruthVehicle truth_;
+  Sensors sensors_;
+  Faults faults_;
+  SensorSchedule schedule_;
+  Actuators actuators_;
+  Deliveries deliveries_;
+  bool has_moved_ = false;
+  bool is_plain_;  ///< all sensors measure at each sample, and arrive together
+  std::vector<double> outputs_, row_, measured_, given_;
+};
+
+}  // namespace rhec::sim
