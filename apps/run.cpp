@@ -78,6 +78,22 @@ void print_noise(const sim::RunSummary& summary, const sim::Scenario& scenario) 
   fmt::print("\n");
 }
 
+/// How often the estimator doubted itself, where it did.
+void print_health(const sim::RunSummary& summary) {
+  const auto samples_of = [&](HealthLevel level) {
+    const auto found = summary.health.find(name_of(level));
+    return found == summary.health.end() ? 0 : found->second;
+  };
+  const std::int64_t degraded = samples_of(HealthLevel::degraded), lost = samples_of(HealthLevel::lost);
+  if (degraded + lost == 0 && summary.counts.rejected == 0) return;
+  fmt::print(
+      "health: ok in {} of {} samples, degraded in {}, lost in {}; {} measurements rejected, {} jumps followed, {} "
+      "clocks "
+      "set; 'findings' in steps.csv say why\n",
+      samples_of(HealthLevel::ok), summary.steps, degraded, lost, summary.counts.rejected, summary.counts.rebased,
+      summary.counts.clocks_set);
+}
+
 void print_table(const sim::RunSummary& summary, const sim::Scenario& scenario, const std::filesystem::path& folder) {
   fmt::print("{:<12} {:>12} {:>12}\n", "ERROR", "MEAN ABS", "RMS");
   for (const auto& [name, value] : summary.mae.parameters)
@@ -95,6 +111,7 @@ void print_table(const sim::RunSummary& summary, const sim::Scenario& scenario, 
   times("rhc", summary.controller_us);
   fmt::print("\n{} steps: {}; {} of {} solves fell back\n", summary.steps, summary.ended, summary.fallbacks,
              summary.solves);
+  print_health(summary);
   print_integration(summary.counts, *scenario.robot().model());
   fmt::print("pictures and numbers: {}\n", folder.string());
 }

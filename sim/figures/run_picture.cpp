@@ -353,8 +353,9 @@ void draw_spans(Svg& svg, const Frame& frame, const std::vector<Span>& spans) {
   constexpr double least_width = 1.0;
   for (const Span& span : spans) {
     const double left = frame.at(span.from, frame.y.upper).x, right = frame.at(span.to, frame.y.upper).x;
-    svg.rectangle({left, frame.corner.y}, std::max(right - left, least_width), frame.height,
-                  R"(fill="#d93025" fill-opacity="0.12")");
+    svg.rectangle(
+        {left, frame.corner.y}, std::max(right - left, least_width), frame.height,
+        span.is_suspected ? R"(fill="#f9ab00" fill-opacity="0.16")" : R"(fill="#d93025" fill-opacity="0.12")");
   }
 }
 

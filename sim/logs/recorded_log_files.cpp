@@ -33,6 +33,9 @@ Json json_of(const Replay& replay, const RecordedLog& log) {
   json["solves"] = replay.counts.estimates;
   json["fallbacks"] = replay.counts.fallbacks;
   json["dropped"] = replay.counts.dropped;
+  json["rejected"] = replay.counts.rejected;
+  json["rebased"] = replay.counts.rebased;
+  json["clocks_set"] = replay.counts.clocks_set;
   json["integration"] = {{"checked", replay.counts.integrated}, {"coarse", replay.counts.coarse}};
   json["seconds"] = replay.seconds;
   const Spread times = replay.solve_us.empty() ? Spread{0.0, 0.0, 0.0} : spread_of(replay.solve_us);

@@ -60,17 +60,26 @@ void append_number(double value, std::string& text) {
   text.append(digits.begin(), end);
 }
 
-/// From each sample at which something went wrong to the next at which nothing did; half a step on either side.
-std::vector<Span> fault_spans(const RunLog& log) {
-  std::vector<Span> spans;
+/// Adds a span from each sample that is meant to the next that is not; half a step on either side.
+template <class Function>
+void add_spans(const RunLog& log, bool is_suspected, const Function& is_meant, std::vector<Span>& spans) {
   const double half = log.samples.size() > 1 ? 0.5 * (log.samples[1].time - log.samples[0].time) : 0.0;
   bool is_open = false;
   for (const Sample& sample : log.samples) {
-    const bool is_faulty = !sample.faults.empty();
-    if (is_faulty && !is_open) spans.push_back({sample.time - half, sample.time + half});
-    if (is_faulty) spans.back().to = sample.time + half;
-    is_open = is_faulty;
+    const bool is_in = is_meant(sample);
+    if (is_in && !is_open) spans.push_back({sample.time - half, sample.time + half, is_suspected});
+    if (is_in) spans.back().to = sample.time + half;
+    is_open = is_in;
   }
+}
+
+/// When something went wrong, and when the estimator thought so.
+std::vector<Span> fault_spans(const RunLog& log) {
+  std::vector<Span> spans;
+  add_spans(
+      log, false, [](const Sample& sample) { return !sample.faults.empty(); }, spans);
+  add_spans(
+      log, true, [](const Sample& sample) { return sample.health != HealthLevel::ok; }, spans);
   return spans;
 }
 

@@ -292,11 +292,15 @@ class RunReport {
     return list;
   }
 
-  /// What went wrong, as spans of time; runs of older programs do not say.
+  /// What went wrong, and what the estimator thought of it, as spans of time; runs of older programs do not say.
   void faults() {
     Json& spans = document_["faults"] = Json::array();
-    if (!steps_.has("faults") || time_.size() < 2) return;
-    const std::size_t index = steps_.column("faults");
+    for (const char* column : {"faults", "findings"})
+      if (steps_.has(column) && time_.size() > 1) add_spans(column, spans);
+  }
+
+  void add_spans(const char* column, Json& spans) {
+    const std::size_t index = steps_.column(column);
     const double half = 0.5 * (time_[1] - time_[0]);
     std::string_view last;
     for (std::size_t row = 0; row < time_.size(); ++row) {

@@ -41,7 +41,8 @@ struct BaseMap {
 
 /// A part of the time.
 struct Span {
-  double from, to;  ///< [s]
+  double from, to;            ///< [s]
+  bool is_suspected = false;  ///< something was suspected then; else it was so
 };
 
 /// What a run looked like: the map on the left, diagrams over time on the right.
@@ -54,7 +55,7 @@ struct RunPicture {
   std::vector<Point> fixes;      ///< measured positions [m]; may be empty
   std::optional<BaseMap> base;
   std::vector<Panel> panels;
-  std::vector<Span> spans = {};  ///< shaded in all panels: when something went wrong
+  std::vector<Span> spans = {};  ///< shaded in all panels: when something went wrong, or was thought to
 };
 
 /// The picture as an SVG document. `thin_curve` and `thin_track` thin the curves, so that files of long runs stay
