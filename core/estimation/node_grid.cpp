@@ -10,7 +10,7 @@ namespace rhec {
 namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-constexpr int most_parts = 1000;     // of one gap
+constexpr int most_parts = 1000;     // of a gap
 constexpr double near_share = 0.05;  // of a step: so far nodes are moved to measurements
 
 }  // namespace
@@ -42,17 +42,21 @@ std::int64_t NodeGrid::oldest() const noexcept {
   return std::max<std::int64_t>(0, count_ - static_cast<std::int64_t>(nodes_.size()));
 }
 
-/// The newest node before a time; one before `oldest()` if there is none.
+/// The newest node that a measurement at a time leaves as it is: one before it, and not within a gap that it divides
+/// anew; one before `oldest()` if there is none.
 std::int64_t NodeGrid::last_before(double time) const noexcept {
+  const auto leaves = [&](const Node& node) {
+    return node.time < time - setup_.tolerance - 2.0 * near_ && node.parts == 0;
+  };
   std::int64_t number = count_ - 1;
-  while (number >= oldest() && !(node(number).time < time)) --number;
+  while (number >= oldest() && !leaves(node(number))) --number;
   return number;
 }
 
 NodeGrid::Place NodeGrid::push_measurement(double time, const double* outputs, int reach) noexcept {
   const bool is_late = count_ > 0 && time <= this->time() + setup_.tolerance;
   if (is_late) {
-    const std::int64_t kept = last_before(time - setup_.tolerance - 2.0 * near_);
+    const std::int64_t kept = last_before(time);
     if (count_ - 1 - kept > reach || (kept >= 0 && node(kept).time < lost_)) {
       ++dropped_;
       return Place::forgotten;
@@ -87,7 +91,7 @@ int NodeGrid::outdated(double until, int reach) const noexcept {
   if (has_next) first = std::min(first, measurements_.time(next));
   std::int64_t kept = count_ - 1;
   if (has_next && ends_open()) --kept;
-  if (first < infinity) kept = std::min(kept, last_before(first - setup_.tolerance - 2.0 * near_));
+  if (first < infinity) kept = std::min(kept, last_before(first));
   while (kept >= oldest() && kept >= 0 && node(kept).time > changed_input_ + setup_.tolerance) --kept;
   return static_cast<int>(std::min<std::int64_t>(count_ - 1 - kept, reach));
 }
@@ -131,10 +135,14 @@ bool NodeGrid::make_next(double until) noexcept {
 
 /// The node that follows, given the measurements behind the last one.
 NodeGrid::Node NodeGrid::next_node(const Node& last, std::size_t from, std::size_t end) const noexcept {
-  const double first = measurements_.time(from);
-  const int parts = last.parts > 0 ? last.parts : first - last.time > most_parts * setup_.step ? most_parts : 0;
+  const double first = measurements_.time(from), gap = first - last.time;
+  const double asked = std::ceil(gap / setup_.step - 1e-6);
+  const int parts = last.parts > 0               ? last.parts
+                    : gap <= setup_.step + near_ ? 0
+                    : asked < double{most_parts} ? static_cast<int>(asked)
+                                                 : most_parts;
   if (parts == 1) return {first, first, Kind::grid, 0};
-  if (parts > 1) return {last.time + (first - last.time) / parts, last.grid, Kind::gap, parts - 1};
+  if (parts > 1) return {last.time + gap / parts, last.grid, Kind::gap, parts - 1};
   const double grid = last.grid + setup_.step;
   Node next{grid, grid, Kind::grid, 0};
   double nearest = infinity, newest = last.time;

@@ -79,6 +79,7 @@ RecedingHorizonEstimation::RecedingHorizonEstimation(std::shared_ptr<const Model
     if (std::ranges::none_of(setup_.noises, blocks)) given_inputs_.push_back(j);
   }
   last_state_ = setup_.initial_mean;
+  base_covariance_ = setup_.initial_covariance;
   // Those of the window and the one before it, one that was prepared, and one to spare.
   nodes_.assign(intervals + 4, Node{0.0, std::vector<double>(model_->input_count()), outputs_,
                                     BetweenNodes(model_->output_count(), setup_.problem.most_between)});
@@ -105,8 +106,12 @@ void RecedingHorizonEstimation::reset() noexcept {
 bool RecedingHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
   const std::int64_t number = newest();
   reset();
-  arrival_.reset(mean, covariance);
-  last_state_ = mean;
+  // Blocked noises, behind the parameters, are as at the start.
+  const Eigen::Index n = mean.size();
+  last_state_.head(n) = mean;
+  base_covariance_ = setup_.initial_covariance;
+  base_covariance_.topLeftCorner(n, n) = covariance;
+  arrival_.reset(last_state_, base_covariance_);
   window_.first = base_ = number;
   std::fill(first_starts_.begin(), first_starts_.end(), number);
   searching_ = false;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "between_cache.hpp"
 #include "cost_view.hpp"
 #include "interval_dynamics.hpp"
 #include "rhec/core/base/padded.hpp"
@@ -25,34 +26,36 @@ struct RheProblem::BetweenBatch {
   BetweenBatch(const RheProblem& problem, double* memory)
       : row(IntervalDynamics::row_length(problem.structure())),
         nx(problem.nx()),
-        nz(problem.nx() + problem.np() + problem.nu() + (problem.structure().any_ramp() ? problem.np() : 0)) {
+        nz(problem.nx() + problem.np() + problem.nu() + (problem.structure().any_ramp() ? problem.np() : 0)),
+        width(padded(nz)) {
     Scratch scratch(memory);
-    const std::ptrdiff_t ny = problem.ny_, width = padded(nx);
+    const std::ptrdiff_t ny = problem.ny_, of_states = padded(nx);
     const auto take = [&](std::ptrdiff_t each) { return scratch.take(at_once * each); };
     z = take(row);
     next = take(row);
     jacobians = take(nx * row);
     outputs = take(problem.output_row_);
-    output_jacobians = take(ny * width);
+    output_jacobians = take(ny * of_states);
     pulls = take(problem.output_row_);
     weights = take(problem.output_row_);
     curvatures = take(problem.output_row_);
     multipliers = take(row);
     hessians = take(row * row);
-    output_hessians = take(nx * width);
+    output_hessians = take(nx * of_states);
     durations = take(8);
     data = take(padded(problem.model().data_count()));
     difference = scratch.take(problem.output_row_);
+    of_outputs = scratch.take(ny * row);
     gradients = scratch.take(std::max<std::ptrdiff_t>(ny, nx) * problem.stride());
     product = scratch.take(static_cast<std::ptrdiff_t>(nx) * problem.stride());
     rest = scratch.rest();
   }
   static std::size_t size(const RheProblem& problem) noexcept {
     const std::size_t row = IntervalDynamics::row_length(problem.structure()), nx = problem.nx(), ny = problem.ny_,
-                      width = padded(problem.nx()), stride = problem.stride();
-    const std::size_t each =
-        row * (3 + nx + row) + 4 * problem.output_row_ + (ny + nx) * width + 8 + padded(problem.model().data_count());
-    return at_once * each + problem.output_row_ + (std::max(ny, nx) + nx) * stride +
+                      of_states = padded(problem.nx()), stride = problem.stride();
+    const std::size_t each = row * (3 + nx + row) + 4 * problem.output_row_ + (ny + nx) * of_states + 8 +
+                             padded(problem.model().data_count());
+    return at_once * each + problem.output_row_ + (std::max(ny, nx) + nx) * stride + ny * row +
            problem.model().rows_scratch(at_once) + 16;
   }
 
@@ -78,21 +81,24 @@ struct RheProblem::BetweenBatch {
             .jacobian_row = padded(nx),
             .scratch = rest};
   }
-  /// d h_j / dz of measurement i.
-  double gradient(int i, int j, int variable, int ny) const noexcept {
-    const double* const J = jacobians + static_cast<std::ptrdiff_t>(i) * nx * row + variable;
-    const double* const C = output_jacobians + (static_cast<std::ptrdiff_t>(i) * ny + j) * padded(nx);
-    double sum = 0.0;
-    for (int r = 0; r < nx; ++r) sum += C[r] * J[r * row];
-    return sum;
+  /// dh/dz of measurement i: a row of `width` for each output.
+  void write_gradients(int i, int ny, double* to) const noexcept {
+    const double* const J = jacobians + static_cast<std::ptrdiff_t>(i) * nx * row;
+    const double* C = output_jacobians + static_cast<std::ptrdiff_t>(i) * ny * padded(nx);
+    for (int j = 0; j < ny; ++j, C += padded(nx), to += width) {
+      std::fill_n(to, width, 0.0);
+      for (int r = 0; r < nx; ++r)
+        if (C[r] != 0.0)
+          for (int k = 0; k < nz; ++k) to[k] += C[r] * J[r * row + k];
+    }
   }
 
-  const int row, nx, nz;
+  const int row, nx, nz, width;
   int count = 0;
   std::array<int, at_once> interval{}, place{};
   std::array<double, at_once> share{};  ///< of the interval's duration
   double *z, *next, *jacobians, *outputs, *output_jacobians, *pulls, *weights, *curvatures, *multipliers, *hessians,
-      *output_hessians, *durations, *data, *difference, *gradients, *product, *rest;
+      *output_hessians, *durations, *data, *difference, *of_outputs, *gradients, *product, *rest;
 };
 
 bool RheProblem::has_between() const noexcept {
@@ -175,12 +181,71 @@ void RheProblem::linearise_between(int interval, const Iterate& iterate, double*
       std::copy_n(batch.weights, ny_, weights + static_cast<std::ptrdiff_t>(first + i) * ny_);
       if (!rows) continue;
       if (structure().any_ramp()) turn_ramp(batch, i, false);
+      batch.write_gradients(i, ny_, batch.of_outputs);
       for (int j = 0; j < ny_; ++j) {
         *rows++ = batch.difference[j];
-        for (int z = 0; z < batch.nz; ++z) *rows++ = batch.gradient(i, j, z, ny_);
+        rows = std::copy_n(batch.of_outputs + j * batch.width, batch.nz, rows);
       }
     }
   }
+}
+
+/// Weights of a measurement's outputs in H, and their pulls in h; returns the cost.
+double RheProblem::weigh(const double* measured, const double* predicted, double* difference, double* weights,
+                         double* pulls, double* curvatures) const noexcept {
+  residual(measured, predicted, difference);
+  const double cost = losses(difference, weights, curvatures);
+  for (int j = 0; j < ny_; ++j) {
+    weights[j] = std::isnan(measured[j]) ? 0.0 : 2.0 * weights[j] * setup_.output_weights[j];
+    pulls[j] = weights[j] * difference[j];
+  }
+  return cost;
+}
+
+std::ptrdiff_t RheProblem::between_key_size() const noexcept {
+  return IntervalDynamics::row_length(structure()) + 1 + model().data_count();
+}
+
+/// The same as `add_between` without second derivatives, with a cache, which is read and completed.
+double RheProblem::add_known_between(StageRange range, const Iterate& iterate, const CostView& view,
+                                     BetweenCache& known, double* memory) const noexcept {
+  BetweenBatch batch(*this, memory);
+  const auto flush = [&] {
+    if (batch.count == 0) return;
+    evaluate_batch(batch, true);
+    for (int i = 0; i < batch.count; ++i) {
+      if (structure().any_ramp()) turn_ramp(batch, i, false);
+      double* const results = known.results(batch.interval[i], batch.place[i]);
+      std::copy_n(batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_, output_row_, results);
+      batch.write_gradients(i, ny_, results + output_row_);
+    }
+    batch.count = 0;
+  };
+  const int last = std::min(range.last, intervals() - 1);
+  const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
+  for (int i = range.first; i <= last; ++i) {
+    if (between(i).count() == 0) continue;
+    double* const key = known.key();
+    dynamics.gather_rows(iterate, {i, i}, key);
+    key[batch.row] = duration(i);
+    std::copy_n(interval_data(i), model().data_count(), key + batch.row + 1);
+    if (known.holds(i, between(i))) continue;
+    known.begin(i, between(i));
+    for (int k = 0; k < between(i).count(); ++k) {
+      gather_between(i, k, iterate, batch);
+      if (batch.count == at_once) flush();
+    }
+  }
+  flush();
+  double total = 0.0;
+  for (int i = range.first; i <= last; ++i) {
+    for (int k = 0; k < between(i).count(); ++k) {
+      const double* const results = known.results(i, k);
+      total += weigh(between(i).outputs(k), results, batch.difference, batch.weights, batch.pulls, nullptr);
+      add_row(batch, i, results + output_row_, batch.weights, batch.pulls, view);
+    }
+  }
+  return total;
 }
 
 double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostView* view,
@@ -190,16 +255,10 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
   double total = 0.0;
   for (int i = 0; i < batch.count; ++i) {
     const std::ptrdiff_t at = i * output_row_;
-    const double* const y = between(batch.interval[i]).outputs(batch.place[i]);
-    residual(y, batch.outputs + at, batch.difference);
-    const double cost = losses(batch.difference, batch.weights + at, batch.curvatures + at);
+    const double cost = weigh(between(batch.interval[i]).outputs(batch.place[i]), batch.outputs + at, batch.difference,
+                              batch.weights + at, batch.pulls + at, batch.curvatures + at);
     total += cost;
     if (stage_costs) stage_costs[batch.interval[i]] += cost;
-    for (int j = 0; j < ny_; ++j) {
-      double& weight = batch.weights[at + j];
-      weight = std::isnan(y[j]) ? 0.0 : 2.0 * weight * setup_.output_weights[j];
-      batch.pulls[at + j] = weight * batch.difference[j];
-    }
   }
   if (!view) return total;
   const bool exact = hessian == Hessian::exact && view->H;
@@ -228,7 +287,9 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
   }
   for (int i = 0; i < batch.count; ++i) {
     if (structure().any_ramp()) turn_ramp(batch, i, exact);
-    add_row(batch, i, *view);
+    batch.write_gradients(i, ny_, batch.of_outputs);
+    const std::ptrdiff_t at = i * output_row_;
+    add_row(batch, batch.interval[i], batch.of_outputs, batch.weights + at, batch.pulls + at, *view);
     if (exact) add_curvature(batch, i, *view);
   }
   return total;
@@ -255,20 +316,29 @@ void RheProblem::turn_ramp(BetweenBatch& batch, int i, bool exact) const noexcep
   }
 }
 
-/// Gradients of the outputs with respect to [s; w]: dh/dx dF/dz, in the order of the stage's variables.
-void RheProblem::add_row(BetweenBatch& batch, int i, const CostView& view) const noexcept {
-  const int interval = batch.interval[i], columns = capacity().states + control_count(interval);
-  const std::ptrdiff_t width = padded(columns);
-  const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
-  std::fill_n(batch.gradients, ny_ * width, 0.0);
-  for (int j = 0; j < ny_; ++j) {
-    if (batch.weights[i * output_row_ + j] == 0.0) continue;
-    for (int z = 0; z < batch.nz; ++z)
-      batch.gradients[j * width + dynamics.column_of(interval, z)] += batch.gradient(i, j, z, ny_);
+/// Adds one measurement's products to H and h, with its gradients by the model's variables in the order of the stage's.
+void RheProblem::add_row(BetweenBatch& batch, int interval, const double* gradients, const double* weights,
+                         const double* pulls, const CostView& view) const noexcept {
+  const int columns = capacity().states + control_count(interval);
+  // Where no block starts, the orders are the same.
+  if (control_count(interval) != nu() || structure().any_ramp()) {
+    const std::ptrdiff_t width = padded(columns);
+    const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
+    std::fill_n(batch.gradients, ny_ * width, 0.0);
+    for (int j = 0; j < ny_; ++j)
+      for (int z = 0; z < batch.nz; ++z)
+        batch.gradients[j * width + dynamics.column_of(interval, z)] += gradients[j * batch.width + z];
+    gradients = batch.gradients;
   }
-  transcription_kernels().add_products(batch.gradients, batch.weights + static_cast<std::ptrdiff_t>(i) * output_row_,
-                                       batch.pulls + static_cast<std::ptrdiff_t>(i) * output_row_, ny_, columns,
-                                       stride(), H_of(view, interval), h_of(view, interval));
+  const double* const end = weights + ny_;
+  const auto is_missing = [](double weight) { return weight == 0.0; };
+  const auto first = std::find_if_not(weights, end, is_missing) - weights;
+  if (first == ny_) return;
+  auto last = std::ptrdiff_t{ny_} - 1;
+  while (is_missing(weights[last])) --last;
+  transcription_kernels().add_products(gradients + first * padded(columns), weights + first, pulls + first,
+                                       static_cast<int>(last - first + 1), columns, stride(), H_of(view, interval),
+                                       h_of(view, interval));
 }
 
 /// What Gauss-Newton leaves out: second derivatives of outputs, of the dynamics up to there, and of robust losses.
@@ -285,11 +355,12 @@ void RheProblem::add_curvature(BetweenBatch& batch, int i, const CostView& view)
   const double* difference = batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_;
   residual(between(interval).outputs(batch.place[i]), difference, batch.difference);
   for (const RobustLoss& loss : setup_.robust) {
-    // 4 rho'' (J' W r)(J' W r)'; the gradients are those that `add_row` has left.
+    // 4 rho'' (J' W r)(J' W r)'
     std::fill_n(batch.product, width, 0.0);
     for (const int j : loss.outputs)
-      for (int c = 0; c < columns; ++c)
-        batch.product[c] += batch.gradients[j * width + c] * setup_.output_weights[j] * batch.difference[j];
+      for (int z = 0; z < batch.nz; ++z)
+        batch.product[column(z)] +=
+            batch.of_outputs[j * batch.width + z] * setup_.output_weights[j] * batch.difference[j];
     add(batch.product, batch.product,
         4.0 * batch.curvatures[static_cast<std::ptrdiff_t>(i) * output_row_ + loss.outputs.front()]);
   }

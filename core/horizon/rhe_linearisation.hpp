@@ -1,12 +1,14 @@
 #pragma once
 
+#include "between_cache.hpp"
 #include "horizon_linearisation.hpp"
 #include "output_cache.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 
 namespace rhec {
 
-/// The linearisation cache of an estimation horizon, which also keeps the outputs at its nodes.
+/// The linearisation cache of an estimation horizon, which also keeps the outputs at its nodes and between
+/// them.
 class RheLinearisation final : public HorizonLinearisation {
  public:
   explicit RheLinearisation(const RheProblem& problem);
@@ -18,6 +20,7 @@ class RheLinearisation final : public HorizonLinearisation {
 
   const RheProblem& problem_;
   OutputCache outputs_;
+  BetweenCache between_;
 };
 
 }  // namespace rhec

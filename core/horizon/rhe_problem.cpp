@@ -256,13 +256,17 @@ double RheProblem::cost(const Iterate& iterate, double* stage_costs, std::span<d
 }
 
 double RheProblem::write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
-                              OutputCache* known, std::span<double> scratch) const noexcept {
+                              OutputCache* known, BetweenCache* known_between,
+                              std::span<double> scratch) const noexcept {
   const bool matrices = parts != CostParts::vectors, vectors = parts != CostParts::matrices;
   const CostView view =
       cost_view(structure(), matrices ? qp.H(0) : nullptr, vectors ? qp.h(0) : nullptr, hessian == Hessian::exact);
   double total = write_measurements(range, iterate, hessian, view, known, scratch);
   if (has_between()) {
-    const double added = add_between(range, iterate, hessian, &view, nullptr, scratch.data());
+    const bool is_exact = hessian == Hessian::exact && matrices;
+    const double added = known_between && !is_exact
+                             ? add_known_between(range, iterate, view, *known_between, scratch.data())
+                             : add_between(range, iterate, hessian, &view, nullptr, scratch.data());
     if (vectors) total += added;
     for (int i = range.first; known && matrices && i <= std::min(range.last, intervals() - 1); ++i)
       if (between(i).count() > 0) known->is_clean()[i] = 0;

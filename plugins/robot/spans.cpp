@@ -1,5 +1,6 @@
 #include "rhec/plugins/robot/spans.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string>
@@ -28,7 +29,7 @@ Settings span_in_intervals(const Settings& length, double step) {
   while (!unit.empty() && unit.front() == ' ') unit.remove_prefix(1);
   if (unit.empty()) return length;
   if (unit != "s") throw length.mismatch("a number of intervals, or a time in seconds such as '3 s'");
-  const double intervals = std::ceil(number / step - rounding);
+  const double intervals = std::max(0.0, std::ceil(number / step - rounding));
   if (!(number >= 0.0) || !(intervals <= most_intervals))
     throw length.mismatch(fmt::format("a time from 0 s to {:.6g} s, which is {:g} intervals of the step, {:g} s",
                                       most_intervals * step, most_intervals, step));

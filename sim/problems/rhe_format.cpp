@@ -2,6 +2,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -130,6 +131,30 @@ void read_processes(const LineValue& line, ProblemRecord& record) {
       throw line["data"].error(fmt::format("rows of {}, expected {}: {}", row.size(), count, what));
 }
 
+/// Measurements within the intervals, whose durations are known.
+void read_between(const LineValue& list, ProblemRecord& record) {
+  const std::size_t width = 1 + record.outputs.front().size();
+  const std::vector<LineValue> intervals = list.items("a list of the intervals' measurements");
+  if (intervals.size() != static_cast<std::size_t>(record.intervals))
+    throw list.error(
+        fmt::format("{} items, expected {}: one for each interval of the horizon", intervals.size(), record.intervals));
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    ProblemRecord::Rows& rows = record.between.emplace_back();
+    double last = 0.0;
+    for (const LineValue& item : intervals[i].items("a list of [time, outputs]")) {
+      std::vector<double>& row = rows.emplace_back();
+      for (const LineValue& number : item.items("a time and the outputs"))
+        row.push_back(row.empty() ? number.number() : number.number_or(std::numeric_limits<double>::quiet_NaN()));
+      if (row.size() != width)
+        throw item.error(fmt::format("{} numbers, expected {}: a time and every output", row.size(), width));
+      if (!(row.front() > last && row.front() < record.durations[i]))
+        throw item.error(fmt::format("the time is {}; expected one above {} and below the interval's duration, {}",
+                                     row.front(), last, record.durations[i]));
+      last = row.front();
+    }
+  }
+}
+
 /// The vehicle with the process noise of its states, if the record has some.
 std::shared_ptr<const Model> with_state_noise(const ProblemRecord& record, std::shared_ptr<const Model> model) {
   if (record.state_noise.empty() && record.blocked_noise.empty()) return model;
@@ -239,6 +264,8 @@ RheProblem::Setup estimation_setup_of(const ProblemRecord& record, const Model& 
   names.fill_bounds(about.inputs, setup.input_lower, setup.input_upper);
   names.fill_bounds(about.parameters, setup.parameter_lower, setup.parameter_upper);
   setup.robust = robust_losses(record, names, about);
+  for (const ProblemRecord::Rows& rows : record.between)
+    setup.most_between = std::max(setup.most_between, static_cast<int>(rows.size()));
   return setup;
 }
 
@@ -257,6 +284,11 @@ void fill(const ProblemRecord& record, RheProblem& problem) {
     problem.set_duration(i, record.durations[i]);
     std::copy(record.inputs[i].begin(), record.inputs[i].end(), problem.measured_input(i));
     if (!record.data.empty()) std::copy(record.data[i].begin(), record.data[i].end(), problem.interval_data(i));
+    problem.between(i).clear();
+    for (std::size_t k = 0; !record.between.empty() && k < record.between[i].size(); ++k) {
+      const std::vector<double>& row = record.between[i][k];
+      std::copy(row.begin() + 1, row.end(), problem.between(i).add(row.front()));
+    }
   }
   for (std::size_t j = 0; j < about.parameters.size(); ++j) {
     const std::string& name = about.parameters[j].name;
@@ -282,12 +314,12 @@ bool same_losses(const std::vector<RobustLoss>& a, const std::vector<RobustLoss>
 
 // Fixed properties of a set-up.
 bool fits(const RheProblem::Setup& wanted, const RheProblem::Setup& there) {
-  return wanted.max_intervals <= there.max_intervals && wanted.substeps == there.substeps &&
-         wanted.output_weights == there.output_weights && wanted.input_weights == there.input_weights &&
-         same_losses(wanted.robust, there.robust) && wanted.state_lower == there.state_lower &&
-         wanted.state_upper == there.state_upper && wanted.input_lower == there.input_lower &&
-         wanted.input_upper == there.input_upper && wanted.parameter_lower == there.parameter_lower &&
-         wanted.parameter_upper == there.parameter_upper;
+  return wanted.most_between <= there.most_between && wanted.max_intervals <= there.max_intervals &&
+         wanted.substeps == there.substeps && wanted.output_weights == there.output_weights &&
+         wanted.input_weights == there.input_weights && same_losses(wanted.robust, there.robust) &&
+         wanted.state_lower == there.state_lower && wanted.state_upper == there.state_upper &&
+         wanted.input_lower == there.input_lower && wanted.input_upper == there.input_upper &&
+         wanted.parameter_lower == there.parameter_lower && wanted.parameter_upper == there.parameter_upper;
 }
 
 class RheFormat final : public ProblemFormat {
@@ -298,7 +330,7 @@ class RheFormat final : public ProblemFormat {
              .keys = {"version", "id", "problem", "model", "horizon", "arrival", "outputs", "inputs", "weights",
                       "bounds", "block_starts"},
              .added = {{2, {"robust", "neighbour_variance", "transition", "guess", "origin", "processes", "data"}},
-                       {4, {"state_noise", "blocked_noise", "block_weights"}}},
+                       {4, {"state_noise", "blocked_noise", "block_weights", "between"}}},
              .looks_back = true,
              .may_be_empty = true,
              .finds_parameters = true}) {}
@@ -318,6 +350,7 @@ class RheFormat final : public ProblemFormat {
     check_information(arrival["information"], record.arrival_information);
     record.outputs = line["outputs"].rows(N + 1, "one for each node of the horizon", true);
     record.inputs = line["inputs"].rows(N, "one for each interval of the horizon", true);
+    if (line.has("between")) read_between(line["between"], record);
     weights.allow({"outputs", "inputs"});
     record.output_weights = read_weights(weights["outputs"]);
     record.input_weights = read_weights(weights["inputs"]);
@@ -340,6 +373,10 @@ class RheFormat final : public ProblemFormat {
                        {"information", rows_of(record.arrival_information)}};
     line["outputs"] = rows_of(record.outputs);
     line["inputs"] = rows_of(record.inputs);
+    if (!record.between.empty()) {
+      line["between"] = Json::array();
+      for (const ProblemRecord::Rows& rows : record.between) line["between"].push_back(rows_of(rows));
+    }
     line["weights"] = {{"outputs", list_of(record.output_weights)}, {"inputs", list_of(record.input_weights)}};
     if (!record.robust.empty()) {
       line["robust"] = Json::array();
@@ -375,6 +412,16 @@ class RheFormat final : public ProblemFormat {
       if (i < record.intervals)
         record.inputs.push_back(copied(problem.measured_input(i), static_cast<int>(about.inputs.size())));
     }
+    for (int i = 0; i < record.intervals; ++i) {
+      ProblemRecord::Rows& rows = record.between.emplace_back();
+      const BetweenNodes& between = problem.between(i);
+      for (int k = 0; k < between.count(); ++k) {
+        rows.push_back(copied(between.outputs(k), between.width()));
+        rows.back().insert(rows.back().begin(), between.time(k));
+      }
+    }
+    if (std::ranges::all_of(record.between, [](const ProblemRecord::Rows& rows) { return rows.empty(); }))
+      record.between.clear();
     record.processes = process_counts(about);
     record.state_noise = state_names(about, about.noisy_states);
     record.blocked_noise = state_names(about, about.blocked_noises);

@@ -148,7 +148,7 @@ class Test(cli.Findings):
         with file.open(newline="") as stream:
             rows = list(csv.DictReader(stream))
         self.expect(len(rows) == summary["steps"], name, f"{len(rows)} rows for {summary['steps']} steps")
-        texts = {"estimator_status", "controller_status"}
+        texts = {"estimator_status", "controller_status", "faults", "health", "findings"}
         numbers = [value for row in rows for key, value in row.items() if key not in texts and value != ""]
         self.expect(all(math.isfinite(float(value)) for value in numbers), name, "a number in steps.csv is not finite")
         kappa = [abs(float(row["kappa"]) - float(row["true_kappa"])) for row in rows]

@@ -351,14 +351,47 @@ TEST(BetweenNodes, AWindowOfBlocksIsTheFilter) {
   }
 }
 
-/// However measurements and inputs come, up to the whole window late: from their arrival on, all is as if they had come
-/// in time.
+/// Estimators of one model, by name.
+struct Way {
+  const char* name;
+  std::function<std::unique_ptr<EstimationMethod>()> make;
+};
+
+/// Two estimators of each kind get the same rows, one of them in time. From the arrival on, all is the same, to a
+/// tolerance in standard deviations.
+void expect_same(const std::vector<Way>& ways, const std::vector<Row>& in_time, unsigned seed, double until,
+                 double tolerance) {
+  std::vector<Row> late = in_time;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> delay(0.0, 0.2 * (horizon - 1));
+  for (Row& row : late)
+    if (random() % 3 == 0) row.arrival = std::min(row.stamp + delay(random), until);
+  for (const Way& way : ways) {
+    SCOPED_TRACE(way.name);
+    Estimator one(way.make(), {.longest_interval = 0.2}), other(way.make(), {.longest_interval = 0.2});
+    drive(one, in_time, until);
+    drive(other, late, until);
+    EXPECT_GT(other.counts().late, 20);
+    EXPECT_EQ(other.counts().dropped, 0);
+    EXPECT_EQ(other.counts().nodes, one.counts().nodes);
+    const Estimate a = one.estimate(until), b = other.estimate(until);
+    EXPECT_FALSE(a.fallback || b.fallback);
+    EXPECT_LT(difference(b, a), tolerance);
+    const auto* first = dynamic_cast<const WindowedEstimation*>(&one.method());
+    const auto* second = dynamic_cast<const WindowedEstimation*>(&other.method());
+    if (!first) continue;
+    ASSERT_EQ(first->window().first, second->window().first);
+    ASSERT_EQ(first->window().intervals, second->window().intervals);
+    const double least = a.covariance.diagonal().cwiseSqrt().minCoeff();
+    for (int i = 0; i <= first->window().intervals; ++i)
+      for (int j = 0; j < 4; ++j)
+        EXPECT_NEAR(first->solution().state(i)[j], second->solution().state(i)[j], tolerance * least) << "node " << i;
+  }
+}
+
+/// However measurements and inputs come, up to the whole window late.
 TEST(LateData, CountFromTheirStampOn) {
   const auto model = linear_model<Hovercraft>();
-  struct Way {
-    const char* name;
-    std::function<std::unique_ptr<EstimationMethod>()> make;
-  };
   const std::vector<Way> ways{
       {"ekf", [&] { return std::make_unique<FilterEstimation>(model, filter_setup(*model)); }},
       {"bank", [&] { return std::make_unique<BankEstimation>(model, bank_estimation_setup(*model, linear_priors())); }},
@@ -369,36 +402,154 @@ TEST(LateData, CountFromTheirStampOn) {
          return window_of_blocks(model, ArrivalKind::ekf, "structured",
                                  "{size: 3, overlap: 2, transition: ramp, neighbour_sigma: 0.2}");
        }}};
-  for (const Way& way : ways) {
-    for (unsigned seed = 1; seed <= 4; ++seed) {
-      const double until = 4.0;
-      const std::vector<Row> in_time = stream(*model, until, seed);
-      std::vector<Row> late = in_time;
-      std::mt19937 random(100 + seed);
-      std::uniform_real_distribution<double> delay(0.0, 0.2 * (horizon - 1));
-      // All of the first window has come before it is full.
-      for (Row& row : late)
-        if (random() % 3 == 0) row.arrival = std::min(row.stamp + delay(random), until);
-      Estimator one(way.make(), {.longest_interval = 0.2}), other(way.make(), {.longest_interval = 0.2});
-      drive(one, in_time, until);
-      drive(other, late, until);
-      EXPECT_GT(other.counts().late, 20) << way.name;
-      EXPECT_EQ(other.counts().dropped, 0) << way.name;
-      EXPECT_EQ(other.counts().nodes, one.counts().nodes) << way.name;
-      const Estimate a = one.estimate(until), b = other.estimate(until);
-      EXPECT_FALSE(a.fallback || b.fallback);
-      EXPECT_LT(difference(b, a), 1e-6) << way.name << ", seed " << seed;
-      const auto* first = dynamic_cast<const WindowedEstimation*>(&one.method());
-      const auto* second = dynamic_cast<const WindowedEstimation*>(&other.method());
-      if (!first) continue;
-      ASSERT_EQ(first->window().first, second->window().first) << way.name;
-      ASSERT_EQ(first->window().intervals, second->window().intervals) << way.name;
-      const double least = a.covariance.diagonal().cwiseSqrt().minCoeff();
-      for (int i = 0; i <= first->window().intervals; ++i)
-        for (int j = 0; j < 4; ++j)
-          EXPECT_NEAR(first->solution().state(i)[j], second->solution().state(i)[j], 1e-6 * least)
-              << way.name << ", node " << i;
+  for (unsigned seed = 1; seed <= 4; ++seed) expect_same(ways, stream(*model, 4.0, seed), 100 + seed, 4.0, 1e-6);
+}
+
+/// A bicycle weaves over ground whose slip varies; GPS at 5 Hz, an encoder of the steering at some rate, both inputs at
+/// 10 Hz.
+struct Weave {
+  double seconds, encoder;  ///< duration, and period of the encoder [s]
+  std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
+  std::vector<Row> rows = {};
+  std::vector<double> kappas = {};  ///< every 0.2 s
+
+  Weave(double length, double period, unsigned seed) : seconds(length), encoder(period) {
+    std::mt19937 random(seed), of_encoder(seed + 1000);
+    std::normal_distribution<double> normal;
+    std::vector<double> x(4, 0.0), next(4), y(3);
+    const double step = 0.01;
+    const int between_readings = static_cast<int>(std::lround(encoder / step));
+    double way = 0.0;
+    for (int k = 0; k <= static_cast<int>(seconds / step); ++k) {
+      const double time = step * k, u[] = {2.0, 0.25 * std::cos(0.9 * time)};
+      const double p[] = {0.75 + 0.12 * std::sin(0.3 * way), 0.9};
+      if (k % 10 == 0) rows.push_back({time, time, true, {u[0] + 0.05 * normal(random), u[1] + 0.02 * normal(random)}});
+      model->observe({.count = 1, .states = x.data(), .outputs = y.data()});
+      const double reading = y[2] + 0.01 * normal(of_encoder);
+      if (k % 20 == 0) {
+        rows.push_back({time, time, false, {y[0] + 0.03 * normal(random), y[1] + 0.03 * normal(random), nan}});
+        kappas.push_back(p[0]);
+      }
+      if (k % between_readings == 0) rows.push_back({time, time, false, {nan, nan, reading}});
+      model->integrate({.count = 1,
+                        .states = x.data(),
+                        .inputs = u,
+                        .parameters = p,
+                        .durations = &step,
+                        .next_states = next.data()});
+      way += std::hypot(next[0] - x[0], next[1] - x[1]);
+      x = next;
     }
+  }
+};
+
+/// Windows and filters for the weaving bicycle.
+struct Bicycle {
+  std::shared_ptr<const Model> model = host().make_model("bicycle_slip");
+  std::string solver;
+  int intervals;
+
+  BankEstimation::Setup filters() const {
+    ModelDescription about = model->description();
+    BankEstimation::Setup setup;
+    setup.bank.members = standard_bank(about);
+    setup.bank.output_variances = {9e-4, 9e-4, 1e-4};
+    setup.bank.input_variances = {2.5e-3, 4e-4};
+    setup.bank.most_between = 32;
+    setup.parameter_lower = {0.1, 0.1};
+    setup.parameter_upper = {1.0, 1.0};
+    setup.initial_state = Eigen::Vector4d::Zero();
+    setup.initial_covariance = 0.01 * Eigen::Matrix4d::Identity();
+    setup.remembered_nodes = intervals + 3;
+    return setup;
+  }
+  RheProblem::Setup problem() const {
+    RheProblem::Setup setup;
+    setup.max_intervals = intervals;
+    setup.most_between = 32;
+    for (const double variance : filters().bank.output_variances) setup.output_weights.push_back(1.0 / variance);
+    for (const double variance : filters().bank.input_variances) setup.input_weights.push_back(1.0 / variance);
+    setup.parameter_lower = filters().parameter_lower;
+    setup.parameter_upper = filters().parameter_upper;
+    return setup;
+  }
+  std::unique_ptr<EstimationMethod> bank() const { return std::make_unique<BankEstimation>(model, filters()); }
+  std::unique_ptr<EstimationMethod> priors() const {
+    return std::make_unique<PriorHorizonEstimation>(
+        model, gn_rti(solver), PriorHorizonEstimation::Setup{.filters = filters(), .problem = problem()});
+  }
+  std::unique_ptr<EstimationMethod> blocks() const {
+    RecedingHorizonEstimation::Setup setup;
+    setup.problem = problem();
+    setup.blockings = {blocking("structured", "{size: 2, overlap: 4}"), blocking("full_horizon")};
+    setup.walks.assign(2, {});
+    setup.initial_mean = Eigen::VectorXd::Zero(6);
+    setup.initial_mean.tail(2).setConstant(0.8);
+    setup.initial_covariance = 0.01 * Eigen::MatrixXd::Identity(6, 6);
+    return std::make_unique<RecedingHorizonEstimation>(model, gn_rti(solver), setup);
+  }
+  std::unique_ptr<EstimationMethod> ekf() const {
+    FilterEstimation::Setup setup;
+    setup.noise = {filters().bank.output_variances, filters().bank.input_variances, filters().parameter_lower,
+                   filters().parameter_upper};
+    setup.walk.assign(2, 0.03);
+    setup.initial_mean = Eigen::VectorXd::Zero(6);
+    setup.initial_mean.tail(2).setConstant(0.8);
+    setup.initial_covariance = 0.01 * Eigen::MatrixXd::Identity(6, 6);
+    setup.most_between = 32;
+    setup.remembered_nodes = intervals + 3;
+    return std::make_unique<FilterEstimation>(model, setup);
+  }
+};
+
+/// Of converged solves, where the model is not linear.
+TEST(LateData, OfABicycleCountFromTheirStampOn) {
+  const Bicycle bicycle{.solver = "{mode: converge, max_iterations: 60, tolerance: 1.0e-11}", .intervals = horizon};
+  const std::vector<Way> ways{{"ekf", [&] { return bicycle.ekf(); }},
+                              {"bank", [&] { return bicycle.bank(); }},
+                              {"rhe", [&] { return bicycle.priors(); }},
+                              {"blocks", [&] { return bicycle.blocks(); }}};
+  for (unsigned seed = 1; seed <= 2; ++seed) expect_same(ways, Weave(6.0, 0.05, seed).rows, seed, 6.0, 1e-4);
+}
+
+/// Mean error of the speed factor once the window is full.
+double kappa_error(const Weave& weave, std::unique_ptr<EstimationMethod> method, int from) {
+  Estimator estimator(std::move(method), {.longest_interval = 0.2});
+  double sum = 0.0;
+  int count = 0;
+  std::size_t next = 0;
+  for (int k = 0; k < static_cast<int>(weave.kappas.size()); ++k) {
+    for (; next < weave.rows.size() && weave.rows[next].stamp <= 0.2 * k + 1e-9; ++next) {
+      const Row& row = weave.rows[next];
+      if (row.is_input)
+        estimator.push_input(row.stamp, row.values.data());
+      else
+        estimator.push_measurement(row.stamp, row.values.data());
+    }
+    const Estimate& estimate = estimator.estimate(0.2 * k);
+    EXPECT_FALSE(estimate.fallback);
+    if (k < from) continue;
+    sum += std::abs(estimate.parameters[0] - weave.kappas[static_cast<std::size_t>(k)]);
+    ++count;
+  }
+  return sum / count;
+}
+
+/// A quick sensor beside a slow one neither shortens the horizon nor adds to its nodes: slip is known as well as with
+/// both at 5 Hz.
+TEST(Rates, AnEncoderAt100HzDoesNotSpoilSlip) {
+  const Bicycle bicycle{.solver = "{mode: rti}", .intervals = 15};
+  for (const bool blocks : {false, true}) {
+    double slow = 0.0, quick = 0.0;
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      const auto make = [&] { return blocks ? bicycle.blocks() : bicycle.priors(); };
+      slow += 0.25 * kappa_error(Weave(40.0, 0.2, seed), make(), 25);
+      quick += 0.25 * kappa_error(Weave(40.0, 0.01, seed), make(), 25);
+    }
+    RecordProperty(blocks ? "blocks_5Hz" : "priors_5Hz", std::to_string(slow));
+    RecordProperty(blocks ? "blocks_100Hz" : "priors_100Hz", std::to_string(quick));
+    EXPECT_LT(quick, 1.02 * slow) << "blocks " << blocks;
+    EXPECT_LT(quick, 0.05);
   }
 }
 

@@ -165,22 +165,40 @@ TEST_F(Timeline, OnlyWhatIsStampedUpToTheTimeIsUsed) {
   EXPECT_EQ(recorder->nodes.size(), 3u);
 }
 
-TEST_F(Timeline, GapsAreFilledWithNodesAStepApart) {
+TEST_F(Timeline, GapsAreFilledWithNodesAtMostAStepApart) {
   input(0.0, 1.0);
   measure(0.0, 1.0);
   measure(0.2, 2.0);  // just fits
-  measure(0.7, 3.0);
+  measure(0.7, 3.0);  // three parts
   input(0.5, 4.0);
   estimator.estimate(0.7);
   ASSERT_EQ(recorder->nodes.size(), 5u);
-  for (std::size_t i = 1; i < 4; ++i) EXPECT_NEAR(recorder->nodes[i].duration, 0.2, 1e-12);
-  EXPECT_NEAR(recorder->nodes[4].duration, 0.1, 1e-12);
+  EXPECT_NEAR(recorder->nodes[1].duration, 0.2, 1e-15);
+  for (std::size_t i = 2; i < 5; ++i) EXPECT_NEAR(recorder->nodes[i].duration, 0.5 / 3.0, 1e-12);
   for (std::size_t i = 2; i < 4; ++i)
     for (const double output : recorder->nodes[i].outputs) EXPECT_TRUE(std::isnan(output));
   EXPECT_EQ(recorder->nodes[4].outputs[0], 3.0);
+  // From 0.2 on: [0.2, 0.3667] 1; [0.3667, 0.5333] 1 and, from 0.5, 4; [0.5333, 0.7] 4.
   EXPECT_NEAR(recorder->nodes[2].inputs[0], 1.0, 1e-12);
-  EXPECT_NEAR(recorder->nodes[3].inputs[0], 0.5 * (1.0 + 4.0), 1e-12);
+  const double part = 0.5 / 3.0, late = 0.2 + 2.0 * part - 0.5;
+  EXPECT_NEAR(recorder->nodes[3].inputs[0], (1.0 * (part - late) + 4.0 * late) / part, 1e-12);
   EXPECT_NEAR(recorder->nodes[4].inputs[0], 4.0, 1e-12);
+}
+
+/// A gap is divided anew by what comes late: as if it had been there.
+TEST_F(Timeline, LateMeasurementsDivideAGapAnew) {
+  estimator = make({.longest_interval = 0.2}, 8, 10);
+  for (const double stamp : {0.0, 0.2, 1.2, 1.4}) measure(stamp, stamp);
+  estimator.estimate(1.4);
+  ASSERT_EQ(recorder->nodes.size(), 8u);
+  measure(0.75, 0.75);
+  estimator.estimate(1.4);
+  // Three parts to there, and three from there on.
+  ASSERT_EQ(recorder->nodes.size(), 9u);
+  for (std::size_t i = 2; i < 5; ++i) EXPECT_NEAR(recorder->nodes[i].duration, 0.55 / 3.0, 1e-12);
+  EXPECT_EQ(recorder->nodes[4].outputs[0], 0.75);
+  for (std::size_t i = 5; i < 8; ++i) EXPECT_NEAR(recorder->nodes[i].duration, 0.15, 1e-12);
+  EXPECT_EQ(estimator.counts().late, 1);
 }
 
 TEST_F(Timeline, AnAbsurdGapIsDividedIntoAThousandParts) {
@@ -283,7 +301,7 @@ TEST_F(Timeline, WhatComesBeforeTheStartIsTheStart) {
   estimator.estimate(1.2);
   ASSERT_EQ(recorder->nodes.size(), 3u);
   EXPECT_EQ(recorder->nodes[0].outputs[0], 0.0);
-  EXPECT_NEAR(recorder->nodes[1].duration, 0.2, 1e-12);
+  EXPECT_NEAR(recorder->nodes[1].duration, 0.2, 1e-12);  // a node of the grid
   EXPECT_EQ(recorder->nodes[1].between[0], 1.0);
   EXPECT_NEAR(recorder->nodes[2].duration, 0.1, 1e-12);
   EXPECT_EQ(estimator.counts().dropped, 0);

@@ -147,5 +147,15 @@ TEST(EstimatorSection, MakesTheEstimatorOfItsNameOnItsTimeline) {
   }
 }
 
+TEST(EstimatorSection, KnowsDelaysOfOutputs) {
+  const auto made = estimator("{name: ekf, delays: {x_gps: 0.1, y_gps: 0.1}}").make();
+  const double outputs[] = {1.0, 2.0, 0.0};
+  for (int k = 0; k <= 4; ++k) made->push_measurement(0.2 * k, outputs);
+  EXPECT_DOUBLE_EQ(made->estimate(0.8).time, 0.8);
+  // From the first fix at -0.1 s on, in steps of 0.2 s, and the newest angle.
+  EXPECT_EQ(made->counts().nodes, 6);
+  EXPECT_THAT(error_of([] { estimator("{delays: {x_gps: -1}}"); }), HasSubstr("x_gps"));
+}
+
 }  // namespace estimator_section_test
 }  // namespace rhec

@@ -56,7 +56,7 @@ TEST(Ends, ARobotThatOnlyTakesItselfToBeAtTheEndIsNotThere) {
 speed: 4
 model: {name: bicycle_slip, outputs: [delta]}
 noise: {outputs: {delta: 0.001}, inputs: {u1: 0.001, u2: 0.001}}
-estimator: {name: ekf, initial: {parameters: {kappa: 0.9, mu: 1}, sigma: {kappa: 0.001, mu: 0.001}}}
+estimator: {name: ekf, health: {watch: false}, initial: {parameters: {kappa: 0.9, mu: 1}, sigma: {kappa: 0.001, mu: 0.001}}}
 path: {name: zigzag}
 terrain: {name: constant, values: {kappa: 0.87, mu: 1}}
 )",

@@ -68,6 +68,35 @@ TEST(RheFormat, BuildsWhatVersion2Adds) {
   EXPECT_FALSE(never->structure().starts_block(0, 0)) << "no ramp starts in the window";
 }
 
+TEST(RheFormat, KeepsMeasurementsBetweenNodes) {
+  const std::string line = replaced(rhe_line_2, "\"version\": 2",
+                                    "\"version\": 4, \"between\": [[], [[0.05, 1.25], [0.1, null]], [[0.25, 2.5]]]");
+  const ProblemRecord record = read_problem(line, "set.jsonl", 3);
+  const auto problem = build(record, cart());
+  const auto& rhe = dynamic_cast<const RheProblem&>(*problem);
+  EXPECT_EQ(rhe.between(0).count(), 0);
+  ASSERT_EQ(rhe.between(1).count(), 2);
+  EXPECT_EQ(rhe.between(1).time(1), 0.1);
+  EXPECT_EQ(rhe.between(1).outputs(0)[0], 1.25);
+  EXPECT_TRUE(std::isnan(rhe.between(1).outputs(1)[0]));
+  EXPECT_EQ(rhe.between(2).outputs(0)[0], 2.5);
+  // And back: the same problem again.
+  const ProblemRecord again = read_problem(
+      problem_line(record_of(rhe, nullptr, record.id, record.model, record.model_options)), "set.jsonl", 3);
+  ASSERT_EQ(again.between.size(), 3U);
+  EXPECT_THAT(again.between[2][0], ElementsAre(0.25, 2.5));
+  EXPECT_TRUE(std::isnan(again.between[1][1][1]));
+  const auto without =
+      build(read_problem(replaced(rhe_line_2, "\"version\": 2", "\"version\": 4"), "set.jsonl", 3), cart());
+  EXPECT_FALSE(refill(record, *without)) << "there is no room for them";
+  for (const char* wrong : {"[[], [[0.3, 1]], []]", "[[], []]", "[[], [[0.1]], []]"})
+    EXPECT_THROW(
+        read_problem(replaced(rhe_line_2, "\"version\": 2", std::string("\"version\": 4, \"between\": ") + wrong),
+                     "set.jsonl", 3),
+        Error)
+        << wrong;
+}
+
 TEST(RheFormat, AnEstimatorsFirstWindowHasNoInterval) {
   const std::string line = R"({"version": 2, "id": "run/rhe/0", "problem": "rhe", "model": {"name": "cart"},
  "horizon": {"intervals": 0, "dt": [], "integrator": "rk4", "substeps": 1},

@@ -145,14 +145,14 @@ class RHEC_EXPORT Controller {
   std::int64_t fallbacks_ = 0;
   std::vector<double> scratch_, straight_, slipless_, largest_, smallest_;
   std::vector<double> nominal_parameters_, reference_parameters_, ahead_parameters_;
-  std::vector<double> last_inputs_;  ///< n_u, applied last; NaN: not known
-  std::vector<std::uint8_t> drives_;   ///< n_u: whether an input moves the vehicle when it drives straight ahead
+  std::vector<double> last_inputs_;   ///< n_u, applied last; NaN: not known
+  std::vector<std::uint8_t> drives_;  ///< n_u: whether an input moves the vehicle when it drives straight ahead
   std::vector<std::uint8_t> begins_;
   std::vector<Obstacle> obstacles_;  ///< room for as many as the terms regard; the first `obstacle_count_` are there
   std::size_t obstacle_count_ = 0;
   double pace_ = 1.0, wanted_pace_ = 1.0;  ///< share of the path's speeds
   double seen_ = 0.0;                      ///< when these were there [s]
-  double now_ = 0.0;   ///< time of the last estimate [s]
+  double now_ = 0.0;                       ///< time of the last estimate [s]
 };
 
 }  // namespace rhec

@@ -13,16 +13,18 @@ namespace rhec {
 ///
 /// Nodes lie on a grid: at the stamp of the first measurement, and every `step` from there on, however often there are
 /// measurements. Where there is a measurement no farther from such a place than a twentieth of the step, the node lies
-/// there, and the grid goes on from there; so measurements at the step itself, with some jitter, are at nodes. The
-/// newest measurement is at a node too, which gives way when later ones come. All others lie between two nodes, at
-/// times of their own. An interval that has more of them than there is room for ends early, in a further node.
+/// there, and the grid goes on from there; so measurements at the step itself, with some jitter, are at nodes. Where no
+/// measurement comes for longer than a step, the gap is divided into equal parts of at most a step, and the grid goes
+/// on from the measurement behind it; so those of a slow sensor are at nodes. The newest measurement is at a node too,
+/// which gives way when later ones come. All others lie between two nodes, at times of their own. An interval that has
+/// more of them than there is room for ends early, in a further node.
 ///
 /// Rows are kept as long as nodes can be taken back, so that all that was measured has its place whenever it arrives:
 /// the nodes from there on are made anew, as if it had come in time. Only the constructor allocates.
 class RHEC_EXPORT NodeGrid {
  public:
   struct Setup {
-    double step = 0.2;            ///< [s]; a gap of more than 1000 steps is divided into 1000 equal parts
+    double step = 0.2;            ///< [s]; a gap has 1000 parts at most, then longer ones
     double tolerance = 1e-6;      ///< measurements with stamps closer than this are one [s]
     std::size_t capacity = 4096;  ///< rows of inputs, and of measurements
     int outputs = 0, inputs = 0;  ///< n_y, n_u

@@ -117,6 +117,7 @@ class RHEC_EXPORT RecedingHorizonEstimation final : public WindowedEstimation {
   GuessShifter shifter_;
   Iterate point_, trial_, best_;
   Window window_;
+  Eigen::MatrixXd base_covariance_;
   std::int64_t base_ = -1;  ///< the node from which `rebase` went on; nothing before it is known
   bool started_ = false, solved_ = false, prepared_ = false;
   bool slid_ = false;      ///< preparing has moved the first node, too

@@ -14,6 +14,7 @@
 
 namespace rhec {
 
+class BetweenCache;
 class OutputCache;
 class PartsOfIntervals;
 struct CostView;
@@ -124,11 +125,11 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   double cost(const Iterate& iterate, double* stage_costs, std::span<double> scratch) const noexcept override;
   double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
                     std::span<double> scratch) const noexcept override {
-    return write_cost(range, iterate, hessian, parts, qp, nullptr, scratch);
+    return write_cost(range, iterate, hessian, parts, qp, nullptr, nullptr, scratch);
   }
-  /// The same with a cache of outputs, which is read and completed; null: none.
+  /// The same with caches of outputs, at nodes and between them, which are read and completed; null: none.
   double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
-                    OutputCache* known, std::span<double> scratch) const noexcept;
+                    OutputCache* known, BetweenCache* known_between, std::span<double> scratch) const noexcept;
   std::size_t cost_scratch_size() const noexcept override;
 
   void residual(const double* measured, const double* predicted, double* difference) const noexcept;
@@ -151,7 +152,13 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void evaluate_batch(BetweenBatch& batch, bool with_gradients) const noexcept;
   double add_batch(BetweenBatch& batch, Hessian hessian, const CostView* view, double* stage_costs) const noexcept;
   void turn_ramp(BetweenBatch& batch, int i, bool exact) const noexcept;
-  void add_row(BetweenBatch& batch, int i, const CostView& view) const noexcept;
+  void add_row(BetweenBatch& batch, int interval, const double* gradients, const double* weights, const double* pulls,
+               const CostView& view) const noexcept;
+  double weigh(const double* measured, const double* predicted, double* difference, double* weights, double* pulls,
+               double* curvatures) const noexcept;
+  std::ptrdiff_t between_key_size() const noexcept;
+  double add_known_between(StageRange range, const Iterate& iterate, const CostView& view, BetweenCache& known,
+                           double* memory) const noexcept;
   void add_curvature(BetweenBatch& batch, int i, const CostView& view) const noexcept;
   double* H_of(const CostView& view, int stage) const noexcept;
   double* h_of(const CostView& view, int stage) const noexcept;

@@ -53,6 +53,8 @@ struct ProblemRecord {
   Rows arrival_information;
   Rows outputs;  ///< N+1 rows, NaN if missing
   Rows inputs;   ///< N rows, measured, NaN if missing
+  /// By interval, rows of a time within it [s] and what was measured then, NaN if missing; or empty.
+  std::vector<Rows> between;
   std::vector<double> output_weights, input_weights;
   struct Robust {
     std::vector<std::string> outputs;

@@ -1,0 +1,37 @@
+#include "between_cache.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace rhec {
+
+BetweenCache::BetweenCache(int intervals, int most, std::ptrdiff_t key, std::ptrdiff_t each)
+    : intervals_(std::max(intervals, 1)), most_(most), each_(each) {
+  const auto slots = static_cast<std::size_t>(intervals_);
+  key_.assign(static_cast<std::size_t>(key), 0.0);
+  keys_.assign(slots * key_.size(), 0.0);
+  results_.assign(slots * static_cast<std::size_t>(most * each), 0.0);
+  times_.assign(slots * static_cast<std::size_t>(most), 0.0);
+  counts_.assign(slots, -1);
+}
+
+bool BetweenCache::holds(int interval, const BetweenNodes& between) const noexcept {
+  const auto at = static_cast<std::size_t>(slot(interval));
+  if (counts_[at] != between.count()) return false;
+  if (std::memcmp(key_.data(), keys_.data() + at * key_.size(), key_.size() * sizeof(double)) != 0) return false;
+  const double* const times = times_.data() + at * static_cast<std::size_t>(most_);
+  for (int k = 0; k < between.count(); ++k)
+    if (times[k] != between.time(k)) return false;
+  return true;
+}
+
+void BetweenCache::begin(int interval, const BetweenNodes& between) noexcept {
+  const auto at = static_cast<std::size_t>(slot(interval));
+  counts_[at] = between.count();
+  std::copy(key_.begin(), key_.end(), keys_.begin() + static_cast<std::ptrdiff_t>(at * key_.size()));
+  for (int k = 0; k < between.count(); ++k) times_[at * static_cast<std::size_t>(most_) + k] = between.time(k);
+}
+
+void BetweenCache::forget() noexcept { std::fill(counts_.begin(), counts_.end(), -1); }
+
+}  // namespace rhec
