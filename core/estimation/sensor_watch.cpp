@@ -31,6 +31,8 @@ constexpr int hopeless = 3;
 // After so many failures in a row a sensor is suspect: it then has to pass a closer gate, so many times in a row.
 constexpr int suspect_after = 3, passes_of_suspects = 2;
 constexpr double close_gate = 3.0;
+// Silence after which a sensor that disagrees is more likely right than the estimate [s].
+constexpr double longest_gap = 1.0;
 // Samples of a dispute within which slip may have jumped.
 constexpr int fresh = 2;
 
@@ -131,6 +133,7 @@ void SensorWatch::reset() noexcept {
   findings_.assign(sensors_.size(), 0);
   quiet_.assign(sensors_.size(), 0);
   records_.assign(sensors_.size(), {});
+  heard_.assign(sensors_.size(), unknown);
   is_unobserved_ = false;
   if (memory_->search) memory_->search->cancel();
   inputs_ = {};
@@ -225,6 +228,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
       innovation.time = time;
       innovation.sensor = static_cast<int>(s);
       innovation.accepted = admits(s, innovation);
+      heard_[s] = time;
       if (innovation.accepted) {
         ++states_[s].accepted;
         continue;
@@ -237,6 +241,10 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
     if (is_blind_) test_inputs(raw_.data());
     if (is_disputed) {
       finding = settle(time, outputs);
+    } else if (is_disputed_ && std::ranges::any_of(records_, [](const Record& each) { return each.failures > 0; })) {
+      // What is disputed was not measured.
+      for (Hypothesis* each : {slip_.get(), moved_.get(), blind_.get()})
+        if (each->is_active) confront(*each, raw_.data(), false);
     } else if (is_any_measured) {
       if (is_disputed_) end_dispute();
       for (std::size_t j = 0; j < input_.size() && !is_blind_; ++j)
@@ -274,6 +282,7 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
   const bool is_suspect = record.failures >= suspect_after;
   const bool passes = innovation.nis <= limit(sensor, innovation.value.size());
   if (!passes) {
+    if (record.failures == 0) record.after_gap = innovation.time - heard_[sensor] > longest_gap;
     ++record.failures;
     record.passes = 0;
     return false;
@@ -390,7 +399,7 @@ bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
   return fits;
 }
 
-void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs) noexcept {
+void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
   if (!fits(hypothesis.filter, outputs)) {
     hypothesis.is_active = false;
     hypothesis.explained = 0;
@@ -398,7 +407,7 @@ void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs) noexce
     return;
   }
   hypothesis.filter.update(outputs);
-  ++hypothesis.explained;
+  hypothesis.explained += counts;
 }
 
 /// A disputed position can be followed only if nothing else says where the vehicle is.
@@ -428,7 +437,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     if (is_new && &hypothesis == moved_.get()) start_moved();
     if (is_new && &hypothesis != moved_.get()) start(hypothesis);
     if (is_new && &hypothesis == slip_.get()) held_count_ = 0;
-    confront(hypothesis, raw_.data());
+    confront(hypothesis, raw_.data(), true);
   };
   consider(*slip_);
   consider(*moved_);
@@ -444,7 +453,10 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     return finding;
   }
   if (slip_->is_active) hold_back(time, outputs);
-  if (moved_->explained >= setup_.proof && may_follow()) {
+  bool after_gap = true;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (findings_[s] & reason::rejected) after_gap = after_gap && records_[s].after_gap;
+  if (moved_->explained >= (after_gap ? setup_.slip_proof : setup_.proof) && may_follow()) {
     for (std::uint32_t& each : findings_)
       if (each & reason::rejected) each |= reason::moved;
     for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;

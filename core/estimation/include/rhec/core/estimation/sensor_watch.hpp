@@ -21,7 +21,8 @@ class WalkingFilter;
 ///   - slip has jumped: the parameters are made anew, once. Where this explains a few samples in a row, the
 ///     measurements were right, and are given back as late ones;
 ///   - what the sensor measures has moved for good: the states that it sees are made anew, once. Where this explains
-///     more samples than a transient may last, the estimate follows;
+///     more samples than a transient may last, the estimate follows. After a time in which the sensor had said nothing
+///     it is rather the estimate that is off, and a few samples are enough;
 ///   - the measured inputs are wrong: they count as typical motion, at every sample. Where neither of the others lasts
 ///     and this does, the estimate goes on without inputs until they fit again.
 /// A measurement that passes its gate again ends all of this.
@@ -104,6 +105,7 @@ class RHEC_EXPORT SensorWatch {
   /// Of a sensor, in a row.
   struct Record {
     int failures = 0, passes = 0;
+    bool after_gap = false;  ///< the first failure came after a time in which the sensor had said nothing
   };
   bool admits(std::size_t sensor, const Innovation& innovation) noexcept;
   void find_stuck(double* outputs) noexcept;
@@ -114,7 +116,7 @@ class RHEC_EXPORT SensorWatch {
   void start(Hypothesis& hypothesis) noexcept;
   void start_moved() noexcept;
   bool fits(WalkingFilter& filter, const double* outputs) noexcept;
-  void confront(Hypothesis& hypothesis, const double* outputs) noexcept;
+  void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis& hypothesis) noexcept;
   void hold_back(double time, const double* outputs) noexcept;
@@ -128,6 +130,7 @@ class RHEC_EXPORT SensorWatch {
   std::vector<Sensor> sensors_;
   std::vector<double> limits_, close_limits_;  ///< of nu' S^-1 nu, by the number of values
   std::vector<Record> records_;                ///< by sensor
+  std::vector<double> heard_;                  ///< by sensor, when it was measured last [s]; NaN: never
   bool is_unobserved_ = false;                 ///< the motion since the last sample is not known
   std::unique_ptr<Hypothesis> own_, slip_, moved_, blind_;
   std::unique_ptr<Memory> memory_;
