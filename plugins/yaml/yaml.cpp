@@ -30,7 +30,7 @@ class Converter {
   explicit Converter(const Source& source) : source_(source) {}
 
   Settings convert(const YAML::Node& node, const YAML::Mark& mark) {
-    constexpr int most_nodes = 1000000, most_levels = 100;
+    constexpr int most_nodes = 100000, most_levels = 100;
     if (++nodes_ > most_nodes || levels_ >= most_levels) {
       throw source_.error(mark, fmt::format("more than {} nodes or {} levels; does an alias (*) stand within its own "
                                             "anchor (&)?",

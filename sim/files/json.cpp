@@ -55,6 +55,11 @@ class Builder {
   }
   // An array or object does not grow while a nested one is open, so the pointers stay valid.
   bool open(Json empty) {
+    // Values are copied, compared and destroyed by recursion.
+    if (open_.size() == JsonParseError::most_levels) {
+      mistake_.emplace(JsonParseError::Cause::nesting, 0, "");
+      return false;
+    }
     open_.push_back(&place_for(std::move(empty)));
     return true;
   }
@@ -102,7 +107,9 @@ JsonError::~JsonError() = default;
 JsonParseError::JsonParseError(Cause the_cause, std::size_t at, std::string the_key)
     : JsonError(the_cause == Cause::syntax         ? fmt::format("no JSON after {} bytes", at)
                 : the_cause == Cause::large_number ? fmt::format("a number after {} bytes is too large", at)
-                                                   : fmt::format("the key '{}' is repeated", the_key)),
+                : the_cause == Cause::nesting
+                    ? fmt::format("more than {} arrays and objects within each other", most_levels)
+                    : fmt::format("the key '{}' is repeated", the_key)),
       cause(the_cause),
       byte(at),
       key(std::move(the_key)) {}

@@ -19,6 +19,8 @@ Json parse(std::string_view text, const std::string& where) {
   } catch (const JsonParseError& mistake) {
     if (mistake.cause == JsonParseError::Cause::repeated_key)
       throw Error(at_key(where, mistake.key, "the key is written twice; keep one of them"));
+    if (mistake.cause == JsonParseError::Cause::nesting)
+      throw Error(fmt::format("{}: {}; expected one problem, {{...}}, on each line", where, mistake.what()));
     if (mistake.cause == JsonParseError::Cause::large_number)
       throw Error(fmt::format("{}: a number is too large; expected finite numbers", where));
     throw Error(

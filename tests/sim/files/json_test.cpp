@@ -75,6 +75,10 @@ TEST(Json, TellsWhatIsWrongWithAText) {
   EXPECT_EQ(twice.cause, JsonParseError::Cause::repeated_key);
   EXPECT_EQ(twice.key, "b");
   EXPECT_EQ(Json::parse(R"({"b":1,"c":2,"b":3})").dump(), R"({"b":3,"c":2})");
+  const auto nested = [](std::size_t levels) { return std::string(levels, '[') + std::string(levels, ']'); };
+  EXPECT_TRUE(Json::parse_if_valid(nested(JsonParseError::most_levels)).has_value());
+  EXPECT_EQ(mistake_in(nested(JsonParseError::most_levels + 1)).cause, JsonParseError::Cause::nesting);
+  EXPECT_FALSE(Json::parse_if_valid(std::string(100000, '[')).has_value());
   EXPECT_FALSE(Json::parse_if_valid("{").has_value());
   EXPECT_TRUE(Json::parse_if_valid("null").has_value());
 }

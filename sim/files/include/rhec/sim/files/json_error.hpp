@@ -21,10 +21,12 @@ class RHEC_EXPORT JsonParseError final : public JsonError {
   enum class Cause {
     syntax,
     large_number,  ///< beyond the range of double
-    repeated_key   ///< if repeated keys are refused
+    repeated_key,  ///< if repeated keys are refused
+    nesting        ///< more than `most_levels` arrays and objects within each other
   };
   JsonParseError(Cause cause, std::size_t byte, std::string key);
   ~JsonParseError() override;
+  static constexpr std::size_t most_levels = 200;
   Cause cause;
   std::size_t byte;  ///< bytes read so far
   std::string key;   ///< the repeated key

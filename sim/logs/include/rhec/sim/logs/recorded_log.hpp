@@ -35,7 +35,7 @@ struct LogOptions {
 struct LogScenarioOptions : RobotOptions {
   std::string name = "log";
   Settings log, variants;
-  static const OptionTable<LogScenarioOptions>& table();
+  RHEC_EXPORT static const OptionTable<LogScenarioOptions>& table();
 };
 
 /// Sections of a scenario for recorded data, in addition to those of a robot.

@@ -1,0 +1,82 @@
+// The formats that are files or folders: written to memory, and read from there.
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "fuzz/targets.hpp"
+#include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+#include "rhec/sim/logs/recorded_log.hpp"
+#include "rhec/sim/report/report.hpp"
+#include "rhec/sim/store/slip_map_file.hpp"
+#include "rhec/sim/store/sweep_runs.hpp"
+
+namespace rhec::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder in memory, of this process, that is empty at first.
+class Folder {
+ public:
+  explicit Folder(const std::string& name)
+      : path_(fs::path(fs::is_directory("/dev/shm") ? fs::path("/dev/shm") : fs::temp_directory_path()) /
+              ("rhec_fuzz_" + std::to_string(getpid()) + "_" + name)) {
+    fs::remove_all(path_);
+    fs::create_directories(path_);
+  }
+  ~Folder() { fs::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  fs::path write(const std::string& name, std::string_view content) const {
+    std::ofstream(path_ / name, std::ios::binary) << content;
+    return path_ / name;
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+}  // namespace
+
+void log(std::string_view input) {
+  static const sim::LogScenario scenario(Host(), load_yaml(RHEC_SOURCE "/tests/fuzz/log.yaml"));
+  static const Folder folder("log");
+  const std::vector<Part> parts = parts_of(input);
+  if (parts.size() != 2) return;
+  answered([&] {
+    static_cast<void>(sim::read_recorded_log(folder.write("dead_reckoning.csv", parts[0].content),
+                                             folder.write("gps.csv", parts[1].content), scenario));
+  });
+}
+
+void results(std::string_view input) {
+  const Folder folder("results");
+  constexpr std::array names{"steps.csv",      "times.csv",     "summary.json",
+                             "horizons.jsonl", "estimates.csv", "comparison.json"};
+  const std::vector<Part> parts = parts_of(input);
+  for (const Part& part : parts)
+    if (std::find(names.begin(), names.end(), part.name) != names.end()) folder.write(part.name, part.content);
+  answered([&] { sim::report_document(folder.path(), "fuzz"); });
+}
+
+void sweep_store(std::string_view input) {
+  const Folder folder("sweep_store");
+  const fs::path file = folder.write("sweep.sqlite", input);
+  answered([&] { static_cast<void>(sim::read_sweep_runs(file)); });
+  answered([&] { sim::report_document(file, "fuzz"); });
+}
+
+void slip_map(std::string_view input) {
+  const Folder folder("slip_map");
+  const fs::path file = folder.write("map.sqlite", input);
+  answered([&] { static_cast<void>(sim::read_slip_map(file)); });
+}
+
+}  // namespace rhec::fuzz
