@@ -15,6 +15,11 @@ namespace {
 
 constexpr int checked_interval = 16;  // of so many, the integration of one is checked
 constexpr int most_parts = 1000;      // largest number of parts of one prediction
+// What a call does even if its deadline has passed: more than usually comes between two calls, so that one that is
+// always late keeps up.
+constexpr int least_rows = 16, least_nodes = 2, least_parts = 16;
+// Parts of the rest of a prediction whose time is up.
+constexpr int hasty_parts = 2;
 
 NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Timeline& timeline) {
   if (!(timeline.longest_interval > 0.0))
@@ -192,17 +197,25 @@ void Estimator::push_input(double time, const double* inputs) noexcept {
   grid_.push_input(time, values_.data());
 }
 
-/// Makes the nodes of all that is stamped up to a time, those anew that it has changed.
-void Estimator::take_in(double until) noexcept {
-  if (const int outdated = grid_.outdated(until, method_->reach()); outdated > 0) {
+/// Makes the nodes of all that is stamped up to a time, those anew that it has changed. False if the time was up
+/// before.
+bool Estimator::take_in(double until, Clock::time_point deadline) noexcept {
+  const int outdated = grid_.outdated(until, method_->reach());
+  if (outdated > 0) {
     method_->rewind(outdated);
-    grid_.take_back(outdated);
     counts_.nodes -= outdated;
     stale_ = true;
   }
-  bool any = false;
-  for (; grid_.make_next(until); any = true) add_node();
-  if (any) grid_.settle(method_->reach());
+  grid_.take_back(outdated, until);
+  int made = 0;
+  bool is_late = false;
+  for (; !is_late && grid_.has_next(until); ++made) {
+    grid_.make_next(until);
+    add_node();
+    is_late = made + 1 >= least_nodes && is_past(deadline);
+  }
+  if (made > 0) grid_.settle(method_->reach());
+  return !is_late || !grid_.has_next(until);
 }
 
 void Estimator::add_node() noexcept {
@@ -215,9 +228,10 @@ void Estimator::add_node() noexcept {
   stale_ = true;
 }
 
-/// Judges what is stamped up to a time, in its order, and hands on what passes.
-void Estimator::judge_waiting(double until) noexcept {
-  while (waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance) {
+/// Judges what is stamped up to a time, in its order, and hands on what passes. False if the time was up before.
+bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept {
+  for (int judged = 0; waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance; ++judged) {
+    if (judged >= least_rows && is_past(deadline)) return false;
     const double time = waiting_->time(0);
     std::fill(merged_.begin(), merged_.end(), missing_value);
     std::size_t same = 0;  // rows with this stamp, e.g. of two sensors
@@ -225,18 +239,24 @@ void Estimator::judge_waiting(double until) noexcept {
       for (std::size_t j = 0; j < merged_.size(); ++j)
         if (const double value = waiting_->values(same)[j]; !std::isnan(value)) merged_[j] = value;
     waiting_->drop_front(same);
-    const SensorWatch::Finding finding = judge(time, merged_.data());
+    const SensorWatch::Finding finding = judge(time, merged_.data(), deadline);
     push_judged(time, merged_.data());
     for (int i = 0; finding.release && i < watch_->held_count(); ++i)
       push_judged(watch_->held()[i].time, watch_->held()[i].outputs.data());
-    if (finding.rebase || !watch_->is_active()) take_in(time);
-    if (finding.rebase) rebase(watch_->mean(), watch_->covariance());
+    bool is_complete = true;
+    if (finding.rebase || !watch_->is_active()) is_complete = take_in(time, deadline);
+    if (finding.rebase) {
+      // What was measured before counts no longer.
+      if (!is_complete) grid_.skip_to(time);
+      rebase(watch_->mean(), watch_->covariance());
+    }
     const bool is_last = waiting_->size() == 0 || !(waiting_->time(0) <= until + timeline_.tolerance);
     if (watch_->is_active() || is_last) continue;
     // There is nothing to judge the next one by yet.
-    method_->estimate(estimate_, Clock::time_point::max());
+    method_->estimate(estimate_, deadline);
     watch_->follow(estimate_);
   }
+  return true;
 }
 
 void Estimator::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept {
@@ -247,16 +267,19 @@ void Estimator::rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covar
 }
 
 /// Judges a row before it is used; what fails becomes NaN.
-SensorWatch::Finding Estimator::judge(double time, double* outputs) noexcept {
+SensorWatch::Finding Estimator::judge(double time, double* outputs, Clock::time_point deadline) noexcept {
   const double last = watched_;
   watched_ = time;
   if (!has_started()) return {};
-  if (time - clocks_->newest(inputs_source()) > longest_silence(inputs_source())) {
-    through_unknown_motion(last, time,
-                           [&](double duration) { watch_->advance(duration, input_.data(), input_sigmas_.data()); });
-  } else {
-    watch_->advance(time - last, grid_.mean_input(last, time));
-  }
+  const bool is_unknown = time - clocks_->newest(inputs_source()) > longest_silence(inputs_source());
+  through_motion(last, time, deadline, [&](double begin, double end) {
+    if (is_unknown) {
+      guess_input(begin, end);
+      watch_->advance(end - begin, input_.data(), input_sigmas_.data());
+    } else {
+      watch_->advance(end - begin, grid_.mean_input(begin, end));
+    }
+  });
   const SensorWatch::Finding finding = watch_->judge(time, outputs);
   counts_.rejected = 0;
   for (const SensorHealth& sensor : watch_->sensor_states()) counts_.rejected += sensor.rejected;
@@ -269,29 +292,41 @@ double Estimator::longest_silence(int source) const noexcept {
   return std::max(least_silence, usual_intervals * clocks_->usual_interval(source));
 }
 
-/// Goes through a time in parts, each with its mean input and how much that may be off besides its noise. An input
-/// holds; the longer nobody has said so again, the less it is known: within a second it may change by its typical
-/// magnitude, and stay there.
+/// Goes through a time in equal parts. Once the deadline has passed, the rest has only few.
 template <class Function>
-void Estimator::through_unknown_motion(double from, double to, const Function& advance) noexcept {
-  const int parts = parts_of(to - from, timeline_.longest_interval);
-  const double newest_input = clocks_->newest(inputs_source()), usual = clocks_->usual_interval(inputs_source());
-  const std::vector<Variable>& inputs = model().description().inputs;
-  double known = 0.0;  // squared age of the last part, in parts
+void Estimator::through_motion(double from, double to, Clock::time_point deadline, const Function& advance) noexcept {
+  int parts = parts_of(to - from, timeline_.longest_interval);
+  unknown_since_ = from;
+  bool is_hasty = false;
   for (int i = 0; i < parts; ++i) {
-    const double begin = from + (to - from) * i / parts, end = from + (to - from) * (i + 1) / parts;
-    std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
-    for (std::size_t j = 0; j < measured_inputs_; ++j)
-      if (std::isnan(input_[j])) input_[j] = 0.0;
-    const double age = std::isnan(newest_input) ? end - from : std::max(0.0, end - newest_input - usual);
-    const double aged = age / (end - begin);  // in parts
-    for (std::size_t j = 0; j < measured_inputs_; ++j) {
-      const double sigma = inputs[j].scale * std::min(1.0, age);
-      // An offset that stays adds up to t^2, not t: each part has what the square grows by.
-      input_sigmas_[j] = sigma * std::sqrt(std::max(0.0, aged * aged - known));
+    if (!is_hasty && i >= least_parts && parts - i > hasty_parts && is_past(deadline)) {
+      from += (to - from) * i / parts;
+      parts = hasty_parts;
+      i = 0;
+      is_hasty = true;
     }
-    known = aged * aged;
-    advance(end - begin);
+    advance(from + (to - from) * i / parts, from + (to - from) * (i + 1) / parts);
+  }
+}
+
+/// The mean input over a part of a motion, 0 where none is known, and how much it may be off besides its noise. An
+/// input holds; the longer nobody has said so again, the less it is known: within a second it may change by its typical
+/// magnitude, and stay there.
+void Estimator::guess_input(double begin, double end) noexcept {
+  const std::vector<Variable>& inputs = model().description().inputs;
+  std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
+  for (std::size_t j = 0; j < measured_inputs_; ++j)
+    if (std::isnan(input_[j])) input_[j] = 0.0;
+  const double newest_input = clocks_->newest(inputs_source()), usual = clocks_->usual_interval(inputs_source());
+  const auto age_at = [&](double time) {
+    return std::isnan(newest_input) ? time - unknown_since_ : std::max(0.0, time - newest_input - usual);
+  };
+  // An offset that stays adds up to t^2, not t: each part has what the square grows by.
+  const double duration = end - begin, before = begin > unknown_since_ ? age_at(begin) / duration : 0.0,
+               aged = age_at(end) / duration;
+  for (std::size_t j = 0; j < measured_inputs_; ++j) {
+    const double sigma = inputs[j].scale * std::min(1.0, age_at(end));
+    input_sigmas_[j] = sigma * std::sqrt(std::max(0.0, aged * aged - before * before));
   }
 }
 
@@ -308,29 +343,31 @@ void Estimator::assess(Estimate& estimate, double time) noexcept {
   watch_->assess(estimate, silent_, reasons, estimate.health);
 }
 
-void Estimator::predict_to(double time) noexcept {
-  const double last = grid_.time();
+void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
   predicted_ = estimate_;
   predicted_.predicted = true;
   if (watch_ && watch_->is_active())
-    return through_unknown_motion(last, time, [&](double duration) {
-      watch_->predict(duration, input_.data(), input_sigmas_.data(), predicted_);
+    return through_motion(grid_.time(), time, deadline, [&](double begin, double end) {
+      guess_input(begin, end);
+      watch_->predict(end - begin, input_.data(), input_sigmas_.data(), predicted_);
     });
-  std::copy_n(grid_.mean_input(last, time), input_.size(), input_.begin());
-  for (double& u : input_)
-    if (std::isnan(u)) u = 0.0;
-  const double duration = time - last;
-  Model::Intervals request;
-  request.count = 1;
-  request.states = estimate_.state.data();
-  request.inputs = input_.data();
-  request.parameters = estimate_.parameters.data();
-  request.durations = &duration;
-  request.substeps = method_->substeps() * parts_of(duration, timeline_.longest_interval);
-  request.next_states = next_.data();
-  method_->model().integrate(request);
-  if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))
-    std::copy(next_.begin(), next_.end(), predicted_.state.data());
+  through_motion(grid_.time(), time, deadline, [&](double begin, double end) {
+    std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
+    for (double& u : input_)
+      if (std::isnan(u)) u = 0.0;
+    const double duration = end - begin;
+    Model::Intervals request;
+    request.count = 1;
+    request.states = predicted_.state.data();
+    request.inputs = input_.data();
+    request.parameters = predicted_.parameters.data();
+    request.durations = &duration;
+    request.substeps = method_->substeps();
+    request.next_states = next_.data();
+    method_->model().integrate(request);
+    if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))
+      std::copy(next_.begin(), next_.end(), predicted_.state.data());
+  });
 }
 
 /// Holds the newest interval's steps against twice as many, from the newest node on: what the vehicle does there can be
@@ -359,13 +396,15 @@ void Estimator::prepare() noexcept {
 
 const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noexcept {
   double clock_offset = 0.0;
+  bool is_all_judged = true, is_all_taken_in = true;
   if (watch_) {
     watch_->begin_innovations();
     clock_offset = clocks_->offset_of(time);
     time -= clock_offset;
-    judge_waiting(time);
+    is_all_judged = judge_waiting(time, deadline);
   }
-  if (has_started() || !std::isnan(time)) take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time);
+  if (has_started() || !std::isnan(time))
+    is_all_taken_in = take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time, deadline);
   if (!has_started()) {
     assess(estimate_, time);
     return estimate_;
@@ -373,7 +412,10 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
   if (stale_) {
     method_->estimate(estimate_, deadline);
     stale_ = false;
-    if (watch_) watch_->follow(estimate_);
+    // The judge is where the last sample is that it has judged.
+    if (watch_ && is_all_taken_in) watch_->follow(estimate_);
+    if (!(is_all_judged && is_all_taken_in) && is_usable(estimate_.report.status))
+      estimate_.report.status = Status::deadline;
     ++counts_.estimates;
     counts_.fallbacks += estimate_.fallback;
     if (counts_.estimates % checked_interval == 0) check_integration();
@@ -385,7 +427,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
     assess(estimate_, std::isfinite(time) ? time : newest);
     return estimate_;
   }
-  predict_to(time);
+  predict_to(time, deadline);
   predicted_.time = time + clock_offset;
   assess(predicted_, time);
   return predicted_;

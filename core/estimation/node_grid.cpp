@@ -46,7 +46,8 @@ std::int64_t NodeGrid::oldest() const noexcept {
 /// anew; one before `oldest()` if there is none.
 std::int64_t NodeGrid::last_before(double time) const noexcept {
   const auto leaves = [&](const Node& node) {
-    return node.time < time - setup_.tolerance - 2.0 * near_ && node.parts == 0;
+    const bool is_divided_anew = node.parts > 0 && time < node.gap_end - setup_.tolerance;
+    return node.time < time - setup_.tolerance - 2.0 * near_ && !is_divided_anew;
   };
   std::int64_t number = count_ - 1;
   while (number >= oldest() && !leaves(node(number))) --number;
@@ -96,7 +97,17 @@ int NodeGrid::outdated(double until, int reach) const noexcept {
   return static_cast<int>(std::min<std::int64_t>(count_ - 1 - kept, reach));
 }
 
-void NodeGrid::take_back(int nodes) noexcept { count_ = std::max<std::int64_t>(0, count_ - nodes); }
+void NodeGrid::take_back(int nodes, double until) noexcept {
+  count_ = std::max<std::int64_t>(0, count_ - nodes);
+  // What has changed is behind the newest node now, or out of reach.
+  changed_ = changed_ <= until + setup_.tolerance ? infinity : changed_;
+  changed_input_ = infinity;
+}
+
+void NodeGrid::skip_to(double time) noexcept {
+  if (count_ == 0 || !(time > this->time())) return;
+  nodes_[static_cast<std::size_t>(count_ - 1) % nodes_.size()] = {time, time, Kind::grid, 0};
+}
 
 /// The row behind those that have the stamp of a row.
 std::size_t NodeGrid::group_end(std::size_t row) const noexcept {
@@ -112,14 +123,8 @@ void NodeGrid::merge(std::size_t row, std::size_t end, double* outputs) const no
       if (const double value = measurements_.values(row)[j]; !std::isnan(value)) outputs[j] = value;
 }
 
-bool NodeGrid::make_next(double until) noexcept {
-  const std::size_t from = count_ > 0 ? measurements_.first_after(time() + setup_.tolerance) : 0;
-  const std::size_t end = measurements_.first_after(until + setup_.tolerance);
-  if (from >= end) {
-    changed_ = changed_ <= until + setup_.tolerance ? infinity : changed_;
-    changed_input_ = infinity;
-    return false;
-  }
+void NodeGrid::make_next(double until) noexcept {
+  const std::size_t from = next_row(), end = measurements_.first_after(until + setup_.tolerance);
   Node next{measurements_.time(from), measurements_.time(from), Kind::grid, 0};
   duration_ = 0.0;
   if (count_ > 0) {
@@ -130,7 +135,6 @@ bool NodeGrid::make_next(double until) noexcept {
   }
   collect(next, from, end);
   nodes_[static_cast<std::size_t>(count_++) % nodes_.size()] = next;
-  return true;
 }
 
 /// The node that follows, given the measurements behind the last one.
@@ -142,7 +146,7 @@ NodeGrid::Node NodeGrid::next_node(const Node& last, std::size_t from, std::size
                     : asked < double{most_parts} ? static_cast<int>(asked)
                                                  : most_parts;
   if (parts == 1) return {first, first, Kind::grid, 0};
-  if (parts > 1) return {last.time + gap / parts, last.grid, Kind::gap, parts - 1};
+  if (parts > 1) return {last.time + gap / parts, last.grid, Kind::gap, parts - 1, first};
   const double grid = last.grid + setup_.step;
   Node next{grid, grid, Kind::grid, 0};
   double nearest = infinity, newest = last.time;

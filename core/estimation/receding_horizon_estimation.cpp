@@ -399,7 +399,7 @@ bool RecedingHorizonEstimation::arrival(double* mean, double* sigma) const noexc
 void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexcept {
   double best_objective = std::numeric_limits<double>::infinity();
   best_ = point_;
-  for (int start = 0; start <= setup_.heading_starts; ++start) {
+  for (int start = 0; start <= setup_.heading_starts && !is_past(deadline); ++start) {
     trial_ = point_;  // the last start is the present guess
     if (start < setup_.heading_starts) {
       trial_.clear_multipliers();
@@ -408,7 +408,7 @@ void RecedingHorizonEstimation::search_heading(Clock::time_point deadline) noexc
       problem_.simulate(trial_, scratch_);
     }
     Report report;
-    for (int i = 0; i < search_iterations; ++i) {
+    for (int i = 0; i < search_iterations && (i == 0 || !is_past(deadline)); ++i) {
       report = solver_->solve(trial_, deadline);
       if (!is_usable(report.status) || report.status == Status::solved) break;
     }

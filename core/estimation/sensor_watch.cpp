@@ -78,6 +78,7 @@ struct SensorWatch::Memory {
   Eigen::VectorXd before_mean;
   Eigen::MatrixXd before_covariance;
   double duration = 0.0;
+  bool has_advanced = false;  ///< since the last samples
   StuckValues stuck;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
   std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
@@ -141,6 +142,7 @@ void SensorWatch::reset() noexcept {
   calm_samples_ = setup_.calm;
   held_count_ = innovation_count_ = 0;
   memory_->count = 0;
+  memory_->has_advanced = false;
   memory_->stuck.reset();
   std::fill(believed_input_.begin(), believed_input_.end(), 0.0);
 }
@@ -153,6 +155,7 @@ void SensorWatch::restart(const Eigen::VectorXd& mean, const Eigen::MatrixXd& co
   if (memory_->search) memory_->search->cancel();
   end_dispute();
   memory_->count = 0;
+  memory_->has_advanced = false;
 }
 
 void SensorWatch::clean_inputs(double* inputs) noexcept {
@@ -187,10 +190,7 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
     memory_->search->predict(inputs, duration);
     return;
   }
-  std::copy_n(inputs, input_.size(), input_.data());
-  memory_->before_mean = own_->filter.mean();
-  memory_->before_covariance = own_->filter.covariance();
-  memory_->duration = duration;
+  note_motion(duration, inputs);
   if (memory_->count > 0) std::copy(input_.begin(), input_.end(), memory_->entries[memory_->newest].inputs.begin());
   if (is_blind_) {
     blind_->filter.mean() = own_->filter.mean();
@@ -207,7 +207,25 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
   if (blind_->is_active && !is_blind_) blind_->filter.predict(believed_input_.data(), duration);
 }
 
+/// Keeps what was known after the last samples, and the mean input since then.
+void SensorWatch::note_motion(double duration, const double* inputs) noexcept {
+  Memory& memory = *memory_;
+  if (!std::exchange(memory.has_advanced, true)) {
+    memory.before_mean = own_->filter.mean();
+    memory.before_covariance = own_->filter.covariance();
+    memory.duration = 0.0;
+    std::fill(input_.begin(), input_.end(), unknown);
+  }
+  memory.duration += duration;
+  const double share = memory.duration > 0.0 ? duration / memory.duration : 1.0;
+  for (std::size_t j = 0; j < input_.size(); ++j) {
+    if (std::isnan(inputs[j])) continue;
+    input_[j] = std::isnan(input_[j]) ? inputs[j] : input_[j] + share * (inputs[j] - input_[j]);
+  }
+}
+
 SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
+  memory_->has_advanced = false;
   std::fill(findings_.begin(), findings_.end(), 0u);
   held_count_ = is_disputed_ ? held_count_ : 0;
   Finding finding;

@@ -94,6 +94,7 @@ RheProblem::RheProblem(std::shared_ptr<const Model> model, Setup setup)
   has_block_bounds_.assign(nodes, 0);
   if (setup_.most_between < 0) throw Error("between nodes: expected room for 0 measurements or more");
   between_.assign(nodes - 1, BetweenNodes(ny_, setup_.most_between));
+  between_points_ = points_of_interval();
   outputs_.assign(nodes * output_row_, missing);
   measured_inputs_.assign(nodes * stride(), missing);
   input_weights_.assign(stride(), 0.0);

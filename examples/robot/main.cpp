@@ -19,8 +19,9 @@ int main(int count, char** words) try {
   for (double time = 0.0; !controller->finished() && time < 60.0; time += step) {
     model.observe({.count = 1, .states = state.data(), .outputs = outputs.data()});  // your sensors
     estimator->push_measurement(time, outputs.data());
-    const rhec::Estimate& now = estimator->estimate(time);
-    const std::vector<double>& inputs = controller->control(now).inputs;
+    const auto deadline = robot.deadline();  // one step from now
+    const rhec::Estimate& now = estimator->estimate(time, deadline);
+    const std::vector<double>& inputs = controller->control(now, deadline).inputs;
     std::printf("%4.1f s  x %6.2f m  y %5.2f m  kappa %.3f\n", time, now.state[0], now.state[1], now.parameters[0]);
 
     model.integrate({.count = 1,  // your actuators

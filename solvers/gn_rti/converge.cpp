@@ -257,7 +257,8 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       break;
     }
     if (report.iterations == options_.max_iterations) break;
-    if (is_past(deadline)) {
+    // One iteration is made in any case: a loop that is always late gets somewhere, if slowly.
+    if (report.iterations > 0 && is_past(deadline)) {
       report.status = Status::deadline;
       break;
     }

@@ -111,7 +111,9 @@ Episode drive_with_fault(const Robot& robot, const Fault& fault, std::uint64_t s
     delivery.outputs[0] += moved;
     if (is_on && fault.spoil) fault.spoil(delivery);
     if (delivery.has_outputs) estimator->push_measurement(delivery.stamp, delivery.outputs.data());
-    const Estimate& estimate = estimator->estimate(delivery.asked);
+    const bool is_hurried = fault.is_hurried && since >= 0;
+    const Estimate& estimate =
+        estimator->estimate(delivery.asked, is_hurried ? Clock::now() : Clock::time_point::max());
     if (delivery.has_inputs) estimator->push_input(delivery.stamp, delivery.inputs.data());
     estimator->prepare();
 

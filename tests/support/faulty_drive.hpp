@@ -26,6 +26,7 @@ struct Fault {
   int length = 1;                        ///< samples
   double moved = 0.0;                    ///< by how much the world has moved from then on, along x [m]
   double slip = 0.0;                     ///< by how much the first parameter falls
+  bool is_hurried = false;               ///< deadlines have passed already, from its begin on
 };
 
 /// What is seen from the first sample of the fault on.

@@ -344,22 +344,20 @@ class PassedDeadline : public ::testing::TestWithParam<bool> {};
 
 INSTANTIATE_TEST_SUITE_P(Controller, PassedDeadline, ::testing::Bool());
 
-TEST_P(PassedDeadline, LeavesTheLastPlanAndIsNoFailure) {
+TEST_P(PassedDeadline, LeavesTimeForOneIterationAndIsNoFailure) {
   const bool prepares = GetParam();
   Drive drive;
   drive.go_well(3, prepares);
   const auto command = drive.ask();
-  const auto plan = drive.planned();
   drive.drive(command.inputs, prepares);
   for (int k = 1; k <= 3; ++k) {
     const int before = drive.solver->asked;
     drive.sound->control(drive.now);
     const auto late = drive.controller->control(drive.now, Clock::time_point::min());
-    EXPECT_EQ(late.report.status, Status::deadline) << k;
-    EXPECT_EQ(late.report.iterations, 0) << k;
+    EXPECT_TRUE(late.report.status == Status::deadline || late.report.status == Status::solved) << k;
+    EXPECT_LE(late.report.iterations, 1) << k;
     EXPECT_EQ(drive.solver->asked - before, 1) << "there is no time for a fresh start";
     EXPECT_FALSE(late.fallback) << k;
-    EXPECT_EQ(late.inputs, plan[k]) << k;
     drive.drive(late.inputs, prepares);
   }
   const auto& in_time = drive.ask();
@@ -368,12 +366,12 @@ TEST_P(PassedDeadline, LeavesTheLastPlanAndIsNoFailure) {
   EXPECT_EQ(drive.controller->fallbacks(), 0);
 }
 
-TEST_P(PassedDeadline, AtTheFirstSampleLetsTheVehicleGoStraightAhead) {
+TEST_P(PassedDeadline, AtTheFirstSampleLeavesTimeForOneIteration) {
   Drive drive;
   const auto late = drive.controller->control(drive.now, Clock::time_point::min());
   EXPECT_EQ(late.report.status, Status::deadline);
-  const double* straight = drive.controller->problem().input_reference(0);
-  EXPECT_EQ(late.inputs, std::vector<double>(straight, straight + 2));
+  EXPECT_EQ(late.report.iterations, 1);
+  EXPECT_FALSE(late.fallback);
   if (GetParam()) drive.controller->prepare();
   EXPECT_FALSE(drive.ask().fallback);
   EXPECT_TRUE(drive.is_as_the_other());

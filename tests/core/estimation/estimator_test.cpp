@@ -359,14 +359,17 @@ TEST_F(Timeline, BeyondTheNewestNodeItIsIntegrated) {
   measure(0.0, 1.0);
   input(0.1, 2.0);
   const double from[] = {1.0, 0.0};
-  double expected[2];
-  const double mean = (0.1 * 0.0 + 0.2 * 2.0) / 0.3, duration = 0.3;
+  double middle[2], expected[2];
+  const double first_mean = (0.1 * 0.0 + 0.05 * 2.0) / 0.15, second_mean = 2.0, duration = 0.15;
   Model::Intervals request;
   request.count = 1;
   request.states = from;
-  request.inputs = &mean;
+  request.inputs = &first_mean;
   request.durations = &duration;
-  request.substeps = 2;
+  request.next_states = middle;
+  recorder->model().integrate(request);
+  request.states = middle;
+  request.inputs = &second_mean;
   request.next_states = expected;
   recorder->model().integrate(request);
   const Estimate& ahead = estimator.estimate(0.3);
@@ -378,6 +381,84 @@ TEST_F(Timeline, BeyondTheNewestNodeItIsIntegrated) {
   EXPECT_FALSE(estimator.estimate(0.0).predicted);
   EXPECT_EQ(recorder->nodes.size(), 1u);
   EXPECT_TRUE(estimator.estimate(1e300).state.allFinite());
+}
+
+/// A prediction knows what was measured of the inputs at each of its parts.
+TEST_F(Timeline, AcrossASilenceInputsKeepTheirTimes) {
+  input(0.0, 0.0);
+  measure(0.0, 0.0);
+  input(0.2, 1.0);
+  input(0.4, 0.0);
+  // An impulse moves the trolley the farther the earlier it comes.
+  const double early = estimator.estimate(2.0).state[0];
+  estimator = make({.longest_interval = 0.2});
+  input(0.0, 0.0);
+  measure(0.0, 0.0);
+  input(1.6, 1.0);
+  input(1.8, 0.0);
+  EXPECT_GT(early - estimator.estimate(2.0).state[0], 1e-3);
+}
+
+/// An estimator that is always late keeps up, and says that it is late.
+TEST_F(Timeline, WhatADeadlineLeavesNoTimeForWaits) {
+  constexpr int rows = 60;
+  const auto push_all = [&] {
+    for (int k = 0; k < rows; ++k) measure(0.2 * k, k);
+  };
+  push_all();
+  estimator.estimate(0.2 * rows);
+  const std::vector<double> expected = durations();
+  estimator = make({.longest_interval = 0.2});
+  push_all();
+  const Clock::time_point past = Clock::now() - std::chrono::seconds(1);
+  std::size_t calls = 0, nodes = 0;
+  for (; estimator.estimate(0.2 * rows, past).report.status == Status::deadline && calls < rows; ++calls) {
+    EXPECT_GT(recorder->nodes.size(), nodes);
+    EXPECT_LE(recorder->nodes.size(), nodes + 4);
+    nodes = recorder->nodes.size();
+  }
+  EXPECT_GT(calls, 10u);
+  EXPECT_EQ(durations(), expected);
+}
+
+/// A gap whose nodes are not all made yet is not begun anew; a measurement within the rest of it divides it anew.
+TEST_F(Timeline, AGapIsGoneThroughInPieces) {
+  constexpr double end = 40.0;
+  const Clock::time_point past = Clock::now() - std::chrono::seconds(1);
+  measure(0.0, 1.0);
+  estimator.estimate(0.0);
+  measure(end, 2.0);
+  int calls = 0;
+  while (estimator.estimate(end, past).report.status == Status::deadline && calls < 300) ++calls;
+  EXPECT_LT(calls, 200);
+  EXPECT_EQ(recorder->nodes.size(), 201u);
+  for (std::size_t i = 1; i < recorder->nodes.size(); ++i) EXPECT_NEAR(recorder->nodes[i].duration, 0.2, 1e-9);
+  measure(2.0 * end, 3.0);
+  estimator.estimate(2.0 * end, past);
+  measure(end + 20.1, 2.5);
+  while (estimator.estimate(2.0 * end, past).report.status == Status::deadline && calls < 600) ++calls;
+  EXPECT_LT(calls, 400);
+  double time = 0.0;
+  bool is_used = false;
+  for (const auto& node : recorder->nodes) {
+    time += node.duration;
+    is_used = is_used || (std::abs(time - end - 20.1) < 1e-9 && node.outputs[0] == 2.5);
+    for (std::size_t k = 0; k < node.times.size(); ++k) is_used = is_used || node.between[2 * k] == 2.5;
+  }
+  EXPECT_NEAR(time, 2.0 * end, 1e-9);
+  EXPECT_TRUE(is_used);
+}
+
+/// A late measurement that comes at each call does not keep a late estimator where it is.
+TEST_F(Timeline, LateMeasurementsAndDeadlinesTogetherDoNotStopIt) {
+  const Clock::time_point past = Clock::now() - std::chrono::seconds(1);
+  for (int k = 0; k < 100; ++k) {
+    measure(0.2 * k, k);
+    if (k > 4) measure(0.2 * (k - 4), nan, k - 4);
+    estimator.estimate(0.2 * k, past);
+  }
+  EXPECT_GE(recorder->nodes.size(), 95u);
+  EXPECT_EQ(estimator.counts().dropped, 0);
 }
 
 TEST_F(Timeline, BuffersThatAreFullLoseTheirOldest) {

@@ -172,5 +172,23 @@ TEST_P(SensorFaults, WhileNothingComesTheCovarianceGrows) {
               });
 }
 
+/// Nothing is said, nothing is asked, and then there is never any time.
+TEST_P(SensorFaults, AnEstimatorThatIsAlwaysLateComesBackFromASilence) {
+  const Fault fault{.spoil =
+                        [](Delivery& d) {
+                          d.has_outputs = d.has_inputs = false;
+                          d.asked = std::numeric_limits<double>::quiet_NaN();
+                        },
+                    .length = 100,
+                    .is_hurried = true};
+  for (int seed = 1; seed <= seeds; ++seed) {
+    SCOPED_TRACE(seed);
+    const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed));
+    EXPECT_TRUE(episode.is_finite);
+    EXPECT_LE(episode.samples_to_recover(usual_error), 80);
+    EXPECT_LE(episode.samples_to_ok(), 100);
+  }
+}
+
 }  // namespace sensor_watch_test
 }  // namespace rhec

@@ -275,7 +275,9 @@ TEST_P(Behaviour, StopsAtADeadlineThatHasPassed) {
     const Assessment assessed =
         solve_and_assess(*solver, *of.ocp, of.guess, tolerance_, Clock::now() - std::chrono::seconds(1));
     EXPECT_LT(Clock::now() - start, promptly) << name;
-    EXPECT_EQ(assessed.report.status, Status::deadline) << name << ": " << name_of(assessed.report.status);
+    // One iteration may be made all the same, and may be enough.
+    const Status status = assessed.report.status;
+    EXPECT_TRUE(status == Status::deadline || status == Status::solved) << name << ": " << name_of(status);
     for (const std::string& complaint : assessed.complaints) ADD_FAILURE() << name << ": " << complaint;
     expect_right(*solver, of, "after a deadline");
   }

@@ -47,7 +47,8 @@ class RHEC_EXPORT Estimator {
 
   /// The estimate at a time [s], from all that was pushed with stamps up to it. Beyond the newest node it is integrated
   /// with the newest inputs; for an earlier or undefined time it is the newest node's. Before the first measurement it
-  /// is empty (see `has_started`).
+  /// is empty (see `has_started`). What the deadline leaves no time for waits for the next call: the estimate is then
+  /// predicted from an earlier node, and its report says `deadline`.
   const Estimate& estimate(double time, Clock::time_point deadline = Clock::time_point::max()) noexcept;
   bool has_started() const noexcept { return grid_.count() > 0; }
 
@@ -89,17 +90,18 @@ class RHEC_EXPORT Estimator {
   void push_judged(double time, const double* outputs) noexcept;
   double place_on_timeline(double stamp, int source) noexcept;
   double place_on_timeline(double stamp, const double* outputs) noexcept;
-  void judge_waiting(double until) noexcept;
-  SensorWatch::Finding judge(double time, double* outputs) noexcept;
+  bool judge_waiting(double until, Clock::time_point deadline) noexcept;
+  SensorWatch::Finding judge(double time, double* outputs, Clock::time_point deadline) noexcept;
   int inputs_source() const noexcept { return static_cast<int>(silent_.size()); }
   double longest_silence(int source) const noexcept;
   template <class Function>
-  void through_unknown_motion(double from, double to, const Function& advance) noexcept;
+  void through_motion(double from, double to, Clock::time_point deadline, const Function& advance) noexcept;
+  void guess_input(double begin, double end) noexcept;
   void assess(Estimate& estimate, double time) noexcept;
   void rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
-  void take_in(double until) noexcept;
+  bool take_in(double until, Clock::time_point deadline) noexcept;
   void add_node() noexcept;
-  void predict_to(double time) noexcept;
+  void predict_to(double time, Clock::time_point deadline) noexcept;
   void check_integration() noexcept;
   void clear_estimates() noexcept;
 
@@ -118,6 +120,7 @@ class RHEC_EXPORT Estimator {
   std::unique_ptr<Clocks> clocks_;        ///< of the sensors, and last of the inputs
   std::unique_ptr<StampedRows> waiting_;  ///< measurements that are not judged yet
   double watched_ = 0.0;                  ///< time of the last sample that was judged
+  double unknown_since_ = 0.0;            ///< begin of the motion that is gone through
   std::vector<double> merged_, input_sigmas_;
   std::vector<std::uint8_t> silent_;
 };

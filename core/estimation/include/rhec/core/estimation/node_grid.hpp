@@ -42,9 +42,15 @@ class RHEC_EXPORT NodeGrid {
 
   /// How many of the newest nodes have to be taken back, at most `reach`, for what is stamped up to a time.
   int outdated(double until, int reach) const noexcept;
-  void take_back(int nodes) noexcept;
-  /// Makes the next node of what is stamped up to a time; false: there is none.
-  bool make_next(double until) noexcept;
+  /// Takes back so many of the newest nodes, for what is stamped up to a time.
+  void take_back(int nodes, double until) noexcept;
+  /// Whether a node follows of what is stamped up to a time; makes it.
+  bool has_next(double until) const noexcept {
+    return next_row() < measurements_.first_after(until + setup_.tolerance);
+  }
+  void make_next(double until) noexcept;
+  /// Moves the newest node on to a time, as if nothing had been measured up to there.
+  void skip_to(double time) noexcept;
   /// Drops the rows that no node needs any more if so many of the newest nodes can be taken back.
   void settle(int reach) noexcept;
   void clear() noexcept;
@@ -66,10 +72,14 @@ class RHEC_EXPORT NodeGrid {
   struct Node {
     double time = 0.0, grid = 0.0;  ///< where it lies, and the last place of the grid up to there
     Kind kind = Kind::grid;
-    int parts = 0;  ///< of a gap that is divided, those still to come
+    int parts = 0;         ///< of a gap that is divided, those still to come
+    double gap_end = 0.0;  ///< and where it ends
   };
   const Node& node(std::int64_t number) const noexcept {
     return nodes_[static_cast<std::size_t>(number) % nodes_.size()];
+  }
+  std::size_t next_row() const noexcept {
+    return count_ > 0 ? measurements_.first_after(time() + setup_.tolerance) : 0;
   }
   std::int64_t oldest() const noexcept;
   std::int64_t last_before(double time) const noexcept;

@@ -54,8 +54,8 @@ class RHEC_EXPORT SensorWatch {
 
   /// Marks measured inputs that cannot be as missing (NaN).
   void clean_inputs(double* inputs) noexcept;
-  /// The time goes on by `duration` [s], with the mean input (n_u). `more_sigmas` (n_u, or null): nobody has said for
-  /// some time what the inputs are, and they may be off by as much.
+  /// The time goes on by `duration` [s], with the mean input (n_u); between two samples in parts, if it is long.
+  /// `more_sigmas` (n_u, or null): nobody has said for some time what the inputs are, and they may be off by as much.
   void advance(double duration, const double* inputs, const double* more_sigmas = nullptr) noexcept;
 
   /// What an estimator has to do beyond using what is left of the outputs.
@@ -109,6 +109,7 @@ class RHEC_EXPORT SensorWatch {
   };
   bool admits(std::size_t sensor, const Innovation& innovation) noexcept;
   void find_stuck(double* outputs) noexcept;
+  void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept;
   void start_search(const double* outputs) noexcept;
   void search_from(WalkingFilter& filter) noexcept;

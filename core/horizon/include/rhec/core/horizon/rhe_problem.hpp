@@ -151,7 +151,16 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void gather_between(int interval, int place, const Iterate& iterate, BetweenBatch& batch) const noexcept;
   void evaluate_batch(BetweenBatch& batch, bool with_gradients) const noexcept;
   double add_batch(BetweenBatch& batch, Hessian hessian, const CostView* view, double* stage_costs) const noexcept;
-  void turn_ramp(BetweenBatch& batch, int i, bool exact) const noexcept;
+  std::vector<double> points_of_interval() const;
+  template <class Flush>
+  void gather_interval(int interval, const Iterate& iterate, BetweenBatch& batch, bool with_gradients,
+                       const Flush& flush) const noexcept;
+  void write_part(int interval, double share, const Iterate& iterate, const BetweenBatch& batch, double* z,
+                  double* data) const noexcept;
+  void integrate_points(int interval, const Iterate& iterate, BetweenBatch& batch, bool with_gradients) const noexcept;
+  void interpolate(BetweenBatch& batch, bool with_gradients) const noexcept;
+  void turn_ramp(const BetweenBatch& batch, double share, double* J, double* H) const noexcept;
+  void add_curvature_of_dynamics(BetweenBatch& batch, const CostView& view) const noexcept;
   void add_row(BetweenBatch& batch, int interval, const double* gradients, const double* weights, const double* pulls,
                const CostView& view) const noexcept;
   double weigh(const double* measured, const double* predicted, double* difference, double* weights, double* pulls,
@@ -177,6 +186,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   std::vector<int> robust_group_;                 ///< per output, or -1
   AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
   std::vector<BetweenNodes> between_;             ///< by interval
+  std::vector<double> between_points_;            ///< shares of an interval, 0 first: see rhe_between_states.cpp
   AlignedDoubles outputs_;                        ///< one row per node, NaN where nothing was measured
   AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period of angles, else 0
   AlignedDoubles measured_inputs_, input_weights_;  ///< rows as in Iterate; NaN and 0 outside of the inputs

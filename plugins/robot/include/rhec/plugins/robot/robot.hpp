@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -56,6 +57,11 @@ class RHEC_EXPORT Robot {
   PluginChoice solver_choice(std::string_view kind) const;
   PluginChoice blocking_choice(int parameter) const { return blocking_.choice(parameter); }
   double step() const noexcept { return context_->step; }
+  /// For the calls of a sample that begins now, in a loop that has to keep pace with a vehicle: one step from now.
+  /// Nothing has a deadline of itself, so that the results of simulations do not depend on the computer's load.
+  Clock::time_point deadline() const {
+    return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(step()));
+  }
   const EstimatorOptions& estimator_options() const noexcept { return estimator_.options(); }
   /// The model as the estimator integrates it: `model()`, or an ImplicitModel of it.
   const std::shared_ptr<const Model>& estimator_model() const noexcept { return estimator_.model(); }
