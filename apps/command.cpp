@@ -77,8 +77,8 @@ Argument Command::add_optional(const std::string& name, std::optional<std::strin
   return Argument(app_->add_option_function<std::vector<std::string>>(name, take, meaning)->expected(0, 1));
 }
 
-Program::Program(const std::string& about, const std::string& examples)
-    : app_(std::make_unique<CLI::App>(about, "rhec")) {
+Program::Program(const std::string& about, const std::string& examples, std::string first_steps)
+    : app_(std::make_unique<CLI::App>(about, "rhec")), first_steps_(std::move(first_steps)) {
   app_->set_version_flag("--version", "rhec " RHEC_PROJECT_VERSION);
   app_->require_subcommand(1);
   app_->footer(examples);
@@ -97,7 +97,6 @@ std::string Program::wrong_command(int count, char** words) const {
   for (const CLI::App* command : std::as_const(*app_).get_subcommands([](const CLI::App*) { return true; }))
     commands.push_back(command->get_name());
   const std::string expected = fmt::format("expected one of {}; see 'rhec --help'", fmt::join(commands, ", "));
-  if (count < 2) return "no command; " + expected;
   const std::string word = words[1];
   if (word == "-h" || word == "--help" || word == "--version") return {};
   if (word.starts_with('-')) return fmt::format("unknown option '{}'; {}", word, expected);
@@ -112,6 +111,10 @@ int Program::run(int count, char** words) {
     fmt::print(stderr, "rhec: error: {}\n", what);
     return exit_usage;
   };
+  if (count < 2) {
+    fmt::print("{}", first_steps_);
+    return exit_fine;
+  }
   if (const std::string problem = wrong_command(count, words); !problem.empty()) return usage_error(problem);
   try {
     app_->parse(count, words);

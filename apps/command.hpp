@@ -64,7 +64,8 @@ class Command {
 /// The program: one of its commands is called.
 class Program {
  public:
-  Program(const std::string& about, const std::string& examples);
+  /// `first_steps` is what is printed where there is not even a command.
+  Program(const std::string& about, const std::string& examples, std::string first_steps);
   ~Program();
 
   /// `notes` follow the help of the command's arguments.
@@ -74,10 +75,11 @@ class Program {
   int run(int count, char** words);
 
  private:
-  /// An error message if the command is missing or unknown; otherwise empty.
+  /// An error message if the command is unknown; otherwise empty.
   std::string wrong_command(int count, char** words) const;
 
   std::unique_ptr<CLI::App> app_;
+  std::string first_steps_;
   Action chosen_;
 };
 

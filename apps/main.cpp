@@ -66,8 +66,34 @@ constexpr const char* examples =
     "  rhec map field.sqlite --geotiff out/geotiff\n\n"
     "'rhec COMMAND --help' says more of each command.";
 
+/// The folder of the scenarios that come with the program, as one would type it: that of the installation, if it runs
+/// from there, or of the source tree.
+std::string scenarios() {
+  std::error_code none;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", none);
+  const std::filesystem::path installed = program.parent_path().parent_path() / "share/rhec/scenarios";
+  return std::filesystem::is_directory(installed, none) ? installed.string() : "scenarios";
+}
+
+std::string first_steps() {
+  return fmt::format(
+      "{0}\n\n"
+      "A robot drives a figure of eight over slipping ground, estimates its slip, and steers with that:\n"
+      "  rhec run {1}/figure8.yaml --out figure8        then look at figure8/run.svg\n"
+      "The same as a page to look into, and with another estimator, at another speed:\n"
+      "  rhec report figure8 -o figure8.html\n"
+      "  rhec run {1}/figure8.yaml --set estimator.name=ekf --set speed=5\n"
+      "Your own vehicle: its equations in a file, checked before its first drive:\n"
+      "  rhec check bicycle_slip                        what a check says\n"
+      "  rhec model --help                              equations become a plugin\n"
+      "Your own log:\n"
+      "  rhec estimate --help\n\n"
+      "'rhec --help' lists all commands, 'rhec options' every key of a scenario, 'rhec plugins' what is installed.\n",
+      about, scenarios());
+}
+
 int run(int count, char** words) {
-  Program program(about, examples);
+  Program program(about, examples, first_steps());
   add_run(program);
   add_estimate(program);
   add_smooth(program);

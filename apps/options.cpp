@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/config/option_values.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
 #include "rhec/sim/loop/scenario.hpp"
@@ -79,19 +80,41 @@ solvers that are backed by another program, since not every installation has the
 `rhec plugins NAME` the options of one, with the variables of a model.
 )";
 
+std::string full_name(const OptionSection& section, const std::string& key) {
+  return section.name.empty() ? key : section.name + "." + key;
+}
+
+/// A section, or the row of a key: by its full name, or by its own where it stands in several sections. Throws Error,
+/// with the nearest name, if there is none.
+std::string section_or_key(const std::vector<OptionSection>& sections, const std::string& word) {
+  std::string text;
+  std::vector<std::string> names, keys;
+  for (const OptionSection& section : sections) {
+    if (!section.name.empty() && section.name == word) return section_text(section);
+    if (!section.name.empty()) names.push_back(section.name);
+    std::vector<OptionRow> found;
+    for (const OptionRow& row : section.rows) {
+      keys.push_back(full_name(section, row.name));
+      if (word == row.name || word == keys.back()) found.push_back(row);
+    }
+    if (!found.empty())
+      text += (text.empty() ? "" : "\n") + table_of(found, section.name.empty() ? "" : section.name + ".");
+  }
+  if (!text.empty()) return text;
+  std::vector<std::string> known = names;
+  known.insert(known.end(), keys.begin(), keys.end());
+  const std::string near = nearest(word, known);
+  throw Error(fmt::format("there is no section and no key '{}'; {}", word,
+                          near.empty() ? fmt::format("expected a key or one of the sections {}", fmt::join(names, ", "))
+                                       : fmt::format("did you mean '{}'?", near)));
+}
+
 int show(const OptionsArguments& arguments) {
   std::vector<OptionSection> sections = sim::scenario_sections();
   for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
   if (!arguments.section.empty()) {
-    std::vector<std::string> known;
-    for (const OptionSection& section : sections) {
-      if (section.name == arguments.section) {
-        fmt::print("{}", section_text(section));
-        return exit_fine;
-      }
-      if (!section.name.empty()) known.push_back(section.name);
-    }
-    throw Error(fmt::format("there is no section '{}'; expected one of {}", arguments.section, fmt::join(known, ", ")));
+    fmt::print("{}", section_or_key(sections, arguments.section));
+    return exit_fine;
   }
   const Host host = examined_host(arguments.plugin_path);
   std::string text = introduction;
@@ -115,9 +138,10 @@ void add_options(Program& program) {
   Command command = program.add("options", "Lists every key of a scenario with its default, as Markdown.",
                                 "Examples:\n"
                                 "  rhec options\n"
-                                "  rhec options estimator",
+                                "  rhec options estimator\n"
+                                "  rhec options estimator.horizon",
                                 [arguments] { return show(*arguments); });
-  command.add("section", arguments->section, "show this section alone").value("SECTION");
+  command.add("section", arguments->section, "show this section or key alone").value("SECTION");
   add_plugin_path(command, arguments->plugin_path);
 }
 

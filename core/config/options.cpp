@@ -54,6 +54,10 @@ std::string nearest(std::string_view word, const std::vector<std::string>& candi
       best = candidate;
     }
   }
+  if (!best.empty() || word.size() < 3) return best;
+  // Or it is a part of a longer name: the shortest one then.
+  for (const std::string& candidate : candidates)
+    if (candidate.find(word) != std::string::npos && (best.empty() || candidate.size() < best.size())) best = candidate;
   return best;
 }
 

@@ -307,7 +307,19 @@ class Test(cli.Findings):
         for words in (["plugins"], ["options"], ["run", FIGURE8], ["solve", "-", "--solver", "gn_rti"]):
             self.refused(f"{words[0]} --plugin-path", self.rhec(*words, "--plugin-path", nowhere), ERROR,
                          f"--plugin-path {nowhere}", "no such directory")
-        self.refused("options SECTION", self.rhec("options", "estimater"), ERROR, "estimater")
+        self.refused("options SECTION", self.rhec("options", "estimater"), ERROR, "did you mean 'estimator'?")
+        self.refused("options KEY", self.rhec("options", "estimator.horizn"), ERROR, "did you mean 'estimator.horizon'?")
+        for word, row in (("estimator.horizon", "`estimator.horizon`"), ("speed", "`speed`"), ("horizon", "`controller.horizon`")):
+            result = self.rhec("options", word)
+            self.expect(result.returncode == 0 and row in result.stdout, f"options {word}", result.stdout + result.stderr)
+
+    def first_steps(self):
+        result = self.rhec()
+        self.expect(result.returncode == 0 and "rhec run" in result.stdout, "no arguments", result.stdout + result.stderr)
+        for line in result.stdout.splitlines():
+            if line.startswith("  rhec") and "--help" in line:
+                words = line.split()[1:3]
+                self.expect(self.rhec(*words).returncode == 0, "no arguments", line)
 
     def outputs(self):
         with open("/dev/full", "w") as full:
@@ -371,7 +383,7 @@ class Test(cli.Findings):
 
     def usage(self):
         for words, text in [
-            ([], "no command"), (["rnu"], "did you mean 'run'?"), (["frobnicate"], "unknown command 'frobnicate'"),
+            (["rnu"], "did you mean 'run'?"), (["frobnicate"], "unknown command 'frobnicate'"),
             (["run"], "scenario is required"), (["run", FIGURE8, "--bogus"], "--bogus"),
             (["run", FIGURE8, "two"], "two"), (["run", FIGURE8, "--out"], "--out"), (["run", FIGURE8, "--set"], "--set"),
             (["solve", FIGURE8], "--solver is required"), (["solve", "--solver", "gn_rti"], "problems is required"),
@@ -393,7 +405,7 @@ class Test(cli.Findings):
 def main():
     with tempfile.TemporaryDirectory(prefix="rhec-cli-") as work:
         test = Test(Program(sys.argv[1]), pathlib.Path(work).resolve())
-        for part in (test.settings, test.files, test.plugins, test.outputs, test.problems, test.usage, test.lost):
+        for part in (test.settings, test.files, test.plugins, test.outputs, test.problems, test.usage, test.first_steps, test.lost):
             part()
         test.tell()
 

@@ -18,6 +18,7 @@ BAD = [
     (["check", "bicycle_slip", "--speed", "-1"], USAGE, "--speed"),
     (["check", "bicycle_slip", "--seed", "-1"], USAGE, "--seed"),
     (["check", "bicycle_slpi"], ERROR, "bicycle_slip"),
+    (["check", "bicycle"], ERROR, "did you mean 'bicycle_slip'"),
     (["check", "gn_rti"], ERROR, "gn_rti"),
     (["check", "bicycle_slip", *assignments("wheelbse=1")], ERROR, "did you mean 'wheelbase'"),
     (["check", "bicycle_slip", *assignments("wheelbase=0")], ERROR, "greater than 0"),

@@ -249,5 +249,13 @@ TEST(Nearest, FindsSlipsOfTheHand) {
   EXPECT_EQ(nearest("size", {}), "");
 }
 
+TEST(Nearest, FindsNamesByAPartOfThem) {
+  const std::vector<std::string> words = {"bicycle_sideslip", "bicycle_slip", "unicycle_traction"};
+  EXPECT_EQ(nearest("bicycle", words), "bicycle_slip");
+  EXPECT_EQ(nearest("traction", words), "unicycle_traction");
+  EXPECT_EQ(nearest("tricycle", words), "");
+  EXPECT_EQ(nearest("cy", words), "");
+}
+
 }  // namespace options_test
 }  // namespace rhec
