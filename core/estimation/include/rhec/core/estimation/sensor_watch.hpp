@@ -11,6 +11,7 @@
 
 namespace rhec {
 
+class HeadingSearch;
 class WalkingFilter;
 
 /// Judges measurements before an estimator uses them (docs/health.md).
@@ -37,10 +38,14 @@ class RHEC_EXPORT SensorWatch {
     bool has_ramps = false;                ///< as in FilterEstimation::Setup
     double step = 0.2;                     ///< [s]
     int substeps = 1;                      ///< of a step
-    double gate = 5.0;           ///< innovations less probable than this many standard deviations are rejected
-    int proof = 11;              ///< samples that a sensor must have moved for before the estimate follows
-    int slip_proof = 3;          ///< samples that a jump of slip must explain
-    int calm = 5;                ///< samples without a finding after which health is ok again
+    double gate = 5.0;   ///< innovations less probable than this many standard deviations are rejected
+    int proof = 11;      ///< samples that a sensor must have moved for before the estimate follows
+    int slip_proof = 2;  ///< samples that a jump of slip must explain
+    int gap_proof = 3;   ///< like `proof`, of a sensor that had said nothing for some time
+    int calm = 5;        ///< samples without a finding after which health is ok again
+    /// The same of a sensor that the estimate has followed: one that comes back as a transient does is then still
+    /// doubted.
+    int calm_after_moving = 12;
     double lost_position = 3.0;  ///< standard deviation above which the vehicle is lost [m]
     double lost_heading = 0.5;   ///< likewise [rad]
   };
@@ -111,7 +116,8 @@ class RHEC_EXPORT SensorWatch {
   void find_stuck(double* outputs) noexcept;
   bool is_searching() const noexcept;
   void start_search(const double* outputs) noexcept;
-  void search_from(WalkingFilter& filter) noexcept;
+  void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
+  void think_again() noexcept;
   Finding search_heading(const double* outputs) noexcept;
   void start(Hypothesis& hypothesis) noexcept;
   void start_moved() noexcept;
@@ -120,6 +126,7 @@ class RHEC_EXPORT SensorWatch {
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis& hypothesis) noexcept;
   void hold_back(double time, const double* outputs) noexcept;
+  void acquit(const double* outputs) noexcept;
   void end_dispute() noexcept;
   bool may_follow() const noexcept;
   void test_inputs(const double* outputs) noexcept;
