@@ -25,6 +25,8 @@ class HeadingSearch {
   bool update(const std::vector<Sensor>& sensors, const double* outputs) noexcept;
   /// The filter that explains the measurements best.
   const WalkingFilter& best() const noexcept { return headings_[best_].filter; }
+  /// Samples in a row that it has explained.
+  int explained() const noexcept { return headings_[best_].explained; }
 
  private:
   struct Heading {

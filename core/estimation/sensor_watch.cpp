@@ -33,8 +33,16 @@ constexpr int suspect_after = 3, passes_of_suspects = 2;
 constexpr double close_gate = 3.0;
 // Silence after which a sensor that disagrees is more likely right than the estimate [s].
 constexpr double longest_gap = 1.0;
+// A real receiver's errors may be far larger than its noise says, and not Gaussian at all: a gate is as much wider as
+// the sensor's squared innovations have been over some fifty samples, of which none counts more than this many times
+// what was expected. A transient of up to ten samples does not open it to itself.
+constexpr double most_excess = 100.0, excess_memory = 50.0;
 // Samples of a dispute within which slip may have jumped.
 constexpr int fresh = 2;
+// A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
+constexpr int informed = 4;
+// A search that has not explained anything for so long begins anew.
+constexpr int stale = 3;
 
 WalkingFilter::Setup filter_setup(const SensorWatch::Setup& setup) {
   return {.noise = setup.noise,
@@ -61,6 +69,7 @@ struct SensorWatch::Hypothesis {
   WalkingFilter filter;
   bool is_active = false;
   int explained = 0, refuted = 0;
+  bool is_informed = false;  ///< it has explained much before it was refuted
 };
 
 /// What was known after the last samples, and the motion since then.
@@ -79,9 +88,13 @@ struct SensorWatch::Memory {
   Eigen::MatrixXd before_covariance;
   double duration = 0.0;
   bool has_advanced = false;  ///< since the last samples
+  bool was_calm = true;       ///< health was ok when the dispute began
   StuckValues stuck;
   std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
   std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
+  /// The same, of a heading that may be wrong, while it is not known who is.
+  std::unique_ptr<HeadingSearch> second_thought;
+  int in_vain = 0;  ///< samples in a row that it has not explained
 };
 
 SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
@@ -105,7 +118,8 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   memory_->stuck = StuckValues(setup_.noise.output_variances);
   memory_->trial = std::make_unique<WalkingFilter>(model, filter_setup(setup_));
   if (model->description().roles.heading >= 0)
-    memory_->search = std::make_unique<HeadingSearch>(model, filter_setup(setup_), close_gate);
+    for (auto* each : {&memory_->search, &memory_->second_thought})
+      *each = std::make_unique<HeadingSearch>(model, filter_setup(setup_), close_gate);
   const Eigen::Index n = own_->filter.mean().size();
   memory_->before_mean = Eigen::VectorXd::Zero(n);
   memory_->before_covariance = Eigen::MatrixXd::Zero(n, n);
@@ -134,6 +148,7 @@ void SensorWatch::reset() noexcept {
   findings_.assign(sensors_.size(), 0);
   quiet_.assign(sensors_.size(), 0);
   records_.assign(sensors_.size(), {});
+  excesses_.assign(sensors_.size(), 1.0);
   heard_.assign(sensors_.size(), unknown);
   is_unobserved_ = false;
   if (memory_->search) memory_->search->cancel();
@@ -204,6 +219,8 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
   if (!is_disputed_) return;
   if (slip_->is_active) slip_->filter.predict(inputs, duration);
   if (moved_->is_active) moved_->filter.predict(inputs, duration);
+  if (memory_->second_thought && memory_->second_thought->is_active())
+    memory_->second_thought->predict(inputs, duration);
   if (blind_->is_active && !is_blind_) blind_->filter.predict(believed_input_.data(), duration);
 }
 
@@ -284,7 +301,8 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
     is_calm = is_calm && findings_[s] == 0;
     quiet_[s] = findings_[s] ? 0 : quiet_[s] + 1;
     if (findings_[s]) states_[s].reasons = findings_[s] | (states_[s].reasons & reason::moved);
-    if (quiet_[s] >= setup_.calm) states_[s].reasons = 0;
+    const bool has_moved = (states_[s].reasons & reason::moved) != 0;
+    if (quiet_[s] >= (has_moved ? setup_.calm_after_moving : setup_.calm)) states_[s].reasons = 0;
   }
   calm_samples_ = is_calm ? calm_samples_ + 1 : 0;
   if (input_findings_) inputs_.reasons = input_findings_;
@@ -298,7 +316,10 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
 bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexcept {
   Record& record = records_[sensor];
   const bool is_suspect = record.failures >= suspect_after;
+  const auto degrees = static_cast<double>(innovation.value.size());
   const bool passes = innovation.nis <= limit(sensor, innovation.value.size());
+  double& excess = excesses_[sensor];
+  excess += (std::min(innovation.nis / degrees, most_excess) - excess) / excess_memory;
   if (!passes) {
     if (record.failures == 0) record.after_gap = innovation.time - heard_[sensor] > longest_gap;
     ++record.failures;
@@ -329,15 +350,15 @@ void SensorWatch::start_search(const double* outputs) noexcept {
   const Eigen::Index np = filter.model().parameter_count(), nx = filter.mean().size() - np;
   filter.mean().tail(np) = memory_->before_mean.tail(np);
   for (Eigen::Index j = nx; j < nx + np; ++j) filter.covariance()(j, j) = memory_->before_covariance(j, j);
-  search_from(filter);
+  search_from(filter, *memory_->search);
 }
 
 /// Starts a search from what a filter knows of each variable by itself.
-void SensorWatch::search_from(WalkingFilter& filter) noexcept {
+void SensorWatch::search_from(WalkingFilter& filter, HeadingSearch& search) noexcept {
   for (Eigen::Index c = 0; c < filter.mean().size(); ++c)
     for (Eigen::Index r = 0; r < filter.mean().size(); ++r)
       if (r != c) filter.covariance()(r, c) = 0.0;
-  memory_->search->start(filter.mean(), filter.covariance());
+  search.start(filter.mean(), filter.covariance());
 }
 
 /// All measurements are used: there is nothing that they could be judged by. Found or not, the best heading so far is
@@ -352,7 +373,7 @@ SensorWatch::Finding SensorWatch::search_heading(const double* outputs) noexcept
 /// Largest nu' S^-1 nu of a sensor.
 double SensorWatch::limit(std::size_t sensor, Eigen::Index degrees) const noexcept {
   const bool is_suspect = records_[sensor].failures >= suspect_after;
-  return (is_suspect ? close_limits_ : limits_)[static_cast<std::size_t>(degrees)];
+  return std::max(1.0, excesses_[sensor]) * (is_suspect ? close_limits_ : limits_)[static_cast<std::size_t>(degrees)];
 }
 
 /// Takes out sensors that give the same values again and again.
@@ -382,14 +403,18 @@ void SensorWatch::start(Hypothesis& hypothesis) noexcept {
   }
 }
 
-/// The states that disputed sensors see are known anew: the position if it is among them, else all of them.
+/// The states that disputed sensors see are known anew: the position if it is among them, else all of them. One that
+/// has followed the sensor for some time, until it jumped again, knows more of heading and slip than the estimate,
+/// which has gone on without.
 void SensorWatch::start_moved() noexcept {
   WalkingFilter& filter = moved_->filter;
   moved_->is_active = true;
   moved_->explained = 0;
-  filter.mean() = own_->filter.mean();
-  filter.covariance() = own_->filter.covariance();
   const ModelDescription& about = filter.model().description();
+  if (!moved_->is_informed) {
+    filter.mean() = own_->filter.mean();
+    filter.covariance() = own_->filter.covariance();
+  }
   const auto is_position = [&](int i) { return i == about.roles.position_x || i == about.roles.position_y; };
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     if (!(findings_[s] & reason::rejected)) continue;
@@ -419,6 +444,7 @@ bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
 
 void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
   if (!fits(hypothesis.filter, outputs)) {
+    hypothesis.is_informed = hypothesis.explained >= informed;
     hypothesis.is_active = false;
     hypothesis.explained = 0;
     ++hypothesis.refuted;
@@ -448,6 +474,7 @@ bool SensorWatch::may_follow() const noexcept {
 }
 
 SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
+  if (!is_disputed_) memory_->was_calm = calm_samples_ >= setup_.calm;
   is_disputed_ = true;
   ++disputed_samples_;
   const auto consider = [&](Hypothesis& hypothesis) {
@@ -459,6 +486,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   };
   consider(*slip_);
   consider(*moved_);
+  think_again();
   if (!is_blind_) consider(*blind_);
   // Slip that has jumped shows from the first sample on. Later the filter without the sensor knows so little that new
   // slip explains nearly anything.
@@ -466,6 +494,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   if (slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
     Finding finding = accept(*slip_);
     for (Record& record : records_) record = {};
+    acquit(outputs);
     finding.release = true;
     finding.rebase = false;
     return finding;
@@ -474,7 +503,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   bool after_gap = true;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
     if (findings_[s] & reason::rejected) after_gap = after_gap && records_[s].after_gap;
-  if (moved_->explained >= (after_gap ? setup_.slip_proof : setup_.proof) && may_follow()) {
+  if (moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) && may_follow()) {
     for (std::uint32_t& each : findings_)
       if (each & reason::rejected) each |= reason::moved;
     for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;
@@ -487,7 +516,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     moved_->filter.update(raw_.data());
     for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
       moved_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
-    search_from(moved_->filter);
+    search_from(moved_->filter, *memory_->search);
     for (Record& record : records_) record = {};
     return accept(*moved_);
   }
@@ -500,11 +529,58 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   return {};
 }
 
+/// What was held back, and what was rejected last, is right after all.
+void SensorWatch::acquit(const double* outputs) noexcept {
+  const auto take_back = [&](auto&& was_rejected) {
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      if (std::ranges::none_of(sensors_[s].outputs, was_rejected)) continue;
+      --states_[s].rejected;
+      ++states_[s].accepted;
+    }
+  };
+  for (int i = 0; i < held_count_; ++i) take_back([&](int j) { return !std::isnan(held_[i].outputs[j]); });
+  take_back([&](int j) { return std::isnan(outputs[j]) && !std::isnan(raw_[j]); });
+  for (std::uint32_t& each : findings_) each &= ~reason::rejected;
+  if (!memory_->was_calm) return;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    states_[s].reasons &= ~reason::rejected;
+    quiet_[s] = setup_.calm;
+  }
+  calm_samples_ = setup_.calm;
+}
+
 SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
   own_->filter.mean() = hypothesis.filter.mean();
   own_->filter.covariance() = hypothesis.filter.covariance();
   end_dispute();
   return {.release = false, .rebase = true};
+}
+
+/// Where a sensor that has moved does not explain what follows, the heading may be wrong, too, e.g. after a turn
+/// without a position. One that is found goes on as if the sensor had moved.
+void SensorWatch::think_again() noexcept {
+  if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= informed) return;
+  HeadingSearch& search = *memory_->second_thought;
+  if (search.is_active()) {
+    const bool is_found = search.update(sensors_, raw_.data());
+    memory_->in_vain = search.explained() > 0 ? 0 : memory_->in_vain + 1;
+    if (!is_found && memory_->in_vain < stale) return;
+    if (is_found) {
+      moved_->is_active = true;
+      moved_->explained = search.explained();
+      moved_->filter.mean() = search.best().mean();
+      moved_->filter.covariance() = search.best().covariance();
+      return;
+    }
+  }
+  start_moved();
+  moved_->filter.update(raw_.data());
+  WalkingFilter& trial = *memory_->trial;
+  trial.mean() = moved_->filter.mean();
+  trial.covariance() = moved_->filter.covariance();
+  search_from(trial, search);
+  moved_->explained = 1;
+  memory_->in_vain = 0;
 }
 
 /// Keeps what was rejected, in case it is right.
@@ -518,8 +594,9 @@ void SensorWatch::hold_back(double time, const double* outputs) noexcept {
 void SensorWatch::end_dispute() noexcept {
   is_disputed_ = false;
   disputed_samples_ = 0;
+  if (memory_->second_thought) memory_->second_thought->cancel();
   for (Hypothesis* each : {slip_.get(), moved_.get(), blind_.get()}) {
-    each->is_active = false;
+    each->is_active = each->is_informed = false;
     each->explained = each->refuted = 0;
   }
 }

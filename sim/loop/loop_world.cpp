@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-
-#include "rhec/core/base/infinity.hpp"
+#include <limits>
 
 namespace rhec::sim {
 namespace {
@@ -25,30 +24,24 @@ LoopWorld::LoopWorld(const Scenario& scenario, const SensorNoise& noise)
       is_plain_(schedule_.latencies().size() == 1 && !std::isfinite(schedule_.next_after(0.0))),
       outputs_(scenario.robot().model()->output_count()),
       row_(outputs_.size()),
+      added_(outputs_.size()),
       measured_(scenario.robot().model()->input_count()),
       given_(measured_.size()) {}
-
-void LoopWorld::deliver(double time, Estimator& estimator) {
-  const bool is_first = !has_moved_;
-  bool has_arrived = false;
-  deliveries_.deliver(is_first ? infinity : time, [&](double stamp, const std::vector<double>& outputs) {
-    estimator.push_measurement(stamp, outputs.data());
-    has_arrived = true;
-  });
-  if (is_first && !has_arrived) estimator.push_measurement(on_robots_clock(time), outputs_.data());
-}
 
 void LoopWorld::measure(double time, bool is_sample) {
   faults_.begin(time);
   const Sensors::Motion motion{actuators_.applied().data(), truth_.parameters().data()};
   sensors_.observe(truth_.state().data(), outputs_.data(), has_moved_ ? &motion : nullptr);
   schedule_.keep_due(time, is_sample, outputs_);
+  std::fill(added_.begin(), added_.end(), std::numeric_limits<double>::quiet_NaN());
   for (const double latency : schedule_.latencies()) {
     row_ = outputs_;
     schedule_.keep_latency(latency, row_);
     // A message of sensors that are due is sent, whatever a fault makes of it.
     if (!is_plain_ && !has_value(row_)) continue;
     faults_.change_outputs(row_.data());
+    for (std::size_t j = 0; j < row_.size(); ++j)
+      if (!std::isnan(row_[j])) added_[j] = row_[j] - outputs_[j];
     faults_.send(row_, latency, deliveries_);
   }
 }

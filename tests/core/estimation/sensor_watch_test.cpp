@@ -159,7 +159,43 @@ TEST_P(SensorFaults, SlipThatJumpsIsNoFault) {
   expect_each({.spoil = {}, .length = 20, .moved = 0.0, .slip = 0.35}, [](const Episode& episode) {
     EXPECT_EQ(episode.samples_to_recover(usual_error), 0);
     EXPECT_EQ(episode.counts.rebased, 0);
+    EXPECT_EQ(episode.counts.rejected, 0) << "what was held back was right, and is not counted";
+    std::ptrdiff_t doubted = 0;
+    for (const Episode::Sample& sample : episode.during) doubted += sample.health != HealthLevel::ok;
+    EXPECT_LE(doubted, 1) << "until the next sample confirms it";
   });
+}
+
+TEST_P(SensorFaults, APositionThatWasFollowedIsDoubtedForSomeTime) {
+  expect_each({.spoil = [](Delivery& d) { d.outputs[0] += 10.0; }, .length = 22}, [](const Episode& episode) {
+    EXPECT_GT(episode.during.back().error, 9.0) << "it cannot be told from one that has moved for good";
+    for (const Episode::Sample& sample : episode.during) EXPECT_NE(sample.health, HealthLevel::ok);
+    EXPECT_LE(episode.samples_to_recover(usual_error), 11);
+  });
+}
+
+/// Nobody sees where the vehicle is for two seconds, and then it heads elsewhere: as after a turn on ground that was
+/// not what it was taken for.
+TEST_P(SensorFaults, AHeadingThatIsWrongAfterAGapIsFound) {
+  constexpr int gap = 10;
+  for (const double angle : {1.5, -2.2, 3.0})
+    for (int seed = 1; seed <= seeds; ++seed) {
+      SCOPED_TRACE(angle * seed);
+      double x = 0.0, y = 0.0;
+      const auto turn = [&](Delivery& d) {
+        if (d.since == 0) x = d.outputs[0], y = d.outputs[1];
+        const double east = d.outputs[0] - x, north = d.outputs[1] - y;
+        d.outputs[0] = d.since < gap ? nan : x + std::cos(angle) * east - std::sin(angle) * north;
+        d.outputs[1] = d.since < gap ? nan : y + std::sin(angle) * east + std::cos(angle) * north;
+      };
+      const Episode episode =
+          drive_with_fault(vehicle, {.spoil = turn, .length = 60}, static_cast<std::uint64_t>(seed), 0);
+      EXPECT_TRUE(episode.is_finite);
+      EXPECT_NE(episode.during[gap].health, HealthLevel::ok);
+      EXPECT_EQ(episode.counts.rebased, 1);
+      for (std::size_t k = gap + 25; k < episode.during.size(); ++k)
+        EXPECT_EQ(episode.during[k].health, HealthLevel::ok) << k << ": " << episode.during[k].words;
+    }
 }
 
 TEST_P(SensorFaults, WhileNothingComesTheCovarianceGrows) {

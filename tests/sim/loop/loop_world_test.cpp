@@ -56,7 +56,7 @@ TEST(LoopWorld, SensorsMeasureAtTheirRatesAndArriveLate) {
   for (int k = 0; k < 20; ++k) {
     const double time = 0.2 * k;
     world.measure(time);
-    world.deliver(time, *estimator);
+    world.deliver(time, [&](double stamp, const double* outputs) { estimator->push_measurement(stamp, outputs); });
     estimator->estimate(world.on_robots_clock(time));
     world.drive(inputs, time, 0.2);
     estimator->push_input(time, world.measured_inputs(inputs).data());

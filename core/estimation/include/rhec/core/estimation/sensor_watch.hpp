@@ -11,12 +11,14 @@
 
 namespace rhec {
 
+class HeadingSearch;
 class WalkingFilter;
 
 /// Judges measurements before an estimator uses them (docs/health.md).
 ///
 /// Beside the estimator a Kalman filter goes on from its last estimate. A sensor's measurement whose innovation is too
-/// large for its covariance (a gate on nu' S^-1 nu) is not used. Who is wrong is then found by filters that assume
+/// large for its covariance (a gate on nu' S^-1 nu) is not used; the gate of a sensor whose innovations are larger than
+/// expected all the time is wider. Who is wrong is then found by filters that assume
 /// different causes, and get all measurements:
 ///   - slip has jumped: the parameters are made anew, once. Where this explains a few samples in a row, the
 ///     measurements were right, and are given back as late ones;
@@ -37,10 +39,14 @@ class RHEC_EXPORT SensorWatch {
     bool has_ramps = false;                ///< as in FilterEstimation::Setup
     double step = 0.2;                     ///< [s]
     int substeps = 1;                      ///< of a step
-    double gate = 5.0;           ///< innovations less probable than this many standard deviations are rejected
-    int proof = 11;              ///< samples that a sensor must have moved for before the estimate follows
-    int slip_proof = 3;          ///< samples that a jump of slip must explain
-    int calm = 5;                ///< samples without a finding after which health is ok again
+    double gate = 5.0;   ///< innovations less probable than this many standard deviations are rejected
+    int proof = 11;      ///< samples that a sensor must have moved for before the estimate follows
+    int slip_proof = 2;  ///< samples that a jump of slip must explain
+    int gap_proof = 3;   ///< like `proof`, of a sensor that had said nothing for some time
+    int calm = 5;        ///< samples without a finding after which health is ok again
+    /// The same of a sensor that the estimate has followed: one that comes back as a transient does is then still
+    /// doubted.
+    int calm_after_moving = 12;
     double lost_position = 3.0;  ///< standard deviation above which the vehicle is lost [m]
     double lost_heading = 0.5;   ///< likewise [rad]
   };
@@ -112,7 +118,8 @@ class RHEC_EXPORT SensorWatch {
   void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept;
   void start_search(const double* outputs) noexcept;
-  void search_from(WalkingFilter& filter) noexcept;
+  void search_from(WalkingFilter& filter, HeadingSearch& search) noexcept;
+  void think_again() noexcept;
   Finding search_heading(const double* outputs) noexcept;
   void start(Hypothesis& hypothesis) noexcept;
   void start_moved() noexcept;
@@ -121,6 +128,7 @@ class RHEC_EXPORT SensorWatch {
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis& hypothesis) noexcept;
   void hold_back(double time, const double* outputs) noexcept;
+  void acquit(const double* outputs) noexcept;
   void end_dispute() noexcept;
   bool may_follow() const noexcept;
   void test_inputs(const double* outputs) noexcept;
@@ -131,6 +139,7 @@ class RHEC_EXPORT SensorWatch {
   std::vector<Sensor> sensors_;
   std::vector<double> limits_, close_limits_;  ///< of nu' S^-1 nu, by the number of values
   std::vector<Record> records_;                ///< by sensor
+  std::vector<double> excesses_;               ///< by sensor, mean nu' S^-1 nu by degree of freedom, of late
   std::vector<double> heard_;                  ///< by sensor, when it was measured last [s]; NaN: never
   bool is_unobserved_ = false;                 ///< the motion since the last sample is not known
   std::unique_ptr<Hypothesis> own_, slip_, moved_, blind_;
