@@ -1,0 +1,37 @@
+"""A robot, sample by sample."""
+from . import _configuration, _rhec
+
+
+class Robot:
+    """What a robot is, and how it is estimated and controlled.
+
+    configuration: a YAML file with the keys of docs/configuration.md, or the same as a dict
+    set: keys to change, such as {"estimator.horizon": 20}
+    plugin_path: further directories with plugins
+    """
+
+    def __init__(self, configuration, *, set=None, plugin_path=()):
+        settings, folders = _configuration.read(configuration, set, plugin_path)
+        self._robot = _rhec.Robot(folders, settings)
+
+    @property
+    def step(self):
+        """Interval of the estimator's nodes, and of the controller [s]."""
+        return self._robot.step
+
+    @property
+    def vehicle(self):
+        """The model, with the bounds of this robot."""
+        return self._robot.vehicle
+
+    def make_estimator(self, initial_state=None):
+        """A new estimator; `initial_state` (n_x) is used where the configuration has none."""
+        return _rhec.Estimator(self._robot, initial_state)
+
+    def make_controller(self, path, ahead=None):
+        """A new controller that follows a path. `ahead`: an estimator that remembers places; the controller then plans
+        with the slip that its map knows ahead."""
+        return _rhec.Controller(self._robot, path, ahead)
+
+    def __repr__(self):
+        return f"<robot: {self.vehicle.name}, a step of {self.step} s>"
