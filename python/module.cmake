@@ -6,6 +6,7 @@ function(rhec_add_python_module TARGET)
   file(GLOB SOURCES CONFIGURE_DEPENDS "${BINDING}/*.cpp")
   pybind11_add_module(${TARGET} MODULE NO_EXTRAS ${SOURCES})
   target_compile_features(${TARGET} PRIVATE cxx_std_20)
+  target_compile_definitions(${TARGET} PRIVATE RHEC_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${TARGET} PRIVATE
     rhec::core rhec::plugins rhec::sim_check rhec::sim_horizons rhec::sim_maps rhec::sim_study rhec::sim_tuning fmt::fmt)
   set_target_properties(${TARGET} PROPERTIES

@@ -11,5 +11,9 @@ void bind_models(pybind11::module_& module);
 void bind_robots(pybind11::module_& module);
 void bind_estimators(pybind11::module_& module);
 void bind_controllers(pybind11::module_& module);
+void bind_problems(pybind11::module_& module);
+void bind_studies(pybind11::module_& module);
+void bind_logs(pybind11::module_& module);
+void bind_runs(pybind11::module_& module);
 
 }  // namespace rhec::python

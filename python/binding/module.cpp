@@ -28,6 +28,7 @@ void translate(std::exception_ptr thrown) {
 
 PYBIND11_MODULE(_rhec, module) {
   module.doc() = "What the package rhec is made of. Use the package: its names are those that stay.";
+  module.attr("version") = RHEC_VERSION;
   py::register_exception_translator(&translate);
   rhec::python::bind_settings(module);
   rhec::python::bind_hosts(module);
@@ -35,4 +36,8 @@ PYBIND11_MODULE(_rhec, module) {
   rhec::python::bind_robots(module);
   rhec::python::bind_estimators(module);
   rhec::python::bind_controllers(module);
+  rhec::python::bind_problems(module);
+  rhec::python::bind_studies(module);
+  rhec::python::bind_logs(module);
+  rhec::python::bind_runs(module);
 }

@@ -3,7 +3,15 @@
 Arrays are numpy's, units SI, angles in rad. docs/python.md has examples of everything.
 """
 from ._errors import Error
-from ._rhec import Command, Controller, Estimate, Estimator, Path, Report, Variable, Vehicle
+from ._plugins import options, plugins
+from ._problems import Problem, read_problems, write_problems
+from ._rhec import Command, Controller, Estimate, Estimator, Path, Report, Solution, Variable, Vehicle
+from ._rhec import version as __version__
 from ._robot import Robot
+from ._runs import Estimates, Run, SmoothedRun, estimate, run, smooth
+from ._studies import Sweep, Tuning, sweep, tune, tune_controller
+from ._table import Table
 
-__all__ = ["Command", "Controller", "Error", "Estimate", "Estimator", "Path", "Report", "Robot", "Variable", "Vehicle"]
+__all__ = ["Command", "Controller", "Error", "Estimate", "Estimates", "Estimator", "Path", "Problem", "Report", "Robot", "Run",
+           "SmoothedRun", "Solution", "Sweep", "Table", "Tuning", "Variable", "Vehicle", "__version__", "estimate", "options",
+           "plugins", "read_problems", "run", "smooth", "sweep", "tune", "tune_controller", "write_problems"]
