@@ -2,7 +2,10 @@
 
 Arrays are numpy's, units SI, angles in rad. docs/python.md has examples of everything.
 """
+from ._check import Check, check
 from ._errors import Error
+from ._model import BuiltModel, Model
+from ._notation import smooth_abs, smooth_max, smooth_min
 from ._plugins import options, plugins
 from ._problems import Problem, read_problems, write_problems
 from ._rhec import Command, Controller, Estimate, Estimator, Path, Report, Solution, Variable, Vehicle
@@ -12,6 +15,7 @@ from ._runs import Estimates, Run, SmoothedRun, estimate, run, smooth
 from ._studies import Sweep, Tuning, sweep, tune, tune_controller
 from ._table import Table
 
-__all__ = ["Command", "Controller", "Error", "Estimate", "Estimates", "Estimator", "Path", "Problem", "Report", "Robot", "Run",
-           "SmoothedRun", "Solution", "Sweep", "Table", "Tuning", "Variable", "Vehicle", "__version__", "estimate", "options",
-           "plugins", "read_problems", "run", "smooth", "sweep", "tune", "tune_controller", "write_problems"]
+__all__ = ["BuiltModel", "Check", "Command", "Controller", "Error", "Estimate", "Estimates", "Estimator", "Model", "Path",
+           "Problem", "Report", "Robot", "Run", "SmoothedRun", "Solution", "Sweep", "Table", "Tuning", "Variable", "Vehicle",
+           "__version__", "check", "estimate", "options", "plugins", "read_problems", "run", "smooth", "smooth_abs",
+           "smooth_max", "smooth_min", "sweep", "tune", "tune_controller", "write_problems"]

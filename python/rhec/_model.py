@@ -1,0 +1,234 @@
+"""A vehicle that is written in Python: with sympy's or CasADi's terms."""
+import hashlib
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+
+from . import _configuration, _notation, _rhec
+from ._check import Check
+from ._errors import Error
+
+_KINDS = ("states", "inputs", "parameters", "outputs", "options")
+
+
+def _name_of(key):
+    """Of a text or a symbol: x, x(t), SX x."""
+    if isinstance(key, str):
+        return key
+    if hasattr(key, "func") and getattr(key, "args", None):
+        return key.func.__name__
+    name = getattr(key, "name", None)
+    if name is None:
+        raise Error(f"found {key!r} as the name of a variable, expected a text or a symbol")
+    return name() if callable(name) else name
+
+
+def _by_name(given, what):
+    """A dict by name of a dict by names or symbols, a list of them, or pairs."""
+    if given is None:
+        return {}
+    pairs = given.items() if isinstance(given, dict) else [each if isinstance(each, tuple) else (each, None) for each in given]
+    made = {}
+    for key, value in pairs:
+        name = _name_of(key)
+        if name in made:
+            raise Error(f"{what}: '{name}' is there twice; keep one of them")
+        made[name] = value
+    return made
+
+
+class Model:
+    """A vehicle's equations, written once: dx/dt = f(x, u, p), y = h(x).
+
+    name: of the vehicle
+    states, inputs, parameters, outputs, options: by name or symbol what docs/equations.md says of a variable, such as
+        {"unit": "m", "typical": 10, "role": "position_x"}, or None; a list where there is nothing to say
+    rates: f: by state, or as many in their order, a term of the others, a number or a text in the notation of equations
+    measured: h: by output, or as many in their order; an output with the name of a state needs none
+    definitions: names for common parts, which stay readable in `build`
+    straight_motion: by input (and states that are speeds) a term of `ground_speed`, parameters and options
+    source: where the equations were published
+    smooth: a width; with it abs, min, max, sign and Piecewise get their smooth forms, without it they are refused
+    """
+
+    _plugin_path = ()
+
+    def __init__(self, name, *, states, inputs, rates, measured=None, outputs=None, parameters=None, options=None,
+                 definitions=None, straight_motion=None, source="", smooth=None):
+        self.name = name
+        self._variables = {kind: _by_name(given, kind) for kind, given in
+                           zip(_KINDS, (states, inputs, parameters, outputs, options))}
+        names = [each for variables in self._variables.values() for each in variables]
+        definitions = _by_name(definitions, "definitions")
+        notes = _notation.Notes([*names, *definitions], smooth)
+        equations = dict(definitions)
+        equations |= {f"{state}'": term for state, term in self._matched(rates, "states", "rates").items()}
+        equations |= self._matched(measured, "outputs", "measured")
+        straight = _by_name(straight_motion, "straight_motion")
+        texts = _texts([*equations.values(), *straight.values()], notes)
+        self.equations = "".join(f"{left} = {right}\n" for left, right in
+                                 [*notes.definitions.items(), *zip(equations, texts)])
+        self._straight = "".join(f"{left} = {right}\n" for left, right in zip(straight, texts[len(equations):]))
+        self._source, self._options = source, {}
+
+    def _matched(self, given, kind, what):
+        """Terms by the name of a variable of a kind, of a dict or as many in their order."""
+        names = list(self._variables[kind])
+        if given is None:
+            return {}
+        if not isinstance(given, dict):
+            given = list(given) if not hasattr(given, "nz") else given.nz[:] and [given[i] for i in range(given.numel())]
+            if len(given) != len(names):
+                raise Error(f"{what}: found {len(given)} terms, expected {len(names)}: {', '.join(names)}")
+            return dict(zip(names, given))
+        terms = _by_name(given, what)
+        for name in terms:
+            if name not in names:
+                raise Error(f"{what}: '{name}' is none of the {kind}; they are {', '.join(names)}")
+        return terms
+
+    def _file(self):
+        """The keys of a file with equations."""
+        made = {"name": self.name}
+        if self._source:
+            made["source"] = self._source
+        for kind in _KINDS:
+            if self._variables[kind]:
+                made[kind] = {name: {} if about is None else about for name, about in self._variables[kind].items()}
+        made["equations"] = self.equations
+        if self._straight:
+            made["straight_motion"] = self._straight
+        return made
+
+    def yaml(self):
+        """The vehicle as a text of docs/equations.md, which every command takes."""
+        made = self._file()
+        blocks = {key: made.pop(key) for key in ("equations", "straight_motion") if key in made}
+        lines = []
+        for key, value in made.items():
+            if isinstance(value, dict):
+                lines.append(f"{key}:")
+                lines += [f"  {name}: {json.dumps(about)}" for name, about in value.items()]
+            else:
+                lines.append(f"{key}: {json.dumps(value)}")
+        for key, text in blocks.items():
+            lines += [f"{key}: |", *(f"  {line}" for line in text.splitlines())]
+        return "\n".join(lines) + "\n"
+
+    def with_options(self, **options):
+        """The same vehicle with other values of its options, such as wheelbase=2.8; and `outputs`, a list."""
+        made = object.__new__(type(self))
+        made.__dict__ = {**self.__dict__, "_options": {**self._options, **options}}
+        return made
+
+    def _section(self):
+        """What a configuration has for it under `model`."""
+        return {"equations": _configuration._plain(self._file(), []), **self._options}
+
+    def load(self):
+        """The Vehicle, at once and without a compiler. In a configuration {"model": model} does the same."""
+        return _vehicle_of(self)
+
+    def check(self):
+        """What `rhec check` says of it (docs/check.md)."""
+        return Check.of(self)
+
+    def build(self, folder=None, *, instruction_sets=None):
+        """Writes it as a plugin in C++, compiles that against the rhec that this package belongs to, checks it and loads
+        it. Returns a BuiltModel, for configurations as this one is.
+
+        folder: of the sources; without one a folder of the user's cache, where it is found again the next time
+        instruction_sets: of generic, avx2, avx512; all without any. One is enough to try a model out.
+
+        Takes cmake and the compiler that rhec was built with.
+        """
+        return _Builder(self, folder, instruction_sets).build()
+
+    def __repr__(self):
+        return f"<model '{self.name}': {', '.join(self._variables['states'])}>"
+
+
+class BuiltModel:
+    """A model that was compiled, for configurations: {"model": built}.
+
+    folder: its sources; vehicle: the Vehicle; check: what `rhec check` says of it
+    """
+
+    def __init__(self, plugin, folder, options):
+        self.plugin, self.folder, self._options = plugin, folder, options
+        self._plugin_path = [str(folder / "build")]
+        self.vehicle = _vehicle_of(self)
+        self.check = Check.of(self)
+
+    def _section(self):
+        return {"name": self.plugin, **self._options}
+
+    def with_options(self, **options):
+        """The same with other values of its options."""
+        return BuiltModel(self.plugin, self.folder, {**self._options, **options})
+
+    def __repr__(self):
+        return f"<model '{self.plugin}', compiled in {self.folder}>"
+
+
+def _vehicle_of(model):
+    return _rhec.make_vehicle(list(model._plugin_path), _rhec.Settings.of(model._section(), "configuration"))
+
+
+def _texts(terms, notes):
+    """Texts are taken as they are; all others are read together."""
+    others = [term for term in terms if not isinstance(term, str)]
+    read = iter(_notation.reader_of(others, notes).read_all(others) if others else [])
+    return [term if isinstance(term, str) else next(read) for term in terms]
+
+
+class _Builder:
+    def __init__(self, model, folder, instruction_sets):
+        self._model, self._sets = model, instruction_sets
+        self._yaml = model.yaml()
+        self._folder = pathlib.Path(folder) if folder is not None else self._cached()
+
+    def _cached(self):
+        library = pathlib.Path(_rhec.library_folder(), "librhec_plugins.so")
+        what = f"{self._yaml}|{self._sets}|{library}|{library.stat().st_mtime_ns}"
+        cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+        return pathlib.Path(cache, "rhec", "models", f"{self._model.name}-{hashlib.sha256(what.encode()).hexdigest()[:16]}")
+
+    def build(self):
+        self._folder.mkdir(parents=True, exist_ok=True)
+        file = self._folder / f"{self._model.name}.yaml"
+        file.write_text(self._yaml, encoding="utf-8")
+        sources = _rhec.vehicle_as_cpp(str(file))
+        for name, content in sources["files"].items():
+            path = self._folder / name
+            if not path.exists() or path.read_text(encoding="utf-8") != content:  # else nothing is compiled anew
+                path.write_text(content, encoding="utf-8")
+        self._compile()
+        built = BuiltModel(sources["plugin"], self._folder, self._model._options)
+        if built.check.failed:
+            raise Error(f"{file}: the check of the compiled model failed: {built.check.failures()}")
+        return built
+
+    def _compile(self):
+        cmake = shutil.which("cmake")
+        if cmake is None:
+            raise Error("build: cmake is not there; install it with a C++ compiler (apt-get install cmake g++), or use load()")
+        package = pathlib.Path(_rhec.library_folder(), "cmake", "rhec")
+        if not (package / "rhecConfig.cmake").exists():
+            raise Error(f"build: {package} has no rhecConfig.cmake; install rhec with its headers, or use load()")
+        configure = [cmake, "-S", self._folder, "-B", self._folder / "build", f"-Drhec_DIR={package}",
+                     "-DCMAKE_BUILD_TYPE=Release"]
+        if self._sets:
+            configure.append(f"-DRHEC_MODEL_INSTRUCTION_SETS={';'.join(self._sets)}")
+        self._call(configure)
+        self._call([cmake, "--build", self._folder / "build", "--parallel"])
+
+    def _call(self, words):
+        result = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+        if result.returncode != 0:
+            log = self._folder / "build.log"
+            log.write_text(result.stdout, encoding="utf-8")
+            end = "\n".join(result.stdout.splitlines()[-15:])
+            raise Error(f"build: {' '.join(map(str, words[:2]))} failed; the whole of it is in {log}; it ends:\n{end}")
