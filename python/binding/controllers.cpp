@@ -18,6 +18,7 @@ namespace {
 
 struct CommandObject {
   Controller::Command value;
+  double microseconds = 0.0;  ///< that the controller took
 };
 
 struct ControllerObject {
@@ -67,18 +68,22 @@ py::object control(ControllerObject& self, const EstimateObject& estimate, std::
   self.seen = estimate.value;
   self.seen.innovations = {};
   const Controller::Command* now = nullptr;
+  double microseconds = 0.0;
   {
     const py::gil_scoped_release others_go_on;
+    const auto start = Clock::now();
     now = &self.controller->control(self.seen, end);
+    microseconds = microseconds_since(start);
   }
   if (!out.is_none()) {
-    auto& place = out.cast<CommandObject&>().value;
-    if (place.inputs.size() != now->inputs.size())
+    auto& place = out.cast<CommandObject&>();
+    if (place.value.inputs.size() != now->inputs.size())
       throw Error("out: a command of another vehicle; expected one of this controller");
-    place = *now;
+    place.value = *now;
+    place.microseconds = microseconds;
     return out;
   }
-  return py::cast(std::make_unique<CommandObject>(CommandObject{*now}));
+  return py::cast(std::make_unique<CommandObject>(CommandObject{*now, microseconds}));
 }
 
 template <class Call>
@@ -159,6 +164,8 @@ void bind_commands(py::module_& module) {
             return copy({at.x, at.y, at.heading, at.speed});
           },
           "the closest point of the path: x [m], y [m], heading [rad], speed [m/s], (4)")
+      .def_readonly("microseconds", &CommandObject::microseconds,
+                    "that the controller took for it, without Python [us]")
       .def_property_readonly(
           "report", [](const CommandObject& self) { return self.value.report; },
           "of the solver; the controller's `finish` adds objective and KKT residual to the next one")
@@ -176,7 +183,7 @@ void bind_controllers(py::module_& module) {
   py::class_<ControllerObject, std::shared_ptr<ControllerObject>>(
       module, "Controller",
       "Follows a path: estimate in, inputs out. Several threads may use it; each call waits for the others.")
-      .def(py::init(&make_controller), py::arg("robot"), py::arg("path"), py::arg("ahead") = nullptr)
+      .def(py::init(&make_controller), py::arg("robot").none(false), py::arg("path"), py::arg("ahead") = nullptr)
       .def("control", &control, py::arg("estimate"), py::arg("deadline") = py::none(), py::kw_only(),
            py::arg("out") = py::none(),
            "The inputs for an estimate. `deadline`: seconds from now after which the best so far is returned. `out`: "

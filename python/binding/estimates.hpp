@@ -13,6 +13,7 @@ namespace rhec::python {
 struct EstimateObject {
   Estimate value;
   std::vector<Innovation> innovations;  ///< `value.innovations` are these
+  double microseconds = 0.0;            ///< that the estimator took
   std::shared_ptr<const ModelDescription> about;
   std::shared_ptr<const std::vector<Sensor>> sensors;
 

@@ -70,20 +70,25 @@ py::object estimate(NamedEstimator& self, double time, std::optional<double> dea
   const Clock::time_point end = deadline_in(deadline);
   const Lock lock(self.mutex);
   const Estimate* now = nullptr;
+  double microseconds = 0.0;
   {
     const py::gil_scoped_release others_go_on;
+    const auto start = Clock::now();
     now = &self.estimator->estimate(time, end);
+    microseconds = microseconds_since(start);
   }
   if (!out.is_none()) {
     auto& place = out.cast<EstimateObject&>();
     if (!place.has_room_for(*now)) throw Error("out: an estimate of another vehicle; expected one of this estimator");
     place.take(*now);
+    place.microseconds = microseconds;
     return out;
   }
   auto made = std::make_unique<EstimateObject>();
   made->about = self.about;
   made->sensors = self.sensors;
   made->take(*now);
+  made->microseconds = microseconds;
   return py::cast(std::move(made));
 }
 
@@ -219,6 +224,8 @@ void bind_estimates(py::module_& module) {
           "innovations", &innovations_of,
           "of the measurements since the last estimate: dicts of time [s], sensor, accepted, nis, value, "
           "covariance")
+      .def_readonly("microseconds", &EstimateObject::microseconds,
+                    "that the estimator took for it, without Python [us]")
       .def_property_readonly("report", [](const EstimateObject& self) { return self.value.report; })
       .def("__getitem__", &value_of, py::arg("name"), "The value of a state or a parameter.")
       .def("__repr__", &described_estimate);
@@ -233,7 +240,7 @@ void bind_estimators(py::module_& module) {
       module, "Estimator",
       "Estimates state and slip: push stamped measurements and inputs, and ask for the estimate at a time.\n\n"
       "Measurements and inputs may come in any order. Several threads may use it; each call waits for the others.")
-      .def(py::init(&make_estimator), py::arg("robot"), py::arg("initial_state") = py::none())
+      .def(py::init(&make_estimator), py::arg("robot").none(false), py::arg("initial_state") = py::none())
       .def("push_measurement", &push_measurement, py::arg("time"), py::arg("outputs"),
            "Measured y, (n_y), NaN where missing, at a time [s].")
       .def("push_input", &push_input, py::arg("time"), py::arg("inputs"),

@@ -27,9 +27,6 @@ int threads_of(int given) {
   return given > 0 ? given : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-/// A sweep is at a file: what it names is beside that.
-sim::Sweep sweep_of(const Settings& settings) { return sim::Sweep(settings); }
-
 /// The rows of a sweep's runs, in the order of the grid; texts are JSON.
 py::list rows_of(const sim::Sweep& sweep, const std::vector<sim::RunIdentity>& runs,
                  const std::vector<sim::SweepRow>& rows) {
@@ -63,7 +60,7 @@ py::list rows_of(const sim::Sweep& sweep, const std::vector<sim::RunIdentity>& r
 
 py::dict sweep(const std::vector<std::string>& plugin_path, const Settings& settings, const std::string& file,
                const std::string& program, int threads, const py::object& progress) {
-  const sim::Sweep grid = sweep_of(settings);
+  const sim::Sweep grid(settings);
   std::vector<sim::RunIdentity> runs;
   std::vector<sim::SweepRow> rows;
   sim::SweepProgress done;
@@ -88,14 +85,6 @@ py::dict sweep(const std::vector<std::string>& plugin_path, const Settings& sett
   made["name"] = grid.name();
   made["made"] = done.made;
   made["rows"] = rows_of(grid, runs, rows);
-  return made;
-}
-
-py::dict grid_of(const Settings& settings) {
-  const sim::Sweep grid = sweep_of(settings);
-  py::dict made;
-  made["name"] = grid.name();
-  made["count"] = grid.count();
   return made;
 }
 
@@ -201,7 +190,6 @@ py::dict tune_controller(const std::vector<std::string>& plugin_path, const Sett
 void bind_studies(py::module_& module) {
   module.def("sweep", &sweep, py::arg("plugin_path"), py::arg("settings"), py::arg("file"), py::arg("program"),
              py::arg("threads"), py::arg("progress"));
-  module.def("grid", &grid_of, py::arg("settings"));
   module.def("tune_log", &tune_log, py::arg("plugin_path"), py::arg("settings"), py::arg("dead_reckoning"),
              py::arg("gps"), py::arg("wishes"), py::arg("progress"));
   module.def("tune_controller", &tune_controller, py::arg("plugin_path"), py::arg("settings"), py::arg("cases"),

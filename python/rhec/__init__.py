@@ -2,8 +2,10 @@
 
 Arrays are numpy's, units SI, angles in rad. docs/python.md has examples of everything.
 """
+from ._casadi import CasadiModel, CasadiProblem, to_casadi
 from ._check import Check, check
 from ._errors import Error
+from ._graphs import to_sympy
 from ._model import BuiltModel, Model
 from ._notation import smooth_abs, smooth_max, smooth_min
 from ._plugins import options, plugins
@@ -15,7 +17,7 @@ from ._runs import Estimates, Run, SmoothedRun, estimate, run, smooth
 from ._studies import Sweep, Tuning, sweep, tune, tune_controller
 from ._table import Table
 
-__all__ = ["BuiltModel", "Check", "Command", "Controller", "Error", "Estimate", "Estimates", "Estimator", "Model", "Path",
+__all__ = ["BuiltModel", "CasadiModel", "CasadiProblem", "Check", "Command", "Controller", "Error", "Estimate", "Estimates", "Estimator", "Model", "Path",
            "Problem", "Report", "Robot", "Run", "SmoothedRun", "Solution", "Sweep", "Table", "Tuning", "Variable", "Vehicle",
            "__version__", "check", "estimate", "options", "plugins", "read_problems", "run", "smooth", "smooth_abs",
-           "smooth_max", "smooth_min", "sweep", "tune", "tune_controller", "write_problems"]
+           "smooth_max", "smooth_min", "sweep", "to_casadi", "to_sympy", "tune", "tune_controller", "write_problems"]

@@ -1,4 +1,6 @@
 """The one exception that rhec raises for what a user can correct."""
+from __future__ import annotations
+
 import re
 
 # "file.yaml:12: key.path: what", "file.yaml:12:3: what", "file.jsonl:3: key: what"
@@ -18,7 +20,7 @@ class Error(Exception):
     def __init__(self, text: str = "") -> None:
         super().__init__(text)
         found = _IN_A_FILE.match(text)
-        self.file = found["file"] if found else None
-        self.line = int(found["line"]) if found else None
+        self.file: str | None = found["file"] if found else None
+        self.line: int | None = int(found["line"]) if found else None
         found = found or _IN_PYTHON.match(text)
-        self.key = found["key"] if found else None
+        self.key: str | None = found["key"] if found else None

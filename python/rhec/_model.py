@@ -1,14 +1,19 @@
 """A vehicle that is written in Python: with sympy's or CasADi's terms."""
+from __future__ import annotations
+
 import hashlib
 import json
 import os
 import pathlib
 import shutil
 import subprocess
+from collections.abc import Sequence
+from typing import Any
 
 from . import _configuration, _notation, _rhec
 from ._check import Check
 from ._errors import Error
+from ._types import File
 
 _KINDS = ("states", "inputs", "parameters", "outputs", "options")
 
@@ -53,10 +58,11 @@ class Model:
     smooth: a width; with it abs, min, max, sign and Piecewise get their smooth forms, without it they are refused
     """
 
-    _plugin_path = ()
+    _plugin_path: list[str] = []
 
-    def __init__(self, name, *, states, inputs, rates, measured=None, outputs=None, parameters=None, options=None,
-                 definitions=None, straight_motion=None, source="", smooth=None):
+    def __init__(self, name: str, *, states: Any, inputs: Any, rates: Any, measured: Any = None, outputs: Any = None,
+                 parameters: Any = None, options: Any = None, definitions: Any = None, straight_motion: Any = None,
+                 source: str = "", smooth: float | None = None) -> None:
         self.name = name
         self._variables = {kind: _by_name(given, kind) for kind, given in
                            zip(_KINDS, (states, inputs, parameters, outputs, options))}
@@ -71,7 +77,8 @@ class Model:
         self.equations = "".join(f"{left} = {right}\n" for left, right in
                                  [*notes.definitions.items(), *zip(equations, texts)])
         self._straight = "".join(f"{left} = {right}\n" for left, right in zip(straight, texts[len(equations):]))
-        self._source, self._options = source, {}
+        self._source = source
+        self._options: dict[str, Any] = {}
 
     def _matched(self, given, kind, what):
         """Terms by the name of a variable of a kind, of a dict or as many in their order."""
@@ -79,7 +86,7 @@ class Model:
         if given is None:
             return {}
         if not isinstance(given, dict):
-            given = list(given) if not hasattr(given, "nz") else given.nz[:] and [given[i] for i in range(given.numel())]
+            given = [given[i] for i in range(given.numel())] if hasattr(given, "numel") else list(given)
             if len(given) != len(names):
                 raise Error(f"{what}: found {len(given)} terms, expected {len(names)}: {', '.join(names)}")
             return dict(zip(names, given))
@@ -102,7 +109,7 @@ class Model:
             made["straight_motion"] = self._straight
         return made
 
-    def yaml(self):
+    def yaml(self) -> str:
         """The vehicle as a text of docs/equations.md, which every command takes."""
         made = self._file()
         blocks = {key: made.pop(key) for key in ("equations", "straight_motion") if key in made}
@@ -117,7 +124,7 @@ class Model:
             lines += [f"{key}: |", *(f"  {line}" for line in text.splitlines())]
         return "\n".join(lines) + "\n"
 
-    def with_options(self, **options):
+    def with_options(self, **options: Any) -> Model:
         """The same vehicle with other values of its options, such as wheelbase=2.8; and `outputs`, a list."""
         made = object.__new__(type(self))
         made.__dict__ = {**self.__dict__, "_options": {**self._options, **options}}
@@ -125,17 +132,17 @@ class Model:
 
     def _section(self):
         """What a configuration has for it under `model`."""
-        return {"equations": _configuration._plain(self._file(), []), **self._options}
+        return {"equations": _configuration.plain(self._file(), []), **self._options}
 
-    def load(self):
+    def load(self) -> _rhec.Vehicle:
         """The Vehicle, at once and without a compiler. In a configuration {"model": model} does the same."""
         return _vehicle_of(self)
 
-    def check(self):
+    def check(self) -> Check:
         """What `rhec check` says of it (docs/check.md)."""
         return Check.of(self)
 
-    def build(self, folder=None, *, instruction_sets=None):
+    def build(self, folder: File | None = None, *, instruction_sets: Sequence[str] | None = None) -> BuiltModel:
         """Writes it as a plugin in C++, compiles that against the rhec that this package belongs to, checks it and loads
         it. Returns a BuiltModel, for configurations as this one is.
 
@@ -146,7 +153,7 @@ class Model:
         """
         return _Builder(self, folder, instruction_sets).build()
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<model '{self.name}': {', '.join(self._variables['states'])}>"
 
 
@@ -156,7 +163,7 @@ class BuiltModel:
     folder: its sources; vehicle: the Vehicle; check: what `rhec check` says of it
     """
 
-    def __init__(self, plugin, folder, options):
+    def __init__(self, plugin: str, folder: pathlib.Path, options: dict[str, Any]) -> None:
         self.plugin, self.folder, self._options = plugin, folder, options
         self._plugin_path = [str(folder / "build")]
         self.vehicle = _vehicle_of(self)
@@ -165,11 +172,11 @@ class BuiltModel:
     def _section(self):
         return {"name": self.plugin, **self._options}
 
-    def with_options(self, **options):
+    def with_options(self, **options: Any) -> BuiltModel:
         """The same with other values of its options."""
         return BuiltModel(self.plugin, self.folder, {**self._options, **options})
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<model '{self.plugin}', compiled in {self.folder}>"
 
 
@@ -196,7 +203,7 @@ class _Builder:
         cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
         return pathlib.Path(cache, "rhec", "models", f"{self._model.name}-{hashlib.sha256(what.encode()).hexdigest()[:16]}")
 
-    def build(self):
+    def build(self) -> BuiltModel:
         self._folder.mkdir(parents=True, exist_ok=True)
         file = self._folder / f"{self._model.name}.yaml"
         file.write_text(self._yaml, encoding="utf-8")

@@ -1,7 +1,10 @@
 """Terms of sympy and CasADi in the notation of vehicles' equations (docs/equations.md)."""
+from __future__ import annotations
+
 import dataclasses
 import math
 import re
+from typing import Any
 
 from ._errors import Error
 
@@ -16,17 +19,17 @@ _SMOOTH = ("has no derivative everywhere; write rhec.smooth_abs, rhec.smooth_max
            "Model(..., smooth=WIDTH), a little below what matters")
 
 
-def smooth_abs(x, width):
+def smooth_abs(x: Any, width: float) -> Any:
     """sqrt(x^2 + width^2): |x| with a derivative everywhere; of numbers, sympy's and CasADi's terms."""
     return (x * x + width * width) ** 0.5
 
 
-def smooth_max(a, b, width):
+def smooth_max(a: Any, b: Any, width: float) -> Any:
     """The larger of a and b, rounded off where they differ by about `width`."""
     return (a + b + smooth_abs(a - b, width)) / 2
 
 
-def smooth_min(a, b, width):
+def smooth_min(a: Any, b: Any, width: float) -> Any:
     """The smaller of a and b, likewise."""
     return (a + b - smooth_abs(a - b, width)) / 2
 
@@ -329,7 +332,7 @@ class CasadiReader:
 
 def reader_of(terms, notes):
     """What reads these terms: CasADi's where one of them is of CasADi, else sympy's."""
-    if any(type(term).__module__.startswith("casadi") for term in terms):
+    if any(str(type(term).__module__).startswith("casadi") for term in terms):
         import casadi
 
         return CasadiReader(casadi, notes)

@@ -1,10 +1,13 @@
 """Which plugins there are, and which options."""
+from __future__ import annotations
+
 from . import _configuration, _rhec
 from ._errors import Error
 from ._table import Table
+from ._types import PluginPath
 
 
-def plugins(*, plugin_path=(), refused=False):
+def plugins(*, plugin_path: PluginPath = (), refused: bool = False) -> Table:
     """The plugins that are found: a Table of kind, name, version, licence, source, backend, path. With `refused` also
     those that are not used, with the reason."""
     import numpy
@@ -15,7 +18,7 @@ def plugins(*, plugin_path=(), refused=False):
     return Table({name: numpy.array([str(each[name] or "") for each in chosen], dtype=object) for name in names})
 
 
-def options(name="", *, kind="", plugin_path=()):
+def options(name: str = "", *, kind: str = "", plugin_path: PluginPath = ()) -> Table:
     """The options of a plugin, by its name, of a section of scenarios ('estimator'), or, without a name, of a scenario's
     root: a Table of name, type, default, values, meaning."""
     import numpy

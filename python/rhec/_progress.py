@@ -1,4 +1,6 @@
 """A bar that shows how far a long call is: in a notebook, or on a terminal; nothing elsewhere."""
+from __future__ import annotations
+
 import math
 import sys
 import time

@@ -1,36 +1,41 @@
 """Drives that are simulated or recorded, and what was estimated of them."""
+from __future__ import annotations
+
 import contextlib
 import html
 import json
 import os
 import pathlib
 import tempfile
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from . import _configuration, _rhec
 from ._errors import Error
 from ._problems import Problem, problems_of
 from ._progress import Bar
 from ._table import Table
+from ._types import Changes, Configuration, File, LogPart, PluginPath, Progress
 
 
 class _Result:
     """What all results have: a summary, a picture, and files for `rhec report`."""
 
-    def __init__(self, made):
+    def __init__(self, made: Any) -> None:
         self._made = made
-        self.summary = json.loads(made.summary_json)
+        self.summary: dict[str, Any] = json.loads(made.summary_json)
 
     @property
-    def svg(self):
+    def svg(self) -> str:
         """The picture of the drive, as a text of SVG."""
         return self._made.svg()
 
-    def save(self, folder):
+    def save(self, folder: File) -> pathlib.Path:
         """Writes the files that the command line writes, whole or not at all; `rhec report` makes a page of them."""
         self._made.save(os.fspath(folder))
         return pathlib.Path(folder)
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         return f"<p>{html.escape(repr(self)[1:-1])}</p>{self.svg}"
 
 
@@ -43,22 +48,22 @@ class Run(_Result):
     problems: every N-th problem, if they were asked for
     """
 
-    def __init__(self, made, plugin_path):
+    def __init__(self, made: _rhec.Drive, plugin_path: list[str]) -> None:
         super().__init__(made)
         self.steps = Table(made.steps())
         self.problems = problems_of("\n".join(made.problems), "run", plugin_path) if made.problems else []
 
     @property
-    def completed(self):
+    def completed(self) -> bool:
         """Whether the end of the path was reached."""
         return self._made.completed
 
     @property
-    def ended(self):
+    def ended(self) -> str:
         """Why the run ended, in words."""
         return self._made.ended
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<run '{self._made.name}': {self.steps.rows} steps, {self.ended}>"
 
 
@@ -69,12 +74,12 @@ class SmoothedRun(_Result):
     report: of the solver
     """
 
-    def __init__(self, made):
+    def __init__(self, made: Any) -> None:
         super().__init__(made)
         self.steps, self.causal = Table(made.steps()), Table(made.causal_steps())
         self.report = made.report
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<smoothed run '{self._made.name}': {self.steps.rows} steps, {self.report.status}>"
 
 
@@ -86,21 +91,22 @@ class Estimates(_Result):
     reports: of a smoother, by variant, in order
     """
 
-    def __init__(self, made):
+    def __init__(self, made: Any) -> None:
         super().__init__(made)
         self.variants = {name: Table(made.estimates(index)) for index, name in enumerate(made.names)}
         self.reports = made.reports
 
     @property
-    def estimates(self):
+    def estimates(self) -> Table:
         """The Table of the first variant."""
         return next(iter(self.variants.values()))
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<estimates of {', '.join(self.variants)}: {self.estimates.rows} rows>"
 
 
-def run(scenario, *, set=None, plugin_path=(), problems_every=0, progress=None):
+def run(scenario: Configuration, *, set: Changes = None, plugin_path: PluginPath = (), problems_every: int = 0,
+        progress: Progress = None) -> Run:
     """Runs a scenario: a robot on simulated ground learns its slip and holds its path. Returns a Run.
 
     scenario: a YAML file, or the same as a dict
@@ -116,7 +122,7 @@ def run(scenario, *, set=None, plugin_path=(), problems_every=0, progress=None):
 
 
 @contextlib.contextmanager
-def _log_file(given, name, columns):
+def _log_file(given: LogPart, name: str, columns: str) -> Iterator[str]:
     """The file of a log; an array becomes one."""
     if isinstance(given, (str, os.PathLike)):
         yield os.fspath(given)
@@ -133,7 +139,7 @@ def _log_file(given, name, columns):
 
 
 @contextlib.contextmanager
-def log_files(dead_reckoning, gps):
+def log_files(dead_reckoning: LogPart, gps: LogPart) -> Iterator[tuple[str, str]]:
     """The names of both files of a log, for as long as the context lasts."""
     with _log_file(dead_reckoning, "dead_reckoning", "time [s], wheel speed [m/s] and steering angle [rad]") as rows:
         with _log_file(gps, "gps", "time [s], x [m] and y [m]") as fixes:
@@ -147,7 +153,9 @@ def _log(function, scenario, log, variants, hold_out, phase, changes, plugin_pat
         return Estimates(function(folders, settings, files, bar))
 
 
-def estimate(scenario, dead_reckoning, gps, *, variants=(), hold_out=0, phase=None, set=None, plugin_path=(), progress=None):
+def estimate(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, variants: Sequence[str] = (), hold_out: int = 0,
+             phase: int | None = None, set: Changes = None, plugin_path: PluginPath = (),
+             progress: Progress = None) -> Estimates:
     """Estimates state and slip from a recorded drive, and predicts what it withholds. Returns Estimates.
 
     dead_reckoning: time [s], wheel speed [m/s], steering angle [rad]: a file, or an array (n, 3), NaN where missing
@@ -159,8 +167,9 @@ def estimate(scenario, dead_reckoning, gps, *, variants=(), hold_out=0, phase=No
                 "estimate")
 
 
-def smooth(scenario, dead_reckoning=None, gps=None, *, variants=(), hold_out=0, phase=None, set=None, plugin_path=(),
-           progress=None):
+def smooth(scenario: Configuration, dead_reckoning: LogPart | None = None, gps: LogPart | None = None, *,
+           variants: Sequence[str] = (), hold_out: int = 0, phase: int | None = None, set: Changes = None,
+           plugin_path: PluginPath = (), progress: Progress = None) -> Estimates | SmoothedRun:
     """Estimates a whole drive at once: every moment from what was measured before and after it.
 
     With the two parts of a recorded drive, as `estimate` has them, it returns Estimates, causal ones beside; without

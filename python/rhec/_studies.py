@@ -1,14 +1,19 @@
 """Many runs: sweeps over the keys of a scenario, and the search for good numbers."""
+from __future__ import annotations
+
 import json
 import math
 import os
 import pathlib
+from collections.abc import Sequence
+from typing import Any
 
 from . import _configuration, _rhec
 from ._errors import Error
 from ._progress import Bar
 from ._runs import log_files
 from ._table import Table
+from ._types import Changes, Configuration, File, LogPart, PluginPath, Progress
 
 
 class Sweep:
@@ -20,18 +25,20 @@ class Sweep:
     file: the database, docs/sweep.md
     """
 
-    def __init__(self, made, file):
-        self.name, self.made, self.file = made["name"], made["made"], pathlib.Path(file)
+    def __init__(self, made: dict[str, Any], file: File) -> None:
+        self.name: str = made["name"]
+        self.made: int = made["made"]
+        self.file = pathlib.Path(file)
         self.runs = _runs_table(made["rows"])
 
-    def to_pandas(self):
+    def to_pandas(self) -> Any:
         """The runs as a pandas.DataFrame."""
         return self.runs.to_pandas()
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<sweep '{self.name}': {self.runs.rows} runs, {self.made} of them new, in {self.file}>"
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         return self.runs._repr_html_()
 
 
@@ -82,7 +89,8 @@ def _column(values):
     return numpy.array([value if isinstance(value, str) else json.dumps(value) for value in values])
 
 
-def sweep(description, file, *, threads=0, plugin_path=(), progress=None):
+def sweep(description: Configuration, file: File, *, threads: int = 0, plugin_path: PluginPath = (),
+          progress: Progress = None) -> Sweep:
     """Runs a scenario over a grid of its keys, on several cores, into one SQLite file. Returns a Sweep.
 
     description: a YAML file (docs/sweep.md), or the same as a dict; then the scenario is beside the working directory
@@ -93,7 +101,7 @@ def sweep(description, file, *, threads=0, plugin_path=(), progress=None):
     """
     folders = _configuration.folders_of(plugin_path)
     if isinstance(description, dict):
-        plain = _configuration._plain(description, folders)
+        plain = _configuration.plain(description, folders)
         settings = _rhec.Settings.of(plain, os.path.join(os.getcwd(), "configuration"))
     else:
         settings, folders = _configuration.read(description, None, plugin_path)
@@ -111,24 +119,26 @@ class Tuning:
     remarks: what cannot be told, in words
     """
 
-    def __init__(self, made):
+    def __init__(self, made: dict[str, Any]) -> None:
         self.numbers, self.judged = Table(made["numbers"]), Table(made["judged"])
         self.yaml, self.svg, self.remarks = made["yaml"], made["svg"], made["remarks"]
         self.summary = json.loads(made["summary"])
 
-    def save(self, file):
+    def save(self, file: File) -> None:
         """Writes the scenario."""
         pathlib.Path(file).write_text(self.yaml, encoding="utf-8")
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<tuning of {', '.join(self.numbers['name'])}>"
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         return self.numbers._repr_html_() + self.judged._repr_html_() + self.svg
 
 
-def tune(scenario, dead_reckoning, gps, *, hold_out=5, tune=(), keep=(), variants=(), threads=0, smoother=True,
-         most_seconds=math.inf, set=None, plugin_path=(), progress=None):
+def tune(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, hold_out: int = 5, tune: Sequence[str] = (),
+         keep: Sequence[str] = (), variants: Sequence[str] = (), threads: int = 0, smoother: bool = True,
+         most_seconds: float = math.inf, set: Changes = None, plugin_path: PluginPath = (),
+         progress: Progress = None) -> Tuning:
     """Finds the noise of sensors, priors, biases, lever arms and delays that make a recorded drive most likely. Returns
     a Tuning.
 
@@ -144,11 +154,13 @@ def tune(scenario, dead_reckoning, gps, *, hold_out=5, tune=(), keep=(), variant
     wishes = {"hold_out": hold_out, "tune": list(tune), "keep": list(keep), "variants": list(variants), "threads": threads,
               "smoother": smoother, "most_seconds": most_seconds}
     with log_files(dead_reckoning, gps) as names, Bar(progress, "tune") as bar:
-        return Tuning(_rhec.tune_log(folders, settings, *names, wishes, bar))
+        return Tuning(_rhec.tune_log(folders, settings, names[0], names[1], wishes, bar))
 
 
-def tune_controller(scenario, *, cases=None, seeds=3, first_seed=1, judges=6, effort=1.0, evaluations=40, threads=0,
-                    most_seconds=math.inf, set=None, plugin_path=(), progress=None):
+def tune_controller(scenario: Configuration, *, cases: dict[str, Changes] | None = None, seeds: int = 3, first_seed: int = 1,
+                    judges: int = 6, effort: float = 1.0, evaluations: int = 40, threads: int = 0,
+                    most_seconds: float = math.inf, set: Changes = None, plugin_path: PluginPath = (),
+                    progress: Progress = None) -> Tuning:
     """Finds weights and horizon by which the vehicle of a scenario tracks its path best, in simulation. Returns a Tuning.
 
     cases: worlds to drive in, {"slow": {"speed": 2}, ...}; the scenario as it is without any
