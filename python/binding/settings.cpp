@@ -52,7 +52,7 @@ class Reader {
       if (!py::isinstance<py::str>(key))
         throw mistake(path, fmt::format("found the key {}, expected a text", py::repr(key).cast<std::string>()));
       const auto name = key.cast<std::string>();
-      map.add(name, read(value, path.empty() ? name : path + "." + name));
+      map.add(name, read(value, path.empty() ? name : fmt::format("{}.{}", path, name)));
     }
     return map;
   }

@@ -150,6 +150,7 @@ py::dict tune_controller(const std::vector<std::string>& plugin_path, const Sett
                          const std::vector<std::pair<std::string, Settings>>& given, const py::dict& wishes,
                          const py::object& progress) {
   std::vector<sim::DrivingCase> cases;
+  cases.reserve(given.size());
   for (const auto& [name, world] : given) cases.push_back({name, world});
   sim::ControllerTuningOptions options;
   options.first_seed = wishes["first_seed"].cast<int>();
