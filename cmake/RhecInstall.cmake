@@ -25,6 +25,7 @@ write_basic_package_version_file("${RHEC_PACKAGE_HERE}/rhecConfigVersion.cmake" 
 foreach(FILE IN ITEMS RhecPlugin RhecModel)
   configure_file("${PROJECT_SOURCE_DIR}/cmake/${FILE}.cmake" "${RHEC_PACKAGE_HERE}/${FILE}.cmake" COPYONLY)
 endforeach()
+file(REMOVE "${PROJECT_BINARY_DIR}/rhecConfig.cmake" "${PROJECT_BINARY_DIR}/rhecConfigVersion.cmake")  # of earlier builds: would be found first
 export(EXPORT rhecTargets NAMESPACE rhec:: FILE "${RHEC_PACKAGE_HERE}/rhecTargets.cmake")
 install(FILES
   "${RHEC_PACKAGE_HERE}/rhecConfig.cmake"

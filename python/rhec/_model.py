@@ -207,6 +207,7 @@ class _Builder:
         self._folder.mkdir(parents=True, exist_ok=True)
         file = self._folder / f"{self._model.name}.yaml"
         file.write_text(self._yaml, encoding="utf-8")
+        self._reject(self._model.check(), file)  # before it is compiled, which takes longer
         sources = _rhec.vehicle_as_cpp(str(file))
         for name, content in sources["files"].items():
             path = self._folder / name
@@ -214,9 +215,12 @@ class _Builder:
                 path.write_text(content, encoding="utf-8")
         self._compile()
         built = BuiltModel(sources["plugin"], self._folder, self._model._options)
-        if built.check.failed:
-            raise Error(f"{file}: the check of the compiled model failed: {built.check.failures()}")
+        self._reject(built.check, file)
         return built
+
+    def _reject(self, check: Check, file: pathlib.Path) -> None:
+        if check.failed:
+            raise Error(f"{file}: the check of the model '{self._model.name}' failed: {check.failures()}")
 
     def _compile(self):
         cmake = shutil.which("cmake")

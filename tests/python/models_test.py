@@ -225,6 +225,7 @@ def test_a_model_that_a_check_rejects(tmp_path):
     assert turning.check().failed  # the dynamics depend on the position
     with pytest.raises(rhec.Error, match="symmetry"):
         turning.build(tmp_path / "turning", instruction_sets=["generic"])
+    assert not (tmp_path / "turning" / "build").exists()  # nothing was compiled
 
 
 def test_examples_are_the_same():

@@ -24,14 +24,14 @@ def skip(reason):
     sys.exit(SKIPPED)
 
 
-def make_environment(folder):
+def make_environment(folder, packages):
     """The interpreter of the environment; its last step is a file that says what is in it."""
     python, told = folder / "bin" / "python", folder / "packages.txt"
-    wanted = "\n".join(NEWEST)
+    wanted = "\n".join(packages)
     if told.is_file() and told.read_text() == wanted:
         return python
     for command in ([sys.executable, "-m", "venv", "--clear", str(folder)],
-                    [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *NEWEST]):
+                    [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages]):
         result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         if result.returncode:
             skip(f"'{' '.join(command)}' failed, so that there are no newest packages: {result.stdout[-500:]}")
@@ -45,7 +45,7 @@ def main():
     parser.add_argument("--environment", type=pathlib.Path)
     arguments = parser.parse_args()
     if arguments.environment:
-        python, files = str(make_environment(arguments.environment.resolve())), sorted(map(str, HERE.glob("*_test.py")))
+        python, files = str(make_environment(arguments.environment.resolve(), NEWEST)), sorted(map(str, HERE.glob("*_test.py")))
     else:
         python, files = sys.executable, [str(HERE / f"{name}_test.py") for name in arguments.names]
         missing = [package for module, package in NEEDED.items() if importlib.util.find_spec(module) is None]
