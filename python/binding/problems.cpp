@@ -23,7 +23,7 @@ namespace {
 
 /// A problem with every number that a solver needs.
 struct Problem {
-  std::vector<std::string> plugin_path;
+  Host host;
   sim::ProblemRecord record;
   std::shared_ptr<const Model> model;  ///< as it is named, before the problem adds states to it
   std::unique_ptr<HorizonProblem> built;
@@ -43,9 +43,7 @@ std::vector<std::shared_ptr<Problem>> problems_of(const std::vector<std::string>
   const Host host = examined_host(plugin_path);
   std::vector<std::shared_ptr<Problem>> made;
   for (sim::ProblemRecord& record : sim::read_problems(text, name)) {
-    auto problem = std::make_shared<Problem>();
-    problem->plugin_path = plugin_path;
-    problem->record = std::move(record);
+    auto problem = std::make_shared<Problem>(Problem{host, std::move(record), nullptr, nullptr});
     sim::make_terms({&problem->record, 1}, host);
     problem->model = host.make_model(problem->record.model, problem->record.model_options);
     problem->built = sim::build(problem->record, sim::as_integrated(problem->record, problem->model));
@@ -92,7 +90,7 @@ void check_kind(const Problem& problem, bool covariances) {
 std::unique_ptr<Solution> solve(const std::shared_ptr<const Problem>& problem, const std::string& solver_name,
                                 const Settings& options, std::optional<double> deadline, bool cold, bool covariances) {
   check_kind(*problem, covariances);
-  const std::shared_ptr<Solver> solver = examined_host(problem->plugin_path).make_solver(solver_name, options);
+  const std::shared_ptr<Solver> solver = problem->host.make_solver(solver_name, options);
   HorizonProblem& ocp = *problem->built;
   if (const std::string reason = solver->why_not(ocp); !reason.empty())
     throw Error(fmt::format("{}: solver '{}' cannot take this problem: {}; choose another one of rhec.plugins()",

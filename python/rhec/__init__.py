@@ -16,8 +16,9 @@ from ._robot import Robot
 from ._runs import Estimates, Run, SmoothedRun, estimate, run, smooth
 from ._studies import Sweep, Tuning, sweep, tune, tune_controller
 from ._table import Table
+from ._term import BuiltTerm, Term
 
-__all__ = ["BuiltModel", "CasadiModel", "CasadiProblem", "Check", "Command", "Controller", "Error", "Estimate", "Estimates", "Estimator", "Model", "Path",
-           "Problem", "Report", "Robot", "Run", "SmoothedRun", "Solution", "Sweep", "Table", "Tuning", "Variable", "Vehicle",
+__all__ = ["BuiltModel", "BuiltTerm", "CasadiModel", "CasadiProblem", "Check", "Command", "Controller", "Error", "Estimate", "Estimates", "Estimator", "Model", "Path",
+           "Problem", "Report", "Robot", "Run", "SmoothedRun", "Solution", "Sweep", "Table", "Term", "Tuning", "Variable", "Vehicle",
            "__version__", "check", "estimate", "options", "plugins", "read_problems", "run", "smooth", "smooth_abs",
            "smooth_max", "smooth_min", "sweep", "to_casadi", "to_sympy", "tune", "tune_controller", "write_problems"]

@@ -1,16 +1,12 @@
 """A vehicle that is written in Python: with sympy's or CasADi's terms."""
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 import pathlib
-import shutil
-import subprocess
 from collections.abc import Sequence
 from typing import Any
 
-from . import _configuration, _notation, _rhec
+from . import _compile, _configuration, _notation, _rhec
 from ._check import Check
 from ._errors import Error
 from ._types import File
@@ -18,7 +14,7 @@ from ._types import File
 _KINDS = ("states", "inputs", "parameters", "outputs", "options")
 
 
-def _name_of(key):
+def name_of(key: Any) -> str:
     """Of a text or a symbol: x, x(t), SX x."""
     if isinstance(key, str):
         return key
@@ -30,14 +26,14 @@ def _name_of(key):
     return name() if callable(name) else name
 
 
-def _by_name(given, what):
+def by_name(given: Any, what: str) -> dict[str, Any]:
     """A dict by name of a dict by names or symbols, a list of them, or pairs."""
     if given is None:
         return {}
     pairs = given.items() if isinstance(given, dict) else [each if isinstance(each, tuple) else (each, None) for each in given]
     made = {}
     for key, value in pairs:
-        name = _name_of(key)
+        name = name_of(key)
         if name in made:
             raise Error(f"{what}: '{name}' is there twice; keep one of them")
         made[name] = value
@@ -64,16 +60,16 @@ class Model:
                  parameters: Any = None, options: Any = None, definitions: Any = None, straight_motion: Any = None,
                  source: str = "", smooth: float | None = None) -> None:
         self.name = name
-        self._variables = {kind: _by_name(given, kind) for kind, given in
+        self._variables = {kind: by_name(given, kind) for kind, given in
                            zip(_KINDS, (states, inputs, parameters, outputs, options))}
         names = [each for variables in self._variables.values() for each in variables]
-        definitions = _by_name(definitions, "definitions")
+        definitions = by_name(definitions, "definitions")
         notes = _notation.Notes([*names, *definitions], smooth)
         equations = dict(definitions)
         equations |= {f"{state}'": term for state, term in self._matched(rates, "states", "rates").items()}
         equations |= self._matched(measured, "outputs", "measured")
-        straight = _by_name(straight_motion, "straight_motion")
-        texts = _texts([*equations.values(), *straight.values()], notes)
+        straight = by_name(straight_motion, "straight_motion")
+        texts = texts_of([*equations.values(), *straight.values()], notes)
         self.equations = "".join(f"{left} = {right}\n" for left, right in
                                  [*notes.definitions.items(), *zip(equations, texts)])
         self._straight = "".join(f"{left} = {right}\n" for left, right in zip(straight, texts[len(equations):]))
@@ -90,7 +86,7 @@ class Model:
             if len(given) != len(names):
                 raise Error(f"{what}: found {len(given)} terms, expected {len(names)}: {', '.join(names)}")
             return dict(zip(names, given))
-        terms = _by_name(given, what)
+        terms = by_name(given, what)
         for name in terms:
             if name not in names:
                 raise Error(f"{what}: '{name}' is none of the {kind}; they are {', '.join(names)}")
@@ -165,7 +161,7 @@ class BuiltModel:
 
     def __init__(self, plugin: str, folder: pathlib.Path, options: dict[str, Any]) -> None:
         self.plugin, self.folder, self._options = plugin, folder, options
-        self._plugin_path = [str(folder / "build")]
+        self._plugin_path = [str(folder.absolute() / "build")]
         self.vehicle = _vehicle_of(self)
         self.check = Check.of(self)
 
@@ -184,7 +180,7 @@ def _vehicle_of(model):
     return _rhec.make_vehicle(list(model._plugin_path), _rhec.Settings.of(model._section(), "configuration"))
 
 
-def _texts(terms, notes):
+def texts_of(terms: list[Any], notes: _notation.Notes) -> list[str]:
     """Texts are taken as they are; all others are read together."""
     others = [term for term in terms if not isinstance(term, str)]
     read = iter(_notation.reader_of(others, notes).read_all(others) if others else [])
@@ -195,25 +191,16 @@ class _Builder:
     def __init__(self, model, folder, instruction_sets):
         self._model, self._sets = model, instruction_sets
         self._yaml = model.yaml()
-        self._folder = pathlib.Path(folder) if folder is not None else self._cached()
-
-    def _cached(self):
-        library = pathlib.Path(_rhec.library_folder(), "librhec_plugins.so")
-        what = f"{self._yaml}|{self._sets}|{library}|{library.stat().st_mtime_ns}"
-        cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-        return pathlib.Path(cache, "rhec", "models", f"{self._model.name}-{hashlib.sha256(what.encode()).hexdigest()[:16]}")
+        self._folder = _compile.folder_of(folder, model.name, f"{self._yaml}|{instruction_sets}")
 
     def build(self) -> BuiltModel:
-        self._folder.mkdir(parents=True, exist_ok=True)
         file = self._folder / f"{self._model.name}.yaml"
-        file.write_text(self._yaml, encoding="utf-8")
+        _compile.write(file, self._yaml)
         self._reject(self._model.check(), file)  # before it is compiled, which takes longer
         sources = _rhec.vehicle_as_cpp(str(file))
         for name, content in sources["files"].items():
-            path = self._folder / name
-            if not path.exists() or path.read_text(encoding="utf-8") != content:  # else nothing is compiled anew
-                path.write_text(content, encoding="utf-8")
-        self._compile()
+            _compile.write(self._folder / name, content)
+        _compile.compile_in(self._folder, [f"-DRHEC_MODEL_INSTRUCTION_SETS={';'.join(self._sets)}"] if self._sets else [])
         built = BuiltModel(sources["plugin"], self._folder, self._model._options)
         self._reject(built.check, file)
         return built
@@ -221,25 +208,3 @@ class _Builder:
     def _reject(self, check: Check, file: pathlib.Path) -> None:
         if check.failed:
             raise Error(f"{file}: the check of the model '{self._model.name}' failed: {check.failures()}")
-
-    def _compile(self):
-        cmake = shutil.which("cmake")
-        if cmake is None:
-            raise Error("build: cmake is not there; install it with a C++ compiler (apt-get install cmake g++), or use load()")
-        package = pathlib.Path(_rhec.library_folder(), "cmake", "rhec")
-        if not (package / "rhecConfig.cmake").exists():
-            raise Error(f"build: {package} has no rhecConfig.cmake; install rhec with its headers, or use load()")
-        configure = [cmake, "-S", self._folder, "-B", self._folder / "build", f"-Drhec_DIR={package}",
-                     "-DCMAKE_BUILD_TYPE=Release"]
-        if self._sets:
-            configure.append(f"-DRHEC_MODEL_INSTRUCTION_SETS={';'.join(self._sets)}")
-        self._call(configure)
-        self._call([cmake, "--build", self._folder / "build", "--parallel"])
-
-    def _call(self, words):
-        result = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
-        if result.returncode != 0:
-            log = self._folder / "build.log"
-            log.write_text(result.stdout, encoding="utf-8")
-            end = "\n".join(result.stdout.splitlines()[-15:])
-            raise Error(f"build: {' '.join(map(str, words[:2]))} failed; the whole of it is in {log}; it ends:\n{end}")

@@ -1,4 +1,4 @@
-"""Terms of sympy and CasADi in the notation of vehicles' equations (docs/equations.md)."""
+"""Terms of sympy and CasADi in the notation of vehicles' equations (docs/equations.md), or as C++."""
 from __future__ import annotations
 
 import dataclasses
@@ -52,16 +52,6 @@ def _joined(pattern, level, *parts):
                 1 + max((part.depth for part, _ in parts), default=0))
 
 
-def number(value):
-    value = float(value)
-    if not math.isfinite(value):
-        raise Error(f"a number that is not finite in an equation: {value}; expected finite ones")
-    text = repr(value)
-    if text.endswith(".0"):
-        text = text[:-2]
-    return Text(text, _SIGNED if value < 0 else _ATOM)
-
-
 def add(a, b):
     if b.text.startswith("-") and b.level >= _SIGNED:
         return _joined("{} - {}", _SUM, (a, _SUM), (Text(b.text[1:], b.level, b.depth), _PRODUCT))
@@ -84,20 +74,61 @@ def negate(a):
     return _joined("-{}", _SIGNED, (a, _POWER))
 
 
-def power(a, b):
-    return _joined("{}^{}", _POWER, (a, _ATOM), (b, _POWER))
-
-
 def call(function, *arguments):
     return Text(f"{function}({', '.join(argument.text for argument in arguments)})", _ATOM,
                 1 + max(argument.depth for argument in arguments))
 
 
-class Notes:
-    """Definitions that are made on the way, and what is smoothed."""
+class Equations:
+    """How equations write what is not alike everywhere."""
 
-    def __init__(self, taken, smooth):
+    pi = "pi"
+    has_corners = False
+
+    def number(self, value):
+        value = float(value)
+        if not math.isfinite(value):
+            raise Error(f"a number that is not finite in an equation: {value}; expected finite ones")
+        return Text(self._digits(value), _SIGNED if value < 0 else _ATOM)
+
+    def _digits(self, value):
+        return repr(value).removesuffix(".0")
+
+    def power(self, a, b):
+        return _joined("{}^{}", _POWER, (a, _ATOM), (b, _POWER))
+
+
+class Cpp(Equations):
+    """How C++ does, for double and rhec::Expression alike."""
+
+    pi = "std::numbers::pi"
+
+    def _digits(self, value):
+        return repr(value)  # 1.0, not 1: 1 / 2 is 0
+
+    def power(self, a, b):
+        if re.fullmatch(r"-?\d+\.0", b.text):
+            return call("pow", a, Text(b.text[:-2], b.level))
+        return call("exp", multiply(b, call("log", a)))
+
+
+class CppNumbers(Cpp):
+    """Numbers that nobody differentiates: they may have corners, and be infinite."""
+
+    has_corners = True
+
+    def number(self, value):
+        if math.isinf(float(value)):
+            return Text("rhec::infinity" if value > 0 else "-rhec::infinity", _ATOM if value > 0 else _SIGNED)
+        return super().number(value)
+
+
+class Notes:
+    """Definitions that are made on the way, what is smoothed, and how terms are written."""
+
+    def __init__(self, taken, smooth, style=None):
         self.definitions, self._taken, self._smooth = {}, set(taken), smooth
+        self.style = style or Equations()
 
     def name(self, text):
         if not _NAME.fullmatch(text):
@@ -119,12 +150,12 @@ class Notes:
     def width(self, what):
         if self._smooth is None:
             raise Error(f"{what} {_SMOOTH}")
-        return number(self._smooth)
+        return self.style.number(self._smooth)
 
     def step(self, difference, what):
         """1 where `difference` is above 0, 0 below, and a slope of the width between."""
         slope = call("tanh", divide(difference, self.width(what)))
-        return divide(add(number(1), slope), number(2))
+        return divide(add(self.style.number(1), slope), self.style.number(2))
 
 
 class SympyReader:
@@ -134,6 +165,7 @@ class SympyReader:
 
     def __init__(self, sympy, notes):
         self._sympy, self._notes, self._known = sympy, notes, {}
+        self._number, self._raised = notes.style.number, notes.style.power
 
     def read_all(self, terms):
         """The texts of several terms."""
@@ -158,11 +190,11 @@ class SympyReader:
         if isinstance(term, sympy.Derivative) and isinstance(term.expr, sympy.core.function.AppliedUndef):
             return Text(self._notes.name(term.expr.func.__name__).text + "'")
         if term is sympy.pi:
-            return Text("pi")
+            return Text(self._notes.style.pi)
         if term.is_Rational and not term.is_Integer:
-            return divide(number(term.p), number(term.q))
+            return divide(self._number(term.p), self._number(term.q))
         if term.is_number and not term.args:
-            return number(self._finite(term))
+            return self._number(self._finite(term))
         if term.is_Add:
             return self._sum(term)
         if term.is_Mul:
@@ -172,6 +204,8 @@ class SympyReader:
         return self._function(term)
 
     def _finite(self, term):
+        if self._notes.style.has_corners and term in (self._sympy.oo, -self._sympy.oo):
+            return term
         if not term.is_finite or not term.is_real:
             raise Error(f"{term} in an equation: expected real, finite numbers")
         return term
@@ -203,13 +237,15 @@ class SympyReader:
         if exponent == self._sympy.Rational(1, 2) or exponent == 0.5:
             return call("sqrt", self.read(base))
         if exponent == -self._sympy.Rational(1, 2) or exponent == -0.5:
-            return divide(number(1), call("sqrt", self.read(base)))
+            return divide(self._number(1), call("sqrt", self.read(base)))
         if exponent == -1:
-            return divide(number(1), self.read(base))
-        return power(self.read(base), self.read(exponent))
+            return divide(self._number(1), self.read(base))
+        return self._raised(self.read(base), self.read(exponent))
 
     def _function(self, term):
         sympy, name = self._sympy, type(term).__name__
+        if self._notes.style.has_corners and isinstance(term, (sympy.Abs, sympy.Max, sympy.Min, sympy.Piecewise)):
+            return self._corner(term)
         if name in self._FUNCTIONS and len(term.args) in (1, 2 if name == "atan2" else 1):
             return call(name, *map(self.read, term.args))
         if isinstance(term, sympy.Abs):
@@ -232,13 +268,41 @@ class SympyReader:
         raise Error(f"{term}: equations do not have the function '{name}'; expected one of "
                     f"{', '.join(self._FUNCTIONS)}, sqrt, and powers (docs/equations.md)")
 
-    def _piecewise(self, term):
+    def _corner(self, term):
+        """Where only the value counts."""
+        sympy = self._sympy
+        if isinstance(term, sympy.Piecewise):
+            made = self.read(self._otherwise(term))
+            for value, condition in reversed(term.args[:-1]):
+                made = Text(f"({self._truth(condition)} ? {self.read(value).text} : {made.text})")
+            return made
+        function = {sympy.Abs: "fabs", sympy.Max: "fmax", sympy.Min: "fmin"}[term.func]
+        made, *others = map(self.read, sorted(term.args, key=str))
+        if function == "fabs":
+            return call(function, made)
+        for other in others:
+            made = call(function, made, other)
+        return made
+
+    def _truth(self, condition):
+        sympy = self._sympy
+        if isinstance(condition, sympy.core.relational.Relational):
+            return f"({self.read(condition.lhs).within(_SUM)} {condition.rel_op} {self.read(condition.rhs).within(_SUM)})"
+        if isinstance(condition, (sympy.And, sympy.Or)):
+            sign = " && " if isinstance(condition, sympy.And) else " || "
+            return f"({sign.join(self._truth(part) for part in condition.args)})"
+        raise Error(f"the condition {condition}: expected comparisons, 'and' and 'or' of them")
+
+    def _otherwise(self, term):
         if term.args[-1][1] != True:  # noqa: E712  (sympy's own truth)
             raise Error(f"{term}: a value for all other cases is missing; end it with (value, True)")
-        made = self.read(term.args[-1][0])
+        return term.args[-1][0]
+
+    def _piecewise(self, term):
+        made = self.read(self._otherwise(term))
         for value, condition in reversed(term.args[:-1]):
             share = self._condition(condition, f"{term}: Piecewise")
-            made = add(multiply(share, self.read(value)), multiply(subtract(number(1), share), made))
+            made = add(multiply(share, self.read(value)), multiply(subtract(self._number(1), share), made))
         return made
 
     def _condition(self, condition, what):
@@ -262,9 +326,8 @@ class CasadiReader:
         self._casadi, self._notes = casadi, notes
         plain = {"SIN": "sin", "COS": "cos", "TAN": "tan", "ASIN": "asin", "ACOS": "acos", "ATAN": "atan", "TANH": "tanh",
                  "EXP": "exp", "LOG": "log", "SQRT": "sqrt", "ATAN2": "atan2", "HYPOT": "hypot"}
-        one = number(1)
-        step = notes.step
-        width = notes.width
+        number, power = notes.style.number, notes.style.power
+        one, step, width = number(1), notes.step, notes.width
         rules = {
             "ASSIGN": lambda a: a,
             "ADD": add, "SUB": subtract, "MUL": multiply, "DIV": divide, "NEG": negate, "POW": power, "CONSTPOW": power,
@@ -293,7 +356,7 @@ class CasadiReader:
                 raise Error(f"an equation of the shape {term.shape}; expected one number for each state and output")
         symbols = casadi.symvar(casadi.vertcat(*terms))
         if not symbols:
-            return [number(term).text for term in terms]
+            return [self._notes.style.number(term).text for term in terms]
         made = casadi.Function("equations", symbols, terms)
         uses = self._count(made)
         work, results = {}, [None] * len(terms)
@@ -304,7 +367,7 @@ class CasadiReader:
                 continue
             term = self._term(made, k, operation, [work[i] for i in inputs] if operation != casadi.OP_INPUT else inputs, symbols)
             work[outputs[0]] = self._notes.define(term) if uses[k] > 1 and term.depth > 1 else self._notes.shallow(term)
-        return [text if text is not None else "0" for text in results]
+        return [text if text is not None else self._notes.style.number(0).text for text in results]
 
     def _count(self, made):
         """How often the result of each instruction is used."""
@@ -321,7 +384,7 @@ class CasadiReader:
     def _term(self, made, k, operation, inputs, symbols):
         casadi = self._casadi
         if operation == casadi.OP_CONST:
-            return number(made.instruction_constant(k))
+            return self._notes.style.number(made.instruction_constant(k))
         if operation == casadi.OP_INPUT:
             return self._notes.name(symbols[inputs[0]].name())
         if operation not in self._rules:
