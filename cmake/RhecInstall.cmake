@@ -17,14 +17,21 @@ endif()
 
 set(RHEC_PACKAGE_DIRECTORY "${CMAKE_INSTALL_LIBDIR}/cmake/rhec")
 install(EXPORT rhecTargets NAMESPACE rhec:: DESTINATION "${RHEC_PACKAGE_DIRECTORY}")
-configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/rhecConfig.cmake.in" "${PROJECT_BINARY_DIR}/rhecConfig.cmake"
+# They lie in the build tree as in an installation, so that `find_package(rhec)` takes either.
+set(RHEC_PACKAGE_HERE "${PROJECT_BINARY_DIR}/${RHEC_PACKAGE_DIRECTORY}")
+configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/rhecConfig.cmake.in" "${RHEC_PACKAGE_HERE}/rhecConfig.cmake"
   INSTALL_DESTINATION "${RHEC_PACKAGE_DIRECTORY}" PATH_VARS RHEC_PLUGIN_DIRECTORY)
-write_basic_package_version_file("${PROJECT_BINARY_DIR}/rhecConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+write_basic_package_version_file("${RHEC_PACKAGE_HERE}/rhecConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+foreach(FILE IN ITEMS RhecPlugin RhecModel)
+  configure_file("${PROJECT_SOURCE_DIR}/cmake/${FILE}.cmake" "${RHEC_PACKAGE_HERE}/${FILE}.cmake" COPYONLY)
+endforeach()
+file(REMOVE "${PROJECT_BINARY_DIR}/rhecConfig.cmake" "${PROJECT_BINARY_DIR}/rhecConfigVersion.cmake")  # of earlier builds: would be found first
+export(EXPORT rhecTargets NAMESPACE rhec:: FILE "${RHEC_PACKAGE_HERE}/rhecTargets.cmake")
 install(FILES
-  "${PROJECT_BINARY_DIR}/rhecConfig.cmake"
-  "${PROJECT_BINARY_DIR}/rhecConfigVersion.cmake"
-  "${PROJECT_SOURCE_DIR}/cmake/RhecPlugin.cmake"
-  "${PROJECT_SOURCE_DIR}/cmake/RhecModel.cmake"
+  "${RHEC_PACKAGE_HERE}/rhecConfig.cmake"
+  "${RHEC_PACKAGE_HERE}/rhecConfigVersion.cmake"
+  "${RHEC_PACKAGE_HERE}/RhecPlugin.cmake"
+  "${RHEC_PACKAGE_HERE}/RhecModel.cmake"
   DESTINATION "${RHEC_PACKAGE_DIRECTORY}")
 
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}")

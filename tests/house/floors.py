@@ -30,6 +30,7 @@ MAY_USE = {
     "terms": ("core", "plugins"),
     "sim": ("core", "plugins", "sim"),
     "apps": ("core", "plugins", "sim", "apps"),
+    "python": ("core", "plugins", "sim"),
     "benchmarks": ("core", "plugins", "sim"),
 }
 PLUGIN_FOLDERS = ("solvers", "models", "blocking", "priors", "terms")
@@ -250,6 +251,7 @@ def self_test():
         "sim/world/model.cpp": '#include "rhec/models/a.hpp"',
         "sim/world/loop.cpp": '#include "rhec/sim/loop/run.hpp"',
         "sim/loop/no_room.cpp": '#include "rhec/sim/world.hpp"',
+        "python/binding/app.cpp": '#include "rhec/apps/commands.hpp"',
         "benchmarks/app.cpp": '#include "rhec/apps/commands.hpp"',
         "benchmarks/up.cpp": '#include "../apps/main.cpp"',
         "benchmarks/gone.cpp": '#include "models/b/gone.hpp"',
@@ -276,6 +278,8 @@ def self_test():
         "sim/loop/CMakeLists.txt": "rhec_add_room(sim loop SHARED AFTER world SOURCES run.cpp)",
         "sim/loop/run.cpp": '#include "rhec/plugins/host/host.hpp"\n#include "rhec/sim/world/truth.hpp"',
         "benchmarks/all.cpp": '#include <benchmark/benchmark.h>\n#include "models/b/b.hpp"\n#include "rhec/sim/world/truth.hpp"',
+        "python/binding/own.hpp": "#pragma once",
+        "python/binding/runs.cpp": '#include <pybind11/pybind11.h>\n#include "own.hpp"\n#include "rhec/sim/world/truth.hpp"',
         "apps/main.cpp": '#include <CLI/CLI.hpp>\n#include "rhec/sim/world/truth.hpp"',
     }
     failures = []

@@ -2,7 +2,7 @@
 """The installed tree can be moved and used: install, move away, run, and build against it from outside.
 
     install_test.py <build directory> --source <source root> [--cxxflags <flags>] [--cmake <cmake>] [--cxx <compiler>]
-                    [--instruction-sets <set>,<set>]
+                    [--instruction-sets <set>,<set>] [--python <python>]
 """
 import argparse
 import json
@@ -199,6 +199,30 @@ def check_template(home, arguments):
     expect(str(home / "rhec") in told, f"the installed model is not the one that is found by name:\n{told}")
 
 
+PYTHON = """\
+import rhec
+robot = rhec.Robot({"model": "bicycle_slip", "estimator": {"name": "ekf"}})
+estimator = robot.make_estimator()
+estimator.push_measurement(0.0, [1.0, 2.0, 0.1])
+print(rhec.__file__, estimator.estimate(0.0).state.shape, rhec.plugins().rows)
+"""
+
+
+def check_python(prefix, python):
+    """The package that was installed, if one was built: it finds the libraries and the plugins beside it."""
+    packages = list(prefix.glob("lib/python3/dist-packages/rhec"))
+    if not packages or not python:
+        return
+    has_numpy = subprocess.run([python, "-c", "import numpy"], capture_output=True, check=False).returncode == 0
+    if not has_numpy:
+        print(f"install: {python} has no numpy, so the Python package was not tried")
+        return
+    result = subprocess.run([python, "-B", "-c", PYTHON], env=CLEAN | {"PYTHONPATH": str(packages[0].parent)}, text=True, cwd="/",
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+    expect(result.returncode == 0 and str(prefix) in result.stdout and "(4,)" in result.stdout,
+           f"the installed Python package: {result.stdout}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("build", type=pathlib.Path)
@@ -207,6 +231,7 @@ def main():
     parser.add_argument("--cxx", default="")
     parser.add_argument("--cxxflags", default="")
     parser.add_argument("--instruction-sets", default="")
+    parser.add_argument("--python", default="", help="for which the Python package was built")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="rhec-install-") as directory:
         work = pathlib.Path(directory).resolve()
@@ -217,6 +242,7 @@ def main():
         first.rename(moved)
         check_relocatable(moved, [str(place.resolve()) for place in (arguments.build, arguments.source, first)])
         plugins = check_plugins(moved)
+        check_python(moved, arguments.python)
         headers = check_consumer(moved, work, arguments)
         check_robot(moved, work, arguments)
         check_problem(moved, work, arguments)

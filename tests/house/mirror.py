@@ -23,6 +23,7 @@ SUITES = {
     "closed_loop": "estimator and controller together",
     "house": "the house itself",
     "performance": "counts of instructions",
+    "python": "the package of python/, from Python",
     "reference": "recorded solutions",
     "report": "the page of reports, in a browser",
     "reproduction": "scripts/reproduce",

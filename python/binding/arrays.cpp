@@ -1,0 +1,56 @@
+#include "arrays.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <string>
+
+#include "rhec/core/base/error.hpp"
+
+namespace rhec::python {
+namespace {
+
+/// Of a dense array, row after row. numpy is always told them: what pybind11 assumes of a type's size does not hold for
+/// every version of numpy.
+Shape strides_of(const Shape& shape) {
+  Shape strides(shape.size());
+  py::ssize_t step = sizeof(double);
+  for (std::size_t i = shape.size(); i-- > 0;) {
+    strides[i] = step;
+    step *= std::max<py::ssize_t>(shape[i], 1);
+  }
+  return strides;
+}
+
+}  // namespace
+
+py::array view(const double* numbers, const Shape& shape, py::handle owner) {
+  py::array_t<double> made(shape, strides_of(shape), numbers, owner);
+  py::detail::array_proxy(made.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  return made;
+}
+
+py::array copy(const double* numbers, const Shape& shape) {
+  py::array_t<double> made(shape, strides_of(shape));
+  std::copy_n(numbers, made.size(), made.mutable_data());
+  return made;
+}
+
+const double* vector_of(const Numbers& given, const std::vector<Variable>& variables, std::string_view what) {
+  if (given.ndim() == 1 && given.size() == static_cast<py::ssize_t>(variables.size())) return given.data();
+  std::string shape;
+  for (py::ssize_t i = 0; i < given.ndim(); ++i) shape += fmt::format("{}{}", i > 0 ? " x " : "", given.shape(i));
+  throw Error(fmt::format("{}: found an array of {}, expected {} numbers in one dimension: {}", what,
+                          shape.empty() ? "one number" : shape, variables.size(),
+                          fmt::join(names_of(variables), ", ")));
+}
+
+py::ssize_t rows_of(const Numbers& given, std::size_t width, std::string_view what) {
+  const auto wanted = static_cast<py::ssize_t>(width);
+  if (given.ndim() == 1 && given.shape(0) == wanted) return 1;
+  if (given.ndim() == 2 && given.shape(1) == wanted) return given.shape(0);
+  throw Error(fmt::format("{}: expected {} numbers, or rows of so many (n x {})", what, width, width));
+}
+
+}  // namespace rhec::python

@@ -1,0 +1,279 @@
+#include <fmt/format.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "arrays.hpp"
+#include "binding.hpp"
+#include "estimates.hpp"
+#include "lock.hpp"
+#include "reports.hpp"
+#include "rhec/core/base/error.hpp"
+#include "robots.hpp"
+
+namespace rhec::python {
+namespace {
+
+using EstimatorHandle = std::shared_ptr<EstimatorObject>;
+
+/// What is made once of an estimator: with it come the names that its estimates share.
+struct NamedEstimator : EstimatorObject {
+  std::shared_ptr<const ModelDescription> about;
+  std::shared_ptr<const std::vector<Sensor>> sensors;
+};
+
+/// An estimate's state may go on behind the vehicle's with biases and scales of sensors, and values of motion; the
+/// latter have no names.
+std::shared_ptr<const ModelDescription> described(const Robot& robot, const Estimator& estimator) {
+  auto about = std::make_shared<ModelDescription>(robot.estimated_description());
+  const auto known = static_cast<std::size_t>(estimator.model().state_count());
+  if (about->states.size() > known) about->states.resize(known);
+  return about;
+}
+
+std::shared_ptr<NamedEstimator> make_estimator(const std::shared_ptr<RobotObject>& robot,
+                                               const std::optional<Numbers>& initial_state) {
+  auto made = std::make_shared<NamedEstimator>();
+  made->robot = robot;
+  made->keeper = std::make_shared<sim::MapKeeper>();
+  Robot hooked = robot->robot;
+  hooked.add_hooks(made->keeper);
+  std::optional<Eigen::VectorXd> start;
+  if (initial_state) {
+    const std::vector<Variable>& states = hooked.bounded_description().states;
+    start = Eigen::Map<const Eigen::VectorXd>(vector_of(*initial_state, states, "initial_state"),
+                                              static_cast<Eigen::Index>(states.size()));
+  }
+  made->estimator = hooked.make_estimator(start);
+  made->about = described(hooked, *made->estimator);
+  made->sensors = std::make_shared<const std::vector<Sensor>>(
+      made->estimator->watch() ? made->estimator->watch()->sensors() : std::vector<Sensor>());
+  return made;
+}
+
+void push_measurement(NamedEstimator& self, double time, const Numbers& outputs) {
+  const double* values = vector_of(outputs, self.robot->robot.model()->description().outputs, "outputs");
+  const Lock lock(self.mutex);
+  self.estimator->push_measurement(time, values);
+}
+
+void push_input(NamedEstimator& self, double time, const Numbers& inputs) {
+  const double* values = vector_of(inputs, self.robot->robot.model()->description().inputs, "inputs");
+  const Lock lock(self.mutex);
+  self.estimator->push_input(time, values);
+}
+
+py::object estimate(NamedEstimator& self, double time, std::optional<double> deadline, const py::object& out) {
+  const Clock::time_point end = deadline_in(deadline);
+  const Lock lock(self.mutex);
+  const Estimate* now = nullptr;
+  double microseconds = 0.0;
+  {
+    const py::gil_scoped_release others_go_on;
+    const auto start = Clock::now();
+    now = &self.estimator->estimate(time, end);
+    microseconds = microseconds_since(start);
+  }
+  if (!out.is_none()) {
+    auto& place = out.cast<EstimateObject&>();
+    if (!place.has_room_for(*now)) throw Error("out: an estimate of another vehicle; expected one of this estimator");
+    place.take(*now);
+    place.microseconds = microseconds;
+    return out;
+  }
+  auto made = std::make_unique<EstimateObject>();
+  made->about = self.about;
+  made->sensors = self.sensors;
+  made->take(*now);
+  made->microseconds = microseconds;
+  return py::cast(std::move(made));
+}
+
+template <class Call>
+void without_interpreter(NamedEstimator& self, const Call& call) {
+  const Lock lock(self.mutex);
+  const py::gil_scoped_release others_go_on;
+  call();
+}
+
+void reset_to(NamedEstimator& self, const std::optional<Numbers>& mean, const std::optional<Numbers>& covariance) {
+  if (mean.has_value() != covariance.has_value())
+    throw Error("reset: expected both the mean and the covariance, or neither");
+  if (!mean) return without_interpreter(self, [&] { self.estimator->reset(); });
+  const Eigen::Index n = self.estimator->model().state_count() + self.estimator->model().parameter_count();
+  if (mean->ndim() != 1 || mean->size() != n || covariance->ndim() != 2 || covariance->shape(0) != n ||
+      covariance->shape(1) != n)
+    throw Error(fmt::format("reset: expected the mean of [state; parameters] ({0}) and its covariance ({0}, {0})", n));
+  const Eigen::VectorXd to = Eigen::Map<const Eigen::VectorXd>(mean->data(), n);
+  const Eigen::MatrixXd with = Eigen::Map<const Eigen::MatrixXd>(covariance->data(), n, n);
+  bool done = false;
+  without_interpreter(self, [&] { done = self.estimator->reset(to, with); });
+  if (!done)
+    throw Error("reset: the estimator cannot go on from there; expected finite numbers, and a measurement before it");
+}
+
+py::dict counts_of(NamedEstimator& self) {
+  const Lock lock(self.mutex);
+  const Estimator::Counts& counts = self.estimator->counts();
+  py::dict made;
+  made["nodes"] = counts.nodes;
+  made["estimates"] = counts.estimates;
+  made["fallbacks"] = counts.fallbacks;
+  made["late"] = counts.late;
+  made["dropped"] = counts.dropped;
+  made["rejected"] = counts.rejected;
+  made["rebased"] = counts.rebased;
+  made["clocks_set"] = counts.clocks_set;
+  made["missing"] = counts.missing;
+  return made;
+}
+
+double value_of(const EstimateObject& self, const std::string& name) {
+  const auto find = [&](const std::vector<Variable>& variables) {
+    const auto at = std::find_if(variables.begin(), variables.end(), [&](const Variable& v) { return v.name == name; });
+    return at == variables.end() ? -1 : static_cast<Eigen::Index>(at - variables.begin());
+  };
+  if (const Eigen::Index j = find(self.about->states); j >= 0 && j < self.value.state.size())
+    return self.value.state[j];
+  if (const Eigen::Index j = find(self.about->parameters); j >= 0) return self.value.parameters[j];
+  throw py::key_error(fmt::format("'{}' is neither a state nor a parameter", name));
+}
+
+py::array sigmas_of(const EstimateObject& self) {
+  std::vector<double> sigmas;
+  for (Eigen::Index j = 0; j < self.value.covariance.rows(); ++j)
+    sigmas.push_back(std::sqrt(self.value.covariance(j, j)));
+  return copy(sigmas);
+}
+
+py::list innovations_of(const EstimateObject& self) {
+  py::list made;
+  for (const Innovation& innovation : self.innovations) {
+    py::dict each;
+    each["time"] = innovation.time;
+    each["sensor"] = self.sensors->at(static_cast<std::size_t>(innovation.sensor)).name;
+    each["accepted"] = innovation.accepted;
+    each["nis"] = innovation.nis;
+    each["value"] = copy(innovation.value.data(), {innovation.value.size()});
+    each["covariance"] =
+        copy(innovation.covariance.data(), {innovation.covariance.rows(), innovation.covariance.cols()});
+    made.append(each);
+  }
+  return made;
+}
+
+std::string described_estimate(const EstimateObject& self) {
+  std::string text = fmt::format("<estimate at {:.3f} s:", self.value.time);
+  for (std::size_t j = 0; j < self.about->states.size() && j < static_cast<std::size_t>(self.value.state.size()); ++j)
+    text += fmt::format(" {} {:.4g}", self.about->states[j].name, self.value.state[static_cast<Eigen::Index>(j)]);
+  for (std::size_t j = 0; j < self.about->parameters.size(); ++j)
+    text +=
+        fmt::format(" {} {:.4g}", self.about->parameters[j].name, self.value.parameters[static_cast<Eigen::Index>(j)]);
+  return text + fmt::format("; health {}>", name_of(self.value.health.level));
+}
+
+void bind_estimates(py::module_& module) {
+  py::class_<EstimateObject>(module, "Estimate",
+                             "State and slip at one time, with their covariance. It stays as it is when the estimator "
+                             "goes on. Its arrays are\n"
+                             "read-only views; they keep the estimate alive.")
+      .def_property_readonly(
+          "time", [](const EstimateObject& self) { return self.value.time; }, "[s]")
+      .def_property_readonly(
+          "state",
+          [](const py::object& self) {
+            const Eigen::VectorXd& state = self.cast<const EstimateObject&>().value.state;
+            return view(state.data(), {state.size()}, self);
+          },
+          "x, (n_x); biases and scales of sensors that are estimated stand behind the vehicle's states")
+      .def_property_readonly(
+          "parameters",
+          [](const py::object& self) {
+            const Eigen::VectorXd& parameters = self.cast<const EstimateObject&>().value.parameters;
+            return view(parameters.data(), {parameters.size()}, self);
+          },
+          "p, (n_p): slip at present")
+      .def_property_readonly(
+          "covariance",
+          [](const py::object& self) {
+            const Eigen::MatrixXd& covariance = self.cast<const EstimateObject&>().value.covariance;
+            return view(covariance.data(), {covariance.rows(), covariance.cols()}, self);
+          },
+          "of [state; parameters], (n_x + n_p, n_x + n_p), squared units")
+      .def_property_readonly("sigmas", &sigmas_of, "standard deviations of [state; parameters], (n_x + n_p)")
+      .def_property_readonly(
+          "fallback", [](const EstimateObject& self) { return self.value.fallback; },
+          "the solver failed; this is the prediction from earlier samples")
+      .def_property_readonly(
+          "predicted", [](const EstimateObject& self) { return self.value.predicted; },
+          "the time is beyond the newest node: the state is integrated from there")
+      .def_property_readonly(
+          "health", [](const EstimateObject& self) { return name_of(self.value.health.level); }, "ok, degraded or lost")
+      .def_property_readonly(
+          "findings",
+          [](const EstimateObject& self) {
+            return self.value.health.level == HealthLevel::ok || self.sensors->empty()
+                       ? std::string()
+                       : in_words(self.value.health, *self.sensors);
+          },
+          "why the health is not ok, in words")
+      .def_property_readonly(
+          "innovations", &innovations_of,
+          "of the measurements since the last estimate: dicts of time [s], sensor, accepted, nis, value, "
+          "covariance")
+      .def_readonly("microseconds", &EstimateObject::microseconds,
+                    "that the estimator took for it, without Python [us]")
+      .def_property_readonly("report", [](const EstimateObject& self) { return self.value.report; })
+      .def("__getitem__", &value_of, py::arg("name"), "The value of a state or a parameter.")
+      .def("__repr__", &described_estimate);
+}
+
+}  // namespace
+
+void bind_estimators(py::module_& module) {
+  bind_estimates(module);
+  py::class_<EstimatorObject, EstimatorHandle>(module, "EstimatorBase");
+  py::class_<NamedEstimator, EstimatorObject, std::shared_ptr<NamedEstimator>>(
+      module, "Estimator",
+      "Estimates state and slip: push stamped measurements and inputs, and ask for the estimate at a time.\n\n"
+      "Measurements and inputs may come in any order. Several threads may use it; each call waits for the others.")
+      .def(py::init(&make_estimator), py::arg("robot").none(false), py::arg("initial_state") = py::none())
+      .def("push_measurement", &push_measurement, py::arg("time"), py::arg("outputs"),
+           "Measured y, (n_y), NaN where missing, at a time [s].")
+      .def("push_input", &push_input, py::arg("time"), py::arg("inputs"),
+           "Measured u, (n_u), NaN where missing, which holds from a time [s] on.")
+      .def("estimate", &estimate, py::arg("time"), py::arg("deadline") = py::none(), py::kw_only(),
+           py::arg("out") = py::none(),
+           "The estimate at a time [s]. `deadline`: seconds from now after which the best so far is returned. `out`: "
+           "an\n"
+           "earlier estimate, which becomes this one, arrays included.")
+      .def(
+          "prepare", [](NamedEstimator& self) { without_interpreter(self, [&] { self.estimator->prepare(); }); },
+          "Does work for the next sample in advance.")
+      .def("reset", &reset_to, py::arg("mean") = py::none(), py::arg("covariance") = py::none(),
+           "Begins anew; or goes on from a mean of [state; parameters] (n) and its covariance (n, n).")
+      .def(
+          "end_drive", [](NamedEstimator& self) { without_interpreter(self, [&] { self.estimator->end_drive(); }); },
+          "Completes what is kept beyond the drive, such as a map of slip.")
+      .def(
+          "save_map",
+          [](NamedEstimator& self) {
+            const Lock lock(self.mutex);
+            self.keeper->save();
+          },
+          "Writes the map of slip to its file (`estimator.memory.file`).")
+      .def_property_readonly(
+          "has_started",
+          [](NamedEstimator& self) {
+            const Lock lock(self.mutex);
+            return self.estimator->has_started();
+          },
+          "whether there was a measurement")
+      .def_property_readonly("counts", &counts_of,
+                             "of nodes, estimates, fallbacks, late, dropped and rejected measurements");
+}
+
+}  // namespace rhec::python

@@ -1,0 +1,35 @@
+"""Which plugins there are, and which options."""
+from __future__ import annotations
+
+from . import _configuration, _rhec
+from ._errors import Error
+from ._table import Table
+from ._types import PluginPath
+
+
+def plugins(*, plugin_path: PluginPath = (), refused: bool = False) -> Table:
+    """The plugins that are found: a Table of kind, name, version, licence, source, backend, path. With `refused` also
+    those that are not used, with the reason."""
+    import numpy
+
+    found = _rhec.plugins(_configuration.folders_of(plugin_path))
+    chosen = [each for each in found if refused or not each["refusal"]]
+    names = ["kind", "name", "version", "licence", "source", "backend", "path"] + (["refusal"] if refused else [])
+    return Table({name: numpy.array([str(each[name] or "") for each in chosen], dtype=object) for name in names})
+
+
+def options(name: str = "", *, kind: str = "", plugin_path: PluginPath = ()) -> Table:
+    """The options of a plugin, by its name, of a section of scenarios ('estimator'), or, without a name, of a scenario's
+    root: a Table of name, type, default, values, meaning."""
+    import numpy
+
+    sections = _rhec.sections()
+    if name in sections and not kind:
+        rows = sections[name]
+    else:
+        by_kind = _rhec.plugin_options(_configuration.folders_of(plugin_path), name, kind)
+        if len(by_kind) > 1:
+            raise Error(f"name: '{name}' is a {' and a '.join(by_kind)}; say which by kind=")
+        rows = next(iter(by_kind.values()))
+    columns = ("name", "type", "default", "values", "meaning")
+    return Table({column: numpy.array([row[column] for row in rows], dtype=object) for column in columns})

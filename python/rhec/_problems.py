@@ -1,0 +1,100 @@
+"""Optimal control and estimation problems, each with every number that a solver needs (docs/problem_format.md)."""
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import tempfile
+from collections.abc import Iterable
+from typing import Any
+
+from . import _configuration, _rhec
+from ._types import ArrayLike, File, PluginPath
+
+
+class Problem:
+    """One problem: of estimation (kind 'rhe') or control ('rhc')."""
+
+    def __init__(self, made: _rhec.ProblemBase) -> None:
+        self._made = made
+
+    @classmethod
+    def from_dict(cls, keys: dict[str, Any], *, plugin_path: PluginPath = ()) -> Problem:
+        """Of a dict with the keys of docs/problem_format.md."""
+        return problems_of(json.dumps(keys), "problem", plugin_path)[0]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As such a dict."""
+        return json.loads(self.line())
+
+    def line(self) -> str:
+        """As a line of a problem file."""
+        return self._made.line()
+
+    @property
+    def id(self) -> str:
+        return self._made.id
+
+    @property
+    def kind(self) -> str:
+        """'rhe' or 'rhc'."""
+        return self._made.kind
+
+    @property
+    def intervals(self) -> int:
+        """N."""
+        return self._made.intervals
+
+    @property
+    def vehicle(self) -> _rhec.Vehicle:
+        """The model, before the problem adds states to it."""
+        return self._made.vehicle
+
+    @property
+    def names(self) -> dict[str, list[str]]:
+        """The names of its states, inputs and parameters, as a dict of lists."""
+        made = self._made
+        return {"states": made.state_names, "inputs": made.input_names, "parameters": made.parameter_names}
+
+    def solve(self, solver: str = "gn_rti", *, deadline: float | None = None, cold: bool = False, covariances: bool = False,
+              **options: Any) -> _rhec.Solution:
+        """Solves it from its guess, or from a simulation if it has none or with `cold`. Returns a Solution, also where
+        that is not usable: `Solution.usable` says so.
+
+        solver: one of rhec.plugins(); options: its own, such as mode="converge"
+        deadline: seconds from now after which the best so far is returned
+        covariances: of [state; parameters] at each node, too
+        """
+        return self._made.solve(solver, _rhec.Settings.of(options, "configuration"), deadline, cold, covariances)
+
+    def evaluate(self, states: ArrayLike, inputs: ArrayLike, parameters: ArrayLike) -> dict[str, float]:
+        """Objective and largest defect of a point: states (N + 1, n_x), inputs (N, n_u), parameters (N, n_p). Parameters
+        of a control problem are those given, on every interval."""
+        return self._made.evaluate(states, inputs, parameters)
+
+    def __repr__(self) -> str:
+        return f"<problem '{self.id}': {self.kind} of {self.intervals} intervals, {self.vehicle.name}>"
+
+
+def problems_of(text: str, name: str, plugin_path: PluginPath) -> list[Problem]:
+    """The problems of lines of JSON; `name` stands for the file in errors."""
+    return [Problem(made) for made in _rhec.problems(_configuration.folders_of(plugin_path), text, name)]
+
+
+def read_problems(file: File, *, plugin_path: PluginPath = ()) -> list[Problem]:
+    """The problems of a file, one on each line."""
+    return problems_of(pathlib.Path(file).read_text(encoding="utf-8"), os.fspath(file), plugin_path)
+
+
+def write_problems(file: File, problems: Iterable[Problem]) -> None:
+    """Writes problems to a file, one on each line, whole or not at all."""
+    file = pathlib.Path(file)
+    text = "".join(problem.line() + "\n" for problem in problems)
+    handle, aside = tempfile.mkstemp(prefix=f".{file.name}-", dir=file.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as out:
+            out.write(text)
+        os.replace(aside, file)
+    except BaseException:
+        os.unlink(aside)
+        raise

@@ -1,0 +1,179 @@
+"""Many runs: sweeps over the keys of a scenario, and the search for good numbers."""
+from __future__ import annotations
+
+import json
+import math
+import os
+import pathlib
+from collections.abc import Sequence
+from typing import Any
+
+from . import _configuration, _rhec
+from ._errors import Error
+from ._progress import Bar
+from ._runs import log_files
+from ._table import Table
+from ._types import Changes, Configuration, File, LogPart, PluginPath, Progress
+
+
+class Sweep:
+    """The runs of a grid.
+
+    runs: Table with a row for each run, in the order of the grid: the grid's keys, status, steps, nees, mae.NAME,
+        rmse.NAME, seconds
+    made: how many were made by this call; the others were in the database before
+    file: the database, docs/sweep.md
+    """
+
+    def __init__(self, made: dict[str, Any], file: File) -> None:
+        self.name: str = made["name"]
+        self.made: int = made["made"]
+        self.file = pathlib.Path(file)
+        self.runs = _runs_table(made["rows"])
+
+    def to_pandas(self) -> Any:
+        """The runs as a pandas.DataFrame."""
+        return self.runs.to_pandas()
+
+    def __repr__(self) -> str:
+        return f"<sweep '{self.name}': {self.runs.rows} runs, {self.made} of them new, in {self.file}>"
+
+    def _repr_html_(self) -> str:
+        return self.runs._repr_html_()
+
+
+def _flat(prefix, value, into):
+    if isinstance(value, dict):
+        for key, each in value.items():
+            _flat(f"{prefix}.{key}" if prefix else key, each, into)
+    else:
+        into[prefix] = value
+
+
+def _runs_table(rows):
+    """What differs between configurations, and the measures of each run."""
+    import numpy
+
+    flat, measures = [], []
+    for row in rows:
+        configuration, of_run = {}, {}
+        _flat("", json.loads(row["configuration"]), configuration)
+        for group in ("mae", "rmse", "mae_after_start"):
+            _flat(group, json.loads(row[group]) if row[group] else {}, of_run)
+        _flat("solve_time_us", json.loads(row["solve_time_us"]) if row["solve_time_us"] else {}, of_run)
+        flat.append(configuration)
+        measures.append(of_run)
+    keys = dict.fromkeys(key for each in flat for key in each)
+    varied = [key for key in keys if len({json.dumps(each.get(key)) for each in flat}) > 1]
+    table = Table(run=numpy.array([row["run"] for row in rows], dtype=int))
+    for key in varied:
+        table[key] = _column([each.get(key) for each in flat])
+    for name in ("status", "reason", "steps", "solves", "fallbacks", "nees"):
+        table[name] = numpy.array([row[name] for row in rows])
+    for name in dict.fromkeys(name for each in measures for name in each):
+        table[name] = numpy.array([_number(each.get(name)) for each in measures])
+    table["seconds"] = numpy.array([row["seconds"] for row in rows])
+    return table
+
+
+def _number(value):
+    return math.nan if value is None else float(value)
+
+
+def _column(values):
+    """Numbers as numbers, texts as texts; what is neither as objects, as it is written."""
+    import numpy
+
+    if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
+        return numpy.array(values)
+    return numpy.array([value if isinstance(value, str) else json.dumps(value) for value in values])
+
+
+def sweep(description: Configuration, file: File, *, threads: int = 0, plugin_path: PluginPath = (),
+          progress: Progress = None) -> Sweep:
+    """Runs a scenario over a grid of its keys, on several cores, into one SQLite file. Returns a Sweep.
+
+    description: a YAML file (docs/sweep.md), or the same as a dict; then the scenario is beside the working directory
+    file: the database. A run is written as soon as it is finished, and one that is there is not made again
+    threads: runs at the same time; 0: as many as there are cores
+
+    Ctrl-C finishes the runs under way, then raises KeyboardInterrupt: the same call goes on where it stopped.
+    """
+    folders = _configuration.folders_of(plugin_path)
+    if isinstance(description, dict):
+        plain = _configuration.plain(description, folders)
+        settings = _rhec.Settings.of(plain, os.path.join(os.getcwd(), "configuration"))
+    else:
+        settings, folders = _configuration.read(description, None, plugin_path)
+    program = f"rhec {_rhec.version} (Python)"
+    with Bar(progress, "sweep") as bar:
+        return Sweep(_rhec.sweep(folders, settings, os.fspath(file), program, threads, bar), file)
+
+
+class Tuning:
+    """What was found.
+
+    numbers: Table of name, unit, before, after, and of a log the standard error
+    judged: Table of figures on what nothing was tuned on, before and after, with the 95 % interval of their change
+    yaml: the scenario with what was found, as a text; `save` writes it
+    remarks: what cannot be told, in words
+    """
+
+    def __init__(self, made: dict[str, Any]) -> None:
+        self.numbers, self.judged = Table(made["numbers"]), Table(made["judged"])
+        self.yaml, self.svg, self.remarks = made["yaml"], made["svg"], made["remarks"]
+        self.summary = json.loads(made["summary"])
+
+    def save(self, file: File) -> None:
+        """Writes the scenario."""
+        pathlib.Path(file).write_text(self.yaml, encoding="utf-8")
+
+    def __repr__(self) -> str:
+        return f"<tuning of {', '.join(self.numbers['name'])}>"
+
+    def _repr_html_(self) -> str:
+        return self.numbers._repr_html_() + self.judged._repr_html_() + self.svg
+
+
+def tune(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, hold_out: int = 5, tune: Sequence[str] = (),
+         keep: Sequence[str] = (), variants: Sequence[str] = (), threads: int = 0, smoother: bool = True,
+         most_seconds: float = math.inf, set: Changes = None, plugin_path: PluginPath = (),
+         progress: Progress = None) -> Tuning:
+    """Finds the noise of sensors, priors, biases, lever arms and delays that make a recorded drive most likely. Returns
+    a Tuning.
+
+    dead_reckoning, gps: as `estimate` has them
+    hold_out: one of so many fixes is not tuned on, and judges the result
+    tune, keep: keys of the scenario to tune beside, or not to tune (docs/tune.md)
+    smoother: whether the smoother judges, too, which takes longest
+    most_seconds: of the search; then the best so far is taken
+
+    Ctrl-C gives it up with KeyboardInterrupt; to keep the best so far use `most_seconds`.
+    """
+    settings, folders = _configuration.read(scenario, set, plugin_path)
+    wishes = {"hold_out": hold_out, "tune": list(tune), "keep": list(keep), "variants": list(variants), "threads": threads,
+              "smoother": smoother, "most_seconds": most_seconds}
+    with log_files(dead_reckoning, gps) as names, Bar(progress, "tune") as bar:
+        return Tuning(_rhec.tune_log(folders, settings, names[0], names[1], wishes, bar))
+
+
+def tune_controller(scenario: Configuration, *, cases: dict[str, Changes] | None = None, seeds: int = 3, first_seed: int = 1,
+                    judges: int = 6, effort: float = 1.0, evaluations: int = 40, threads: int = 0,
+                    most_seconds: float = math.inf, set: Changes = None, plugin_path: PluginPath = (),
+                    progress: Progress = None) -> Tuning:
+    """Finds weights and horizon by which the vehicle of a scenario tracks its path best, in simulation. Returns a Tuning.
+
+    cases: worlds to drive in, {"slow": {"speed": 2}, ...}; the scenario as it is without any
+    seeds, first_seed: drives to tune on in each case; judges: further ones that judge the result
+    effort: at most so many times the inputs' changes of the scenario
+    """
+    settings, folders = _configuration.read(scenario, set, plugin_path)
+    worlds = []
+    for name, changes in (cases or {"as it is": {}}).items():
+        if not isinstance(changes, dict):
+            raise Error(f"cases: '{name}': expected a dict of keys and values")
+        worlds.append((name, _configuration.read(scenario, {**(set or {}), **changes}, plugin_path)[0]))
+    wishes = {"seeds": seeds, "first_seed": first_seed, "judges": judges, "effort": effort, "evaluations": evaluations,
+              "threads": threads, "most_seconds": most_seconds}
+    with Bar(progress, "tune") as bar:
+        return Tuning(_rhec.tune_controller(folders, settings, worlds, wishes, bar))

@@ -1,0 +1,183 @@
+"""Robots, estimators and controllers, sample by sample."""
+import os
+import subprocess
+
+import numpy
+import pytest
+import rhec
+from shared import ROBOT, Driven, line
+
+
+def test_the_same_drive_as_in_cpp():
+    printed = subprocess.run([os.environ["RHEC_EXAMPLE_ROBOT"], str(ROBOT)], check=True, capture_output=True, text=True).stdout
+    driven, lines = Driven(), []
+    while not driven.controller.finished and driven.time < 60.0:
+        estimate, _ = driven.step()
+        lines.append(f"{estimate.time:4.1f} s  x {estimate.state[0]:6.2f} m  y {estimate.state[1]:5.2f} m  kappa "
+                     f"{estimate['kappa']:.3f}")
+    assert driven.controller.finished
+    assert len(lines) > 40
+    assert lines == printed.splitlines()
+
+
+def test_a_dict_is_the_same_as_a_file():
+    configuration = {
+        "step": 0.2, "model": {"name": "bicycle_slip", "wheelbase": 1.4, "gps_offset": numpy.float64(0.4)},
+        "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "delta": 0.017}, "inputs": {"u1": 0.1, "u2": 0.1}},
+        "blocking": {"kappa": {"name": "structured", "size": 2, "overlap": 4}, "mu": {"name": "full_horizon"}},
+        "estimator": {"horizon": numpy.int64(15), "initial": {"parameters": {"kappa": 0.9, "mu": 0.9}, "sigma": {"beta": 0.3}}},
+        "controller": {"horizon": 15},
+    }
+    of_file, of_dict = Driven(), Driven(rhec.Robot(configuration))
+    for _ in range(10):
+        first, second = of_file.step()[0], of_dict.step()[0]
+        numpy.testing.assert_array_equal(first.state, second.state)
+        numpy.testing.assert_array_equal(first.covariance, second.covariance)
+
+
+def test_changes_are_put_over_the_configuration():
+    assert rhec.Robot(ROBOT, set={"step": 0.1}).step == 0.1
+    assert rhec.Robot(ROBOT, set={"model": {"name": "unicycle_traction"}, "noise": None, "blocking": None,
+                                  "estimator.initial": None}).vehicle.name == "unicycle_traction"
+
+
+@pytest.mark.parametrize("change, key, word", [
+    ({"estimator.horizont": 3}, "estimator.horizont", "did you mean 'horizon'"),
+    ({"estimator.horizon": "many"}, "estimator.horizon", "expected an integer"),
+    ({"model": {"name": "bycicle_slip"}}, None, "bicycle_slip"),
+    ({"estimator": {"horizon": object()}}, "estimator.horizon", "found an object of the class 'object'"),
+    ({"noise": {"outputs": {"x_gps": float("nan")}}}, "noise.outputs.x_gps", "NaN"),
+])
+def test_mistakes_name_the_key(change, key, word):
+    with pytest.raises(rhec.Error, match=word) as caught:
+        rhec.Robot(ROBOT, set=change)
+    if key:
+        assert key.endswith(caught.value.key)
+    assert caught.value.line is None
+
+
+def test_mistakes_in_files_name_file_line_and_key(tmp_path):
+    file = tmp_path / "robot.yaml"
+    file.write_text("step: 0.2\nestimator:\n  horizon: -3\n")
+    with pytest.raises(rhec.Error) as caught:
+        rhec.Robot(file)
+    assert (caught.value.file, caught.value.line, caught.value.key) == (str(file), 3, "estimator.horizon")
+    with pytest.raises(rhec.Error, match="gone.yaml"):
+        rhec.Robot(tmp_path / "gone.yaml")
+    with pytest.raises(rhec.Error, match="class 'int'"):
+        rhec.Robot(3)
+    with pytest.raises(rhec.Error, match="the key 1, expected a text"):
+        rhec.Robot({"model": {1: 2}})
+
+
+def test_estimates_stay_as_they_are():
+    driven = Driven()
+    estimates = [driven.step()[0] for _ in range(5)]
+    assert [round(each.time, 3) for each in estimates] == [0.0, 0.2, 0.4, 0.6, 0.8]
+    x = [each["x_pos"] for each in estimates]
+    assert x == sorted(x) and x[0] < x[-1]
+    last = estimates[-1]
+    assert last.state.shape == (4,) and last.parameters.shape == (2,) and last.covariance.shape == (6, 6)
+    numpy.testing.assert_array_equal(last.covariance, last.covariance.T)
+    numpy.testing.assert_allclose(last.sigmas, numpy.sqrt(numpy.diag(last.covariance)))
+    assert last.health == "ok" and last.findings == ""
+    assert [each["sensor"] for each in last.innovations] == ["x_gps and y_gps", "delta"]
+    assert last.report.usable and not last.fallback
+    with pytest.raises(KeyError, match="'gamma' is neither"):
+        last["gamma"]
+
+
+def test_results_that_are_reused():
+    driven, other = Driven(), Driven()
+    estimate, command = driven.step()
+    state, inputs = estimate.state, command.inputs
+    for _ in range(3):
+        again, order = driven.step(estimate, command)
+        assert again is estimate and order is command
+    other.step()
+    for _ in range(3):
+        expected, ordered = other.step()
+    numpy.testing.assert_array_equal(state, expected.state)  # the array of the first call, which has become the last one's
+    numpy.testing.assert_array_equal(inputs, ordered.inputs)
+    wide = rhec.Robot({"model": {"name": "tractor_trailer"}}).make_estimator()
+    with pytest.raises(rhec.Error, match="an estimate of another vehicle"):
+        wide.estimate(0.0, out=estimate)
+
+
+def test_what_a_controller_plans_and_says():
+    driven = Driven()
+    for _ in range(3):
+        _, command = driven.step()
+    plan = driven.controller.plan()
+    assert plan["times"].shape == (16,) and plan["states"].shape == (16, 4) and plan["inputs"].shape == (15, 2)
+    assert plan["times"][1] == pytest.approx(0.2)
+    assert command.reference.shape == (4,) and command.pace == 1.0 and not command.fallback
+    assert command.report.status in ("solved", "step_taken")
+    assert driven.controller.fallbacks == 0
+    assert driven.controller.set_obstacles(numpy.zeros((0, 7)), 0.0) == 0
+    driven.controller.applied([1.0, 0.0])
+    driven.controller.locate()
+    driven.controller.reset()
+    driven.controller.finish()
+
+
+def test_a_deadline_is_data():
+    driven = Driven(rhec.Robot(ROBOT, set={"controller.solver": {"name": "gn_rti", "mode": "converge"}}))
+    driven.estimator.push_measurement(0.0, driven.robot.vehicle.observe(driven.state))
+    estimate = driven.estimator.estimate(0.0)
+    command = driven.controller.control(estimate, deadline=0.0)
+    assert command.report.status == "deadline" and command.report.usable and "allow more time" in command.report.advice
+    with pytest.raises(rhec.Error, match="at least 0"):
+        driven.controller.control(estimate, deadline=-1.0)
+
+
+def test_estimators_are_reset():
+    driven = Driven()
+    with pytest.raises(rhec.Error, match="both the mean and the covariance"):
+        driven.estimator.reset(mean=numpy.zeros(6))
+    estimate, _ = driven.step()
+    n = driven.estimator.estimate(0.0).covariance.shape[0]
+    with pytest.raises(rhec.Error, match=r"expected the mean of \[state; parameters\]"):
+        driven.estimator.reset(numpy.zeros(3), numpy.eye(3))
+    driven.estimator.reset()
+    assert not driven.estimator.has_started and driven.estimator.counts["nodes"] == 0
+    assert n == 6 and estimate.time == 0.0
+
+
+def test_shapes_are_checked():
+    driven = Driven()
+    for wrong in ([1.0, 2.0], 3.0, numpy.zeros((1, 3)), []):
+        with pytest.raises(rhec.Error, match="outputs: found an array of .*expected 3 numbers.*x_gps, y_gps, delta"):
+            driven.estimator.push_measurement(0.0, wrong)
+    with pytest.raises(TypeError):
+        driven.estimator.push_measurement(0.0, "three")
+    # Anything that numpy makes doubles of, in whatever order it lies.
+    for right in ([1, 2, 3], (1.0, 2.0, 3.0), numpy.arange(3), numpy.zeros(6)[::2], numpy.zeros(3, dtype=">f8")):
+        driven.estimator.push_measurement(0.0, right)
+    with pytest.raises(rhec.Error, match="n x 3"):
+        rhec.Path(numpy.zeros((3, 2)))
+    with pytest.raises(rhec.Error, match="n x 7"):
+        driven.controller.set_obstacles([[1.0, 2.0]], 0.0)
+
+
+def test_another_vehicle():
+    robot = rhec.Robot({"model": "skid_steer", "estimator": {"name": "ekf"}})
+    assert [each.name for each in robot.vehicle.parameters] == ["lambda_left", "lambda_right", "icr_offset"]
+    driven = robot.make_estimator(initial_state=[1.0, 2.0, 0.5])
+    driven.push_measurement(0.0, [1.0, 2.0, 0.5])
+    numpy.testing.assert_allclose(driven.estimate(0.0).state[:3], [1.0, 2.0, 0.5], atol=1e-6)
+    bicycle = Driven()
+    with pytest.raises(rhec.Error, match="expected an estimate of the same robot"):
+        bicycle.controller.control(driven.estimate(0.0))
+
+
+def test_paths():
+    path = line()
+    length = sum(numpy.hypot(0.5, numpy.sin(0.25 * (i + 1)) - numpy.sin(0.25 * i)) for i in range(40))
+    assert len(path) == 41 and path.length == pytest.approx(length)
+    x, y, heading, speed, _ = path.at(0.0)
+    assert (x, y, speed) == (0.0, 0.0, 2.0) and heading > 0.0
+    slowed = rhec.Path([(0.0, 0.0, 2.0), (10.0, 0.0, 2.0), (20.0, 0.0, 0.0)], acceleration=0.1)
+    assert slowed.at(10.0)[3] == pytest.approx(numpy.sqrt(2 * 0.1 * 10.0))
+    with pytest.raises(rhec.Error, match="waypoint 1"):
+        rhec.Path([(numpy.nan, 0.0, 1.0), (1.0, 0.0, 1.0)])

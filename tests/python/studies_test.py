@@ -1,0 +1,74 @@
+"""Sweeps: parallel, resumed, stopped; and the tuning of a controller."""
+import os
+import signal
+import sqlite3
+import threading
+
+import numpy
+import pytest
+import rhec
+from shared import FIGURE8, SHORT
+
+GRID = {"name": "two by two", "scenario": str(FIGURE8), "set": {"path": {"name": "figure8", "laps": 1}},
+        "grid": {"speed": [8, 10], "seed": [1, 2], "blocking.kappa": [{"name": "full_horizon"}]}}
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    return rhec.sweep(GRID, tmp_path_factory.mktemp("sweep") / "grid.sqlite", threads=2)
+
+
+def test_runs_of_a_grid(swept):
+    assert swept.made == 4 and swept.runs.rows == 4 and swept.name == "two by two"
+    assert sorted(zip(swept.runs["speed"], swept.runs["seed"])) == [(8, 1), (8, 2), (10, 1), (10, 2)]
+    assert "blocking.kappa.name" not in swept.runs  # what is the same for all is no column
+    assert set(swept.runs["status"]) == {"completed"}
+    alone = rhec.run(FIGURE8, set={**SHORT, "seed": 2, "blocking.kappa": {"name": "full_horizon"}, "path": {"name": "figure8", "laps": 1}})
+    at = (swept.runs["speed"] == 10) & (swept.runs["seed"] == 2)
+    assert swept.runs["mae.kappa"][at][0] == alone.summary["mae"]["kappa"]
+
+
+def test_what_is_there_is_not_made_again(swept):
+    again = rhec.sweep(GRID, swept.file)
+    assert again.made == 0 and again.runs.rows == 4
+    numpy.testing.assert_array_equal(again.runs["mae.kappa"], swept.runs["mae.kappa"])
+    wider = rhec.sweep({**GRID, "grid": {**GRID["grid"], "seed": [1, 2, 3]}}, swept.file)
+    assert wider.made == 2 and wider.runs.rows == 6
+
+
+def test_a_sweep_goes_to_pandas(swept):
+    pytest.importorskip("pandas")
+    assert swept.to_pandas().groupby("speed")["mae.kappa"].mean().shape == (2,)
+
+
+def test_ctrl_c_keeps_what_was_made(tmp_path):
+    many = {**GRID, "grid": {"speed": [10], "seed": {"from": 1, "to": 500, "step": 1}}}
+    file = tmp_path / "many.sqlite"
+    timer = threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        rhec.sweep(many, file, threads=2)
+    timer.join()
+    with sqlite3.connect(file) as database:
+        assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+    few = {**many, "grid": {"speed": [10], "seed": [1, 2]}}
+    assert rhec.sweep(few, file).made < 2  # at least one was there
+
+
+def test_mistakes_in_sweeps(tmp_path):
+    with pytest.raises(rhec.Error) as caught:
+        rhec.sweep({**GRID, "grid": {"sped": [1]}}, tmp_path / "x.sqlite")
+    assert "sped" in str(caught.value)
+    assert not (tmp_path / "x.sqlite").exists()
+    broken = tmp_path / "broken.sqlite"
+    broken.write_text("no database")
+    with pytest.raises(rhec.Error, match="broken.sqlite"):
+        rhec.sweep(GRID, broken)
+    assert broken.read_text() == "no database"
+
+
+def test_tuning_a_controller():
+    tuning = rhec.tune_controller(FIGURE8, set=SHORT, seeds=1, judges=2, evaluations=5, threads=2, most_seconds=4.0)
+    assert tuning.numbers.rows > 2 and "controller" in tuning.yaml
+    with pytest.raises(rhec.Error, match="cases: 'slow'"):
+        rhec.tune_controller(FIGURE8, cases={"slow": 3})
