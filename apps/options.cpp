@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/logs/mapping/signal_map.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
 #include "rhec/sim/loop/scenario.hpp"
@@ -82,6 +83,7 @@ solvers that are backed by another program, since not every installation has the
 int show(const OptionsArguments& arguments) {
   std::vector<OptionSection> sections = sim::scenario_sections();
   for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
+  for (OptionSection& section : logs::signal_sections()) sections.push_back(std::move(section));
   if (!arguments.section.empty()) {
     std::vector<std::string> known;
     for (const OptionSection& section : sections) {

@@ -5,6 +5,7 @@
 
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/sim/loop/scenario.hpp"
+#include "rhec/sim/problems/recording_solver.hpp"
 #include "rhec/sim/world/actuators.hpp"
 #include "rhec/sim/world/deliveries.hpp"
 #include "rhec/sim/world/faults.hpp"
@@ -25,7 +26,7 @@ class LoopWorld {
   void measure(double time) { measure(time, true); }
   /// Pushes what has arrived by now. What is measured before the vehicle moves arrives at once: a drive begins with an
   /// estimate.
-  void deliver(double time, Estimator& estimator);
+  void deliver(double time, Estimator& estimator, const LoopHooks& hooks = {});
   /// Drives for `duration` with constant inputs; sensors with a rate of their own measure on the way.
   void drive(const std::vector<double>& inputs, double time, double duration);
   /// The inputs as they are measured.
