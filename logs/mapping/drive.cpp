@@ -30,12 +30,13 @@ struct RawEvent {
   std::size_t values = 0;
 };
 
+bool waits_for_all(SignalForm form) { return form == SignalForm::mean || form == SignalForm::turn; }
+
 /// A mapped signal while a log is read.
 struct Channel {
   MappedSignal signal;
   std::vector<double> fields;
   std::vector<bool> is_fresh;
-  bool is_of_one_topic = true;
   double last = missing;  ///< of a derivative: the value before
   Stamp last_stamp = no_stamp, newest = no_stamp;
   SignalCount count;
@@ -95,7 +96,6 @@ class DriveReader {
     const std::vector<SignalName> fields = fields_of(signal, type);
     for (std::size_t i = 0; i < fields.size(); ++i) {
       Plan& plan = plan_of(log_.topic(fields[i].topic), signal.options.clock);
-      channel.is_of_one_topic = channel.is_of_one_topic && fields[i].topic == fields.front().topic;
       std::vector<std::string>& requested = plan.request.fields;
       const auto known = std::find(requested.begin(), requested.end(), fields[i].field);
       plan.uses.push_back({channels_.size(), i, static_cast<std::size_t>(known - requested.begin())});
@@ -129,11 +129,13 @@ class DriveReader {
     rows_.clear();
     for (const Plan::Use& use : plan.uses) {
       Channel& channel = channels_[use.channel];
+      // Wheels may come one by one, each in a message of its own: what a message lacks is waited for.
+      if (waits_for_all(channel.signal.options.form) && std::isnan(plan.values[use.slot])) continue;
       channel.fields[use.field] = plan.values[use.slot];
       channel.is_fresh[use.field] = true;
       channel.newest = std::max(channel.newest, stamp);
       if (std::find(channel.is_fresh.begin(), channel.is_fresh.end(), false) == channel.is_fresh.end())
-        complete(channel, channel.is_of_one_topic ? stamp : channel.newest, arrival);
+        complete(channel, channel.newest, arrival);
     }
     for (const auto& [key, row] : rows_) raw_.push_back(row);
   }

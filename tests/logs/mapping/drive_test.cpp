@@ -70,6 +70,17 @@ TEST_F(DriveTest, StampsSince1970BeginAtTheFirst) {
   EXPECT_EQ(found.stamp_of(0.25), 1700000000500000000);
 }
 
+TEST_F(DriveTest, SidesMayComeOneByOne) {
+  const Drive found = drive(
+      "time,left,right\n1,2,\n1.1,,4\n1.5,4,\n1.6,,6\n",
+      "{outputs: {x_gps: {from: left}, y_gps: none, psi_m: none, delta: none}, inputs: {v: {from: [left, right], as: "
+      "mean}, delta_rate: none}}");
+  std::vector<double> means;
+  for (std::size_t i = 0; i < found.events.size(); ++i)
+    if (!found.events[i].is_output) means.push_back(values(found, i)[0]);
+  EXPECT_EQ(means, (std::vector<double>{3.0, 5.0}));
+}
+
 TEST_F(DriveTest, SaysWhatIsMissing) {
   EXPECT_THAT(error_of([&] { drive("time,x_gps,y_gps,delta,v\n0,1,2,0,1\n", "{}"); }), HasSubstr("no column 'psi_m'"));
   EXPECT_THAT(error_of([&] {
