@@ -21,6 +21,7 @@ enum ExitCode : int {
 void add_check(Program& program);
 void add_compare(Program& program);
 void add_estimate(Program& program);
+void add_log(Program& program);
 void add_map(Program& program);
 void add_model(Program& program);
 void add_report(Program& program);

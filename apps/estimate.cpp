@@ -7,10 +7,12 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "drive_arguments.hpp"
 #include "dump.hpp"
 #include "integration_note.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
+#include "rhec/core/base/error.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/horizons/horizon_log.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
@@ -24,6 +26,7 @@ constexpr std::int64_t most_windows = 1500;
 
 struct EstimateArguments : LogArguments {
   DumpArguments dump;
+  TrackArguments tracks;
 };
 
 void print_table(const sim::RecordedLog& log, const Model& model, const std::vector<sim::Replay>& replays,
@@ -64,7 +67,7 @@ void refuse_shared_maps(const sim::LogScenario& scenario) {
   }
 }
 
-int estimate(const EstimateArguments& arguments) {
+int estimate_log(const EstimateArguments& arguments) {
   const LogInput input(arguments);
   const auto& [scenario, hold_out, log] = input;
   sim::OutputFolder folder(arguments.out);
@@ -76,7 +79,9 @@ int estimate(const EstimateArguments& arguments) {
   // Limits the number of nodes: one per fix, and one per step between fixes.
   const double seconds = log.rows.back().time - log.rows.front().time;
   bool all_usable = true;
+  Tracks tracks(arguments.tracks, scenario.variants().front().robot);
   for (const sim::LogVariant& variant : scenario.variants()) {
+    const bool is_first = replays.empty();
     ProgressBar bar(variant.name);
     const std::string run =
         variant.name == scenario.name() ? variant.name : fmt::format("{}/{}", scenario.name(), variant.name);
@@ -86,7 +91,11 @@ int estimate(const EstimateArguments& arguments) {
     replays.push_back(sim::replay(variant.robot, log, scenario.log(), hold_out,
                                   {.progress = [&](double share) { bar.show(share); },
                                    .solved = dump.watch(run, variant.robot),
-                                   .sampled = [&](const sim::LoopSample& sample) { horizons.back().take(sample); },
+                                   .sampled =
+                                       [&](const sim::LoopSample& sample) {
+                                         horizons.back().take(sample);
+                                         if (is_first) tracks.take(sample, 0);
+                                       },
                                    .robot = keeper}));
     keepers.push_back(keeper);
     replays.back().name = variant.name;
@@ -100,9 +109,17 @@ int estimate(const EstimateArguments& arguments) {
   for (const auto& keeper : keepers) keeper->save();
   folder.commit();
   dump.commit();
+  tracks.commit();
   print_table(log, *scenario.variants().front().robot.model(), replays, hold_out, folder.path());
   dump.tell(arguments.plugin_path);
   return all_usable ? exit_fine : exit_not_solved;
+}
+
+int estimate(const EstimateArguments& arguments) {
+  if (!names_log(arguments, "estimate")) return exit_usage;
+  if (arguments.log.empty()) return estimate_log(arguments);
+  if (arguments.dump.folder) throw Error("--dump: is for --dead-reckoning and --gps; leave it out");
+  return estimate_drive(arguments, arguments.tracks);
 }
 
 }  // namespace
@@ -111,14 +128,26 @@ void add_estimate(Program& program) {
   auto arguments = std::make_shared<EstimateArguments>();
   Command command = program.add(
       "estimate", "Estimates state and slip from a recorded drive, and predicts what it withholds.",
-      "Files are comma-separated without a header: time, wheel speed, steering angle; and time, x, y. Writes\n"
-      "estimates.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; 'rhec report' makes a\n"
-      "page of them. The exit code is 3 where a solve failed.\n\n"
+      "A LOG is a table with a header, MCAP or a bag of rosbag2; the section `signals` of the scenario says which of "
+      "its\n"
+      "signals are the vehicle's outputs and inputs ('rhec log' proposes one). All measurements are used; a second "
+      "replay\n"
+      "withholds one in 5 of the position's, and says how well they are predicted. Writes estimates.csv, "
+      "innovations.csv,\n"
+      "predictions.csv, times.csv, summary.json and run.svg to the output folder.\n\n"
+      "Files of --dead-reckoning and --gps are comma-separated without a header: time, wheel speed, steering angle; "
+      "and\n"
+      "time, x, y. Writes estimates.csv, times.csv, summary.json, horizons.jsonl and run.svg; 'rhec report' makes a "
+      "page\n"
+      "of them. The exit code is 3 where a solve failed.\n\n"
       "Examples:\n"
+      "  rhec estimate my_robot.yaml drive.mcap --out out/drive --mcap out/estimate.mcap\n"
+      "  rhec estimate scenarios/figure8.yaml drive.csv --set estimator.name=ekf --hold-out 10\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/park\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 --variant ekf",
       [arguments] { return estimate(*arguments); });
   add_log_arguments(command, *arguments);
+  add_tracks(command, arguments->tracks);
   add_dump(command, arguments->dump);
 }
 

@@ -4,6 +4,7 @@
 
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "drive_arguments.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -17,11 +18,12 @@ sim::LogScenario read_log_scenario(const LogArguments& arguments) {
 }
 
 sim::HoldOut read_hold_out(const LogArguments& arguments) {
-  const int phase = arguments.phase >= 0 ? arguments.phase : arguments.hold_out - 1;
-  if (arguments.hold_out > 0 && phase >= arguments.hold_out)
-    throw Error(
-        fmt::format("--hold-out-phase {} with --hold-out {}; expected a number below it", phase, arguments.hold_out));
-  return {arguments.hold_out, phase};
+  const int usual = arguments.log.empty() ? 0 : default_hold_out;
+  const int every = arguments.hold_out >= 0 ? arguments.hold_out : usual;
+  const int phase = arguments.phase >= 0 ? arguments.phase : every - 1;
+  if (every > 0 && phase >= every)
+    throw Error(fmt::format("--hold-out-phase {} with --hold-out {}; expected a number below it", phase, every));
+  return {every, phase};
 }
 
 LogInput::LogInput(const LogArguments& arguments)
@@ -29,22 +31,23 @@ LogInput::LogInput(const LogArguments& arguments)
       hold_out(read_hold_out(arguments)),
       log(sim::read_recorded_log(arguments.dead_reckoning, arguments.gps, scenario)) {}
 
-void add_log_arguments(Command& command, LogArguments& arguments, bool needs_log) {
+void add_log_arguments(Command& command, LogArguments& arguments, bool takes_log) {
   command.add("scenario", arguments.scenario, "a YAML file").required();
+  if (takes_log) {
+    command.add("log", arguments.log, "a table (CSV), MCAP, or a bag of rosbag2; see 'rhec log'").value("LOG");
+    add_msg_paths(command, arguments.msg_paths);
+  }
   Argument dead_reckoning =
       command.add("--dead-reckoning", arguments.dead_reckoning, "time [s], wheel speed [m/s], steering angle [rad]")
           .value("FILE");
   Argument gps = command.add("--gps", arguments.gps, "time [s], x [m], y [m]").value("FILE");
-  if (needs_log) {
-    dead_reckoning.required();
-    gps.required();
-  } else {
-    dead_reckoning.needs(gps);
-    gps.needs(dead_reckoning);
-  }
-  command.add("--hold-out", arguments.hold_out, "withhold one of so many fixes and predict it; 0: none")
-      .within(0, 1000000)
-      .shows_default();
+  dead_reckoning.needs(gps);
+  gps.needs(dead_reckoning);
+  command
+      .add("--hold-out", arguments.hold_out,
+           takes_log ? "withhold one of so many fixes and predict it; 0: none; default: 5 of LOG, else none"
+                     : "withhold one of so many fixes and predict it; 0: none; default: 5")
+      .within(0, 1000000);
   command.add("--hold-out-phase", arguments.phase, "place of the first one withheld, from 0; default: the last of them")
       .within(0, 1000000);
   command.add_list("--variant", arguments.variants, "run this variant alone; may be given several times");

@@ -11,14 +11,16 @@ namespace rhec::apps {
 
 /// The arguments of commands that work on a recorded log.
 struct LogArguments {
-  std::string scenario, dead_reckoning, gps, out = "out";
-  std::vector<std::string> assignments, variants;
-  int hold_out = 0, phase = -1;
+  std::string scenario, log, dead_reckoning, gps, out = "out";
+  std::vector<std::string> assignments, variants, msg_paths;
+  int hold_out = -1, phase = -1;  ///< -1: the default
   std::vector<std::filesystem::path> plugin_path;
 };
 
-/// `needs_log`: whether the command cannot do without the log's files.
-void add_log_arguments(Command& command, LogArguments& arguments, bool needs_log = true);
+/// `takes_log`: whether the command knows logs with the vehicle's own sensors, too.
+void add_log_arguments(Command& command, LogArguments& arguments, bool takes_log = true);
+/// Of a log, without --hold-out.
+inline constexpr int default_hold_out = 5;
 
 /// The scenario that these arguments name; and what they say of fixes to be withheld. Throw Error for any mistake.
 sim::LogScenario read_log_scenario(const LogArguments& arguments);

@@ -62,6 +62,8 @@ constexpr const char* examples =
     "  rhec compare scenarios/figure8.yaml --solvers gn_rti,sparse_sqp\n"
     "  rhec sweep scenarios/sweep_blocks.yaml --out out/blocks.sqlite\n"
     "  rhec tune scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/tuned\n"
+    "  rhec log drive.mcap --vehicle bicycle_slip\n"
+    "  rhec estimate my_robot.yaml drive.mcap --out out/drive\n"
     "  rhec report out/figure8 -o out/figure8.html\n"
     "  rhec map field.sqlite --geotiff out/geotiff\n\n"
     "'rhec COMMAND --help' says more of each command.";
@@ -101,6 +103,7 @@ int run(int count, char** words) {
   add_compare(program);
   add_sweep(program);
   add_tune(program);
+  add_log(program);
   add_report(program);
   add_map(program);
   add_check(program);

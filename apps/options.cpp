@@ -9,6 +9,7 @@
 #include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
+#include "rhec/logs/mapping/signal_map.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
 #include "rhec/sim/loop/scenario.hpp"
@@ -112,6 +113,7 @@ std::string section_or_key(const std::vector<OptionSection>& sections, const std
 int show(const OptionsArguments& arguments) {
   std::vector<OptionSection> sections = sim::scenario_sections();
   for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
+  for (OptionSection& section : logs::signal_sections()) sections.push_back(std::move(section));
   if (!arguments.section.empty()) {
     fmt::print("{}", section_or_key(sections, arguments.section));
     return exit_fine;

@@ -5,11 +5,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "drive_arguments.hpp"
 #include "dump.hpp"
 #include "integration_note.hpp"
 #include "progress.hpp"
@@ -21,6 +23,7 @@
 #include "rhec/sim/loop/closed_loop.hpp"
 #include "rhec/sim/loop/run_files.hpp"
 #include "rhec/sim/maps/map_keeper.hpp"
+#include "rhec/sim/telemetry/measurement_log.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -30,6 +33,8 @@ struct RunArguments {
   std::vector<std::string> assignments;
   std::vector<std::filesystem::path> plugin_path;
   DumpArguments dump;
+  TrackArguments tracks;
+  std::string log;
 };
 
 /// How sure the estimator is, and whether that is right.
@@ -138,11 +143,22 @@ int run(const RunArguments& arguments) {
   const double samples = scenario.path().length() / (scenario.options().speed * scenario.robot().step());
   sim::HorizonLog horizons(scenario.robot(), static_cast<std::int64_t>(samples) + 1);
   const auto keeper = std::make_shared<sim::MapKeeper>();
-  const sim::RunLog log =
-      sim::run_closed_loop(scenario, {.progress = [&](double share) { bar.show(share); },
-                                      .solved = dump.watch(scenario.options().name, scenario.robot()),
-                                      .sampled = [&](const sim::LoopSample& sample) { horizons.take(sample); },
-                                      .robot = keeper});
+  Tracks tracks(arguments.tracks, scenario.robot(), &scenario.path());
+  std::optional<sim::MeasurementLog> measured;
+  if (!arguments.log.empty()) measured.emplace(arguments.log, scenario.robot().model()->description());
+  sim::LoopHooks hooks{.progress = [&](double share) { bar.show(share); },
+                       .solved = dump.watch(scenario.options().name, scenario.robot()),
+                       .sampled =
+                           [&](const sim::LoopSample& sample) {
+                             horizons.take(sample);
+                             tracks.take(sample, 0);
+                           },
+                       .robot = keeper};
+  if (measured) {
+    hooks.measured = [&](double arrival, double stamp, const double* y) { measured->take_outputs(arrival, stamp, y); };
+    hooks.moved = [&](double stamp, const double* u) { measured->take_inputs(stamp, u); };
+  }
+  const sim::RunLog log = sim::run_closed_loop(scenario, hooks);
   bar.finish();
   const sim::RunSummary summary = sim::summarise(log, scenario);
   folder.write("steps.csv", sim::steps_csv(log, scenario));
@@ -153,6 +169,8 @@ int run(const RunArguments& arguments) {
   keeper->save();
   folder.commit();
   dump.commit();
+  tracks.commit();
+  if (measured) measured->close();
   print_table(summary, scenario, folder.path());
   print_map(*keeper);
   dump.tell(arguments.plugin_path);
@@ -172,11 +190,17 @@ void add_run(Program& program) {
       "  rhec run scenarios/figure8.yaml --out out/figure8\n"
       "  rhec run scenarios/figure8.yaml --set speed=4 --set 'blocking.kappa={name: full_horizon}' --out out/fhb\n"
       "  rhec run scenarios/zigzag.yaml --set estimator.name=ekf --set seed=3 --out out/ekf\n"
+      "  rhec run scenarios/figure8.yaml --log drive.mcap --mcap estimate.mcap\n"
       "  rhec run scenarios/zigzag.yaml --dump out/problems --dump-every 10",
       [arguments] { return run(*arguments); });
   command.add("scenario", arguments->scenario, "a YAML file").required();
   add_assignments(command, arguments->assignments, "a key of the scenario");
   add_out(command, arguments->out, "DIR", "folder of the results");
+  command
+      .add("--log", arguments->log,
+           "write what the sensors measured, as 'rhec estimate SCENARIO LOG' reads it; .csv or .mcap")
+      .value("FILE");
+  add_tracks(command, arguments->tracks);
   add_dump(command, arguments->dump);
   add_plugin_path(command, arguments->plugin_path);
 }

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "drive_arguments.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
@@ -19,7 +21,7 @@
 #include "rhec/sim/loop/smoothed_drive.hpp"
 
 namespace rhec::apps {
-namespace {
+namespace {}  // namespace
 
 void print_solve(const std::string& name, const Report& report, int intervals, double seconds, bool has_sigmas,
                  const std::vector<SmoothedRun::Law>& laws) {
@@ -31,6 +33,22 @@ void print_solve(const std::string& name, const Report& report, int intervals, d
     fmt::print(
         "  this solver gives no covariances: standard deviations are left empty; sparse_sqp and gn_rti give them\n");
   if (laws.size() > 1) fmt::print("  a mixture of {} laws of variation\n", laws.size());
+}
+
+namespace {
+
+struct SmoothArguments : LogArguments {
+  TrackArguments tracks;
+};
+
+/// An estimate in the form that all kinds of drives share.
+void write_track(double time, const Eigen::VectorXd& values, const Eigen::VectorXd& sigmas, const Robot& robot,
+                 Tracks& tracks) {
+  sim::DriveEstimate estimate;
+  estimate.time = time;
+  estimate.values = values;
+  estimate.sigmas = sigmas.size() > 0 ? sigmas : Eigen::VectorXd::Constant(values.size(), std::nan(""));
+  tracks.write(sim::track_sample(estimate, robot, 0));
 }
 
 void print_table(const std::vector<sim::SmoothedReplay>& results, const sim::RecordedLog& log,
@@ -53,7 +71,7 @@ void print_table(const std::vector<sim::SmoothedReplay>& results, const sim::Rec
   fmt::print("\npictures and numbers: {}\n", folder.string());
 }
 
-int smooth_log(const LogArguments& arguments) {
+int smooth_log(const SmoothArguments& arguments) {
   const LogInput input(arguments);
   sim::OutputFolder folder(arguments.out);
   std::vector<sim::SmoothedReplay> results;
@@ -65,6 +83,11 @@ int smooth_log(const LogArguments& arguments) {
     all_solved = all_solved && results.back().report.status == Status::solved;
   }
   const sim::SmoothedReplay& first = results.front();
+  const Robot& robot = input.scenario.variants().front().robot;
+  Tracks tracks(arguments.tracks, robot);
+  for (const sim::LoggedEstimate& entry : first.smoothed.estimates)
+    write_track(entry.time, entry.values, entry.sigmas, robot, tracks);
+  tracks.commit();
   folder.write("run.svg", sim::replay_svg(first.smoothed, input.log, input.scenario, &first.causal));
   std::vector<sim::Replay> replays;
   for (const sim::SmoothedReplay& result : results) {
@@ -109,7 +132,7 @@ void print_table(const sim::SmoothedDrive& drive, const sim::Scenario& scenario,
   fmt::print("\npictures and numbers: {}\n", folder.string());
 }
 
-int smooth_drive(const LogArguments& arguments) {
+int smooth_simulation(const SmoothArguments& arguments) {
   Settings settings = load_yaml(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   constexpr const char* give_files = "give its files by --dead-reckoning and --gps";
@@ -125,6 +148,13 @@ int smooth_drive(const LogArguments& arguments) {
   const sim::SmoothedDrive drive =
       sim::smooth_closed_loop(scenario, {.progress = [&](double share) { bar.show(share); }});
   bar.finish();
+  Tracks tracks(arguments.tracks, scenario.robot(), &scenario.path());
+  for (const sim::Sample& sample : drive.smoothed.samples) {
+    Eigen::VectorXd values(sample.state.size() + sample.parameters.size());
+    values << sample.state, sample.parameters;
+    write_track(sample.time, values, sample.sigma, scenario.robot(), tracks);
+  }
+  tracks.commit();
   folder.write("steps.csv", sim::steps_csv(drive.smoothed, scenario));
   folder.write("times.csv", sim::times_csv(drive.smoothed));
   folder.write("summary.json", sim::summary_json(drive, scenario));
@@ -138,17 +168,20 @@ int smooth_drive(const LogArguments& arguments) {
   return drive.report.status == Status::solved ? exit_fine : exit_not_solved;
 }
 
-int smooth(const LogArguments& arguments) {
-  return arguments.gps.empty() ? smooth_drive(arguments) : smooth_log(arguments);
+int smooth(const SmoothArguments& arguments) {
+  if (!arguments.log.empty() && names_log(arguments, "smooth")) return smooth_drive(arguments, arguments.tracks);
+  return arguments.gps.empty() ? smooth_simulation(arguments) : smooth_log(arguments);
 }
 
 }  // namespace
 
 void add_smooth(Program& program) {
-  auto arguments = std::make_shared<LogArguments>();
+  auto arguments = std::make_shared<SmoothArguments>();
   Command command = program.add(
       "smooth", "Estimates a whole drive at once: every moment from what was measured before and after it.",
-      "A drive that was recorded, by the files of its log, or, without them, the one that the scenario simulates. The\n"
+      "A drive that was recorded, by its LOG (see 'rhec estimate') or the files of --dead-reckoning and --gps, or, "
+      "without\n"
+      "them, the one that the scenario simulates. The\n"
       "scenario's estimator goes through it first; its estimates are the start. The section `smoother` says how\n"
       "parameters vary over the drive, by blocks or by priors, and which solver is used. Of a recorded drive, writes\n"
       "estimates.csv, times.csv, summary.json, horizons.jsonl and run.svg to the output folder; of a simulated one,\n"
@@ -159,7 +192,8 @@ void add_smooth(Program& program) {
       "  rhec smooth scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 \\\n"
       "    --set 'smoother.blocking.kappa={name: structured, size: 50, neighbour_sigma: 0.004}'",
       [arguments] { return smooth(*arguments); });
-  add_log_arguments(command, *arguments, false);
+  add_log_arguments(command, *arguments);
+  add_tracks(command, arguments->tracks);
 }
 
 }  // namespace rhec::apps

@@ -12,6 +12,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/sim/files/csv.hpp"
+#include "rhec/sim/logs/variants.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
 
 namespace rhec::sim {
@@ -24,20 +25,6 @@ constexpr double same_time = 1e-6;
 constexpr double longest_silence = 3600.0;
 // Rows with equal stamps are spread over at most this time, since the start of a subsequent gap is unknown [s].
 constexpr double longest_spread = 0.1;
-
-/// Overrides the scenario with a variant's keys: maps are merged, all else is replaced.
-void put_over(Settings& base, const Settings& variant, const std::string& prefix) {
-  for (const auto& [key, value] : variant.members()) {
-    std::string path = prefix;
-    if (!path.empty()) path += '.';
-    path += key;
-    if (value.kind() == Settings::Kind::map && !value.members().empty()) {
-      put_over(base, value, path);
-    } else {
-      base.set(path, value);
-    }
-  }
-}
 
 int index_of(const std::string& name, const std::vector<Variable>& variables, const Settings& section,
              const char* what) {
@@ -354,29 +341,8 @@ LogScenario::LogScenario(const Host& host, const Settings& settings, const std::
       throw base.log.error("wheel_offset: needs model.wheelbase, the distance of the axles; give both or neither");
     variants_.back().robot.make_estimator();  // reports errors before anything runs
   };
-  if (base.variants.is_null()) {
-    if (!chosen.empty())
-      throw settings.error(fmt::format("the scenario has no variants, so none is called '{}'", chosen.front()));
-    add(base.name, settings);
-    return;
-  }
-  if (base.variants.kind() != Settings::Kind::map) throw base.variants.mismatch("a map: by a name, keys that differ");
-  std::vector<std::string> names;
-  for (const auto& [name, keys] : base.variants.members()) names.push_back(name);
-  for (const std::string& name : chosen)
-    if (std::find(names.begin(), names.end(), name) == names.end())
-      throw base.variants.error(
-          fmt::format("there is no variant '{}'; expected one of {}", name, fmt::join(names, ", ")));
-  for (const auto& [name, keys] : base.variants.members()) {
-    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), name) == chosen.end()) continue;
-    if (!keys.is_null() && keys.kind() != Settings::Kind::map) throw keys.mismatch("a map of keys of the scenario");
-    for (const char* shared : {"name", "log", "variants"})
-      if (const Settings* key = keys.find(shared)) throw key->error("is shared by all variants; write it at the top");
-    Settings merged = settings;
-    put_over(merged, keys, "");
-    add(name, merged);
-  }
-  if (variants_.empty()) throw base.variants.mismatch("at least one variant");
+  for (const auto& [name, with] : variant_settings(base.name, settings, chosen, {"name", "log", "variants"}))
+    add(name, with);
 }
 
 LogTables read_log_tables(const std::filesystem::path& dead_reckoning, const std::filesystem::path& gps) {

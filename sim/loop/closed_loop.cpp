@@ -128,6 +128,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     world.measure(time);
     begin(LoopPart::estimate);
     world.deliver(time, [&](double stamp, const double* outputs) { estimator->push_measurement(stamp, outputs); });
+    world.deliver(time, *estimator, hooks);
     const Estimate& estimate = estimator->estimate(world.on_robots_clock(time));
     begin(LoopPart::control);
     const Controller::Command& command = controller->control(estimate);
@@ -198,6 +199,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     controller->prepare();
     begin(LoopPart::prepare_estimate);
     estimator->push_input(world.on_robots_clock(time), measured.data());
+    if (hooks.moved) hooks.moved(world.on_robots_clock(time), measured.data());
     estimator->prepare();
     begin(LoopPart::simulate);
   }

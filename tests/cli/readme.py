@@ -50,6 +50,8 @@ def main():
                     words[3:3] = assignments("path.laps=1", "path.legs=2")
                     words = [str(pathlib.Path(work) / "out") if before == "--out" else word
                              for before, word in zip([""] + words, words)]
+                    words = [str(pathlib.Path(work) / word) if before in ("--log", "--mcap", "--csv", "--tum") else word
+                             for before, word in zip([""] + words, words)]
                     if "--out" not in words:
                         words += ["--out", str(pathlib.Path(work) / "out")]
                 # A drawing goes there too: the tree that is tested stays as it is.

@@ -8,6 +8,12 @@
 #include <string>
 
 #include "fuzz/targets.hpp"
+#include "rhec/logs/files/open_log.hpp"
+#include "rhec/logs/mapping/drive.hpp"
+#include "rhec/logs/mapping/proposal.hpp"
+#include "rhec/logs/mcap/mcap_log.hpp"
+#include "rhec/logs/rosbag2/rosbag2.hpp"
+#include "rhec/logs/signals/survey.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
@@ -77,6 +83,34 @@ void slip_map(std::string_view input) {
   const Folder folder("slip_map");
   const fs::path file = folder.write("map.sqlite", input);
   answered([&] { static_cast<void>(sim::read_slip_map(file)); });
+}
+
+void mcap(std::string_view input) {
+  static const Folder folder("mcap");
+  const fs::path file = folder.write("x.mcap", input);
+  answered([&] { static_cast<void>(logs::survey(*logs::open_mcap(file))); });
+}
+
+void db3(std::string_view input) {
+  static const Folder folder("db3");
+  const fs::path file = folder.write("x.db3", input);
+  answered([&] { static_cast<void>(logs::survey(*logs::open_db3(file))); });
+}
+
+void signals(std::string_view input) {
+  static const Folder folder("signals");
+  const std::vector<Part> parts = parts_of(input);
+  if (parts.size() != 2) return;
+  ModelDescription about;
+  about.outputs = {{"x_gps", "m", ""}, {"y_gps", "m", ""}, {"heading", "rad", ""}};
+  about.inputs = {{"v", "m/s", ""}, {"omega", "rad/s", ""}};
+  const fs::path file = folder.write("x.csv", parts[0].content);
+  answered([&] {
+    const auto log = logs::open_log(file);
+    answered([&] { static_cast<void>(logs::propose_signals(logs::survey(*log), about)); });
+    const logs::SignalMap map(parse_yaml(std::string(parts[1].content), "fuzz.yaml"), about);
+    static_cast<void>(logs::read_drive(*log, map));
+  });
 }
 
 }  // namespace rhec::fuzz

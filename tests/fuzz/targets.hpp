@@ -29,6 +29,15 @@ void sweep_store(std::string_view input);
 /// A map of slip.
 void slip_map(std::string_view input);
 
+/// A log in MCAP: its records, and the fields of its messages.
+void mcap(std::string_view input);
+/// A bag of rosbag2 in SQLite.
+void db3(std::string_view input);
+/// A log in a table, and a section `signals`, two parts: what they are to a vehicle.
+void signals(std::string_view input);
+/// Definitions of messages, in both languages.
+void message_definitions(std::string_view input);
+
 /// Calls it, and takes an Error for an answer.
 template <class Call>
 void answered(const Call& call) {
@@ -52,7 +61,11 @@ inline const std::vector<Target>& targets() {
                                        {"log", log},
                                        {"results", results},
                                        {"sweep_store", sweep_store},
-                                       {"slip_map", slip_map}};
+                                       {"slip_map", slip_map},
+                                       {"mcap", mcap},
+                                       {"db3", db3},
+                                       {"signals", signals},
+                                       {"message_definitions", message_definitions}};
   return all;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "fuzz/targets.hpp"
+#include "rhec/logs/cdr/message_definitions.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
@@ -53,6 +54,16 @@ void problems(std::string_view input) {
     for (const sim::ProblemRecord& record : sim::read_problems(input, "fuzz.jsonl"))
       answered([&] { static_cast<void>(sim::problem_format(record.kind).build(record, model, record.intervals, {})); });
   });
+}
+
+void message_definitions(std::string_view input) {
+  const std::string type = "pkg/msg/A";
+  for (const auto parse : {logs::parse_ros2msg, logs::parse_ros2idl})
+    answered([&] {
+      logs::Definitions definitions = logs::builtin_definitions();
+      parse(type, input, definitions);
+      static_cast<void>(logs::ros2msg_text(type, definitions));
+    });
 }
 
 void csv(std::string_view input) {

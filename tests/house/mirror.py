@@ -16,7 +16,7 @@ import tempfile
 import house
 
 # The floors whose sources and tests must mirror each other.
-FLOORS = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "sim", "apps")
+FLOORS = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "logs", "sim", "apps")
 # Folders of tests that are about more than one source: whole suites, and programs in other languages.
 SUITES = {
     "cli": "the commands of apps/, from outside: apps/check.cpp is tested by tests/cli/check.py",
@@ -49,6 +49,13 @@ UNTESTED = {
     "apps/solve.cpp": "tests/cli/dump.py: problems that were saved are solved again; tests/cli/bad_input.py has mistakes",
     "apps/stop_request.cpp": "tests/cli/tune.py: a command that is stopped",
     "apps/sweep_ranks.cpp": "tests/cli/sweep_mpi.py: sweeps under mpirun, and of a build without MPI",
+    "apps/drive.cpp": "tests/cli/log.py: logs of all vehicles are estimated and smoothed",
+    "apps/drive_arguments.cpp": "tests/cli/log.py: arguments, and files for others' tools",
+    "logs/cdr/message_log.cpp": "tests/logs/rosbag2/db3_log_test.cpp: topics with and without definitions",
+    "sim/replay/drive_replay_files.cpp": "tests/sim/replay/replay_summary_test.cpp: a row for each",
+    "sim/telemetry/robot_messages.cpp": "tests/sim/telemetry/track_writer_test.cpp: every message is read back",
+    "sim/telemetry/track_csv.cpp": "tests/sim/telemetry/track_writer_test.cpp: tables and trajectories",
+    "sim/telemetry/track_mcap.cpp": "tests/sim/telemetry/track_writer_test.cpp: messages have what the run had",
     "plugins/host/examiner_process.cpp": "tests/plugins/host/examine_test.cpp: runs it; examiner_test.cpp has how it may end",
     "core/estimation/kalman_filter_between.cpp": "tests/core/estimation/between_nodes_test.cpp: against dense conditioning",
     "core/estimation/node_grid.cpp": "tests/core/estimation/estimator_test.cpp: every rule of where nodes lie",

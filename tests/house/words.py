@@ -12,7 +12,7 @@ import tempfile
 import house
 
 LONGEST_HEADER = 200
-LIBRARIES = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "sim")
+LIBRARIES = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "logs", "sim")
 # In libraries: nothing is printed, nobody leaves the process. Looked for in code alone, comments and texts blanked.
 LIBRARY_WORDS = [
     (re.compile(r"\bstd::(cout|cerr|clog)\b"), "a library prints nothing"),

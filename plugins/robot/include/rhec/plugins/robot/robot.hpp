@@ -21,6 +21,7 @@ namespace rhec {
 struct RobotOptions {
   double step = Estimator::Timeline{}.longest_interval;  ///< dt [s]
   Settings model, noise, bounds, blocking, estimator, controller, smoother;
+  Settings signals;  ///< read by who reads a log, or listens to a robot: rhec/logs/mapping/signal_map.hpp
 
   RHEC_EXPORT static const OptionTable<RobotOptions>& table();
   /// Adds the same rows to the table of a struct that has further keys.
@@ -36,7 +37,9 @@ struct RobotOptions {
         .subtree("blocking", &Derived::blocking, "by parameter: name and options of a blocking plugin")
         .subtree("estimator", &Derived::estimator, "how state and parameters are estimated")
         .subtree("controller", &Derived::controller, "how the path is followed")
-        .subtree("smoother", &Derived::smoother, "how a whole log is estimated at once; see 'rhec smooth'");
+        .subtree("smoother", &Derived::smoother, "how a whole log is estimated at once; see 'rhec smooth'")
+        .subtree("signals", &Derived::signals,
+                 "which signals of a log, or of a robot, are the model's outputs and inputs");
   }
 };
 

@@ -73,6 +73,10 @@ struct LoopHooks {
   std::function<void(LoopPart part)> begins = {};
   /// Called for each sample before the next one is prepared, e.g. to inspect windows and plans.
   std::function<void(const LoopSample& sample)> sampled = {};
+  /// Called when a measurement of a closed loop arrives [s], with the stamp that it bears [s] and its outputs (n_y, NaN
+  /// where missing); and when inputs (n_u) as measured become known, with the time from which they were applied.
+  std::function<void(double arrival, double stamp, const double* outputs)> measured = {};
+  std::function<void(double stamp, const double* inputs)> moved = {};
   /// Added to the robot's own, e.g. to let other estimators see what the loop's estimator sees.
   std::shared_ptr<const RobotHooks> robot = {};
 };

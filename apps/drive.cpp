@@ -1,0 +1,159 @@
+// `rhec estimate` and `rhec smooth` of a log with the vehicle's own sensors.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "drive_arguments.hpp"
+#include "integration_note.hpp"
+#include "progress.hpp"
+#include "rhec/sim/files/output_folder.hpp"
+#include "rhec/sim/maps/map_keeper.hpp"
+#include "rhec/sim/replay/drive_smoothing.hpp"
+#include "rhec/sim/replay/replay_summary.hpp"
+
+namespace rhec::apps {
+namespace {
+
+void print_signals(const logs::Drive& drive) {
+  fmt::print("{:<18} {:>8} {:>8}   {}\n", "SIGNAL", "VALUES", "MISSING", "FROM");
+  for (const logs::SignalCount& each : drive.signals)
+    fmt::print("{:<18} {:>8} {:>8}   {}\n", each.variable, each.values, each.missing, each.source);
+  if (drive.origin)
+    fmt::print("local plane: origin {:.8f}, {:.8f} degrees, {:.3f} m\n", drive.origin->latitude,
+               drive.origin->longitude, drive.origin->height);
+}
+
+void print_innovations(const sim::DriveReplay& replay, const Robot& robot) {
+  fmt::print("\n{}: {} estimates, {} fallbacks, {:.2f} s\n", replay.name, replay.estimates.size(),
+             replay.counts.fallbacks, replay.seconds);
+  if (replay.innovations.empty()) {
+    fmt::print("no innovations: nobody judges the measurements; set estimator.health.watch=true\n");
+    return;
+  }
+  fmt::print("{:<24} {:>8} {:>8} {:>8} {:>8}   {}\n", "INNOVATIONS", "USED", "REJECTED", "NIS", "EXPECTED",
+             "RMS / STATED, CORRELATION WITH THE NEXT");
+  for (const sim::SensorSummary& sensor : sim::summarise_innovations(replay, robot)) {
+    std::string outputs;
+    for (const sim::SensorSummary::Output& output : sensor.outputs)
+      outputs += fmt::format("{}{:.3g} / {:.3g} {}, {:.2f}", outputs.empty() ? "" : "; ", output.rms, output.expected,
+                             output.unit, output.correlation);
+    fmt::print("{:<24} {:>8} {:>8} {:>8.2f} {:>8.2f}   {}\n", sensor.name, sensor.used, sensor.rejected, sensor.nis,
+               sensor.expected, outputs);
+  }
+}
+
+void print_accuracy(const sim::DriveReplay& replay, const Robot& robot, const sim::HoldOut& hold_out,
+                    const char* what = "predicted") {
+  const sim::AccuracySummary accuracy = sim::summarise_predictions(replay, robot);
+  if (accuracy.count == 0) {
+    fmt::print("nothing was withheld, or nothing could be predicted: no accuracy is known; see --hold-out\n");
+    return;
+  }
+  std::string outputs;
+  for (const sim::SensorSummary::Output& output : accuracy.outputs)
+    outputs += fmt::format("{}{} {:.3g} {}", outputs.empty() ? "" : ", ", output.name, output.rms, output.unit);
+  fmt::print(
+      "withheld, 1 of {}: {} measurements of {} {}: distance {:.4g} in the median, RMS {:.4g}, largest {:.4g}; {}\n",
+      hold_out.every, accuracy.count, accuracy.sensor, what, accuracy.median, accuracy.rms, accuracy.most, outputs);
+}
+
+/// What is written of all variants.
+void write_files(sim::OutputFolder& folder, const DriveInput& input, const std::vector<sim::DriveResult>& results,
+                 const std::string& log, const sim::DriveReplay* beside) {
+  const Robot& robot = input.scenario.variants().front().robot;
+  const logs::Drive& drive = input.drives.front();
+  folder.write("estimates.csv", sim::drive_estimates_csv(results, robot));
+  folder.write("innovations.csv", sim::innovations_csv(results, robot));
+  folder.write("predictions.csv", sim::predictions_csv(results, robot));
+  folder.write("times.csv", sim::drive_times_csv(results));
+  folder.write("summary.json",
+               sim::drive_summary_json(results, input.scenario.name(), robot, drive, log, input.hold_out));
+  folder.write("run.svg", sim::drive_svg(results.front(), input.scenario.name(), robot, drive, beside));
+  folder.commit();
+}
+
+/// The name of a variant's track: the first one's is as given.
+TrackArguments only_first(const TrackArguments& tracks, std::size_t variant) {
+  return variant == 0 ? tracks : TrackArguments{};
+}
+
+}  // namespace
+
+int estimate_drive(const LogArguments& arguments, const TrackArguments& track_arguments) {
+  const DriveInput input(arguments);
+  sim::OutputFolder folder(arguments.out);
+  std::vector<sim::DriveResult> results;
+  print_signals(input.drives.front());
+  bool all_usable = true;
+  const auto& start = input.scenario.simulated_start();
+  for (std::size_t v = 0; v < input.drives.size(); ++v) {
+    const sim::ReplayVariant& variant = input.scenario.variants()[v];
+    const logs::Drive& drive = input.drives[v];
+    ProgressBar bar(variant.name);
+    Tracks tracks(only_first(track_arguments, v), variant.robot);
+    const double passes = input.hold_out.every > 0 ? 2.0 : 1.0;
+    const auto keeper = std::make_shared<sim::MapKeeper>();
+    sim::DriveResult result;
+    result.all = sim::replay_drive(variant.robot, drive, {}, start,
+                                   {.progress = [&](double share) { bar.show(share / passes); },
+                                    .sampled = [&](const sim::LoopSample& sample) { tracks.take(sample, drive.start); },
+                                    .robot = keeper});
+    result.all.name = variant.name;
+    // Accuracy is that of a replay of its own: the estimates have all measurements.
+    if (input.hold_out.every > 0)
+      result.withheld = sim::replay_drive(variant.robot, drive, input.hold_out, start,
+                                          {.progress = [&](double share) { bar.show(0.5 + 0.5 * share); },
+                                           .robot = std::make_shared<sim::MapKeeper>()});
+    bar.finish();
+    tracks.commit();
+    keeper->save();
+    print_innovations(result.all, variant.robot);
+    print_accuracy(result.withheld, variant.robot, input.hold_out);
+    print_integration(result.all.counts, *variant.robot.model(), variant.name + ": ");
+    all_usable = all_usable && result.all.counts.fallbacks == 0;
+    results.push_back(std::move(result));
+  }
+  write_files(folder, input, results, arguments.log, nullptr);
+  fmt::print("\npictures and numbers: {}\n", folder.path().string());
+  return all_usable ? exit_fine : exit_not_solved;
+}
+
+int smooth_drive(const LogArguments& arguments, const TrackArguments& track_arguments) {
+  const DriveInput input(arguments);
+  sim::OutputFolder folder(arguments.out);
+  std::vector<sim::DriveResult> results;
+  print_signals(input.drives.front());
+  bool all_solved = true;
+  const auto& start = input.scenario.simulated_start();
+  for (std::size_t v = 0; v < input.drives.size(); ++v) {
+    const sim::ReplayVariant& variant = input.scenario.variants()[v];
+    const logs::Drive& drive = input.drives[v];
+    ProgressBar bar(variant.name);
+    sim::SmoothedDriveReplay smoothed = sim::smooth_drive(variant.name, variant.robot, drive, {}, start,
+                                                          {.progress = [&](double share) { bar.show(share); }});
+    sim::DriveReplay withheld;
+    if (input.hold_out.every > 0)
+      withheld = sim::smooth_drive(variant.name, variant.robot, drive, input.hold_out, start).smoothed;
+    bar.finish();
+    print_solve(variant.name, smoothed.report, smoothed.intervals, smoothed.solve_seconds, smoothed.has_sigmas,
+                smoothed.laws);
+    print_innovations(smoothed.causal, variant.robot);
+    print_accuracy(withheld, variant.robot, input.hold_out, "interpolated");
+    Tracks tracks(only_first(track_arguments, v), variant.robot);
+    for (const sim::DriveEstimate& estimate : smoothed.smoothed.estimates)
+      tracks.write(sim::track_sample(estimate, variant.robot, drive.start));
+    tracks.commit();
+    all_solved = all_solved && smoothed.report.status == Status::solved;
+    results.push_back({std::move(smoothed.smoothed), std::move(withheld)});
+    results.push_back({std::move(smoothed.causal), {}});
+  }
+  write_files(folder, input, results, arguments.log, &results[1].all);
+  fmt::print("\npictures and numbers: {}\n", folder.path().string());
+  return all_solved ? exit_fine : exit_not_solved;
+}
+
+}  // namespace rhec::apps

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "rhec/core/base/export.hpp"
+#include "rhec/logs/cdr/message_definitions.hpp"
+#include "rhec/logs/signals/log.hpp"
+
+namespace rhec::logs {
+
+/// How logs of messages are opened.
+struct MessageLogOptions {
+  std::vector<std::filesystem::path> msg_paths;  ///< folders of packages with .msg or .idl files
+};
+
+/// How the messages of a topic are written.
+struct MessageEncoding {
+  std::string serialization;    ///< "cdr"
+  std::string schema_encoding;  ///< "ros2msg", "ros2idl"; empty: the file does not define the type
+  std::string schema;
+};
+
+/// A log of messages in CDR, whatever file they lie in.
+class RHEC_EXPORT MessageLog : public Log {
+ public:
+  std::unique_ptr<FieldReader> reader(int topic, const FieldRequest& request) const override;
+  std::vector<std::string> fields_of(const Record& record) const override;
+
+ protected:
+  MessageLog(std::string name, MessageLogOptions options);
+  /// Adds a topic, or finds the one that has this name and type. Returns its index.
+  int add_topic(const std::string& name, const std::string& type, MessageEncoding encoding);
+
+ private:
+  std::shared_ptr<const MessageType> type_of(int topic) const;
+  MessageLogOptions options_;
+  std::vector<MessageEncoding> encodings_;
+  mutable std::vector<std::shared_ptr<const MessageType>> types_;  ///< by topic, once they are asked for
+};
+
+}  // namespace rhec::logs

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rhec/core/config/options.hpp"
+#include "rhec/core/config/settings.hpp"
+#include "rhec/core/model/model.hpp"
+#include "rhec/logs/mapping/local_plane.hpp"
+#include "rhec/logs/signals/log.hpp"
+#include "rhec/plugins/robot/option_section.hpp"
+
+namespace rhec::logs {
+
+/// What a variable is made of.
+enum class SignalForm : std::uint8_t {
+  value,  ///< one number
+  east,
+  north,
+  up,       ///< latitude, longitude and height in the local plane [m]
+  heading,  ///< of a quaternion x, y, z, w: the angle about the vertical [rad]
+  mean,     ///< of all
+  turn,     ///< (second - first) / track: the yaw rate of the speeds of a left and a right side
+};
+
+/// How one output or input is read from a log: sign * scale * unit * signal + offset.
+struct SignalOptions {
+  Settings from;
+  SignalForm form = SignalForm::value;
+  std::string unit;
+  int sign = 1;
+  std::optional<double> scale;
+  double offset = 0.0;
+  std::optional<double> radius, track;
+  double delay = 0.0;
+  bool derivative = false;
+  std::string clock;
+  RHEC_EXPORT static const OptionTable<SignalOptions>& table();
+};
+
+/// The section `signals`.
+struct SignalMapOptions {
+  std::string clock;
+  std::vector<double> origin;
+  Settings outputs, inputs;
+  RHEC_EXPORT static const OptionTable<SignalMapOptions>& table();
+};
+RHEC_EXPORT std::vector<OptionSection> signal_sections();
+
+/// A variable with what it is made of.
+struct MappedSignal {
+  Variable variable;
+  bool is_output = false;
+  int index = 0;  ///< among the model's outputs or inputs
+  SignalOptions options = {};
+  std::vector<SignalName> from = {};
+  double factor = 1.0;    ///< sign, scale, unit and radius
+  bool is_angle = false;  ///< what is read is one: its differences are taken on the circle
+};
+
+/// Which signals of a log are a model's outputs and inputs. A variable that the section does not name is the signal of
+/// the log that bears its name: the column `delta`, or the item of that name in the topics that `rhec run --log`
+/// writes. `none`: it is not measured.
+class RHEC_EXPORT SignalMap {
+ public:
+  /// Throws Error, with file, line and key, for names, units and forms that cannot be.
+  SignalMap(const Settings& section, const ModelDescription& about);
+
+  const std::vector<MappedSignal>& signals() const noexcept { return signals_; }
+  const std::optional<GeodeticPoint>& origin() const noexcept { return origin_; }
+  /// What these are in a log: with signals found by name, and without those that are `none`. Throws Error for an output
+  /// or input that the log does not have.
+  std::vector<MappedSignal> resolved(const Log& log) const;
+  int outputs() const noexcept { return outputs_; }
+  int inputs() const noexcept { return inputs_; }
+
+ private:
+  void add(const Settings& map, const std::vector<Variable>& variables, bool is_output);
+  std::string clock_;
+  std::optional<GeodeticPoint> origin_;
+  std::vector<MappedSignal> signals_;  ///< without `from`: by name
+  std::vector<bool> is_none_;
+  Settings section_;
+  int outputs_ = 0, inputs_ = 0;
+};
+
+/// Topics that `rhec run --log` writes: what the sensors measured, and the inputs.
+inline constexpr const char *measured_topic = "/rhec/measured", *inputs_topic = "/rhec/inputs";
+
+}  // namespace rhec::logs

@@ -1,0 +1,220 @@
+#include "rhec/logs/mapping/proposal.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "rhec/logs/mapping/signal_map.hpp"
+
+namespace rhec::logs {
+namespace {
+
+/// A signal that could be meant, and how likely that is.
+struct Candidate {
+  std::string entry;  ///< in YAML
+  double points = 0.0;
+};
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return result;
+}
+
+bool has_any(const std::string& text, std::initializer_list<const char*> words) {
+  return std::any_of(words.begin(), words.end(),
+                     [&](const char* word) { return text.find(word) != std::string::npos; });
+}
+
+/// What a variable is, as far as its unit, name and meaning say.
+enum class Quantity {
+  x,
+  y,
+  height,
+  heading,
+  steering,
+  articulation,
+  steering_rate,
+  yaw_rate,
+  ground_speed,
+  speed,
+  left,
+  right,
+  other
+};
+
+Quantity quantity_of(const Variable& variable, bool is_output) {
+  const std::string name = lower(variable.name), all = name + " " + lower(variable.meaning);
+  if (variable.unit == "m") {
+    if (name.starts_with('x') || all.ends_with(", x")) return Quantity::x;
+    if (name.starts_with('y') || all.ends_with(", y")) return Quantity::y;
+    return name.starts_with('z') ? Quantity::height : Quantity::other;
+  }
+  if (variable.unit == "rad") {
+    if (has_any(all, {"heading", "yaw", "orientation"})) return Quantity::heading;
+    if (has_any(all, {"articul", "hitch"})) return Quantity::articulation;
+    return has_any(all, {"steer", "delta"}) ? Quantity::steering : Quantity::other;
+  }
+  if (variable.unit == "rad/s" || variable.unit == "m/s") {
+    if (has_any(all, {"left"})) return Quantity::left;
+    if (has_any(all, {"right"})) return Quantity::right;
+    if (variable.unit == "m/s") return is_output ? Quantity::ground_speed : Quantity::speed;
+    return has_any(all, {"steer", "delta"}) ? Quantity::steering_rate : Quantity::yaw_rate;
+  }
+  return Quantity::other;
+}
+
+std::string plain(const std::string& signal) {
+  // In YAML's flow style, brackets and the like are punctuation.
+  return signal.find_first_of("[]{},:# %") == std::string::npos ? signal : fmt::format("\"{}\"", signal);
+}
+
+class Proposer {
+ public:
+  explicit Proposer(const Survey& survey) : survey_(survey) {}
+
+  std::vector<Candidate> candidates(const Variable& variable, bool is_output) {
+    found_.clear();
+    const Quantity quantity = quantity_of(variable, is_output);
+    for (const TopicSurvey& topic : survey_.topics) {
+      const bool is_table = topic.topic.name.empty();
+      for (const FieldSurvey& field : topic.fields) {
+        if (field.count == 0) continue;
+        by_name(topic, field, variable, quantity);
+      }
+      if (!is_table) by_type(topic, quantity);
+      if (is_table) by_columns(topic, quantity);
+    }
+    std::stable_sort(found_.begin(), found_.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.points > b.points; });
+    return found_;
+  }
+
+ private:
+  void add(std::string entry, double points) { found_.push_back({std::move(entry), points}); }
+
+  static std::string signal_of(const TopicSurvey& topic, const std::string& field) {
+    return topic.topic.name.empty() ? field : topic.topic.name + ":" + field;
+  }
+
+  void by_name(const TopicSurvey& topic, const FieldSurvey& field, const Variable& variable, Quantity quantity) {
+    const std::string item = fmt::format("[{}]", variable.name);
+    const std::string signal = signal_of(topic, field.name);
+    if (field.name == variable.name || (field.name.ends_with(item) && field.name.starts_with("position")))
+      return add(plain(signal), 10.0);
+    const std::string name = lower(signal);
+    const bool is_velocity = has_any(name, {"velocity", "rate", "omega", "speed", "vel"});
+    const bool is_angle_of_joint = field.name.starts_with("position[") || topic.topic.name.empty();
+    if (quantity == Quantity::steering && is_angle_of_joint && has_any(name, {"steer", "delta"}) && !is_velocity)
+      add(plain(signal), 5.0);
+    if (quantity == Quantity::steering && field.name.ends_with("steering_angle")) add(plain(signal), 5.0);
+    if (quantity == Quantity::articulation && is_angle_of_joint && has_any(name, {"articul", "hitch"}))
+      add(plain(signal), 5.0);
+    if (quantity == Quantity::steering_rate && has_any(name, {"steer", "delta"})) {
+      if (is_velocity && !field.name.starts_with("position")) add(plain(signal), 4.0);
+      if (is_angle_of_joint && !is_velocity) add(fmt::format("{{from: {}, derivative: true}}", plain(signal)), 3.0);
+    }
+    if ((quantity == Quantity::left && has_any(name, {"left"})) ||
+        (quantity == Quantity::right && has_any(name, {"right"})))
+      if (field.name.starts_with("velocity[") ||
+          (topic.topic.name.empty() && has_any(name, {"wheel", "omega", "speed", "vel"})))
+        add(plain(signal), 5.0);
+    if (quantity == Quantity::speed && field.name.starts_with("velocity[") && has_any(name, {"wheel", "rear"}))
+      add(fmt::format("{{from: {}, unit: rad/s, radius: 0.3}}    # the wheel's radius [m]", plain(signal)), 2.5);
+    if (topic.topic.name.empty() && quantity == Quantity::speed && has_any(name, {"speed", "velocity"}) &&
+        !has_any(name, {"left", "right", "ang", "steer"}))
+      add(plain(signal), 4.0);
+    if (topic.topic.name.empty() && quantity == Quantity::heading && has_any(name, {"heading", "yaw"}) && !is_velocity)
+      add(plain(signal), 4.0);
+    if (topic.topic.name.empty() && quantity == Quantity::yaw_rate &&
+        has_any(name, {"yaw_rate", "gyro_z", "wz", "omega_z"}))
+      add(plain(signal), 4.0);
+  }
+
+  void by_type(const TopicSurvey& topic, Quantity quantity) {
+    const std::string& type = topic.topic.type;
+    const std::string& name = topic.topic.name;
+    const bool is_gnss = type == "sensor_msgs/msg/NavSatFix";
+    const bool is_odometry = type == "nav_msgs/msg/Odometry";
+    const bool is_of_gps = has_any(lower(name), {"gps", "gnss", "rtk"});
+    if (is_gnss && quantity == Quantity::x) add(fmt::format("{{from: {}, as: east}}", name), 4.0);
+    if (is_gnss && quantity == Quantity::y) add(fmt::format("{{from: {}, as: north}}", name), 4.0);
+    if (is_gnss && quantity == Quantity::height) add(fmt::format("{{from: {}, as: up}}", name), 4.0);
+    const std::string pose = is_odometry || type == "geometry_msgs/msg/PoseWithCovarianceStamped" ? "pose.pose"
+                             : type == "geometry_msgs/msg/PoseStamped"                            ? "pose"
+                                                                                                  : "";
+    if (!pose.empty() && (quantity == Quantity::x || quantity == Quantity::y))
+      add(plain(fmt::format("{}:{}.position.{}", name, pose, quantity == Quantity::x ? "x" : "y")),
+          is_of_gps ? 4.5 : 2.0);
+    if (!pose.empty() && quantity == Quantity::heading)
+      add(fmt::format("{{from: {}, as: heading}}", plain(fmt::format("{}:{}.orientation", name, pose))), 2.0);
+    if (type == "sensor_msgs/msg/Imu") {
+      if (quantity == Quantity::heading)
+        add(fmt::format("{{from: {}, as: heading}}", plain(name + ":orientation")), 3.0);
+      if (quantity == Quantity::yaw_rate) add(plain(name + ":angular_velocity.z"), 4.0);
+    }
+    const std::string twist = is_odometry                                ? "twist.twist"
+                              : type == "geometry_msgs/msg/TwistStamped" ? "twist"
+                              : type == "geometry_msgs/msg/Twist"        ? ""
+                                                                         : "-";
+    if (twist != "-") {
+      const std::string prefix = name + ":" + (twist.empty() ? "" : twist + ".");
+      if (quantity == Quantity::speed) add(plain(prefix + "linear.x"), is_odometry ? 3.5 : 1.5);
+      if (quantity == Quantity::yaw_rate) add(plain(prefix + "angular.z"), is_odometry ? 2.5 : 1.0);
+    }
+    if (type == "ackermann_msgs/msg/AckermannDriveStamped" && quantity == Quantity::speed)
+      add(plain(name + ":drive.speed"), 2.0);
+  }
+
+  void by_columns(const TopicSurvey& topic, Quantity quantity) {
+    if (quantity != Quantity::x && quantity != Quantity::y) return;
+    std::string latitude, longitude, height;
+    for (const FieldSurvey& field : topic.fields) {
+      const std::string name = lower(field.name);
+      if (latitude.empty() && name.starts_with("lat")) latitude = field.name;
+      if (longitude.empty() && name.starts_with("lon")) longitude = field.name;
+      if (height.empty() && (name.starts_with("alt") || name.starts_with("height"))) height = field.name;
+    }
+    if (latitude.empty() || longitude.empty()) return;
+    add(fmt::format("{{from: [{}, {}{}], as: {}}}", plain(latitude), plain(longitude),
+                    height.empty() ? "" : ", " + plain(height), quantity == Quantity::x ? "east" : "north"),
+        4.0);
+  }
+
+  const Survey& survey_;
+  std::vector<Candidate> found_;
+};
+
+void append_section(const char* name, const std::vector<Variable>& variables, bool is_output, Proposer& proposer,
+                    std::string& text) {
+  text += fmt::format("  {}:\n", name);
+  for (const Variable& variable : variables) {
+    const std::vector<Candidate> found = proposer.candidates(variable, is_output);
+    text += fmt::format("    {}: {}", variable.name, found.empty() ? "none" : found.front().entry);
+    text +=
+        fmt::format("{}{} [{}]", found.empty() || found.front().entry.find('#') == std::string::npos ? "    # " : "; ",
+                    variable.meaning.empty() ? variable.name : variable.meaning, variable.unit);
+    if (found.empty()) text += "; nothing was found that could be it";
+    text += "\n";
+    constexpr std::size_t most_others = 3;
+    for (std::size_t i = 1; i < std::min(found.size(), most_others + 1); ++i)
+      text += fmt::format("    #   or {}\n", found[i].entry);
+  }
+}
+
+}  // namespace
+
+std::string propose_signals(const Survey& survey, const ModelDescription& about) {
+  Proposer proposer(survey);
+  std::string text = "signals:\n";
+  append_section("outputs", about.outputs, true, proposer, text);
+  append_section("inputs", about.inputs, false, proposer, text);
+  return text;
+}
+
+}  // namespace rhec::logs

@@ -1,0 +1,246 @@
+#include "rhec/logs/mapping/signal_map.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "rhec/core/base/error.hpp"
+#include "rhec/logs/mapping/units.hpp"
+
+namespace rhec::logs {
+namespace {
+
+constexpr double most_delay = 10.0;
+
+bool is_geodetic(SignalForm form) {
+  return form == SignalForm::east || form == SignalForm::north || form == SignalForm::up;
+}
+
+/// What kind of number comes out of a form, without a unit of its own.
+std::string unit_after(SignalForm form, const std::string& unit) {
+  if (is_geodetic(form)) return "m";
+  if (form == SignalForm::heading) return "rad";
+  if (form == SignalForm::turn && unit == "m/s") return "rad/s";
+  return unit;
+}
+
+/// Of a wheel: what it rolls by.
+std::string unit_rolled(const std::string& unit) {
+  if (unit == "rad/s") return "m/s";
+  if (unit == "m/s") return "rad/s";
+  if (unit == "rad") return "m";
+  return unit == "m" ? "rad" : "";
+}
+
+std::string unit_of_rate(const std::string& unit) {
+  if (unit == "m") return "m/s";
+  if (unit == "rad") return "rad/s";
+  return unit == "m/s" ? "m/s^2" : "";
+}
+
+std::vector<SignalName> names_in(const Settings& from) {
+  std::vector<SignalName> names;
+  if (from.kind() == Settings::Kind::scalar) {
+    names.push_back(parse_signal_name(from.as_text()));
+  } else if (from.kind() == Settings::Kind::list && !from.items().empty()) {
+    for (const std::string& name : from.as_names()) names.push_back(parse_signal_name(name));
+  } else {
+    throw from.mismatch("a signal, such as /odom:twist.twist.linear.x or the name of a column, or a list of them");
+  }
+  return names;
+}
+
+void check_count(const MappedSignal& signal, const Settings& entry) {
+  const std::size_t count = signal.from.size();
+  const SignalForm form = signal.options.form;
+  const bool is_whole_topic = count == 1 && !signal.from.front().topic.empty();
+  if (form == SignalForm::value && count != 1)
+    throw entry.error(
+        fmt::format("found {} signals, expected one; or give the form: mean, turn, heading, east, north", count));
+  if (form == SignalForm::value && signal.from.front().field.empty())
+    throw entry.error(
+        fmt::format("'{}' is a topic; expected one of its fields, e.g. '{}:data'; or the form: east, "
+                    "north, up, heading",
+                    signal.from.front().topic, signal.from.front().topic));
+  if (form == SignalForm::heading && !is_whole_topic && count != 4)
+    throw entry.error(
+        fmt::format("found {} signals, expected the field of a quaternion, or the four columns x, y, z, w", count));
+  if (is_geodetic(form) && !is_whole_topic && count != 2 && count != 3)
+    throw entry.error(
+        fmt::format("found {} signals, expected a topic such as /fix, or latitude, longitude and height", count));
+  if (form == SignalForm::turn && count != 2)
+    throw entry.error(fmt::format("found {} signals, expected two: of the left and of the right side", count));
+}
+
+/// sign * scale * unit * radius, once it is sure that what comes out has the variable's unit.
+void set_factor(MappedSignal& signal, const Settings& entry) {
+  const SignalOptions& options = signal.options;
+  const Settings* const unit_key = entry.find("unit");
+  std::string unit;
+  signal.factor = options.sign * options.scale.value_or(1.0);
+  if (!options.unit.empty()) {
+    const std::optional<Unit> found = find_unit(options.unit);
+    if (!found)
+      throw unit_key->error(
+          fmt::format("found '{}', expected a unit{}", options.unit, suggestion_for(options.unit, unit_names())));
+    unit = found->si;
+    signal.factor *= found->factor;
+  }
+  signal.is_angle =
+      options.form == SignalForm::heading || unit == "rad" || (unit.empty() && signal.variable.unit == "rad/s");
+  if (options.radius) {
+    const bool is_inverse = unit == "m/s" || unit == "m";
+    signal.factor *= is_inverse ? 1.0 / *options.radius : *options.radius;
+    if (!unit.empty()) unit = unit_rolled(unit);
+  }
+  if (options.form == SignalForm::turn) {
+    if (!options.track) throw entry.error("as: turn: needs `track`, the distance of the two sides [m]");
+    signal.factor /= *options.track;
+  }
+  if (is_geodetic(options.form) || options.form == SignalForm::heading) {
+    if (unit_key) throw unit_key->error("is given by the form; leave it out");
+  } else if (unit.empty() || options.scale) {
+    return;  // who scales knows
+  }
+  unit = unit_after(options.form, unit);
+  if (options.derivative) unit = unit_of_rate(unit);
+  if (unit != signal.variable.unit)
+    throw entry.error(fmt::format("gives [{}], but {} is in [{}]; expected another unit or form{}", unit,
+                                  signal.variable.name, signal.variable.unit,
+                                  unit == unit_rolled(signal.variable.unit) ? ", or the `radius` of a wheel" : ""));
+}
+
+}  // namespace
+
+const OptionTable<SignalOptions>& SignalOptions::table() {
+  static const auto rows =
+      OptionTable<SignalOptions>()
+          .subtree(
+              "from", &SignalOptions::from,
+              "`topic:field`, or the name of a column; several in a list. An item of a list by its index or by name: "
+              "`/joint_states:position[rear_left]`")
+          .choice("as", &SignalOptions::form,
+                  {{"value", SignalForm::value},
+                   {"east", SignalForm::east},
+                   {"north", SignalForm::north},
+                   {"up", SignalForm::up},
+                   {"heading", SignalForm::heading},
+                   {"mean", SignalForm::mean},
+                   {"turn", SignalForm::turn}},
+                  "the number itself; latitude, longitude (and height), or a topic with them, in the local plane; the "
+                  "heading of a quaternion; the mean of several; the yaw rate of a left and a right speed")
+          .text("unit", &SignalOptions::unit, "of the signal, e.g. deg, rpm, km/h; none: that of the variable")
+          .integer("sign", &SignalOptions::sign, "-1: the signal counts the other way", between(-1, 1))
+          .optional_number("scale", &SignalOptions::scale,
+                           "what the signal is multiplied by; units are then not checked")
+          .number("offset", &SignalOptions::offset, "what is added, in the variable's unit")
+          .optional_number("radius", &SignalOptions::radius,
+                           "of a wheel [m]: makes speeds of its rotation, or the other way round", greater_than(0.0))
+          .optional_number("track", &SignalOptions::track, "of `as: turn`: the distance of the two sides [m]",
+                           greater_than(0.0))
+          .number("delay", &SignalOptions::delay, "how much later than it was measured it is stamped [s]",
+                  between(-most_delay, most_delay))
+          .flag("derivative", &SignalOptions::derivative,
+                "the rate at which the signal changes between records, for an input that nothing measures")
+          .text("clock", &SignalOptions::clock,
+                "what says when it was measured: `received`, or a field or column that counts seconds (`name [ms]`: "
+                "others); empty: `signals.clock`");
+  return rows;
+}
+
+const OptionTable<SignalMapOptions>& SignalMapOptions::table() {
+  static const auto rows =
+      OptionTable<SignalMapOptions>()
+          .text(
+              "clock", &SignalMapOptions::clock,
+              "what says when something was measured; empty: the stamp of a header or the column `time`, else when it "
+              "was received")
+          .numbers("origin", &SignalMapOptions::origin,
+                   "latitude, longitude [deg] and height [m] of the local plane's origin; none: the first fix")
+          .map("outputs", &SignalMapOptions::outputs,
+               {{"OUTPUT", "text or map", "", "", "a signal, or a map: see signals.SIGNAL; `none`: not measured"}})
+          .map("inputs", &SignalMapOptions::inputs, {{"INPUT", "text or map", "", "", "the same"}});
+  return rows;
+}
+
+std::vector<OptionSection> signal_sections() {
+  return {{"signals",
+           "For `rhec estimate`, `rhec smooth` and `rhec log`: which signals of a log are the model's outputs and "
+           "inputs. One that is "
+           "not named is the signal of its own name.",
+           SignalMapOptions::table().schema()},
+          {"signals.SIGNAL", "How one output or input is read: sign * scale * unit * signal + offset.",
+           SignalOptions::table().schema()}};
+}
+
+SignalMap::SignalMap(const Settings& section, const ModelDescription& about)
+    : section_(section),
+      outputs_(static_cast<int>(about.outputs.size())),
+      inputs_(static_cast<int>(about.inputs.size() - about.noisy_states.size())) {
+  const SignalMapOptions options = SignalMapOptions::table().parse(section, "signals");
+  clock_ = options.clock;
+  if (!options.origin.empty()) {
+    const Settings& key = *section.find("origin");
+    if (options.origin.size() != 2 && options.origin.size() != 3)
+      throw key.error(fmt::format("found {} numbers, expected latitude, longitude and height", options.origin.size()));
+    origin_ = {options.origin[0], options.origin[1], options.origin.size() > 2 ? options.origin[2] : 0.0};
+    if (!is_valid(*origin_)) throw key.error("expected a latitude within 90 degrees, and a longitude, in degrees");
+  }
+  add(options.outputs, about.outputs, true);
+  add(options.inputs, {about.inputs.begin(), about.inputs.begin() + inputs_}, false);
+}
+
+void SignalMap::add(const Settings& map, const std::vector<Variable>& variables, bool is_output) {
+  check_keys(map, names_of(variables), is_output ? "signals.outputs" : "signals.inputs");
+  for (std::size_t j = 0; j < variables.size(); ++j) {
+    MappedSignal signal{.variable = variables[j], .is_output = is_output, .index = static_cast<int>(j)};
+    signal.options.clock = clock_;
+    const Settings* entry = map.find(variables[j].name);
+    const bool is_none = entry && entry->kind() == Settings::Kind::scalar && entry->text() == "none";
+    if (entry && !is_none) {
+      Settings keys = *entry;
+      if (entry->kind() != Settings::Kind::map) {
+        keys = Settings::map(entry->origin());
+        keys.add("from", *entry);
+      }
+      SignalOptions::table().parse_into(signal.options, keys, is_output ? "an output" : "an input");
+      if (signal.options.sign == 0) throw entry->error("sign: found 0, expected 1 or -1");
+      if (signal.options.derivative && is_output)
+        throw entry->error("derivative: is for inputs; expected an output that is measured");
+      signal.from = names_in(keys.find("from") ? *keys.find("from") : keys);
+      check_count(signal, *entry);
+      set_factor(signal, *entry);
+    }
+    signals_.push_back(std::move(signal));
+    is_none_.push_back(is_none);
+  }
+}
+
+std::vector<MappedSignal> SignalMap::resolved(const Log& log) const {
+  const std::vector<Topic>& topics = log.topics();
+  const bool is_table = topics.size() == 1 && topics.front().name.empty();
+  std::vector<MappedSignal> result;
+  for (std::size_t i = 0; i < signals_.size(); ++i) {
+    if (is_none_[i]) continue;
+    MappedSignal signal = signals_[i];
+    if (signal.from.empty()) {
+      const char* own = signal.is_output ? measured_topic : inputs_topic;
+      const bool has_own =
+          std::any_of(topics.begin(), topics.end(), [&](const Topic& each) { return each.name == own; });
+      if (!is_table && !has_own)
+        throw section_.error(
+            fmt::format("nothing says which signal of {} is the {} {}; name it under `signals.{}`, or write `{}: none` "
+                        "there; `rhec "
+                        "log` lists what there is",
+                        log.name(), signal.is_output ? "output" : "input", signal.variable.name,
+                        signal.is_output ? "outputs" : "inputs", signal.variable.name));
+      signal.from = {is_table ? SignalName{"", signal.variable.name}
+                              : SignalName{own, fmt::format("position[{}]", signal.variable.name)}};
+    }
+    result.push_back(std::move(signal));
+  }
+  return result;
+}
+
+}  // namespace rhec::logs

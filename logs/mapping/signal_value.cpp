@@ -1,0 +1,76 @@
+#include "signal_value.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace rhec::logs {
+namespace {
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* fix_type = "sensor_msgs/msg/NavSatFix";
+
+double place_in_plane(SignalForm form, std::span<const double> fields, std::optional<LocalPlane>& plane) {
+  const bool has_status = fields.size() == 4;
+  if (has_status && !(fields[3] >= 0.0)) return missing;  // a receiver without a fix
+  GeodeticPoint point{fields[0], fields[1], fields.size() > 2 && std::isfinite(fields[2]) ? fields[2] : 0.0};
+  if (!is_valid(point)) return missing;
+  if (!plane) plane.emplace(point);
+  if (fields.size() < 3 || !std::isfinite(fields[2])) point.height = plane->origin().height;
+  return plane->forward(point)[form == SignalForm::east ? 0 : form == SignalForm::north ? 1 : 2];
+}
+
+double heading_of(std::span<const double> q) {
+  const double x = q[0], y = q[1], z = q[2], w = q[3];
+  const double norm = x * x + y * y + z * z + w * w;
+  if (!(std::abs(norm - 1.0) < 0.1)) return missing;  // zeros stand for an orientation that is not known
+  return std::atan2(2.0 * (w * z + x * y), norm - 2.0 * (y * y + z * z));
+}
+
+}  // namespace
+
+std::vector<SignalName> fields_of(const MappedSignal& signal, const std::string& type) {
+  const SignalForm form = signal.options.form;
+  if (signal.from.size() != 1 || signal.from.front().topic.empty()) return signal.from;
+  const auto& [topic, field] = signal.from.front();
+  const std::string prefix = field.empty() ? "" : field + ".";
+  std::vector<std::string> parts;
+  if (form == SignalForm::heading) {
+    parts = {"x", "y", "z", "w"};
+  } else if (form == SignalForm::east || form == SignalForm::north || form == SignalForm::up) {
+    parts = {"latitude", "longitude", "altitude"};
+    if (type == fix_type) parts.emplace_back("status.status");
+  } else {
+    return signal.from;
+  }
+  std::vector<SignalName> fields;
+  for (const std::string& part : parts) fields.push_back({topic, prefix + part});
+  return fields;
+}
+
+double value_of(const MappedSignal& signal, std::span<const double> fields, std::optional<LocalPlane>& plane) {
+  double value = fields.front();
+  switch (signal.options.form) {
+    case SignalForm::value:
+      break;
+    case SignalForm::mean:
+      value = std::accumulate(fields.begin(), fields.end(), 0.0) / static_cast<double>(fields.size());
+      break;
+    case SignalForm::turn:
+      value = fields[1] - fields[0];
+      break;
+    case SignalForm::heading:
+      value = heading_of(fields);
+      break;
+    case SignalForm::east:
+    case SignalForm::north:
+    case SignalForm::up:
+      value = place_in_plane(signal.options.form, fields, plane);
+      break;
+  }
+  value *= signal.factor;
+  if (!signal.options.derivative) value += signal.options.offset;
+  return std::isfinite(value) ? value : missing;
+}
+
+}  // namespace rhec::logs

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "rhec/logs/mapping/local_plane.hpp"
+#include "rhec/logs/mapping/signal_map.hpp"
+
+namespace rhec::logs {
+
+/// The fields that a signal needs: of a form that takes a topic as a whole, those that it stands for. `type` is the
+/// topic's.
+std::vector<SignalName> fields_of(const MappedSignal& signal, const std::string& type);
+
+/// The value of a signal, given those of its fields; NaN if it has none. The first good place becomes the origin of the
+/// local plane where there is none.
+double value_of(const MappedSignal& signal, std::span<const double> fields, std::optional<LocalPlane>& plane);
+
+}  // namespace rhec::logs

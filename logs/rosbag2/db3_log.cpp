@@ -1,0 +1,168 @@
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "rhec/logs/rosbag2/rosbag2.hpp"
+#include "rhec/logs/storage/compression.hpp"
+
+namespace rhec::logs {
+namespace {
+
+constexpr int longest_value = 1 << 28;
+
+struct CloseDatabase {
+  void operator()(sqlite3* database) const noexcept { sqlite3_close(database); }
+};
+struct FinishQuery {
+  void operator()(sqlite3_stmt* query) const noexcept { sqlite3_finalize(query); }
+};
+using Database = std::unique_ptr<sqlite3, CloseDatabase>;
+using Query = std::unique_ptr<sqlite3_stmt, FinishQuery>;
+
+std::string text_at(sqlite3_stmt* query, int column) {
+  const auto* text = sqlite3_column_text(query, column);
+  return text ? std::string(reinterpret_cast<const char*>(text),
+                            static_cast<std::size_t>(sqlite3_column_bytes(query, column)))
+              : std::string();
+}
+
+std::span<const std::byte> bytes_at(sqlite3_stmt* query, int column) {
+  const auto* bytes = static_cast<const std::byte*>(sqlite3_column_blob(query, column));
+  return {bytes, bytes ? static_cast<std::size_t>(sqlite3_column_bytes(query, column)) : 0};
+}
+
+class Db3Log final : public MessageLog {
+ public:
+  Db3Log(const std::filesystem::path& file, const MessageLogOptions& options)
+      : MessageLog(file.string(), options), file_(file) {
+    const Database database = open();
+    const std::set<std::string> tables = tables_of(database.get());
+    if (!tables.contains("topics") || !tables.contains("messages"))
+      throw Error(fmt::format("{}: found SQLite without the tables 'topics' and 'messages'; expected a bag of rosbag2",
+                              name()));
+    if (tables.contains("message_definitions")) read_definitions(database.get());
+    read_topics(database.get());
+  }
+
+  std::optional<Damage> read(const std::vector<bool>& wanted, const Take& take) const override {
+    const Database database = open();
+    std::string of_topics;
+    for (const auto& [id, topic] : topic_of_id_)
+      if (static_cast<std::size_t>(topic) < wanted.size() && wanted[static_cast<std::size_t>(topic)])
+        of_topics += fmt::format("{}{}", of_topics.empty() ? "" : ",", id);
+    if (of_topics.empty()) return std::nullopt;
+    // In the order of the file, which is that of arrival: sorting would take a large bag's memory.
+    const Query query =
+        prepare(database.get(), fmt::format("SELECT id, topic_id, timestamp, data FROM messages WHERE topic_id IN ({}) "
+                                            "ORDER BY id",
+                                            of_topics));
+    std::vector<std::byte> decompressed;
+    Record record;
+    int code = SQLITE_OK;
+    while ((code = sqlite3_step(query.get())) == SQLITE_ROW) {
+      const auto topic = topic_of_id_.find(sqlite3_column_int64(query.get(), 1));
+      if (topic == topic_of_id_.end()) continue;
+      record.topic = topic->second;
+      record.place = sqlite3_column_int64(query.get(), 0);
+      record.received = sqlite3_column_int64(query.get(), 2);
+      record.bytes = bytes_at(query.get(), 3);
+      if (is_zstd(record.bytes)) {
+        const std::string wrong = decompress(Compression::zstd, record.bytes, longest_value, decompressed);
+        if (!wrong.empty()) return damage(record.place, wrong);
+        record.bytes = decompressed;
+      }
+      if (!take(record)) return std::nullopt;
+    }
+    if (code != SQLITE_DONE) return damage(record.place, sqlite3_errmsg(database.get()));
+    return std::nullopt;
+  }
+
+  Damage damage_at(const Record& record, const RecordError& error) const override {
+    return {fmt::format("{}: message {}: of {}, cannot be read: {}; those before it are used", name(), record.place,
+                        topics_[static_cast<std::size_t>(record.topic)].name, error.what())};
+  }
+
+ private:
+  Damage damage(std::int64_t after, std::string_view what) const {
+    return {
+        fmt::format("{}: behind message {}: {}; the messages up to there are used; `ros2 bag reindex` or SQLite's "
+                    "`.recover` may save more",
+                    name(), after, what)};
+  }
+
+  Database open() const {
+    sqlite3* opened = nullptr;
+    const int code = sqlite3_open_v2(file_.c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
+    Database database(opened);
+    if (code != SQLITE_OK) throw failure(opened);
+    // A file is data: nothing in it is to be run, and nothing in it is as long as SQLite allows.
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+    // SQLite refuses a file that was cut as a whole, unless it is told that its schema may be written.
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
+    sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, longest_value);
+    return database;
+  }
+
+  Error failure(sqlite3* database) const {
+    return Error(fmt::format("{}: {}; expected a bag of rosbag2 (.db3)", name(), sqlite3_errmsg(database)));
+  }
+
+  Query prepare(sqlite3* database, const std::string& text) const {
+    sqlite3_stmt* prepared = nullptr;
+    if (sqlite3_prepare_v2(database, text.c_str(), -1, &prepared, nullptr) != SQLITE_OK) throw failure(database);
+    return Query(prepared);
+  }
+
+  /// Rows of a query that is small.
+  template <class Visit>
+  void for_each(sqlite3* database, const std::string& text, const Visit& visit) const {
+    const Query query = prepare(database, text);
+    int code = SQLITE_OK;
+    while ((code = sqlite3_step(query.get())) == SQLITE_ROW) visit(query.get());
+    if (code != SQLITE_DONE) throw failure(database);
+  }
+
+  /// Tables proper: a view may have rows without end.
+  std::set<std::string> tables_of(sqlite3* database) const {
+    std::set<std::string> tables;
+    for_each(database, "SELECT name FROM sqlite_master WHERE type = 'table'",
+             [&](sqlite3_stmt* row) { tables.insert(text_at(row, 0)); });
+    return tables;
+  }
+
+  void read_definitions(sqlite3* database) {
+    for_each(database, "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions",
+             [&](sqlite3_stmt* row) {
+               definitions_[text_at(row, 0)] = {"cdr", text_at(row, 1), text_at(row, 2)};
+             });
+  }
+
+  void read_topics(sqlite3* database) {
+    for_each(database, "SELECT id, name, type, serialization_format FROM topics", [&](sqlite3_stmt* row) {
+      const std::string type = text_at(row, 2);
+      MessageEncoding encoding{.serialization = text_at(row, 3), .schema_encoding = {}, .schema = {}};
+      const auto known = definitions_.find(type);
+      if (known != definitions_.end() && !known->second.schema.empty()) {
+        encoding.schema_encoding = known->second.schema_encoding;
+        encoding.schema = known->second.schema;
+      }
+      topic_of_id_[sqlite3_column_int64(row, 0)] = add_topic(text_at(row, 1), type, std::move(encoding));
+    });
+  }
+
+  std::filesystem::path file_;
+  std::map<std::string, MessageEncoding> definitions_;
+  std::map<std::int64_t, int> topic_of_id_;
+};
+
+}  // namespace
+
+std::unique_ptr<Log> open_db3(const std::filesystem::path& file, const MessageLogOptions& options) {
+  return std::make_unique<Db3Log>(file, options);
+}
+
+}  // namespace rhec::logs

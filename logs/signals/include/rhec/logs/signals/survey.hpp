@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rhec/logs/signals/log.hpp"
+
+namespace rhec::logs {
+
+/// What there is of one number in a log.
+struct FieldSurvey {
+  std::string name;
+  std::int64_t count = 0;          ///< values that are not missing
+  double least = 0.0, most = 0.0;  ///< of them
+  double first = 0.0;
+};
+
+/// What there is of one topic.
+struct TopicSurvey {
+  Topic topic;
+  std::int64_t count = 0;
+  Stamp first = no_stamp, last = no_stamp;  ///< when records were measured
+  double usual_interval = 0.0;              ///< median of the intervals between them [s]; 0 of fewer than two records
+  double longest_gap = 0.0;                 ///< [s]
+  double gap_start = 0.0;                   ///< [s] since the first record of the log
+  double largest_lateness = 0.0;            ///< between measured and received [s]
+  std::int64_t backwards = 0;               ///< records with a stamp before that of the one before them
+  std::vector<FieldSurvey> fields;
+  std::string unreadable;  ///< why nothing is known of its fields; empty: something is
+};
+
+struct Survey {
+  std::vector<TopicSurvey> topics;
+  Stamp first = no_stamp, last = no_stamp;  ///< when records were received
+  std::optional<Damage> damage;
+};
+
+/// Reads a whole log once. The fields of a topic are those of its first record.
+RHEC_EXPORT Survey survey(const Log& log);
+
+}  // namespace rhec::logs

@@ -1,0 +1,89 @@
+#include "robot_messages.hpp"
+
+#include <array>
+#include <cmath>
+
+#include "rhec/logs/cdr/message_definitions.hpp"
+
+namespace rhec::sim {
+namespace {
+
+constexpr const char *fixed_frame = "odom", *vehicle_frame = "base_link";
+
+void write_quaternion(double heading, logs::CdrWriter& message) {
+  message.numbers(std::array{0.0, 0.0, std::sin(0.5 * heading), std::cos(0.5 * heading)});
+}
+
+void write_pose(const PlanarPose& pose, logs::CdrWriter& message) {
+  message.numbers(std::array{pose.x, pose.y, 0.0});
+  write_quaternion(pose.heading, message);
+}
+
+}  // namespace
+
+logs::Stamp stamp_at(double time) noexcept { return static_cast<logs::Stamp>(std::llround(time * 1e9)); }
+
+std::uint16_t add_channel(logs::McapWriter& writer, const std::string& topic, const std::string& type) {
+  return writer.add_channel(topic, type, logs::ros2msg_text(type, logs::builtin_definitions()));
+}
+
+void write_joint_state(logs::Stamp when, std::string_view frame, std::span<const std::string> names,
+                       std::span<const double> positions, std::span<const double> efforts, logs::CdrWriter& message) {
+  message.header(when, frame);
+  message.length(names.size());
+  for (const std::string& name : names) message.text(name);
+  message.length(positions.size());
+  message.numbers(positions);
+  message.length(0);  // velocities
+  message.length(efforts.size());
+  message.numbers(efforts);
+}
+
+void write_odometry(logs::Stamp when, const PlanarPose& pose, const Eigen::Matrix3d& covariance, double speed,
+                    double yaw_rate, logs::CdrWriter& message) {
+  message.header(when, fixed_frame);
+  message.text(vehicle_frame);
+  write_pose(pose, message);
+  std::array<double, 36> full{};  // of x, y, z, roll, pitch, yaw
+  constexpr std::array places{0, 1, 5};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) full[static_cast<std::size_t>(6 * places[i] + places[j])] = covariance(i, j);
+  message.numbers(full);
+  message.numbers(std::array{speed, 0.0, 0.0, 0.0, 0.0, yaw_rate});
+  message.numbers(std::array<double, 36>{});
+}
+
+void write_transform(logs::Stamp when, const PlanarPose& pose, logs::CdrWriter& message) {
+  message.length(1);
+  message.header(when, fixed_frame);
+  message.text(vehicle_frame);
+  message.numbers(std::array{pose.x, pose.y, 0.0});
+  write_quaternion(pose.heading, message);
+}
+
+void write_path(logs::Stamp when, std::span<const PlanarPose> poses, std::span<const logs::Stamp> times,
+                logs::CdrWriter& message) {
+  message.header(when, fixed_frame);
+  message.length(poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    message.header(times[i], fixed_frame);
+    write_pose(poses[i], message);
+  }
+}
+
+void write_diagnostics(logs::Stamp when, std::uint8_t level, std::string_view name, std::string_view text,
+                       std::span<const DiagnosticValue> values, logs::CdrWriter& message) {
+  message.header(when, "");
+  message.length(1);
+  message.u8(level);
+  message.text(name);
+  message.text(text);
+  message.text("");
+  message.length(values.size());
+  for (const DiagnosticValue& value : values) {
+    message.text(value.key);
+    message.text(value.value);
+  }
+}
+
+}  // namespace rhec::sim

@@ -1,0 +1,70 @@
+#include "rhec/logs/csv/csv_log.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "logs/support/files.hpp"
+#include "logs/support/rows.hpp"
+#include "support/error_of.hpp"
+
+namespace rhec::logs {
+namespace csv_log_test {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class CsvLogTest : public FilesTest {
+ protected:
+  Rows rows(const std::string& text, const FieldRequest& request) {
+    return rows_of(*open_csv(write("drive.csv", text)), "", request);
+  }
+};
+
+TEST_F(CsvLogTest, ReadsColumnsByNameWhateverElseThereIs) {
+  const Rows found = rows("time,note,speed,gear\n0.5,\"a, b\",1.25,R\n1.5,,nan,D\r\n\n2.5,c,true,\n", {{"speed"}});
+  EXPECT_FALSE(found.damage);
+  ASSERT_EQ(found.values.size(), 3u);
+  EXPECT_EQ(found.stamps, (std::vector<Stamp>{500000000, 1500000000, 2500000000}));
+  EXPECT_EQ(found.received, found.stamps);
+  EXPECT_EQ(found.values[0][0], 1.25);
+  EXPECT_TRUE(std::isnan(found.values[1][0]));
+  EXPECT_EQ(found.values[2][0], 1.0);
+}
+
+TEST_F(CsvLogTest, KnowsSeveralClocksUnitsAndSeparators) {
+  const std::string text = "\xEF\xBB\xBFtime [ms];received [ms];gps_time;x\n1000;1250;0.9;7\n2000;2250;;8\n";
+  EXPECT_EQ(rows(text, {{"x"}}).stamps, (std::vector<Stamp>{1000000000, 2000000000}));
+  EXPECT_EQ(rows(text, {{"x"}}).received, (std::vector<Stamp>{1250000000, 2250000000}));
+  EXPECT_EQ(rows(text, {{"x"}, "gps_time"}).stamps, (std::vector<Stamp>{900000000, no_stamp}));
+  EXPECT_EQ(rows(text, {{"x"}, "received"}).stamps, (std::vector<Stamp>{1250000000, 2250000000}));
+}
+
+TEST_F(CsvLogTest, UsesWhatIsBeforeABrokenLine) {
+  const Rows found = rows("time,x\n0,1\n1,2\n2,three\n3,4\n", {{"x"}});
+  EXPECT_EQ(found.values.size(), 2u);
+  ASSERT_TRUE(found.damage);
+  EXPECT_THAT(found.damage->what, AllOf(HasSubstr("drive.csv:4"), HasSubstr("'three'"), HasSubstr("mend the line")));
+  EXPECT_THAT(rows("time,x\n0,1\nsoon,2\n", {{"x"}}).damage->what, HasSubstr("drive.csv:3: found 'soon'"));
+}
+
+TEST_F(CsvLogTest, ALineIsNotLongerThanMemory) {
+  const Rows found = rows("time,x\n0,1\n" + std::string(std::size_t{3} << 20, '7') + "\n1,2\n", {{"x"}});
+  EXPECT_EQ(found.values.size(), 1u);
+  EXPECT_THAT(found.damage->what, HasSubstr("drive.csv:3: found a line of more than"));
+}
+
+TEST_F(CsvLogTest, SaysWhatIsWrongWithAFile) {
+  const auto message = [&](const std::string& text) { return error_of([&] { open_csv(write("x.csv", text)); }); };
+  EXPECT_THAT(message("0,1,2\n1,2,3\n"), AllOf(HasSubstr("x.csv:1"), HasSubstr("expected a header")));
+  EXPECT_THAT(message(""), HasSubstr("found nothing, expected a header"));
+  EXPECT_THAT(message("time,x,x\n"), HasSubstr("two columns are called 'x'"));
+  EXPECT_THAT(error_of([&] { open_csv(path("gone.csv")); }), HasSubstr("No such file"));
+  EXPECT_THAT(error_of([&] { rows("time,speed\n0,1\n", {{"sped"}}); }), HasSubstr("did you mean 'speed'"));
+  EXPECT_THAT(error_of([&] { rows("when,speed\n0,1\n", {{"speed"}}); }), HasSubstr("signals.clock"));
+  EXPECT_THAT(error_of([&] { rows("time [h],speed\n0,1\n", {{"speed"}}); }), HasSubstr("[h]"));
+}
+
+}  // namespace csv_log_test
+}  // namespace rhec::logs

@@ -1,0 +1,64 @@
+#include "rhec/logs/mapping/signal_map.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "logs/support/described.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+#include "support/error_of.hpp"
+
+namespace rhec::logs {
+namespace signal_map_test {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+SignalMap map_of(const std::string& text) { return {parse_yaml(text, "robot.yaml"), described()}; }
+std::string message_of(const std::string& text) {
+  return error_of([&] { map_of(text); });
+}
+const MappedSignal& signal(const SignalMap& map, const std::string& name) {
+  for (const MappedSignal& each : map.signals())
+    if (each.variable.name == name) return each;
+  throw Error("no such signal");
+}
+
+TEST(SignalMap, FactorsContainSignScaleUnitAndRadius) {
+  const SignalMap map = map_of(R"(
+outputs:
+  x_gps: {from: /fix, as: east}
+  delta: {from: "/joint_states:position[steer]", unit: deg, sign: -1, offset: 0.1}
+  psi_m: compass
+inputs:
+  v: {from: [left, right], as: mean, unit: rpm, radius: 0.3}
+  delta_rate: {from: steer, unit: deg, derivative: true}
+)");
+  EXPECT_DOUBLE_EQ(signal(map, "delta").factor, -M_PI / 180.0);
+  EXPECT_EQ(signal(map, "delta").from.front().field, "position[steer]");
+  EXPECT_DOUBLE_EQ(signal(map, "v").factor, 0.3 * 2.0 * M_PI / 60.0);
+  EXPECT_TRUE(signal(map, "delta_rate").is_angle);
+  EXPECT_EQ(signal(map, "psi_m").from.front().field, "compass");
+  EXPECT_TRUE(signal(map, "y_gps").from.empty());
+}
+
+TEST(SignalMap, MistakesNameTheirPlaceAndARemedy) {
+  EXPECT_THAT(message_of("outputs: {x_pgs: a}"), AllOf(HasSubstr("robot.yaml:1"), HasSubstr("x_gps")));
+  EXPECT_THAT(message_of("outputs:\n  delta: {from: a, unit: degrees}"),
+              AllOf(HasSubstr("robot.yaml:2"), HasSubstr("'degrees'"), HasSubstr("deg")));
+  EXPECT_THAT(message_of("outputs: {delta: {from: a, unit: m}}"), HasSubstr("gives [m], but delta is in [rad]"));
+  EXPECT_THAT(message_of("inputs: {v: {from: a, unit: rpm}}"), HasSubstr("`radius`"));
+  EXPECT_THAT(message_of("inputs: {v: {from: [a, b]}}"), HasSubstr("found 2 signals"));
+  EXPECT_THAT(message_of("outputs: {x_gps: /fix}"), HasSubstr("expected one of its fields"));
+  EXPECT_THAT(message_of("outputs: {psi_m: {from: [a, b], as: heading}}"), HasSubstr("x, y, z, w"));
+  EXPECT_THAT(message_of("outputs: {x_gps: {from: a, derivative: true}}"), HasSubstr("is for inputs"));
+  EXPECT_THAT(message_of("inputs: {v: {form: a}}"), HasSubstr("did you mean 'from'"));
+  EXPECT_THAT(message_of("origin: [1]"), HasSubstr("latitude, longitude and height"));
+  EXPECT_THAT(message_of("origin: [100, 0, 0]"), HasSubstr("within 90 degrees"));
+  EXPECT_THAT(message_of("inputs: {delta_rate: {from: [a, b], as: turn, unit: m/s}}"), HasSubstr("`track`"));
+  EXPECT_EQ(message_of("inputs: {delta_rate: {from: [a, b], as: turn, unit: m/s, track: 0.5}}"), "");
+}
+
+}  // namespace signal_map_test
+}  // namespace rhec::logs

@@ -1,0 +1,51 @@
+#include "rhec/logs/signals/survey.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "logs/support/files.hpp"
+#include "rhec/logs/csv/csv_log.hpp"
+
+namespace rhec::logs {
+namespace survey_test {
+
+using SurveyTest = FilesTest;
+
+TEST_F(SurveyTest, CountsRatesGapsAndRanges) {
+  std::string text = "time,speed,label,rare\n";
+  for (int i = 0; i < 100; ++i)
+    text += std::to_string(i < 50 ? 0.1 * i : 0.1 * i + 7.0) + "," + std::to_string(i) + ",word," +
+            (i == 7 ? "3" : "") + "\n";
+  const auto log = open_csv(write("drive.csv", text));
+  const Survey found = survey(*log);
+  ASSERT_EQ(found.topics.size(), 1u);
+  const TopicSurvey& table = found.topics.front();
+  EXPECT_EQ(table.count, 100);
+  EXPECT_NEAR(table.usual_interval, 0.1, 1e-4);
+  EXPECT_NEAR(table.longest_gap, 7.1, 1e-6);
+  EXPECT_NEAR(table.gap_start, 4.9, 1e-6);
+  EXPECT_EQ(table.backwards, 0);
+  ASSERT_EQ(table.fields.size(), 2u);
+  EXPECT_EQ(table.fields[0].name, "speed");
+  EXPECT_EQ(table.fields[0].least, 0.0);
+  EXPECT_EQ(table.fields[0].most, 99.0);
+  EXPECT_EQ(table.fields[1].name, "rare");
+  EXPECT_EQ(table.fields[1].count, 1);
+  EXPECT_FALSE(found.damage);
+}
+
+TEST_F(SurveyTest, TellsDamageAndWhatWasBeforeIt) {
+  const auto log = open_csv(write("drive.csv", "time,speed\n0,1\n1,2\n2\n3,4\n"));
+  const Survey found = survey(*log);
+  EXPECT_EQ(found.topics.front().count, 2);
+  ASSERT_TRUE(found.damage);
+  EXPECT_THAT(found.damage->what, testing::HasSubstr("drive.csv:4: found 1 cells, expected 2"));
+}
+
+TEST_F(SurveyTest, SaysWhyItKnowsNothingOfATopic) {
+  const auto log = open_csv(write("drive.csv", "when,speed\n0,1\n"));
+  EXPECT_THAT(survey(*log).topics.front().unreadable, testing::HasSubstr("no column 'time'"));
+}
+
+}  // namespace survey_test
+}  // namespace rhec::logs
