@@ -92,12 +92,11 @@ Command Program::add(const std::string& name, const std::string& about, const st
   return Command(command);
 }
 
-std::string Program::wrong_command(int count, char** words) const {
+std::string Program::wrong_command(const std::string& word) const {
   std::vector<std::string> commands;
   for (const CLI::App* command : std::as_const(*app_).get_subcommands([](const CLI::App*) { return true; }))
     commands.push_back(command->get_name());
   const std::string expected = fmt::format("expected one of {}; see 'rhec --help'", fmt::join(commands, ", "));
-  const std::string word = words[1];
   if (word == "-h" || word == "--help" || word == "--version") return {};
   if (word.starts_with('-')) return fmt::format("unknown option '{}'; {}", word, expected);
   if (std::find(commands.begin(), commands.end(), word) != commands.end()) return {};
@@ -115,7 +114,7 @@ int Program::run(int count, char** words) {
     fmt::print("{}", first_steps_);
     return exit_fine;
   }
-  if (const std::string problem = wrong_command(count, words); !problem.empty()) return usage_error(problem);
+  if (const std::string problem = wrong_command(words[1]); !problem.empty()) return usage_error(problem);
   try {
     app_->parse(count, words);
   } catch (const CLI::ParseError& end) {

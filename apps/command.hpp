@@ -76,7 +76,7 @@ class Program {
 
  private:
   /// An error message if the command is unknown; otherwise empty.
-  std::string wrong_command(int count, char** words) const;
+  std::string wrong_command(const std::string& word) const;
 
   std::unique_ptr<CLI::App> app_;
   std::string first_steps_;

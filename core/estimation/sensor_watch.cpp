@@ -33,10 +33,10 @@ constexpr int suspect_after = 3, passes_of_suspects = 2;
 constexpr double close_gate = 3.0;
 // Silence after which a sensor that disagrees is more likely right than the estimate [s].
 constexpr double longest_gap = 1.0;
-// A real receiver's errors may be far larger than its noise says, and not Gaussian at all: a gate is as much wider as
-// the sensor's squared innovations have been over some fifty samples, of which none counts more than this many times
-// what was expected. A transient of up to ten samples does not open it to itself.
-constexpr double most_excess = 100.0, excess_memory = 50.0;
+// A real receiver's errors may be far larger than its noise says, and not Gaussian at all: its gate is as much wider as
+// its squared innovations have been over some five hundred samples, of which none counts more than this many times what
+// was expected, and those of one that is suspect not at all.
+constexpr double most_excess = 100.0, excess_memory = 500.0;
 // Samples of a dispute within which slip may have jumped.
 constexpr int fresh = 2;
 // A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
@@ -319,7 +319,8 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
   const auto degrees = static_cast<double>(innovation.value.size());
   const bool passes = innovation.nis <= limit(sensor, innovation.value.size());
   double& excess = excesses_[sensor];
-  excess += (std::min(innovation.nis / degrees, most_excess) - excess) / excess_memory;
+  if (record.failures < suspect_after)
+    excess += (std::min(innovation.nis / degrees, most_excess) - excess) / excess_memory;
   if (!passes) {
     if (record.failures == 0) record.after_gap = innovation.time - heard_[sensor] > longest_gap;
     ++record.failures;
@@ -373,7 +374,8 @@ SensorWatch::Finding SensorWatch::search_heading(const double* outputs) noexcept
 /// Largest nu' S^-1 nu of a sensor.
 double SensorWatch::limit(std::size_t sensor, Eigen::Index degrees) const noexcept {
   const bool is_suspect = records_[sensor].failures >= suspect_after;
-  return std::max(1.0, excesses_[sensor]) * (is_suspect ? close_limits_ : limits_)[static_cast<std::size_t>(degrees)];
+  const double usual = std::max(1.0, excesses_[sensor]) * limits_[static_cast<std::size_t>(degrees)];
+  return is_suspect ? close_limits_[static_cast<std::size_t>(degrees)] : usual;
 }
 
 /// Takes out sensors that give the same values again and again.

@@ -127,8 +127,10 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
     const double time = static_cast<double>(k) * step;
     world.measure(time);
     begin(LoopPart::estimate);
-    world.deliver(time, [&](double stamp, const double* outputs) { estimator->push_measurement(stamp, outputs); });
-    world.deliver(time, *estimator, hooks);
+    world.deliver(time, [&](double stamp, const double* outputs) {
+      estimator->push_measurement(stamp, outputs);
+      if (hooks.measured) hooks.measured(world.on_robots_clock(time), stamp, outputs);
+    });
     const Estimate& estimate = estimator->estimate(world.on_robots_clock(time));
     begin(LoopPart::control);
     const Controller::Command& command = controller->control(estimate);

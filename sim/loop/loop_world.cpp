@@ -28,18 +28,6 @@ LoopWorld::LoopWorld(const Scenario& scenario, const SensorNoise& noise)
       measured_(scenario.robot().model()->input_count()),
       given_(measured_.size()) {}
 
-void LoopWorld::deliver(double time, Estimator& estimator, const LoopHooks& hooks) {
-  const bool is_first = !has_moved_;
-  bool has_arrived = false;
-  const auto push = [&](double stamp, const std::vector<double>& outputs) {
-    estimator.push_measurement(stamp, outputs.data());
-    if (hooks.measured) hooks.measured(on_robots_clock(time), stamp, outputs.data());
-    has_arrived = true;
-  };
-  deliveries_.deliver(is_first ? infinity : time, push);
-  if (is_first && !has_arrived) push(on_robots_clock(time), outputs_);
-}
-
 void LoopWorld::measure(double time, bool is_sample) {
   faults_.begin(time);
   const Sensors::Motion motion{actuators_.applied().data(), truth_.parameters().data()};

@@ -36,9 +36,6 @@ class LoopWorld {
     });
     if (is_first && !has_arrived) take(on_robots_clock(time), outputs_.data());
   }
-  /// Pushes what has arrived by now. What is measured before the vehicle moves arrives at once: a drive begins with an
-  /// estimate.
-  void deliver(double time, Estimator& estimator, const LoopHooks& hooks = {});
   /// Drives for `duration` with constant inputs; sensors with a rate of their own measure on the way.
   void drive(const std::vector<double>& inputs, double time, double duration);
   /// The inputs as they are measured.

@@ -28,13 +28,10 @@ MAY_USE = {
     "blocking": ("core", "plugins"),
     "priors": ("core", "plugins"),
     "terms": ("core", "plugins"),
-    "sim": ("core", "plugins", "sim"),
-    "apps": ("core", "plugins", "sim", "apps"),
-    "python": ("core", "plugins", "sim"),
-    "benchmarks": ("core", "plugins", "sim"),
     "logs": ("core", "plugins", "logs"),
     "sim": ("core", "plugins", "logs", "sim"),
     "apps": ("core", "plugins", "logs", "sim", "apps"),
+    "python": ("core", "plugins", "logs", "sim"),
     "benchmarks": ("core", "plugins", "logs", "sim"),
 }
 PLUGIN_FOLDERS = ("solvers", "models", "blocking", "priors", "terms")

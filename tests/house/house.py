@@ -2,8 +2,7 @@
 import pathlib
 import sys
 
-FOLDERS = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "sim", "apps", "python", "benchmarks")
-FOLDERS = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "logs", "sim", "apps", "benchmarks")
+FOLDERS = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "logs", "sim", "apps", "python", "benchmarks")
 CODE_FOLDERS = FOLDERS + ("tests", "examples")
 ALL_FOLDERS = CODE_FOLDERS + ("cmake", "docs", "scenarios", "scripts", ".ci")
 CODE = {".hpp", ".cpp", ".h", ".cc", ".in"}
