@@ -308,14 +308,23 @@ void Estimator::assess(Estimate& estimate, double time) noexcept {
   watch_->assess(estimate, silent_, reasons, estimate.health);
 }
 
+/// What an input that holds would lead beyond, as a steering angle beyond its stop, ends there.
+void Estimator::clip_prediction() noexcept {
+  const std::vector<Variable>& states = model().description().states;
+  for (Eigen::Index j = 0; j < std::min<Eigen::Index>(std::ssize(states), predicted_.state.size()); ++j)
+    predicted_.state[j] = std::min(std::max(predicted_.state[j], states[j].lower), states[j].upper);
+}
+
 void Estimator::predict_to(double time) noexcept {
   const double last = grid_.time();
   predicted_ = estimate_;
   predicted_.predicted = true;
-  if (watch_ && watch_->is_active())
-    return through_unknown_motion(last, time, [&](double duration) {
+  if (watch_ && watch_->is_active()) {
+    through_unknown_motion(last, time, [&](double duration) {
       watch_->predict(duration, input_.data(), input_sigmas_.data(), predicted_);
     });
+    return clip_prediction();
+  }
   std::copy_n(grid_.mean_input(last, time), input_.size(), input_.begin());
   for (double& u : input_)
     if (std::isnan(u)) u = 0.0;
@@ -331,6 +340,7 @@ void Estimator::predict_to(double time) noexcept {
   method_->model().integrate(request);
   if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))
     std::copy(next_.begin(), next_.end(), predicted_.state.data());
+  clip_prediction();
 }
 
 /// Holds the newest interval's steps against twice as many, from the newest node on: what the vehicle does there can be

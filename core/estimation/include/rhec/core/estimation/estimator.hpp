@@ -46,8 +46,8 @@ class RHEC_EXPORT Estimator {
   void push_input(double time, const double* inputs) noexcept;
 
   /// The estimate at a time [s], from all that was pushed with stamps up to it. Beyond the newest node it is integrated
-  /// with the newest inputs; for an earlier or undefined time it is the newest node's. Before the first measurement it
-  /// is empty (see `has_started`).
+  /// with the newest inputs, within the model's bounds; for an earlier or undefined time it is the newest node's.
+  /// Before the first measurement it is empty (see `has_started`).
   const Estimate& estimate(double time, Clock::time_point deadline = Clock::time_point::max()) noexcept;
   bool has_started() const noexcept { return grid_.count() > 0; }
 
@@ -99,6 +99,7 @@ class RHEC_EXPORT Estimator {
   void rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
   void take_in(double until) noexcept;
   void add_node() noexcept;
+  void clip_prediction() noexcept;
   void predict_to(double time) noexcept;
   void check_integration() noexcept;
   void clear_estimates() noexcept;
