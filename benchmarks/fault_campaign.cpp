@@ -71,6 +71,7 @@ sim::Json answer(const Host& host, const sim::Json& job) {
     }
   }
   result["steps"] = steps;
+  result["after"] = std::vector<int>(sim::recovery_samples.begin(), sim::recovery_samples.end());
   return result;
 }
 

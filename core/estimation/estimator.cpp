@@ -343,6 +343,13 @@ void Estimator::assess(Estimate& estimate, double time) noexcept {
   watch_->assess(estimate, silent_, reasons, estimate.health);
 }
 
+/// What an input that holds would lead beyond, as a steering angle beyond its stop, ends there.
+void Estimator::clip_prediction() noexcept {
+  const std::vector<Variable>& states = model().description().states;
+  for (Eigen::Index j = 0; j < std::min<Eigen::Index>(std::ssize(states), predicted_.state.size()); ++j)
+    predicted_.state[j] = std::min(std::max(predicted_.state[j], states[j].lower), states[j].upper);
+}
+
 void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
   predicted_ = estimate_;
   predicted_.predicted = true;
@@ -350,6 +357,7 @@ void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
     return through_motion(grid_.time(), time, deadline, [&](double begin, double end) {
       guess_input(begin, end);
       watch_->predict(end - begin, input_.data(), input_sigmas_.data(), predicted_);
+      clip_prediction();
     });
   through_motion(grid_.time(), time, deadline, [&](double begin, double end) {
     std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
@@ -367,6 +375,7 @@ void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
     method_->model().integrate(request);
     if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))
       std::copy(next_.begin(), next_.end(), predicted_.state.data());
+    clip_prediction();
   });
 }
 

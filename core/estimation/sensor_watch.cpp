@@ -543,7 +543,14 @@ void SensorWatch::acquit(const double* outputs) noexcept {
   for (int i = 0; i < held_count_; ++i) take_back([&](int j) { return !std::isnan(held_[i].outputs[j]); });
   take_back([&](int j) { return std::isnan(outputs[j]) && !std::isnan(raw_[j]); });
   for (std::uint32_t& each : findings_) each &= ~reason::rejected;
-  if (!memory_->was_calm) return;
+  // Slip at a bound may well be beyond it, as that of wheels that spin on the spot.
+  const Eigen::Index nx = own_->filter.model().state_count();
+  bool is_usual = memory_->was_calm;
+  for (std::size_t j = 0; j < setup_.walk.size(); ++j) {
+    const double slip = own_->filter.mean()[nx + static_cast<Eigen::Index>(j)];
+    is_usual = is_usual && slip > setup_.noise.parameter_lower[j] && slip < setup_.noise.parameter_upper[j];
+  }
+  if (!is_usual) return;
   for (std::size_t s = 0; s < sensors_.size(); ++s) {
     states_[s].reasons &= ~reason::rejected;
     quiet_[s] = setup_.calm;

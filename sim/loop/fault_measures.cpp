@@ -57,7 +57,7 @@ void find_span(const std::vector<RideSample>& samples, FaultMeasures& result) {
 
 void find_followed(const std::vector<RideSample>& samples, FaultMeasures& result) {
   for (std::size_t k = result.first; k < samples.size(); ++k)
-    if (samples[k].displaced > displaced_factor * result.limit)
+    if (samples[k].displaced > displaced_factor * result.limit && (result.is_lasting || !samples[k].is_inside))
       result.followed = std::max(result.followed, samples[k].followed);
   for (std::size_t k = result.first; k < samples.size() && result.moved < 0; ++k) {
     if (samples[k].reasons & reason::moved)

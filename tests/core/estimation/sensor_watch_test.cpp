@@ -167,7 +167,7 @@ TEST_P(SensorFaults, SlipThatJumpsIsNoFault) {
 }
 
 TEST_P(SensorFaults, APositionThatWasFollowedIsDoubtedForSomeTime) {
-  expect_each({.spoil = [](Delivery& d) { d.outputs[0] += 10.0; }, .length = 22}, [](const Episode& episode) {
+  expect_each({.spoil = [](Delivery& d) { d.outputs[0] += 10.0; }, .length = 20}, [](const Episode& episode) {
     EXPECT_GT(episode.during.back().error, 9.0) << "it cannot be told from one that has moved for good";
     for (const Episode::Sample& sample : episode.during) EXPECT_NE(sample.health, HealthLevel::ok);
     EXPECT_LE(episode.samples_to_recover(usual_error), 11);
@@ -223,6 +223,21 @@ TEST_P(SensorFaults, AnEstimatorThatIsAlwaysLateComesBackFromASilence) {
     EXPECT_TRUE(episode.is_finite);
     EXPECT_LE(episode.samples_to_recover(usual_error), 80);
     EXPECT_LE(episode.samples_to_ok(), 100);
+  }
+}
+
+TEST(SensorWatch, APredictionStaysWithinBounds) {
+  for (const char* health : {"", "  health: {watch: false}\n"}) {
+    SCOPED_TRACE(health);
+    const Robot vehicle = robot("ekf", health);
+    const auto estimator = vehicle.make_estimator(Eigen::VectorXd::Zero(4));
+    const std::vector<double> outputs{0.0, 0.0, 0.0}, inputs{2.0, 0.3};
+    estimator->push_measurement(0.0, outputs.data());
+    estimator->estimate(0.0);
+    estimator->push_input(0.0, inputs.data());
+    const double upper = vehicle.model()->description().states[3].upper;
+    EXPECT_NEAR(estimator->estimate(0.5).state[3], 0.15, 0.02);
+    EXPECT_EQ(estimator->estimate(100.0).state[3], upper) << "a steering angle, at its stop";
   }
 }
 

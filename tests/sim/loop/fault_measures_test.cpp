@@ -87,6 +87,8 @@ TEST(FaultMeasures, WhatIsFollowedIsMoreThanNoise) {
   ride.samples[31].followed = 1.0;
   ride.samples[32].displaced = 2.1;
   ride.samples[32].followed = 0.7;
+  ride.samples[45].displaced = 5.0;  // known to be possible
+  ride.samples[45].followed = 0.9;
   EXPECT_DOUBLE_EQ(measure_fault(ride, calm_ride(60)).followed, 0.7);
 }
 

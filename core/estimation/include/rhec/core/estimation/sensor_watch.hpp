@@ -46,7 +46,7 @@ class RHEC_EXPORT SensorWatch {
     int calm = 5;        ///< samples without a finding after which health is ok again
     /// The same of a sensor that the estimate has followed: one that comes back as a transient does is then still
     /// doubted.
-    int calm_after_moving = 12;
+    int calm_after_moving = 10;
     double lost_position = 3.0;  ///< standard deviation above which the vehicle is lost [m]
     double lost_heading = 0.5;   ///< likewise [rad]
   };

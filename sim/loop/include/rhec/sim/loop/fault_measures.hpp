@@ -27,8 +27,10 @@ struct FaultMeasures {
   double limit = 0.0;      ///< an error up to this one is usual: the ride without the fault has no larger one [m]
   int recovered = -1;      ///< samples until the error stays below the limit; -1: never
   bool is_lost_at_end = false;
-  double followed = 0.0;  ///< largest share of a displacement, of ten limits at least, that the position has taken up
-  int moved = -1;         ///< samples from the beginning until the health says `moved`; -1: never
+  /// Largest share of a displacement, of ten limits at least, that the position has taken up, where the truth is
+  /// outside of 3 standard deviations: one that knows that it may be off by as much has followed nothing.
+  double followed = 0.0;
+  int moved = -1;            ///< samples from the beginning until the health says `moved`; -1: never
   std::int64_t doubted = 0;  ///< samples before that whose health is not ok; of a ride that says `moved`
   std::int64_t counted = 0;  ///< samples during and after the fault
   std::int64_t honest = 0;   ///< of these, those whose true position is inside 3 standard deviations, or health not ok
