@@ -101,9 +101,8 @@ class RHEC_EXPORT Estimator {
   void rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
   bool take_in(double until, Clock::time_point deadline) noexcept;
   void add_node() noexcept;
-  /// with the newest inputs, within the model's bounds; for an earlier or undefined time it is the newest node's. Before
-  /// the first measurement it is empty (see `has_started`). What the deadline leaves no time for waits for the next
-  /// call: the estimate is then predicted from an earlier node, and its report says `deadline`.
+  void clip_prediction() noexcept;
+  void predict_to(double time, Clock::time_point deadline) noexcept;
   void check_integration() noexcept;
   void clear_estimates() noexcept;
 
