@@ -49,18 +49,18 @@ std::shared_ptr<const Model> cart() {
 
 /// Nothing slips.
 template <class Scalar>
-struct Train {
+struct Rail {
   static constexpr int state_count = 1, input_count = 1, parameter_count = 0, output_count = 1;
   void dynamics(const Scalar*, const Scalar* u, const Scalar*, Scalar* dxdt) const { dxdt[0] = u[0]; }
   void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
-TEST(ProcessModelTrainTest, AVehicleWithoutParametersHasNoData) {
+TEST(ProcessModel, TakesAVehicleWithoutParameters) {
   ModelDescription about;
   about.states.resize(1);
   about.inputs.resize(1);
   about.outputs.resize(1);
-  const ProcessModel model(std::make_shared<FormulaModel<Train>>(Train<double>{}, about), {});
+  const ProcessModel model(std::make_shared<FormulaModel<Rail>>(Rail<double>{}, about), {});
   ASSERT_EQ(model.data_count(), 0);
   const double state = 1.0, input = 2.0, duration = 0.5;
   double next = 0.0;
