@@ -112,7 +112,8 @@ void ProcessModel::data_of_part(const double* data, double share, double* part) 
 }
 
 void ProcessModel::integrate(const Intervals& request) const noexcept {
-  RHEC_ASSERT(request.count == 0 || (request.states && request.inputs && request.durations && request.data),
+  RHEC_ASSERT(request.count == 0 || (request.states && request.inputs && request.durations &&
+                                     (request.data || data_count_ == 0)),  // a vehicle without parameters has none
               "where to integrate");
   with_memory([&](double* memory) { integrate(request, memory); });
 }

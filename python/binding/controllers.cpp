@@ -11,6 +11,7 @@
 #include "lock.hpp"
 #include "reports.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
 #include "robots.hpp"
 
 namespace rhec::python {
@@ -135,6 +136,13 @@ py::dict plan(ControllerObject& self) {
   return made;
 }
 
+std::string plan_line(ControllerObject& self, const std::string& id) {
+  const ControllerLock lock(self);
+  const PluginChoice model = self.robot->robot.model_choice();
+  return sim::problem_line(
+      sim::record_of(self.controller->problem(), &self.controller->plan(), id, model.name, model.options));
+}
+
 void bind_commands(py::module_& module) {
   py::class_<CommandObject>(
       module, "Command", "The inputs to be applied until the next call. It stays as it is when the controller goes on.")
@@ -207,6 +215,7 @@ void bind_controllers(py::module_& module) {
       .def(
           "reset", [](ControllerObject& self) { locked(self, [](Controller& c) { c.reset(); }); }, "Begins anew.")
       .def("plan", &plan, "What is planned: times from now [s] (N + 1), states (N + 1, n_x) and inputs (N, n_u).")
+      .def("problem_line", &plan_line, py::arg("id"), "Its problem and plan as a line of a problem file.")
       .def_property_readonly(
           "finished", [](ControllerObject& self) { return locked(self, [](Controller& c) { return c.finished(); }); },
           "whether the end of the path is passed, or the vehicle has stopped there")

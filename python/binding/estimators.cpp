@@ -12,6 +12,8 @@
 #include "lock.hpp"
 #include "reports.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/windowed_estimation.hpp"
+#include "rhec/sim/problems/problem_file.hpp"
 #include "robots.hpp"
 
 namespace rhec::python {
@@ -129,6 +131,15 @@ py::dict counts_of(NamedEstimator& self) {
   made["clocks_set"] = counts.clocks_set;
   made["missing"] = counts.missing;
   return made;
+}
+
+std::string window_line(NamedEstimator& self, const std::string& id) {
+  const Lock lock(self.mutex);
+  const auto* method = dynamic_cast<const WindowedEstimation*>(&self.estimator->method());
+  if (method == nullptr || !method->has_window())
+    throw Error("problem: the estimator has no window at present; expected one with the name rhe, and a measurement");
+  const PluginChoice model = self.robot->robot.model_choice();
+  return sim::problem_line(sim::record_of(method->problem(), &method->solution(), id, model.name, model.options));
 }
 
 double value_of(const EstimateObject& self, const std::string& name) {
@@ -265,6 +276,8 @@ void bind_estimators(py::module_& module) {
             self.keeper->save();
           },
           "Writes the map of slip to its file (`estimator.memory.file`).")
+      .def("problem_line", &window_line, py::arg("id"),
+           "Its window's problem and solution as a line of a problem file.")
       .def_property_readonly(
           "has_started",
           [](NamedEstimator& self) {

@@ -10,6 +10,7 @@ from ._model import BuiltModel, Model
 from ._notation import smooth_abs, smooth_max, smooth_min
 from ._plugins import options, plugins
 from ._problems import Problem, read_problems, write_problems
+from ._report import Page, report
 from ._rhec import Command, Controller, Estimate, Estimator, Path, Report, Solution, Variable, Vehicle
 from ._rhec import version as __version__
 from ._robot import Robot
@@ -18,7 +19,8 @@ from ._studies import Sweep, Tuning, sweep, tune, tune_controller
 from ._table import Table
 from ._term import BuiltTerm, Term
 
-__all__ = ["BuiltModel", "BuiltTerm", "CasadiModel", "CasadiProblem", "Check", "Command", "Controller", "Error", "Estimate", "Estimates", "Estimator", "Model", "Path",
-           "Problem", "Report", "Robot", "Run", "SmoothedRun", "Solution", "Sweep", "Table", "Term", "Tuning", "Variable", "Vehicle",
-           "__version__", "check", "estimate", "options", "plugins", "read_problems", "run", "smooth", "smooth_abs",
-           "smooth_max", "smooth_min", "sweep", "to_casadi", "to_sympy", "tune", "tune_controller", "write_problems"]
+__all__ = ["BuiltModel", "BuiltTerm", "CasadiModel", "CasadiProblem", "Check", "Command", "Controller", "Error", "Estimate",
+           "Estimates", "Estimator", "Model", "Page", "Path", "Problem", "Report", "Robot", "Run", "SmoothedRun", "Solution",
+           "Sweep", "Table", "Term", "Tuning", "Variable", "Vehicle", "__version__", "check", "estimate", "options", "plugins",
+           "read_problems", "report", "run", "smooth", "smooth_abs", "smooth_max", "smooth_min", "sweep", "to_casadi",
+           "to_sympy", "tune", "tune_controller", "write_problems"]

@@ -23,6 +23,12 @@ class Problem:
         """Of a dict with the keys of docs/problem_format.md."""
         return problems_of(json.dumps(keys), "problem", plugin_path)[0]
 
+    @classmethod
+    def of(cls, source: _rhec.Estimator | _rhec.Controller, id: str = "live", *, plugin_path: PluginPath = ()) -> Problem:
+        """The problem that an estimator or a controller has solved last, with its solution as the guess. Of a vehicle
+        from outside give the `plugin_path` of its robot."""
+        return problems_of(source.problem_line(id), id, plugin_path)[0]
+
     def to_dict(self) -> dict[str, Any]:
         """As such a dict."""
         return json.loads(self.line())

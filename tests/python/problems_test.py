@@ -5,7 +5,7 @@ import subprocess
 import numpy
 import pytest
 import rhec
-from shared import CLI, FIGURE8, SHORT
+from shared import CLI, FIGURE8, SHORT, Driven
 
 BACKENDS = ("gn_rti", "sparse_sqp", "ipopt", "nlopt")
 
@@ -116,3 +116,31 @@ def test_a_file_is_written_whole_or_not_at_all(problems, tmp_path):
     with pytest.raises(ZeroDivisionError):
         rhec.write_problems(file, [problems[0], Broken()])
     assert file.read_text() == before and [each.name for each in tmp_path.iterdir()] == ["problems.jsonl"]
+
+
+def test_problems_of_a_robot_that_drives():
+    driven = Driven()
+    with pytest.raises(rhec.Error, match="no window at present"):
+        rhec.Problem.of(driven.estimator)
+    for _ in range(20):
+        _, command = driven.step()
+    control = rhec.Problem.of(driven.controller, "now/rhc/19")
+    assert control.kind == "rhc" and control.id == "now/rhc/19"
+    window = rhec.Problem.of(driven.estimator)
+    assert window.kind == "rhe" and window.intervals == 15 and window.solve("sparse_sqp").status == "solved"
+    with pytest.raises(rhec.Error, match="no window at present"):
+        rhec.Problem.of(rhec.Robot({"estimator": {"name": "ekf"}}).make_estimator())
+
+
+def test_problems_of_a_vehicle_of_equations():
+    sympy = pytest.importorskip("sympy")
+    x, v, force = sympy.symbols("x v force")
+    model = rhec.Model("cart", states={x: {"unit": "m"}, v: {"unit": "m/s"}}, inputs={force: {"unit": "N"}}, outputs=["x"],
+                       rates={x: v, v: force - v / 5})
+    estimator = rhec.Robot({"model": model}).make_estimator()
+    for k in range(10):
+        estimator.push_measurement(0.2 * k, [0.1 * k])
+        estimator.push_input(0.2 * k, [0.0])
+        estimator.estimate(0.2 * k)
+    window = rhec.Problem.of(estimator)
+    assert window.vehicle.name == "cart" and window.solve("sparse_sqp").usable

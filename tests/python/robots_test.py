@@ -181,3 +181,20 @@ def test_paths():
     assert slowed.at(10.0)[3] == pytest.approx(numpy.sqrt(2 * 0.1 * 10.0))
     with pytest.raises(rhec.Error, match="waypoint 1"):
         rhec.Path([(numpy.nan, 0.0, 1.0), (1.0, 0.0, 1.0)])
+
+
+def test_a_map_is_kept(tmp_path):
+    file = tmp_path / "map.sqlite"
+    robot = rhec.Robot(ROBOT, set={"blocking": None, "estimator.memory": {"name": "place", "file": str(file)}})
+    driven = Driven(robot)
+    for _ in range(40):
+        driven.step()
+    assert not file.exists()
+    driven.estimator.end_drive()
+    driven.estimator.save_map()
+    assert file.stat().st_size > 0
+    again = Driven(robot)
+    assert again.step()[0].health == "ok"  # the second drive begins with what the first one has found
+    file.write_text("no map")
+    with pytest.raises(rhec.Error, match="map.sqlite"):
+        robot.make_estimator()

@@ -47,10 +47,20 @@ def test_saved_files_are_those_of_the_command_line(run, of_the_command_line, tmp
     for name in ("steps.csv", "horizons.jsonl", "run.svg"):
         assert (saved / name).read_bytes() == (of_the_command_line / name).read_bytes(), name
     assert sorted(file.name for file in saved.iterdir()) == sorted(file.name for file in of_the_command_line.iterdir())
-    subprocess.run([CLI, "report", str(saved), "-o", str(tmp_path / "page.html")], check=True, capture_output=True)
     summary = json.loads((of_the_command_line / "summary.json").read_text())
     assert run.summary["mae"] == summary["mae"]
     assert run.completed and run.ended == summary["ended"]
+
+
+@pytest.mark.skipif(os.environ.get("RHEC_REPORT") == "0", reason="rhec was built without the page of reports")
+def test_the_page_of_a_run(run, tmp_path):
+    page = rhec.report(run)
+    assert page.html.startswith("<!") and page.save(tmp_path / "page.html").stat().st_size > 100_000
+    assert page._repr_html_().startswith("<iframe srcdoc=")
+    again = rhec.report(run.save(tmp_path / "folder"))
+    assert len(again.html) == pytest.approx(len(page.html), rel=1e-2)
+    with pytest.raises(rhec.Error, match="nothing here"):
+        rhec.report(tmp_path / "nothing here")
 
 
 def test_how_a_run_is_shown(run):
@@ -93,6 +103,7 @@ def test_a_bar_on_a_terminal(capfd):
 
 
 def interrupt_after(seconds):
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     thread = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGINT))
     thread.start()
     return thread

@@ -44,6 +44,7 @@ def test_a_sweep_goes_to_pandas(swept):
 def test_ctrl_c_keeps_what_was_made(tmp_path):
     many = {**GRID, "grid": {"speed": [10], "seed": {"from": 1, "to": 500, "step": 1}}}
     file = tmp_path / "many.sqlite"
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     timer = threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):

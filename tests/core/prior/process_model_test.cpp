@@ -47,6 +47,28 @@ std::shared_ptr<const Model> cart() {
   return std::make_shared<FormulaModel<Cart>>(Cart<double>{}, about);
 }
 
+/// Nothing slips.
+template <class Scalar>
+struct Rail {
+  static constexpr int state_count = 1, input_count = 1, parameter_count = 0, output_count = 1;
+  void dynamics(const Scalar*, const Scalar* u, const Scalar*, Scalar* dxdt) const { dxdt[0] = u[0]; }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
+};
+
+TEST(ProcessModel, TakesAVehicleWithoutParameters) {
+  ModelDescription about;
+  about.states.resize(1);
+  about.inputs.resize(1);
+  about.outputs.resize(1);
+  const ProcessModel model(std::make_shared<FormulaModel<Rail>>(Rail<double>{}, about), {});
+  ASSERT_EQ(model.data_count(), 0);
+  const double state = 1.0, input = 2.0, duration = 0.5;
+  double next = 0.0;
+  model.integrate(
+      {.count = 1, .states = &state, .inputs = &input, .durations = &duration, .data = nullptr, .next_states = &next});
+  EXPECT_DOUBLE_EQ(next, 2.0);
+}
+
 /// Three states for kappa, which runs to its next value, and one for mu, which is held.
 class ProcessModelTest : public ::testing::Test {
  protected:
