@@ -31,12 +31,10 @@ LogInput::LogInput(const LogArguments& arguments)
       hold_out(read_hold_out(arguments)),
       log(sim::read_recorded_log(arguments.dead_reckoning, arguments.gps, scenario)) {}
 
-void add_log_arguments(Command& command, LogArguments& arguments, bool takes_log) {
+void add_log_arguments(Command& command, LogArguments& arguments, const std::string& usual_hold_out) {
   command.add("scenario", arguments.scenario, "a YAML file").required();
-  if (takes_log) {
-    command.add("log", arguments.log, "a table (CSV), MCAP, or a bag of rosbag2; see 'rhec log'").value("LOG");
-    add_msg_paths(command, arguments.msg_paths);
-  }
+  command.add("log", arguments.log, "a table (CSV), MCAP, or a bag of rosbag2; see 'rhec log'").value("LOG");
+  add_msg_paths(command, arguments.msg_paths);
   Argument dead_reckoning =
       command.add("--dead-reckoning", arguments.dead_reckoning, "time [s], wheel speed [m/s], steering angle [rad]")
           .value("FILE");
@@ -45,8 +43,7 @@ void add_log_arguments(Command& command, LogArguments& arguments, bool takes_log
   gps.needs(dead_reckoning);
   command
       .add("--hold-out", arguments.hold_out,
-           takes_log ? "withhold one of so many fixes and predict it; 0: none; default: 5 of LOG, else none"
-                     : "withhold one of so many fixes and predict it; 0: none; default: 5")
+           "withhold one of so many fixes and predict it; 0: none; default: " + usual_hold_out)
       .within(0, 1000000);
   command.add("--hold-out-phase", arguments.phase, "place of the first one withheld, from 0; default: the last of them")
       .within(0, 1000000);

@@ -17,8 +17,9 @@ struct LogArguments {
   std::vector<std::filesystem::path> plugin_path;
 };
 
-/// `takes_log`: whether the command knows logs with the vehicle's own sensors, too.
-void add_log_arguments(Command& command, LogArguments& arguments, bool takes_log = true);
+/// `usual_hold_out`: the default of --hold-out, in words.
+void add_log_arguments(Command& command, LogArguments& arguments,
+                       const std::string& usual_hold_out = "5 of LOG, else none");
 /// Of a log, without --hold-out.
 inline constexpr int default_hold_out = 5;
 

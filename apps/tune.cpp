@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "drive_arguments.hpp"
 #include "log_arguments.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
@@ -17,6 +18,7 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/tuning/controller_tuning.hpp"
+#include "rhec/sim/tuning/drive_tuning.hpp"
 #include "rhec/sim/tuning/innovations.hpp"
 #include "rhec/sim/tuning/log_tuning.hpp"
 #include "stop_request.hpp"
@@ -188,14 +190,74 @@ int tune_controller(const TuneArguments& arguments) {
   return tuning.stopped ? exit_not_solved : exit_fine;
 }
 
+void print_drive(const sim::DriveTuning& tuning) {
+  sim::LogTuning numbers;
+  numbers.numbers = tuning.numbers;
+  print_numbers(numbers);
+  fmt::print("\nlog likelihood of {} measurements: {:.1f} before, {:.1f} after\n", tuning.measurements,
+             tuning.log_likelihood_before, tuning.log_likelihood_after);
+  fmt::print("\n{:<28} {:>10} {:>10}\n", "INNOVATIONS: NIS / EXPECTED", "BEFORE", "AFTER");
+  for (std::size_t i = 0; i < tuning.innovations_before.size(); ++i) {
+    const sim::SensorSummary &one = tuning.innovations_before[i], &other = tuning.innovations_after[i];
+    fmt::print("{:<28} {:>10.2f} {:>10.2f}\n", one.name, one.nis / one.expected, other.nis / other.expected);
+  }
+  if (tuning.before.count == 0) {
+    fmt::print("nothing judges the result, since nothing was withheld; --hold-out 5 withholds every fifth\n");
+    return;
+  }
+  fmt::print("\n{:<28} {:>10} {:>10}\n", "WITHHELD, NOT TUNED ON", "BEFORE", "AFTER");
+  fmt::print("{:<28} {:>10.4f} {:>10.4f}\n", "distance, median", tuning.before.median, tuning.after.median);
+  fmt::print("{:<28} {:>10.4f} {:>10.4f}\n", "distance, RMS", tuning.before.rms, tuning.after.rms);
+  if (!tuning.is_taken) fmt::print("what was found predicts worse: the scenario is left as it was\n");
+}
+
+int tune_on_drive(const TuneArguments& arguments) {
+  Settings settings = load_yaml(arguments.scenario);
+  apply_assignments(settings, arguments.assignments);
+  const Host host = examined_host(arguments.plugin_path);
+  const sim::ReplayScenario scenario(host, settings, arguments.variants);
+  const sim::ReplayVariant& variant = scenario.variants().front();
+  const logs::Drive drive = logs::read_drive(*open_log(arguments.log, arguments.msg_paths), variant.signals);
+  tell_damage(drive.damage);
+  sim::OutputFolder folder(arguments.out);
+  sim::DriveTuningOptions options{.hold_out = read_hold_out(arguments), .wishes = {arguments.tune, arguments.keep}};
+  options.threads = threads_of(arguments);
+  if (arguments.most_seconds > 0) options.most_seconds = arguments.most_seconds;
+  sim::DriveTuning tuning;
+  {
+    const StopRequest stop;
+    StageLine line(variant.name);
+    tuning = sim::tune_on_drive(host, variant.settings, drive, options,
+                                {.progress =
+                                     [&](const sim::TuningProgress& now) {
+                                       line.show(fmt::format("{}, {} evaluations, log likelihood {:+.1f}, {:.0f} s",
+                                                             now.stage, now.evaluations, now.gain, now.seconds));
+                                     },
+                                 .stop = [] { return StopRequest::asked(); }});
+  }
+  folder.write("tuned.yaml", sim::tuned_yaml(tuning, fmt::format("on {}, from {} ({})", arguments.log,
+                                                                 arguments.scenario, variant.name)));
+  folder.write("summary.json", sim::summary_json(tuning));
+  folder.commit();
+  print_drive(tuning);
+  if (tuning.stopped) fmt::print("\nstopped: this is the best that was found until then\n");
+  fmt::print("\n{} evaluations, {:.0f} s; the scenario to use: {}\n", tuning.evaluations, tuning.seconds,
+             (folder.path() / "tuned.yaml").string());
+  return tuning.stopped ? exit_not_solved : exit_fine;
+}
+
 int tune(const TuneArguments& arguments) {
+  if (!arguments.log.empty()) {
+    if (arguments.controller) throw Error("--controller is tuned in simulation; leave the log away");
+    if (names_log(arguments, "tune")) return tune_on_drive(arguments);
+  }
   if (arguments.controller) {
     if (!arguments.dead_reckoning.empty() || !arguments.gps.empty())
       throw Error("--controller is tuned in simulation; leave --dead-reckoning and --gps away");
     return tune_controller(arguments);
   }
   if (arguments.dead_reckoning.empty() || arguments.gps.empty())
-    throw Error("expected --dead-reckoning FILE and --gps FILE, a recorded drive; or --controller");
+    throw Error("expected a LOG, or --dead-reckoning FILE and --gps FILE, a recorded drive; or --controller");
   return tune_on_log(arguments);
 }
 
@@ -211,6 +273,10 @@ void add_tune(Program& program) {
       "given all before it. Fixes that --hold-out withholds are not tuned on, and judge the result. Writes tuned.yaml, "
       "a\n"
       "scenario for 'rhec estimate', summary.json and tuning.svg to the output folder.\n\n"
+      "From a LOG with the vehicle's own sensors (see 'rhec estimate'): noise of sensors and inputs, their delays, "
+      "lever arms\n"
+      "and how fast slip changes, by the innovations of a Kalman filter; taken unless withheld measurements are\n"
+      "then predicted worse.\n\n"
       "With --controller: weights and horizon by which the vehicle of the scenario tracks its path best without more\n"
       "effort, over several seeds; others judge the result. Writes tuned.yaml, a scenario for 'rhec run', "
       "summary.json,\n"
@@ -219,12 +285,13 @@ void add_tune(Program& program) {
       "and\n"
       "where the log says nothing.\n\n"
       "Examples:\n"
+      "  rhec tune my_robot.yaml drive.mcap --out out/tuned\n"
       "  rhec tune scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/tuned\n"
       "  rhec tune scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --keep log --tune "
       "model.wheelbase\n"
       "  rhec tune scenarios/figure8.yaml --controller --case speed=2 --case speed=8 --out out/tuned",
       [arguments] { return tune(*arguments); });
-  add_log_arguments(command, *arguments, false);
+  add_log_arguments(command, *arguments, "5");
   command.add_list("--tune", arguments->tune, "tune this number of the scenario, too; may be given several times")
       .value("KEY[=[LOWER, UPPER]]");
   command

@@ -8,6 +8,8 @@
 #include <memory>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/base/infinity.hpp"
@@ -90,6 +92,11 @@ bool agrees(const Robot& robot, const FirstOutputs& first, const Eigen::VectorXd
     if (!(std::abs(off) <= spread + 2.0 * quickest * first.ages[j])) return false;
   }
   return true;
+}
+
+double log_determinant(const Innovation& innovation) {
+  const Eigen::MatrixXd factor = innovation.covariance.llt().matrixL();
+  return 2.0 * factor.diagonal().array().log().sum();
 }
 
 /// Pushes a drive into an estimator.
@@ -252,6 +259,7 @@ class Driver {
                           .sensor = innovation.sensor,
                           .accepted = innovation.accepted,
                           .nis = innovation.nis,
+                          .log_determinant = log_determinant(innovation),
                           .values = {},
                           .sigmas = {}};
     for (Eigen::Index j = 0; j < innovation.value.size(); ++j) {

@@ -26,7 +26,8 @@ ReplayScenario::ReplayScenario(const Host& host, const Settings& settings, const
     Robot robot(host, options, scenario_estimators());
     logs::SignalMap signals(options.signals, robot.model()->description());
     robot.make_estimator();  // reports errors before anything runs
-    variants_.push_back({name, std::move(robot), std::move(signals)});
+    variants_.push_back({name, std::move(robot), std::move(signals), with});
+    if (!options.variants.is_null()) variants_.back().settings.set("variants", Settings::null());
   }
   if (settings.find("path") && !settings.find("variants")) start_ = Scenario(host, settings).initial_state();
 }

@@ -12,6 +12,7 @@
 #include "rhec/core/config/options.hpp"
 #include "rhec/plugins/robot/spans.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "rhec/sim/tuning/drive_tuning.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -54,6 +55,29 @@ Tunable offset_of(const std::string& key, double start, const std::string& unit,
   return tunable;
 }
 
+/// Numbers of a model that have a sign: lever arms.
+void add_lever_arms(const Host& host, const Robot& robot, std::vector<Tunable>& all) {
+  const PluginChoice model = robot.model_choice();
+  for (const OptionRow& row : host.options(PluginKind::model, model.name)) {
+    // A number without a constraint has a sign.
+    if (row.type != "number" || !row.constraint.empty()) continue;
+    const Settings* given = model.options.find(row.name);
+    const double start = given ? given->as_number() : Settings::scalar(row.default_value).number().value_or(0.0);
+    all.push_back(offset_of("model." + row.name, start, "m", Doubts::length));
+  }
+}
+
+/// The process noise of a filter.
+void add_process_noise(const Robot& robot, std::vector<Tunable>& all) {
+  for (const Variable& parameter : robot.model()->description().parameters) {
+    const Settings* given = robot.estimator_options().process_noise.find(parameter.name);
+    const double start = given ? given->as_number() : ParameterWalk{}.process_noise;
+    if (start > 0.0)
+      all.push_back(
+          scale_of({"estimator.process_noise." + parameter.name}, start, "per root of a step", Doubts::factor));
+  }
+}
+
 /// Collects what can be tuned.
 class Finder {
  public:
@@ -64,7 +88,7 @@ class Finder {
     add_noise();
     add_estimator();
     add_log();
-    add_model();
+    add_lever_arms(host_, robot_, all_);
     return std::move(all_);
   }
 
@@ -98,15 +122,9 @@ class Finder {
 
   void add_estimator() {
     const EstimatorOptions& options = robot_.estimator_options();
+    if (options.name == "ekf") add_process_noise(robot_, all_);
     for (const Variable& parameter : about().parameters) {
-      if (options.name == "ekf") {
-        const Settings* given = options.process_noise.find(parameter.name);
-        const double start = given ? given->as_number() : ParameterWalk{}.process_noise;
-        if (start > 0.0)
-          all_.push_back(
-              scale_of({"estimator.process_noise." + parameter.name}, start, "per root of a step", Doubts::factor));
-        continue;
-      }
+      if (options.name == "ekf") break;
       const Settings* prior = options.priors.find(parameter.name);
       if (!prior || prior->kind() != Settings::Kind::map) continue;
       for (const auto& [key, value] : prior->members()) {
@@ -127,17 +145,6 @@ class Finder {
     all_.push_back(offset_of("log.steering_delay", log.steering_delay, "s", Doubts::delay));
     if (scenario_.wheelbase() > 0.0)
       all_.push_back(offset_of("log.wheel_offset", log.wheel_offset, "m", Doubts::length));
-  }
-
-  void add_model() {
-    const PluginChoice model = robot_.model_choice();
-    for (const OptionRow& row : host_.options(PluginKind::model, model.name)) {
-      // A number without a constraint has a sign.
-      if (row.type != "number" || !row.constraint.empty()) continue;
-      const Settings* given = model.options.find(row.name);
-      const double start = given ? given->as_number() : Settings::scalar(row.default_value).number().value_or(0.0);
-      all_.push_back(offset_of("model." + row.name, start, "m", Doubts::length));
-    }
   }
 
   const Host& host_;
@@ -177,6 +184,33 @@ Tunable asked_for(const Settings& settings, const std::string& key, std::optiona
   return tunable;
 }
 
+std::vector<Tunable> with_wishes(std::vector<Tunable> all, const Settings& settings, const TuningWishes& wishes) {
+  for (const std::string& wish : wishes.tune) {
+    const std::string where = "--tune " + wish, key = wish.substr(0, wish.find('='));
+    std::optional<std::pair<double, double>> range;
+    if (key.size() < wish.size()) {
+      const std::vector<double> ends = parse_yaml(wish.substr(key.size() + 1), where).as_numbers();
+      if (ends.size() != 2) throw Error(fmt::format("{}: expected KEY, or KEY=[lower, upper]", where));
+      range = {ends[0], ends[1]};
+    }
+    std::erase_if(all,
+                  [&](const Tunable& tunable) { return tunable.keys.size() == 1 && tunable.keys[0] == key && range; });
+    if (std::none_of(all.begin(), all.end(), [&](const Tunable& tunable) { return is_meant(tunable, key); }))
+      all.push_back(asked_for(settings, key, range, where));
+  }
+  for (const std::string& wish : wishes.keep) {
+    const std::size_t before = all.size();
+    std::erase_if(all, [&](const Tunable& tunable) { return is_meant(tunable, wish); });
+    if (all.size() == before) {
+      std::vector<std::string> keys;
+      for (const Tunable& tunable : all) keys.insert(keys.end(), tunable.keys.begin(), tunable.keys.end());
+      throw Error(fmt::format("--keep {}: nothing of that name would be tuned; expected the start of one of {}", wish,
+                              fmt::join(keys, ", ")));
+    }
+  }
+  return all;
+}
+
 }  // namespace
 
 double Tunable::value_at(double coordinate) const noexcept {
@@ -202,32 +236,33 @@ Settings with_values(Settings settings, const std::vector<Tunable>& tunables, co
 }
 
 std::vector<Tunable> tunables_of(const Host& host, const LogScenario& scenario, const TuningWishes& wishes) {
-  const Settings& settings = scenario.variants().front().settings;
-  std::vector<Tunable> all = Finder(host, scenario).find();
-  for (const std::string& wish : wishes.tune) {
-    const std::string where = "--tune " + wish, key = wish.substr(0, wish.find('='));
-    std::optional<std::pair<double, double>> range;
-    if (key.size() < wish.size()) {
-      const std::vector<double> ends = parse_yaml(wish.substr(key.size() + 1), where).as_numbers();
-      if (ends.size() != 2) throw Error(fmt::format("{}: expected KEY, or KEY=[lower, upper]", where));
-      range = {ends[0], ends[1]};
+  return with_wishes(Finder(host, scenario).find(), scenario.variants().front().settings, wishes);
+}
+
+std::vector<Tunable> drive_tunables(const Host& host, const Robot& robot, const Settings& settings,
+                                    const std::vector<Sensor>& sensors, const TuningWishes& wishes) {
+  const ModelDescription& about = robot.model()->description();
+  std::vector<Tunable> all;
+  for (const Sensor& sensor : sensors) {
+    std::vector<std::string> noises, delays;
+    for (const int j : sensor.outputs) {
+      noises.push_back("noise.outputs." + about.outputs[static_cast<std::size_t>(j)].name);
+      delays.push_back("estimator.delays." + about.outputs[static_cast<std::size_t>(j)].name);
     }
-    std::erase_if(all,
-                  [&](const Tunable& tunable) { return tunable.keys.size() == 1 && tunable.keys[0] == key && range; });
-    if (std::none_of(all.begin(), all.end(), [&](const Tunable& tunable) { return is_meant(tunable, key); }))
-      all.push_back(asked_for(settings, key, range, where));
+    const auto first = static_cast<std::size_t>(sensor.outputs.front());
+    all.push_back(scale_of(noises, robot.output_sigmas()[first], about.outputs[first].unit, Doubts::factor));
+    const Settings* given = settings.find_path(delays.front());
+    Tunable delay = offset_of(delays.front(), given ? given->as_number() : 0.0, "s", Doubts::delay);
+    delay.keys = delays;
+    delay.lower = 0.0;  // nothing is stamped before it is measured
+    all.push_back(std::move(delay));
   }
-  for (const std::string& wish : wishes.keep) {
-    const std::size_t before = all.size();
-    std::erase_if(all, [&](const Tunable& tunable) { return is_meant(tunable, wish); });
-    if (all.size() == before) {
-      std::vector<std::string> keys;
-      for (const Tunable& tunable : all) keys.insert(keys.end(), tunable.keys.begin(), tunable.keys.end());
-      throw Error(fmt::format("--keep {}: nothing of that name would be tuned; expected the start of one of {}", wish,
-                              fmt::join(keys, ", ")));
-    }
-  }
-  return all;
+  for (std::size_t j = 0; j < robot.input_sigmas().size(); ++j)
+    all.push_back(scale_of({"noise.inputs." + about.inputs[j].name}, robot.input_sigmas()[j], about.inputs[j].unit,
+                           Doubts::factor));
+  add_process_noise(robot, all);
+  add_lever_arms(host, robot, all);
+  return with_wishes(std::move(all), settings, wishes);
 }
 
 std::vector<Tunable> controller_tunables(const Robot& robot, const Settings& settings) {

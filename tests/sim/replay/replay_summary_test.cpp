@@ -19,7 +19,7 @@ class ReplaySummaryTest : public DrivenLogTest {
     made.name = "made";
     made.sensors = {{"x_gps and y_gps", {0, 1}}, {"heading", {2}}};
     for (int i = 0; i < 4; ++i)
-      made.innovations.push_back({1.0 * i, 0, i != 3, 2.0, {0.3, i % 2 ? 0.4 : -0.4}, {0.5, 0.5}});
+      made.innovations.push_back({1.0 * i, 0, i != 3, 2.0, 0.0, {0.3, i % 2 ? 0.4 : -0.4}, {0.5, 0.5}});
     made.withheld_sensor = 0;
     made.predictions = {{0, 1.0, {3.0, 4.0}, 5.0}, {1, 2.0, {0.0, 1.0}, 1.0}, {2, 3.0, {std::nan(""), 2.0}, 2.0}};
     made.unpredicted = 2;

@@ -31,7 +31,7 @@ struct DriveInnovation {
   double time = 0.0;  ///< [s]
   int sensor = 0;
   bool accepted = true;
-  double nis = 0.0;
+  double nis = 0.0, log_determinant = 0.0;  ///< nu' S^-1 nu, and of S
   std::vector<double> values, sigmas;  ///< of the sensor's outputs that were measured, and what was expected of them
 };
 

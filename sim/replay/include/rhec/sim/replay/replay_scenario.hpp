@@ -22,6 +22,7 @@ struct ReplayVariant {
   std::string name;
   Robot robot;
   logs::SignalMap signals;
+  Settings settings;  ///< the scenario with the variant's keys put over it, without `variants`
 };
 
 /// A scenario for drives with the vehicle's own sensors, with all its objects constructed. Throws Error, naming file,
