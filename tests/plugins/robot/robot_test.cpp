@@ -74,7 +74,7 @@ TEST(Robot, DocumentsEachOfItsSections) {
   std::vector<std::string> names, expected;
   for (const OptionSection& section : robot_sections()) names.push_back(section.name);
   for (const OptionRow& row : RobotOptions::table().schema())
-    if (row.type == SubtreeValue{}.type()) expected.push_back(row.name);
+    if (row.type == SubtreeValue{}.type() && row.name != "signals") expected.push_back(row.name);  // those of logs
   EXPECT_EQ(names, expected);
 }
 
