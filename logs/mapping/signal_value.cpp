@@ -44,6 +44,7 @@ std::vector<SignalName> fields_of(const MappedSignal& signal, const std::string&
     return signal.from;
   }
   std::vector<SignalName> fields;
+  fields.reserve(parts.size());
   for (const std::string& part : parts) fields.push_back({topic, prefix + part});
   return fields;
 }

@@ -26,6 +26,11 @@ class LogReport {
  public:
   LogReport(const fs::path& folder, const Json& summary)
       : folder_(folder), summary_(summary), table_(folder / "estimates.csv", log_maker), time_(table_.numbers("time")) {
+    if (summary.is_object() && summary.contains("log") && summary.contains("signals"))
+      throw Error(
+          fmt::format("{}: is the estimation of a log with the vehicle's own sensors, of which there is no page yet; "
+                      "expected one by --dead-reckoning and --gps; {} is its picture",
+                      folder.string(), (folder / "run.svg").string()));
     find_variants();
     if (fs::exists(folder / "horizons.jsonl")) {
       horizons_ = read_horizons(folder / "horizons.jsonl", log_maker, "log");

@@ -45,9 +45,9 @@ void write_odometry(logs::Stamp when, const PlanarPose& pose, const Eigen::Matri
   message.text(vehicle_frame);
   write_pose(pose, message);
   std::array<double, 36> full{};  // of x, y, z, roll, pitch, yaw
-  constexpr std::array places{0, 1, 5};
+  constexpr std::array<std::size_t, 3> places{0, 1, 5};
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) full[static_cast<std::size_t>(6 * places[i] + places[j])] = covariance(i, j);
+    for (int j = 0; j < 3; ++j) full[6 * places[i] + places[j]] = covariance(i, j);
   message.numbers(full);
   message.numbers(std::array{speed, 0.0, 0.0, 0.0, 0.0, yaw_rate});
   message.numbers(std::array<double, 36>{});
