@@ -112,7 +112,7 @@ FaultMeasures measure_fault(const Ride& ride, const Ride& without) {
   count_honest(ride.samples, result);
   compare_volumes(ride.samples, without.samples, result);
   for (const int after : recovery_samples)
-    if (const auto k = static_cast<std::size_t>(result.end + after); k < ride.samples.size())
+    if (const auto k = static_cast<std::size_t>(result.end) + static_cast<std::size_t>(after); k < ride.samples.size())
       result.errors.push_back(ride.samples[k].error);
   return result;
 }

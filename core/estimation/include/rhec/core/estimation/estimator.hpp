@@ -46,9 +46,9 @@ class RHEC_EXPORT Estimator {
   void push_input(double time, const double* inputs) noexcept;
 
   /// The estimate at a time [s], from all that was pushed with stamps up to it. Beyond the newest node it is integrated
-  /// with the newest inputs, within the model's bounds; for an earlier or undefined time it is the newest node's. Before
-  /// the first measurement it is empty (see `has_started`). What the deadline leaves no time for waits for the next
-  /// call: the estimate is then predicted from an earlier node, and its report says `deadline`.
+  /// with the newest inputs, within the model's bounds; for an earlier or undefined time it is the newest node's.
+  /// Before the first measurement it is empty (see `has_started`). What the deadline leaves no time for waits for the
+  /// next call: the estimate is then predicted from an earlier node, and its report says `deadline`.
   const Estimate& estimate(double time, Clock::time_point deadline = Clock::time_point::max()) noexcept;
   bool has_started() const noexcept { return grid_.count() > 0; }
 
