@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 
 #include "interval_dynamics.hpp"
@@ -89,13 +88,12 @@ struct RheProblem::BetweenBatch {
   double* hessian(const Intervals& of, int i) const noexcept {
     return of.hessians + static_cast<std::ptrdiff_t>(i) * row * row;
   }
-  /// dh/dz of measurement i: a row of `width` for each output that was measured, else zeros.
-  void write_gradients(int i, const double* measured, int ny, double* to) const noexcept {
+  /// dh/dz of measurement i: a row of `width` for each output, measured or not: one that is not may come later.
+  void write_gradients(int i, int ny, double* to) const noexcept {
     const double* const J = jacobian(own, i);
     const double* C = output_jacobians + static_cast<std::ptrdiff_t>(i) * ny * padded(nx);
     for (int j = 0; j < ny; ++j, C += padded(nx), to += width) {
       std::fill_n(to, width, 0.0);
-      if (std::isnan(measured[j])) continue;
       for (int r = 0; r < nx; ++r)
         if (C[r] != 0.0)
           for (int k = 0; k < nz; ++k) to[k] += C[r] * J[r * row + k];

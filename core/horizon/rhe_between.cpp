@@ -68,7 +68,7 @@ void RheProblem::linearise_between(int interval, const Iterate& iterate, double*
       losses(batch.difference, batch.weights, nullptr);
       std::copy_n(batch.weights, ny_, weights + static_cast<std::ptrdiff_t>(batch.place[i]) * ny_);
       if (!rows) continue;
-      batch.write_gradients(i, measured, ny_, batch.of_outputs);
+      batch.write_gradients(i, ny_, batch.of_outputs);
       for (int j = 0; j < ny_; ++j) {
         *rows++ = batch.difference[j];
         rows = std::copy_n(batch.of_outputs + j * batch.width, batch.nz, rows);
@@ -104,10 +104,9 @@ double RheProblem::add_known_between(StageRange range, const Iterate& iterate, c
     if (batch.count == 0) return;
     evaluate_batch(batch, true);
     for (int i = 0; i < batch.count; ++i) {
-      const int of = batch.interval[i], k = batch.place[i];
-      double* const results = known.results(of, k);
+      double* const results = known.results(batch.interval[i], batch.place[i]);
       std::copy_n(batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_, output_row_, results);
-      batch.write_gradients(i, between(of).outputs(k), ny_, results + output_row_);
+      batch.write_gradients(i, ny_, results + output_row_);
     }
     batch.count = 0;
   };
@@ -167,7 +166,7 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
     add_curvature_of_dynamics(batch, *view);
   }
   for (int i = 0; i < batch.count; ++i) {
-    batch.write_gradients(i, between(batch.interval[i]).outputs(batch.place[i]), ny_, batch.of_outputs);
+    batch.write_gradients(i, ny_, batch.of_outputs);
     const std::ptrdiff_t at = i * output_row_;
     add_row(batch, batch.interval[i], batch.of_outputs, batch.weights + at, batch.pulls + at, *view);
     if (exact) add_curvature(batch, i, *view);

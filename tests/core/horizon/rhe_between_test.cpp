@@ -188,5 +188,28 @@ TEST(RheBetween, ALinearisationFollowsThemAsTheHorizonMoves) {
   }
 }
 
+/// An output that comes late, with the stamp of others, changes neither the states nor the times.
+TEST(RheBetween, ALinearisationKnowsOutputsThatComeLater) {
+  const auto problem = problem_of(specs()[0]);
+  const Iterate point = scattered_point(*problem);
+  std::vector<double> scratch(problem->scratch_size());
+  const auto linearisation = problem->make_linearisation();
+  StageQp fresh(problem->capacity());
+  const auto refresh = [&] {
+    linearisation->prepare(point, Hessian::gauss_newton);
+    linearisation->refresh(point);
+  };
+  refresh();
+  for (int i : {0, 1, 3})
+    for (int k = 0; k < problem->between(i).count(); ++k)
+      for (int j = 0; j < 2; ++j)
+        if (std::isnan(problem->between(i).outputs(k)[j])) problem->between(i).outputs(k)[j] = 0.3;
+  refresh();
+  problem->linearise(all_stages(*problem), point, Hessian::gauss_newton, fresh, scratch);
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < problem->capacity().states; ++c)
+      ASSERT_NEAR(linearisation->qp().h(i)[c], fresh.h(i)[c], 1e-9 * (1.0 + std::abs(fresh.h(i)[c]))) << i;
+}
+
 }  // namespace rhe_between_test
 }  // namespace rhec
