@@ -3,10 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <limits>
-#include <system_error>
 
 #include "mcap_format.hpp"
 #include "rhec/core/base/error.hpp"
@@ -33,14 +30,7 @@ void append_record(std::uint8_t opcode, const ByteWriter& content, ByteWriter& t
 
 }  // namespace
 
-McapWriter::McapWriter(const std::filesystem::path& file) : file_(file), part_(file.string() + ".part") {
-  if (file_.has_parent_path()) {
-    std::error_code ignored;  // the stream says what is wrong
-    std::filesystem::create_directories(file_.parent_path(), ignored);
-  }
-  errno = 0;
-  stream_.open(part_, std::ios::binary | std::ios::trunc);
-  if (!stream_) throw Error(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
+McapWriter::McapWriter(const std::filesystem::path& file) : file_(file) {
   put(std::as_bytes(std::span(mcap_magic)));
   ByteWriter header;
   header.text("ros2");
@@ -48,17 +38,10 @@ McapWriter::McapWriter(const std::filesystem::path& file) : file_(file), part_(f
   put_record(byte_of(Opcode::header), header);
 }
 
-McapWriter::~McapWriter() {
-  if (is_closed_) return;
-  stream_.close();
-  std::error_code ignored;  // nothing is left to be done about it
-  std::filesystem::remove(part_, ignored);
-}
-
 std::uint16_t McapWriter::add_channel(const std::string& topic, const std::string& type,
                                       const std::string& definition) {
   if (channels_.size() >= std::numeric_limits<std::uint16_t>::max())
-    throw Error(fmt::format("{}: has {} topics; expected fewer", file_.string(), channels_.size()));
+    throw Error(fmt::format("{}: has {} topics; expected fewer", file_.path().string(), channels_.size()));
   const auto [schema, is_new] = schema_ids_.try_emplace(type, static_cast<std::uint16_t>(schemas_.size() + 1));
   if (is_new) {
     ByteWriter content;
@@ -221,15 +204,11 @@ void McapWriter::close() {
   crc.u32(summary_crc_);
   put(crc.bytes());
   put(std::as_bytes(std::span(mcap_magic)));
-  stream_.close();
-  if (!stream_) throw Error(fmt::format("{}: cannot be written; is there room on the disk?", file_.string()));
-  std::filesystem::rename(part_, file_);
-  is_closed_ = true;
+  file_.close();
 }
 
 void McapWriter::put(std::span<const std::byte> bytes) {
-  stream_.write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
-  if (!stream_) throw Error(fmt::format("{}: cannot be written; is there room on the disk?", file_.string()));
+  file_.write(bytes);
   summary_crc_ = crc32(bytes, summary_crc_);
   place_ += bytes.size();
 }

@@ -14,14 +14,13 @@ namespace {
 
 using Seconds = std::chrono::duration<double>;
 
-/// The node at a time since the first node: the last one that is not later, up to rounding.
+}  // namespace
+
 std::ptrdiff_t node_at(const SmoothedRun& run, double time) {
   constexpr double rounding = 1e-6;  // the timeline merges stamps this close into one node [s]
   const auto after = std::upper_bound(run.times.begin(), run.times.end(), time + rounding);
   return std::max<std::ptrdiff_t>(0, after - run.times.begin() - 1);
 }
-
-}  // namespace
 
 SmoothedReplay smooth(const std::string& name, const Robot& robot, const RecordedLog& log, const LogOptions& options,
                       const HoldOut& hold_out, const LoopHooks& hooks) {

@@ -12,8 +12,8 @@
 #include "rhec/logs/cdr/cdr_writer.hpp"
 #include "rhec/logs/mapping/signal_map.hpp"
 #include "rhec/logs/mcap/mcap_writer.hpp"
+#include "rhec/logs/storage/whole_file.hpp"
 #include "robot_messages.hpp"
-#include "whole_file.hpp"
 
 namespace rhec::sim {
 
@@ -53,7 +53,7 @@ class TableForm final : public MeasurementLog::Form {
   void close() override { file_.close(); }
 
  private:
-  WholeFile file_;
+  logs::WholeFile file_;
   std::size_t outputs_, inputs_;
   std::string text_;
 };

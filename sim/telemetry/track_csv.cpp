@@ -5,8 +5,8 @@
 #include <string>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/logs/storage/whole_file.hpp"
 #include "rhec/sim/telemetry/track_writer.hpp"
-#include "whole_file.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -50,7 +50,7 @@ class CsvTrack final : public TrackWriter {
     text_ += ',';
     if (std::isfinite(value)) fmt::format_to(std::back_inserter(text_), "{:.10g}", value);
   }
-  WholeFile file_;
+  logs::WholeFile file_;
   std::size_t inputs_;
   std::string text_;
 };
@@ -73,7 +73,7 @@ class TumTrack final : public TrackWriter {
   void close() override { file_.close(); }
 
  private:
-  WholeFile file_;
+  logs::WholeFile file_;
   Roles roles_;
   std::string text_;
 };

@@ -1,15 +1,8 @@
 #include "rhec/sim/telemetry/track_writer.hpp"
 
-#include <fmt/format.h>
-
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <system_error>
 
-#include "rhec/core/base/error.hpp"
 #include "robot_messages.hpp"
-#include "whole_file.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -35,32 +28,6 @@ std::vector<Eigen::Vector3d> plan_of(const Controller& controller, const Roles& 
 }
 
 }  // namespace
-
-WholeFile::WholeFile(const std::filesystem::path& file) : file_(file), part_(file.string() + ".part") {
-  if (file_.has_parent_path()) {
-    std::error_code ignored;  // the stream says what is wrong
-    std::filesystem::create_directories(file_.parent_path(), ignored);
-  }
-  errno = 0;
-  stream_.open(part_, std::ios::binary | std::ios::trunc);
-  if (!stream_) throw Error(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
-}
-
-WholeFile::~WholeFile() {
-  if (is_closed_) return;
-  stream_.close();
-  std::error_code ignored;  // nothing is left to be done about it
-  std::filesystem::remove(part_, ignored);
-}
-
-void WholeFile::write(std::string_view text) { stream_.write(text.data(), std::ssize(text)); }
-
-void WholeFile::close() {
-  stream_.close();
-  if (!stream_) throw Error(fmt::format("{}: cannot be written; is there room on the disk?", file_.string()));
-  std::filesystem::rename(part_, file_);
-  is_closed_ = true;
-}
 
 TrackSample track_sample(const DriveEstimate& estimate, const Robot& robot, logs::Stamp start) {
   const ModelDescription& about = robot.estimated_description();

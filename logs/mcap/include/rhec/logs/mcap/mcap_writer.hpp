@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <span>
 #include <string>
@@ -12,6 +11,7 @@
 #include "rhec/core/base/export.hpp"
 #include "rhec/logs/signals/log.hpp"
 #include "rhec/logs/storage/input_file.hpp"
+#include "rhec/logs/storage/whole_file.hpp"
 
 namespace rhec::logs {
 
@@ -22,9 +22,6 @@ namespace rhec::logs {
 class RHEC_EXPORT McapWriter {
  public:
   explicit McapWriter(const std::filesystem::path& file);
-  ~McapWriter();
-  McapWriter(const McapWriter&) = delete;
-  McapWriter& operator=(const McapWriter&) = delete;
 
   /// A topic whose messages are in CDR, with the definition of their type in ROS's language. Returns its channel.
   std::uint16_t add_channel(const std::string& topic, const std::string& type, const std::string& definition);
@@ -41,11 +38,9 @@ class RHEC_EXPORT McapWriter {
   void put_record(std::uint8_t opcode, const ByteWriter& content);
   std::uint64_t write_summary();
 
-  std::filesystem::path file_, part_;
-  std::ofstream stream_;
+  WholeFile file_;
   std::uint64_t place_ = 0;
   std::uint32_t summary_crc_ = 0;
-  bool is_closed_ = false;
   std::vector<ByteWriter> schemas_, channels_;
   std::map<std::string, std::uint16_t> schema_ids_;
   std::vector<std::uint32_t> sequences_;  ///< messages, by channel

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "rhec/core/estimation/smoother.hpp"
@@ -9,6 +10,9 @@ namespace rhec::sim {
 
 /// Suffix of a variant's name for its causal (online) estimates.
 inline constexpr const char* causal_suffix = " causal";
+
+/// The node of a smoothed run at a time since its first node [s]: the last one that is not later, up to rounding.
+RHEC_EXPORT std::ptrdiff_t node_at(const SmoothedRun& run, double time);
 
 /// A recorded drive estimated as one problem, and the causal estimates used as its initial guess.
 struct SmoothedReplay {
