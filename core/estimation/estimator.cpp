@@ -20,6 +20,7 @@ constexpr int most_parts = 1000;      // largest number of parts of one predicti
 constexpr int least_rows = 16, least_nodes = 2, least_parts = 16;
 // Parts of the rest of a prediction whose time is up.
 constexpr int hasty_parts = 2;
+constexpr int most_steps = 32;  // of such a part, times those of a usual one
 
 NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Timeline& timeline) {
   if (!(timeline.longest_interval > 0.0))
@@ -274,7 +275,7 @@ SensorWatch::Finding Estimator::judge(double time, double* outputs, Clock::time_
   const bool is_unknown = time - clocks_->newest(inputs_source()) > longest_silence(inputs_source());
   through_motion(last, time, deadline, [&](double begin, double end) {
     if (is_unknown) {
-      guess_input(begin, end);
+      guess_input(last, begin, end);
       watch_->advance(end - begin, input_.data(), input_sigmas_.data());
     } else {
       watch_->advance(end - begin, grid_.mean_input(begin, end));
@@ -296,7 +297,6 @@ double Estimator::longest_silence(int source) const noexcept {
 template <class Function>
 void Estimator::through_motion(double from, double to, Clock::time_point deadline, const Function& advance) noexcept {
   int parts = parts_of(to - from, timeline_.longest_interval);
-  unknown_since_ = from;
   bool is_hasty = false;
   for (int i = 0; i < parts; ++i) {
     if (!is_hasty && i >= least_parts && parts - i > hasty_parts && is_past(deadline)) {
@@ -309,20 +309,20 @@ void Estimator::through_motion(double from, double to, Clock::time_point deadlin
   }
 }
 
-/// The mean input over a part of a motion, 0 where none is known, and how much it may be off besides its noise. An
-/// input holds; the longer nobody has said so again, the less it is known: within a second it may change by its typical
-/// magnitude, and stay there.
-void Estimator::guess_input(double begin, double end) noexcept {
+/// The mean input over a part of a motion that began at a time, 0 where none is known, and how much it may be off
+/// besides its noise. An input holds; the longer nobody has said so again, the less it is known: within a second it may
+/// change by its typical magnitude, and stay there.
+void Estimator::guess_input(double since, double begin, double end) noexcept {
   const std::vector<Variable>& inputs = model().description().inputs;
   std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
   for (std::size_t j = 0; j < measured_inputs_; ++j)
     if (std::isnan(input_[j])) input_[j] = 0.0;
   const double newest_input = clocks_->newest(inputs_source()), usual = clocks_->usual_interval(inputs_source());
   const auto age_at = [&](double time) {
-    return std::isnan(newest_input) ? time - unknown_since_ : std::max(0.0, time - newest_input - usual);
+    return std::isnan(newest_input) ? time - since : std::max(0.0, time - newest_input - usual);
   };
   // An offset that stays adds up to t^2, not t: each part has what the square grows by.
-  const double duration = end - begin, before = begin > unknown_since_ ? age_at(begin) / duration : 0.0,
+  const double duration = end - begin, before = begin > since ? age_at(begin) / duration : 0.0,
                aged = age_at(end) / duration;
   for (std::size_t j = 0; j < measured_inputs_; ++j) {
     const double sigma = inputs[j].scale * std::min(1.0, age_at(end));
@@ -353,13 +353,14 @@ void Estimator::clip_prediction() noexcept {
 void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
   predicted_ = estimate_;
   predicted_.predicted = true;
+  const double last = grid_.time();
   if (watch_ && watch_->is_active())
-    return through_motion(grid_.time(), time, deadline, [&](double begin, double end) {
-      guess_input(begin, end);
+    return through_motion(last, time, deadline, [&](double begin, double end) {
+      guess_input(last, begin, end);
       watch_->predict(end - begin, input_.data(), input_sigmas_.data(), predicted_);
       clip_prediction();
     });
-  through_motion(grid_.time(), time, deadline, [&](double begin, double end) {
+  through_motion(last, time, deadline, [&](double begin, double end) {
     std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
     for (double& u : input_)
       if (std::isnan(u)) u = 0.0;
@@ -370,7 +371,7 @@ void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
     request.inputs = input_.data();
     request.parameters = predicted_.parameters.data();
     request.durations = &duration;
-    request.substeps = method_->substeps();
+    request.substeps = method_->substeps() * std::min(most_steps, parts_of(duration, timeline_.longest_interval));
     request.next_states = next_.data();
     method_->model().integrate(request);
     if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))

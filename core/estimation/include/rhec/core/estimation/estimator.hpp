@@ -96,7 +96,7 @@ class RHEC_EXPORT Estimator {
   double longest_silence(int source) const noexcept;
   template <class Function>
   void through_motion(double from, double to, Clock::time_point deadline, const Function& advance) noexcept;
-  void guess_input(double begin, double end) noexcept;
+  void guess_input(double since, double begin, double end) noexcept;
   void assess(Estimate& estimate, double time) noexcept;
   void rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
   bool take_in(double until, Clock::time_point deadline) noexcept;
@@ -121,7 +121,6 @@ class RHEC_EXPORT Estimator {
   std::unique_ptr<Clocks> clocks_;        ///< of the sensors, and last of the inputs
   std::unique_ptr<StampedRows> waiting_;  ///< measurements that are not judged yet
   double watched_ = 0.0;                  ///< time of the last sample that was judged
-  double unknown_since_ = 0.0;            ///< begin of the motion that is gone through
   std::vector<double> merged_, input_sigmas_;
   std::vector<std::uint8_t> silent_;
 };
