@@ -20,6 +20,8 @@ constexpr int most_parts = 1000;      // largest number of parts of one predicti
 constexpr int least_rows = 16, least_nodes = 2, least_parts = 16;
 // Parts of the rest of a prediction whose time is up.
 constexpr int hasty_parts = 2;
+// A source is overdue after so many of its usual intervals.
+constexpr double overdue = 1.75;
 constexpr int most_steps = 32;  // of such a part, times those of a usual one
 
 NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Timeline& timeline) {
@@ -78,7 +80,7 @@ Estimator::Estimator(std::unique_ptr<EstimationMethod> method, const Timeline& t
       Clocks::Setup{.usual_interval = timeline.longest_interval,
                     .behind = std::max(least_lateness, method_->most_reach() * timeline.longest_interval)});
   waiting_ = std::make_unique<StampedRows>(timeline.capacity, model().output_count());
-  silent_.assign(sensors, 0);
+  presence_.assign(sensors, SensorWatch::Presence::present);
   input_sigmas_.assign(input_.size(), 0.0);
   merged_.assign(model().output_count(), missing_value);
   for (Estimate* e : {&estimate_, &predicted_}) assess(*e, 0.0);
@@ -255,6 +257,7 @@ bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept
     if (watch_->is_active() || is_last) continue;
     // There is nothing to judge the next one by yet.
     method_->estimate(estimate_, deadline);
+    clip(estimate_);
     watch_->follow(estimate_);
   }
   return true;
@@ -334,20 +337,25 @@ void Estimator::assess(Estimate& estimate, double time) noexcept {
   if (!watch_) return;
   const bool is_estimated = estimate.covariance.size() > 0 && estimate.covariance.diagonal().maxCoeff() > 0.0;
   std::uint32_t reasons = !has_started() || (is_estimated && !watch_->is_active()) ? reason::starting : 0;
-  for (std::size_t s = 0; s < silent_.size(); ++s) {
+  for (std::size_t s = 0; s < presence_.size(); ++s) {
     const int source = static_cast<int>(s);
-    silent_[s] = has_started() && time - clocks_->newest(source) > longest_silence(source);
+    const double silence = has_started() ? time - clocks_->newest(source) : 0.0;
+    presence_[s] = silence > longest_silence(source)                     ? SensorWatch::Presence::silent
+                   : silence > overdue * clocks_->usual_interval(source) ? SensorWatch::Presence::overdue
+                                                                         : SensorWatch::Presence::present;
     if (clocks_->is_suspected(source)) reasons |= reason::clock;
   }
   if (clocks_->is_suspected(inputs_source())) reasons |= reason::clock;
-  watch_->assess(estimate, silent_, reasons, estimate.health);
+  const double input_age = has_started() ? time - clocks_->newest(inputs_source()) : 0.0;
+  watch_->assess(estimate, presence_, input_age > overdue * clocks_->usual_interval(inputs_source()), reasons,
+                 estimate.health);
 }
 
-/// What an input that holds would lead beyond, as a steering angle beyond its stop, ends there.
-void Estimator::clip_prediction() noexcept {
+/// What leads beyond a bound, as a steering angle beyond its stop, ends there.
+void Estimator::clip(Estimate& estimate) const noexcept {
   const std::vector<Variable>& states = model().description().states;
-  for (Eigen::Index j = 0; j < std::min<Eigen::Index>(std::ssize(states), predicted_.state.size()); ++j)
-    predicted_.state[j] = std::min(std::max(predicted_.state[j], states[j].lower), states[j].upper);
+  for (Eigen::Index j = 0; j < std::min<Eigen::Index>(std::ssize(states), estimate.state.size()); ++j)
+    estimate.state[j] = std::min(std::max(estimate.state[j], states[j].lower), states[j].upper);
 }
 
 void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
@@ -358,7 +366,7 @@ void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
     return through_motion(last, time, deadline, [&](double begin, double end) {
       guess_input(last, begin, end);
       watch_->predict(end - begin, input_.data(), input_sigmas_.data(), predicted_);
-      clip_prediction();
+      clip(predicted_);
     });
   through_motion(last, time, deadline, [&](double begin, double end) {
     std::copy_n(grid_.mean_input(begin, end), input_.size(), input_.begin());
@@ -376,7 +384,7 @@ void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
     method_->model().integrate(request);
     if (std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); }))
       std::copy(next_.begin(), next_.end(), predicted_.state.data());
-    clip_prediction();
+    clip(predicted_);
   });
 }
 
@@ -421,6 +429,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
   }
   if (stale_) {
     method_->estimate(estimate_, deadline);
+    clip(estimate_);
     stale_ = false;
     // The judge is where the last sample is that it has judged.
     if (watch_ && is_all_taken_in) watch_->follow(estimate_);

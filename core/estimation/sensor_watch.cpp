@@ -3,46 +3,33 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "heading_search.hpp"
 #include "rhec/core/base/error.hpp"
-#include "stuck_values.hpp"
-#include "walking_filter.hpp"
+#include "sensor_watch_parts.hpp"
 
 namespace rhec {
+
 namespace {
 
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t innovation_capacity = 256, held_capacity = 32, remembered_samples = 64;
-// A heading that is less certain is still being searched [rad].
-constexpr double known_heading = 0.35;
+constexpr std::size_t innovation_capacity = 256, held_capacity = 32;
 // In typical magnitudes, what a measured input cannot be.
 constexpr double impossible_input = 20.0;
-// In typical magnitudes, how far off a state can be that a sensor sees after it has moved.
-constexpr double displacement = 100.0;
-// Samples in a row that measured inputs must fit before they are believed again.
-constexpr int trusted_again = 3;
-// Disputes longer than this many times the proof mean that nothing explains the sensors.
-constexpr int hopeless = 3;
 // After so many failures in a row a sensor is suspect: it then has to pass a closer gate, so many times in a row.
 constexpr int suspect_after = 3, passes_of_suspects = 2;
+// The same of one that is not followed when it moves.
+constexpr int passes_of_kept_out = 5;
 constexpr double close_gate = 3.0;
+// The error of a sensor that fails is a mean over so many of its measurements.
+constexpr double error_memory = 5.0;
 // Silence after which a sensor that disagrees is more likely right than the estimate [s].
 constexpr double longest_gap = 1.0;
 // A real receiver's errors may be far larger than its noise says, and not Gaussian at all: its gate is as much wider as
 // its squared innovations have been over some five hundred samples, of which none counts more than this many times what
 // was expected, and those of one that is suspect not at all.
 constexpr double most_excess = 100.0, excess_memory = 500.0;
-// Samples of a dispute within which slip may have jumped.
-constexpr int fresh = 2;
-// A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
-constexpr int informed = 4;
-// A search that has not explained anything for so long begins anew.
-constexpr int stale = 3;
 
 WalkingFilter::Setup filter_setup(const SensorWatch::Setup& setup) {
   return {.noise = setup.noise,
@@ -63,39 +50,6 @@ WalkingFilter::Setup blind_setup(const Model& model, const SensorWatch::Setup& s
 }
 
 }  // namespace
-
-/// A filter, and how long what it assumes has explained the measurements.
-struct SensorWatch::Hypothesis {
-  WalkingFilter filter;
-  bool is_active = false;
-  int explained = 0, refuted = 0;
-  bool is_informed = false;  ///< it has explained much before it was refuted
-};
-
-/// What was known after the last samples, and the motion since then.
-struct SensorWatch::Memory {
-  struct Entry {
-    double time = unknown;
-    Eigen::VectorXd mean;
-    Eigen::MatrixXd covariance;
-    std::vector<double> inputs;
-  };
-  std::vector<Entry> entries{remembered_samples};
-  std::size_t newest = 0;
-  std::int64_t count = 0;
-  // Before the last advance, and that.
-  Eigen::VectorXd before_mean;
-  Eigen::MatrixXd before_covariance;
-  double duration = 0.0;
-  bool has_advanced = false;  ///< since the last samples
-  bool was_calm = true;       ///< health was ok when the dispute began
-  StuckValues stuck;
-  std::unique_ptr<WalkingFilter> trial;   ///< for what is tried within one call
-  std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
-  /// The same, of a heading that may be wrong, while it is not known who is.
-  std::unique_ptr<HeadingSearch> second_thought;
-  int in_vain = 0;  ///< samples in a row that it has not explained
-};
 
 SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
     : setup_(setup), sensors_(sensors_of(model->description(), setup.noise.output_variances)) {
@@ -123,12 +77,13 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   const Eigen::Index n = own_->filter.mean().size();
   memory_->before_mean = Eigen::VectorXd::Zero(n);
   memory_->before_covariance = Eigen::MatrixXd::Zero(n, n);
+  memory_->factor = Eigen::LLT<Eigen::MatrixXd>(n);
   for (Memory::Entry& entry : memory_->entries) {
     entry.mean = memory_->before_mean;
     entry.covariance = memory_->before_covariance;
     entry.inputs.assign(model->input_count(), 0.0);
   }
-  raw_.assign(model->output_count(), unknown);
+  raw_.assign(model->output_count(), Memory::unknown);
   input_.assign(model->input_count(), 0.0);
   believed_input_ = input_;
   held_.assign(held_capacity, {0.0, raw_});
@@ -149,8 +104,10 @@ void SensorWatch::reset() noexcept {
   quiet_.assign(sensors_.size(), 0);
   records_.assign(sensors_.size(), {});
   excesses_.assign(sensors_.size(), 1.0);
-  heard_.assign(sensors_.size(), unknown);
+  heard_.assign(sensors_.size(), Memory::unknown);
   is_unobserved_ = false;
+  usual_volume_ = Memory::unknown;
+  aftermath_ = 0;
   if (memory_->search) memory_->search->cancel();
   inputs_ = {};
   input_findings_ = 0;
@@ -181,7 +138,7 @@ void SensorWatch::clean_inputs(double* inputs) noexcept {
     const double lower = std::isfinite(room) ? about[j].lower - room : -far,
                  upper = std::isfinite(room) ? about[j].upper + room : far;
     if (std::isnan(inputs[j]) || (inputs[j] >= lower && inputs[j] <= upper)) continue;
-    inputs[j] = unknown;
+    inputs[j] = Memory::unknown;
     input_findings_ |= reason::implausible;
     ++inputs_.rejected;
   }
@@ -231,7 +188,7 @@ void SensorWatch::note_motion(double duration, const double* inputs) noexcept {
     memory.before_mean = own_->filter.mean();
     memory.before_covariance = own_->filter.covariance();
     memory.duration = 0.0;
-    std::fill(input_.begin(), input_.end(), unknown);
+    std::fill(input_.begin(), input_.end(), Memory::unknown);
   }
   memory.duration += duration;
   const double share = memory.duration > 0.0 ? duration / memory.duration : 1.0;
@@ -271,7 +228,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
       is_disputed = true;
       findings_[s] |= reason::rejected;
       ++states_[s].rejected;
-      for (const int j : sensors_[s].outputs) outputs[j] = unknown;
+      for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
     }
     if (is_blind_) test_inputs(raw_.data());
     if (is_disputed) {
@@ -312,25 +269,44 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
 }
 
 /// Whether a sensor's measurement may be used. One that has failed for some time must agree well, and twice: the filter
-/// without it knows less and less, so that a gate opens by itself.
+/// without it knows less and less, so that a gate opens by itself. For the same reason a sensor that is not followed
+/// when it moves must agree better with no error than with the one that it has had.
 bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexcept {
   Record& record = records_[sensor];
   const bool is_suspect = record.failures >= suspect_after;
   const auto degrees = static_cast<double>(innovation.value.size());
-  const bool passes = innovation.nis <= limit(sensor, innovation.value.size());
+  const bool is_kept_out = record.failures > 0 && !record.after_gap && !sees_position(sensors_[sensor].outputs);
+  const bool is_off = is_kept_out && is_still_off(record, innovation);
+  const bool passes = innovation.nis <= limit(sensor, innovation.value.size()) && !is_off;
   double& excess = excesses_[sensor];
   if (record.failures < suspect_after)
     excess += (std::min(innovation.nis / degrees, most_excess) - excess) / excess_memory;
   if (!passes) {
+    if (record.failures == 0 || record.error.size() != innovation.value.size()) {
+      record.error = innovation.value;
+      record.covariance = innovation.covariance;
+    } else {
+      record.error += (innovation.value - record.error) / error_memory;
+    }
     if (record.failures == 0) record.after_gap = innovation.time - heard_[sensor] > longest_gap;
     ++record.failures;
     record.passes = 0;
     return false;
   }
   ++record.passes;
-  if (is_suspect && record.passes < passes_of_suspects) return false;
+  if (is_suspect && record.passes < (is_kept_out ? passes_of_kept_out : passes_of_suspects)) return false;
   record = {};
   return true;
+}
+
+/// Whether a measurement is nearer to the error that the sensor has had than to none, or farther from none than it
+/// could have been when it failed first.
+bool SensorWatch::is_still_off(const Record& record, const Innovation& innovation) const noexcept {
+  const Innovation::OfSensor<1>& value = innovation.value;
+  if (record.error.size() != value.size()) return false;
+  const Innovation::OfSensor<1> rest = value - record.error;
+  return rest.dot(innovation.covariance.llt().solve(rest)) < innovation.nis ||
+         value.dot(record.covariance.llt().solve(value)) > close_limits_[static_cast<std::size_t>(value.size())];
 }
 
 bool SensorWatch::is_searching() const noexcept { return memory_->search && memory_->search->is_active(); }
@@ -340,7 +316,7 @@ void SensorWatch::start_search(const double* outputs) noexcept {
   if (!memory_->search) return;
   const Roles& roles = own_->filter.model().description().roles;
   const int h = roles.heading;
-  const bool is_unknown = own_->filter.covariance()(h, h) > known_heading * known_heading;
+  const bool is_unknown = own_->filter.covariance()(h, h) > Memory::known_heading * Memory::known_heading;
   bool is_placed = false;
   for (int j = 0; j < static_cast<int>(raw_.size()); ++j)
     is_placed = is_placed || (!std::isnan(outputs[j]) && own_->filter.depends_on(j, roles.position_x));
@@ -387,237 +363,8 @@ void SensorWatch::find_stuck(double* outputs) noexcept {
     if (std::none_of(all.begin(), all.end(), [&](int j) { return memory_->stuck.is_stuck(j); })) continue;
     findings_[s] |= reason::stuck;
     ++states_[s].rejected;
-    for (const int j : all) outputs[j] = unknown;
+    for (const int j : all) outputs[j] = Memory::unknown;
   }
-}
-
-void SensorWatch::start(Hypothesis& hypothesis) noexcept {
-  hypothesis.is_active = true;
-  hypothesis.explained = 0;
-  hypothesis.filter.mean() = memory_->before_mean;
-  hypothesis.filter.covariance() = memory_->before_covariance;
-  if (&hypothesis == slip_.get()) {
-    for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
-      slip_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
-    slip_->filter.predict(input_.data(), memory_->duration);
-  } else {
-    blind_->filter.predict(believed_input_.data(), memory_->duration);
-  }
-}
-
-/// The states that disputed sensors see are known anew: the position if it is among them, else all of them. One that
-/// has followed the sensor for some time, until it jumped again, knows more of heading and slip than the estimate,
-/// which has gone on without.
-void SensorWatch::start_moved() noexcept {
-  WalkingFilter& filter = moved_->filter;
-  moved_->is_active = true;
-  moved_->explained = 0;
-  const ModelDescription& about = filter.model().description();
-  if (!moved_->is_informed) {
-    filter.mean() = own_->filter.mean();
-    filter.covariance() = own_->filter.covariance();
-  }
-  const auto is_position = [&](int i) { return i == about.roles.position_x || i == about.roles.position_y; };
-  for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    if (!(findings_[s] & reason::rejected)) continue;
-    for (const int j : sensors_[s].outputs) {
-      const bool sees_position = (about.roles.position_x >= 0 && own_->filter.depends_on(j, about.roles.position_x)) ||
-                                 (about.roles.position_y >= 0 && own_->filter.depends_on(j, about.roles.position_y));
-      for (int i = 0; i < filter.model().state_count(); ++i) {
-        if (!own_->filter.depends_on(j, i) || (sees_position && !is_position(i))) continue;
-        const double error = std::isnan(raw_[j]) ? 0.0 : 3.0 * std::abs(raw_[j] - own_->filter.expected(j));
-        const double sigma =
-            about.states[i].is_angle ? std::numbers::pi : std::max(displacement * about.states[i].scale, error);
-        filter.covariance()(i, i) = std::max(filter.covariance()(i, i), sigma * sigma);
-      }
-    }
-  }
-}
-
-/// Whether all measurements pass their gates.
-bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
-  filter.expect();
-  bool fits = true;
-  for (std::size_t s = 0; s < sensors_.size(); ++s)
-    if (filter.innovation(sensors_[s], outputs, scratch_))
-      fits = fits && scratch_.nis <= limit(s, scratch_.value.size());
-  return fits;
-}
-
-void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
-  if (!fits(hypothesis.filter, outputs)) {
-    hypothesis.is_informed = hypothesis.explained >= informed;
-    hypothesis.is_active = false;
-    hypothesis.explained = 0;
-    ++hypothesis.refuted;
-    return;
-  }
-  hypothesis.filter.update(outputs);
-  hypothesis.explained += counts;
-}
-
-/// A disputed position can be followed only if nothing else says where the vehicle is.
-bool SensorWatch::may_follow() const noexcept {
-  const Roles& roles = own_->filter.model().description().roles;
-  bool is_position_disputed = false, is_any_undisputed = false;
-  for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    bool sees_position = false, is_measured = false;
-    for (const int j : sensors_[s].outputs) {
-      sees_position = sees_position || (roles.position_x >= 0 && own_->filter.depends_on(j, roles.position_x));
-      is_measured = is_measured || !std::isnan(raw_[j]);
-    }
-    if (!is_measured) continue;
-    const bool is_rejected = (findings_[s] & reason::rejected) != 0;
-    is_position_disputed = is_position_disputed || (sees_position && is_rejected);
-    is_any_undisputed = is_any_undisputed || (!is_rejected && (sees_position || !is_position_disputed));
-    if (sees_position && !is_rejected) return false;
-  }
-  return is_position_disputed || !is_any_undisputed;
-}
-
-SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
-  if (!is_disputed_) memory_->was_calm = calm_samples_ >= setup_.calm;
-  is_disputed_ = true;
-  ++disputed_samples_;
-  const auto consider = [&](Hypothesis& hypothesis) {
-    const bool is_new = !hypothesis.is_active;
-    if (is_new && &hypothesis == moved_.get()) start_moved();
-    if (is_new && &hypothesis != moved_.get()) start(hypothesis);
-    if (is_new && &hypothesis == slip_.get()) held_count_ = 0;
-    confront(hypothesis, raw_.data(), true);
-  };
-  consider(*slip_);
-  consider(*moved_);
-  think_again();
-  if (!is_blind_) consider(*blind_);
-  // Slip that has jumped shows from the first sample on. Later the filter without the sensor knows so little that new
-  // slip explains nearly anything.
-  const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
-  if (slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
-    Finding finding = accept(*slip_);
-    for (Record& record : records_) record = {};
-    acquit(outputs);
-    finding.release = true;
-    finding.rebase = false;
-    return finding;
-  }
-  if (slip_->is_active) hold_back(time, outputs);
-  bool after_gap = true;
-  for (std::size_t s = 0; s < sensors_.size(); ++s)
-    if (findings_[s] & reason::rejected) after_gap = after_gap && records_[s].after_gap;
-  if (moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) && may_follow()) {
-    for (std::uint32_t& each : findings_)
-      if (each & reason::rejected) each |= reason::moved;
-    for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;
-    for (Record& record : records_) record = {};
-    return accept(*moved_);
-  }
-  if (memory_->search && disputed_samples_ > hopeless * setup_.proof) {
-    // Nothing explains what is measured: the position counts, and all else is found anew.
-    start_moved();
-    moved_->filter.update(raw_.data());
-    for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
-      moved_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
-    search_from(moved_->filter, *memory_->search);
-    for (Record& record : records_) record = {};
-    return accept(*moved_);
-  }
-  if (!is_blind_ && blind_->explained >= setup_.proof && slip_->refuted > 0 && moved_->refuted > 0) {
-    is_blind_ = true;
-    trusted_samples_ = 0;
-    for (Record& record : records_) record = {};
-    return accept(*blind_);
-  }
-  return {};
-}
-
-/// What was held back, and what was rejected last, is right after all.
-void SensorWatch::acquit(const double* outputs) noexcept {
-  const auto take_back = [&](auto&& was_rejected) {
-    for (std::size_t s = 0; s < sensors_.size(); ++s) {
-      if (std::ranges::none_of(sensors_[s].outputs, was_rejected)) continue;
-      --states_[s].rejected;
-      ++states_[s].accepted;
-    }
-  };
-  for (int i = 0; i < held_count_; ++i) take_back([&](int j) { return !std::isnan(held_[i].outputs[j]); });
-  take_back([&](int j) { return std::isnan(outputs[j]) && !std::isnan(raw_[j]); });
-  for (std::uint32_t& each : findings_) each &= ~reason::rejected;
-  // Slip at a bound may well be beyond it, as that of wheels that spin on the spot.
-  const Eigen::Index nx = own_->filter.model().state_count();
-  bool is_usual = memory_->was_calm;
-  for (std::size_t j = 0; j < setup_.walk.size(); ++j) {
-    const double slip = own_->filter.mean()[nx + static_cast<Eigen::Index>(j)];
-    is_usual = is_usual && slip > setup_.noise.parameter_lower[j] && slip < setup_.noise.parameter_upper[j];
-  }
-  if (!is_usual) return;
-  for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    states_[s].reasons &= ~reason::rejected;
-    quiet_[s] = setup_.calm;
-  }
-  calm_samples_ = setup_.calm;
-}
-
-SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
-  own_->filter.mean() = hypothesis.filter.mean();
-  own_->filter.covariance() = hypothesis.filter.covariance();
-  end_dispute();
-  return {.release = false, .rebase = true};
-}
-
-/// Where a sensor that has moved does not explain what follows, the heading may be wrong, too, e.g. after a turn
-/// without a position. One that is found goes on as if the sensor had moved.
-void SensorWatch::think_again() noexcept {
-  if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= informed) return;
-  HeadingSearch& search = *memory_->second_thought;
-  if (search.is_active()) {
-    const bool is_found = search.update(sensors_, raw_.data());
-    memory_->in_vain = search.explained() > 0 ? 0 : memory_->in_vain + 1;
-    if (!is_found && memory_->in_vain < stale) return;
-    if (is_found) {
-      moved_->is_active = true;
-      moved_->explained = search.explained();
-      moved_->filter.mean() = search.best().mean();
-      moved_->filter.covariance() = search.best().covariance();
-      return;
-    }
-  }
-  start_moved();
-  moved_->filter.update(raw_.data());
-  WalkingFilter& trial = *memory_->trial;
-  trial.mean() = moved_->filter.mean();
-  trial.covariance() = moved_->filter.covariance();
-  search_from(trial, search);
-  moved_->explained = 1;
-  memory_->in_vain = 0;
-}
-
-/// Keeps what was rejected, in case it is right.
-void SensorWatch::hold_back(double time, const double* outputs) noexcept {
-  if (held_count_ == static_cast<int>(held_.size())) return;
-  Held& held = held_[held_count_++];
-  held.time = time;
-  for (std::size_t j = 0; j < raw_.size(); ++j) held.outputs[j] = std::isnan(outputs[j]) ? raw_[j] : unknown;
-}
-
-void SensorWatch::end_dispute() noexcept {
-  is_disputed_ = false;
-  disputed_samples_ = 0;
-  if (memory_->second_thought) memory_->second_thought->cancel();
-  for (Hypothesis* each : {slip_.get(), moved_.get(), blind_.get()}) {
-    each->is_active = each->is_informed = false;
-    each->explained = each->refuted = 0;
-  }
-}
-
-/// Whether the measured inputs explain the last interval again.
-void SensorWatch::test_inputs(const double* outputs) noexcept {
-  WalkingFilter& trial = *memory_->trial;
-  trial.mean() = memory_->before_mean;
-  trial.covariance() = memory_->before_covariance;
-  trial.predict(input_.data(), memory_->duration);
-  trusted_samples_ = fits(trial, outputs) ? trusted_samples_ + 1 : 0;
-  if (trusted_samples_ >= trusted_again) is_blind_ = false;
 }
 
 void SensorWatch::remember(double time) noexcept {
@@ -628,93 +375,6 @@ void SensorWatch::remember(double time) noexcept {
   entry.time = time;
   entry.mean = own_->filter.mean();
   entry.covariance = own_->filter.covariance();
-}
-
-void SensorWatch::judge_late(double time, double* outputs) noexcept {
-  if (!is_active_) return;
-  const Memory::Entry* last = nullptr;
-  const auto known = static_cast<std::size_t>(std::min<std::int64_t>(memory_->count, remembered_samples));
-  for (std::size_t i = 0; i < known; ++i) {
-    const Memory::Entry& entry = memory_->entries[i];
-    if (entry.time <= time && (!last || entry.time > last->time)) last = &entry;
-  }
-  if (!last) return;
-  WalkingFilter& filter = *memory_->trial;
-  filter.mean() = last->mean;
-  filter.covariance() = last->covariance;
-  filter.predict(last->inputs.data(), time - last->time);
-  filter.expect();
-  for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    if (!filter.innovation(sensors_[s], outputs, scratch_)) continue;
-    if (scratch_.nis <= limit(s, scratch_.value.size())) {
-      ++states_[s].accepted;
-      continue;
-    }
-    ++states_[s].rejected;
-    states_[s].reasons |= reason::rejected;
-    quiet_[s] = 0;
-    for (const int j : sensors_[s].outputs) outputs[j] = unknown;
-  }
-}
-
-void SensorWatch::follow(const Estimate& estimate) noexcept {
-  const Model& model = own_->filter.model();
-  const Eigen::Index nx = model.state_count(), np = model.parameter_count(), n = nx + np;
-  if (estimate.state.size() != nx || estimate.parameters.size() != np || estimate.covariance.rows() != n) return;
-  if (!estimate.state.allFinite() || !estimate.parameters.allFinite() || !estimate.covariance.allFinite()) return;
-  const int heading = model.description().roles.heading;
-  if (!is_active_) {
-    if (!(estimate.covariance.diagonal().maxCoeff() > 0.0)) return;  // of one that is not estimated
-    if (heading >= 0 && estimate.covariance(heading, heading) > known_heading * known_heading) return;
-    is_active_ = true;
-  }
-  if (is_blind_ || is_searching()) return;
-  own_->filter.mean().head(nx) = estimate.state;
-  own_->filter.mean().tail(np) = estimate.parameters;
-  own_->filter.covariance() = estimate.covariance;
-}
-
-void SensorWatch::assess(const Estimate& estimate, std::span<const std::uint8_t> silent, std::uint32_t reasons,
-                         Health& health) const noexcept {
-  health.reasons = reasons;
-  health.sensors.assign(states_.begin(), states_.end());
-  health.inputs = inputs_;
-  bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || inputs_.reasons != 0;
-  for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    if (silent[s]) health.sensors[s].reasons |= reason::silent;
-    has_finding = has_finding || health.sensors[s].reasons != 0;
-  }
-  const Roles& roles = own_->filter.model().description().roles;
-  const Eigen::MatrixXd& P = estimate.covariance;
-  if (is_searching()) health.reasons |= reason::uncertain;
-  bool is_lost = (reasons & reason::starting) != 0;
-  if (P.rows() > 0) {
-    double variance = 0.0;
-    for (const int i : {roles.position_x, roles.position_y})
-      if (i >= 0) variance = std::max(variance, P(i, i));
-    const bool is_place_known = variance <= setup_.lost_position * setup_.lost_position;
-    const bool is_heading_known =
-        roles.heading < 0 || P(roles.heading, roles.heading) <= setup_.lost_heading * setup_.lost_heading;
-    if (!is_place_known || !is_heading_known) {
-      health.reasons |= reason::uncertain;
-      is_lost = true;
-    }
-  }
-  is_lost = is_lost || is_searching() || disputed_samples_ > hopeless * setup_.proof;
-  health.level = is_lost ? HealthLevel::lost : has_finding ? HealthLevel::degraded : HealthLevel::ok;
-}
-
-void SensorWatch::predict(double duration, const double* inputs, const double* input_sigmas,
-                          Estimate& estimate) noexcept {
-  WalkingFilter& filter = *memory_->trial;
-  const Eigen::Index nx = filter.model().state_count(), np = filter.model().parameter_count();
-  if (estimate.state.size() != nx || estimate.parameters.size() != np || estimate.covariance.rows() != nx + np) return;
-  filter.mean().head(nx) = estimate.state;
-  filter.mean().tail(np) = estimate.parameters;
-  filter.covariance() = estimate.covariance;
-  filter.predict(inputs, duration, input_sigmas);
-  estimate.state = filter.mean().head(nx);
-  estimate.covariance = filter.covariance();
 }
 
 }  // namespace rhec

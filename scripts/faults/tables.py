@@ -202,10 +202,30 @@ class Result:
                 found.setdefault(after, []).append(error)
         return [[after, quantile(errors, 0.5), quantile(errors, 0.99)] for after, errors in found.items()]
 
+    def measures(self, kind, estimator):
+        """What the page of `rhec report` tells of an estimator and a kind of fault; None: never."""
+        rides = self.rides(kind, estimator=estimator)
+        def spread(samples):
+            found = [quantile(samples, share) for share in (0.5, 0.99)]
+            return dict(zip(("median", "p99"), (None if value == NEVER else value for value in found)))
+        def known(value):
+            return None if math.isnan(value) else value
+        return {"rides": len(rides.rides), "recovered": spread(rides.recovered), "ok_again": spread(rides.ok_again),
+                "never": sum(each == NEVER for each in rides.recovered), "unsaid": rides.unsaid(), "followed": rides.followed(),
+                "honest": rides.share("honest", "counted"), "honest_heading": rides.share("honest_heading", "counted"),
+                "longest_dishonest": max(ride["longest_dishonest"] for ride in rides.rides),
+                "volume": quantile([ride["volume"] for ride in rides.rides], 0.5), "wide": known(rides.share("wide", "ok")),
+                "curve": self.curve(kind, estimator)}
+
     def document(self):
-        """What the curves of recovery are drawn from."""
-        return {"form": "rhec faults", "version": 1, "steps": self.steps, "drives": len(self.answers), "missed": self.missed(),
-                "kinds": {kind: {estimator: self.curve(kind, estimator) for estimator in self.estimators} for kind in self.kinds}}
+        """What `rhec report` makes a page of."""
+        figures = sum(len(self.wanted(kind)) for kind in self.kinds) + sum(
+            len(self.wanted_calm(vehicle, estimator)) for vehicle in self.vehicles for estimator in self.estimators)
+        return {"form": "rhec faults", "version": 2, "steps": self.steps, "drives": len(self.answers), "window": self.data["window"],
+                "samples": self.after, "vehicles": self.vehicles, "estimators": self.estimators, "wanted": {"honest": HONEST},
+                "figures": figures, "missed": self.missed(),
+                "kinds": [{"name": kind, "group": self.group(kind),
+                           "estimators": {name: self.measures(kind, name) for name in self.estimators}} for kind in self.kinds]}
 
 
 def write(page, text):

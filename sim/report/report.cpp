@@ -17,7 +17,7 @@ constexpr int document_version = 1;
 constexpr const char* what_there_is =
     "expected the folder of a run (steps.csv, times.csv, summary.json: 'rhec run' makes it) or of an estimation "
     "(estimates.csv, summary.json: 'rhec estimate'), the database of a sweep ('rhec sweep'), or compare.json ('rhec "
-    "compare'), or a map of slip (estimator.memory.file)";
+    "compare'), or a map of slip (estimator.memory.file), or faults.json ('scripts/fault-campaign')";
 
 [[noreturn]] void missing(const fs::path& folder, const char* file, const char* beside, const char* maker) {
   throw Error(
@@ -40,6 +40,7 @@ Json folder_report(const fs::path& folder) {
   if (!has("summary.json")) {
     if (has("steps.csv")) missing(folder, "summary.json", "steps.csv", run_maker);
     if (has("estimates.csv")) missing(folder, "summary.json", "estimates.csv", log_maker);
+    if (has("faults.json")) return faults_report(folder / "faults.json");
     if (has("compare.json")) return comparison_report(folder / "compare.json");
     throw Error(
         fmt::format("{}: there is no run in this folder{}; {}", folder.string(), unfinished_in(folder), what_there_is));
@@ -73,7 +74,7 @@ Json file_report(const fs::path& file) {
     throw Error(fmt::format("{}: is one of a run's files; give the folder that it is in, '{}'", file.string(),
                             file.has_parent_path() ? file.parent_path().string() : "."));
   if (start.find_first_not_of(" \t\r\n") != std::string::npos && start[start.find_first_not_of(" \t\r\n")] == '{')
-    return comparison_report(file);
+    return name == "faults.json" ? faults_report(file) : comparison_report(file);
   throw Error(fmt::format("{}: is neither a database of SQLite nor JSON; {}", file.string(), what_there_is));
 }
 

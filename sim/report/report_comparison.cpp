@@ -10,58 +10,44 @@ namespace {
 
 constexpr const char* comparison_maker = "rhec compare";
 
-[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
-  throw Error(fmt::format("{}: {}; expected compare.json as docs/compare.md describes it, which '{}' writes",
-                          file.string(), what, comparison_maker));
-}
-
-/// A member of this kind; otherwise throws an Error with its location.
-const Json& required(const Json& json, const std::string& key, Json::Kind kind, const std::filesystem::path& file,
-                     const std::string& place) {
-  const std::string path = place.empty() ? key : place + "." + key;
-  if (!json.is_object()) refuse(file, fmt::format("{} is no map", place.empty() ? "the whole" : place));
-  const Json* found = json.find(key);
-  if (!found) refuse(file, fmt::format("there is no {}", path));
-  if (found->kind() != kind) refuse(file, fmt::format("{} is {}", path, found->kind_name()));
-  return *found;
-}
-
 }  // namespace
 
 Json comparison_report(const std::filesystem::path& file) {
   using Kind = Json::Kind;
+  const RequiredMembers members(
+      file, fmt::format("compare.json as docs/compare.md describes it, which '{}' writes", comparison_maker));
   Json comparison = read_json(file, comparison_maker);
-  const Json& solvers = required(comparison, "solvers", Kind::array, file, "");
-  required(comparison, "scenario", Kind::text, file, "");
-  required(comparison, "seeds", Kind::array, file, "");
-  required(comparison, "reference", Kind::object, file, "");
-  required(comparison, "every", Kind::integer, file, "");
-  required(comparison, "all_usable", Kind::boolean, file, "");
+  const Json& solvers = members.get(comparison, "solvers", Kind::array);
+  members.get(comparison, "scenario", Kind::text);
+  members.get(comparison, "seeds", Kind::array);
+  members.get(comparison, "reference", Kind::object);
+  members.get(comparison, "every", Kind::integer);
+  members.get(comparison, "all_usable", Kind::boolean);
   Json labels = Json::array();
   for (std::size_t i = 0; i < solvers.size(); ++i)
-    labels.push_back(required(solvers[i], "label", Kind::text, file, fmt::format("solvers[{}]", i)));
-  if (labels.empty()) refuse(file, "solvers is empty");
-  const Json& same = required(comparison, "same_problems", Kind::object, file, "");
+    labels.push_back(members.get(solvers[i], "label", Kind::text, fmt::format("solvers[{}]", i)));
+  if (labels.empty()) members.refuse("solvers is empty");
+  const Json& same = members.get(comparison, "same_problems", Kind::object);
   for (const auto& [kind, problems] : same.items()) {
     const std::string place = "same_problems." + kind;
-    const Json& answers = required(problems, "solvers", Kind::array, file, place);
+    const Json& answers = members.get(problems, "solvers", Kind::array, place);
     if (answers.size() != labels.size())
-      refuse(file, fmt::format("{}.solvers has {} entries for {} solvers", place, answers.size(), labels.size()));
+      members.refuse(fmt::format("{}.solvers has {} entries for {} solvers", place, answers.size(), labels.size()));
     for (std::size_t i = 0; i < answers.size(); ++i) {
       const std::string entry = fmt::format("{}.solvers[{}]", place, i);
       for (const char* spread : {"iterations", "kkt_residual", "defect", "gap", "distance", "time_us"})
         for (const char* number : {"median", "p99", "max"})
-          if (!required(answers[i], spread, Kind::object, file, entry).contains(number))
-            refuse(file, fmt::format("there is no {}.{}.{}", entry, spread, number));
-      required(answers[i], "statuses", Kind::object, file, entry);
+          if (!members.get(answers[i], spread, Kind::object, entry).contains(number))
+            members.refuse(fmt::format("there is no {}.{}.{}", entry, spread, number));
+      members.get(answers[i], "statuses", Kind::object, entry);
     }
   }
-  const Json& loops = required(comparison, "closed_loop", Kind::array, file, "");
+  const Json& loops = members.get(comparison, "closed_loop", Kind::array);
   for (std::size_t i = 0; i < loops.size(); ++i) {
     const std::string entry = fmt::format("closed_loop[{}]", i);
-    required(loops[i], "label", Kind::text, file, entry);
-    required(loops[i], "errors", Kind::object, file, entry);
-    required(loops[i], "runs", Kind::array, file, entry);
+    members.get(loops[i], "label", Kind::text, entry);
+    members.get(loops[i], "errors", Kind::object, entry);
+    members.get(loops[i], "runs", Kind::array, entry);
   }
   Json document;
   document["kind"] = "comparison";

@@ -141,6 +141,24 @@ Json seen(double value, int digits) {
   return rounded;
 }
 
+RequiredMembers::RequiredMembers(std::filesystem::path file, std::string expected)
+    : file_(std::move(file)), expected_(std::move(expected)) {}
+
+void RequiredMembers::refuse(const std::string& what) const {
+  throw Error(fmt::format("{}: {}; expected {}", file_.string(), what, expected_));
+}
+
+const Json& RequiredMembers::get(const Json& json, const std::string& key, Json::Kind kind,
+                                 const std::string& place) const {
+  const std::string path = place.empty() ? key : place + "." + key;
+  if (!json.is_object()) refuse(fmt::format("{} is no map", place.empty() ? "the whole" : place));
+  const Json* found = json.find(key);
+  if (!found) refuse(fmt::format("there is no {}", path));
+  const bool is_number = kind == Json::Kind::number && found->kind() == Json::Kind::integer;
+  if (found->kind() != kind && !is_number) refuse(fmt::format("{} is {}", path, found->kind_name()));
+  return *found;
+}
+
 Json seen(double value) {
   constexpr int digits = 7, decimals = 4;
   const double size = std::abs(value);

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
 #include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
@@ -46,6 +47,23 @@ Json parse_json_line(std::string_view line, const std::filesystem::path& file, s
                      const std::string& maker);
 /// A required member; throws Error, naming file and key, if it is missing.
 const Json& member(const Json& json, const char* key, const std::filesystem::path& file, const std::string& maker);
+
+/// Members of a JSON document of which nobody knows who wrote it. Errors name the file, the place in it, and what was
+/// expected.
+class RequiredMembers {
+ public:
+  /// `expected`: what the file should be, and what makes it.
+  RequiredMembers(std::filesystem::path file, std::string expected);
+  /// The member `key` of what is at `place` (empty: the whole); throws Error unless it is there and of this kind. An
+  /// integer is a number, too.
+  const Json& get(const Json& json, const std::string& key, Json::Kind kind, const std::string& place = {}) const;
+  /// Throws Error.
+  [[noreturn]] void refuse(const std::string& what) const;
+
+ private:
+  std::filesystem::path file_;
+  std::string expected_;
+};
 
 /// A number for display only: seven digits, at least four decimals. NaN becomes null.
 Json seen(double value);

@@ -14,6 +14,7 @@ Json run_report(const std::filesystem::path& folder, const Json& summary);
 Json log_report(const std::filesystem::path& folder, const Json& summary);
 Json sweep_report(const std::filesystem::path& file);
 Json comparison_report(const std::filesystem::path& file);
+Json faults_report(const std::filesystem::path& file);
 Json map_report(const std::filesystem::path& file);
 
 constexpr const char* run_maker = "rhec run";

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`rhec report` of a sweep and of a comparison: every map's means and pairs are those of the database.
+"""`rhec report` of a sweep, of a comparison and of a fault campaign: every map's means and pairs are those of the database.
 
     report_study.py <rhec>
 """
@@ -21,7 +21,7 @@ FIVE_DIGITS, FOUR_DIGITS = 5.1e-5, 5.1e-4
 
 
 class StudyReports(Reports):
-    parts = ("numbers_of_a_sweep", "sweep_of_100_000_runs", "sweep_of_other_keys", "no_sweep", "comparison")
+    parts = ("numbers_of_a_sweep", "sweep_of_100_000_runs", "sweep_of_other_keys", "no_sweep", "comparison", "faults")
 
     def numbers_of_a_sweep(self):
         database = self.work / "blocks.sqlite"
@@ -177,6 +177,34 @@ grid:
         self.refused(file, f"broken.json:{text[:len(text) // 2].count(chr(10)) + 1}", "cut off", "rhec compare")
         file.write_text("{}")
         self.refused(file, "broken.json", "rhec compare")
+
+    def faults(self):
+        folder = self.work / "campaign"
+        folder.mkdir()
+        spread = {"median": 3, "p99": None}
+        measures = {"rides": 7, "recovered": spread, "ok_again": spread, "never": 1, "unsaid": 0, "followed": 0, "honest": 0.97, "honest_heading": 1,
+                    "longest_dishonest": 4, "volume": 1.0, "wide": None, "curve": [[0, 0.1, 2.0], [10, 0.05, 0.3]]}
+        campaign = {"form": "rhec faults", "version": 2, "steps": 4200, "drives": 7, "window": 15, "samples": [0, 10], "vehicles": ["bicycle_slip"],
+                    "estimators": ["ekf", "rhe"], "wanted": {"honest": 0.95}, "figures": 6, "missed": ["spike: not reached: this"],
+                    "kinds": [{"name": "spike", "group": "transient", "estimators": {"ekf": measures, "rhe": measures}}]}
+        file = folder / "faults.json"
+        file.write_text(json.dumps(campaign))
+        for source in (folder, file):
+            document, _ = self.page_of(source)
+            self.expect(document["kind"] == "faults" and document["campaign"] == campaign, "faults", "is not faults.json")
+            self.expect("spike" in self.notes(document, "not reached"), "faults", "what is not reached is not told")
+        for change, *words in (
+                (lambda c: c.update(version=1), "version is 1"),
+                (lambda c: c.pop("kinds"), "there is no kinds"),
+                (lambda c: c.update(kinds=[]), "kinds or estimators are empty"),
+                (lambda c: c["kinds"][0]["estimators"].pop("rhe"), "there is no kinds[0].estimators.rhe"),
+                (lambda c: c["kinds"][0]["estimators"]["ekf"]["recovered"].pop("p99"), "kinds[0].estimators.ekf.recovered.p99"),
+                (lambda c: c["kinds"][0]["estimators"]["rhe"].update(honest="all"), "kinds[0].estimators.rhe.honest is string"),
+                (lambda c: c["kinds"][0]["estimators"]["rhe"]["curve"].append([1]), "kinds[0].estimators.rhe.curve[2]")):
+            broken = json.loads(json.dumps(campaign))
+            change(broken)
+            file.write_text(json.dumps(broken))
+            self.refused(file, "faults.json", *words, "scripts/fault-campaign")
 
     def check_maps(self, document, database, every=1):
         """Every n-th cell's means and pairs, from the database by another way."""

@@ -9,7 +9,7 @@ import xml.etree.ElementTree as xml
 import material
 
 SVG = "{http://www.w3.org/2000/svg}"
-LEAST = {"run": 12, "log": 8, "sweep": 8, "comparison": 5}
+LEAST = {"run": 12, "log": 8, "sweep": 8, "comparison": 5, "faults": 5}
 
 
 AXES = {"#666666", "#dddddd", "none", None}

@@ -1,4 +1,4 @@
-"""What reports are made of in these tests: a run, an estimation of a drive made here, a sweep, a comparison, all short."""
+"""What reports are made of in these tests: a run, an estimation of a drive made here, a sweep, a comparison, a fault campaign, all short."""
 import importlib.util
 import json
 import pathlib
@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-KINDS = ("run", "log", "sweep", "comparison")
+KINDS = ("run", "log", "sweep", "comparison", "faults")
 SWEEP = """\
 name: small
 scenario: {scenario}
@@ -54,6 +54,10 @@ def make(kind, rhec, folder):
         (folder / "sweep.yaml").write_text(SWEEP.format(scenario=figure8))
         call(rhec, "sweep", folder / "sweep.yaml", "--out", folder / "runs.sqlite")
         return folder / "runs.sqlite"
+    if kind == "faults":
+        call(ROOT / "scripts" / "fault-campaign", pathlib.Path(rhec).parents[1], "--kinds", "spike 100 m", "no position, 10 samples", "moved for good, 10 m",
+             "--vehicles", "bicycle_slip", "--steps", "1000", "--loop-seeds", "0", "--out", folder / "faults")
+        return folder / "faults"
     call(rhec, "compare", figure8, "--solvers", "gn_rti:mode=converge,sparse_sqp", "--seeds", "2", "--every", "20", "--set", "speed=10",
          "--set", "path.laps=1", "--set", "path.radius=12", "--out", folder / "compare", fine=(0, 3))
     return folder / "compare" / "compare.json"

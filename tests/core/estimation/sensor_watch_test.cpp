@@ -118,6 +118,36 @@ TEST_P(SensorFaults, AValueThatIsStuckIsFound) {
               });
 }
 
+/// Neither slip nor unknown inputs explain what a steering encoder alone says; and however little is known of the angle
+/// without it, its error stays one.
+TEST_P(SensorFaults, AnAngleThatIsOffForGoodIsNotBelieved) {
+  for (const double size : {0.2, -0.3}) {
+    SCOPED_TRACE(size);
+    const Fault fault{.spoil = [=](Delivery& d) { d.outputs[2] += size; }, .length = 50};
+    for (int seed = 1; seed <= seeds; ++seed) {
+      SCOPED_TRACE(seed);
+      const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed), 0);
+      EXPECT_TRUE(episode.is_finite);
+      EXPECT_GE(episode.honest_share(), 0.95);
+      for (const Episode::Sample& sample : episode.during) {
+        EXPECT_THAT(sample.words, HasSubstr("degraded: delta rejected"));
+        EXPECT_EQ(sample.words.find("inputs"), std::string::npos);
+        EXPECT_LT(sample.error, usual_error);
+      }
+    }
+  }
+}
+
+/// A second without a position is no silence yet; but how little is known by its end is said.
+TEST_P(SensorFaults, WhatIsMissingShowsBeforeItIsSilent) {
+  expect_each({.spoil = [](Delivery& d) { d.outputs[0] = d.outputs[1] = nan; }, .length = 5},
+              [](const Episode& episode) {
+                EXPECT_EQ(episode.during[0].health, HealthLevel::ok);
+                EXPECT_THAT(episode.during[4].words, HasSubstr("degraded: uncertain"));
+                EXPECT_LE(episode.samples_to_ok(), 10);
+              });
+}
+
 TEST_P(SensorFaults, AClockThatIsSetIsFollowed) {
   for (const double jump : {-1000.0, 1000.0, -1.5e9}) {
     SCOPED_TRACE(jump);

@@ -1,5 +1,6 @@
 // Which figures a document has, in sections, in the order of the page; --svg draws the same.
 import {comparisonFigures} from "./comparison.js";
+import {faultFigures} from "./faults.js";
 import {mapFigures} from "./map.js";
 import {placeFigures} from "./place.js";
 import {columnFigure, errorFigures, estimateFigures, inputFigures, statusFigure} from "./series.js";
@@ -11,7 +12,7 @@ import {stem} from "../text.js";
 
 /// [{id, title, figures}], without sections that have nothing to show.
 export function sectionsOf(document) {
-  const sections = {run: runSections, log: logSections, sweep: sweepSections, comparison: comparisonSections, place: placeSections}[document.kind](document);
+  const sections = {run: runSections, log: logSections, sweep: sweepSections, comparison: comparisonSections, place: placeSections, faults: faultSections}[document.kind](document);
   return sections.map((section) => ({...section, figures: section.figures.filter(Boolean)})).filter((section) => section.figures.length);
 }
 
@@ -95,6 +96,14 @@ function sweepSections(document) {
 
 function placeSections(document) {
   return [{id: "place", title: "Slip of the ground", figures: placeFigures(document), inPairs: true}];
+}
+
+function faultSections(document) {
+  const {curves, shares} = faultFigures(document);
+  return [
+    {id: "curves", title: "Curves of recovery", figures: curves},
+    {id: "kinds", title: "How each kind ends", figures: shares},
+  ];
 }
 
 function comparisonSections(document) {

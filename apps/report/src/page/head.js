@@ -27,6 +27,11 @@ function highlights(document) {
   }
   if (document.kind === "place")
     return [["cells", count(document.cells)], ["visits a cell", number(document.visits)], ["observations a cell", number(document.observations)], ["first to last visit", `${number(document.seconds)} s`]];
+  if (document.kind === "faults") {
+    const {campaign} = document;
+    return [["estimates", count(campaign.steps)], ["drives", count(campaign.drives)], ["kinds of faults", count(campaign.kinds.length)], ["estimators", campaign.estimators.join(", ")],
+            ["vehicles", campaign.vehicles.join(", ")], ["not reached", `${count(campaign.missed.length)} of ${count(campaign.figures)} figures`]];
+  }
   const variants = document.variants.map((variant) => variant.name);
   return [["fixes", document.fixes ? count(document.fixes.total) : "–"], ["gaps without a fix", document.gaps ? count(document.gaps.length) : "–"], ["estimators", variants.join(", ")]];
 }

@@ -92,7 +92,7 @@ class RHEC_EXPORT Estimator {
   double place_on_timeline(double stamp, const double* outputs) noexcept;
   bool judge_waiting(double until, Clock::time_point deadline) noexcept;
   SensorWatch::Finding judge(double time, double* outputs, Clock::time_point deadline) noexcept;
-  int inputs_source() const noexcept { return static_cast<int>(silent_.size()); }
+  int inputs_source() const noexcept { return static_cast<int>(presence_.size()); }
   double longest_silence(int source) const noexcept;
   template <class Function>
   void through_motion(double from, double to, Clock::time_point deadline, const Function& advance) noexcept;
@@ -101,7 +101,7 @@ class RHEC_EXPORT Estimator {
   void rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept;
   bool take_in(double until, Clock::time_point deadline) noexcept;
   void add_node() noexcept;
-  void clip_prediction() noexcept;
+  void clip(Estimate& estimate) const noexcept;
   void predict_to(double time, Clock::time_point deadline) noexcept;
   void check_integration() noexcept;
   void clear_estimates() noexcept;
@@ -122,7 +122,7 @@ class RHEC_EXPORT Estimator {
   std::unique_ptr<StampedRows> waiting_;  ///< measurements that are not judged yet
   double watched_ = 0.0;                  ///< time of the last sample that was judged
   std::vector<double> merged_, input_sigmas_;
-  std::vector<std::uint8_t> silent_;
+  std::vector<SensorWatch::Presence> presence_;
 };
 
 }  // namespace rhec

@@ -101,9 +101,14 @@ class RHEC_EXPORT SensorWatch {
   std::span<const Innovation> innovations() const noexcept {
     return {innovations_.data(), static_cast<std::size_t>(innovation_count_)};
   }
-  /// `silent`: by sensor, whether it has said nothing for too long; `reasons`: those that belong to no sensor.
-  void assess(const Estimate& estimate, std::span<const std::uint8_t> silent, std::uint32_t reasons,
-              Health& health) const noexcept;
+  enum class Presence : std::uint8_t {
+    present,
+    overdue,  ///< a measurement was to be expected
+    silent    ///< it has said nothing for too long
+  };
+  /// `presence`: by sensor; `reasons`: those that belong to no sensor.
+  void assess(const Estimate& estimate, std::span<const Presence> presence, bool are_inputs_overdue,
+              std::uint32_t reasons, Health& health) noexcept;
 
  private:
   struct Hypothesis;
@@ -111,9 +116,12 @@ class RHEC_EXPORT SensorWatch {
   /// Of a sensor, in a row.
   struct Record {
     int failures = 0, passes = 0;
-    bool after_gap = false;  ///< the first failure came after a time in which the sensor had said nothing
+    bool after_gap = false;         ///< the first failure came after a time in which the sensor had said nothing
+    Innovation::OfSensor<1> error;  ///< mean innovation of those that failed
+    Innovation::OfSensor<Eigen::Dynamic> covariance;  ///< of the first of these
   };
   bool admits(std::size_t sensor, const Innovation& innovation) noexcept;
+  bool is_still_off(const Record& record, const Innovation& innovation) const noexcept;
   void find_stuck(double* outputs) noexcept;
   void note_motion(double duration, const double* inputs) noexcept;
   bool is_searching() const noexcept;
@@ -124,15 +132,22 @@ class RHEC_EXPORT SensorWatch {
   void start(Hypothesis& hypothesis) noexcept;
   void start_moved() noexcept;
   bool fits(WalkingFilter& filter, const double* outputs) noexcept;
+  void refute(Hypothesis& hypothesis) noexcept;
+  double disputed_nis(WalkingFilter& filter) noexcept;
+  double undisputed_likelihood(WalkingFilter& filter) noexcept;
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis& hypothesis) noexcept;
   void hold_back(double time, const double* outputs) noexcept;
   void acquit(const double* outputs) noexcept;
   void end_dispute() noexcept;
+  bool sees_position(int output) const noexcept;
+  bool sees_position(const std::vector<int>& outputs) const noexcept;
+  bool is_position_disputed() const noexcept;
   bool may_follow() const noexcept;
   void test_inputs(const double* outputs) noexcept;
   void remember(double time) noexcept;
+  void note_volume(const Estimate& estimate) noexcept;
   double limit(std::size_t sensor, Eigen::Index degrees) const noexcept;
 
   Setup setup_;
@@ -142,6 +157,8 @@ class RHEC_EXPORT SensorWatch {
   std::vector<double> excesses_;               ///< by sensor, mean nu' S^-1 nu by degree of freedom, of late
   std::vector<double> heard_;                  ///< by sensor, when it was measured last [s]; NaN: never
   bool is_unobserved_ = false;                 ///< the motion since the last sample is not known
+  double usual_volume_ = 0.0;  ///< mean log sqrt(det P) of late, where nothing was missing; NaN: none yet
+  int aftermath_ = 0;          ///< estimates since something was missing, counted down
   std::unique_ptr<Hypothesis> own_, slip_, moved_, blind_;
   std::unique_ptr<Memory> memory_;
   bool is_active_ = false, is_disputed_ = false, is_blind_ = false;

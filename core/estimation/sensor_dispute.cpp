@@ -1,0 +1,306 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/LU>
+
+#include "sensor_watch_parts.hpp"
+
+// Who is wrong, where a sensor and the estimate disagree.
+
+namespace rhec {
+
+namespace {
+
+// In typical magnitudes, how far off a state can be that a sensor sees after it has moved.
+constexpr double displacement = 100.0;
+// Samples in a row that measured inputs must fit before they are believed again.
+constexpr int trusted_again = 3;
+// New slip explains what the filter does not only if it leaves less than this share of nu' S^-1 nu.
+constexpr double left_unexplained = 0.5;
+// The logarithm of the odds at which a sensor is followed that does not see the position.
+constexpr double convincing = 4.6;
+// Samples of a dispute within which slip may have jumped.
+constexpr int fresh = 2;
+// A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
+constexpr int informed = 4;
+// A search that has not explained anything for so long begins anew.
+constexpr int stale = 3;
+
+}  // namespace
+
+void SensorWatch::start(Hypothesis& hypothesis) noexcept {
+  hypothesis.is_active = true;
+  hypothesis.explained = 0;
+  hypothesis.filter.mean() = memory_->before_mean;
+  hypothesis.filter.covariance() = memory_->before_covariance;
+  if (&hypothesis == slip_.get()) {
+    for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
+      slip_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+    slip_->filter.predict(input_.data(), memory_->duration);
+  } else {
+    blind_->filter.predict(believed_input_.data(), memory_->duration);
+  }
+}
+
+/// The states that disputed sensors see are known anew: the position if it is among them, else all of them. One that
+/// has followed the sensor for some time, until it jumped again, knows more of heading and slip than the estimate,
+/// which has gone on without.
+void SensorWatch::start_moved() noexcept {
+  WalkingFilter& filter = moved_->filter;
+  moved_->is_active = true;
+  moved_->explained = 0;
+  moved_->evidence = 0.0;
+  const ModelDescription& about = filter.model().description();
+  if (!moved_->is_informed) {
+    filter.mean() = own_->filter.mean();
+    filter.covariance() = own_->filter.covariance();
+  }
+  const auto is_position = [&](int i) { return i == about.roles.position_x || i == about.roles.position_y; };
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (!(findings_[s] & reason::rejected)) continue;
+    for (const int j : sensors_[s].outputs) {
+      for (int i = 0; i < filter.model().state_count(); ++i) {
+        if (!own_->filter.depends_on(j, i) || (sees_position(j) && !is_position(i))) continue;
+        const double error = std::isnan(raw_[j]) ? 0.0 : 3.0 * std::abs(raw_[j] - own_->filter.expected(j));
+        const double sigma =
+            about.states[i].is_angle ? std::numbers::pi : std::max(displacement * about.states[i].scale, error);
+        filter.covariance()(i, i) = std::max(filter.covariance()(i, i), sigma * sigma);
+      }
+    }
+  }
+}
+
+/// Whether all measurements pass their gates.
+bool SensorWatch::fits(WalkingFilter& filter, const double* outputs) noexcept {
+  filter.expect();
+  bool fits = true;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (filter.innovation(sensors_[s], outputs, scratch_))
+      fits = fits && scratch_.nis <= limit(s, scratch_.value.size());
+  return fits;
+}
+
+void SensorWatch::refute(Hypothesis& hypothesis) noexcept {
+  hypothesis.is_informed = hypothesis.explained >= informed;
+  hypothesis.is_active = false;
+  hypothesis.explained = 0;
+  ++hypothesis.refuted;
+}
+
+/// nu' S^-1 nu of the sensors that were rejected, together.
+double SensorWatch::disputed_nis(WalkingFilter& filter) noexcept {
+  filter.expect();
+  double sum = 0.0;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if ((findings_[s] & reason::rejected) && filter.innovation(sensors_[s], raw_.data(), scratch_)) sum += scratch_.nis;
+  return sum;
+}
+
+/// Log likelihood of what was not rejected, but for a constant.
+double SensorWatch::undisputed_likelihood(WalkingFilter& filter) noexcept {
+  filter.expect();
+  double sum = 0.0;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (!(findings_[s] & reason::rejected) && filter.innovation(sensors_[s], raw_.data(), scratch_))
+      sum -= 0.5 * (scratch_.nis + std::log(scratch_.covariance.determinant()));
+  return sum;
+}
+
+void SensorWatch::confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept {
+  if (!fits(hypothesis.filter, outputs)) {
+    refute(hypothesis);
+    return;
+  }
+  hypothesis.filter.update(outputs);
+  hypothesis.explained += counts;
+}
+
+/// Whether a sensor that sees the position was rejected.
+bool SensorWatch::is_position_disputed() const noexcept {
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if ((findings_[s] & reason::rejected) && sees_position(sensors_[s].outputs)) return true;
+  return false;
+}
+
+bool SensorWatch::sees_position(const std::vector<int>& outputs) const noexcept {
+  return std::ranges::any_of(outputs, [&](int j) { return sees_position(j); });
+}
+
+bool SensorWatch::sees_position(int output) const noexcept {
+  const Roles& roles = own_->filter.model().description().roles;
+  return (roles.position_x >= 0 && own_->filter.depends_on(output, roles.position_x)) ||
+         (roles.position_y >= 0 && own_->filter.depends_on(output, roles.position_y));
+}
+
+/// A disputed position can be followed only if nothing else says where the vehicle is.
+bool SensorWatch::may_follow() const noexcept {
+  bool is_any_undisputed = false;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    const std::vector<int>& outputs = sensors_[s].outputs;
+    if ((findings_[s] & reason::rejected) || std::ranges::all_of(outputs, [&](int j) { return std::isnan(raw_[j]); }))
+      continue;
+    if (sees_position(outputs)) return false;
+    is_any_undisputed = true;
+  }
+  return is_position_disputed() || !is_any_undisputed;
+}
+
+SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noexcept {
+  if (!is_disputed_) memory_->was_calm = calm_samples_ >= setup_.calm;
+  is_disputed_ = true;
+  ++disputed_samples_;
+  const auto consider = [&](Hypothesis& hypothesis) {
+    const bool is_new = !hypothesis.is_active;
+    if (is_new && &hypothesis == moved_.get()) start_moved();
+    if (is_new && &hypothesis != moved_.get()) start(hypothesis);
+    if (is_new && &hypothesis == slip_.get()) {
+      held_count_ = 0;
+      if (disputed_nis(hypothesis.filter) > left_unexplained * disputed_nis(own_->filter)) {
+        refute(hypothesis);
+        return;
+      }
+    }
+    // Whether the other sensors agree better with a vehicle whose state is what the disputed one says.
+    if (&hypothesis == moved_.get() && !is_new && !is_position_disputed())
+      hypothesis.evidence += undisputed_likelihood(hypothesis.filter) - undisputed_likelihood(own_->filter);
+    confront(hypothesis, raw_.data(), true);
+  };
+  consider(*slip_);
+  consider(*moved_);
+  think_again();
+  if (!is_blind_) consider(*blind_);
+  // Slip that has jumped shows from the first sample on. Later the filter without the sensor knows so little that new
+  // slip explains nearly anything.
+  const bool has_begun_with_it = disputed_samples_ - slip_->explained < fresh;
+  if (slip_->explained >= (has_begun_with_it ? setup_.slip_proof : setup_.proof)) {
+    Finding finding = accept(*slip_);
+    for (Record& record : records_) record = {};
+    acquit(outputs);
+    finding.release = true;
+    finding.rebase = false;
+    return finding;
+  }
+  if (slip_->is_active) hold_back(time, outputs);
+  bool after_gap = true;
+  for (std::size_t s = 0; s < sensors_.size(); ++s)
+    if (findings_[s] & reason::rejected) after_gap = after_gap && records_[s].after_gap;
+  if (moved_->explained >= (after_gap ? setup_.gap_proof : setup_.proof) &&
+      (may_follow() || moved_->evidence > convincing)) {
+    for (std::uint32_t& each : findings_)
+      if (each & reason::rejected) each |= reason::moved;
+    for (std::size_t s = 0; s < sensors_.size(); ++s) states_[s].reasons |= findings_[s] & reason::moved;
+    for (Record& record : records_) record = {};
+    return accept(*moved_);
+  }
+  if (memory_->search && disputed_samples_ > Memory::hopeless * setup_.proof && is_position_disputed()) {
+    // Nothing explains what is measured: the position counts, and all else is found anew.
+    start_moved();
+    moved_->filter.update(raw_.data());
+    for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
+      moved_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+    search_from(moved_->filter, *memory_->search);
+    for (Record& record : records_) record = {};
+    return accept(*moved_);
+  }
+  // Inputs of which nothing is known explain what any other sensor says. That it is they is to be seen in the motion.
+  if (!is_blind_ && blind_->explained >= setup_.proof && slip_->refuted > 0 && moved_->refuted > 0 &&
+      is_position_disputed()) {
+    is_blind_ = true;
+    trusted_samples_ = 0;
+    for (Record& record : records_) record = {};
+    return accept(*blind_);
+  }
+  return {};
+}
+
+/// What was held back, and what was rejected last, is right after all.
+void SensorWatch::acquit(const double* outputs) noexcept {
+  const auto take_back = [&](auto&& was_rejected) {
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      if (std::ranges::none_of(sensors_[s].outputs, was_rejected)) continue;
+      --states_[s].rejected;
+      ++states_[s].accepted;
+    }
+  };
+  for (int i = 0; i < held_count_; ++i) take_back([&](int j) { return !std::isnan(held_[i].outputs[j]); });
+  take_back([&](int j) { return std::isnan(outputs[j]) && !std::isnan(raw_[j]); });
+  for (std::uint32_t& each : findings_) each &= ~reason::rejected;
+  // Slip at a bound may well be beyond it, as that of wheels that spin on the spot.
+  const Eigen::Index nx = own_->filter.model().state_count();
+  bool is_usual = memory_->was_calm;
+  for (std::size_t j = 0; j < setup_.walk.size(); ++j) {
+    const double slip = own_->filter.mean()[nx + static_cast<Eigen::Index>(j)];
+    is_usual = is_usual && slip > setup_.noise.parameter_lower[j] && slip < setup_.noise.parameter_upper[j];
+  }
+  if (!is_usual) return;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    states_[s].reasons &= ~reason::rejected;
+    quiet_[s] = setup_.calm;
+  }
+  calm_samples_ = setup_.calm;
+}
+
+SensorWatch::Finding SensorWatch::accept(Hypothesis& hypothesis) noexcept {
+  own_->filter.mean() = hypothesis.filter.mean();
+  own_->filter.covariance() = hypothesis.filter.covariance();
+  end_dispute();
+  return {.release = false, .rebase = true};
+}
+
+/// Where a sensor that has moved does not explain what follows, the heading may be wrong, too, e.g. after a turn
+/// without a position. One that is found goes on as if the sensor had moved.
+void SensorWatch::think_again() noexcept {
+  if (!memory_->second_thought || moved_->refuted == 0 || moved_->explained >= informed) return;
+  HeadingSearch& search = *memory_->second_thought;
+  if (search.is_active()) {
+    const bool is_found = search.update(sensors_, raw_.data());
+    memory_->in_vain = search.explained() > 0 ? 0 : memory_->in_vain + 1;
+    if (!is_found && memory_->in_vain < stale) return;
+    if (is_found) {
+      moved_->is_active = true;
+      moved_->explained = search.explained();
+      moved_->filter.mean() = search.best().mean();
+      moved_->filter.covariance() = search.best().covariance();
+      return;
+    }
+  }
+  start_moved();
+  moved_->filter.update(raw_.data());
+  WalkingFilter& trial = *memory_->trial;
+  trial.mean() = moved_->filter.mean();
+  trial.covariance() = moved_->filter.covariance();
+  search_from(trial, search);
+  moved_->explained = 1;
+  memory_->in_vain = 0;
+}
+
+/// Keeps what was rejected, in case it is right.
+void SensorWatch::hold_back(double time, const double* outputs) noexcept {
+  if (held_count_ == static_cast<int>(held_.size())) return;
+  Held& held = held_[held_count_++];
+  held.time = time;
+  for (std::size_t j = 0; j < raw_.size(); ++j) held.outputs[j] = std::isnan(outputs[j]) ? raw_[j] : Memory::unknown;
+}
+
+void SensorWatch::end_dispute() noexcept {
+  is_disputed_ = false;
+  disputed_samples_ = 0;
+  if (memory_->second_thought) memory_->second_thought->cancel();
+  for (Hypothesis* each : {slip_.get(), moved_.get(), blind_.get()}) {
+    each->is_active = each->is_informed = false;
+    each->explained = each->refuted = 0;
+  }
+}
+
+/// Whether the measured inputs explain the last interval again.
+void SensorWatch::test_inputs(const double* outputs) noexcept {
+  WalkingFilter& trial = *memory_->trial;
+  trial.mean() = memory_->before_mean;
+  trial.covariance() = memory_->before_covariance;
+  trial.predict(input_.data(), memory_->duration);
+  trusted_samples_ = fits(trial, outputs) ? trusted_samples_ + 1 : 0;
+  if (trusted_samples_ >= trusted_again) is_blind_ = false;
+}
+
+}  // namespace rhec

@@ -1,0 +1,129 @@
+#include <algorithm>
+#include <cmath>
+
+#include "sensor_watch_parts.hpp"
+
+// What is said of an estimate, and of late measurements.
+
+namespace rhec {
+
+namespace {
+
+// While a measurement is missing, and for so many estimates afterwards, an ellipsoid of more than so many times
+// its usual volume is a finding; the usual one is a mean over so many estimates before.
+constexpr int aftermath = 10;
+constexpr double most_volume = 2.0, volume_memory = 10.0;
+
+}  // namespace
+
+void SensorWatch::judge_late(double time, double* outputs) noexcept {
+  if (!is_active_) return;
+  const Memory::Entry* last = nullptr;
+  const auto known = static_cast<std::size_t>(std::min<std::int64_t>(memory_->count, Memory::remembered_samples));
+  for (std::size_t i = 0; i < known; ++i) {
+    const Memory::Entry& entry = memory_->entries[i];
+    if (entry.time <= time && (!last || entry.time > last->time)) last = &entry;
+  }
+  if (!last) return;
+  WalkingFilter& filter = *memory_->trial;
+  filter.mean() = last->mean;
+  filter.covariance() = last->covariance;
+  filter.predict(last->inputs.data(), time - last->time);
+  filter.expect();
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (!filter.innovation(sensors_[s], outputs, scratch_)) continue;
+    if (scratch_.nis <= limit(s, scratch_.value.size())) {
+      ++states_[s].accepted;
+      continue;
+    }
+    ++states_[s].rejected;
+    states_[s].reasons |= reason::rejected;
+    quiet_[s] = 0;
+    for (const int j : sensors_[s].outputs) outputs[j] = Memory::unknown;
+  }
+}
+
+void SensorWatch::follow(const Estimate& estimate) noexcept {
+  const Model& model = own_->filter.model();
+  const Eigen::Index nx = model.state_count(), np = model.parameter_count(), n = nx + np;
+  if (estimate.state.size() != nx || estimate.parameters.size() != np || estimate.covariance.rows() != n) return;
+  if (!estimate.state.allFinite() || !estimate.parameters.allFinite() || !estimate.covariance.allFinite()) return;
+  const int heading = model.description().roles.heading;
+  if (!is_active_) {
+    if (!(estimate.covariance.diagonal().maxCoeff() > 0.0)) return;  // of one that is not estimated
+    if (heading >= 0 && estimate.covariance(heading, heading) > Memory::known_heading * Memory::known_heading) return;
+    is_active_ = true;
+  }
+  note_volume(estimate);
+  if (is_blind_ || is_searching()) return;
+  own_->filter.mean().head(nx) = estimate.state;
+  own_->filter.mean().tail(np) = estimate.parameters;
+  own_->filter.covariance() = estimate.covariance;
+}
+
+/// What volume is usual is learnt where nothing is missing.
+void SensorWatch::note_volume(const Estimate& estimate) noexcept {
+  if (aftermath_ > 0) {
+    --aftermath_;
+    return;
+  }
+  const double volume = memory_->log_volume(estimate.covariance);
+  if (std::isnan(usual_volume_))
+    usual_volume_ = volume;
+  else if (!std::isnan(volume))
+    usual_volume_ += (volume - usual_volume_) / volume_memory;
+}
+
+void SensorWatch::assess(const Estimate& estimate, std::span<const Presence> presence, bool are_inputs_overdue,
+                         std::uint32_t reasons, Health& health) noexcept {
+  health.reasons = reasons;
+  health.sensors.assign(states_.begin(), states_.end());
+  health.inputs = inputs_;
+  bool has_finding = reasons != 0 || calm_samples_ < setup_.calm || inputs_.reasons != 0;
+  bool is_overdue = are_inputs_overdue;
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    if (presence[s] == Presence::silent) health.sensors[s].reasons |= reason::silent;
+    is_overdue = is_overdue || presence[s] != Presence::present;
+    has_finding = has_finding || health.sensors[s].reasons != 0;
+  }
+  if (is_overdue) aftermath_ = aftermath;
+  const Roles& roles = own_->filter.model().description().roles;
+  const Eigen::MatrixXd& P = estimate.covariance;
+  if (is_searching()) health.reasons |= reason::uncertain;
+  bool is_lost = (reasons & reason::starting) != 0;
+  if (P.rows() > 0) {
+    double variance = 0.0;
+    for (const int i : {roles.position_x, roles.position_y})
+      if (i >= 0) variance = std::max(variance, P(i, i));
+    const bool is_place_known = variance <= setup_.lost_position * setup_.lost_position;
+    const bool is_heading_known =
+        roles.heading < 0 || P(roles.heading, roles.heading) <= setup_.lost_heading * setup_.lost_heading;
+    if (!is_place_known || !is_heading_known) {
+      health.reasons |= reason::uncertain;
+      is_lost = true;
+    }
+    if (aftermath_ > 0 && P.rows() == own_->filter.mean().size() &&
+        memory_->log_volume(P) > usual_volume_ + std::log(most_volume)) {
+      health.reasons |= reason::uncertain;
+      has_finding = true;
+    }
+  }
+  is_lost =
+      is_lost || is_searching() || (disputed_samples_ > Memory::hopeless * setup_.proof && is_position_disputed());
+  health.level = is_lost ? HealthLevel::lost : has_finding ? HealthLevel::degraded : HealthLevel::ok;
+}
+
+void SensorWatch::predict(double duration, const double* inputs, const double* input_sigmas,
+                          Estimate& estimate) noexcept {
+  WalkingFilter& filter = *memory_->trial;
+  const Eigen::Index nx = filter.model().state_count(), np = filter.model().parameter_count();
+  if (estimate.state.size() != nx || estimate.parameters.size() != np || estimate.covariance.rows() != nx + np) return;
+  filter.mean().head(nx) = estimate.state;
+  filter.mean().tail(np) = estimate.parameters;
+  filter.covariance() = estimate.covariance;
+  filter.predict(inputs, duration, input_sigmas);
+  estimate.state = filter.mean().head(nx);
+  estimate.covariance = filter.covariance();
+}
+
+}  // namespace rhec
