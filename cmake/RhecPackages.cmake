@@ -5,7 +5,8 @@
 #   librhec-dev   headers, the CMake package, plugins/template
 #   python3-rhec  the Python package
 #   rhec-ros      the node
-set(RHEC_MAINTAINER "the rhec authors <rhec@localhost.localdomain>" CACHE STRING "Who is named as the maintainer of Debian packages")
+set(RHEC_MAINTAINER "the rhec authors <rhec@localhost.localdomain>" CACHE STRING
+  "Who is named as the maintainer of Debian packages: a name, and an address that is read")
 
 # Documents that Debian's packages have. The date of a package is SOURCE_DATE_EPOCH's, where that is set.
 set(RHEC_PACKAGE_REVISION 1)
@@ -37,9 +38,8 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 # Libraries of other packages are found by dpkg-shlibdeps; those of our own package are looked for where they were built.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${CMAKE_LIBRARY_OUTPUT_DIRECTORY}")
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")
 set(RHEC_THIS_VERSION "${PROJECT_VERSION}-${RHEC_PACKAGE_REVISION}")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each component's begins with its own
 
 get_cmake_property(KNOWN COMPONENTS)
 set(CPACK_COMPONENTS_ALL rhec dev)
@@ -51,20 +51,27 @@ endforeach()
 
 set(CPACK_DEBIAN_RHEC_PACKAGE_NAME rhec)
 set(CPACK_DEBIAN_RHEC_PACKAGE_SECTION science)
+# Which package a library is in, and that the loader's cache is to be renewed. (cpack would do so by scripts.)
+get_property(LIBRARIES GLOBAL PROPERTY RHEC_SHARED_LIBRARIES)
+list(TRANSFORM LIBRARIES APPEND " ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} rhec (= ${RHEC_THIS_VERSION})\n" OUTPUT_VARIABLE SHLIBS)
+list(JOIN SHLIBS "" SHLIBS)
+file(CONFIGURE OUTPUT "${DOCUMENTS}/shlibs" CONTENT "${SHLIBS}")
+file(CONFIGURE OUTPUT "${DOCUMENTS}/triggers" CONTENT "activate-noawait ldconfig\n")
+set(CPACK_DEBIAN_RHEC_PACKAGE_CONTROL_EXTRA "${DOCUMENTS}/shlibs;${DOCUMENTS}/triggers")
 set(CPACK_COMPONENT_RHEC_DESCRIPTION "receding horizon estimation and control of field robots that slip
- rhec estimates how much the wheels of a field robot slip, and steers the robot
- along a path with what it has learned. This package has the command line, the
- libraries and the plugins: vehicle models, priors, blocking strategies, terms
- and solvers.")
+rhec estimates how much the wheels of a field robot slip, and steers the robot
+along a path with what it has learned. This package has the command line, the
+libraries and the plugins: vehicle models, priors, blocking strategies, terms
+and solvers.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME librhec-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "rhec (= ${RHEC_THIS_VERSION}), libeigen3-dev, libfmt-dev, libxsimd-dev")
 set(CPACK_DEBIAN_DEV_PACKAGE_SUGGESTS "cmake, g++")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "headers of rhec, for robots and plugins
- What programs and plugins are built with that use rhec, a framework for
- receding horizon estimation and control: headers, the CMake package and a
- project with plugins to begin with.")
+What programs and plugins are built with that use rhec, a framework for
+receding horizon estimation and control: headers, the CMake package and a
+project with plugins to begin with.")
 
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-rhec)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
@@ -76,16 +83,16 @@ endif()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "rhec (= ${RHEC_THIS_VERSION}), ${PYTHON}, python3-numpy")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-sympy, python3-pandas, librhec-dev")
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "rhec from Python
- The same as the command line and the library of rhec, a framework for receding
- horizon estimation and control, from Python: robots sample by sample, runs,
- recorded drives, sweeps, tuning and problems. Results are arrays of numpy.")
+The same as the command line and the library of rhec, a framework for receding
+horizon estimation and control, from Python: robots sample by sample, runs,
+recorded drives, sweeps, tuning and problems. Results are arrays of numpy.")
 
 set(CPACK_DEBIAN_ROS_PACKAGE_NAME rhec-ros)
 set(CPACK_DEBIAN_ROS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_ROS_PACKAGE_DEPENDS "rhec (= ${RHEC_THIS_VERSION})")
 set(CPACK_COMPONENT_ROS_DESCRIPTION "rhec as a node of ROS 2
- The estimator and the controller of rhec, a framework for receding horizon
- estimation and control, as a node of ROS 2.")
+The estimator and the controller of rhec, a framework for receding horizon
+estimation and control, as a node of ROS 2.")
 
 # What each package has in /usr/share/doc, and why lintian is to overlook what it has found.
 foreach(COMPONENT IN LISTS CPACK_COMPONENTS_ALL)

@@ -17,7 +17,6 @@
 #include "rhec/core/ocp/solver.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
-#include "rhec/sim/check/derivative_check.hpp"
 #include "support/random_problem.hpp"
 
 namespace {
@@ -37,22 +36,25 @@ void write(const std::string& kind, const std::string& vehicle, const std::strin
   fmt::print("\n");
 }
 
-/// F, h and all of their derivatives at random stages, by the kernels of an instruction set.
-void write_evaluations(const Model& model, const std::string& vehicle, const std::string& set) {
+/// F, h and all of their derivatives along a drive, by the kernels of an instruction set. A ramp leads from the slip of
+/// an interval to that of the next.
+void write_evaluations(const std::shared_ptr<const Model>& shared, const std::string& vehicle, const std::string& set) {
+  const Model& model = *shared;
   const bool second = model.has_second_derivatives();
   const int nx = model.state_count(), ny = model.output_count();
-  const rhec::sim::StagePoints stages = rhec::sim::random_stages(model.description(), stage_count, 1);
+  RandomProblem random(shared, 1);
+  const RandomProblem::Drive drive = random.drive(random.durations(stage_count + 1, 0.05, 0.25), false);
   for (const bool ramp : {false, true}) {
     for (const int substeps : {1, 3}) {
       const int nz = nx + model.input_count() + (ramp ? 2 : 1) * model.parameter_count();
       std::vector<double> next(stage_count * nx), jacobians(stage_count * nx * nz), multipliers(stage_count * nx, 1.0),
           hessians(stage_count * nz * nz);
       model.integrate({.count = stage_count,
-                       .states = stages.states.data(),
-                       .inputs = stages.inputs.data(),
-                       .parameters = stages.parameters.data(),
-                       .parameters_end = ramp ? stages.parameters_end.data() : nullptr,
-                       .durations = stages.durations.data(),
+                       .states = drive.states.data(),
+                       .inputs = drive.inputs.data(),
+                       .parameters = drive.parameters.data(),
+                       .parameters_end = ramp ? drive.parameters.data() + model.parameter_count() : nullptr,
+                       .durations = drive.durations.data(),
                        .substeps = substeps,
                        .next_states = next.data(),
                        .jacobians = jacobians.data(),
@@ -67,7 +69,7 @@ void write_evaluations(const Model& model, const std::string& vehicle, const std
   std::vector<double> outputs(stage_count * ny), jacobians(stage_count * ny * nx), multipliers(stage_count * ny, 1.0),
       hessians(stage_count * nx * nx);
   model.observe({.count = stage_count,
-                 .states = stages.states.data(),
+                 .states = drive.states.data(),
                  .outputs = outputs.data(),
                  .jacobians = jacobians.data(),
                  .multipliers = second ? multipliers.data() : nullptr,
@@ -110,10 +112,10 @@ int main(int count, char** words) try {
   const rhec::Host host;
   for (const std::string vehicle : std::span(words + 1, words + count)) {
     const std::shared_ptr<Model> model = host.make_model(vehicle);
-    write_evaluations(*model, vehicle, "widest");  // the set that the machine is given
+    write_evaluations(model, vehicle, "widest");  // the set that the machine is given
     write_steps(host, model, vehicle);
     model->use_instruction_set("generic");
-    write_evaluations(*model, vehicle, "generic");
+    write_evaluations(model, vehicle, "generic");
   }
   return 0;
 } catch (const std::exception& error) {
