@@ -107,4 +107,17 @@ foreach(COMPONENT IN LISTS CPACK_COMPONENTS_ALL)
   endif()
 endforeach()
 
+# The terms of what is compiled in, as the packages of these headers have them.
+set(EMBEDDED_RHEC libeigen3-dev libfmt-dev libxsimd-dev libcli11-dev nlohmann-json3-dev)
+set(EMBEDDED_PYTHON pybind11-dev)
+foreach(NAME IN ITEMS RHEC PYTHON)
+  string(TOLOWER ${NAME} COMPONENT)
+  foreach(PACKAGE IN LISTS EMBEDDED_${NAME})
+    if(COMPONENT IN_LIST CPACK_COMPONENTS_ALL AND EXISTS "/usr/share/doc/${PACKAGE}/copyright")
+      install(FILES "/usr/share/doc/${PACKAGE}/copyright"
+        DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/${CPACK_DEBIAN_${NAME}_PACKAGE_NAME}/embedded" RENAME "${PACKAGE}" COMPONENT ${COMPONENT})
+    endif()
+  endforeach()
+endforeach()
+
 include(CPack)
