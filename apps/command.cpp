@@ -77,9 +77,10 @@ Argument Command::add_optional(const std::string& name, std::optional<std::strin
   return Argument(app_->add_option_function<std::vector<std::string>>(name, take, meaning)->expected(0, 1));
 }
 
-Program::Program(const std::string& about, const std::string& examples, std::string first_steps)
+Program::Program(const std::string& about, const std::string& examples, std::string first_steps,
+                 std::function<std::string()> version)
     : app_(std::make_unique<CLI::App>(about, "rhec")), first_steps_(std::move(first_steps)) {
-  app_->set_version_flag("--version", "rhec " RHEC_PROJECT_VERSION);
+  app_->set_version_flag("--version", std::move(version), "Show the version, and what this program was built with");
   app_->require_subcommand(1);
   app_->footer(examples);
 }

@@ -64,8 +64,9 @@ class Command {
 /// The program: one of its commands is called.
 class Program {
  public:
-  /// `first_steps` is what is printed where there is not even a command.
-  Program(const std::string& about, const std::string& examples, std::string first_steps);
+  /// `first_steps` is what is printed where there is not even a command, `version` makes what `--version` prints.
+  Program(const std::string& about, const std::string& examples, std::string first_steps,
+          std::function<std::string()> version);
   ~Program();
 
   /// `notes` follow the help of the command's arguments.

@@ -13,6 +13,7 @@
 #include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "version.hpp"
 
 namespace rhec::apps {
 
@@ -95,7 +96,7 @@ std::string first_steps() {
 }
 
 int run(int count, char** words) {
-  Program program(about, examples, first_steps());
+  Program program(about, examples, first_steps(), &version_text);
   add_run(program);
   add_estimate(program);
   add_smooth(program);

@@ -4,20 +4,27 @@ if(NOT xsimd_FOUND)
   message(STATUS "rhec: xsimd was not found (package libxsimd-dev): models evaluate one stage at a time")
 endif()
 
-# Instruction sets that models are also compiled for, and what the compiler must be told; rhec/core/base/instruction_sets.hpp
-# asks the machine for all of it before it uses them.
+# Instruction sets of this kind of processor that models are also compiled for, slowest first, and what the compiler must be
+# told; rhec/core/base/instruction_sets.hpp lists the same, and asks the machine for all of it before it uses them.
+set(RHEC_WIDE_SETS "")
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+  set(RHEC_WIDE_SETS avx2 avx512)
+elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+  set(RHEC_WIDE_SETS neon)
+endif()
 set(RHEC_WIDE_FLAGS_avx2 -mavx2 -mfma)
 set(RHEC_WIDE_FLAGS_avx512 ${RHEC_WIDE_FLAGS_avx2} -mavx512f -mavx512cd -mavx512dq -mavx512bw -mavx512vl)
+set(RHEC_WIDE_FLAGS_neon "")  # every compiler for 64-bit ARM takes it for granted
 
-set(RHEC_MODEL_INSTRUCTION_SETS generic avx2 avx512 CACHE STRING
+set(RHEC_MODEL_INSTRUCTION_SETS generic ${RHEC_WIDE_SETS} CACHE STRING
   "Instruction sets that models are compiled for; generic is always among them. One is enough to try a model out.")
 
 set(RHEC_MODEL_WRITERS "" CACHE PATH
   "When cross-compiling without CMAKE_CROSSCOMPILING_EMULATOR: the folder in which a build for this machine has its programs <model>_write")
 
 # rhec_add_model_kernels(TARGET PREFIX FORMULA_HEADER header FORMULA class_template)
-#   Compiles the kernels of a formula into TARGET, for every set of RHEC_MODEL_INSTRUCTION_SETS (without xsimd or off x86-64
-#   for the generic one alone), and with them `const rhec::StraightCode& rhec::<PREFIX>_kernels()` that returns them. A
+#   Compiles the kernels of a formula into TARGET, for every set of RHEC_MODEL_INSTRUCTION_SETS (without xsimd for the
+#   generic one alone), and with them `const rhec::StraightCode& rhec::<PREFIX>_kernels()` that returns them. A
 #   program <PREFIX>_write records the formula as a graph, differentiates it, and writes the kernels as C++.
 function(rhec_add_model_kernels TARGET PREFIX)
   cmake_parse_arguments(PARSE_ARGV 2 ARG "" "FORMULA_HEADER;FORMULA" "")
@@ -26,19 +33,18 @@ function(rhec_add_model_kernels TARGET PREFIX)
   endif()
   get_filename_component(HEADER "${ARG_FORMULA_HEADER}" ABSOLUTE)
   set(FOLDER "${CMAKE_CURRENT_BINARY_DIR}/${PREFIX}_kernels")
-  set(SETS generic)
-  if(xsimd_FOUND AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
-    foreach(SET IN ITEMS avx2 avx512)
-      if(SET IN_LIST RHEC_MODEL_INSTRUCTION_SETS)
-        list(APPEND SETS ${SET})
-      endif()
-    endforeach()
-    set(UNKNOWN ${RHEC_MODEL_INSTRUCTION_SETS})
-    list(REMOVE_ITEM UNKNOWN generic avx2 avx512)
-    if(UNKNOWN)
-      message(FATAL_ERROR "RHEC_MODEL_INSTRUCTION_SETS: '${UNKNOWN}' is none of generic, avx2, avx512")
-    endif()
+  set(UNKNOWN ${RHEC_MODEL_INSTRUCTION_SETS})
+  list(REMOVE_ITEM UNKNOWN generic ${RHEC_WIDE_SETS})
+  if(UNKNOWN)
+    list(JOIN RHEC_WIDE_SETS ", " KNOWN)
+    message(FATAL_ERROR "RHEC_MODEL_INSTRUCTION_SETS: '${UNKNOWN}' is none of those for ${CMAKE_SYSTEM_PROCESSOR}: generic, ${KNOWN}")
   endif()
+  set(SETS generic)
+  foreach(SET IN LISTS RHEC_WIDE_SETS)
+    if(xsimd_FOUND AND SET IN_LIST RHEC_MODEL_INSTRUCTION_SETS)
+      list(APPEND SETS ${SET})
+    endif()
+  endforeach()
 
   file(CONFIGURE OUTPUT "${FOLDER}/write.cpp" CONTENT "\
 #include \"rhec/core/model/write_model_code.hpp\"

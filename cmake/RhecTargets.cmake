@@ -6,6 +6,9 @@ target_compile_options(rhec_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -W
 # x86-64-v2 is what any field computer of the last decade has; kernels for wider registers are chosen at run time.
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   target_compile_options(rhec_flags INTERFACE -march=x86-64-v2)
+else()
+  # That has no fused product and sum; processors that have it round as if they had not, but in targets with this property.
+  target_compile_options(rhec_flags INTERFACE "$<$<NOT:$<BOOL:$<TARGET_PROPERTY:RHEC_FUSES>>>:-ffp-contract=off>")
 endif()
 # IEEE semantics stay; only what costs speed and is never read (errno, floating-point traps) goes.
 target_compile_options(rhec_flags INTERFACE -fno-math-errno -fno-trapping-math)
@@ -77,7 +80,9 @@ function(rhec_set_up_shared_library NAME)
   set_target_properties(${TARGET} PROPERTIES
     LINKER_LANGUAGE CXX VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
     EXPORT_NAME ${NAME} INSTALL_RPATH "$ORIGIN")
-  install(TARGETS ${TARGET} EXPORT rhecTargets LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+  set_property(GLOBAL APPEND PROPERTY RHEC_SHARED_LIBRARIES lib${TARGET})
+  install(TARGETS ${TARGET} EXPORT rhecTargets
+    LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT rhec NAMELINK_COMPONENT dev)
 endfunction()
 
 # rhec_unite(TARGET): with RHEC_UNITY, several of the target's sources are compiled as one. Those with a private header
@@ -136,8 +141,18 @@ function(rhec_add_room FLOOR ROOM)
   endif()
   if(NOT ARG_INTERNAL)
     set_property(GLOBAL APPEND PROPERTY RHEC_HEADERS_${FLOOR} "${CMAKE_CURRENT_SOURCE_DIR}/include")
-    install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+    install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT dev)
   endif()
+endfunction()
+
+# rhec_write_set_list(SOURCE HEADER set ...): the header of SOURCE with RHEC_FOR_EACH_SET(of), which is `of(<set>)` for each of the
+# instruction sets that kernels were compiled for.
+function(rhec_write_set_list SOURCE HEADER)
+  set(FOLDER "${CMAKE_CURRENT_BINARY_DIR}/sets")
+  list(TRANSFORM ARGN REPLACE "(.+)" "of(\\1)" OUTPUT_VARIABLE CALLS)
+  list(JOIN CALLS " " CALLS)
+  file(CONFIGURE OUTPUT "${FOLDER}/${HEADER}" CONTENT "#pragma once\n\n#define RHEC_FOR_EACH_SET(of) ${CALLS}\n")
+  set_source_files_properties("${SOURCE}" PROPERTIES INCLUDE_DIRECTORIES "${FOLDER}")
 endfunction()
 
 # rhec_add_objects(FLOOR TARGET): what an object library has compiled becomes part of a floor's library.
@@ -155,7 +170,7 @@ function(rhec_add_library NAME)
   if(ARG_SOURCES)
     list(APPEND HEADERS "${CMAKE_CURRENT_SOURCE_DIR}/include")
     set_property(GLOBAL APPEND PROPERTY RHEC_HEADERS_${NAME} "${CMAKE_CURRENT_SOURCE_DIR}/include")
-    install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+    install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT dev)
   endif()
   add_library(rhec_${NAME} SHARED ${ARG_SOURCES} ${OBJECTS})
   target_include_directories(rhec_${NAME} PUBLIC
@@ -177,7 +192,7 @@ function(rhec_add_plugin NAME)
     LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/${RHEC_PLUGIN_DIRECTORY}"
     INSTALL_RPATH "$ORIGIN/${LIB_FROM_PLUGINS}")
   set_property(GLOBAL APPEND PROPERTY RHEC_PLUGIN_TARGETS ${NAME})
-  install(TARGETS ${NAME} LIBRARY DESTINATION "${RHEC_PLUGIN_DIRECTORY}")
+  install(TARGETS ${NAME} LIBRARY DESTINATION "${RHEC_PLUGIN_DIRECTORY}" COMPONENT rhec)
 endfunction()
 
 include("${CMAKE_CURRENT_LIST_DIR}/RhecModel.cmake")

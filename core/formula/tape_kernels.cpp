@@ -226,11 +226,13 @@ void load_rows(const double* rows, std::ptrdiff_t step, int count, int columns, 
 RHEC_INLINE inline void gather_eight(const double* from, const std::int32_t* offsets, double* to) {
 #if defined(__AVX512F__)
   _mm512_storeu_pd(to, _mm512_i32gather_pd(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(offsets)), from, 8));
-#else
+#elif defined(__AVX2__)
   for_indices<2>([&](auto half) RHEC_INLINE {
     const __m128i four = _mm_loadu_si128(reinterpret_cast<const __m128i*>(offsets + 4 * half));
     _mm256_storeu_pd(to + 4 * half, _mm256_i32gather_pd(from, four, 8));
   });
+#else
+  for_indices<8>([&](auto i) RHEC_INLINE { to[i] = from[offsets[i]]; });
 #endif
 }
 #endif
@@ -266,7 +268,7 @@ RHEC_INLINE inline void store_group(const StoredEight& group, const double* regi
     const auto from = [&](auto i)
                           RHEC_INLINE { return registers + std::ptrdiff_t{group.sources[column + i]} * (lanes / 8); };
     Lane block[width];
-    if (is_half && (part > 0 || width > 4)) {  // zero from column 4 on
+    if (is_half && column + width > 4) {  // zero from column 4 on
       for_indices<8 / width>([&](auto packs) RHEC_INLINE {
         for_indices<width>([&](auto i) RHEC_INLINE {
           if constexpr (column + i < 4)

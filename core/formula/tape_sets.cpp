@@ -1,20 +1,16 @@
 #include "rhec/core/base/instruction_sets.hpp"
 #include "rhec/core/formula/tape.hpp"
+#include "tape_set_list.hpp"
 
 namespace rhec {
 
-extern const TapeKernels tape_kernels_generic;
-#if defined(RHEC_WIDE_TAPES)
-extern const TapeKernels tape_kernels_avx2, tape_kernels_avx512;
-#endif
+#define RHEC_DECLARED(set) extern const TapeKernels tape_kernels_##set;
+RHEC_FOR_EACH_SET(RHEC_DECLARED)
 
 namespace {
 
-constexpr const TapeKernels* kernel_sets[] = {&tape_kernels_generic,
-#if defined(RHEC_WIDE_TAPES)
-                                              &tape_kernels_avx2, &tape_kernels_avx512
-#endif
-};
+#define RHEC_TAPE_KERNELS(set) &tape_kernels_##set,
+constexpr const TapeKernels* kernel_sets[] = {RHEC_FOR_EACH_SET(RHEC_TAPE_KERNELS)};
 
 }  // namespace
 

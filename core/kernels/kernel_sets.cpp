@@ -1,29 +1,22 @@
 #include "rhec/core/kernels/kernel_sets.hpp"
 
+#include "kernel_set_list.hpp"
 #include "rhec/core/base/instruction_sets.hpp"
 
 namespace rhec {
 
-extern const BankKernels bank_kernels_generic;
-extern const RiccatiKernels riccati_kernels_generic;
-extern const QpKernels qp_kernels_generic;
-extern const TranscriptionKernels transcription_kernels_generic;
-#if defined(RHEC_WIDE_KERNELS)
-extern const BankKernels bank_kernels_avx2, bank_kernels_avx512;
-extern const RiccatiKernels riccati_kernels_avx2, riccati_kernels_avx512;
-extern const QpKernels qp_kernels_avx2, qp_kernels_avx512;
-extern const TranscriptionKernels transcription_kernels_avx2, transcription_kernels_avx512;
-#endif
+#define RHEC_DECLARED(set)                           \
+  extern const BankKernels bank_kernels_##set;       \
+  extern const RiccatiKernels riccati_kernels_##set; \
+  extern const QpKernels qp_kernels_##set;           \
+  extern const TranscriptionKernels transcription_kernels_##set;
+RHEC_FOR_EACH_SET(RHEC_DECLARED)
 
 namespace {
 
-constexpr KernelSet kernel_sets[] = {
-    {"generic", &riccati_kernels_generic, &qp_kernels_generic, &transcription_kernels_generic, &bank_kernels_generic},
-#if defined(RHEC_WIDE_KERNELS)
-    {"avx2", &riccati_kernels_avx2, &qp_kernels_avx2, &transcription_kernels_avx2, &bank_kernels_avx2},
-    {"avx512", &riccati_kernels_avx512, &qp_kernels_avx512, &transcription_kernels_avx512, &bank_kernels_avx512},
-#endif
-};
+#define RHEC_KERNEL_SET(set) \
+  {#set, &riccati_kernels_##set, &qp_kernels_##set, &transcription_kernels_##set, &bank_kernels_##set},
+constexpr KernelSet kernel_sets[] = {RHEC_FOR_EACH_SET(RHEC_KERNEL_SET)};
 
 }  // namespace
 

@@ -143,7 +143,7 @@ class Model:
         it. Returns a BuiltModel, for configurations as this one is.
 
         folder: of the sources; without one a folder of the user's cache, where it is found again the next time
-        instruction_sets: of generic, avx2, avx512; all without any. One is enough to try a model out.
+        instruction_sets: of generic, avx2, avx512 (on ARM generic, neon); all without any. One is enough to try a model out.
 
         Takes cmake and the compiler that rhec was built with.
         """

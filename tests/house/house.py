@@ -4,7 +4,7 @@ import sys
 
 FOLDERS = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms", "logs", "sim", "apps", "python", "benchmarks")
 CODE_FOLDERS = FOLDERS + ("tests", "examples")
-ALL_FOLDERS = CODE_FOLDERS + ("cmake", "docs", "scenarios", "scripts", ".ci")
+ALL_FOLDERS = CODE_FOLDERS + ("cmake", "docs", "packaging", "scenarios", "scripts", ".ci")
 CODE = {".hpp", ".cpp", ".h", ".cc", ".in"}
 TEXT = CODE | {".py", ".sh", ".cmake", ".txt", ".md", ".yaml", ".yml", ".json", ".toml", ".js", ".mjs", ".css", ".html", ""}
 

@@ -22,6 +22,7 @@ SUITES = {
     "cli": "the commands of apps/, from outside: apps/check.cpp is tested by tests/cli/check.py",
     "closed_loop": "estimator and controller together",
     "house": "the house itself",
+    "machines": "the same numbers on other processors",
     "performance": "counts of instructions",
     "python": "the package of python/, from Python",
     "reference": "recorded solutions",

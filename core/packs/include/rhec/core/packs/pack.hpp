@@ -80,6 +80,17 @@ struct Pack {
 using WidestPack = Pack<xsimd::avx512dq>;
 #elif defined(__AVX2__)
 using WidestPack = Pack<xsimd::fma3<xsimd::avx2>>;
+#elif defined(__aarch64__)
+using WidestPack = Pack<xsimd::neon64>;
+#endif
+
+#if defined(__aarch64__)
+/// Transposes two packs of two, taken as a matrix.
+RHEC_INLINE inline void transpose(Pack<xsimd::neon64>* a) {
+  const float64x2_t first = a[0].values;
+  a[0] = vzip1q_f64(first, a[1].values);
+  a[1] = vzip2q_f64(first, a[1].values);
+}
 #endif
 
 #if defined(__AVX2__)

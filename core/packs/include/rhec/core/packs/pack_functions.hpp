@@ -16,6 +16,17 @@ namespace rhec {
 
 // a b + c, a b - c and c - a b, rounded once. xsimd has none of them for AVX-512, and leaves that to the compiler,
 // which is told not to fuse what is written apart (rhec/core/formula/lane.hpp).
+#if defined(__aarch64__)
+RHEC_INLINE static inline float64x2_t fused_multiply_add(float64x2_t a, float64x2_t b, float64x2_t c) {
+  return vfmaq_f64(c, a, b);
+}
+RHEC_INLINE static inline float64x2_t fused_multiply_subtract(float64x2_t a, float64x2_t b, float64x2_t c) {
+  return vfmaq_f64(vnegq_f64(c), a, b);
+}
+RHEC_INLINE static inline float64x2_t fused_subtract_product(float64x2_t c, float64x2_t a, float64x2_t b) {
+  return vfmsq_f64(c, a, b);
+}
+#endif
 #if defined(__AVX2__) && defined(__FMA__)
 RHEC_INLINE static inline __m256d fused_multiply_add(__m256d a, __m256d b, __m256d c) {
   return _mm256_fmadd_pd(a, b, c);
