@@ -61,9 +61,14 @@ def number_in(pattern, text):
     return float(found.group(1)) if found else float("nan")
 
 
+def commands_in(page):
+    return [shlex.split(line, comments=True)[1:] for block in BLOCK.findall((cli.ROOT / page).read_text()) for line in block.splitlines()]
+
+
 def commands_of_the_page(rhec, findings):
-    commands = [shlex.split(line)[1:] for block in BLOCK.findall((cli.ROOT / "docs" / "live.md").read_text()) for line in block.splitlines()]
+    commands = commands_in("docs/live.md")
     findings.expect(len(commands) == 2, "docs/live.md", f"{len(commands)} commands")
+    findings.expect(commands_in("README.md") == commands, "README.md", "has other commands than docs/live.md")
     with Domain() as domain:
         robot, node = (domain.start(rhec, *command, *QUICK) for command in commands)
         node_code, node_text = end_of(node, 120)

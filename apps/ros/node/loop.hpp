@@ -104,6 +104,7 @@ class Loop {
   logs::Stamp now() const;
   double time_of(logs::Stamp stamp) const { return logs::seconds_between(start_, stamp); }
   Clock::time_point next_look() const;
+  void set_due(Clock::time_point begin, bool was_triggered);
 
   Participant& wire_;
   Intake& intake_;

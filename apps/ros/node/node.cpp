@@ -72,8 +72,8 @@ void print_report(const LoopReport& report) {
              report.estimator.estimates);
   const sim::Spread latency = sim::spread_of(report.latencies);
   if (!report.latencies.empty())
-    fmt::print("latency from the last measurement to the command [ms]: median {:.3f}, p99 {:.3f}, max {:.3f}\n",
-               1e3 * latency.median, 1e3 * latency.p99, 1e3 * latency.max);
+    fmt::print("latency from the last measurement to the {} [ms]: median {:.3f}, p99 {:.3f}, max {:.3f}\n",
+               report.driven > 0 ? "command" : "estimate", 1e3 * latency.median, 1e3 * latency.p99, 1e3 * latency.max);
 }
 
 /// Makes a controller for a path that has come, and hands it to the loop; what cannot be followed is told.

@@ -1,10 +1,14 @@
 #include "confinement.hpp"
 
 #include <fmt/format.h>
+#include <linux/filter.h>
+#include <net/if.h>
 #include <sys/socket.h>
 
+#include <array>
 #include <cerrno>
 #include <charconv>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 
@@ -38,14 +42,23 @@ std::set<int> udp_sockets() {
 Confinement::Confinement() : before_(udp_sockets()) {}
 
 void Confinement::apply(const std::string& interface) const {
+  const unsigned index = if_nametoindex(interface.c_str());
+  if (index == 0) throw Error(fmt::format("the interface {} is not there: {}", interface, std::strerror(errno)));
+  // By the interface that a packet came in by: all of it is kept (largest length), or nothing.
+  constexpr std::uint32_t came_in_by = static_cast<std::uint32_t>(SKF_AD_OFF) + SKF_AD_IFINDEX, all = 0xffffffff;
+  std::array<sock_filter, 5> code{{
+      {.code = BPF_LD | BPF_W | BPF_ABS, .jt = 0, .jf = 0, .k = came_in_by},
+      {.code = BPF_JMP | BPF_JEQ | BPF_K, .jt = 1, .jf = 0, .k = index},
+      {.code = BPF_JMP | BPF_JEQ | BPF_K, .jt = 0, .jf = 1, .k = if_nametoindex("lo")},
+      {.code = BPF_RET | BPF_K, .jt = 0, .jf = 0, .k = all},
+      {.code = BPF_RET | BPF_K, .jt = 0, .jf = 0, .k = 0},
+  }};
+  const sock_fprog filter{.len = code.size(), .filter = code.data()};
   for (const int descriptor : udp_sockets()) {
     if (before_.contains(descriptor)) continue;
-    if (setsockopt(descriptor, SOL_SOCKET, SO_BINDTODEVICE, interface.c_str(),
-                   static_cast<socklen_t>(interface.size() + 1)) != 0)
+    if (setsockopt(descriptor, SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof(filter)) != 0)
       throw Error(
-          fmt::format("the sockets could not be confined to the interface {}: {}; expected Linux 5.7 or newer, or the "
-                      "capability CAP_NET_RAW",
-                      interface, std::strerror(errno)));
+          fmt::format("the sockets could not be confined to the interface {}: {}", interface, std::strerror(errno)));
   }
 }
 
