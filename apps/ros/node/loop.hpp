@@ -96,6 +96,7 @@ class Loop {
   void cycle();
   Driving judge(const Estimate& estimate, Clock::time_point now) const;
   void send_command(const Estimate& estimate, logs::Stamp when, const Controller::Command* command);
+  void look_for_rival(const std::vector<PlaceOfFrame>& transforms);
   void tell(const Estimate& estimate, logs::Stamp when, double time, const Controller::Command* command);
   void tell_health(const Estimate& estimate, logs::Stamp when);
   void stop_robot() noexcept;
@@ -132,6 +133,8 @@ class Loop {
   std::vector<double> input_times_, held_;  ///< when, and a row
   std::vector<Obstacle> obstacles_;
   double obstacles_time_ = 0.0;
+  bool has_rival_ = false;    ///< since health was told last, another node has sent this one's transform
+  std::string rival_parent_;  ///< from which frame
   Driving driving_ = Driving::waiting;
   HealthLevel told_level_ = HealthLevel::ok;
   LoopReport report_;

@@ -11,7 +11,7 @@ namespace rhec::apps::ros {
 namespace {
 
 /// Topics that are heard and are no measurements.
-enum class Other : int { path, obstacles, stop, clock };
+enum class Other : int { path, obstacles, stop, clock, transforms };
 
 WireTopic topic_of(const std::string& name, const std::string& type) {
   return {name, type, type_hash(type, logs::builtin_definitions())};
@@ -45,6 +45,8 @@ void Loop::subscribe(const LiveTopics& topics) {
     // A stop is heard from everybody, reliable or not.
     hear(Other::stop, options_.names.stop, "std_msgs/msg/Bool", Delivery::latest);
   }
+  if (options_.frames.publish)
+    hear(Other::transforms, options_.names.transforms, "tf2_msgs/msg/TFMessage", Delivery::latest);
   if (options_.use_sim_time) hear(Other::clock, options_.names.clock, "rosgraph_msgs/msg/Clock", Delivery::latest);
 }
 
@@ -110,10 +112,27 @@ void Loop::hear_special(int which, std::span<const std::byte> message) {
       case Other::clock:
         simulated_now_ = read_clock(message);
         break;
+      case Other::transforms:
+        look_for_rival(read_transforms(message));
+        return;  // others' business, and much of it
     }
     ++count.used;
   } catch (const logs::RecordError& error) {
     refuse(Refusal::broken, error.what());
+  }
+}
+
+/// A frame has one parent, and a transform one owner (REP 105).
+void Loop::look_for_rival(const std::vector<PlaceOfFrame>& transforms) {
+  for (const PlaceOfFrame& transform : transforms) {
+    if (transform.child != options_.frames.vehicle) continue;
+    if (rival_parent_ != transform.parent)
+      say(
+          fmt::format("another node sends the transform from {} to {}, too; one of both must not: ros.frames.publish: "
+                      "false",
+                      logs::in_quotes(transform.parent), options_.frames.vehicle));
+    rival_parent_ = transform.parent;
+    has_rival_ = true;
   }
 }
 
@@ -153,7 +172,9 @@ void Loop::tell_health(const Estimate& estimate, logs::Stamp when) {
   const std::string findings = estimate.health.level != HealthLevel::ok && estimator_->watch()
                                    ? rhec::in_words(estimate.health, estimator_->watch()->sensors())
                                    : rhec::name_of(estimate.health.level);
-  const bool is_error = estimate.health.level == HealthLevel::lost || driving_ == Driving::silent;
+  const bool has_rival = std::exchange(has_rival_, false);
+  if (has_rival) values.push_back({"transform", "sent by another node, too, from " + rival_parent_});
+  const bool is_error = estimate.health.level == HealthLevel::lost || driving_ == Driving::silent || has_rival;
   const std::uint8_t level = is_error ? 2 : estimate.health.level == HealthLevel::degraded ? 1 : 0;
   message_.clear();
   sim::write_diagnostics(when, level, options_.node + ": estimate", findings + "; " + in_words(driving_), values,

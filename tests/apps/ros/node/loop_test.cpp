@@ -207,6 +207,21 @@ TEST_F(LoopTest, TellsItsEstimates) {
   EXPECT_TRUE(has_event("estimates, does not steer"));
 }
 
+TEST_F(LoopTest, NoticesAnotherOwnerOfItsTransform) {
+  begin({});
+  dds::DataWriter* const transforms = writer("rt/tf", "tf2_msgs/msg/TFMessage", true);
+  EXPECT_TRUE(becomes_while_measuring([&] {
+    logs::CdrWriter message;
+    sim::write_transform(now(), {"base_link", "wheel"}, {}, message);  // no rival
+    send(transforms, message);
+    message.clear();
+    sim::write_transform(now(), {"map", "base_link"}, {}, message);
+    send(transforms, message);
+    return has_event("another node sends the transform from 'map' to base_link");
+  }));
+  EXPECT_FALSE(has_event("wheel"));
+}
+
 TEST_F(LoopTest, SaysWhichProcessorsThereAre) {
   begin({});
   loop_->stop();
