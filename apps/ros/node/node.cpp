@@ -80,6 +80,7 @@ void print_report(const LoopReport& report) {
 void follow(const std::vector<Position>& places, const Robot& robot, const RosOptions& options, Loop& loop,
             double time) {
   std::vector<Waypoint> waypoints;
+  waypoints.reserve(places.size());
   for (const Position& place : places) waypoints.push_back({place.x, place.y, options.path_speed});
   try {
     const Path path(waypoints);

@@ -26,6 +26,8 @@ namespace {
 constexpr std::uint32_t most_domain = 232;
 // Participants on one host that find each other without multicast.
 constexpr int most_neighbours = 60;
+// Messages that are taken at once.
+constexpr std::size_t most_taken = 64;
 constexpr const char* discovery_topic = "ros_discovery_info";
 constexpr const char* discovery_type = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 
@@ -127,10 +129,13 @@ struct Participant::Parts {
   std::vector<ddsi_sertype*> types;  ///< by writer; a reference of each topic keeps them
   dds_entity_t announcement = 0;
   ddsi_sertype* announcement_type = nullptr;
-  std::vector<ddsi_serdata*> taken = std::vector<ddsi_serdata*>(64);
-  std::vector<dds_sample_info_t> infos = std::vector<dds_sample_info_t>(64);
+  std::vector<ddsi_serdata*> taken = std::vector<ddsi_serdata*>(most_taken);
+  std::vector<dds_sample_info_t> infos = std::vector<dds_sample_info_t>(most_taken);
+  std::vector<MessageReference> references;
 
+  Parts() { references.reserve(most_taken); }
   ~Parts() {
+    references.clear();
     if (domain > 0) dds_delete(domain);
   }
 
@@ -236,13 +241,15 @@ void Participant::take(const std::function<void(const Arrival&)>& use) {
     const auto most = static_cast<std::uint32_t>(parts.taken.size());
     const dds_return_t count =
         dds_takecdr(parts.readers[reader], parts.taken.data(), most, parts.infos.data(), DDS_ANY_STATE);
-    for (dds_return_t i = 0; i < count; ++i) {
-      const auto place = static_cast<std::size_t>(i);
-      const MessageReference message(parts.taken[place]);
-      if (!parts.infos[place].valid_data) continue;
-      const RawMessage raw = look_into(message.get());
+    // References first: whatever `use` throws, none is lost.
+    parts.references.clear();
+    for (dds_return_t i = 0; i < count; ++i) parts.references.emplace_back(parts.taken[static_cast<std::size_t>(i)]);
+    for (std::size_t i = 0; i < parts.references.size(); ++i) {
+      if (!parts.infos[i].valid_data) continue;
+      const RawMessage raw = look_into(parts.references[i].get());
       use({static_cast<int>(reader), raw.cdr, raw.received});
     }
+    parts.references.clear();
   }
 }
 

@@ -30,6 +30,7 @@ WireOptions wire_options(const RosOptions& options, const LiveArguments& argumen
   const auto found = std::ranges::find_if(distributions, [&](const auto& each) { return distro == each.first; });
   if (found == distributions.end()) {
     std::vector<std::string> names;
+    names.reserve(distributions.size());
     for (const auto& [name, bytes] : distributions) names.emplace_back(name);
     throw Error(fmt::format("{}: found '{}', expected {}", arguments.distro.empty() ? "ROS_DISTRO" : "--ros-distro",
                             distro, one_of(names)));
