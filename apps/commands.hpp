@@ -25,6 +25,7 @@ void add_log(Program& program);
 void add_map(Program& program);
 void add_model(Program& program);
 void add_report(Program& program);
+void add_ros(Program& program);
 void add_run(Program& program);
 void add_smooth(Program& program);
 void add_solve(Program& program);

@@ -65,6 +65,7 @@ constexpr const char* examples =
     "  rhec tune scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/tuned\n"
     "  rhec log drive.mcap --vehicle bicycle_slip\n"
     "  rhec estimate my_robot.yaml drive.mcap --out out/drive\n"
+    "  rhec ros my_robot.yaml\n"
     "  rhec report out/figure8 -o out/figure8.html\n"
     "  rhec map field.sqlite --geotiff out/geotiff\n\n"
     "'rhec COMMAND --help' says more of each command.";
@@ -105,6 +106,7 @@ int run(int count, char** words) {
   add_sweep(program);
   add_tune(program);
   add_log(program);
+  add_ros(program);
   add_report(program);
   add_map(program);
   add_check(program);

@@ -13,6 +13,7 @@
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
 #include "rhec/sim/loop/scenario.hpp"
+#include "ros/ros_options.hpp"
 
 namespace rhec::apps {
 namespace {
@@ -114,6 +115,7 @@ int show(const OptionsArguments& arguments) {
   std::vector<OptionSection> sections = sim::scenario_sections();
   for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
   for (OptionSection& section : logs::signal_sections()) sections.push_back(std::move(section));
+  for (OptionSection& section : ros::ros_sections()) sections.push_back(std::move(section));
   if (!arguments.section.empty()) {
     fmt::print("{}", section_or_key(sections, arguments.section));
     return exit_fine;

@@ -1,4 +1,4 @@
-#include "cdr_cursor.hpp"
+#include "rhec/logs/cdr/cdr_cursor.hpp"
 
 #include <fmt/format.h>
 

@@ -175,7 +175,7 @@ class IdlParser {
         tokens_.take();
         tokens_.expect(">");
       }
-    if (const auto kind = kind_of(word)) return {.name = "", .kind = *kind};
+    if (const auto kind = kind_of(word)) return {.name = "", .kind = *kind, .is_octet = word == "octet"};
     for (const std::string& candidate : {scoped(word), word})
       if (const auto found = typedefs_.find(candidate); found != typedefs_.end()) {
         FieldDefinition field = found->second;

@@ -62,7 +62,7 @@ std::string short_name(const std::string& type) {
 
 void append_fields(const StructureDefinition& structure, std::string& text) {
   for (const FieldDefinition& field : structure.fields) {
-    text += field.kind == Kind::structure ? short_name(field.type) : word_of(field.kind);
+    text += field.kind == Kind::structure ? short_name(field.type) : field.is_octet ? "byte" : word_of(field.kind);
     if (field.shape == Shape::array) text += fmt::format("[{}]", field.length);
     if (field.shape == Shape::sequence) text += "[]";
     text += fmt::format(" {}\n", field.name);

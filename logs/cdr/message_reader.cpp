@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "cdr_cursor.hpp"
 #include "field_path.hpp"
+#include "rhec/logs/cdr/cdr_cursor.hpp"
 #include "rhec/logs/signals/clock.hpp"
 
 namespace rhec::logs {

@@ -78,6 +78,7 @@ class MsgParser {
     if (text.empty()) return false;
     if (const auto kind = kind_of(text)) {
       field.kind = *kind;
+      field.is_octet = text == "byte";
     } else {
       field.kind = Kind::structure;
       field.type = resolved(text, type_);

@@ -26,4 +26,10 @@ std::array<double, 3> LocalPlane::forward(const GeodeticPoint& point) const {
   return place;
 }
 
+GeodeticPoint LocalPlane::reverse(const std::array<double, 3>& place) const {
+  GeodeticPoint point;
+  projection_->cartesian.Reverse(place[0], place[1], place[2], point.latitude, point.longitude, point.height);
+  return point;
+}
+
 }  // namespace rhec::logs

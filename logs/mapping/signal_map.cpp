@@ -166,7 +166,8 @@ const OptionTable<SignalMapOptions>& SignalMapOptions::table() {
 
 std::vector<OptionSection> signal_sections() {
   return {{"signals",
-           "For `rhec estimate`, `rhec smooth` and `rhec log`: which signals of a log are the model's outputs and "
+           "For `rhec estimate`, `rhec smooth`, `rhec log` and `rhec ros`: which signals of a log, or topics of a "
+           "robot, are the model's outputs and "
            "inputs. One that is "
            "not named is the signal of its own name.",
            SignalMapOptions::table().schema()},

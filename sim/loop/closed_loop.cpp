@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "consistency.hpp"
-#include "loop_world.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/sim/loop/loop_world.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
 
 namespace rhec::sim {
@@ -73,13 +73,6 @@ Spread spread_of_times(std::vector<double> times) {
   return times.empty() ? Spread{0.0, 0.0, 0.0} : spread_of(std::move(times));
 }
 
-std::vector<SensorDrift> drifts_of(const std::vector<SensorError>& errors) {
-  std::vector<SensorDrift> drifts;
-  drifts.reserve(errors.size());
-  for (const auto& [sigma, drift] : errors) drifts.push_back({sigma, drift});
-  return drifts;
-}
-
 /// Counts the states and parameters whose truth is within two standard deviations.
 void count_inside(const Sample& sample, const ModelDescription& about, std::vector<std::int64_t>& inside) {
   const auto states = static_cast<Eigen::Index>(about.states.size());
@@ -99,10 +92,7 @@ RunLog run_closed_loop(const Scenario& scenario, const LoopHooks& hooks) {
   Robot robot = with_hooks(scenario.robot(), hooks, [&k] { return k; });
   const Model& model = *robot.model();
   const Roles& roles = model.description().roles;
-  LoopWorld world(scenario, {.outputs = robot.output_sigmas(),
-                             .inputs = robot.input_sigmas(),
-                             .biases = drifts_of(robot.output_biases()),
-                             .scales = drifts_of(robot.output_scales())});
+  LoopWorld world(scenario, noise_of(robot));
   const TruthVehicle& truth = world.truth();
   const Sensors& sensors = world.sensors();
   robot.use_estimators(scenario_estimators(&truth));

@@ -1,4 +1,4 @@
-#include "loop_world.hpp"
+#include "rhec/sim/loop/loop_world.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,21 @@ bool has_value(const std::vector<double>& outputs) {
   return std::any_of(outputs.begin(), outputs.end(), [](double value) { return !std::isnan(value); });
 }
 
+std::vector<SensorDrift> drifts_of(const std::vector<SensorError>& errors) {
+  std::vector<SensorDrift> drifts;
+  drifts.reserve(errors.size());
+  for (const auto& [sigma, drift] : errors) drifts.push_back({sigma, drift});
+  return drifts;
+}
+
 }  // namespace
+
+SensorNoise noise_of(const Robot& robot) {
+  return {.outputs = robot.output_sigmas(),
+          .inputs = robot.input_sigmas(),
+          .biases = drifts_of(robot.output_biases()),
+          .scales = drifts_of(robot.output_scales())};
+}
 
 LoopWorld::LoopWorld(const Scenario& scenario, const SensorNoise& noise)
     : truth_(*scenario.robot().model(), scenario.terrain(), scenario.initial_state(), scenario.vehicle()),

@@ -10,9 +10,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 
-#include "loop_world.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/sim/loop/loop_world.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -8,12 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "mcap_channel.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/logs/cdr/cdr_writer.hpp"
 #include "rhec/logs/mapping/signal_map.hpp"
 #include "rhec/logs/mcap/mcap_writer.hpp"
 #include "rhec/logs/storage/whole_file.hpp"
-#include "robot_messages.hpp"
+#include "rhec/sim/telemetry/robot_messages.hpp"
 
 namespace rhec::sim {
 

@@ -1,30 +1,22 @@
-#include "robot_messages.hpp"
+#include "rhec/sim/telemetry/robot_messages.hpp"
 
 #include <array>
 #include <cmath>
 
-#include "rhec/logs/cdr/message_definitions.hpp"
-
 namespace rhec::sim {
 namespace {
 
-constexpr const char *fixed_frame = "odom", *vehicle_frame = "base_link";
-
 void write_quaternion(double heading, logs::CdrWriter& message) {
   message.numbers(std::array{0.0, 0.0, std::sin(0.5 * heading), std::cos(0.5 * heading)});
-}
-
-void write_pose(const PlanarPose& pose, logs::CdrWriter& message) {
-  message.numbers(std::array{pose.x, pose.y, 0.0});
-  write_quaternion(pose.heading, message);
 }
 
 }  // namespace
 
 logs::Stamp stamp_at(double time) noexcept { return static_cast<logs::Stamp>(std::llround(time * 1e9)); }
 
-std::uint16_t add_channel(logs::McapWriter& writer, const std::string& topic, const std::string& type) {
-  return writer.add_channel(topic, type, logs::ros2msg_text(type, logs::builtin_definitions()));
+void write_pose(const PlanarPose& pose, logs::CdrWriter& message) {
+  message.numbers(std::array{pose.x, pose.y, 0.0});
+  write_quaternion(pose.heading, message);
 }
 
 void write_joint_state(logs::Stamp when, std::string_view frame, std::span<const std::string> names,
@@ -39,10 +31,10 @@ void write_joint_state(logs::Stamp when, std::string_view frame, std::span<const
   message.numbers(efforts);
 }
 
-void write_odometry(logs::Stamp when, const PlanarPose& pose, const Eigen::Matrix3d& covariance, double speed,
-                    double yaw_rate, logs::CdrWriter& message) {
-  message.header(when, fixed_frame);
-  message.text(vehicle_frame);
+void write_odometry(logs::Stamp when, const Frames& frames, const PlanarPose& pose, const Eigen::Matrix3d& covariance,
+                    double speed, double yaw_rate, logs::CdrWriter& message) {
+  message.header(when, frames.fixed);
+  message.text(frames.vehicle);
   write_pose(pose, message);
   std::array<double, 36> full{};  // of x, y, z, roll, pitch, yaw
   constexpr std::array<std::size_t, 3> places{0, 1, 5};
@@ -53,20 +45,20 @@ void write_odometry(logs::Stamp when, const PlanarPose& pose, const Eigen::Matri
   message.numbers(std::array<double, 36>{});
 }
 
-void write_transform(logs::Stamp when, const PlanarPose& pose, logs::CdrWriter& message) {
+void write_transform(logs::Stamp when, const Frames& frames, const PlanarPose& pose, logs::CdrWriter& message) {
   message.length(1);
-  message.header(when, fixed_frame);
-  message.text(vehicle_frame);
+  message.header(when, frames.fixed);
+  message.text(frames.vehicle);
   message.numbers(std::array{pose.x, pose.y, 0.0});
   write_quaternion(pose.heading, message);
 }
 
-void write_path(logs::Stamp when, std::span<const PlanarPose> poses, std::span<const logs::Stamp> times,
-                logs::CdrWriter& message) {
-  message.header(when, fixed_frame);
+void write_path(logs::Stamp when, std::string_view frame, std::span<const PlanarPose> poses,
+                std::span<const logs::Stamp> times, logs::CdrWriter& message) {
+  message.header(when, frame);
   message.length(poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    message.header(times[i], fixed_frame);
+    message.header(times[i], frame);
     write_pose(poses[i], message);
   }
 }

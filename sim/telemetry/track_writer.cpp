@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "robot_messages.hpp"
+#include "rhec/sim/telemetry/robot_messages.hpp"
 
 namespace rhec::sim {
 namespace {

@@ -46,6 +46,12 @@ UNTESTED = {
     "apps/report/embedded.cpp": "tests/report/report.py: the page, which it holds, is looked at in a browser",
     "apps/report/report_page.cpp": "tests/cli/report_run.py: the document is read from the page",
     "apps/report/svg_engine.cpp": "tests/report/figures.py: each figure of each kind of report",
+    "apps/ros/no_wire.cpp": "tests/cli/ros.py: a build without the wire says what to install",
+    "apps/ros/node/lever_arms.cpp": "tests/apps/ros/wire/participant_strangers_test.cpp: transforms come from another process",
+    "apps/ros/node/loop_topics.cpp": "tests/apps/ros/node/loop_test.cpp: paths, stops and what is told of estimates",
+    "apps/ros/node/node.cpp": "tests/cli/ros.py: the command, its mistakes and its end",
+    "apps/ros/simulation/robot.cpp": "tests/cli/ros.py: the other end of every drive",
+    "apps/ros/wire/raw_type.cpp": "tests/apps/ros/wire/participant_strangers_test.cpp: bytes arrive as they were sent",
     "apps/run.cpp": "tests/cli/runs.py: every choice of a scenario, and what a run leaves behind",
     "apps/solve.cpp": "tests/cli/dump.py: problems that were saved are solved again; tests/cli/bad_input.py has mistakes",
     "apps/stop_request.cpp": "tests/cli/tune.py: a command that is stopped",
@@ -56,6 +62,7 @@ UNTESTED = {
     "sim/replay/drive_replay_files.cpp": "tests/sim/replay/replay_summary_test.cpp: a row for each",
     "sim/telemetry/robot_messages.cpp": "tests/sim/telemetry/track_writer_test.cpp: every message is read back",
     "sim/telemetry/track_csv.cpp": "tests/sim/telemetry/track_writer_test.cpp: tables and trajectories",
+    "sim/telemetry/track_messages.cpp": "tests/sim/telemetry/track_writer_test.cpp: messages have what the run had",
     "sim/telemetry/track_mcap.cpp": "tests/sim/telemetry/track_writer_test.cpp: messages have what the run had",
     "plugins/host/examiner_process.cpp": "tests/plugins/host/examine_test.cpp: runs it; examiner_test.cpp has how it may end",
     "core/estimation/kalman_filter_between.cpp": "tests/core/estimation/between_nodes_test.cpp: against dense conditioning",
@@ -190,7 +197,13 @@ def self_test():
     more = ["tests/core/low/tested_after_all_test.cpp", "sim/loop/by_nobody.cpp", "sim/loop/by_words.cpp"]
     by_another = "tests/models/every_test.cpp: planted"
     untested = {"core/low/special.cpp": by_another, "core/low/tested_after_all.cpp": by_another,
-                "apps/run.cpp": "tests/cli/runs.py", "sim/loop/by_nobody.cpp": "tests/cli/gone.py: planted",
+                "apps/ros/no_wire.cpp": "tests/cli/ros.py: a build without the wire says what to install",
+    "apps/ros/node/lever_arms.cpp": "tests/apps/ros/wire/participant_strangers_test.cpp: transforms come from another process",
+    "apps/ros/node/loop_topics.cpp": "tests/apps/ros/node/loop_test.cpp: paths, stops and what is told of estimates",
+    "apps/ros/node/node.cpp": "tests/cli/ros.py: the command, its mistakes and its end",
+    "apps/ros/simulation/robot.cpp": "tests/cli/ros.py: the other end of every drive",
+    "apps/ros/wire/raw_type.cpp": "tests/apps/ros/wire/participant_strangers_test.cpp: bytes arrive as they were sent",
+    "apps/run.cpp": "tests/cli/runs.py", "sim/loop/by_nobody.cpp": "tests/cli/gone.py: planted",
                 "sim/loop/by_words.cpp": "looked at by eye"}
     alone = {"tests/models/every_test.cpp": "planted", "tests/core/low/never_written_test.cpp": "planted"}
     failures = []

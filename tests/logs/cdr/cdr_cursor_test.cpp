@@ -1,4 +1,4 @@
-#include "logs/cdr/cdr_cursor.hpp"
+#include "rhec/logs/cdr/cdr_cursor.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

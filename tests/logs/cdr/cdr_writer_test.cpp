@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "logs/cdr/cdr_cursor.hpp"
+#include "rhec/logs/cdr/cdr_cursor.hpp"
 
 namespace rhec::logs {
 namespace cdr_writer_test {

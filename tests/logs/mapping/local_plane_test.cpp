@@ -22,6 +22,15 @@ TEST(LocalPlane, EastNorthAndUpAreMetres) {
   EXPECT_NEAR(place[2], 2.0, 1e-5);
 }
 
+TEST(LocalPlane, GoesThereAndBack) {
+  const LocalPlane plane({48.0, 11.0, 500.0});
+  const GeodeticPoint point{48.01, 10.98, 510.0};
+  const GeodeticPoint found = plane.reverse(plane.forward(point));
+  EXPECT_NEAR(found.latitude, point.latitude, 1e-12);
+  EXPECT_NEAR(found.longitude, point.longitude, 1e-12);
+  EXPECT_NEAR(found.height, point.height, 1e-6);
+}
+
 TEST(LocalPlane, PlacesThatCannotBeAreTold) {
   EXPECT_TRUE(is_valid({90.0, -180.0, -400.0}));
   EXPECT_FALSE(is_valid({91.0, 0.0, 0.0}));

@@ -1,4 +1,4 @@
-#include "sim/loop/loop_world.hpp"
+#include "rhec/sim/loop/loop_world.hpp"
 
 #include <gmock/gmock.h>
 

@@ -37,6 +37,7 @@ struct FieldDefinition {
   Shape shape = Shape::single;
   std::uint64_t length = 0;  ///< of an array
   int structure = -1;        ///< of a structure: its index in a MessageType
+  bool is_octet = false;     ///< of a u8: `byte`, which ROS tells from `uint8`
 };
 
 struct StructureDefinition {

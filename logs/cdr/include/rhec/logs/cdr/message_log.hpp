@@ -33,9 +33,10 @@ class RHEC_EXPORT MessageLog : public Log {
   MessageLog(std::string name, MessageLogOptions options);
   /// Adds a topic, or finds the one that has this name and type. Returns its index.
   int add_topic(const std::string& name, const std::string& type, MessageEncoding encoding);
+  /// What the messages of a topic are made of. Throws Error for a type that nobody defines.
+  std::shared_ptr<const MessageType> type_of(int topic) const;
 
  private:
-  std::shared_ptr<const MessageType> type_of(int topic) const;
   MessageLogOptions options_;
   std::vector<MessageEncoding> encodings_;
   mutable std::vector<std::shared_ptr<const MessageType>> types_;  ///< by topic, once they are asked for

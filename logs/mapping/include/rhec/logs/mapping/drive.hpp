@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rhec/logs/mapping/signal_map.hpp"
+#include "rhec/logs/mapping/signal_stream.hpp"
 
 namespace rhec::logs {
 
@@ -16,13 +17,6 @@ struct DriveEvent {
   double time = 0.0;     ///< when it was measured; of inputs, from when on they held [s since the start]
   bool is_output = false;
   std::size_t values = 0;  ///< where its values begin: n_y or n_u, NaN where missing
-};
-
-/// What was read of one variable.
-struct SignalCount {
-  std::string variable, source;
-  bool is_output = false;
-  std::int64_t values = 0, missing = 0;
 };
 
 /// A drive: what a robot's sensors and drives said, in the order in which it became known.

@@ -25,6 +25,7 @@ class RHEC_EXPORT LocalPlane {
 
   const GeodeticPoint& origin() const noexcept { return origin_; }
   std::array<double, 3> forward(const GeodeticPoint& point) const;
+  GeodeticPoint reverse(const std::array<double, 3>& place) const;
 
  private:
   struct Projection;

@@ -22,6 +22,7 @@ struct RobotOptions {
   double step = Estimator::Timeline{}.longest_interval;  ///< dt [s]
   Settings model, noise, bounds, blocking, estimator, controller, smoother;
   Settings signals;  ///< read by who reads a log, or listens to a robot: rhec/logs/mapping/signal_map.hpp
+  Settings ros;      ///< read by `rhec ros`
 
   RHEC_EXPORT static const OptionTable<RobotOptions>& table();
   /// Adds the same rows to the table of a struct that has further keys.
@@ -39,7 +40,8 @@ struct RobotOptions {
         .subtree("controller", &Derived::controller, "how the path is followed")
         .subtree("smoother", &Derived::smoother, "how a whole log is estimated at once; see 'rhec smooth'")
         .subtree("signals", &Derived::signals,
-                 "which signals of a log, or of a robot, are the model's outputs and inputs");
+                 "which signals of a log, or of a robot, are the model's outputs and inputs")
+        .subtree("ros", &Derived::ros, "how a live node takes part in ROS 2; see 'rhec ros'");
   }
 };
 

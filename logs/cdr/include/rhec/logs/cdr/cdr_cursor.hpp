@@ -5,16 +5,17 @@
 #include <span>
 #include <string_view>
 
+#include "rhec/core/base/export.hpp"
 #include "rhec/logs/cdr/message_definitions.hpp"
 
 namespace rhec::logs {
 
 /// Bytes of a number in CDR; 0 for what is none.
-std::size_t size_of(Kind kind) noexcept;
+RHEC_EXPORT std::size_t size_of(Kind kind) noexcept;
 
 /// A place in a message in CDR: XCDR1 (classic CDR) of either byte order, or plain XCDR2. Throws RecordError where a
 /// message ends too early, or has a length that it has no room for.
-class CdrCursor {
+class RHEC_EXPORT CdrCursor {
  public:
   /// Reads the four bytes that say how the message is encoded.
   explicit CdrCursor(std::span<const std::byte> message);

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "rhec/core/base/export.hpp"
 #include "rhec/core/base/infinity.hpp"
 #include "rhec/sim/loop/scenario.hpp"
 #include "rhec/sim/problems/recording_solver.hpp"
@@ -14,9 +15,12 @@
 
 namespace rhec::sim {
 
+/// The noise with which the sensors of a robot measure, as its configuration states it.
+RHEC_EXPORT SensorNoise noise_of(const Robot& robot);
+
 /// The world of a closed loop: the true vehicle with its actuators, its sensors, what goes wrong with them, and the way
 /// of what they measure to the estimator.
-class LoopWorld {
+class RHEC_EXPORT LoopWorld {
  public:
   LoopWorld(const Scenario& scenario, const SensorNoise& noise);
 

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rhec/core/config/settings.hpp"
+#include "rhec/plugins/host/host.hpp"
+
+namespace rhec::apps::ros {
+
+/// What the command line of `rhec ros` says.
+struct LiveArguments {
+  std::string file = {}, interface = {}, distro = {}, path = {};
+  std::vector<std::string> assignments = {}, msg_paths = {};
+  int domain = -1;  ///< -1: of the environment
+  int priority = 0, cpu = -1;
+  double seconds = 0.0;  ///< 0: until it is stopped
+  bool once = false, simulate = false;
+  std::vector<std::filesystem::path> plugin_path = {};
+};
+
+// Both need a build with Cyclone DDS; without one they throw Error that says what to install. They return an exit code.
+/// A node that estimates and steers.
+int run_node(const Host& host, Settings settings, const LiveArguments& arguments);
+/// A simulated robot.
+int run_robot(const Host& host, Settings settings, const LiveArguments& arguments);
+
+}  // namespace rhec::apps::ros

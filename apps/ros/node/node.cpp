@@ -1,0 +1,137 @@
+// `rhec ros`: what supervises the loop of a live node.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include "../../commands.hpp"
+#include "../../stop_request.hpp"
+#include "../live.hpp"
+#include "../wire/wire_options.hpp"
+#include "lever_arms.hpp"
+#include "loop.hpp"
+#include "rhec/core/base/error.hpp"
+#include "rhec/sim/loop/scenario.hpp"
+#include "rhec/sim/maps/map_keeper.hpp"
+#include "rhec/sim/numbers/spread.hpp"
+#include "rhec/sim/replay/replay_scenario.hpp"
+#include "rhec/sim/world/paths.hpp"
+
+namespace rhec::apps::ros {
+namespace {
+
+constexpr auto between_looks = std::chrono::milliseconds(20);
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// The path that is known before the first one comes as a message; none: there is none.
+std::unique_ptr<const Path> known_path(const Host& host, const Settings& settings, const LiveArguments& arguments,
+                                       const RosOptions& options) {
+  if (!arguments.path.empty())
+    return std::make_unique<const Path>(sim::load_waypoints(arguments.path, {.speed = options.path_speed}));
+  if (settings.find("path")) return std::make_unique<const Path>(sim::Scenario(host, settings).path());
+  return nullptr;
+}
+
+void print_topics(const LiveTopics& topics, const Intake& intake, const RosOptions& options, const WireOptions& wire) {
+  fmt::print("node {} in domain {} on {}\n", wire.node, wire.domain, wire.interface);
+  for (std::size_t i = 0; i < topics.topics().size(); ++i)
+    if (intake.is_wanted(static_cast<int>(i)))
+      fmt::print("  hears  {} ({})\n", topics.topics()[i].name, topics.topics()[i].type);
+  if (options.command.steer)
+    fmt::print("  steers {} ({}); stopped by {}\n", options.names.command,
+               CommandMessage::type_of(options.command.form),
+               options.names.stop.empty() ? "nobody" : options.names.stop);
+  else
+    fmt::print("  does not steer; ros.command.steer: true lets it\n");
+  std::fflush(stdout);
+}
+
+void print_report(const LoopReport& report) {
+  fmt::print("\n{:<28} {:>8} {:>8}   {}\n", "TOPIC", "USED", "REFUSED", "WHY");
+  const auto print = [](const TopicCount& count) {
+    if (count.used == 0 && count.refusals() == 0) return;
+    std::string why;
+    for (std::size_t i = 0; i < refusal_count; ++i)
+      if (count.refused[i] > 0)
+        why += fmt::format("{}{} {}", why.empty() ? "" : ", ", count.refused[i], name_of(static_cast<Refusal>(i)));
+    if (!count.last.empty()) why += "; last: " + count.last;
+    fmt::print("{:<28} {:>8} {:>8}   {}\n", count.topic, count.used, count.refusals(), why);
+  };
+  for (const TopicCount& count : report.topics) print(count);
+  print(report.other);
+  if (report.origin)
+    fmt::print("local plane: origin {:.8f}, {:.8f} degrees, {:.3f} m\n", report.origin->latitude,
+               report.origin->longitude, report.origin->height);
+  fmt::print("{} steps, {} of them steered; {} deadlines missed; {} messages not sent\n", report.cycles, report.driven,
+             report.misses, report.unsent);
+  fmt::print("health: degraded in {} steps, lost in {}; {} measurements rejected, {} of {} estimates fell back\n",
+             report.degraded, report.lost, report.estimator.rejected, report.estimator.fallbacks,
+             report.estimator.estimates);
+  const sim::Spread latency = sim::spread_of(report.latencies);
+  if (!report.latencies.empty())
+    fmt::print("latency from the last measurement to the {} [ms]: median {:.3f}, p99 {:.3f}, max {:.3f}\n",
+               report.driven > 0 ? "command" : "estimate", 1e3 * latency.median, 1e3 * latency.p99, 1e3 * latency.max);
+}
+
+/// Makes a controller for a path that has come, and hands it to the loop; what cannot be followed is told.
+void follow(const std::vector<Position>& places, const Robot& robot, const RosOptions& options, Loop& loop,
+            double time) {
+  std::vector<Waypoint> waypoints;
+  waypoints.reserve(places.size());
+  for (const Position& place : places) waypoints.push_back({place.x, place.y, options.path_speed});
+  try {
+    const Path path(waypoints);
+    loop.follow(robot.make_controller(path, loop.slip_ahead()));
+    fmt::print("{:8.2f} s  a path of {:.1f} m has come\n", time, path.length());
+  } catch (const Error& mistake) {
+    fmt::print("{:8.2f} s  a path was refused: {}\n", time, mistake.what());
+  }
+}
+
+}  // namespace
+
+int run_node(const Host& host, Settings settings, const LiveArguments& arguments) {
+  const RosOptions options =
+      read_ros_options(settings.find("ros") ? *settings.find("ros") : Settings::map(settings.origin()));
+  const WireOptions wire_setup = wire_options(options, arguments);
+  Participant wire(wire_setup);
+  const StopRequest stop_request;
+  set_lever_arms(wire, options, settings);
+  const auto replay_options = sim::ReplayOptions::table().parse(settings, "the file");
+  Robot robot(host, replay_options);
+  robot.make_estimator();  // tells mistakes before anything runs
+  const auto keeper = std::make_shared<sim::MapKeeper>();
+  robot.add_hooks(keeper);
+  const LiveTopics topics(replay_options.signals, options.types,
+                          {arguments.msg_paths.begin(), arguments.msg_paths.end()});
+  Intake intake(topics, logs::SignalMap(replay_options.signals, robot.model()->description()),
+                robot.bounded_description(), options.checks);
+  std::unique_ptr<const Path> path = options.command.steer ? known_path(host, settings, arguments, options) : nullptr;
+  if (path) robot.make_controller(*path);  // likewise
+  Loop loop(wire, topics, intake, robot, options);
+  print_topics(topics, intake, options, wire_setup);
+  loop.start({arguments.priority, arguments.cpu >= 0 ? std::optional(arguments.cpu) : std::nullopt});
+  if (path && !robot.memory().is_given()) loop.follow(robot.make_controller(*std::exchange(path, nullptr)));
+  const auto begin = Clock::now();
+  while (!StopRequest::asked() && !(arguments.once && loop.is_finished()) &&
+         (arguments.seconds <= 0.0 || seconds_since(begin) < arguments.seconds)) {
+    std::this_thread::sleep_for(between_looks);
+    loop.check();
+    // A controller that looks ahead on a map needs the estimator that keeps it.
+    if (path && loop.slip_ahead()) loop.follow(robot.make_controller(*std::exchange(path, nullptr), loop.slip_ahead()));
+    if (const auto places = loop.take_wanted_path()) follow(*places, robot, options, loop, seconds_since(begin));
+    for (const std::string& event : loop.take_events()) fmt::print("{:8.2f} s  {}\n", seconds_since(begin), event);
+    std::fflush(stdout);
+  }
+  loop.stop();
+  loop.check();
+  const LoopReport report = loop.report();
+  print_report(report);
+  keeper->save();
+  return arguments.once && !loop.is_finished() ? exit_not_solved : exit_fine;
+}
+
+}  // namespace rhec::apps::ros

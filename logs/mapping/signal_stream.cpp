@@ -1,0 +1,171 @@
+#include "rhec/logs/mapping/signal_stream.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "rhec/core/base/angle.hpp"
+#include "signal_value.hpp"
+
+namespace rhec::logs {
+namespace {
+
+constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+
+bool waits_for_all(SignalForm form) { return form == SignalForm::mean || form == SignalForm::turn; }
+
+std::string source_of(const MappedSignal& signal) {
+  std::string source;
+  for (const SignalName& name : signal.from)
+    source += fmt::format("{}{}{}{}", source.empty() ? "" : ", ", name.topic,
+                          name.topic.empty() || name.field.empty() ? "" : ":", name.field);
+  return source;
+}
+
+}  // namespace
+
+/// A mapped signal while records are read.
+struct SignalStream::Channel {
+  MappedSignal signal;
+  std::vector<double> fields;
+  std::vector<bool> is_fresh;
+  double last = no_value;  ///< of a derivative: the value before
+  Stamp last_stamp = no_stamp, newest = no_stamp;
+  SignalCount count;
+};
+
+/// The fields that are read out of one topic by one clock.
+struct SignalStream::Reading {
+  int topic = 0;
+  std::string clock;
+  FieldRequest request;
+  std::unique_ptr<FieldReader> reader;
+  std::vector<double> values;
+  struct Use {
+    std::size_t channel, field, slot;
+  };
+  std::vector<Use> uses;
+  double least_lateness = std::numeric_limits<double>::infinity();
+};
+
+SignalStream::SignalStream(const Log& log, const SignalMap& map)
+    : outputs_(static_cast<std::size_t>(map.outputs())),
+      inputs_(static_cast<std::size_t>(map.inputs())),
+      wanted_(log.topics().size()) {
+  if (map.origin()) plane_.emplace(*map.origin());
+  for (MappedSignal& signal : map.resolved(log)) add(log, std::move(signal));
+  for (Reading& reading : readings_) {
+    reading.reader = log.reader(reading.topic, reading.request);
+    reading.values.resize(reading.request.fields.size());
+    wanted_[static_cast<std::size_t>(reading.topic)] = true;
+  }
+}
+
+SignalStream::~SignalStream() = default;
+
+void SignalStream::add(const Log& log, MappedSignal signal) {
+  Channel channel;
+  const int topic = log.topic(signal.from.front().topic);
+  const std::string& type = log.topics()[static_cast<std::size_t>(topic)].type;
+  const std::vector<SignalName> fields = fields_of(signal, type);
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    Reading& reading = reading_of(log.topic(fields[i].topic), signal.options.clock);
+    std::vector<std::string>& requested = reading.request.fields;
+    const auto known = std::find(requested.begin(), requested.end(), fields[i].field);
+    reading.uses.push_back({channels_.size(), i, static_cast<std::size_t>(known - requested.begin())});
+    if (known == requested.end()) requested.push_back(fields[i].field);
+  }
+  channel.fields.assign(fields.size(), no_value);
+  channel.is_fresh.assign(fields.size(), false);
+  channel.count = {signal.variable.name, source_of(signal), signal.is_output};
+  channel.signal = std::move(signal);
+  channels_.push_back(std::move(channel));
+}
+
+SignalStream::Reading& SignalStream::reading_of(int topic, const std::string& clock) {
+  for (Reading& reading : readings_)
+    if (reading.topic == topic && reading.clock == clock) return reading;
+  Reading& reading = readings_.emplace_back();
+  reading.topic = topic;
+  reading.clock = reading.request.clock = clock;
+  return reading;
+}
+
+std::span<const SignalRow> SignalStream::take(const Record& record) {
+  rows_.clear();
+  for (Reading& reading : readings_)
+    if (reading.topic == record.topic) read(record, reading);
+  return rows_;
+}
+
+void SignalStream::read(const Record& record, Reading& reading) {
+  const Stamp stamp = reading.reader->read(record, reading.values.data());
+  if (stamp == no_stamp) return;
+  const Stamp arrival = record.received == no_stamp ? stamp : record.received;
+  reading.least_lateness = std::min(reading.least_lateness, seconds_between(stamp, arrival));
+  values_.clear();
+  for (const Reading::Use& use : reading.uses) {
+    Channel& channel = channels_[use.channel];
+    // Wheels may come one by one, each in a message of its own: what a message lacks is waited for.
+    if (waits_for_all(channel.signal.options.form) && std::isnan(reading.values[use.slot])) continue;
+    channel.fields[use.field] = reading.values[use.slot];
+    channel.is_fresh[use.field] = true;
+    channel.newest = std::max(channel.newest, stamp);
+    if (std::find(channel.is_fresh.begin(), channel.is_fresh.end(), false) == channel.is_fresh.end())
+      complete(channel, channel.newest);
+  }
+  for (auto& [key, values] : values_) rows_.push_back({!key.first, key.second, std::move(values)});
+}
+
+/// All that makes up a signal has come.
+void SignalStream::complete(Channel& channel, Stamp stamp) {
+  channel.is_fresh.assign(channel.is_fresh.size(), false);
+  channel.newest = no_stamp;
+  const double value = value_of(channel.signal, channel.fields, plane_);
+  if (std::isnan(value)) {
+    ++channel.count.missing;
+    ++missing_;
+    return;
+  }
+  const Stamp measured = stamp - static_cast<Stamp>(std::llround(channel.signal.options.delay * 1e9));
+  if (!channel.signal.options.derivative) return put(channel, measured, value);
+  const double duration = channel.last_stamp == no_stamp ? 0.0 : seconds_between(channel.last_stamp, measured);
+  if (duration > 0.0) {
+    const double change = channel.signal.is_angle ? angle_difference(value, channel.last) : value - channel.last;
+    const double rate = change / duration + channel.signal.options.offset;
+    // It was so since the last record, and is taken to stay so.
+    put(channel, channel.last_stamp, rate);
+    put(channel, measured, rate);
+  }
+  if (channel.last_stamp != no_stamp && duration <= 0.0) return;
+  channel.last = value;
+  channel.last_stamp = measured;
+}
+
+void SignalStream::put(Channel& channel, Stamp stamp, double value) {
+  ++channel.count.values;
+  const bool is_output = channel.signal.is_output;
+  std::vector<double>& values = values_[{!is_output, stamp}];
+  if (values.empty()) values.assign(is_output ? outputs_ : inputs_, no_value);
+  values[static_cast<std::size_t>(channel.signal.index)] = value;
+}
+
+std::vector<SignalCount> SignalStream::counts() const {
+  std::vector<SignalCount> counts;
+  for (const Channel& channel : channels_) counts.push_back(channel.count);
+  return counts;
+}
+
+std::optional<GeodeticPoint> SignalStream::origin() const {
+  return plane_ ? std::optional(plane_->origin()) : std::nullopt;
+}
+
+std::vector<SignalStream::Lateness> SignalStream::lateness() const {
+  std::vector<Lateness> lateness;
+  for (const Reading& reading : readings_) lateness.push_back({reading.topic, reading.least_lateness});
+  return lateness;
+}
+
+}  // namespace rhec::logs

@@ -1,0 +1,63 @@
+#include "rhec/logs/mapping/signal_stream.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "logs/support/described.hpp"
+#include "logs/support/files.hpp"
+#include "rhec/logs/csv/csv_log.hpp"
+#include "rhec/plugins/yaml/yaml.hpp"
+
+namespace rhec::logs {
+namespace signal_stream_test {
+
+// What rows are made of is tested with drives (drive_test.cpp); here is what a stream has of its own.
+class SignalStreamTest : public FilesTest {
+ protected:
+  SignalMap map(const std::string& signals) const { return SignalMap(parse_yaml(signals, "robot.yaml"), described()); }
+};
+
+TEST_F(SignalStreamTest, RowsComeRecordByRecordOutputsFirst) {
+  const auto log = open_csv(write("d.csv", "time,x_gps,y_gps,delta,v\n1,2,3,0.1,5\n2,,4,,\n3,,,,\n"));
+  SignalStream stream(*log, map("{outputs: {psi_m: none}, inputs: {delta_rate: none}}"));
+  EXPECT_EQ(stream.wanted(), (std::vector<bool>{true}));
+  std::vector<std::vector<SignalRow>> found;
+  log->read(stream.wanted(), [&](const Record& record) {
+    const auto rows = stream.take(record);
+    found.emplace_back(rows.begin(), rows.end());
+    return true;
+  });
+  ASSERT_EQ(found.size(), 3u);
+  ASSERT_EQ(found[0].size(), 2u);
+  EXPECT_TRUE(found[0][0].is_output);
+  EXPECT_EQ(found[0][0].values[1], 3.0);
+  EXPECT_FALSE(found[0][1].is_output);
+  EXPECT_EQ(found[0][1].values[0], 5.0);
+  ASSERT_EQ(found[1].size(), 1u);
+  EXPECT_TRUE(std::isnan(found[1][0].values[0]));
+  EXPECT_EQ(found[1][0].stamp, 2'000'000'000);
+  EXPECT_TRUE(found[2].empty());
+  EXPECT_EQ(stream.missing(), 3 + 4);
+  for (const SignalCount& count : stream.counts()) EXPECT_EQ(count.values + count.missing, 3) << count.variable;
+  EXPECT_FALSE(stream.origin());
+}
+
+TEST_F(SignalStreamTest, TheFirstGoodFixIsTheOrigin) {
+  const auto log = open_csv(write("d.csv", "time,lat,lon\n1,95,7\n2,51,7\n3,52,7\n"));
+  SignalStream stream(*log, map("{outputs: {x_gps: {from: [lat, lon], as: east}, y_gps: {from: [lat, lon], as: north}, "
+                                "psi_m: none, delta: none}, inputs: {v: none, delta_rate: none}}"));
+  std::vector<double> north;
+  log->read(stream.wanted(), [&](const Record& record) {
+    for (const SignalRow& row : stream.take(record)) north.push_back(row.values[1]);
+    return true;
+  });
+  ASSERT_TRUE(stream.origin());
+  EXPECT_EQ(stream.origin()->latitude, 51.0);
+  ASSERT_EQ(north.size(), 2u);
+  EXPECT_NEAR(north[0], 0.0, 1e-9);
+  EXPECT_NEAR(north[1], 111e3, 1e3);
+}
+
+}  // namespace signal_stream_test
+}  // namespace rhec::logs
