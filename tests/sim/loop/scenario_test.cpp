@@ -42,6 +42,21 @@ TEST(Scenario, TheVehicleStartsOnThePathAndFacesAlongIt) {
   EXPECT_EQ(start.speed, 8.0);
 }
 
+TEST(Scenario, NotesWhatLooksLikeAWrongUnit) {
+  EXPECT_THAT(figure8_with({}).notes(), testing::IsEmpty());
+  EXPECT_THAT(figure8_with({"speed=60"}).notes(),
+              testing::ElementsAre(HasSubstr("216 km/h"), HasSubstr("lateral acceleration")));
+  EXPECT_THAT(figure8_with({"step=5", "speed=1"}).notes(), testing::ElementsAre(HasSubstr("step: 5 s")));
+  EXPECT_THAT(figure8_with({"model.outputs=[x_gps, y_gps]"}).notes(),
+              testing::ElementsAre(HasSubstr("noise.outputs.delta: passed over")));
+}
+
+TEST(Scenario, OtherFilesSayWhatTheyAre) {
+  EXPECT_THAT(error_of([] { figure8_with({"log={}"}); }), HasSubstr("'rhec estimate'"));
+  EXPECT_THAT(error_of([] { figure8_with({"grid=[]"}); }), HasSubstr("'rhec sweep'"));
+  EXPECT_THAT(error_of([] { figure8_with({"equations=x"}); }), HasSubstr("model: {equations: FILE}"));
+}
+
 TEST(Scenario, ThePathsSpeedsChangeAsFastAsTheyMay) {
   const Scenario bends = figure8_with({"path.radius=12", "path.lateral_acceleration=3"});
   EXPECT_NEAR(bends.path().point_at(20.0).speed, 6.0, 0.01) << "3 m/s^2 at a radius of 12 m";
