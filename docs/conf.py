@@ -6,19 +6,14 @@ import re
 project = "rhec"
 version = release = os.environ.get("RHEC_VERSION", "")
 copyright = author = "the authors of rhec"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "breathe"]
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["doxygen"]
 myst_heading_anchors = 4
+smartquotes = False  # two dashes are those of an option
 myst_enable_extensions = ["deflist"]
 suppress_warnings = ["myst.header", "misc.highlighting_failure"]  # pages of rooms begin where their folder is; grammars are no code
 highlight_language = "none"
 primary_domain = None
-
-breathe_projects = {"rhec": os.environ.get("RHEC_DOXYGEN", "")}
-breathe_default_project = "rhec"
-breathe_default_members = ("members",)
-breathe_show_include = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 
@@ -50,7 +45,9 @@ ITEM = re.compile(r"^(\w+(?:, \w+)*): ")
 
 
 def escaped(text):
-    return re.sub(r"([*|_\\]|(?<!`)`(?!`))", r"\\\1", text)
+    """Everything as it is, but for what stands in backquotes, which is code."""
+    parts = re.split(r"`([^`]+)`", text)
+    return "".join(f"``{part}``" if i % 2 else re.sub(r"([*|_\\`])", r"\\\1", part) for i, part in enumerate(parts))
 
 
 def plain_docstring(app, what, name, value, options, lines):

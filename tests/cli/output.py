@@ -16,7 +16,6 @@ grid:
   - estimator.name: [ekf, truth]
     seed: {{from: 1, to: 2}}
 """
-SHIPPED = sorted((cli.ROOT / "scenarios").glob("*.yaml"))
 
 
 class Test(cli.Findings):
@@ -94,17 +93,13 @@ class Test(cli.Findings):
             result = self.call("run", FIGURE8, *assignments("path.laps=1", *settings), "--out", "c", fine=(FINE, NOT_SOLVED, ERROR))
             return result.stderr
 
-        self.expect("note: step: 5 s" in note("step=5"), "step=5", note("step=5"))
-        self.expect("km/h" in note("speed=60") and "lateral acceleration" in note("speed=60"), "speed=60", note("speed=60"))
+        # Which numbers are noted is tested in tests/sim/loop/scenario_test.cpp; drives with such numbers take minutes.
+        long_step = note("step=1.5", "speed=1", "path.radius=5", "estimator.name=truth")
+        self.expect("rhec: note: step: 1.5 s" in long_step, "step=1.5", long_step)
         leftover = note("model.outputs=[x_gps, y_gps]", "path.radius=12")
         self.expect("figure8.yaml:" in leftover and "noise.outputs.delta: passed over" in leftover, "model.outputs", leftover)
         wrong = self.rhec("run", FIGURE8, *assignments("model.outputs=[x_gps, y_gps]", "noise.outputs.dleta=1"), cwd=self.work)
         self.expect(wrong.returncode == ERROR and "did you mean 'delta'?" in wrong.stderr, "a name that no sensor has", wrong.stderr)
-        for scenario in SHIPPED:
-            if "grid:" in (text := scenario.read_text()) or "\nlog:" in text:
-                continue
-            told = self.call("run", scenario, *assignments("path.laps=1", "path.legs=1", "path.rows=2"), "--out", "d").stderr
-            self.expect("note:" not in told, scenario.name, told)
 
 
 def main():

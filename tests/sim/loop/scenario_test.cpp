@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,18 @@ TEST(Scenario, NotesWhatLooksLikeAWrongUnit) {
   EXPECT_THAT(figure8_with({"step=5", "speed=1"}).notes(), testing::ElementsAre(HasSubstr("step: 5 s")));
   EXPECT_THAT(figure8_with({"model.outputs=[x_gps, y_gps]"}).notes(),
               testing::ElementsAre(HasSubstr("noise.outputs.delta: passed over")));
+}
+
+TEST(Scenario, ThoseThatComeWithRhecHaveNothingToNote) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SCENARIOS)) {
+    if (entry.path().extension() != ".yaml") continue;
+    const Settings settings = load_yaml(entry.path());
+    if (settings.find("grid") || settings.find("log")) continue;
+    EXPECT_THAT(Scenario(Host(), settings).notes(), testing::IsEmpty()) << entry.path();
+    ++count;
+  }
+  EXPECT_GT(count, 7);
 }
 
 TEST(Scenario, OtherFilesSayWhatTheyAre) {

@@ -15,7 +15,9 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-StarterWishes bicycle() { return {.name = "mine", .vehicle = "bicycle_slip", .folder = "mine"}; }
+StarterWishes bicycle() {
+  return {.name = "mine", .vehicle = "bicycle_slip", .sensors = {}, .options = {}, .folder = "mine"};
+}
 
 Robot robot_of(const StarterFiles& files) {
   const Host host;
