@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The manual is built without a warning, has every page, and refers to nothing outside of itself: manual.py <build tree>
 
-Leaves out the pages of C++ headers, which take longest; with --cpp it has them.
+Leaves out the pages of C++ headers and the results of notebooks, which take longest; with --whole it has them.
 """
 import html.parser
 import pathlib
@@ -61,9 +61,10 @@ def complaints_of(html_folder):
 def main():
     build, more = pathlib.Path(sys.argv[1]).resolve(), sys.argv[2:]
     with tempfile.TemporaryDirectory(prefix="rhec-manual-") as work:
-        command = [sys.executable, ROOT / "scripts" / "docs", "--build", build, "--out", work] + ([] if "--cpp" in more else ["--without-cpp"])
+        command = [sys.executable, ROOT / "scripts" / "docs", "--build", build, "--out", work]
+        command += [] if "--whole" in more else ["--without-cpp", "--without-results"]
         result = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-        if result.returncode and "is missing; apt-get install" in result.stderr:
+        if result.returncode and "apt-get install" in result.stderr:
             print(result.stderr)
             sys.exit(SKIPPED)
         if result.returncode:
