@@ -17,6 +17,7 @@ primary_domain = None
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 
+html_extra_path = ["extra"]
 html_theme = "furo"
 html_title = f"rhec {version}"
 html_show_copyright = html_show_sphinx = html_show_sourcelink = False

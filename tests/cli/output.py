@@ -81,6 +81,14 @@ class Test(cli.Findings):
         tuned = self.document("tune", FIGURE8, "drive.csv", "--most-seconds", "2", "--out", "tuned", fine=(FINE, NOT_SOLVED))
         self.expect("out" in tuned and len(tuned) > 3, "tune --json", str(tuned)[:200])
 
+    def every_command_has_it(self):
+        """But for those that print no results: a script for a shell, and solutions, which are JSON anyway."""
+        listed = self.rhec("--help").stdout.split("Subcommands:")[1].split("\n\n")[0]
+        for command in {line.split()[0] for line in listed.splitlines() if line.strip()} - {"completion", "solve"}:
+            self.expect("--json" in self.rhec(command, "--help").stdout, f"{command} --json")
+        vehicle = self.document("model", cli.ROOT / "examples" / "vehicles" / "bicycle.yaml")
+        self.expect([state["name"] for state in vehicle["states"]] == ["x_pos", "y_pos", "beta", "delta"] and vehicle["options"], "model --json", str(vehicle))
+
     def sweeps_are_told(self):
         told = self.call("sweep", "small.yaml").stdout
         rows = [line.split() for line in told.splitlines()]
@@ -107,6 +115,7 @@ def main():
         test = Test(Program(sys.argv[1]), pathlib.Path(folder).resolve())
         test.places()
         test.json_of_all()
+        test.every_command_has_it()
         test.sweeps_are_told()
         test.notes()
         test.tell()
