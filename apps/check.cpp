@@ -14,6 +14,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/check/model_check.hpp"
 #include "rhec/sim/loop/scenario.hpp"
@@ -58,7 +59,7 @@ RobotOptions robot_of_model(const CheckArguments& arguments) {
 
 /// The robot of a scenario, and its speed.
 RobotOptions robot_of_scenario(const CheckArguments& arguments, std::optional<double>& speed) {
-  Settings settings = load_yaml(arguments.model);
+  Settings settings = load_scenario(arguments.model);
   apply_assignments(settings, arguments.assignments);
   const Settings* given = settings.find("speed");
   Settings robot = Settings::map(settings.origin());
@@ -132,7 +133,7 @@ sim::FormulaPoint start_of(const Host& host, const CheckArguments& arguments, bo
   const ModelDescription& about = robot.bounded_description();
   sim::FormulaPoint point = sim::straight_point(model, about, speed);
   if (is_scenario) {
-    Settings settings = load_yaml(arguments.model);
+    Settings settings = load_scenario(arguments.model);
     apply_assignments(settings, arguments.assignments);
     if (settings.find("path")) {
       const Path path = sim::Scenario(host, settings).path();

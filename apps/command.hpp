@@ -61,6 +61,17 @@ class Command {
   CLI::App* app_;
 };
 
+/// What a command takes, for those who show it in other forms.
+struct CommandDescription {
+  struct Option {
+    std::vector<std::string> names;  ///< with their dashes
+    std::string meaning;
+    bool takes_value = false;
+  };
+  std::string name, about;
+  std::vector<Option> options;
+};
+
 /// The program: one of its commands is called.
 class Program {
  public:
@@ -71,6 +82,8 @@ class Program {
 
   /// `notes` follow the help of the command's arguments.
   Command add(const std::string& name, const std::string& about, const std::string& notes, Action action);
+  /// All commands, in the order in which they were added.
+  std::vector<CommandDescription> commands() const;
   /// Reads the command line and calls its command's action, or prints help, the version, or what is wrong. Returns an
   /// exit code. Throws what the action throws.
   int run(int count, char** words);

@@ -20,7 +20,9 @@ enum ExitCode : int {
 // One function per command: adds the command to the program.
 void add_check(Program& program);
 void add_compare(Program& program);
+void add_completion(Program& program);
 void add_estimate(Program& program);
+void add_init(Program& program);
 void add_log(Program& program);
 void add_map(Program& program);
 void add_model(Program& program);
@@ -42,7 +44,5 @@ void add_plugin_path(Command& command, std::vector<std::filesystem::path>& direc
 void add_assignments(Command& command, std::vector<std::string>& assignments, const std::string& what);
 /// Applies the assignments of `--set` to `settings`, in the order given.
 void apply_assignments(Settings& settings, const std::vector<std::string>& assignments);
-/// `--out`; `type` says whether it takes a file or a folder.
-void add_out(Command& command, std::string& out, const std::string& type, const std::string& meaning);
 
 }  // namespace rhec::apps

@@ -11,10 +11,12 @@
 
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "output.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/comparison/comparison.hpp"
 #include "rhec/sim/files/json.hpp"
@@ -28,13 +30,13 @@ using sim::Backend;
 using sim::Comparison;
 
 struct CompareArguments {
-  std::string scenario, out = "out";
+  std::string scenario, out;
   std::vector<std::string> solvers;
   std::string drive;
   std::vector<std::string> assignments;
   int seeds = 1, every = 0;
   double accuracy = 0.0;
-  bool no_closed_loop = false;
+  bool no_closed_loop = false, json = false;
   std::vector<std::filesystem::path> plugin_path;
 };
 
@@ -328,7 +330,7 @@ void print_notes(const Comparison& comparison, const std::filesystem::path& fold
 }
 
 int compare(const CompareArguments& arguments) {
-  Settings settings = load_yaml(arguments.scenario);
+  Settings settings = load_scenario(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   const Host host = examined_host(arguments.plugin_path);
   sim::ComparisonOptions options;
@@ -338,18 +340,23 @@ int compare(const CompareArguments& arguments) {
   options.every = arguments.every;
   options.closed_loop = !arguments.no_closed_loop;
   if (arguments.accuracy > 0.0) options.accuracy = arguments.accuracy;
-  sim::OutputFolder folder(arguments.out);
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_compare"));
   ProgressBar bar("compare");
   options.progress = [&](double share) { bar.show(share); };
   const Comparison comparison = sim::compare(host, settings, options);
   bar.finish();
-  folder.write("compare.json", sim::comparison_json(comparison));
+  const std::string document = sim::comparison_json(comparison);
+  folder.write("compare.json", document);
   folder.write("compare.svg", sim::comparison_svg(comparison));
   folder.commit();
-  print_head(comparison);
-  for (const sim::SameProblems& same : comparison.problems) print_answers(comparison, same);
-  print_loops(comparison);
-  print_notes(comparison, folder.path());
+  if (arguments.json) {
+    print_json(document, folder.path());
+  } else {
+    print_head(comparison);
+    for (const sim::SameProblems& same : comparison.problems) print_answers(comparison, same);
+    print_loops(comparison);
+    print_notes(comparison, folder.path());
+  }
   return comparison.all_usable() ? exit_fine : exit_not_solved;
 }
 
@@ -399,7 +406,9 @@ void add_compare(Program& program) {
       .positive();
   command.add_flag("--no-closed-loop", arguments->no_closed_loop, "the same problems alone");
   add_assignments(command, arguments->assignments, "a key of the scenario");
-  add_out(command, arguments->out, "DIR", "folder of the results");
+  add_out(command, arguments->out, "DIR",
+          "folder of the results; otherwise out/ and the scenario's name with _compare");
+  add_json(command, arguments->json);
   add_plugin_path(command, arguments->plugin_path);
 }
 

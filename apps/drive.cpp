@@ -9,6 +9,7 @@
 #include "commands.hpp"
 #include "drive_arguments.hpp"
 #include "integration_note.hpp"
+#include "output.hpp"
 #include "progress.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/maps/map_keeper.hpp"
@@ -61,19 +62,29 @@ void print_accuracy(const sim::DriveReplay& replay, const Robot& robot, const si
       hold_out.every, accuracy.count, accuracy.sensor, what, accuracy.median, accuracy.rms, accuracy.most, outputs);
 }
 
-/// What is written of all variants.
-void write_files(sim::OutputFolder& folder, const DriveInput& input, const std::vector<sim::DriveResult>& results,
-                 const std::string& log, const sim::DriveReplay* beside) {
+/// What is written of all variants; returns the text of summary.json.
+std::string write_files(sim::OutputFolder& folder, const DriveInput& input,
+                        const std::vector<sim::DriveResult>& results, const std::string& log,
+                        const sim::DriveReplay* beside) {
   const Robot& robot = input.scenario.variants().front().robot;
   const logs::Drive& drive = input.drives.front();
   folder.write("estimates.csv", sim::drive_estimates_csv(results, robot));
   folder.write("innovations.csv", sim::innovations_csv(results, robot));
   folder.write("predictions.csv", sim::predictions_csv(results, robot));
   folder.write("times.csv", sim::drive_times_csv(results));
-  folder.write("summary.json",
-               sim::drive_summary_json(results, input.scenario.name(), robot, drive, log, input.hold_out));
+  std::string summary = sim::drive_summary_json(results, input.scenario.name(), robot, drive, log, input.hold_out);
+  folder.write("summary.json", summary);
   folder.write("run.svg", sim::drive_svg(results.front(), input.scenario.name(), robot, drive, beside));
   folder.commit();
+  return summary;
+}
+
+/// What is said at the end: all results as JSON, or where they are.
+void tell_results(const LogArguments& arguments, const std::string& summary, const std::filesystem::path& folder) {
+  if (arguments.json)
+    print_json(summary, folder);
+  else
+    fmt::print("\npictures and numbers: {}\n", folder.string());
 }
 
 /// The name of a variant's track: the first one's is as given.
@@ -85,9 +96,10 @@ TrackArguments only_first(const TrackArguments& tracks, std::size_t variant) {
 
 int estimate_drive(const LogArguments& arguments, const TrackArguments& track_arguments) {
   const DriveInput input(arguments);
-  sim::OutputFolder folder(arguments.out);
+  tell_notes(input.scenario.variants().front().robot.notes());
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_estimate"));
   std::vector<sim::DriveResult> results;
-  print_signals(input.drives.front());
+  if (!arguments.json) print_signals(input.drives.front());
   bool all_usable = true;
   const auto& start = input.scenario.simulated_start();
   for (std::size_t v = 0; v < input.drives.size(); ++v) {
@@ -111,22 +123,24 @@ int estimate_drive(const LogArguments& arguments, const TrackArguments& track_ar
     bar.finish();
     tracks.commit();
     keeper->save();
-    print_innovations(result.all, variant.robot);
-    print_accuracy(result.withheld, variant.robot, input.hold_out);
-    print_integration(result.all.counts, *variant.robot.model(), variant.name + ": ");
+    if (!arguments.json) {
+      print_innovations(result.all, variant.robot);
+      print_accuracy(result.withheld, variant.robot, input.hold_out);
+      print_integration(result.all.counts, *variant.robot.model(), variant.name + ": ");
+    }
     all_usable = all_usable && result.all.counts.fallbacks == 0;
     results.push_back(std::move(result));
   }
-  write_files(folder, input, results, arguments.log, nullptr);
-  fmt::print("\npictures and numbers: {}\n", folder.path().string());
+  tell_results(arguments, write_files(folder, input, results, arguments.log, nullptr), folder.path());
   return all_usable ? exit_fine : exit_not_solved;
 }
 
 int smooth_drive(const LogArguments& arguments, const TrackArguments& track_arguments) {
   const DriveInput input(arguments);
-  sim::OutputFolder folder(arguments.out);
+  tell_notes(input.scenario.variants().front().robot.notes());
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_smooth"));
   std::vector<sim::DriveResult> results;
-  print_signals(input.drives.front());
+  if (!arguments.json) print_signals(input.drives.front());
   bool all_solved = true;
   const auto& start = input.scenario.simulated_start();
   for (std::size_t v = 0; v < input.drives.size(); ++v) {
@@ -139,10 +153,12 @@ int smooth_drive(const LogArguments& arguments, const TrackArguments& track_argu
     if (input.hold_out.every > 0)
       withheld = sim::smooth_drive(variant.name, variant.robot, drive, input.hold_out, start).smoothed;
     bar.finish();
-    print_solve(variant.name, smoothed.report, smoothed.intervals, smoothed.solve_seconds, smoothed.has_sigmas,
-                smoothed.laws);
-    print_innovations(smoothed.causal, variant.robot);
-    print_accuracy(withheld, variant.robot, input.hold_out, "interpolated");
+    if (!arguments.json) {
+      print_solve(variant.name, smoothed.report, smoothed.intervals, smoothed.solve_seconds, smoothed.has_sigmas,
+                  smoothed.laws);
+      print_innovations(smoothed.causal, variant.robot);
+      print_accuracy(withheld, variant.robot, input.hold_out, "interpolated");
+    }
     Tracks tracks(only_first(track_arguments, v), variant.robot);
     for (const sim::DriveEstimate& estimate : smoothed.smoothed.estimates)
       tracks.write(sim::track_sample(estimate, variant.robot, drive.start));
@@ -151,8 +167,7 @@ int smooth_drive(const LogArguments& arguments, const TrackArguments& track_argu
     results.push_back({std::move(smoothed.smoothed), std::move(withheld)});
     results.push_back({std::move(smoothed.causal), {}});
   }
-  write_files(folder, input, results, arguments.log, &results[1].all);
-  fmt::print("\npictures and numbers: {}\n", folder.path().string());
+  tell_results(arguments, write_files(folder, input, results, arguments.log, &results[1].all), folder.path());
   return all_solved ? exit_fine : exit_not_solved;
 }
 

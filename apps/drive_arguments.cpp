@@ -6,13 +6,14 @@
 #include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/logs/files/open_log.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::apps {
 namespace {
 
 sim::ReplayScenario read_replay_scenario(const LogArguments& arguments) {
-  Settings settings = load_yaml(arguments.scenario);
+  Settings settings = load_scenario(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   return {examined_host(arguments.plugin_path), settings, arguments.variants};
 }

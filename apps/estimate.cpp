@@ -11,6 +11,7 @@
 #include "dump.hpp"
 #include "integration_note.hpp"
 #include "log_arguments.hpp"
+#include "output.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/sim/files/output_folder.hpp"
@@ -70,10 +71,11 @@ void refuse_shared_maps(const sim::LogScenario& scenario) {
 int estimate_log(const EstimateArguments& arguments) {
   const LogInput input(arguments);
   const auto& [scenario, hold_out, log] = input;
-  sim::OutputFolder folder(arguments.out);
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_estimate"));
   Dump dump(arguments.dump, {"rhe"});
   std::vector<sim::Replay> replays;
   std::vector<sim::HorizonLog> horizons;
+  tell_notes(scenario.variants().front().robot.notes());
   refuse_shared_maps(scenario);
   std::vector<std::shared_ptr<sim::MapKeeper>> keepers;
   // Limits the number of nodes: one per fix, and one per step between fixes.
@@ -102,7 +104,8 @@ int estimate_log(const EstimateArguments& arguments) {
     all_usable = all_usable && replays.back().counts.fallbacks == 0;
   }
   folder.write("estimates.csv", sim::estimates_csv(replays, log, scenario));
-  folder.write("summary.json", sim::summary_json(replays, log, scenario, hold_out));
+  const std::string summary = sim::summary_json(replays, log, scenario, hold_out);
+  folder.write("summary.json", summary);
   folder.write("times.csv", sim::times_csv(replays));
   folder.write("horizons.jsonl", sim::horizons_text(horizons, log, scenario, hold_out));
   folder.write("run.svg", sim::replay_svg(replays.front(), log, scenario));
@@ -110,8 +113,12 @@ int estimate_log(const EstimateArguments& arguments) {
   folder.commit();
   dump.commit();
   tracks.commit();
-  print_table(log, *scenario.variants().front().robot.model(), replays, hold_out, folder.path());
-  dump.tell(arguments.plugin_path);
+  if (arguments.json) {
+    print_json(summary, folder.path());
+  } else {
+    print_table(log, *scenario.variants().front().robot.model(), replays, hold_out, folder.path());
+    dump.tell(arguments.plugin_path);
+  }
   return all_usable ? exit_fine : exit_not_solved;
 }
 
@@ -146,7 +153,7 @@ void add_estimate(Program& program) {
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --out out/park\n"
       "  rhec estimate scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 --variant ekf",
       [arguments] { return estimate(*arguments); });
-  add_log_arguments(command, *arguments);
+  add_log_arguments(command, "estimate", *arguments);
   add_tracks(command, arguments->tracks);
   add_dump(command, arguments->dump);
 }

@@ -8,10 +8,13 @@
 #include "commands.hpp"
 #include "crash_report.hpp"
 #include "drive_arguments.hpp"
+#include "output.hpp"
 #include "rhec/logs/mapping/proposal.hpp"
 #include "rhec/logs/signals/survey.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/replay/replay_scenario.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
 
@@ -20,6 +23,7 @@ namespace {
 
 struct InspectArguments {
   std::string log, vehicle;
+  bool json = false;
   std::vector<std::string> msg_paths;
   std::vector<std::filesystem::path> plugin_path;
 };
@@ -55,7 +59,7 @@ ModelDescription description_of(const InspectArguments& arguments) {
   const Host host = examined_host(arguments.plugin_path);
   Settings settings;
   if (std::filesystem::is_regular_file(arguments.vehicle)) {
-    settings = load_yaml(arguments.vehicle);
+    settings = load_scenario(arguments.vehicle);
     if (!settings.find("model")) {  // equations
       Settings model;
       model.set("equations", Settings::scalar(arguments.vehicle));
@@ -68,9 +72,49 @@ ModelDescription description_of(const InspectArguments& arguments) {
   return sim::ReplayScenario(host, settings).variants().front().robot.model()->description();
 }
 
+sim::Json json_of(const logs::TopicSurvey& topic) {
+  sim::Json fields = sim::Json::array();
+  for (const logs::FieldSurvey& field : topic.fields) {
+    sim::Json one{{"name", field.name}, {"values", field.count}};
+    if (field.count > 0) {
+      one["least"] = field.least;
+      one["most"] = field.most;
+    }
+    fields.push_back(std::move(one));
+  }
+  return {{"topic", topic.topic.name},
+          {"type", topic.topic.type},
+          {"records", topic.count},
+          {"usual_interval", topic.usual_interval},
+          {"longest_gap", topic.longest_gap},
+          {"gap_start", topic.gap_start},
+          {"largest_lateness", topic.largest_lateness},
+          {"backwards", topic.backwards},
+          {"not_understood", topic.unreadable},
+          {"fields", fields}};
+}
+
+/// Everything that the tables have; the proposal as the text that goes into a scenario.
+sim::Json json_of(const logs::Survey& survey, const InspectArguments& arguments) {
+  sim::Json topics = sim::Json::array();
+  for (const logs::TopicSurvey& topic : survey.topics) topics.push_back(json_of(topic));
+  sim::Json all{{"log", arguments.log}, {"topics", topics}};
+  if (survey.first != logs::no_stamp) {
+    all["first"] = seconds(survey.first);
+    all["last"] = seconds(survey.last);
+  }
+  if (!arguments.vehicle.empty()) all["signals"] = logs::propose_signals(survey, description_of(arguments));
+  return all;
+}
+
 int inspect(const InspectArguments& arguments) {
   const auto log = open_log(arguments.log, arguments.msg_paths);
   const logs::Survey survey = logs::survey(*log);
+  if (arguments.json) {
+    fmt::print("{}\n", json_of(survey, arguments).dump(2));
+    tell_damage(survey.damage);
+    return exit_fine;
+  }
   std::int64_t records = 0;
   for (const logs::TopicSurvey& topic : survey.topics) records += topic.count;
   fmt::print("{}: {} records", arguments.log, records);
@@ -108,6 +152,7 @@ void add_log(Program& program) {
   command.add("log", arguments->log, "a file, or the folder of a bag").required().value("LOG");
   command.add("--vehicle", arguments->vehicle, "propose `signals` for this model, or for that of this scenario")
       .value("NAME|FILE");
+  add_json(command, arguments->json);
   add_msg_paths(command, arguments->msg_paths);
   add_plugin_path(command, arguments->plugin_path);
 }

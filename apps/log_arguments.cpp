@@ -5,14 +5,16 @@
 #include "commands.hpp"
 #include "crash_report.hpp"
 #include "drive_arguments.hpp"
+#include "output.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::apps {
 
 sim::LogScenario read_log_scenario(const LogArguments& arguments) {
-  Settings settings = load_yaml(arguments.scenario);
+  Settings settings = load_scenario(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   return {examined_host(arguments.plugin_path), settings, arguments.variants};
 }
@@ -31,7 +33,8 @@ LogInput::LogInput(const LogArguments& arguments)
       hold_out(read_hold_out(arguments)),
       log(sim::read_recorded_log(arguments.dead_reckoning, arguments.gps, scenario)) {}
 
-void add_log_arguments(Command& command, LogArguments& arguments, const std::string& usual_hold_out) {
+void add_log_arguments(Command& command, const std::string& name, LogArguments& arguments,
+                       const std::string& usual_hold_out) {
   command.add("scenario", arguments.scenario, "a YAML file").required();
   command.add("log", arguments.log, "a table (CSV), MCAP, or a bag of rosbag2; see 'rhec log'").value("LOG");
   add_msg_paths(command, arguments.msg_paths);
@@ -49,7 +52,9 @@ void add_log_arguments(Command& command, LogArguments& arguments, const std::str
       .within(0, 1000000);
   command.add_list("--variant", arguments.variants, "run this variant alone; may be given several times");
   add_assignments(command, arguments.assignments, "a key of the scenario");
-  add_out(command, arguments.out, "DIR", "folder of the results");
+  add_out(command, arguments.out, "DIR",
+          fmt::format("folder of the results; otherwise out/ and the scenario's name with _{}", name));
+  add_json(command, arguments.json);
   add_plugin_path(command, arguments.plugin_path);
 }
 

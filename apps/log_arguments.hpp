@@ -11,14 +11,15 @@ namespace rhec::apps {
 
 /// The arguments of commands that work on a recorded log.
 struct LogArguments {
-  std::string scenario, log, dead_reckoning, gps, out = "out";
+  std::string scenario, log, dead_reckoning, gps, out;
   std::vector<std::string> assignments, variants, msg_paths;
   int hold_out = -1, phase = -1;  ///< -1: the default
+  bool json = false;
   std::vector<std::filesystem::path> plugin_path;
 };
 
-/// `usual_hold_out`: the default of --hold-out, in words.
-void add_log_arguments(Command& command, LogArguments& arguments,
+/// `name` is the command's; `usual_hold_out`: the default of --hold-out, in words.
+void add_log_arguments(Command& command, const std::string& name, LogArguments& arguments,
                        const std::string& usual_hold_out = "5 of LOG, else none");
 /// Of a log, without --hold-out.
 inline constexpr int default_hold_out = 5;

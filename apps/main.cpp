@@ -43,16 +43,14 @@ void apply_assignments(Settings& settings, const std::vector<std::string>& assig
   for (const std::string& assignment : assignments) apply_assignment(settings, assignment);
 }
 
-void add_out(Command& command, std::string& out, const std::string& type, const std::string& meaning) {
-  command.add("--out", out, meaning).value(type).shows_default();
-}
-
 namespace {
 
 constexpr const char* about = "Receding horizon estimation and control of field robots whose wheels slip.";
 constexpr const char* examples =
     "Examples:\n"
-    "  rhec run scenarios/figure8.yaml --out out/figure8\n"
+    "  rhec run scenarios/figure8.yaml    results go to out/figure8\n"
+    "  rhec report out/figure8            a page of them\n"
+    "  rhec init my_robot                 files of a robot to go on from\n"
     "  rhec options                       every key of a scenario\n"
     "  rhec plugins                       what is installed\n"
     "  rhec plugins gn_rti                the options of one plugin\n"
@@ -83,12 +81,13 @@ std::string first_steps() {
   return fmt::format(
       "{0}\n\n"
       "A robot drives a figure of eight over slipping ground, estimates its slip, and steers with that:\n"
-      "  rhec run {1}/figure8.yaml --out figure8        then look at figure8/run.svg\n"
+      "  rhec run {1}/figure8.yaml                      then look at out/figure8/run.svg\n"
       "The same as a page to look into, and with another estimator, at another speed:\n"
-      "  rhec report figure8 -o figure8.html\n"
-      "  rhec run {1}/figure8.yaml --set estimator.name=ekf --set speed=5\n"
-      "Your own vehicle: its equations in a file, checked before its first drive:\n"
-      "  rhec check bicycle_slip                        what a check says\n"
+      "  rhec report out/figure8                        opens in a browser: out/figure8/report.html\n"
+      "  rhec run {1}/figure8.yaml --set estimator.name=ekf --set speed=5 --out out/ekf\n"
+      "Your own robot: one of the vehicles, or equations of your own, and its sensors:\n"
+      "  rhec init my_robot                             writes its files\n"
+      "  rhec check my_robot/robot.yaml                 what a check says\n"
       "  rhec model --help                              equations become a plugin\n"
       "Your own log:\n"
       "  rhec estimate --help\n\n"
@@ -98,6 +97,7 @@ std::string first_steps() {
 
 int run(int count, char** words) {
   Program program(about, examples, first_steps(), &version_text);
+  add_init(program);
   add_run(program);
   add_estimate(program);
   add_smooth(program);
@@ -113,6 +113,7 @@ int run(int count, char** words) {
   add_model(program);
   add_options(program);
   add_plugins(program);
+  add_completion(program);
   return program.run(count, words);
 }
 

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "output.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/maps/map_export.hpp"
 
@@ -21,7 +23,32 @@ namespace fs = std::filesystem;
 struct MapArguments {
   std::vector<std::string> files;
   std::string merged, ascii, geotiff;
+  bool json = false;
 };
+
+/// What is known of a parameter over all cells.
+struct ParameterFigures {
+  std::string name;
+  double least, mean, largest, median_sigma;
+};
+
+std::vector<ParameterFigures> figures_of(const sim::SlipMapContent& content) {
+  std::vector<ParameterFigures> figures;
+  for (std::size_t j = 0; j < content.identity.parameters.size() && !content.cells.empty(); ++j) {
+    std::vector<double> means, sigmas;
+    double sum = 0.0;
+    for (const SlipMap::Cell& cell : content.cells) {
+      means.push_back(cell.means[j]);
+      sigmas.push_back(std::sqrt(cell.variances[j]));
+      sum += cell.means[j];
+    }
+    std::nth_element(sigmas.begin(), sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2), sigmas.end());
+    const auto [lowest, largest] = std::minmax_element(means.begin(), means.end());
+    figures.push_back({content.identity.parameters[j], *lowest, sum / static_cast<double>(means.size()), *largest,
+                       sigmas[sigmas.size() / 2]});
+  }
+  return figures;
+}
 
 void print_content(const sim::SlipMapContent& content, const fs::path& file) {
   const MapIdentity& identity = content.identity;
@@ -39,20 +66,29 @@ void print_content(const sim::SlipMapContent& content, const fs::path& file) {
   fmt::print("{:.1f} visits and {:.1f} observations a cell, from {:.1f} s to {:.1f} s\n\n",
              static_cast<double>(visits) / count, static_cast<double>(values) / count, least, content.newest());
   fmt::print("{:<12} {:>8} {:>8} {:>8}   {:>16}\n", "PARAMETER", "LEAST", "MEAN", "LARGEST", "MEDIAN SIGMA");
-  for (std::size_t j = 0; j < identity.parameters.size(); ++j) {
-    std::vector<double> means, sigmas;
-    double sum = 0.0;
-    for (const SlipMap::Cell& cell : content.cells) {
-      means.push_back(cell.means[j]);
-      sigmas.push_back(std::sqrt(cell.variances[j]));
-      sum += cell.means[j];
-    }
-    std::nth_element(sigmas.begin(), sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2), sigmas.end());
-    const auto [lowest, largest] = std::minmax_element(means.begin(), means.end());
-    fmt::print("{:<12} {:>8.3f} {:>8.3f} {:>8.3f}   {:>16.4f}\n", identity.parameters[j], *lowest, sum / count,
-               *largest, sigmas[sigmas.size() / 2]);
-  }
+  for (const ParameterFigures& each : figures_of(content))
+    fmt::print("{:<12} {:>8.3f} {:>8.3f} {:>8.3f}   {:>16.4f}\n", each.name, each.least, each.mean, each.largest,
+               each.median_sigma);
   fmt::print("\n");
+}
+
+sim::Json json_of(const sim::SlipMapContent& content, const fs::path& file) {
+  const MapIdentity& identity = content.identity;
+  sim::Json parameters = sim::Json::array();
+  for (const ParameterFigures& each : figures_of(content))
+    parameters.push_back({{"name", each.name},
+                          {"least", each.least},
+                          {"mean", each.mean},
+                          {"largest", each.largest},
+                          {"median_sigma", each.median_sigma}});
+  return {{"file", file.string()},
+          {"cells", content.cells.size()},
+          {"cell", content.cell},
+          {"vehicle", identity.vehicle},
+          {"model", identity.model},
+          {"frame", identity.frame},
+          {"origin", std::vector<double>{identity.origin_x, identity.origin_y}},
+          {"parameters", parameters}};
 }
 
 /// All files on one map: that of the first, with its frame and its lattice.
@@ -71,14 +107,12 @@ sim::SlipMapContent merged(const std::vector<sim::SlipMapContent>& contents, con
 
 int run_map(const MapArguments& arguments) {
   std::vector<sim::SlipMapContent> contents;
-  for (const std::string& file : arguments.files) {
-    contents.push_back(sim::read_slip_map(file));
-    print_content(contents.back(), file);
-  }
+  for (const std::string& file : arguments.files) contents.push_back(sim::read_slip_map(file));
   const sim::SlipMapContent content = contents.size() == 1 ? contents.front() : merged(contents, arguments.files);
+  sim::Json written = sim::Json::object();
   if (!arguments.merged.empty()) {
     sim::write_slip_map(arguments.merged, content);
-    fmt::print("merged: {} ({} cells)\n", arguments.merged, content.cells.size());
+    written["merged"] = arguments.merged;
   }
   for (const bool is_ascii : {true, false}) {
     const std::string& name = is_ascii ? arguments.ascii : arguments.geotiff;
@@ -95,8 +129,18 @@ int run_map(const MapArguments& arguments) {
       }
     }
     folder.commit();
-    fmt::print("{}: {}\n", is_ascii ? "ASCII rasters" : "GeoTIFF", folder.path().string());
+    written[is_ascii ? "ASCII rasters" : "GeoTIFF"] = folder.path().string();
   }
+  if (arguments.json) {
+    sim::Json maps = sim::Json::array();
+    for (std::size_t i = 0; i < contents.size(); ++i) maps.push_back(json_of(contents[i], arguments.files[i]));
+    fmt::print("{}\n", sim::Json({{"maps", maps}, {"written", written}}).dump(2));
+    return exit_fine;
+  }
+  for (std::size_t i = 0; i < contents.size(); ++i) print_content(contents[i], arguments.files[i]);
+  for (const auto& [what, place] : written.items())
+    fmt::print("{}: {}{}\n", what, place.as_text(),
+               what == "merged" ? fmt::format(" ({} cells)", content.cells.size()) : "");
   return exit_fine;
 }
 
@@ -119,6 +163,7 @@ void add_map(Program& program) {
       .value("DIR");
   command.add("--geotiff", arguments->geotiff, "folder for GeoTIFF: PARAMETER.tif, with bands for mean and sigma")
       .value("DIR");
+  add_json(command, arguments->json);
 }
 
 }  // namespace rhec::apps

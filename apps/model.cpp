@@ -7,12 +7,14 @@
 
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "output.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/vehicle_graph.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 #include "rhec/plugins/equations/vehicle_cpp.hpp"
 #include "rhec/plugins/host/host.hpp"
 #include "rhec/sim/check/formula_size.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 
 namespace rhec::apps {
@@ -22,7 +24,7 @@ struct ModelArguments {
   std::string file;
   std::vector<std::string> assignments;
   std::optional<std::string> folder;
-  bool force = false;
+  bool force = false, json = false;
 };
 
 std::string listed(const std::vector<Variable>& variables) {
@@ -30,6 +32,28 @@ std::string listed(const std::vector<Variable>& variables) {
   names.reserve(variables.size());
   for (const Variable& variable : variables) names.push_back(fmt::format("{} [{}]", variable.name, variable.unit));
   return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
+}
+
+sim::Json json_of(const std::vector<Variable>& variables) {
+  sim::Json list = sim::Json::array();
+  for (const Variable& variable : variables) list.push_back({{"name", variable.name}, {"unit", variable.unit}});
+  return list;
+}
+
+sim::Json json_of(const Model& model, const std::string& file) {
+  const ModelDescription& about = model.description();
+  sim::Json options = sim::Json::object(), operations = sim::Json::object();
+  for (const Tape::Known& option : model.graph()->options)
+    options[model.graph()->graph->name_of(option.node)] = option.value;
+  for (const auto& [what, count] : sim::size_of_formula(*model.graph(), about).counts) operations[what] = count;
+  return {{"file", file},
+          {"name", about.name},
+          {"states", json_of(about.states)},
+          {"inputs", json_of(about.inputs)},
+          {"parameters", json_of(about.parameters)},
+          {"outputs", json_of(about.outputs)},
+          {"options", options},
+          {"operations", operations}};
 }
 
 void summarise(const Model& model, const std::string& file) {
@@ -74,6 +98,8 @@ int show(const ModelArguments& arguments) {
   const std::shared_ptr<Model> model = examined_host({}).make_model(arguments.file, settings);
   if (arguments.folder)
     write_cpp(arguments);
+  else if (arguments.json)
+    fmt::print("{}\n", json_of(*model, arguments.file).dump(2));
   else
     summarise(*model, arguments.file);
   return exit_fine;
@@ -97,6 +123,7 @@ void add_model(Program& program) {
   Argument(cpp).value("[FOLDER]");
   command.add_flag("--force", arguments->force, "replace files that are there").needs(cpp);
   add_assignments(command, arguments->assignments, "an option of the vehicle, where the file has no default");
+  add_json(command, arguments->json);
 }
 
 }  // namespace rhec::apps

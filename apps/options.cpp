@@ -7,10 +7,12 @@
 
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "output.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/option_values.hpp"
 #include "rhec/logs/mapping/signal_map.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
 #include "rhec/sim/loop/scenario.hpp"
 #include "ros/ros_options.hpp"
@@ -20,6 +22,7 @@ namespace {
 
 struct OptionsArguments {
   std::string section;
+  bool json = false;
   std::vector<std::filesystem::path> plugin_path;
 };
 
@@ -86,23 +89,22 @@ std::string full_name(const OptionSection& section, const std::string& key) {
   return section.name.empty() ? key : section.name + "." + key;
 }
 
-/// A section, or the row of a key: by its full name, or by its own where it stands in several sections. Throws Error,
-/// with the nearest name, if there is none.
-std::string section_or_key(const std::vector<OptionSection>& sections, const std::string& word) {
-  std::string text;
+/// The sections that a word names: one of that name, or those with a key of that name, by its full name or its own,
+/// with its row alone. Throws Error, with the nearest name, if there is none.
+std::vector<OptionSection> named(const std::vector<OptionSection>& sections, const std::string& word) {
+  std::vector<OptionSection> found;
   std::vector<std::string> names, keys;
   for (const OptionSection& section : sections) {
-    if (!section.name.empty() && section.name == word) return section_text(section);
+    if (!section.name.empty() && section.name == word) return {section};
     if (!section.name.empty()) names.push_back(section.name);
-    std::vector<OptionRow> found;
+    OptionSection with_key{section.name, section.meaning, {}};
     for (const OptionRow& row : section.rows) {
       keys.push_back(full_name(section, row.name));
-      if (word == row.name || word == keys.back()) found.push_back(row);
+      if (word == row.name || word == keys.back()) with_key.rows.push_back(row);
     }
-    if (!found.empty())
-      text += (text.empty() ? "" : "\n") + table_of(found, section.name.empty() ? "" : section.name + ".");
+    if (!with_key.rows.empty()) found.push_back(std::move(with_key));
   }
-  if (!text.empty()) return text;
+  if (!found.empty()) return found;
   std::vector<std::string> known = names;
   known.insert(known.end(), keys.begin(), keys.end());
   const std::string near = nearest(word, known);
@@ -111,18 +113,35 @@ std::string section_or_key(const std::vector<OptionSection>& sections, const std
                                        : fmt::format("did you mean '{}'?", near)));
 }
 
-int show(const OptionsArguments& arguments) {
-  std::vector<OptionSection> sections = sim::scenario_sections();
-  for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
-  for (OptionSection& section : logs::signal_sections()) sections.push_back(std::move(section));
-  for (OptionSection& section : ros::ros_sections()) sections.push_back(std::move(section));
-  if (!arguments.section.empty()) {
-    fmt::print("{}", section_or_key(sections, arguments.section));
-    return exit_fine;
-  }
-  const Host host = examined_host(arguments.plugin_path);
-  std::string text = introduction;
-  for (const OptionSection& section : sections) text += "\n" + section_text(section);
+/// A section with all its text, or the rows of keys alone.
+std::string text_of(const std::vector<OptionSection>& found, const std::string& word) {
+  if (found.size() == 1 && found.front().name == word) return section_text(found.front());
+  std::string text;
+  for (const OptionSection& section : found)
+    text += (text.empty() ? "" : "\n") + table_of(section.rows, section.name.empty() ? "" : section.name + ".");
+  return text;
+}
+
+sim::Json json_of(const std::vector<OptionRow>& rows) {
+  sim::Json list = sim::Json::array();
+  for (const OptionRow& row : rows)
+    list.push_back({{"name", row.name},
+                    {"type", row.type},
+                    {"default", row.default_value},
+                    {"constraint", row.constraint},
+                    {"meaning", row.meaning}});
+  return list;
+}
+
+sim::Json json_of(const std::vector<OptionSection>& sections) {
+  sim::Json list = sim::Json::array();
+  for (const OptionSection& section : sections)
+    list.push_back({{"section", section.name}, {"meaning", section.meaning}, {"keys", json_of(section.rows)}});
+  return list;
+}
+
+/// Plugins whose options every installation has.
+std::vector<PluginRecord> listed_plugins(const Host& host) {
   std::vector<PluginRecord> plugins = host.discover();
   std::erase_if(plugins, [](const PluginRecord& plugin) {
     return !plugin.accepted() || plugin.kind == PluginKind::model || !plugin.backend.empty();
@@ -130,7 +149,32 @@ int show(const OptionsArguments& arguments) {
   std::sort(plugins.begin(), plugins.end(), [](const PluginRecord& a, const PluginRecord& b) {
     return a.kind != b.kind ? a.kind < b.kind : a.name < b.name;
   });
-  for (const PluginRecord& plugin : plugins) text += "\n" + plugin_text(host, plugin);
+  return plugins;
+}
+
+int show(const OptionsArguments& arguments) {
+  std::vector<OptionSection> sections = sim::scenario_sections();
+  for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
+  for (OptionSection& section : logs::signal_sections()) sections.push_back(std::move(section));
+  for (OptionSection& section : ros::ros_sections()) sections.push_back(std::move(section));
+  if (!arguments.section.empty()) {
+    const std::vector<OptionSection> found = named(sections, arguments.section);
+    fmt::print("{}", arguments.json ? json_of(found).dump(2) + "\n" : text_of(found, arguments.section));
+    return exit_fine;
+  }
+  const Host host = examined_host(arguments.plugin_path);
+  if (arguments.json) {
+    sim::Json plugins = sim::Json::array();
+    for (const PluginRecord& plugin : listed_plugins(host))
+      plugins.push_back({{"kind", std::string(word_of(plugin.kind))},
+                         {"name", plugin.name},
+                         {"options", json_of(host.options(plugin.kind, plugin.name))}});
+    fmt::print("{}\n", sim::Json({{"sections", json_of(sections)}, {"plugins", plugins}}).dump(2));
+    return exit_fine;
+  }
+  std::string text = introduction;
+  for (const OptionSection& section : sections) text += "\n" + section_text(section);
+  for (const PluginRecord& plugin : listed_plugins(host)) text += "\n" + plugin_text(host, plugin);
   fmt::print("{}", text);
   return exit_fine;
 }
@@ -146,6 +190,7 @@ void add_options(Program& program) {
                                 "  rhec options estimator.horizon",
                                 [arguments] { return show(*arguments); });
   command.add("section", arguments->section, "show this section or key alone").value("SECTION");
+  add_json(command, arguments->json);
   add_plugin_path(command, arguments->plugin_path);
 }
 

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "output.hpp"
 #include "report/report_page.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/report/report.hpp"
 
@@ -16,7 +18,8 @@ namespace rhec::apps {
 namespace {
 
 struct ReportArguments {
-  std::string source, page = "report.html", figures;
+  std::string source, page, figures;
+  bool json = false;
 };
 
 /// Writes one file next to its destination; `commit` moves it into place.
@@ -37,11 +40,20 @@ class OutputFile {
   sim::OutputFolder folder_;
 };
 
+/// The page lies with what it is of: in a folder of results, beside a file.
+std::filesystem::path page_of(const ReportArguments& arguments) {
+  if (!arguments.page.empty()) return arguments.page;
+  const std::filesystem::path source(arguments.source);
+  return std::filesystem::is_directory(source) ? source / "report.html"
+                                               : std::filesystem::path(source).replace_extension(".html");
+}
+
 int report(const ReportArguments& arguments) {
   if (!has_report_page())
     throw Error("this program was built without the page of reports (-DRHEC_REPORT=OFF); build it with RHEC_REPORT=ON");
   const std::string document = sim::report_document(arguments.source, "rhec " RHEC_PROJECT_VERSION);
-  OutputFile page(arguments.page, report_page(document));
+  const std::filesystem::path file = page_of(arguments);
+  OutputFile page(file, report_page(document));
   std::optional<sim::OutputFolder> figures;
   std::size_t count = 0;
   if (!arguments.figures.empty()) {
@@ -53,7 +65,13 @@ int report(const ReportArguments& arguments) {
     figures->commit();
   }
   page.commit();
-  fmt::print("report: {}\n", arguments.page);
+  if (arguments.json) {
+    sim::Json all{{"report", file.string()}};
+    if (figures) all["figures"] = figures->path().string();
+    fmt::print("{}\n", all.dump(2));
+    return exit_fine;
+  }
+  fmt::print("report: {}\n", file.string());
   if (figures) fmt::print("{} figures: {}\n", count, figures->path().string());
   return exit_fine;
 }
@@ -68,7 +86,7 @@ void add_report(Program& program) {
       "and a\n"
       "window that can be moved through a run: blocks, measurements, the plan.\n\n"
       "Examples:\n"
-      "  rhec report out/figure8 -o figure8.html\n"
+      "  rhec report out/figure8                  makes out/figure8/report.html\n"
       "  rhec report out/blocks.sqlite -o blocks.html --svg out/figures\n"
       "  rhec report out/compare/compare.json",
       [arguments] { return report(*arguments); });
@@ -77,8 +95,12 @@ void add_report(Program& program) {
            "the folder of 'rhec run' or 'rhec estimate', the database of 'rhec sweep', compare.json, or a map of slip")
       .value("RUN_OR_DB_OR_COMPARISON")
       .required();
-  command.add("-o,--out", arguments->page, "the page").value("FILE").shows_default();
+  command
+      .add("-o,--out", arguments->page,
+           "the page; otherwise report.html in the folder that it is of, or beside the file, with its name")
+      .value("FILE");
   command.add("--svg", arguments->figures, "folder for the figures, each a file of its own for a paper").value("DIR");
+  add_json(command, arguments->json);
 }
 
 }  // namespace rhec::apps

@@ -14,9 +14,11 @@
 #include "drive_arguments.hpp"
 #include "dump.hpp"
 #include "integration_note.hpp"
+#include "output.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/horizons/horizon_log.hpp"
@@ -29,12 +31,13 @@ namespace rhec::apps {
 namespace {
 
 struct RunArguments {
-  std::string scenario, out = "out";
+  std::string scenario, out;
   std::vector<std::string> assignments;
   std::vector<std::filesystem::path> plugin_path;
   DumpArguments dump;
   TrackArguments tracks;
   std::string log;
+  bool json = false;
 };
 
 /// How sure the estimator is, and whether that is right.
@@ -131,13 +134,14 @@ void print_map(const sim::MapKeeper& keeper) {
 }
 
 int run(const RunArguments& arguments) {
-  Settings settings = load_yaml(arguments.scenario);
+  Settings settings = load_scenario(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   const sim::Scenario scenario(examined_host(arguments.plugin_path), settings);
   if (scenario.robot().memory().is_given() && arguments.dump.folder)
     throw Error(
         "--dump: problems of a controller that knows the slip ahead cannot be saved yet; give estimator.memory=none");
-  sim::OutputFolder folder(arguments.out);
+  tell_notes(scenario.notes());
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, ""));
   Dump dump(arguments.dump, {"rhe", "rhc"});
   ProgressBar bar(scenario.options().name);
   const double samples = scenario.path().length() / (scenario.options().speed * scenario.robot().step());
@@ -171,9 +175,13 @@ int run(const RunArguments& arguments) {
   dump.commit();
   tracks.commit();
   if (measured) measured->close();
-  print_table(summary, scenario, folder.path());
-  print_map(*keeper);
-  dump.tell(arguments.plugin_path);
+  if (arguments.json) {
+    print_json(sim::summary_json(summary), folder.path());
+  } else {
+    print_table(summary, scenario, folder.path());
+    print_map(*keeper);
+    dump.tell(arguments.plugin_path);
+  }
   return log.completed ? exit_fine : exit_not_solved;
 }
 
@@ -187,7 +195,7 @@ void add_run(Program& program) {
       "a\n"
       "page of them. The exit code is 3 where the robot did not reach the end of its path.\n\n"
       "Examples:\n"
-      "  rhec run scenarios/figure8.yaml --out out/figure8\n"
+      "  rhec run scenarios/figure8.yaml          results go to out/figure8\n"
       "  rhec run scenarios/figure8.yaml --set speed=4 --set 'blocking.kappa={name: full_horizon}' --out out/fhb\n"
       "  rhec run scenarios/zigzag.yaml --set estimator.name=ekf --set seed=3 --out out/ekf\n"
       "  rhec run scenarios/figure8.yaml --log drive.mcap --mcap estimate.mcap\n"
@@ -195,7 +203,8 @@ void add_run(Program& program) {
       [arguments] { return run(*arguments); });
   command.add("scenario", arguments->scenario, "a YAML file").required();
   add_assignments(command, arguments->assignments, "a key of the scenario");
-  add_out(command, arguments->out, "DIR", "folder of the results");
+  add_out(command, arguments->out, "DIR", "folder of the results; otherwise out/ and the scenario's name");
+  add_json(command, arguments->json);
   command
       .add("--log", arguments->log,
            "write what the sensors measured, as 'rhec estimate SCENARIO LOG' reads it; .csv or .mcap")

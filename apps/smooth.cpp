@@ -10,9 +10,11 @@
 #include "crash_report.hpp"
 #include "drive_arguments.hpp"
 #include "log_arguments.hpp"
+#include "output.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/horizons/horizon_log.hpp"
@@ -21,8 +23,6 @@
 #include "rhec/sim/loop/smoothed_drive.hpp"
 
 namespace rhec::apps {
-namespace {}  // namespace
-
 void print_solve(const std::string& name, const Report& report, int intervals, double seconds, bool has_sigmas,
                  const std::vector<SmoothedRun::Law>& laws) {
   fmt::print("{}: {} intervals at once: {} after {} iterations and {} factorisations, {:.2f} s; KKT residual {:.1e}\n",
@@ -73,7 +73,8 @@ void print_table(const std::vector<sim::SmoothedReplay>& results, const sim::Rec
 
 int smooth_log(const SmoothArguments& arguments) {
   const LogInput input(arguments);
-  sim::OutputFolder folder(arguments.out);
+  tell_notes(input.scenario.variants().front().robot.notes());
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_smooth"));
   std::vector<sim::SmoothedReplay> results;
   bool all_solved = true;
   for (const sim::LogVariant& variant : input.scenario.variants()) {
@@ -95,7 +96,8 @@ int smooth_log(const SmoothArguments& arguments) {
     replays.push_back(result.causal);
   }
   folder.write("estimates.csv", sim::estimates_csv(replays, input.log, input.scenario));
-  folder.write("summary.json", sim::summary_json(replays, input.log, input.scenario, input.hold_out));
+  const std::string summary = sim::summary_json(replays, input.log, input.scenario, input.hold_out);
+  folder.write("summary.json", summary);
   folder.write("times.csv", sim::times_csv(replays));
   // A smoother has no windows, but a report reads the description of the model from this file.
   std::vector<sim::HorizonLog> none;
@@ -104,7 +106,10 @@ int smooth_log(const SmoothArguments& arguments) {
   folder.write("horizons.jsonl",
                sim::horizons_text(none, input.log, input.scenario, input.hold_out, {"", sim::causal_suffix}));
   folder.commit();
-  print_table(results, input.log, input.hold_out, folder.path());
+  if (arguments.json)
+    print_json(summary, folder.path());
+  else
+    print_table(results, input.log, input.hold_out, folder.path());
   return all_solved ? exit_fine : exit_not_solved;
 }
 
@@ -133,7 +138,7 @@ void print_table(const sim::SmoothedDrive& drive, const sim::Scenario& scenario,
 }
 
 int smooth_simulation(const SmoothArguments& arguments) {
-  Settings settings = load_yaml(arguments.scenario);
+  Settings settings = load_scenario(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   constexpr const char* give_files = "give its files by --dead-reckoning and --gps";
   for (const char* key : {"log", "variants"})
@@ -143,7 +148,8 @@ int smooth_simulation(const SmoothArguments& arguments) {
     throw Error(fmt::format(
         "--hold-out, --hold-out-phase and --variant are for a recorded drive; {}, or leave them out", give_files));
   const sim::Scenario scenario(examined_host(arguments.plugin_path), settings);
-  sim::OutputFolder folder(arguments.out);
+  tell_notes(scenario.notes());
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_smooth"));
   ProgressBar bar(scenario.options().name);
   const sim::SmoothedDrive drive =
       sim::smooth_closed_loop(scenario, {.progress = [&](double share) { bar.show(share); }});
@@ -157,14 +163,19 @@ int smooth_simulation(const SmoothArguments& arguments) {
   tracks.commit();
   folder.write("steps.csv", sim::steps_csv(drive.smoothed, scenario));
   folder.write("times.csv", sim::times_csv(drive.smoothed));
-  folder.write("summary.json", sim::summary_json(drive, scenario));
+  const std::string summary = sim::summary_json(drive, scenario);
+  folder.write("summary.json", summary);
   // A smoother has no windows, but a report reads the description of the model from this file.
   folder.write("horizons.jsonl", sim::horizons_text(sim::HorizonLog(scenario.robot(), 1), drive.smoothed, scenario));
   folder.write("run.svg", sim::run_svg(drive.smoothed, scenario, &drive.causal));
   folder.commit();
-  print_solve(scenario.options().name, drive.report, drive.intervals, drive.solve_seconds, drive.has_sigmas,
-              drive.laws);
-  print_table(drive, scenario, folder.path());
+  if (arguments.json) {
+    print_json(summary, folder.path());
+  } else {
+    print_solve(scenario.options().name, drive.report, drive.intervals, drive.solve_seconds, drive.has_sigmas,
+                drive.laws);
+    print_table(drive, scenario, folder.path());
+  }
   return drive.report.status == Status::solved ? exit_fine : exit_not_solved;
 }
 
@@ -192,7 +203,7 @@ void add_smooth(Program& program) {
       "  rhec smooth scenarios/victoria_park.yaml --dead-reckoning DRS.txt --gps GPS.txt --hold-out 5 \\\n"
       "    --set 'smoother.blocking.kappa={name: structured, size: 50, neighbour_sigma: 0.004}'",
       [arguments] { return smooth(*arguments); });
-  add_log_arguments(command, *arguments);
+  add_log_arguments(command, "smooth", *arguments);
   add_tracks(command, arguments->tracks);
 }
 

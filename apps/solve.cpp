@@ -318,7 +318,7 @@ void add_solve(Program& program) {
   add_assignments(command, arguments->assignments, "an option of the solver");
   command.add_flag("--sequence", arguments->sequence, "warm starts along each id prefix");
   command.add_flag("--cold", arguments->cold, "pass over the guesses of the file");
-  add_out(command, arguments->out, "FILE", "write there, whole or not at all, instead of to standard output");
+  command.add("--out", arguments->out, "write there, whole or not at all, instead of to standard output").value("FILE");
   command.add_flag("--verbose", arguments->verbose, "print a summary even where standard error is no terminal");
   add_plugin_path(command, arguments->plugin_path);
 }

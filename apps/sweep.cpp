@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
@@ -15,9 +16,12 @@
 
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "output.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/sim/files/json.hpp"
+#include "rhec/sim/report/sweep_table.hpp"
 #include "rhec/sim/store/sweep_store.hpp"
 #include "rhec/sim/study/sweep.hpp"
 #include "rhec/sim/study/sweep_runner.hpp"
@@ -30,7 +34,7 @@ namespace {
 struct SweepArguments {
   std::string sweep, out;
   int threads = 0;
-  bool yes = false, dry_run = false;
+  bool yes = false, dry_run = false, json = false;
   std::vector<std::filesystem::path> plugin_path;
 };
 
@@ -55,17 +59,74 @@ std::string counted(std::int64_t count, const std::string& word) {
   return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
 }
 
-/// Prints what was done and returns the exit code; `there` is how many runs the database already had.
-int tell(const sim::Sweep& sweep, const sim::SweepProgress& done, std::int64_t there,
-         const std::filesystem::path& file) {
+/// What does not fit into a terminal is in the database.
+constexpr std::size_t most_rows = 20, widest_value = 24;
+
+/// What came out, setting by setting, the best first.
+void print_table(const sim::SweepTable& table) {
+  if (table.measures.empty()) return;
+  std::vector<std::vector<std::string>> rows{table.keys};
+  rows.front().insert(rows.front().end(), {"RUNS"});
+  for (const std::string& measure : table.measures) rows.front().push_back(measure);
+  for (const sim::SweepTable::Row& row : table.rows) {
+    if (rows.size() > most_rows) break;
+    rows.emplace_back();
+    for (const std::string& value : row.values)
+      rows.back().push_back(value.size() > widest_value ? value.substr(0, widest_value - 1) + "~" : value);
+    rows.back().push_back(row.completed == row.runs ? fmt::format("{}", row.runs)
+                                                    : fmt::format("{} of {}", row.completed, row.runs));
+    for (const double mean : row.means) rows.back().push_back(std::isnan(mean) ? "-" : fmt::format("{:.4g}", mean));
+  }
+  std::vector<std::size_t> widths(rows.front().size());
+  for (const auto& row : rows)
+    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
+  fmt::print("\nMean absolute errors of what the database has, the least of {} first:\n", table.measures.front());
+  for (const auto& row : rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) fmt::print("{}{:>{}}", c == 0 ? "" : "  ", row[c], widths[c]);
+    fmt::print("\n");
+  }
+  if (table.rows.size() > most_rows) fmt::print("and {} settings more\n", table.rows.size() - most_rows);
+}
+
+sim::Json json_of(const sim::SweepTable& table) {
+  sim::Json settings = sim::Json::array();
+  for (const sim::SweepTable::Row& row : table.rows) {
+    sim::Json keys = sim::Json::object(), means = sim::Json::object();
+    for (std::size_t i = 0; i < table.keys.size(); ++i) keys[table.keys[i]] = row.values[i];
+    for (std::size_t i = 0; i < table.measures.size(); ++i) means[table.measures[i]] = row.means[i];
+    settings.push_back({{"keys", keys}, {"runs", row.runs}, {"completed", row.completed}, {"mae", means}});
+  }
+  return settings;
+}
+
+/// What was done, as text or JSON.
+void print_results(const sim::Sweep& sweep, const sim::SweepProgress& done, std::int64_t there, std::int64_t left,
+                   const std::filesystem::path& file, bool json) {
+  const sim::SweepTable table =
+      done.made + there > 0 ? sim::sweep_table(sim::read_sweep_runs(file)) : sim::SweepTable();
+  if (json) {
+    sim::Json statuses = sim::Json::object();
+    for (const auto& [status, count] : done.statuses) statuses[name_of(status)] = count;
+    const sim::Json all{{"name", sweep.name()}, {"made", done.made},       {"there_before", there},     {"left", left},
+                        {"statuses", statuses}, {"seconds", done.seconds}, {"settings", json_of(table)}};
+    print_json(all.dump(), file);
+    return;
+  }
   fmt::print("{}: {} made in {:.1f} s", sweep.name(), counted(done.made, "run"), done.seconds);
   if (done.made > 0) fmt::print(" ({:.1f} a second)", static_cast<double>(done.made) / done.seconds);
   if (there > 0) fmt::print(", {} there before", there);
   fmt::print("\n");
   for (const auto& [status, count] : done.statuses) fmt::print("  {:>9} {}\n", count, name_of(status));
-  const std::int64_t left = done.total - there - done.made;
+  print_table(table);
   if (left > 0) fmt::print("stopped with {} still to make; the same command goes on there\n", counted(left, "run"));
-  fmt::print("database: {}\n", file.string());
+  fmt::print("\ndatabase: {}\n", file.string());
+}
+
+/// Prints what was done and returns the exit code; `there` is how many runs the database already had.
+int tell(const sim::Sweep& sweep, const sim::SweepProgress& done, std::int64_t there, const std::filesystem::path& file,
+         bool json) {
+  const std::int64_t left = done.total - there - done.made;
+  print_results(sweep, done, there, left, file, json);
   const bool all_completed = std::all_of(done.statuses.begin(), done.statuses.end(),
                                          [](const auto& entry) { return entry.first == sim::RunStatus::completed; });
   return left > 0 || !all_completed ? exit_not_solved : exit_fine;
@@ -103,10 +164,7 @@ int sweep(const SweepArguments& arguments) {
     fmt::print("{}: {}; the first is {}\n", sweep.name(), counted(sweep.count(), "run"), sweep.assignments(0));
     return exit_fine;
   }
-  const std::filesystem::path file =
-      arguments.out.empty()
-          ? std::filesystem::path("out") / std::filesystem::path(arguments.sweep).stem().concat(".sqlite")
-          : std::filesystem::path(arguments.out);
+  const std::filesystem::path file = out_of(arguments.out, arguments.sweep, ".sqlite");
   sim::SweepStore store(file, "rhec " RHEC_PROJECT_VERSION);
   const std::int64_t there =
       std::count_if(runs.begin(), runs.end(), [&](const sim::RunIdentity& run) { return store.find(run).has_value(); });
@@ -127,7 +185,7 @@ int sweep(const SweepArguments& arguments) {
     done = sim::run_sweep(sweep, store, *workers, {.progress = show, .stop = [] { return StopRequest::asked(); }});
   }
   line.finish();
-  return tell(sweep, done, std::max(there, done.there), file);
+  return tell(sweep, done, std::max(there, done.there), file, arguments.json);
 }
 
 }  // namespace
@@ -147,7 +205,8 @@ void add_sweep(Program& program) {
       "  rhec sweep scenarios/sweep_blocks.yaml --dry-run",
       [arguments] { return sweep(*arguments); });
   command.add("sweep", arguments->sweep, "a YAML file").required();
-  command.add("--out", arguments->out, "database of the runs; otherwise out/ and the sweep's name").value("FILE");
+  add_out(command, arguments->out, "FILE", "database of the runs; otherwise out/ and the sweep's name with .sqlite");
+  add_json(command, arguments->json);
   command
       .add("--threads", arguments->threads,
            "runs at the same time; otherwise as many as there are cores, or 1 in each process of mpirun")

@@ -12,9 +12,11 @@
 #include "crash_report.hpp"
 #include "drive_arguments.hpp"
 #include "log_arguments.hpp"
+#include "output.hpp"
 #include "progress.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/files/output_folder.hpp"
 #include "rhec/sim/tuning/controller_tuning.hpp"
@@ -81,6 +83,14 @@ void print_judgement(const sim::LogTuning& tuning) {
   for (const std::string& remark : tuning.remarks) fmt::print("  - {}\n", remark);
 }
 
+/// Of a tuning on a recorded drive, of either kind.
+template <class Tuning>
+void print_end(const Tuning& tuning, const std::filesystem::path& folder) {
+  if (tuning.stopped) fmt::print("\nstopped: this is the best that was found until then\n");
+  fmt::print("\n{} evaluations, {:.0f} s; the scenario to use: {}\n", tuning.evaluations, tuning.seconds,
+             (folder / "tuned.yaml").string());
+}
+
 int threads_of(const TuneArguments& arguments) {
   return arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
@@ -89,7 +99,7 @@ int tune_on_log(const TuneArguments& arguments) {
   const sim::LogScenario scenario = read_log_scenario(arguments);
   const sim::LogVariant& variant = scenario.variants().front();
   const sim::LogTables tables = sim::read_log_tables(arguments.dead_reckoning, arguments.gps);
-  sim::OutputFolder folder(arguments.out);
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_tune"));
   const Host host = examined_host(arguments.plugin_path);
   sim::LogTuningOptions options;
   options.hold_out = read_hold_out(arguments);
@@ -110,14 +120,17 @@ int tune_on_log(const TuneArguments& arguments) {
                                .stop = [] { return StopRequest::asked(); }});
   }
   folder.write("tuned.yaml", sim::tuned_yaml(tuning, fmt::format("from {} ({})", arguments.scenario, variant.name)));
-  folder.write("summary.json", sim::summary_json(tuning));
+  const std::string summary = sim::summary_json(tuning);
+  folder.write("summary.json", summary);
   folder.write("tuning.svg", sim::tuning_svg(tuning));
   folder.commit();
-  print_numbers(tuning);
-  print_judgement(tuning);
-  if (tuning.stopped) fmt::print("\nstopped: this is the best that was found until then\n");
-  fmt::print("\n{} evaluations, {:.0f} s; the scenario to use: {}\n", tuning.evaluations, tuning.seconds,
-             (folder.path() / "tuned.yaml").string());
+  if (arguments.json) {
+    print_json(summary, folder.path());
+  } else {
+    print_numbers(tuning);
+    print_judgement(tuning);
+    print_end(tuning, folder.path());
+  }
   const bool says_anything =
       std::any_of(tuning.numbers.begin(), tuning.numbers.end(), [](const auto& number) { return number.is_told; });
   return tuning.stopped || !says_anything ? exit_not_solved : exit_fine;
@@ -135,40 +148,7 @@ sim::DrivingCase driving_case(const Settings& scenario, const std::string& text)
   return result;
 }
 
-int tune_controller(const TuneArguments& arguments) {
-  Settings settings = load_yaml(arguments.scenario);
-  apply_assignments(settings, arguments.assignments);
-  std::vector<sim::DrivingCase> cases;
-  for (const std::string& text : arguments.cases) cases.push_back(driving_case(settings, text));
-  if (cases.empty()) cases.push_back({"as it is", settings});
-  sim::ControllerTuningOptions options;
-  options.first_seed = arguments.first_seed;
-  options.seeds = arguments.seeds;
-  options.judge_first_seed = arguments.first_seed + arguments.seeds;
-  options.judges = arguments.judges;
-  options.effort = arguments.effort;
-  options.threads = threads_of(arguments);
-  options.most_evaluations = arguments.evaluations;
-  if (arguments.most_seconds > 0) options.most_seconds = arguments.most_seconds;
-  sim::OutputFolder folder(arguments.out);
-  const Host host = examined_host(arguments.plugin_path);
-  sim::ControllerTuning tuning;
-  {
-    const StopRequest stop;
-    StageLine line("controller");
-    tuning = sim::tune_controller(
-        host, settings, cases, options,
-        {.progress =
-             [&](const sim::TuningProgress& now) {
-               line.show(fmt::format("{}, {} runs, {:.0f} s", now.stage, now.evaluations, now.seconds));
-             },
-         .stop = [] { return StopRequest::asked(); }});
-  }
-  folder.write("tuned.yaml", sim::tuned_yaml(tuning, "from " + arguments.scenario));
-  folder.write("summary.json", sim::summary_json(tuning));
-  folder.write("pareto.csv", sim::pareto_csv(tuning));
-  folder.write("pareto.svg", sim::pareto_svg(tuning));
-  folder.commit();
+void print_controller(const sim::ControllerTuning& tuning, const std::filesystem::path& folder) {
   const sim::TriedController& chosen = tuning.tried[static_cast<std::size_t>(tuning.chosen)];
   fmt::print("{:<36} {:>11} {:>11}\n", "NUMBER", "BEFORE", "AFTER");
   for (std::size_t i = 0; i < tuning.numbers.size(); ++i)
@@ -185,8 +165,48 @@ int tune_controller(const TuneArguments& arguments) {
                    : "");
   if (tuning.stopped) fmt::print("\nstopped: this is the best that was found until then\n");
   fmt::print("\n{} controllers in {} runs, {:.0f} s; figure: {}; the scenario to use: {}\n", tuning.tried.size(),
-             tuning.runs, tuning.seconds, (folder.path() / "pareto.svg").string(),
-             (folder.path() / "tuned.yaml").string());
+             tuning.runs, tuning.seconds, (folder / "pareto.svg").string(), (folder / "tuned.yaml").string());
+}
+
+int tune_controller(const TuneArguments& arguments) {
+  Settings settings = load_scenario(arguments.scenario);
+  apply_assignments(settings, arguments.assignments);
+  std::vector<sim::DrivingCase> cases;
+  for (const std::string& text : arguments.cases) cases.push_back(driving_case(settings, text));
+  if (cases.empty()) cases.push_back({"as it is", settings});
+  sim::ControllerTuningOptions options;
+  options.first_seed = arguments.first_seed;
+  options.seeds = arguments.seeds;
+  options.judge_first_seed = arguments.first_seed + arguments.seeds;
+  options.judges = arguments.judges;
+  options.effort = arguments.effort;
+  options.threads = threads_of(arguments);
+  options.most_evaluations = arguments.evaluations;
+  if (arguments.most_seconds > 0) options.most_seconds = arguments.most_seconds;
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_tune"));
+  const Host host = examined_host(arguments.plugin_path);
+  sim::ControllerTuning tuning;
+  {
+    const StopRequest stop;
+    StageLine line("controller");
+    tuning = sim::tune_controller(
+        host, settings, cases, options,
+        {.progress =
+             [&](const sim::TuningProgress& now) {
+               line.show(fmt::format("{}, {} runs, {:.0f} s", now.stage, now.evaluations, now.seconds));
+             },
+         .stop = [] { return StopRequest::asked(); }});
+  }
+  folder.write("tuned.yaml", sim::tuned_yaml(tuning, "from " + arguments.scenario));
+  const std::string summary = sim::summary_json(tuning);
+  folder.write("summary.json", summary);
+  folder.write("pareto.csv", sim::pareto_csv(tuning));
+  folder.write("pareto.svg", sim::pareto_svg(tuning));
+  folder.commit();
+  if (arguments.json)
+    print_json(summary, folder.path());
+  else
+    print_controller(tuning, folder.path());
   return tuning.stopped ? exit_not_solved : exit_fine;
 }
 
@@ -212,14 +232,14 @@ void print_drive(const sim::DriveTuning& tuning) {
 }
 
 int tune_on_drive(const TuneArguments& arguments) {
-  Settings settings = load_yaml(arguments.scenario);
+  Settings settings = load_scenario(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
   const Host host = examined_host(arguments.plugin_path);
   const sim::ReplayScenario scenario(host, settings, arguments.variants);
   const sim::ReplayVariant& variant = scenario.variants().front();
   const logs::Drive drive = logs::read_drive(*open_log(arguments.log, arguments.msg_paths), variant.signals);
   tell_damage(drive.damage);
-  sim::OutputFolder folder(arguments.out);
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_tune"));
   sim::DriveTuningOptions options{.hold_out = read_hold_out(arguments), .wishes = {arguments.tune, arguments.keep}};
   options.threads = threads_of(arguments);
   if (arguments.most_seconds > 0) options.most_seconds = arguments.most_seconds;
@@ -237,12 +257,15 @@ int tune_on_drive(const TuneArguments& arguments) {
   }
   folder.write("tuned.yaml", sim::tuned_yaml(tuning, fmt::format("on {}, from {} ({})", arguments.log,
                                                                  arguments.scenario, variant.name)));
-  folder.write("summary.json", sim::summary_json(tuning));
+  const std::string summary = sim::summary_json(tuning);
+  folder.write("summary.json", summary);
   folder.commit();
-  print_drive(tuning);
-  if (tuning.stopped) fmt::print("\nstopped: this is the best that was found until then\n");
-  fmt::print("\n{} evaluations, {:.0f} s; the scenario to use: {}\n", tuning.evaluations, tuning.seconds,
-             (folder.path() / "tuned.yaml").string());
+  if (arguments.json) {
+    print_json(summary, folder.path());
+  } else {
+    print_drive(tuning);
+    print_end(tuning, folder.path());
+  }
   return tuning.stopped ? exit_not_solved : exit_fine;
 }
 
@@ -291,7 +314,7 @@ void add_tune(Program& program) {
       "model.wheelbase\n"
       "  rhec tune scenarios/figure8.yaml --controller --case speed=2 --case speed=8 --out out/tuned",
       [arguments] { return tune(*arguments); });
-  add_log_arguments(command, *arguments, "5");
+  add_log_arguments(command, "tune", *arguments, "5");
   command.add_list("--tune", arguments->tune, "tune this number of the scenario, too; may be given several times")
       .value("KEY[=[LOWER, UPPER]]");
   command

@@ -1,14 +1,27 @@
 #include "rhec/plugins/robot/model_section.hpp"
 
+#include <algorithm>
+
 namespace rhec {
 namespace {
 
 constexpr PluginOption<Model> vehicle{.otherwise = "bicycle_slip"};
 
+std::vector<std::string> outputs_left_out(const Host& host, const Settings& section, const Model& model) {
+  if (!section.find("outputs")) return {};
+  Settings with_all = section;
+  with_all.set("outputs", Settings::scalar("all"));
+  const std::vector<std::string> chosen = names_of(model.description().outputs);
+  std::vector<std::string> others = names_of(vehicle.make(host, with_all)->description().outputs);
+  std::erase_if(others,
+                [&](const std::string& name) { return std::find(chosen.begin(), chosen.end(), name) != chosen.end(); });
+  return others;
+}
+
 }  // namespace
 
 ModelSection::ModelSection(const Host& host, const Settings& section)
-    : section_(section), model_(vehicle.make(host, section)) {}
+    : section_(section), model_(vehicle.make(host, section)), left_out_(outputs_left_out(host, section, *model_)) {}
 
 OptionSection ModelSection::documentation() {
   // The host selects the outputs, for any model.

@@ -105,13 +105,20 @@ struct NoiseOptions {
 
 }  // namespace
 
-NoiseSection::NoiseSection(const Settings& section, const ModelDescription& about) {
+NoiseSection::NoiseSection(const Settings& section, const ModelDescription& about,
+                           const std::vector<std::string>& left_out) {
   const NoiseOptions options = NoiseOptions::table().parse(section, "noise");
-  output_sigmas = outputs_by_name().read(options.outputs, about);
+  output_sigmas = outputs_by_name().read(options.outputs, about, left_out);
   input_sigmas = inputs_by_name().read(options.inputs, about);
   state_sigmas = states_by_name().read(options.states, about);
-  biases = biases_by_name().read(options.biases, about);
-  scales = scales_by_name().read(options.scales, about);
+  biases = biases_by_name().read(options.biases, about, left_out);
+  scales = scales_by_name().read(options.scales, about, left_out);
+  for (const Settings* map : {&options.outputs, &options.biases, &options.scales})
+    for (const std::string& name : left_out)
+      if (const Settings* unused = map->find(name))
+        notes.emplace_back(
+            unused->error("passed over, since model.outputs leaves this sensor out; take it out, or name it there")
+                .what());
   const auto drifts = [](const SensorError& error) { return error.drift > 0.0; };
   const bool has_drift =
       std::any_of(biases.begin(), biases.end(), drifts) || std::any_of(scales.begin(), scales.end(), drifts);

@@ -1,5 +1,7 @@
 #include "rhec/plugins/robot/robot.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "rhec/plugins/robot/bounds_section.hpp"
@@ -10,11 +12,14 @@ namespace rhec {
 namespace {
 
 std::shared_ptr<const RobotContext> context_of(const Host& host, const RobotOptions& options,
-                                               const std::shared_ptr<const Model>& model) {
-  const NoiseSection noise(options.noise, model->description());
+                                               const ModelSection& vehicle) {
+  const std::shared_ptr<const Model>& model = vehicle.model();
+  const NoiseSection noise(options.noise, model->description(), vehicle.left_out());
   const BoundsSection bounds(options.bounds, model->description());
   return std::make_shared<const RobotContext>(RobotContext{host, options.step, model, bounds.bounded(), noise});
 }
+
+constexpr double longest_usual_step = 1.0;  // [s]
 
 }  // namespace
 
@@ -39,7 +44,7 @@ std::vector<OptionSection> robot_sections(const EstimatorMakers& estimators) {
 
 Robot::Robot(const Host& host, const RobotOptions& options, EstimatorMakers estimators)
     : model_(host, options.model),
-      context_(context_of(host, options, model_.model())),
+      context_(context_of(host, options, model_)),
       estimated_(with_sensor_errors(*context_)),
       blocking_(context_, options.blocking),
       estimator_(context_, blocking_, options.estimator, std::move(estimators)),
@@ -57,6 +62,16 @@ PluginChoice Robot::solver_choice(std::string_view kind) const {
 void Robot::use_estimators(EstimatorMakers estimators) { estimator_.use(std::move(estimators)); }
 
 void Robot::add_hooks(std::shared_ptr<const RobotHooks> hooks) { hooks_.add(std::move(hooks)); }
+
+std::vector<std::string> Robot::notes() const {
+  std::vector<std::string> notes = context_->noise.notes;
+  if (step() > longest_usual_step)
+    notes.push_back(fmt::format(
+        "step: {} s from node to node is long: what happens between is not seen, and inputs do not change; most robots "
+        "take 0.05 to 0.5 s",
+        step()));
+  return notes;
+}
 
 std::unique_ptr<Estimator> Robot::make_estimator(const std::optional<Eigen::VectorXd>& initial_state) const {
   return estimator_.make(initial_state, hooks_);

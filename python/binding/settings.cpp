@@ -7,6 +7,7 @@
 
 #include "binding.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::python {
@@ -99,7 +100,8 @@ py::object object_of(const Settings& settings) {
 void bind_settings(py::module_& module) {
   py::class_<Settings>(module, "Settings", "A configuration, each part of which knows where it was written.")
       .def_static(
-          "load", [](const std::string& file) { return load_yaml(file); }, py::arg("file"), "Reads a YAML file.")
+          "load", [](const std::string& file) { return load_scenario(file); }, py::arg("file"),
+          "Reads a scenario, and the robot that it names.")
       .def_static("of", &settings_of, py::arg("object"), py::arg("origin"), "Of dicts, lists, numbers and texts.")
       .def(
           "set",

@@ -134,7 +134,8 @@ void Svg::end_group() { body_ += "</g>\n"; }
 
 std::string Svg::document() const {
   return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
+      // Without width and height: it fills the window, the page or the cell of a notebook that it is shown in.
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" "
       "font-family=\"Helvetica Neue, Arial, Liberation Sans, DejaVu Sans, sans-serif\" font-size=\"12\" "
       "fill=\"#333\">\n"
       "<rect width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n{2}</svg>\n",

@@ -326,7 +326,21 @@ std::vector<OptionSection> log_sections() {
            {{"NAME", "keys of a robot", "", "", "put over those of the scenario, for the variant so called"}}}};
 }
 
+namespace {
+
+/// A scenario of `rhec run` says what it is.
+void refuse_simulation(const Settings& settings) {
+  for (const char* key : {"speed", "path", "terrain", "vehicle", "seed", "sensors", "faults"})
+    if (const Settings* found = settings.find(key))
+      throw found->error(
+          "is that of a simulated drive: this scenario is for 'rhec run'; that of a recorded drive has a section 'log' "
+          "instead, as scenarios/victoria_park.yaml, or 'signals' for a log with its own topics or columns");
+}
+
+}  // namespace
+
 LogScenario::LogScenario(const Host& host, const Settings& settings, const std::vector<std::string>& chosen) {
+  refuse_simulation(settings);
   const LogScenarioOptions base = LogScenarioOptions::table().parse(settings, "scenario");
   name_ = base.name;
   log_ = LogOptions::table().parse(base.log, "log");

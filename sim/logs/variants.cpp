@@ -4,22 +4,10 @@
 
 #include <algorithm>
 
+#include "rhec/plugins/robot/scenario_file.hpp"
+
 namespace rhec::sim {
 namespace {
-
-/// Overrides the scenario with a variant's keys: maps are merged, all else is replaced.
-void put_over(Settings& base, const Settings& variant, const std::string& prefix) {
-  for (const auto& [key, value] : variant.members()) {
-    std::string path = prefix;
-    if (!path.empty()) path += '.';
-    path += key;
-    if (value.kind() == Settings::Kind::map && !value.members().empty()) {
-      put_over(base, value, path);
-    } else {
-      base.set(path, value);
-    }
-  }
-}
 
 void check_chosen(const Settings& scenario, const Settings& variants, const std::vector<std::string>& chosen) {
   if (variants.is_null() && !chosen.empty())
@@ -49,7 +37,7 @@ std::vector<std::pair<std::string, Settings>> variant_settings(const std::string
     for (const std::string& one : shared)
       if (const Settings* key = keys.find(one)) throw key->error("is shared by all variants; write it at the top");
     Settings merged = scenario;
-    put_over(merged, keys, "");
+    put_over(merged, keys);
     result.emplace_back(variant, std::move(merged));
   }
   if (result.empty()) throw variants.mismatch("at least one variant");

@@ -1,5 +1,6 @@
 #include "rhec/sim/loop/scenario.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -291,6 +292,43 @@ std::unique_ptr<const SlipField> make_terrain(const Settings& section, int scena
   return nullptr;
 }
 
+/// Files that are given to the wrong command say what they are.
+void refuse_other_files(const Settings& settings) {
+  struct {
+    const char* key;
+    const char* what;
+  } constexpr others[] = {
+      {"log", "is that of a recorded drive: this scenario is for 'rhec estimate', 'rhec smooth' and 'rhec tune'"},
+      {"variants", "is that of a recorded drive: this scenario is for 'rhec estimate' and 'rhec smooth'"},
+      {"grid", "is that of a sweep: this file is for 'rhec sweep'"},
+      {"equations", "is that of a vehicle; a scenario names the file: 'model: {equations: FILE}'"}};
+  for (const auto& [key, what] : others)
+    if (const Settings* found = settings.find(key)) throw found->error(what);
+}
+
+ScenarioOptions parse_scenario(const Settings& settings) {
+  refuse_other_files(settings);
+  return ScenarioOptions::table().parse(settings, "scenario");
+}
+
+constexpr double quickest_usual = 40.0;     // [m/s]
+constexpr double most_acceleration = 20.0;  // of any ground vehicle, with a wide margin [m/s^2]
+constexpr double most_turn = 1.0;           // in a step [rad]
+constexpr double share_that_counts = 0.1;   // of a path; corners of coarse waypoints are less
+constexpr int most_places_looked_at = 2000;
+
+/// Over places along the path, evenly: a number of what is there, that a share of the path exceeds.
+template <class Number>
+double exceeded_along(const Path& path, const Number& number) {
+  const int count = std::clamp(static_cast<int>(path.length()), 10, most_places_looked_at);
+  std::vector<double> numbers;
+  numbers.reserve(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) numbers.push_back(number(path.point_at(path.length() * (i + 0.5) / count)));
+  const auto place = numbers.begin() + static_cast<std::ptrdiff_t>((1.0 - share_that_counts) * count);
+  std::nth_element(numbers.begin(), place, numbers.end());
+  return *place;
+}
+
 }  // namespace
 
 const OptionTable<ScenarioOptions>& ScenarioOptions::table() {
@@ -312,9 +350,21 @@ const OptionTable<ScenarioOptions>& ScenarioOptions::table() {
   return rows;
 }
 
+namespace {
+
+/// The keys of the table, and the one that load_scenario takes away.
+std::vector<OptionRow> root_rows() {
+  std::vector<OptionRow> rows = ScenarioOptions::table().schema();
+  rows.push_back({"robot", "text", "", "a file",
+                  "a robot's keys, from `step` on: as if they stood here, with what stands here put over them"});
+  return rows;
+}
+
+}  // namespace
+
 std::vector<OptionSection> scenario_sections() {
   std::vector<OptionSection> sections = {
-      {"", "A scenario: a robot, and the world that it drives in.", ScenarioOptions::table().schema()},
+      {"", "A scenario: a robot, and the world that it drives in.", root_rows()},
       {"path", "What the robot shall follow.", path_table().schema()},
       {"terrain", "The ground: the true parameters of the model as a function of position.", terrain_table().schema()},
       {"vehicle", "The vehicle as it really moves.", vehicle_table().schema()},
@@ -330,7 +380,7 @@ std::vector<OptionSection> scenario_sections() {
 }
 
 Scenario::Scenario(const Host& host, const Settings& settings)
-    : options_(ScenarioOptions::table().parse(settings, "scenario")),
+    : options_(parse_scenario(settings)),
       robot_(host, options_, scenario_estimators()),
       path_(make_path(options_)),
       terrain_(make_terrain(options_.terrain, options_.seed, robot_.model()->description())) {
@@ -357,6 +407,28 @@ Scenario::Scenario(const Host& host, const Settings& settings)
   const PathPoint start = path_.point_at(along);
   initial_state_ = Eigen::VectorXd::Zero(robot_.model()->state_count());
   robot_.model()->description().roles.place(start.x, start.y, start.heading, initial_state_.data());
+}
+
+std::vector<std::string> Scenario::notes() const {
+  std::vector<std::string> notes = robot_.notes();
+  const double quickest = path_.top_speed();
+  if (quickest > quickest_usual)
+    notes.push_back(fmt::format("speed: {:.4g} m/s is {:.0f} km/h; speeds are in m/s", quickest, 3.6 * quickest));
+  const double acceleration = exceeded_along(
+      path_, [](const PathPoint& point) { return point.speed * point.speed * std::abs(point.curvature); });
+  if (acceleration > most_acceleration)
+    notes.push_back(
+        fmt::format("speed: in the bends of this path it is a lateral acceleration of {:.3g} m/s^2, which no vehicle "
+                    "holds; lower the speed, widen the path, or set path.lateral_acceleration",
+                    acceleration));
+  const double turn = exceeded_along(
+      path_, [this](const PathPoint& point) { return std::abs(point.speed * point.curvature) * robot_.step(); });
+  if (turn > most_turn)
+    notes.push_back(fmt::format(
+        "step: in {} s the path turns by {:.2g} rad, which inputs that are constant for so long cannot follow; take a "
+        "shorter step",
+        robot_.step(), turn));
+  return notes;
 }
 
 }  // namespace rhec::sim

@@ -9,6 +9,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/config/options.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 
 namespace rhec::sim {
@@ -114,7 +115,7 @@ void Sweep::read_scenarios(const Values& values) {
       throw named.error(
           fmt::format("found '{}', expected the file of a scenario; there is no {}", named.text(), file.string()));
     if (bases_.contains(named.text())) continue;
-    Settings base = load_yaml(file);
+    Settings base = load_scenario(file);
     if (base.kind() != Settings::Kind::map) throw base.mismatch("a scenario, which is a map of keys and values");
     for (const auto& [key, value] : set_.members()) base.set(key, value);
     bases_.emplace(named.text(), std::move(base));

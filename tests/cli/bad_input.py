@@ -307,11 +307,6 @@ class Test(cli.Findings):
         for words in (["plugins"], ["options"], ["run", FIGURE8], ["solve", "-", "--solver", "gn_rti"]):
             self.refused(f"{words[0]} --plugin-path", self.rhec(*words, "--plugin-path", nowhere), ERROR,
                          f"--plugin-path {nowhere}", "no such directory")
-        self.refused("options SECTION", self.rhec("options", "estimater"), ERROR, "did you mean 'estimator'?")
-        self.refused("options KEY", self.rhec("options", "estimator.horizn"), ERROR, "did you mean 'estimator.horizon'?")
-        for word, row in (("estimator.horizon", "`estimator.horizon`"), ("speed", "`speed`"), ("horizon", "`controller.horizon`")):
-            result = self.rhec("options", word)
-            self.expect(result.returncode == 0 and row in result.stdout, f"options {word}", result.stdout + result.stderr)
 
     def first_steps(self):
         result = self.rhec()
@@ -391,6 +386,22 @@ class Test(cli.Findings):
         ]:
             self.refused(f"rhec {' '.join(map(str, words))}", self.rhec(*words), USAGE, text)
 
+    def wrong_commands(self):
+        """A file that is given to another command than its own says what it is."""
+        drive = ("--dead-reckoning", self.work / "drs.txt", "--gps", self.work / "gps.txt")
+        (self.work / "drs.txt").write_text("0,1,0\n1,1,0\n")
+        (self.work / "gps.txt").write_text("0,0,0\n1,1,0\n")
+        park = cli.ROOT / "scenarios" / "victoria_park.yaml"
+        for command in ("estimate", "smooth", "tune"):
+            self.refused(f"{command} of a simulation", self.rhec(command, FIGURE8, *drive), ERROR, str(FIGURE8), "this scenario is for 'rhec run'")
+        self.refused("run of a log", self.rhec("run", park), ERROR, str(park), "'rhec estimate'")
+        self.refused("smooth of a log without files", self.rhec("smooth", park), ERROR, str(park), "--dead-reckoning")
+        self.refused("run of a sweep", self.rhec("run", cli.ROOT / "scenarios" / "sweep_blocks.yaml"), ERROR, "'rhec sweep'")
+        self.refused("run of a vehicle", self.rhec("run", cli.ROOT / "examples" / "vehicles" / "bicycle.yaml"), ERROR, "model: {equations: FILE}")
+        for word, near in (("bicycle", "bicycle_slip"), ("skid", "skid_steer"), ("bicycle_slpi", "bicycle_slip")):
+            result = self.rhec("check", word)
+            self.expect(result.returncode == ERROR and f"did you mean '{near}'?" in result.stderr, f"check {word}", result.stderr)
+
     def lost(self):
         """A robot that leaves its path: exit code 3, and all files are there."""
         result = self.run("bounds.u2=[0, 0]")
@@ -405,7 +416,7 @@ class Test(cli.Findings):
 def main():
     with tempfile.TemporaryDirectory(prefix="rhec-cli-") as work:
         test = Test(Program(sys.argv[1]), pathlib.Path(work).resolve())
-        for part in (test.settings, test.files, test.plugins, test.outputs, test.problems, test.usage, test.first_steps, test.lost):
+        for part in (test.settings, test.files, test.plugins, test.outputs, test.problems, test.usage, test.first_steps, test.wrong_commands, test.lost):
             part()
         test.tell()
 

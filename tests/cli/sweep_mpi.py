@@ -156,6 +156,7 @@ def without_mpi(rhec, work):
         shutil.copy2(path, target, follow_symlinks=False)
     plugins = copy / library.relative_to(build) / "plugins"
     plugins.mkdir(parents=True)
+    shutil.copy2(library / "examine_plugin", plugins.parent)
     for plugin in (library / "plugins").glob("*.so"):
         (plugins / plugin.name).symlink_to(plugin)
     return Program(copy / rhec.path.relative_to(build))

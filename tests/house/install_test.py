@@ -19,7 +19,7 @@ import tempfile
 CLEAN = {name: value for name, value in os.environ.items()
          if name not in ("LD_LIBRARY_PATH", "RHEC_PLUGIN_PATH", "CMAKE_PREFIX_PATH", "rhec_DIR", "rhec_ROOT")}
 
-# A block of README.md that this test runs.
+# A block of docs/plugin.md that this test runs.
 RUN_BLOCK = re.compile(r"<!-- run: tests/house/install_test\.py -->\n```sh\n(.*?)```\n", re.DOTALL)
 
 CONSUMER_CMAKE = """\
@@ -137,10 +137,21 @@ def build_example(name, prefix, work, arguments):
 
 
 def check_robot(prefix, work, arguments):
-    """The program of the README with a robot in it."""
+    """The program of docs/in_a_vehicle.md with a robot in it."""
     source, build = build_example("robot", prefix, work, arguments)
     lines = run(build / "robot", source / "robot.yaml", cwd="/").splitlines()
     expect(len(lines) > 20 and "kappa 0.7" in lines[-1], "the robot did not learn its slip:\n" + "\n".join(lines))
+
+
+def check_without_exceptions(prefix, work, arguments):
+    """The program of docs/embed.md, and the robot that is installed."""
+    _, build = build_example("without_exceptions", prefix, work, arguments)
+    installed = prefix / "share" / "rhec" / "robot"
+    expect(sorted(file.name for file in installed.iterdir()) == ["CMakeLists.txt", "main.cpp", "robot.yaml"], f"{installed} is not examples/robot")
+    lines = run(build / "drive", installed / "robot.yaml", cwd="/").splitlines()
+    expect(len(lines) > 20 and "kappa 0.7" in lines[-1], "without exceptions the robot did not learn its slip:\n" + "\n".join(lines))
+    wrong = subprocess.run([build / "drive", work / "none.yaml"], capture_output=True, text=True)
+    expect(wrong.returncode == 1 and "none.yaml" in wrong.stderr, f"a mistake is told without exceptions: {wrong.stderr}")
 
 
 def check_problem(prefix, work, arguments):
@@ -165,13 +176,13 @@ def check_minimum_time(prefix, work, arguments):
 
 
 def check_template(home, arguments):
-    """What the README says of a plugin from outside, command by command, as someone whose rhec lies in ~/rhec.
+    """What docs/plugin.md says of a plugin from outside, command by command, as someone whose rhec lies in ~/rhec.
 
     Where the page names a build of rhec itself, it is the one under test, and the vehicle is compiled for the instruction
     sets that its models have.
     """
-    blocks = RUN_BLOCK.findall((arguments.source / "README.md").read_text())
-    expect(len(blocks) == 4, f"README.md has {len(blocks)} blocks of commands that are run here, and not 4")
+    blocks = RUN_BLOCK.findall((arguments.source / "docs" / "plugin.md").read_text())
+    expect(len(blocks) == 4, f"docs/plugin.md has {len(blocks)} blocks of commands that are run here, and not 4")
     environment = CLEAN | {"HOME": str(home), "CXXFLAGS": arguments.cxxflags,
                            "PATH": f"{pathlib.Path(arguments.cmake).parent}:{CLEAN['PATH']}",
                            "RHEC_CONFORMANCE_FOLDER": str(home / "verdicts")}
@@ -179,12 +190,12 @@ def check_template(home, arguments):
         environment["CXX"] = arguments.cxx
     script = "set -euo pipefail\n" + "".join(blocks).replace("build/release", shlex.quote(str(arguments.build.resolve())))
     configure = "cmake -S my_robot -B my_robot/build"
-    expect(script.count(configure) == 1, f"README.md does not say '{configure}'")
+    expect(script.count(configure) == 1, f"docs/plugin.md does not say '{configure}'")
     if arguments.instruction_sets:
         script = script.replace(configure, f"{configure} -DRHEC_MODEL_INSTRUCTION_SETS={shlex.quote(arguments.instruction_sets.replace(',', ';'))}")
     result = subprocess.run(["bash", "-c", script], cwd=home, env=environment, text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    expect(result.returncode == 0, f"the README's page on plugins from outside ends with {result.returncode}:\n{result.stdout}")
+    expect(result.returncode == 0, f"docs/plugin.md, on plugins from outside, ends with {result.returncode}:\n{result.stdout}")
     expect(not arguments.source.resolve().joinpath("my_robot").exists(), "the page wrote into the source tree")
     for name in ("articulated", "geometric", "plain_sqp", "slow_zone"):
         expect(re.search(rf"^\w+ +{name} .*my_robot/build/{name}\.so$", result.stdout, re.MULTILINE),
@@ -245,10 +256,11 @@ def main():
         check_python(moved, arguments.python)
         headers = check_consumer(moved, work, arguments)
         check_robot(moved, work, arguments)
+        check_without_exceptions(moved, work, arguments)
         check_problem(moved, work, arguments)
         check_minimum_time(moved, work, arguments)
         check_template(home, arguments)
-    print(f"install: moved, {plugins} plugins seen, {headers} headers included from outside, the README's examples run")
+    print(f"install: moved, {plugins} plugins seen, {headers} headers included from outside, the manual's examples run")
 
 
 if __name__ == "__main__":

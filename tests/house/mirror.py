@@ -20,6 +20,7 @@ FLOORS = ("core", "plugins", "solvers", "models", "blocking", "priors", "terms",
 # Folders of tests that are about more than one source: whole suites, and programs in other languages.
 SUITES = {
     "cli": "the commands of apps/, from outside: apps/check.cpp is tested by tests/cli/check.py",
+    "docs": "the pages of the manual, and what is made of them",
     "closed_loop": "estimator and controller together",
     "house": "the house itself",
     "machines": "the same numbers on other processors",
@@ -41,7 +42,6 @@ UNTESTED = {
     "apps/integration_note.cpp": "tests/cli/runs.py: a vehicle with a fast lag",
     "apps/log_arguments.cpp": "tests/cli/smooth.py: `rhec smooth` has the arguments that `rhec estimate` has",
     "apps/main.cpp": "tests/cli/bad_input.py: commands, usage and exit codes",
-    "apps/options.cpp": "tests/cli/configuration.py: docs/configuration.md is what it prints",
     "apps/plugins.cpp": "tests/cli/runs.py: the list, and one plugin's options; tests/cli/doctor.py has --doctor",
     "apps/report/embedded.cpp": "tests/report/report.py: the page, which it holds, is looked at in a browser",
     "apps/report/report_page.cpp": "tests/cli/report_run.py: the document is read from the page",

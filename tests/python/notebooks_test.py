@@ -18,7 +18,8 @@ def test_notebooks_are_kept_without_results(notebook):
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebooks_run(notebook, tmp_path, monkeypatch):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
+    for needed in ("ipykernel", "matplotlib", "sympy"):
+        pytest.importorskip(needed)
     monkeypatch.setenv("RHEC_SCENARIOS", str(ROOT / "scenarios"))
     made = nbformat.read(notebook, as_version=4)
     nbclient.NotebookClient(made, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}).execute()

@@ -55,6 +55,42 @@ def look_at(file, complaints):
         complaints.append(f"{file.name}: refers to another file")
 
 
+NAMES = """\
+name: names
+scenario: {scenario}
+set: {{path.laps: 1, path.radius: 12, speed: 10, path.legs: 1, path.leg_length: 40}}
+grid:
+  - estimator.name: [ekf, truth]
+    path.name: [figure8, zigzag]
+"""
+
+
+def labels_of(file):
+    return ["".join(label.itertext()) for label in xml.parse(file).getroot().iter(f"{SVG}text")]
+
+
+def marks(rhec, folder, complaints):
+    """What is to be expected, and bounds that are touched, are lines of their own; between names there is no surface."""
+    run, names = folder / "bounded", folder / "names"
+    figure8 = material.ROOT / "scenarios" / "figure8.yaml"
+    material.call(rhec, "run", figure8, "--set", "path.laps=1", "--set", "bounds.kappa=[0.6, 0.7]", "--set", "estimator.initial.parameters.kappa=0.65",
+                  "--out", run, fine=(0, 3))
+    material.call(rhec, "report", run, "--svg", run / "svg")
+    expected = {"error-nees": {"expected"}, "parameter-kappa": {"lower bound", "upper bound"}}
+    for name, words in expected.items():
+        missing = words - set(labels_of(run / "svg" / f"{name}.svg"))
+        if missing:
+            complaints.append(f"{name}.svg: has no {missing}")
+    if "upper bound" in labels_of(run / "svg" / "state-beta.svg"):
+        complaints.append("state-beta.svg: a bound that does not exist is drawn")
+    (folder / "names.yaml").write_text(NAMES.format(scenario=figure8))
+    material.call(rhec, "sweep", folder / "names.yaml", "--out", names.with_suffix(".sqlite"), fine=(0, 3))
+    material.call(rhec, "report", names.with_suffix(".sqlite"), "--svg", names)
+    drawn = {file.stem for file in names.iterdir()}
+    if [name for name in drawn if "surface" in name] or not [name for name in drawn if name.startswith("heat")]:
+        complaints.append(f"a sweep over names: {sorted(drawn)}")
+
+
 def main():
     rhec, complaints, count = pathlib.Path(sys.argv[1]).resolve(), [], 0
     with tempfile.TemporaryDirectory(prefix="rhec-figures-") as name:
@@ -68,6 +104,8 @@ def main():
             for file in files:
                 count += 1
                 look_at(file, complaints)
+    with tempfile.TemporaryDirectory(prefix="rhec-figures-") as name:
+        marks(rhec, pathlib.Path(name), complaints)
     for complaint in complaints:
         print(complaint)
     print(f"figures: {count} looked at, {len(complaints)} complaints")

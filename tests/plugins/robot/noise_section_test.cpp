@@ -39,5 +39,18 @@ TEST(NoiseSection, RefusesUnknownNamesAndWrongNumbers) {
   EXPECT_THAT(error_of([] { noise("inputs: {u1: .inf}"); }), HasSubstr("a finite number"));
 }
 
+TEST(NoiseSection, WhatIsSaidOfASensorThatIsLeftOutIsPassedOverAndNoted) {
+  const auto about = context_with()->about;
+  const NoiseSection section(settings("outputs: {x_gps: 0.5, yaw_rate: 0.1}\nbiases: {yaw_rate: {sigma: 0.1}}"), about,
+                             {"yaw_rate", "heading"});
+  EXPECT_EQ(section.output_sigmas.size(), about.outputs.size());
+  EXPECT_EQ(section.output_sigmas[0], 0.5);
+  EXPECT_THAT(section.notes, ElementsAre(AllOf(StartsWith("robot.yaml:1: outputs.yaw_rate"), HasSubstr("passed over")),
+                                         StartsWith("robot.yaml:2: biases.yaw_rate")));
+  EXPECT_THAT(error_of([&] { NoiseSection(settings("outputs: {yaw_rte: 1}"), about, {"yaw_rate"}); }),
+              HasSubstr("did you mean 'yaw_rate'?"));
+  EXPECT_THAT(noise("outputs: {x_gps: 0.5}").notes, testing::IsEmpty());
+}
+
 }  // namespace noise_section_test
 }  // namespace rhec

@@ -13,6 +13,14 @@ namespace svg_test {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
+TEST(Svg, FillsWhateverItIsShownIn) {
+  const std::string document = Svg(300.0, 200.0).document();
+  const std::string head = document.substr(0, document.find('>'));
+  EXPECT_NE(head.find("viewBox=\"0 0 300 200\""), std::string::npos) << head;
+  EXPECT_EQ(head.find(" width="), std::string::npos) << head;
+  EXPECT_EQ(head.find(" height="), std::string::npos) << head;
+}
+
 TEST(NiceTicks, AreRoundAndWithinTheAxis) {
   EXPECT_EQ(nice_ticks(0.0, 1.0, 5).labels, (std::vector<std::string>{"0", "0.2", "0.4", "0.6", "0.8", "1.0"}));
   EXPECT_EQ(nice_ticks(-25.0, 72.0, 5).labels, (std::vector<std::string>{"-20", "0", "20", "40", "60"}));

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,33 @@ TEST(Scenario, TheVehicleStartsOnThePathAndFacesAlongIt) {
   EXPECT_EQ(state[3], 0.0);
   EXPECT_NEAR(scenario.path().length(), 2 * 4.0 * M_PI * 12.0, 1.0) << "two laps of two circles";
   EXPECT_EQ(start.speed, 8.0);
+}
+
+TEST(Scenario, NotesWhatLooksLikeAWrongUnit) {
+  EXPECT_THAT(figure8_with({}).notes(), testing::IsEmpty());
+  EXPECT_THAT(figure8_with({"speed=60"}).notes(),
+              testing::ElementsAre(HasSubstr("216 km/h"), HasSubstr("lateral acceleration")));
+  EXPECT_THAT(figure8_with({"step=5", "speed=1"}).notes(), testing::ElementsAre(HasSubstr("step: 5 s")));
+  EXPECT_THAT(figure8_with({"model.outputs=[x_gps, y_gps]"}).notes(),
+              testing::ElementsAre(HasSubstr("noise.outputs.delta: passed over")));
+}
+
+TEST(Scenario, ThoseThatComeWithRhecHaveNothingToNote) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SCENARIOS)) {
+    if (entry.path().extension() != ".yaml") continue;
+    const Settings settings = load_yaml(entry.path());
+    if (settings.find("grid") || settings.find("log")) continue;
+    EXPECT_THAT(Scenario(Host(), settings).notes(), testing::IsEmpty()) << entry.path();
+    ++count;
+  }
+  EXPECT_GT(count, 7);
+}
+
+TEST(Scenario, OtherFilesSayWhatTheyAre) {
+  EXPECT_THAT(error_of([] { figure8_with({"log={}"}); }), HasSubstr("'rhec estimate'"));
+  EXPECT_THAT(error_of([] { figure8_with({"grid=[]"}); }), HasSubstr("'rhec sweep'"));
+  EXPECT_THAT(error_of([] { figure8_with({"equations=x"}); }), HasSubstr("model: {equations: FILE}"));
 }
 
 TEST(Scenario, ThePathsSpeedsChangeAsFastAsTheyMay) {

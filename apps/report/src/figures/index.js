@@ -4,7 +4,7 @@ import {faultFigures} from "./faults.js";
 import {mapFigures} from "./map.js";
 import {placeFigures} from "./place.js";
 import {columnFigure, errorFigures, estimateFigures, inputFigures, statusFigure} from "./series.js";
-import {startState, sweepFigures} from "./sweep.js";
+import {hasCells, startState, sweepFigures} from "./sweep.js";
 import {solveTimeFigure} from "./times.js";
 import {trackFigure} from "./log.js";
 import {blockColours, parameterToColour, stripHeight, stripOption, stripRows, windowMapOption, windowWords} from "./window.js";
@@ -87,7 +87,7 @@ function sweepSections(document) {
   const {surfaces, explore, pairs, speed, times} = sweepFigures(document);
   return [
     {id: "surfaces", title: document.maps.some((map) => map.is_blocking) ? "Errors over block length and overlap" : "Errors over the grid", figures: surfaces},
-    {id: "explore", title: "One measure, closely", figures: explore, hasMeasure: surfaces.length > 0},
+    {id: "explore", title: "One measure, closely", figures: explore, hasMeasure: hasCells(document)},
     {id: "pairs", title: "Pairs of the same seed", figures: pairs},
     {id: "speed", title: "By speed", figures: speed},
     {id: "times", title: "Solve times", figures: times, hasTime: true},

@@ -49,24 +49,39 @@ function estimateFigure(document, column, variable, kind, prefix) {
   const unit = variable ? variable.unit : "";
   const meaning = variable && variable.meaning ? variable.meaning : "";
   const times = document.times;
-  const hasError = Boolean(column.error), hasSigma = Boolean(column.sigma);
+  const hasError = Boolean(column.error), hasSigma = Boolean(column.sigma), bounds = boundsTouched(column.estimate, variable);
   const what = meaning ? `${column.name}, ${meaning}` : column.name;
   return {
     name: `${prefix}${kind}-${column.name}`,
     title: `${what}: estimate${column.true ? " and truth" : ""}`,
     caption: (hasSigma ? "Band: ± 2 standard deviations, cut off where it would dwarf the lines." : "The estimator gives no standard deviation.") +
-             (hasError ? " Below: estimate less truth." : ""),
+             (hasError ? " Below: estimate less truth." : "") + boundsWords(column.estimate, bounds),
     about: ["samples", "truth", "times"],
     time: () => times[column.time],
     frames: hasError ? 2 : 1,
     height: (width) => (hasError ? (width < 500 ? 330 : 380) : 240),
     option: (look, {width, height, view}) =>
-      estimateOption(look, width, height, view, column, times[column.time], unit, gapStripes(document), stripeName(document)),
+      estimateOption(look, width, height, view, column, times[column.time], unit, gapStripes(document), stripeName(document), bounds),
     table: () => estimateTable(column, times[column.time], unit),
   };
 }
 
-function estimateOption(look, width, height, view, column, wholeTime, unit, gaps, gapName) {
+/// The bounds of a variable that its estimate touches: [{name, value, type}].
+function boundsTouched(values, variable) {
+  if (!variable) return [];
+  return [["lower bound", variable.lower, "dotted"], ["upper bound", variable.upper, "dashed"]]
+    .filter(([, bound]) => isKnown(bound) && values.some((value) => isAt(value, bound)))
+    .map(([name, value, type]) => ({name, value, type}));
+}
+
+const isAt = (value, bound) => isKnown(value) && isKnown(bound) && Math.abs(value - bound) <= 1e-6 * Math.max(1, Math.abs(bound));
+
+function boundsWords(values, bounds) {
+  const known = values.filter(isKnown).length;
+  return bounds.map(({name, value}) => ` At its ${name} in ${percent(values.filter((one) => isAt(one, value)).length / known)} of the samples shown.`).join("");
+}
+
+function estimateOption(look, width, height, view, column, wholeTime, unit, gaps, gapName, bounds) {
   const option = base(look);
   const {time, estimate, sigma, error, truth} =
     inView(wholeTime, view, {estimate: column.estimate, sigma: column.sigma, error: column.error, truth: column.true});
@@ -74,7 +89,7 @@ function estimateOption(look, width, height, view, column, wholeTime, unit, gaps
   const axis = timeAxis(wholeTime, view);
   const upper = error ? Math.round((inner - GAP) * 0.6) : inner;
   const low = sigma && plus(estimate, sigma, -2), high = sigma && plus(estimate, sigma, 2);
-  const range = axisRange(extentWithBand([estimate, truth], low, high));
+  const range = axisRange(extentWithBand([estimate, truth, bounds.map(({value}) => value)], low, high));
   const frame = addFrame(option, look, {top: TOP, height: upper, width, y: {name: withUnit(column.name, unit), ...range},
     x: error ? {...axis, name: "", axisLabel: {show: false}} : axis});
   addStripes(option, frame, gapName, gaps, look.gap, [range.min, range.max]);
@@ -88,6 +103,10 @@ function estimateOption(look, width, height, view, column, wholeTime, unit, gaps
   }
   addLine(option, frame, "estimate", pairs(time, estimate), {color: look.estimate});
   names.push("estimate");
+  for (const {name, value, type} of bounds) {
+    addLine(option, frame, name, time.map((at) => [at, value]), {color: look.bound, type});
+    names.push(name);
+  }
   if (gaps.length) names.push(gapName);
   if (error) {
     const below = sigma && sigma.map((value) => (isKnown(value) ? -2 * value : null));
@@ -121,17 +140,21 @@ export function estimateFigures(document, source = document, prefix = "") {
 }
 
 /// One column in one frame: an error of the run, or how far fixes are from the estimate.
-export function columnFigure(document, {name, title, caption, about, label, unit, time, values, colour = "reference", zero = false, dots = false, log = false}) {
+export function columnFigure(document, {name, title, caption, about, label, unit, time, values, colour = "reference", zero = false, dots = false, log = false, expected = null}) {
   return {
     name, title, caption, about, time: () => time, frames: 1, height: () => 220,
     option: (look, {width, height, view}) => {
       const option = base(look), part = inView(time, view, {values});
-      const range = log ? powersOf(part.values) : axisRange(extentOf(part.values), {zero});
-      const frame = addFrame(option, look, {top: 12, height: height - 12 - BOTTOM, width, x: timeAxis(time, view),
+      const range = log ? powersOf(part.values) : axisRange(extentOf(part.values, [expected]), {zero}), top = isKnown(expected) ? TOP : 12;
+      const frame = addFrame(option, look, {top, height: height - top - BOTTOM, width, x: timeAxis(time, view),
         y: {name: withUnit(label, unit), ...range}});
       addStripes(option, frame, stripeName(document), gapStripes(document), look.gap, [range.min, range.max]);
       if (dots) addDots(option, frame, label, pairs(part.time, part.values), look[colour], {symbolSize: 3});
       else addLine(option, frame, label, pairs(part.time, part.values), {color: look[colour]});
+      if (isKnown(expected)) {
+        addLine(option, frame, "expected", part.time.map((at) => [at, expected]), {color: look.truth, type: "dashed"});
+        addLegend(option, look, [label, "expected"]);
+      }
       option.tooltip = tooltip(look);
       return option;
     },
@@ -142,10 +165,12 @@ export function columnFigure(document, {name, title, caption, about, label, unit
 export function errorFigures(document) {
   const titles = {position: "Error of the estimated position", heading: "Error of the estimated heading",
                   tracking: "Distance of the true position from the path", nees: "Normalised estimation error squared (NEES)"};
+  const expected = document.summary ? document.summary.nees_expected : null;
   return (document.errors || []).map((column) => columnFigure(document, {
-    name: `error-${column.name}`, title: titles[column.name] || capital(column.name), caption: column.meaning ? `${capital(column.meaning)}.` : "",
+    name: `error-${column.name}`, title: titles[column.name] || capital(column.name), caption: (column.meaning ? `${capital(column.meaning)}.` : "") + (column.name === "nees" && isKnown(expected) ? ` Dashed: ${expected}, the mean of an estimator that is as certain as it should be.` : ""),
     about: ["samples", "truth"], label: column.name === "nees" ? "NEES" : column.name, unit: column.unit,
     time: document.times[column.time], values: column.values, zero: true, colour: column.name === "tracking" ? "plan" : "reference",
+    expected: column.name === "nees" ? expected : null,
   }));
 }
 

@@ -61,20 +61,25 @@ export function heightsOf(map, name, relative) {
 }
 
 const hasTwoAxes = (map) => Boolean(map.axes[1]) && map.axes[0].values.length > 1 && map.axes[1].values.length > 1;
+const isNumeric = (axis) => axis.values.every((value) => typeof value === "number");
+/// Between numbers there are others, and a surface; between names there is nothing.
+const isSurface = (map) => hasTwoAxes(map) && map.axes.every(isNumeric);
+/// Whether a map of the sweep is looked at cell by cell.
+export const hasCells = (document) => document.maps.some(hasTwoAxes);
 
 // ---- figures
 
 export function sweepFigures(document) {
   const first = document.maps[0];
   if (!first) return {surfaces: [], explore: [], pairs: [], speed: [], times: []};
-  const anyTwo = document.maps.some(hasTwoAxes), anyReference = document.maps.some((map) => map.reference), times = measuresOf(document, ["time"]);
+  const anyTwo = hasCells(document), anySurface = document.maps.some(isSurface), anyReference = document.maps.some((map) => map.reference), times = measuresOf(document, ["time"]);
   return {
-    surfaces: anyTwo ? [fourSurfaces(document, false)].concat(anyReference ? [fourSurfaces(document, true)] : []) : [],
-    explore: anyTwo ? [oneSurface(document, "surface", (state) => state.measure), heatMap(document, "heat", (state) => state.measure)]
+    surfaces: anySurface ? [fourSurfaces(document, false)].concat(anyReference ? [fourSurfaces(document, true)] : []) : [],
+    explore: anyTwo ? [anySurface && oneSurface(document, "surface", (state) => state.measure), heatMap(document, "heat", (state) => state.measure)]
                     : [curves(document)],
     pairs: document.maps.some((map) => map.pairs) ? [pairFigure(document)] : [],
     speed: numericChoice(document) >= 0 ? [overChoice(document)] : [],
-    times: times.length && anyTwo ? [oneSurface(document, "time-surface", (state) => state.time), heatMap(document, "time-heat", (state) => state.time)] : [],
+    times: times.length && anyTwo ? [anySurface && oneSurface(document, "time-surface", (state) => state.time), heatMap(document, "time-heat", (state) => state.time)] : [],
   };
 }
 
@@ -118,7 +123,7 @@ function panelTitle(look, box, words) {
 
 function surface(look, box, map, measure, relative, {turn, tilt}) {
   const {heights, plane, relative: inPercent} = heightsOf(map, measure.name, relative);
-  if (!hasTwoAxes(map)) return panelTitle(look, {...box, top: box.top + box.height / 2}, "one axis alone varies here");
+  if (!isSurface(map)) return panelTitle(look, {...box, top: box.top + box.height / 2}, hasTwoAxes(map) ? "names vary here: see it cell by cell" : "one axis alone varies here");
   const range = shownRange(heights, plane);
   return surfaceShapes(look, {...box, shift: 6, drop: 0}, {
     axes: map.axes.map((axis) => ({label: axis.label, values: axis.values})), heights, plane, range, shade: shading(range, plane),
@@ -389,7 +394,7 @@ function curves(document) {
     about: ["runs"], height: (width) => Math.ceil(measures.length / across(width)) * tall,
     option: (look, {width, state}) => {
       const option = base(look), map = mapOf(document, state), columns = across(width), [axis] = map.axes;
-      const numeric = axis.values.every((value) => typeof value === "number");
+      const numeric = isNumeric(axis);
       measures.forEach((measure, m) => {
         const values = (map.means[measure.name] || []).map((row) => row[0]), column = m % columns, wide = width / columns;
         const frame = addFrame(option, look, {
@@ -397,7 +402,7 @@ function curves(document) {
           x: numeric ? {name: axis.label, ...pad(extentOf(axis.values))} : {type: "category", data: axis.values.map(String), name: axis.label, axisLabel: {formatter: null}},
           y: {name: shortLabel(measure), ...axisRange(extentOf(values, map.reference ? [map.reference.means[measure.name]] : null), {zero: true})},
         });
-        addLine(option, frame, measure.name, values.map((value, i) => [numeric ? axis.values[i] : i, value]), {color: look.estimate, width: 2}, {showSymbol: true, symbolSize: 6});
+        addLine(option, frame, measure.name, values.map((value, i) => [numeric ? axis.values[i] : i, value]), {color: look.estimate, width: numeric ? 2 : 0}, {showSymbol: true, symbolSize: numeric ? 6 : 9});
         if (map.reference) addLine(option, frame, map.reference.label, [0, axis.values.length - 1].map((i) => [numeric ? axis.values[i] : i, map.reference.means[measure.name]]), {color: look.truth, type: "dashed"});
       });
       option.tooltip = tooltip(look);

@@ -58,12 +58,15 @@ class ByName {
       : owner_(std::move(owner)), value_(std::move(value)), kinds_(std::move(kinds)) {}
 
   /// The values of a model's variables, one kind after the other. Throws Error for unknown names, with the nearest
-  /// known one, and for values that cannot be read.
-  std::vector<Item> read(const Settings& map, const ModelDescription& about) const {
+  /// known one, and for values that cannot be read. Names in `passed_over` may stand there, and count for nothing.
+  std::vector<Item> read(const Settings& map, const ModelDescription& about,
+                         const std::vector<std::string>& passed_over = {}) const {
     std::vector<std::string> known;
     for (const Kind& kind : kinds_)
       for (const Variable& variable : about.*kind.variables) known.push_back(variable.name);
-    check_keys(map, known, owner_);
+    std::vector<std::string> allowed = known;
+    allowed.insert(allowed.end(), passed_over.begin(), passed_over.end());
+    check_keys(map, allowed, owner_);
     std::vector<Item> items;
     items.reserve(known.size());
     for (const Kind& kind : kinds_) {

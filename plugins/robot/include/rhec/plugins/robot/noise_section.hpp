@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "rhec/core/config/settings.hpp"
@@ -16,13 +17,16 @@ struct SensorError {
 
 /// The section `noise`: standard deviations of the measured variables.
 struct RHEC_EXPORT NoiseSection {
-  NoiseSection(const Settings& section, const ModelDescription& about);
+  /// `left_out`: outputs that the model has, but that are not measured (`model.outputs`). What is said of them counts
+  /// for nothing, and is noted.
+  NoiseSection(const Settings& section, const ModelDescription& about, const std::vector<std::string>& left_out = {});
   static OptionSection documentation();
 
   std::vector<double> output_sigmas, input_sigmas;
   std::vector<double> state_sigmas;         ///< process noise, per square root of a second; 0: none
   std::vector<SensorError> biases, scales;  ///< by output
   bool adapt = true;                        ///< whether estimators that can do so learn the noise of outputs
+  std::vector<std::string> notes;           ///< what was passed over, with file and line
 };
 
 /// Default standard deviations of measured variables: a fraction of their typical magnitudes.

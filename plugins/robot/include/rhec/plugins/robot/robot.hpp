@@ -86,6 +86,9 @@ class RHEC_EXPORT Robot {
   bool has_blockings() const noexcept { return blocking_.is_given(); }
   /// The priors of a parameter as written, e.g. "auto".
   std::string priors_text(int parameter) const { return estimator_.priors_text(parameter); }
+  /// What one should know of this configuration though it can be used: keys that count for nothing, numbers that look
+  /// like a wrong unit. A sentence each.
+  std::vector<std::string> notes() const;
   /// What its estimators remember of places.
   const MemorySection& memory() const noexcept { return estimator_.memory(); }
   /// Of the section `blocking`, by parameter.

@@ -45,6 +45,8 @@ class RHEC_EXPORT Scenario {
   const std::vector<FaultOptions>& faults() const noexcept { return faults_; }
   /// Initial state: at the path's first point, heading along the path, all else zero.
   const Eigen::VectorXd& initial_state() const noexcept { return initial_state_; }
+  /// Those of the robot, and of a drive that no vehicle could follow: a sentence each.
+  std::vector<std::string> notes() const;
 
  private:
   ScenarioOptions options_;

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+
+#include "rhec/core/config/settings.hpp"
+
+namespace rhec {
+
+/// Reads a scenario. Its key `robot`, if it has one, names a file with the keys of a robot, relative to the scenario:
+/// they are as if they stood in the scenario, whose own keys are put over them. So simulations, logs and the program in
+/// the vehicle share one description. Throws Error as load_yaml does, and if that file is not there or names another.
+RHEC_EXPORT Settings load_scenario(const std::filesystem::path& file);
+
+/// Puts keys over others: maps are merged, all else is replaced.
+RHEC_EXPORT void put_over(Settings& base, const Settings& keys);
+
+}  // namespace rhec
