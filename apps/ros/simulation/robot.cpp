@@ -24,8 +24,9 @@ namespace {
 
 // A base that hears no command for so long stops by itself, as real ones do [s].
 constexpr double patience = 0.5;
-// At rest for so long at the end of its path, the robot has arrived [s].
-constexpr double longest_rest = 1.0;
+// At rest for so long at the end of its path, the robot has arrived [s]. Who steers it stops it where it takes it to be
+// at the end, which may be that much before [m].
+constexpr double longest_rest = 1.0, near_end = 0.5;
 
 double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
@@ -75,7 +76,9 @@ class SimulatedRobot {
     }
   }
 
-  bool has_arrived() const noexcept { return follower_.finished(); }
+  bool has_arrived() const noexcept {
+    return follower_.finished() || follower_.arc_length() >= scenario_.path().length() - near_end;
+  }
 
   void print() const {
     fmt::print("{:.1f} s, {} commands heard, {} refused; {:.1f} of {:.1f} m driven\n", time_, heard_, refused_,
