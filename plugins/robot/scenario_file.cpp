@@ -42,7 +42,7 @@ Settings load_robot(const Settings& named, const std::filesystem::path& scenario
 void put_over(Settings& base, const Settings& keys) { put_over(base, keys, ""); }
 
 Settings load_scenario(const std::filesystem::path& file) {
-  const Settings scenario = load_yaml(file);
+  Settings scenario = load_yaml(file);
   const Settings* named = scenario.find(robot_key);
   if (!named) return scenario;
   Settings merged = load_robot(*named, file);

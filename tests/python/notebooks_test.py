@@ -28,3 +28,5 @@ def test_notebooks_run(notebook, tmp_path, monkeypatch):
     assert any("<svg" in data.get("text/html", "") for data in shown)  # a run is shown by its picture
     assert any("<progress" in data.get("text/html", "") or data.get("text/html") == "" for data in shown)  # and its bar
     assert not [output for output in outputs if output.output_type == "error"]
+    warnings = [output.text for output in outputs if output.output_type == "stream" and output.name == "stderr" and "Warning" in output.text]
+    assert not warnings  # such as the mean of nothing, which is drawn as nothing
