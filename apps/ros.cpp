@@ -3,6 +3,7 @@
 #include "command.hpp"
 #include "commands.hpp"
 #include "crash_report.hpp"
+#include "output.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "ros/live.hpp"
 
@@ -53,6 +54,7 @@ void add_ros(Program& program) {
   command.add("--seconds", arguments->seconds, "end after this time [s]").positive().value("S");
   command.add_list("--msg-path", arguments->msg_paths, "folder of packages with further message definitions")
       .value("DIR");
+  add_json(command, arguments->json);
   add_assignments(command, arguments->assignments, "a key of the file");
   add_plugin_path(command, arguments->plugin_path);
 }

@@ -18,6 +18,7 @@ struct LiveArguments {
   int priority = 0, cpu = -1;
   double seconds = 0.0;  ///< 0: until it is stopped
   bool once = false, simulate = false;
+  bool json = false;  ///< the report at the end is JSON, and what happens is told on standard error
   std::vector<std::filesystem::path> plugin_path = {};
 };
 

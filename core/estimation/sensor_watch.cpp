@@ -24,6 +24,8 @@ constexpr int passes_of_kept_out = 5;
 constexpr double close_gate = 3.0;
 // The error of a sensor that fails is a mean over so many of its measurements.
 constexpr double error_memory = 5.0;
+// By so much less nu' S^-1 nu is a measurement much nearer to no error than to that one.
+constexpr double much_nearer = 9.0;
 // Silence after which a sensor that disagrees is more likely right than the estimate [s].
 constexpr double longest_gap = 1.0;
 // A real receiver's errors may be far larger than its noise says, and not Gaussian at all: its gate is as much wider as
@@ -300,12 +302,14 @@ bool SensorWatch::admits(std::size_t sensor, const Innovation& innovation) noexc
 }
 
 /// Whether a measurement is nearer to the error that the sensor has had than to none, or farther from none than it
-/// could have been when it failed first.
+/// could have been when it failed first; but not if it is much nearer to none.
 bool SensorWatch::is_still_off(const Record& record, const Innovation& innovation) const noexcept {
   const Innovation::OfSensor<1>& value = innovation.value;
   if (record.error.size() != value.size()) return false;
   const Innovation::OfSensor<1> rest = value - record.error;
-  return rest.dot(innovation.covariance.llt().solve(rest)) < innovation.nis ||
+  const double of_error = rest.dot(innovation.covariance.llt().solve(rest));
+  if (of_error > innovation.nis + much_nearer) return false;
+  return of_error < innovation.nis ||
          value.dot(record.covariance.llt().solve(value)) > close_limits_[static_cast<std::size_t>(value.size())];
 }
 

@@ -4,6 +4,7 @@
 The commands of docs/live.md work, at the same time. A node stops the robot when it is stopped itself. Mistakes are told.
 """
 import fcntl
+import json
 import pathlib
 import re
 import shlex
@@ -54,6 +55,15 @@ def end_of(process, seconds):
         text, _ = process.communicate()
         return "did not end", text
     return process.returncode, text
+
+
+def report_in(text):
+    """What --json prints last, after what is told on standard error."""
+    start = text.find("\n{\n")
+    try:
+        return json.loads(text[start:])
+    except ValueError:
+        return {}
 
 
 def number_in(pattern, text):
@@ -114,12 +124,16 @@ def silence_stops_the_robot(rhec, findings):
 
 def who_does_not_steer(rhec, findings):
     with Domain() as domain:
-        robot = domain.start(rhec, "ros", ROBOT, "--simulate", "--seconds", 4)
-        node = domain.start(rhec, "ros", ROBOT, "--seconds", 4, *assignments("ros.command.steer=false"))
+        robot = domain.start(rhec, "ros", ROBOT, "--simulate", "--seconds", 4, "--json")
+        node = domain.start(rhec, "ros", ROBOT, "--seconds", 4, "--json", *assignments("ros.command.steer=false"))
         _, robot_text = end_of(robot, 30)
         node_code, node_text = end_of(node, 30)
     findings.expect(node_code == FINE and "estimates, does not steer" in node_text, "a node that only estimates", node_text)
-    findings.expect(" 0 commands heard" in robot_text, "nobody is steered unbidden", robot_text)
+    node_report, robot_report = report_in(node_text), report_in(robot_text)
+    findings.expect(robot_report.get("commands") == 0 and not robot_report.get("has_arrived", True), "nobody is steered unbidden", robot_text)
+    used = {topic["topic"]: topic["used"] for topic in node_report.get("topics", [])}
+    findings.expect(min(used.get(topic, 0) for topic in ("/fix", "/imu", "/joint_states")) > 10 and node_report["steered"] == 0
+                    and node_report["latency_ms"]["median"] > 0, "the report as JSON", node_text)
 
 
 def mistakes(rhec, findings):

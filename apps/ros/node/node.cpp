@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cstdio>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "lever_arms.hpp"
 #include "loop.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/loop/scenario.hpp"
 #include "rhec/sim/maps/map_keeper.hpp"
 #include "rhec/sim/numbers/spread.hpp"
@@ -35,18 +37,19 @@ std::unique_ptr<const Path> known_path(const Host& host, const Settings& setting
   return nullptr;
 }
 
-void print_topics(const LiveTopics& topics, const Intake& intake, const RosOptions& options, const WireOptions& wire) {
-  fmt::print("node {} in domain {} on {}\n", wire.node, wire.domain, wire.interface);
+void print_topics(const LiveTopics& topics, const Intake& intake, const RosOptions& options, const WireOptions& wire,
+                  std::FILE* out) {
+  fmt::print(out, "node {} in domain {} on {}\n", wire.node, wire.domain, wire.interface);
   for (std::size_t i = 0; i < topics.topics().size(); ++i)
     if (intake.is_wanted(static_cast<int>(i)))
-      fmt::print("  hears  {} ({})\n", topics.topics()[i].name, topics.topics()[i].type);
+      fmt::print(out, "  hears  {} ({})\n", topics.topics()[i].name, topics.topics()[i].type);
   if (options.command.steer)
-    fmt::print("  steers {} ({}); stopped by {}\n", options.names.command,
+    fmt::print(out, "  steers {} ({}); stopped by {}\n", options.names.command,
                CommandMessage::type_of(options.command.form),
                options.names.stop.empty() ? "nobody" : options.names.stop);
   else
-    fmt::print("  does not steer; ros.command.steer: true lets it\n");
-  std::fflush(stdout);
+    fmt::print(out, "  does not steer; ros.command.steer: true lets it\n");
+  std::fflush(out);
 }
 
 void print_report(const LoopReport& report) {
@@ -76,18 +79,50 @@ void print_report(const LoopReport& report) {
                report.driven > 0 ? "command" : "estimate", 1e3 * latency.median, 1e3 * latency.p99, 1e3 * latency.max);
 }
 
+sim::Json json_of(const TopicCount& count) {
+  sim::Json refused = sim::Json::object();
+  for (std::size_t i = 0; i < refusal_count; ++i)
+    if (count.refused[i] > 0) refused[name_of(static_cast<Refusal>(i))] = count.refused[i];
+  return {{"topic", count.topic}, {"used", count.used}, {"refused", refused}};
+}
+
+void print_json_report(const LoopReport& report) {
+  sim::Json json;
+  json["topics"] = sim::Json::array();
+  for (const TopicCount& count : report.topics) json["topics"].push_back(json_of(count));
+  json["other"] = json_of(report.other);
+  if (report.origin)
+    json["origin"] = {{"latitude", report.origin->latitude},
+                      {"longitude", report.origin->longitude},
+                      {"height", report.origin->height}};
+  json["steps"] = report.cycles;
+  json["steered"] = report.driven;
+  json["missed_deadlines"] = report.misses;
+  json["not_sent"] = report.unsent;
+  json["degraded"] = report.degraded;
+  json["lost"] = report.lost;
+  json["rejected"] = report.estimator.rejected;
+  json["estimates"] = report.estimator.estimates;
+  json["fallbacks"] = report.estimator.fallbacks;
+  if (!report.latencies.empty()) {
+    const sim::Spread latency = sim::spread_of(report.latencies);
+    json["latency_ms"] = {{"median", 1e3 * latency.median}, {"p99", 1e3 * latency.p99}, {"max", 1e3 * latency.max}};
+  }
+  fmt::print("{}\n", json.dump(2));
+}
+
 /// Makes a controller for a path that has come, and hands it to the loop; what cannot be followed is told.
-void follow(const std::vector<Position>& places, const Robot& robot, const RosOptions& options, Loop& loop,
-            double time) {
+void follow(const std::vector<Position>& places, const Robot& robot, const RosOptions& options, Loop& loop, double time,
+            std::FILE* out) {
   std::vector<Waypoint> waypoints;
   waypoints.reserve(places.size());
   for (const Position& place : places) waypoints.push_back({place.x, place.y, options.path_speed});
   try {
     const Path path(waypoints);
     loop.follow(robot.make_controller(path, loop.slip_ahead()));
-    fmt::print("{:8.2f} s  a path of {:.1f} m has come\n", time, path.length());
+    fmt::print(out, "{:8.2f} s  a path of {:.1f} m has come\n", time, path.length());
   } catch (const Error& mistake) {
-    fmt::print("{:8.2f} s  a path was refused: {}\n", time, mistake.what());
+    fmt::print(out, "{:8.2f} s  a path was refused: {}\n", time, mistake.what());
   }
 }
 
@@ -112,7 +147,8 @@ int run_node(const Host& host, Settings settings, const LiveArguments& arguments
   std::unique_ptr<const Path> path = options.command.steer ? known_path(host, settings, arguments, options) : nullptr;
   if (path) robot.make_controller(*path);  // likewise
   Loop loop(wire, topics, intake, robot, options);
-  print_topics(topics, intake, options, wire_setup);
+  std::FILE* const out = arguments.json ? stderr : stdout;
+  print_topics(topics, intake, options, wire_setup, out);
   loop.start({arguments.priority, arguments.cpu >= 0 ? std::optional(arguments.cpu) : std::nullopt});
   if (path && !robot.memory().is_given()) loop.follow(robot.make_controller(*std::exchange(path, nullptr)));
   const auto begin = Clock::now();
@@ -122,14 +158,17 @@ int run_node(const Host& host, Settings settings, const LiveArguments& arguments
     loop.check();
     // A controller that looks ahead on a map needs the estimator that keeps it.
     if (path && loop.slip_ahead()) loop.follow(robot.make_controller(*std::exchange(path, nullptr), loop.slip_ahead()));
-    if (const auto places = loop.take_wanted_path()) follow(*places, robot, options, loop, seconds_since(begin));
-    for (const std::string& event : loop.take_events()) fmt::print("{:8.2f} s  {}\n", seconds_since(begin), event);
-    std::fflush(stdout);
+    if (const auto places = loop.take_wanted_path()) follow(*places, robot, options, loop, seconds_since(begin), out);
+    for (const std::string& event : loop.take_events()) fmt::print(out, "{:8.2f} s  {}\n", seconds_since(begin), event);
+    std::fflush(out);
   }
   loop.stop();
   loop.check();
   const LoopReport report = loop.report();
-  print_report(report);
+  if (arguments.json)
+    print_json_report(report);
+  else
+    print_report(report);
   keeper->save();
   return arguments.once && !loop.is_finished() ? exit_not_solved : exit_fine;
 }

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <thread>
 
@@ -14,6 +15,7 @@
 #include "../node/live_topics.hpp"
 #include "../wire/wire_options.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/sim/files/json.hpp"
 #include "rhec/sim/loop/loop_world.hpp"
 #include "rhec/sim/numbers/spread.hpp"
 #include "rhec/sim/telemetry/robot_messages.hpp"
@@ -78,6 +80,23 @@ class SimulatedRobot {
 
   bool has_arrived() const noexcept {
     return follower_.finished() || follower_.arc_length() >= scenario_.path().length() - near_end;
+  }
+
+  void print_json() const {
+    sim::Json json{{"seconds", time_},
+                   {"commands", heard_},
+                   {"refused", refused_},
+                   {"driven_m", std::min(follower_.arc_length(), scenario_.path().length())},
+                   {"path_m", scenario_.path().length()},
+                   {"has_arrived", has_arrived()}};
+    const auto add = [&](const char* name, const std::vector<double>& values, double factor) {
+      if (values.empty()) return;
+      const sim::Spread spread = sim::spread_of(values);
+      json[name] = {{"median", factor * spread.median}, {"p99", factor * spread.p99}, {"max", factor * spread.max}};
+    };
+    add("distance_m", distances_, 1.0);
+    add("answer_ms", answers_, 1e3);
+    fmt::print("{}\n", json.dump(2));
   }
 
   void print() const {
@@ -205,11 +224,15 @@ int run_robot(const Host& host, Settings settings, const LiveArguments& argument
   wire.node = options.node + "_robot";
   const StopRequest stop_request;
   SimulatedRobot robot(scenario, options, wire, arguments.msg_paths);
-  fmt::print("a simulated {} in domain {} on {}; obeys {}\n", scenario.robot().model()->description().name, wire.domain,
-             wire.interface, options.names.command);
-  std::fflush(stdout);
+  std::FILE* const out = arguments.json ? stderr : stdout;
+  fmt::print(out, "a simulated {} in domain {} on {}; obeys {}\n", scenario.robot().model()->description().name,
+             wire.domain, wire.interface, options.names.command);
+  std::fflush(out);
   robot.run(arguments.seconds);
-  robot.print();
+  if (arguments.json)
+    robot.print_json();
+  else
+    robot.print();
   return robot.has_arrived() ? exit_fine : exit_not_solved;
 }
 

@@ -1,0 +1,129 @@
+// Where a sensor and the estimate disagree: who is found to be wrong.
+#include "rhec/core/estimation/sensor_watch.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "support/sensor_faults.hpp"
+
+namespace rhec {
+namespace sensor_dispute_test {
+
+using namespace rhec::testing;
+using ::testing::HasSubstr;
+
+struct SensorDisputes : SensorFaults {};
+INSTANTIATE_TEST_SUITE_P(All, SensorDisputes, ::testing::Values("ekf", "bank", "rhe"), name_of_estimator);
+
+TEST_P(SensorDisputes, ASpikeIsNotFollowed) {
+  for (const double size : {1.0, 10.0, 100.0, 1e6}) {
+    SCOPED_TRACE(size);
+    expect_each({.spoil = [=](Delivery& d) { d.outputs[0] += size; }}, [](const Episode& episode) {
+      EXPECT_LT(episode.largest_error_during(), usual_error);
+      EXPECT_EQ(episode.samples_to_recover(usual_error), 0);
+      EXPECT_THAT(episode.during[0].words, HasSubstr("degraded: x_gps and y_gps rejected"));
+    });
+  }
+}
+
+TEST_P(SensorDisputes, ATransientOfTenSamplesIsNotFollowed) {
+  for (const double size : {5.0, 10.0, 100.0}) {
+    SCOPED_TRACE(size);
+    expect_each({.spoil = [=](Delivery& d) { d.outputs[1] += size; }, .length = 10}, [=](const Episode& episode) {
+      EXPECT_LT(episode.largest_error_during(), 4.0);  // drift on up to 16 m without a position
+      EXPECT_LE(episode.samples_to_recover(usual_error), 5);
+    });
+  }
+}
+
+TEST_P(SensorDisputes, APositionThatHasMovedForGoodIsFollowed) {
+  for (const double size : {10.0, 100.0}) {
+    SCOPED_TRACE(size);
+    expect_each({.spoil = {}, .length = 9, .moved = size}, [=](const Episode& episode) {
+      for (const Episode::Sample& sample : episode.during) {
+        EXPECT_EQ(sample.health, HealthLevel::degraded);
+        EXPECT_GT(sample.error, 0.8 * size);
+      }
+      EXPECT_LE(episode.samples_to_recover(usual_error), 21);
+      EXPECT_EQ(episode.counts.rebased, 1);
+    });
+  }
+}
+
+/// Neither slip nor unknown inputs explain what a steering encoder alone says; and however little is known of the angle
+/// without it, its error stays one.
+TEST_P(SensorDisputes, AnAngleThatIsOffForGoodIsNotBelieved) {
+  for (const double size : {0.2, -0.3}) {
+    SCOPED_TRACE(size);
+    const Fault fault{.spoil = [=](Delivery& d) { d.outputs[2] += size; }, .length = 50};
+    for (int seed = 1; seed <= seeds; ++seed) {
+      SCOPED_TRACE(seed);
+      const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed), 0);
+      EXPECT_TRUE(episode.is_finite);
+      EXPECT_GE(episode.honest_share(), 0.95);
+      for (const Episode::Sample& sample : episode.during) {
+        EXPECT_THAT(sample.words, HasSubstr("degraded: delta rejected"));
+        EXPECT_EQ(sample.words.find("inputs"), std::string::npos);
+        EXPECT_LT(sample.error, usual_error);
+      }
+    }
+  }
+}
+
+TEST_P(SensorDisputes, WheelsThatSpinOrStandAreNotBelieved) {
+  for (const double factor : {3.0, 0.0}) {
+    SCOPED_TRACE(factor);
+    expect_each({.spoil = [=](Delivery& d) { d.inputs[0] *= factor; }, .length = 25},
+                [](const Episode& episode) { EXPECT_LE(episode.samples_to_recover(usual_error), 16); });
+  }
+}
+
+TEST_P(SensorDisputes, SlipThatJumpsIsNoFault) {
+  expect_each({.spoil = {}, .length = 20, .moved = 0.0, .slip = 0.35}, [](const Episode& episode) {
+    EXPECT_EQ(episode.samples_to_recover(usual_error), 0);
+    EXPECT_EQ(episode.counts.rebased, 0);
+    EXPECT_EQ(episode.counts.rejected, 0) << "what was held back was right, and is not counted";
+    std::ptrdiff_t doubted = 0;
+    for (const Episode::Sample& sample : episode.during) doubted += sample.health != HealthLevel::ok;
+    EXPECT_LE(doubted, 1) << "until the next sample confirms it";
+  });
+}
+
+TEST_P(SensorDisputes, APositionThatWasFollowedIsDoubtedForSomeTime) {
+  expect_each({.spoil = [](Delivery& d) { d.outputs[0] += 10.0; }, .length = 20}, [](const Episode& episode) {
+    EXPECT_GT(episode.during.back().error, 9.0) << "it cannot be told from one that has moved for good";
+    for (const Episode::Sample& sample : episode.during) EXPECT_NE(sample.health, HealthLevel::ok);
+    EXPECT_LE(episode.samples_to_recover(usual_error), 11);
+  });
+}
+
+/// Nobody sees where the vehicle is for two seconds, and then it heads elsewhere: as after a turn on ground that was
+/// not what it was taken for.
+TEST_P(SensorDisputes, AHeadingThatIsWrongAfterAGapIsFound) {
+  constexpr int gap = 10;
+  for (const double angle : {1.5, -2.2, 3.0})
+    for (int seed = 1; seed <= seeds; ++seed) {
+      SCOPED_TRACE(angle * seed);
+      double x = 0.0, y = 0.0;
+      const auto turn = [&](Delivery& d) {
+        if (d.since == 0) x = d.outputs[0], y = d.outputs[1];
+        const double east = d.outputs[0] - x, north = d.outputs[1] - y;
+        d.outputs[0] = d.since < gap ? nan : x + std::cos(angle) * east - std::sin(angle) * north;
+        d.outputs[1] = d.since < gap ? nan : y + std::sin(angle) * east + std::cos(angle) * north;
+      };
+      const Episode episode =
+          drive_with_fault(vehicle, {.spoil = turn, .length = 60}, static_cast<std::uint64_t>(seed), 0);
+      EXPECT_TRUE(episode.is_finite);
+      EXPECT_NE(episode.during[gap].health, HealthLevel::ok);
+      EXPECT_EQ(episode.counts.rebased, 1);
+      for (std::size_t k = gap + 25; k < episode.during.size(); ++k)
+        EXPECT_EQ(episode.during[k].health, HealthLevel::ok) << k << ": " << episode.during[k].words;
+    }
+}
+
+}  // namespace sensor_dispute_test
+}  // namespace rhec

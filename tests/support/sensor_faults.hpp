@@ -1,0 +1,56 @@
+#pragma once
+
+// Episodes of a bicycle whose sensors fail, with every estimator that is watched.
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+
+#include "rhec/plugins/yaml/yaml.hpp"
+#include "support/faulty_drive.hpp"
+#include "support/linear_case.hpp"
+
+namespace rhec::testing {
+
+inline Robot watched_robot(const std::string& estimator, const std::string& more = "") {
+  return {host(), RobotOptions::table().parse(parse_yaml(R"(
+step: 0.2
+model: {name: bicycle_slip, wheelbase: 1.4, gps_offset: 0.4}
+noise: {outputs: {x_gps: 0.03, y_gps: 0.03, delta: 0.01745}, inputs: {u1: 0.1, u2: 0.1}}
+bounds: {delta: [-0.61, 0.61], u2: [-0.61, 0.61], kappa: [0, 1], mu: [0, 1]}
+estimator:
+  name: )" + estimator + R"(
+  horizon: 15
+  process_noise: {kappa: 0.03, mu: 0.03}
+  initial:
+    parameters: {kappa: 0.5, mu: 0.5}
+    sigma: {x_pos: 0.05, y_pos: 0.05, beta: 0.03, delta: 0.02, kappa: 1, mu: 1}
+)" + more,
+                                                         "robot"),
+                                              "robot")};
+}
+
+struct SensorFaults : ::testing::TestWithParam<const char*> {
+  Robot vehicle = watched_robot(GetParam());
+  static constexpr int seeds = 4;
+  static constexpr double usual_error = 0.3;  // [m]
+
+  /// Holds what every fault has to keep, and hands on the episodes.
+  template <class Function>
+  void expect_each(const Fault& fault, const Function& check) {
+    for (int seed = 1; seed <= seeds; ++seed) {
+      SCOPED_TRACE(seed);
+      const Episode episode = drive_with_fault(vehicle, fault, static_cast<std::uint64_t>(seed));
+      EXPECT_TRUE(episode.is_finite);
+      EXPECT_GE(episode.honest_share(), 0.95);
+      for (const Episode::Sample& sample : episode.before) EXPECT_EQ(sample.health, HealthLevel::ok) << sample.words;
+      EXPECT_LE(episode.samples_to_ok(), 25);
+      check(episode);
+    }
+  }
+};
+
+inline std::string name_of_estimator(const ::testing::TestParamInfo<const char*>& about) { return about.param; }
+
+}  // namespace rhec::testing
