@@ -197,13 +197,7 @@ def self_test():
     more = ["tests/core/low/tested_after_all_test.cpp", "sim/loop/by_nobody.cpp", "sim/loop/by_words.cpp"]
     by_another = "tests/models/every_test.cpp: planted"
     untested = {"core/low/special.cpp": by_another, "core/low/tested_after_all.cpp": by_another,
-                "apps/ros/no_wire.cpp": "tests/cli/ros.py: a build without the wire says what to install",
-    "apps/ros/node/lever_arms.cpp": "tests/apps/ros/wire/participant_strangers_test.cpp: transforms come from another process",
-    "apps/ros/node/loop_topics.cpp": "tests/apps/ros/node/loop_test.cpp: paths, stops and what is told of estimates",
-    "apps/ros/node/node.cpp": "tests/cli/ros.py: the command, its mistakes and its end",
-    "apps/ros/simulation/robot.cpp": "tests/cli/ros.py: the other end of every drive",
-    "apps/ros/wire/raw_type.cpp": "tests/apps/ros/wire/participant_strangers_test.cpp: bytes arrive as they were sent",
-    "apps/run.cpp": "tests/cli/runs.py", "sim/loop/by_nobody.cpp": "tests/cli/gone.py: planted",
+                "apps/run.cpp": "tests/cli/runs.py", "sim/loop/by_nobody.cpp": "tests/cli/gone.py: planted",
                 "sim/loop/by_words.cpp": "looked at by eye"}
     alone = {"tests/models/every_test.cpp": "planted", "tests/core/low/never_written_test.cpp": "planted"}
     failures = []
