@@ -6,7 +6,7 @@ const groups = {
   transient: "Faults of up to ten samples", long: "Faults of more samples", moved: "Positions that move for good", angle: "Angles that are off for good",
   clock: "Clocks that are set",
 };
-const PANEL = 190, ROW = 20;
+const PANEL = 190, ROOM = 60, ROW = 20;  // heights of a panel and a row; room for the numbers of an axis [px]
 
 export function faultFigures({campaign}) {
   const names = Object.keys(groups).filter((group) => campaign.kinds.some((kind) => kind.group === group));
@@ -47,9 +47,9 @@ function curveFigure(campaign, group) {
       const option = base(look), columns = across(width), wide = width / columns, top = legend(look, width);
       kinds.forEach((kind, k) => {
         const column = k % columns, y = top + Math.floor(k / columns) * PANEL;
-        const frame = addFrame(option, look, {top: y + 20, height: PANEL - 66, width, left: column * wide + 52, right: width - (column + 1) * wide + 12,
+        const frame = addFrame(option, look, {top: y + 20, height: PANEL - 66, width, left: column * wide + ROOM, right: width - (column + 1) * wide + 12,
           x: {min: 0, max: longest({samples})}, y: {type: "log", name: column === 0 ? "error [m]" : "", ...ends}});
-        option.graphic = (option.graphic || []).concat({type: "text", silent: true, x: column * wide + 52, y, style: {text: kind.name, fill: look.text, font: `600 ${look.fontSize}px ${look.font}`}});
+        option.graphic = (option.graphic || []).concat({type: "text", silent: true, x: column * wide + ROOM, y, style: {text: kind.name, fill: look.text, font: `600 ${look.fontSize}px ${look.font}`}});
         addShapes(option, frame, "window", [window, ends.min], (at) => {
           const [x, bottom] = at([window, ends.min]), [, above] = at([window, ends.max]);
           return [{type: "line", shape: {x1: x, y1: bottom, x2: x, y2: above}, style: {stroke: look.line}}];
