@@ -153,6 +153,14 @@ class Page:
                 self.expect(anchor in headings, line, f"leads to #{anchor} of {file.name}, which has no such heading")
 
 
+def same_first_table(findings):
+    """What the first screen says of an EKF is what the page of concepts says."""
+    def rows(page):
+        return [line for line in (cli.ROOT / page).read_text(encoding="utf-8").splitlines() if line.startswith(("| EKF |", "| rhec, `rhe` |"))]
+    findings.expect(len(rows("README.md")) == 2 and rows("README.md") == rows("docs/concepts.md"), "README.md",
+                    "its table against an EKF is not that of docs/concepts.md")
+
+
 def main():
     rhec, findings = Program(sys.argv[1]), cli.Findings("blocks")
     wanted = sys.argv[2:]
@@ -163,6 +171,8 @@ def main():
                 continue
             page.links()
             page.blocks()
+    if not wanted:
+        same_first_table(findings)
     findings.tell()
 
 

@@ -14,8 +14,9 @@ namespace rhec::sim {
 namespace report_faults_test {
 
 struct FaultsReport : ::testing::Test {
-  std::filesystem::path file = std::filesystem::path(::testing::TempDir()) /
-                               (std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".json");
+  std::filesystem::path folder =
+      std::filesystem::path(::testing::TempDir()) /
+      (std::string("rhec-faults-report-") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
   Json spread{{"median", 3}, {"p99", nullptr}};
   Json measures{{"rides", 7},     {"recovered", spread},   {"ok_again", spread},
                 {"never", 1},     {"unsaid", 0},           {"followed", 0},
@@ -35,15 +36,16 @@ struct FaultsReport : ::testing::Test {
     all["kinds"].push_back(kind);
     return all;
   }
-  void write(const Json& json) { std::ofstream(file) << json.dump(); }
-  ~FaultsReport() override { std::filesystem::remove(file); }
+  std::filesystem::path written(const char* name) {
+    std::filesystem::create_directories(folder);
+    std::ofstream(folder / name) << campaign().dump();
+    return folder / name;
+  }
+  ~FaultsReport() override { std::filesystem::remove_all(folder); }
 };
 
 TEST_F(FaultsReport, HasTheCampaignAndWhatIsNotReached) {
-  const std::filesystem::path named = file.parent_path() / "faults.json";
-  std::ofstream(named) << campaign().dump();
-  const Json document = Json::parse(report_document(named, "test"));
-  std::filesystem::remove(named);
+  const Json document = Json::parse(report_document(written("faults.json"), "test"));
   EXPECT_EQ(document.at("kind").get<std::string>(), "faults");
   EXPECT_EQ(document.at("campaign").dump(), campaign().dump());
   EXPECT_EQ(document.at("notes")[0].at("text").get<std::string>(), "spike: not reached: this");
@@ -51,7 +53,7 @@ TEST_F(FaultsReport, HasTheCampaignAndWhatIsNotReached) {
 }
 
 TEST_F(FaultsReport, AnotherFileIsNoCampaign) {
-  write(campaign());
+  const std::filesystem::path file = written("another.json");
   EXPECT_CONTAINS(error_of([&] { report_document(file, "test"); }), "compare.json");
 }
 
