@@ -21,7 +21,7 @@ struct Vehicle {
 };
 const Vehicle vehicles[] = {
     {"unicycle_traction", RHEC_SOURCE_DIRECTORY "/scenarios/unicycle_traction.yaml"},
-    {"bicycle_slip", RHEC_SOURCE_DIRECTORY "/scenarios/figure8.yaml", {"path.laps=1"}},
+    {"bicycle_slip", RHEC_SOURCE_DIRECTORY "/scenarios/figure8.yaml", {"path.laps=1", without_rates}},
     {"bicycle_sideslip", RHEC_SOURCE_DIRECTORY "/scenarios/bicycle_sideslip.yaml"},
     {"skid_steer", RHEC_SOURCE_DIRECTORY "/scenarios/skid_steer.yaml"},
     {"tractor_trailer", RHEC_SOURCE_DIRECTORY "/scenarios/tractor_trailer.yaml"},

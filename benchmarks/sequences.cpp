@@ -60,6 +60,7 @@ void set_known(const RheProblem& from, bool slides, RheProblem& to) noexcept {
   for (int i = slides ? N - 1 : 0; i < N; ++i) {
     std::copy_n(from.output(i), ny, to.output(i));
     std::copy_n(from.measured_input(i), nu, to.measured_input(i));
+    if (from.setup().most_between > 0) to.between(i).assign(from.between(i));
     to.set_duration(i, from.duration(i));
   }
   set_blocks(from, to);
@@ -93,10 +94,17 @@ bool slides(const HorizonProblem& before, const HorizonProblem& after) {
   const auto same = [](const double* a, const double* b, int count) {
     return std::memcmp(a, b, static_cast<std::size_t>(count) * sizeof(double)) == 0;
   };
+  const auto same_between = [&](const BetweenNodes& a, const BetweenNodes& b) {
+    if (a.count() != b.count()) return false;
+    for (int k = 0; k < a.count(); ++k)
+      if (a.time(k) != b.time(k) || !same(a.outputs(k), b.outputs(k), ny)) return false;
+    return true;
+  };
   for (int i = 0; i < N; ++i)
     if (!same(from->output(i + 1), to->output(i), ny)) return false;
   for (int i = 0; i + 1 < N; ++i)
-    if (!same(from->measured_input(i + 1), to->measured_input(i), nu) || from->duration(i + 1) != to->duration(i))
+    if (!same(from->measured_input(i + 1), to->measured_input(i), nu) || from->duration(i + 1) != to->duration(i) ||
+        !same_between(from->between(i + 1), to->between(i)))
       return false;
   return true;
 }
@@ -212,28 +220,37 @@ const std::vector<Drive>& usual_drives() {
       "{x: -18.5, y: -5.5, radius: 1.2, velocity_x: 0.2, velocity_y: 0.3},"
       "{x: 30.7, y: -38, length: 4, width: 1.5, heading: 0.2, velocity_x: -0.5, velocity_y: -0.1}]}]";
   static const std::vector<Drive> drives = {
-      {"figure8/fhb", figure8, {"path.laps=1", "blocking.kappa=" + full}},
+      {"figure8/fhb", figure8, {"path.laps=1", without_rates, "blocking.kappa=" + full}},
       {"figure8/rates",
        figure8,
-       {"path.laps=1", "blocking.kappa=" + full, "controller.weights.stage.u2=0.1",
+       {"path.laps=1", "blocking.kappa=" + full, without_rates, "controller.weights.stage.u2=0.1",
         "controller.weights.rates.u2=0.02"}},
-      {"figure8/sbo_5_3", figure8, {"path.laps=1", "blocking.kappa=" + blocks}},
-      {"figure8/sbo_5_3_both", figure8, {"path.laps=1", "blocking.kappa=" + blocks, "blocking.mu=" + blocks}},
-      {"figure8/noise_one", figure8, {"path.laps=1", "blocking.kappa=" + full, "noise.states.y_pos=0.02"}},
+      {"figure8/sbo_5_3", figure8, {"path.laps=1", without_rates, "blocking.kappa=" + blocks}},
+      {"figure8/sbo_5_3_both",
+       figure8,
+       {"path.laps=1", without_rates, "blocking.kappa=" + blocks, "blocking.mu=" + blocks}},
+      {"figure8/often",
+       figure8,
+       {"path.laps=1", without_rates, "blocking.kappa=" + full,
+        "sensors={x_gps: {rate: 100}, y_gps: {rate: 100}, delta: {rate: 100}}"}},
+      {"figure8/noise_one",
+       figure8,
+       {"path.laps=1", without_rates, "blocking.kappa=" + full, "noise.states.y_pos=0.02"}},
       {"figure8/noise_two",
        figure8,
-       {"path.laps=1", "blocking.kappa=" + full, "noise.states={x_pos: 0.02, y_pos: 0.02}"}},
+       {"path.laps=1", without_rates, "blocking.kappa=" + full, "noise.states={x_pos: 0.02, y_pos: 0.02}"}},
       {"figure8/noise_all",
        figure8,
-       {"path.laps=1", "blocking.kappa=" + full, "noise.states={x_pos: 0.02, y_pos: 0.02, beta: 0.005, delta: 0.005}"}},
+       {"path.laps=1", without_rates, "blocking.kappa=" + full,
+        "noise.states={x_pos: 0.02, y_pos: 0.02, beta: 0.005, delta: 0.005}"}},
       {"figure8/noise_blocks",
        figure8,
-       {"path.laps=1", "blocking.kappa=" + full, "noise.states={x_pos: 0.02, y_pos: 0.02}",
+       {"path.laps=1", without_rates, "blocking.kappa=" + full, "noise.states={x_pos: 0.02, y_pos: 0.02}",
         "blocking.x_pos_noise=" + blocks, "blocking.y_pos_noise=" + blocks}},
-      {"zigzag/fhb", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4", "blocking.kappa=" + full}},
-      {"zigzag/sbo_2_4", zigzag, {"path.legs=4", "path.turn_radius=3", "speed=4"}},
-      {"obstacles/free", obstacles, {"estimator={name: truth}", "controller.terms=[]"}},
-      {"obstacles/limits", obstacles, {"estimator={name: truth}", "controller.terms=" + limits}},
+      {"zigzag/fhb", zigzag, {"path.legs=4", without_rates, "path.turn_radius=3", "speed=4", "blocking.kappa=" + full}},
+      {"zigzag/sbo_2_4", zigzag, {"path.legs=4", without_rates, "path.turn_radius=3", "speed=4"}},
+      {"obstacles/free", obstacles, {"estimator={name: truth}", without_rates, "controller.terms=[]"}},
+      {"obstacles/limits", obstacles, {"estimator={name: truth}", without_rates, "controller.terms=" + limits}},
   };
   return drives;
 }

@@ -49,6 +49,11 @@ struct Drive {
 std::vector<std::vector<sim::ProblemRecord>> record(const Host& host, const Drive& how);
 std::vector<Sequence> drive(const Host& host, const Drive& how);
 
+/// An assignment for scenarios of the bicycle: effort is weighed without rates of inputs, and so without a state for
+/// the input applied last. That is the problem that other programs are given.
+inline const std::string without_rates =
+    "controller.weights={stage: {x_pos: 1, y_pos: 1, u1: 5, u2: 0.8}, terminal: {x_pos: 10, y_pos: 10}}";
+
 /// Drives over varying ground that need no data outside the source tree: full-horizon blocking, and structured blocking
 /// of one and of both parameters, on an easy path and on one with turns as tight as the steering allows.
 const std::vector<Drive>& usual_drives();

@@ -5,70 +5,82 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "interval_dynamics.hpp"
+#include "point_sums.hpp"
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/scratch.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 
 namespace rhec {
 
-/// Measurements of some intervals, each with its own integration up to its time; or of one interval that has many, with
-/// states interpolated between few points of it. Rows are those of IntervalRows and NodeRows.
+/// Measurements of some intervals, each with its own integration up to its time. Of an interval that has many, points,
+/// between which outputs are interpolated, stand in their place. Rows are those of IntervalRows and NodeRows.
 struct RheProblem::BetweenBatch {
   static constexpr int at_once = 32;  ///< so that the model fills the processor's lanes
-  static constexpr int most_points = 8;
-
-  /// Memory for some intervals as the model takes them, and what it says of them.
-  struct Intervals {
-    double *z, *next, *jacobians, *multipliers, *hessians, *durations, *data;
-  };
 
   BetweenBatch(const RheProblem& problem, double* memory)
       : row(IntervalDynamics::row_length(problem.structure())),
         nx(problem.nx()),
         nz(problem.nx() + problem.np() + problem.nu() + (problem.structure().any_ramp() ? problem.np() : 0)),
-        width(padded(nz)) {
+        ny(problem.ny_),
+        width(padded(nz)),
+        said_size(problem.output_row_ + static_cast<std::ptrdiff_t>(problem.ny_) * width),
+        point_count(static_cast<int>(problem.between_points_.size())) {
     Scratch scratch(memory);
-    const std::ptrdiff_t ny = problem.ny_, of_states = padded(nx), data_row = padded(problem.model().data_count());
-    const auto take = [&](std::ptrdiff_t intervals) -> Intervals {
-      const auto of_each = [&](std::ptrdiff_t each) { return scratch.take(intervals * each); };
-      return {of_each(row),       of_each(row), of_each(nx * row), of_each(row),
-              of_each(row * row), of_each(8),   of_each(data_row)};
-    };
-    own = take(at_once);
-    points = take(most_points);
-    outputs = scratch.take(at_once * problem.output_row_);
-    output_jacobians = scratch.take(at_once * ny * of_states);
-    pulls = scratch.take(at_once * problem.output_row_);
-    weights = scratch.take(at_once * problem.output_row_);
-    curvatures = scratch.take(at_once * problem.output_row_);
-    output_hessians = scratch.take(at_once * nx * of_states);
+    const std::ptrdiff_t of_states = padded(nx), data_row = padded(problem.model().data_count());
+    const auto take = [&](std::ptrdiff_t each) { return scratch.take(at_once * each); };
+    z = take(row);
+    next = take(row);
+    jacobians = take(static_cast<std::ptrdiff_t>(nx) * row);
+    multipliers = take(row);
+    hessians = take(static_cast<std::ptrdiff_t>(row) * row);
+    durations = take(8);
+    data = take(data_row);
+    outputs = take(problem.output_row_);
+    output_jacobians = take(ny * of_states);
+    pulls = take(problem.output_row_);
+    weights = take(problem.output_row_);
+    curvatures = take(problem.output_row_);
+    output_hessians = take(nx * of_states);
     difference = scratch.take(problem.output_row_);
-    of_outputs = scratch.take(ny * row);
-    gradients = scratch.take(std::max<std::ptrdiff_t>(ny, nx) * problem.stride());
+    predicted = scratch.take(problem.output_row_);
+    weight = scratch.take(problem.output_row_);
+    pull = scratch.take(problem.output_row_);
+    curvature = scratch.take(problem.output_row_);
+    of_outputs = scratch.take(static_cast<std::ptrdiff_t>(ny) * row);
+    gradients =
+        scratch.take(std::max({ny, nx, PointSums::most_points}) * static_cast<std::ptrdiff_t>(problem.stride()));
     product = scratch.take(static_cast<std::ptrdiff_t>(nx) * problem.stride());
+    said = scratch.take(PointSums::most_points * said_size);
+    parts = scratch.take(problem.setup_.most_between * padded(PointSums::most_points));
+    known_weights = scratch.take(problem.setup_.most_between * problem.output_row_);
+    factors = scratch.take(problem.between_factors_size());
+    sums = PointSums(point_count, ny, width, scratch.take(PointSums::size(ny, width)));
     rest = scratch.rest();
   }
   static std::size_t size(const RheProblem& problem) noexcept {
     const std::size_t row = IntervalDynamics::row_length(problem.structure()), nx = problem.nx(), ny = problem.ny_,
-                      of_states = padded(problem.nx()), stride = problem.stride();
+                      of_states = padded(problem.nx()), stride = problem.stride(), most = PointSums::most_points;
     const std::size_t interval = row * (3 + nx + row) + 8 + padded(problem.model().data_count());
     const std::size_t each = 4 * problem.output_row_ + (ny + nx) * of_states;
-    return (at_once + most_points) * interval + at_once * each + problem.output_row_ +
-           (std::max(ny, nx) + nx) * stride + ny * row + problem.model().rows_scratch(at_once) + 16;
+    return at_once * (interval + each) + 5 * problem.output_row_ + (std::max({ny, nx, most}) + nx) * stride + ny * row +
+           most * (problem.output_row_ + ny * row) + problem.between_factors_size() +
+           problem.setup_.most_between * (padded(PointSums::most_points) + problem.output_row_) +
+           PointSums::size(problem.ny_, static_cast<int>(row)) + problem.model().rows_scratch(at_once) + 16;
   }
 
-  /// Requests for so many intervals, and for the outputs at their ends, without results.
-  IntervalRows along(const RheProblem& problem, const Intervals& of, int intervals) const noexcept {
-    return {.count = intervals,
-            .z = of.z,
+  /// Requests for the intervals, and for the outputs at their ends, without results.
+  IntervalRows along(const RheProblem& problem) const noexcept {
+    return {.count = count,
+            .z = z,
             .z_step = row,
             .ramp = problem.structure().any_ramp(),
-            .durations = of.durations,
-            .data = of.data,
+            .durations = durations,
+            .data = data,
             .substeps = problem.substeps(),
-            .next_states = of.next,
+            .next_states = next,
             .next_step = row,
             .jacobian_step = static_cast<std::ptrdiff_t>(nx) * row,
             .jacobian_row = row,
@@ -76,21 +88,22 @@ struct RheProblem::BetweenBatch {
   }
   NodeRows there(const RheProblem& problem) const noexcept {
     return {.count = count,
-            .states = own.next,
+            .states = next,
             .state_step = row,
             .output_step = problem.output_row_,
             .jacobian_row = padded(nx),
             .scratch = rest};
   }
-  double* jacobian(const Intervals& of, int i) const noexcept {
-    return of.jacobians + static_cast<std::ptrdiff_t>(i) * nx * row;
+  double* jacobian(int i) const noexcept { return jacobians + static_cast<std::ptrdiff_t>(i) * nx * row; }
+  double* hessian(int i) const noexcept { return hessians + static_cast<std::ptrdiff_t>(i) * row * row; }
+  /// What the model says at entry i: a row of outputs, then one of `width` with the derivatives dh/dz of each output,
+  /// measured or not: one that is not may come later.
+  void write_said(int i, std::ptrdiff_t output_row, double* to) const noexcept {
+    std::copy_n(outputs + i * output_row, output_row, to);
+    write_gradients(i, to + output_row);
   }
-  double* hessian(const Intervals& of, int i) const noexcept {
-    return of.hessians + static_cast<std::ptrdiff_t>(i) * row * row;
-  }
-  /// dh/dz of measurement i: a row of `width` for each output, measured or not: one that is not may come later.
-  void write_gradients(int i, int ny, double* to) const noexcept {
-    const double* const J = jacobian(own, i);
+  void write_gradients(int i, double* to) const noexcept {
+    const double* const J = jacobian(i);
     const double* C = output_jacobians + static_cast<std::ptrdiff_t>(i) * ny * padded(nx);
     for (int j = 0; j < ny; ++j, C += padded(nx), to += width) {
       std::fill_n(to, width, 0.0);
@@ -100,16 +113,32 @@ struct RheProblem::BetweenBatch {
     }
   }
 
-  const int row, nx, nz, width;
+  const int row, nx, nz, ny, width;
+  const std::ptrdiff_t said_size;  ///< of what write_said writes
+  const int point_count;           ///< of an interval that has many measurements
   int count = 0;
-  int point_count = 0;  ///< of the one interval whose measurements these are; 0: each is integrated by itself
-  std::array<int, at_once> interval{}, place{};
+  std::array<int, at_once> interval{};
+  std::array<int, at_once> place{};  ///< of the measurement in its interval, or of the point
+  std::array<std::uint8_t, at_once> is_point{};
   std::array<double, at_once> share{};  ///< of the interval's duration
-  /// By measurement, the shares of the interval's begin and of its points in the state there.
-  std::array<double, at_once*(most_points + 1)> parts{};
-  Intervals own{}, points{};
-  double *outputs, *output_jacobians, *pulls, *weights, *curvatures, *output_hessians, *difference, *of_outputs,
-      *gradients, *product, *rest;
+  double *z, *next, *jacobians, *multipliers, *hessians, *durations, *data;
+  double *outputs, *output_jacobians, *pulls, *weights, *curvatures, *output_hessians, *difference, *predicted, *weight,
+      *pull, *curvature, *of_outputs, *gradients, *product;
+  double *said, *parts, *known_weights, *factors;  ///< room for one interval with points: see OfPoints
+  PointSums sums;
+  double* rest;
+};
+
+/// What is known of an interval with points: what the model says at each (BetweenBatch::write_said), the measurements'
+/// parts of the points and their weights, and the factors of the sums of these (PointSums).
+struct RheProblem::OfPoints {
+  const double* said;
+  std::ptrdiff_t said_step;
+  const double* parts;
+  std::ptrdiff_t parts_step;
+  double* weights;  ///< for which there are factors
+  std::ptrdiff_t weights_step;
+  double* factors;  ///< by output
 };
 
 }  // namespace rhec

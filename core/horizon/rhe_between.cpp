@@ -9,34 +9,40 @@
 #include "rhec/core/kernels/transcription_kernels.hpp"
 
 namespace rhec {
+namespace {
+
+constexpr double no_factors = -1.0;  // the weight of measurements whose sums have no factors yet
+
+}  // namespace
+
 bool RheProblem::has_between() const noexcept {
   if (setup_.most_between == 0) return false;
   return std::any_of(between_.begin(), between_.begin() + intervals(),
                      [](const BetweenNodes& each) { return each.count() > 0; });
 }
 
+/// Whether an interval has so many measurements that points take their place.
+bool RheProblem::has_many(int interval) const noexcept {
+  return between(interval).count() >= static_cast<int>(between_points_.size());
+}
+
 std::size_t RheProblem::between_scratch_size() const noexcept {
   return setup_.most_between > 0 ? BetweenBatch::size(*this) : 0;
 }
 
-/// Puts the measurements of an interval into a batch, and calls `flush` when it is full. Those of an interval with many
-/// are evaluated by themselves.
+/// Puts the measurements of an interval into a batch, or its points if there are more measurements than these, and
+/// calls `flush` when it is full.
 template <class Flush>
-void RheProblem::gather_interval(int interval, const Iterate& iterate, BetweenBatch& batch, bool with_gradients,
+void RheProblem::gather_interval(int interval, const Iterate& iterate, BetweenBatch& batch,
                                  const Flush& flush) const noexcept {
-  const int count = between(interval).count();
-  const bool has_many = count >= static_cast<int>(between_points_.size());
-  if (has_many) {
-    flush();
-    integrate_points(interval, iterate, batch, with_gradients);
-  }
-  for (int k = 0; k < count; ++k) {
-    gather_between(interval, k, iterate, batch);
+  const bool with_points = has_many(interval);
+  const int entries = with_points ? batch.point_count : between(interval).count();
+  if (with_points && batch.count + entries > BetweenBatch::at_once) flush();
+  for (int k = 0; k < entries; ++k) {
+    const double share = with_points ? between_points_[k] : between(interval).time(k) / duration(interval);
+    gather_entry(interval, k, with_points, share, iterate, batch);
     if (batch.count == BetweenBatch::at_once) flush();
   }
-  if (!has_many) return;
-  flush();
-  batch.point_count = 0;
 }
 
 /// Adds the costs of the measurements between the nodes of a range: to `stage_costs`, and to H and h of the view, where
@@ -49,34 +55,54 @@ double RheProblem::add_between(StageRange range, const Iterate& iterate, Hessian
     if (batch.count > 0) total += add_batch(batch, hessian, view, stage_costs);
     batch.count = 0;
   };
-  for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i)
-    gather_interval(i, iterate, batch, view != nullptr, flush);
+  for (int i = range.first; i <= std::min(range.last, intervals() - 1); ++i) gather_interval(i, iterate, batch, flush);
   flush();
   return total;
+}
+
+/// `count` entries of what the model says at the points of an interval (BetweenBatch::write_said, at `from` in it), at
+/// a measurement with these parts.
+void RheProblem::combine(const BetweenBatch& batch, const double* parts, const double* said, std::ptrdiff_t step,
+                         std::ptrdiff_t count, double* to) const noexcept {
+  std::fill_n(to, count, 0.0);
+  for (int k = 0; k < batch.point_count; ++k, said += step)
+    for (std::ptrdiff_t e = 0; e < count; ++e) to[e] += parts[k] * said[e];
 }
 
 void RheProblem::linearise_between(int interval, const Iterate& iterate, double* weights, double* rows,
                                    std::span<double> scratch) const noexcept {
   BetweenBatch batch(*this, scratch.data());
-  const bool with_gradients = rows != nullptr;
+  const auto take = [&](int k, const double* gradients) {
+    residual(between(interval).outputs(k), batch.predicted, batch.difference);
+    losses(batch.difference, batch.weight, nullptr);
+    std::copy_n(batch.weight, ny_, weights + static_cast<std::ptrdiff_t>(k) * ny_);
+    for (int j = 0; rows && j < ny_; ++j) {
+      *rows++ = batch.difference[j];
+      rows = std::copy_n(gradients + j * batch.width, batch.nz, rows);
+    }
+  };
   const auto flush = [&] {
     if (batch.count == 0) return;
-    evaluate_batch(batch, with_gradients);
-    for (int i = 0; i < batch.count; ++i) {
-      const double* const measured = between(interval).outputs(batch.place[i]);
-      residual(measured, batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_, batch.difference);
-      losses(batch.difference, batch.weights, nullptr);
-      std::copy_n(batch.weights, ny_, weights + static_cast<std::ptrdiff_t>(batch.place[i]) * ny_);
-      if (!rows) continue;
-      batch.write_gradients(i, ny_, batch.of_outputs);
-      for (int j = 0; j < ny_; ++j) {
-        *rows++ = batch.difference[j];
-        rows = std::copy_n(batch.of_outputs + j * batch.width, batch.nz, rows);
+    evaluate_batch(batch, true);
+    for (int i = 0; i < batch.count && !batch.is_point[i]; ++i) {
+      std::copy_n(batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_, output_row_, batch.predicted);
+      batch.write_gradients(i, batch.of_outputs);
+      take(batch.place[i], batch.of_outputs);
+    }
+    if (batch.is_point[0]) {
+      write_points(batch, 0);
+      for (int k = 0; k < between(interval).count(); ++k) {
+        double parts[padded(PointSums::most_points)];
+        write_parts(interval, k, parts);
+        combine(batch, parts, batch.said, batch.said_size, output_row_, batch.predicted);
+        combine(batch, parts, batch.said + output_row_, batch.said_size, batch.said_size - output_row_,
+                batch.of_outputs);
+        take(k, batch.of_outputs);
       }
     }
     batch.count = 0;
   };
-  gather_interval(interval, iterate, batch, with_gradients, flush);
+  gather_interval(interval, iterate, batch, flush);
   flush();
 }
 
@@ -96,6 +122,13 @@ std::ptrdiff_t RheProblem::between_key_size() const noexcept {
   return IntervalDynamics::row_length(structure()) + 1 + model().data_count();
 }
 
+/// Of a measurement in a BetweenCache: what the model says there or at a point, its parts of points, and its weights.
+std::ptrdiff_t RheProblem::between_said_size() const noexcept {
+  return 2 * output_row_ + static_cast<std::ptrdiff_t>(ny_) * stride() + padded(PointSums::most_points);
+}
+
+std::ptrdiff_t RheProblem::between_factors_size() const noexcept { return ny_ * PointSums::Factors::size; }
+
 /// The same as `add_between` without second derivatives, with a cache, which is read and completed.
 double RheProblem::add_known_between(StageRange range, const Iterate& iterate, const CostView& view,
                                      BetweenCache& known, double* memory) const noexcept {
@@ -103,14 +136,13 @@ double RheProblem::add_known_between(StageRange range, const Iterate& iterate, c
   const auto flush = [&] {
     if (batch.count == 0) return;
     evaluate_batch(batch, true);
-    for (int i = 0; i < batch.count; ++i) {
-      double* const results = known.results(batch.interval[i], batch.place[i]);
-      std::copy_n(batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_, output_row_, results);
-      batch.write_gradients(i, ny_, results + output_row_);
-    }
+    for (int i = 0; i < batch.count; ++i)
+      batch.write_said(i, output_row_, known.results(batch.interval[i], batch.place[i]));
     batch.count = 0;
   };
   const int last = std::min(range.last, intervals() - 1);
+  const std::ptrdiff_t step = between_said_size(), at_weights = step - output_row_,
+                       at_parts = at_weights - padded(PointSums::most_points);
   const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
   for (int i = range.first; i <= last; ++i) {
     if (between(i).count() == 0) continue;
@@ -119,17 +151,86 @@ double RheProblem::add_known_between(StageRange range, const Iterate& iterate, c
     key[batch.row] = duration(i);
     std::copy_n(interval_data(i), model().data_count(), key + batch.row + 1);
     if (known.holds(i, between(i))) continue;
+    const bool has_parts = known.has_times(i, between(i));
     known.begin(i, between(i));
-    gather_interval(i, iterate, batch, true, flush);
+    gather_interval(i, iterate, batch, flush);
+    for (int k = 0; has_many(i) && !has_parts && k < between(i).count(); ++k) {
+      write_parts(i, k, known.results(i, k) + at_parts);
+      std::fill_n(known.results(i, k) + at_weights, ny_, no_factors);
+    }
   }
   flush();
   double total = 0.0;
   for (int i = range.first; i <= last; ++i) {
+    if (has_many(i)) {
+      double* const said = known.results(i, 0);
+      const OfPoints points{.said = said,
+                            .said_step = step,
+                            .parts = said + at_parts,
+                            .parts_step = step,
+                            .weights = said + at_weights,
+                            .weights_step = step,
+                            .factors = known.results_together(i)};
+      total += add_points(batch, i, points, &view);
+      continue;
+    }
     for (int k = 0; k < between(i).count(); ++k) {
       const double* const results = known.results(i, k);
-      total += weigh(between(i).outputs(k), results, batch.difference, batch.weights, batch.pulls, nullptr);
-      add_row(batch, i, results + output_row_, batch.weights, batch.pulls, view);
+      total += weigh(between(i).outputs(k), results, batch.difference, batch.weight, batch.pull, nullptr);
+      add_rows(batch, i, results + output_row_, ny_, batch.weight, batch.pull, view);
     }
+  }
+  return total;
+}
+
+/// What the model says at the points of an interval, the first of which is entry i.
+void RheProblem::write_points(const BetweenBatch& batch, int i) const noexcept {
+  for (int k = 0; k < batch.point_count; ++k) batch.write_said(i + k, output_row_, batch.said + k * batch.said_size);
+}
+
+void RheProblem::write_parts(int interval, int place, double* parts) const noexcept {
+  PointSums::write_parts(between_points_.data(), static_cast<int>(between_points_.size()),
+                         between(interval).time(place) / duration(interval), parts);
+}
+
+/// Factors for the weights of an interval's measurements. Without robust losses, and as long as nothing new is
+/// measured, these are the ones that they had before.
+void RheProblem::find_weights(BetweenBatch& batch, int interval, const OfPoints& points) const noexcept {
+  const int count = between(interval).count();
+  batch.sums.begin_weights();
+  for (int m = 0; m < count; ++m)
+    batch.sums.add_weights(points.parts + m * points.parts_step, points.weights + m * points.weights_step);
+  for (int j = 0; j < ny_; ++j) batch.sums.factor(j, PointSums::Factors(points.factors + j * PointSums::Factors::size));
+}
+
+/// The costs of the measurements of an interval that has points.
+double RheProblem::add_points(BetweenBatch& batch, int interval, const OfPoints& points,
+                              const CostView* view) const noexcept {
+  batch.sums.begin(points.said, points.said_step);
+  double total = 0.0;
+  bool has_new_weights = false;
+  const BetweenNodes& measured = between(interval);
+  for (int m = 0; m < measured.count(); ++m) {
+    const double* const parts = points.parts + m * points.parts_step;
+    batch.sums.predict(parts, batch.predicted);
+    total += weigh(measured.outputs(m), batch.predicted, batch.difference, batch.weight, batch.pull, nullptr);
+    if (view) batch.sums.add_pulls(parts, batch.pull);
+    if (!view || !view->H) continue;
+    double* const known = points.weights + m * points.weights_step;
+    has_new_weights |= !std::equal(known, known + ny_, batch.weight);
+    std::copy_n(batch.weight, ny_, known);
+  }
+  if (!view) return total;
+  if (has_new_weights) find_weights(batch, interval, points);
+  for (int j = 0; j < ny_; ++j) {
+    const PointSums::Factors factors(points.factors + j * PointSums::Factors::size);
+    const auto are_zero = [&](const double* values) {
+      return std::all_of(values, values + batch.point_count, [](double value) { return value == 0.0; });
+    };
+    if (are_zero(batch.sums.pulls(j)) && (!view->H || are_zero(factors.pivots()))) continue;
+    const double* const gradients = points.said + output_row_ + static_cast<std::ptrdiff_t>(j) * batch.width;
+    const PointSums::Rows all = batch.sums.rows(j, gradients, points.said_step, view->H ? &factors : nullptr);
+    add_rows(batch, interval, all.rows, batch.point_count, all.weights, all.pulls, *view);
   }
   return total;
 }
@@ -139,101 +240,139 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
   const std::ptrdiff_t row = batch.row, width = padded(nx());
   evaluate_batch(batch, view != nullptr);
   double total = 0.0;
-  for (int i = 0; i < batch.count; ++i) {
+  for (int i = 0; i < batch.count; i += batch.is_point[i] ? batch.point_count : 1) {
+    const int interval = batch.interval[i];
     const std::ptrdiff_t at = i * output_row_;
-    const double cost = weigh(between(batch.interval[i]).outputs(batch.place[i]), batch.outputs + at, batch.difference,
-                              batch.weights + at, batch.pulls + at, batch.curvatures + at);
+    double cost;
+    if (batch.is_point[i]) {
+      if (view) write_points(batch, i);
+      const OfPoints points{.said = view ? batch.said : batch.outputs + at,
+                            .said_step = view ? batch.said_size : output_row_,
+                            .parts = batch.parts,
+                            .parts_step = padded(PointSums::most_points),
+                            .weights = batch.known_weights,
+                            .weights_step = output_row_,
+                            .factors = batch.factors};
+      for (int m = 0; m < between(interval).count(); ++m) {
+        write_parts(interval, m, batch.parts + m * points.parts_step);
+        std::fill_n(batch.known_weights + m * points.weights_step, ny_, no_factors);
+      }
+      cost = add_points(batch, interval, points, view);
+      for (int k = 0; k < batch.point_count; ++k)
+        for (int j = 0; j < ny_; ++j) batch.pulls[at + k * output_row_ + j] = batch.sums.pulls(j)[k];
+    } else {
+      cost = weigh(between(interval).outputs(batch.place[i]), batch.outputs + at, batch.difference, batch.weights + at,
+                   batch.pulls + at, batch.curvatures + at);
+      if (view) {
+        batch.write_gradients(i, batch.of_outputs);
+        add_rows(batch, interval, batch.of_outputs, ny_, batch.weights + at, batch.pulls + at, *view);
+      }
+    }
     total += cost;
-    if (stage_costs) stage_costs[batch.interval[i]] += cost;
+    if (stage_costs) stage_costs[interval] += cost;
   }
-  if (!view) return total;
-  const bool exact = hessian == Hessian::exact && view->H;
-  if (exact) {
-    std::fill_n(batch.own.multipliers, batch.count * row, 0.0);
-    std::fill_n(batch.output_hessians, batch.count * nx() * width, 0.0);
-    for (int i = 0; i < batch.count; ++i)
-      for (int j = 0; j < ny_; ++j)
-        for (int r = 0; r < nx(); ++r)
-          batch.own.multipliers[i * row + r] +=
-              batch.pulls[i * output_row_ + j] * batch.output_jacobians[(i * ny_ + j) * width + r];
-    NodeRows there = batch.there(*this);
-    there.multipliers = batch.pulls;
-    there.multiplier_step = output_row_;
-    there.hessians = batch.output_hessians;
-    there.hessian_step = nx() * width;
-    there.hessian_row = width;
-    model().observe_rows(there);
-    add_curvature_of_dynamics(batch, *view);
-  }
-  for (int i = 0; i < batch.count; ++i) {
-    batch.write_gradients(i, ny_, batch.of_outputs);
-    const std::ptrdiff_t at = i * output_row_;
-    add_row(batch, batch.interval[i], batch.of_outputs, batch.weights + at, batch.pulls + at, *view);
-    if (exact) add_curvature(batch, i, *view);
-  }
+  if (!view || hessian != Hessian::exact || !view->H) return total;
+  // What Gauss-Newton leaves out.
+  std::fill_n(batch.multipliers, batch.count * row, 0.0);
+  std::fill_n(batch.output_hessians, batch.count * nx() * width, 0.0);
+  for (int i = 0; i < batch.count; ++i)
+    for (int j = 0; j < ny_; ++j)
+      for (int r = 0; r < nx(); ++r)
+        batch.multipliers[i * row + r] +=
+            batch.pulls[i * output_row_ + j] * batch.output_jacobians[(i * ny_ + j) * width + r];
+  NodeRows there = batch.there(*this);
+  there.multipliers = batch.pulls;
+  there.multiplier_step = output_row_;
+  there.hessians = batch.output_hessians;
+  there.hessian_step = nx() * width;
+  there.hessian_row = width;
+  model().observe_rows(there);
+  add_curvature_of_dynamics(batch, *view);
+  for (int i = 0; i < batch.count; ++i) add_curvature_between(batch, i, *view);
+  if (!setup_.robust.empty()) add_curvature_of_losses(batch, *view);
   return total;
 }
 
-/// Adds one measurement's products to H and h, with its gradients by the model's variables in the order of the stage's.
-void RheProblem::add_row(BetweenBatch& batch, int interval, const double* gradients, const double* weights,
-                         const double* pulls, const CostView& view) const noexcept {
+/// Adds products of rows to H and h: gradients by the model's variables, in the order of the stage's. `weights` may be
+/// null if H is.
+void RheProblem::add_rows(BetweenBatch& batch, int interval, const double* rows, int count, const double* weights,
+                          const double* pulls, const CostView& view) const noexcept {
   const int columns = capacity().states + control_count(interval);
   // Where no block starts, the orders are the same.
   if (control_count(interval) != nu() || structure().any_ramp()) {
     const std::ptrdiff_t width = padded(columns);
     const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
-    std::fill_n(batch.gradients, ny_ * width, 0.0);
+    std::fill_n(batch.gradients, count * width, 0.0);
     for (int z = 0; z < batch.nz; ++z) {
       double* const to = batch.gradients + dynamics.column_of(interval, z);
-      for (int j = 0; j < ny_; ++j) to[j * width] += gradients[j * batch.width + z];
+      for (int j = 0; j < count; ++j) to[j * width] += rows[j * batch.width + z];
     }
-    gradients = batch.gradients;
+    rows = batch.gradients;
   }
-  const double* const end = weights + ny_;
-  const auto is_missing = [](double weight) { return weight == 0.0; };
-  const auto first = std::find_if_not(weights, end, is_missing) - weights;
-  if (first == ny_) return;
-  auto last = std::ptrdiff_t{ny_} - 1;
-  while (is_missing(weights[last])) --last;
-  transcription_kernels().add_products(gradients + first * padded(columns), weights + first, pulls + first,
-                                       static_cast<int>(last - first + 1), columns, stride(), H_of(view, interval),
-                                       h_of(view, interval));
+  // The first and the last rows that count.
+  int first = 0;
+  while (first < count && pulls[first] == 0.0 && (!weights || weights[first] == 0.0)) ++first;
+  if (first == count) return;
+  while (pulls[count - 1] == 0.0 && (!weights || weights[count - 1] == 0.0)) --count;
+  transcription_kernels().add_products(rows + static_cast<std::ptrdiff_t>(first) * padded(columns),
+                                       weights ? weights + first : nullptr, pulls + first, count - first, columns,
+                                       stride(), H_of(view, interval), h_of(view, interval));
 }
 
-/// What Gauss-Newton leaves out: second derivatives of outputs and of robust losses.
-void RheProblem::add_curvature(BetweenBatch& batch, int i, const CostView& view) const noexcept {
+/// Second derivatives of robust losses: 4 rho'' (J' W r)(J' W r)' for each measurement.
+void RheProblem::add_curvature_of_losses(BetweenBatch& batch, const CostView& view) const noexcept {
+  const auto add = [&](int interval, const double* measured, const double* gradients) {
+    const int columns = capacity().states + control_count(interval);
+    const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
+    weigh(measured, batch.predicted, batch.difference, batch.weight, batch.pull, batch.curvature);
+    double* const H = H_of(view, interval);
+    for (const RobustLoss& loss : setup_.robust) {
+      std::fill_n(batch.product, padded(columns), 0.0);
+      for (const int j : loss.outputs)
+        for (int z = 0; z < batch.nz; ++z)
+          batch.product[dynamics.column_of(interval, z)] +=
+              gradients[j * batch.width + z] * setup_.output_weights[j] * batch.difference[j];
+      const double scale = 4.0 * batch.curvature[loss.outputs.front()];
+      for (int c = 0; c < columns; ++c)
+        for (int r = 0; r < columns; ++r) H[c * stride() + r] += scale * batch.product[r] * batch.product[c];
+    }
+  };
+  for (int i = 0; i < batch.count; i += batch.is_point[i] ? batch.point_count : 1) {
+    const BetweenNodes& measured = between(batch.interval[i]);
+    if (!batch.is_point[i]) {
+      batch.write_gradients(i, batch.of_outputs);
+      std::copy_n(batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_, output_row_, batch.predicted);
+      add(batch.interval[i], measured.outputs(batch.place[i]), batch.of_outputs);
+      continue;
+    }
+    write_points(batch, i);
+    for (int m = 0; m < measured.count(); ++m) {
+      double parts[padded(PointSums::most_points)];
+      write_parts(batch.interval[i], m, parts);
+      combine(batch, parts, batch.said, batch.said_size, output_row_, batch.predicted);
+      combine(batch, parts, batch.said + output_row_, batch.said_size, batch.said_size - output_row_, batch.of_outputs);
+      add(batch.interval[i], measured.outputs(m), batch.of_outputs);
+    }
+  }
+}
+
+/// Second derivatives of outputs by the states: dF/dz' (sum of multipliers times d2h/dx2) dF/dz.
+void RheProblem::add_curvature_between(BetweenBatch& batch, int i, const CostView& view) const noexcept {
   const int interval = batch.interval[i], columns = capacity().states + control_count(interval);
   const std::ptrdiff_t width = padded(columns), row = batch.row;
   double* const H = H_of(view, interval);
   const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
-  const auto column = [&](int z) { return dynamics.column_of(interval, z); };
-  const auto add = [&](const double* left, const double* right, double scale) {
-    for (int c = 0; c < columns; ++c)
-      for (int r = 0; r < columns; ++r) H[c * stride() + r] += scale * left[r] * right[c];
-  };
-  const double* difference = batch.outputs + static_cast<std::ptrdiff_t>(i) * output_row_;
-  residual(between(interval).outputs(batch.place[i]), difference, batch.difference);
-  for (const RobustLoss& loss : setup_.robust) {
-    // 4 rho'' (J' W r)(J' W r)'
-    std::fill_n(batch.product, width, 0.0);
-    for (const int j : loss.outputs)
-      for (int z = 0; z < batch.nz; ++z)
-        batch.product[column(z)] +=
-            batch.of_outputs[j * batch.width + z] * setup_.output_weights[j] * batch.difference[j];
-    add(batch.product, batch.product,
-        4.0 * batch.curvatures[static_cast<std::ptrdiff_t>(i) * output_row_ + loss.outputs.front()]);
-  }
-  // dF/dz' (sum of multipliers times d2h/dx2) dF/dz
-  const double* const J = batch.jacobian(batch.own, i);
+  const double* const J = batch.jacobian(i);
   const double* const X = batch.output_hessians + static_cast<std::ptrdiff_t>(i) * nx() * padded(nx());
   std::fill_n(batch.gradients, nx() * width, 0.0);
   for (int r = 0; r < nx(); ++r)
-    for (int z = 0; z < batch.nz; ++z) batch.gradients[r * width + column(z)] += J[r * row + z];
+    for (int z = 0; z < batch.nz; ++z) batch.gradients[r * width + dynamics.column_of(interval, z)] += J[r * row + z];
   for (int r = 0; r < nx(); ++r) {
     std::fill_n(batch.product, width, 0.0);
     for (int k = 0; k < nx(); ++k)
       for (int c = 0; c < columns; ++c) batch.product[c] += X[r * padded(nx()) + k] * batch.gradients[k * width + c];
-    add(batch.gradients + r * width, batch.product, 1.0);
+    for (int c = 0; c < columns; ++c)
+      for (int l = 0; l < columns; ++l) H[c * stride() + l] += batch.gradients[r * width + l] * batch.product[c];
   }
 }
 

@@ -76,10 +76,13 @@ TEST(Comparison, AWorsePointIsSeenAsWorse) {
     // It says "solved": the core's residual does not.
     EXPECT_EQ(toy.statuses.at("solved"), std::ssize(same.problems));
     EXPECT_THAT(numbers(toy, &Answer::kkt), Each(Ge(1e-6)));
-    for (std::size_t p = 0; p < same.problems.size(); ++p)
-      EXPECT_NEAR(toy.answers[p].gap,
-                  (toy.answers[p].objective - good.answers[p].objective) / std::max(1.0, good.answers[p].objective),
-                  1e-6);
+    for (std::size_t p = 0; p < same.problems.size(); ++p) {
+      const double above =
+          (toy.answers[p].objective - good.answers[p].objective) / std::max(1.0, good.answers[p].objective);
+      // The toy's plan may leave the bounds of a state a little, which is charged.
+      EXPECT_GE(toy.answers[p].gap, above - 1e-6);
+      EXPECT_LE(toy.answers[p].gap, above + 1e-6 + 1e-4 * above);
+    }
   }
 }
 

@@ -148,27 +148,36 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   std::size_t between_scratch_size() const noexcept;
   double add_between(StageRange range, const Iterate& iterate, Hessian hessian, const CostView* view,
                      double* stage_costs, double* memory) const noexcept;
-  void gather_between(int interval, int place, const Iterate& iterate, BetweenBatch& batch) const noexcept;
-  void evaluate_batch(BetweenBatch& batch, bool with_gradients) const noexcept;
-  double add_batch(BetweenBatch& batch, Hessian hessian, const CostView* view, double* stage_costs) const noexcept;
+  bool has_many(int interval) const noexcept;
   std::vector<double> points_of_interval() const;
   template <class Flush>
-  void gather_interval(int interval, const Iterate& iterate, BetweenBatch& batch, bool with_gradients,
-                       const Flush& flush) const noexcept;
+  void gather_interval(int interval, const Iterate& iterate, BetweenBatch& batch, const Flush& flush) const noexcept;
+  void gather_entry(int interval, int place, bool is_point, double share, const Iterate& iterate,
+                    BetweenBatch& batch) const noexcept;
   void write_part(int interval, double share, const Iterate& iterate, const BetweenBatch& batch, double* z,
                   double* data) const noexcept;
-  void integrate_points(int interval, const Iterate& iterate, BetweenBatch& batch, bool with_gradients) const noexcept;
-  void interpolate(BetweenBatch& batch, bool with_gradients) const noexcept;
   void turn_ramp(const BetweenBatch& batch, double share, double* J, double* H) const noexcept;
+  void evaluate_batch(BetweenBatch& batch, bool with_gradients) const noexcept;
+  double add_batch(BetweenBatch& batch, Hessian hessian, const CostView* view, double* stage_costs) const noexcept;
+  void write_points(const BetweenBatch& batch, int i) const noexcept;
+  void write_parts(int interval, int place, double* parts) const noexcept;
+  void combine(const BetweenBatch& batch, const double* parts, const double* said, std::ptrdiff_t step,
+               std::ptrdiff_t count, double* to) const noexcept;
+  struct OfPoints;
+  double add_points(BetweenBatch& batch, int interval, const OfPoints& points, const CostView* view) const noexcept;
+  void find_weights(BetweenBatch& batch, int interval, const OfPoints& points) const noexcept;
+  void add_rows(BetweenBatch& batch, int interval, const double* rows, int count, const double* weights,
+                const double* pulls, const CostView& view) const noexcept;
   void add_curvature_of_dynamics(BetweenBatch& batch, const CostView& view) const noexcept;
-  void add_row(BetweenBatch& batch, int interval, const double* gradients, const double* weights, const double* pulls,
-               const CostView& view) const noexcept;
+  void add_curvature_between(BetweenBatch& batch, int i, const CostView& view) const noexcept;
+  void add_curvature_of_losses(BetweenBatch& batch, const CostView& view) const noexcept;
   double weigh(const double* measured, const double* predicted, double* difference, double* weights, double* pulls,
                double* curvatures) const noexcept;
   std::ptrdiff_t between_key_size() const noexcept;
+  std::ptrdiff_t between_said_size() const noexcept;
+  std::ptrdiff_t between_factors_size() const noexcept;
   double add_known_between(StageRange range, const Iterate& iterate, const CostView& view, BetweenCache& known,
                            double* memory) const noexcept;
-  void add_curvature(BetweenBatch& batch, int i, const CostView& view) const noexcept;
   double* H_of(const CostView& view, int stage) const noexcept;
   double* h_of(const CostView& view, int stage) const noexcept;
   double inputs(int interval, const Iterate& iterate, double* H, double* h) const noexcept;
@@ -186,7 +195,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   std::vector<int> robust_group_;                 ///< per output, or -1
   AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
   std::vector<BetweenNodes> between_;             ///< by interval
-  std::vector<double> between_points_;            ///< shares of an interval, 0 first: see rhe_between_states.cpp
+  std::vector<double> between_points_;            ///< shares of an interval (PointSums)
   AlignedDoubles outputs_;                        ///< one row per node, NaN where nothing was measured
   AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period of angles, else 0
   AlignedDoubles measured_inputs_, input_weights_;  ///< rows as in Iterate; NaN and 0 outside of the inputs
