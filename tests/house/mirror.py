@@ -29,6 +29,7 @@ SUITES = {
     "reference": "recorded solutions",
     "report": "the page of reports, in a browser",
     "reproduction": "scripts/reproduce",
+    "ros2": "the package for colcon",
     "solvers/conformance": "every solver on every problem",
     "support": "what tests share",
     "threads": "what is promised to programs with several threads",
