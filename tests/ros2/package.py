@@ -113,10 +113,19 @@ def manifest(findings, python):
     findings.expect(text.split() == ["rhec_ros", version, "ament_cmake", "3"], "what the manifest says", text)
 
 
+def linked(work):
+    """The package as a link in a workspace, as docs/live.md has it."""
+    link = work / "src" / "rhec_ros"
+    if not link.is_symlink():
+        link.parent.mkdir(parents=True)
+        link.symlink_to(PACKAGE)
+    return link
+
+
 def build(findings, rhec, python, work):
     """As in a workspace; `ros2 run` looks for lib/<package>/<executable>."""
     environment = dict(cli.CLEAN, PATH=f"{python.parent}:{os.environ['PATH']}")
-    text = run(findings, "colcon build", python.parent / "colcon", "--log-base", work / "log", "build", "--paths", PACKAGE, "--build-base", work / "build",
+    text = run(findings, "colcon build", python.parent / "colcon", "--log-base", work / "log", "build", "--paths", linked(work), "--build-base", work / "build",
                "--install-base", work / "install", "--event-handlers", "console_direct+", "--cmake-args", f"-DRHEC_PROGRAM={rhec.path}", f"-DPython3_EXECUTABLE={DEBIANS_PYTHON}",
                env=environment)
     findings.expect(f"uses {rhec.path}" in text, "an installed rhec is used", text)
@@ -134,7 +143,7 @@ def build(findings, rhec, python, work):
 
 def configure_with_sources(findings, cmake, work):
     """Without an installed rhec: its sources become part of the package."""
-    text = run(findings, "configured with the sources", cmake, "-S", PACKAGE, "-B", work / "sources", "-DRHEC_PROGRAM=", f"-DPython3_EXECUTABLE={DEBIANS_PYTHON}", "-DRHEC_MODEL_INSTRUCTION_SETS=generic",
+    text = run(findings, "configured with the sources", cmake, "-S", linked(work), "-B", work / "sources", "-DRHEC_PROGRAM=", f"-DPython3_EXECUTABLE={DEBIANS_PYTHON}", "-DRHEC_MODEL_INSTRUCTION_SETS=generic",
                "-DCMAKE_INSTALL_PREFIX=" + str(work / "prefix"), env=cli.CLEAN)
     findings.expect("builds rhec from the sources" in text, "rhec's sources", text)
     targets = run(findings, "what would be built", cmake, "--build", work / "sources", "--target", "help", env=cli.CLEAN)

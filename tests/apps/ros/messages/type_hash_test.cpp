@@ -16,7 +16,8 @@ class TypeHash : public testing::TestWithParam<Published> {};
 
 TEST_P(TypeHash, IsTheOneThatOthersPublish) { EXPECT_EQ(hash_of(GetParam().type), GetParam().hash); }
 
-// What ROS 2 Jazzy publishes beside its interfaces (.json): a text, nested types, arrays, sequences, a type without fields.
+// What ROS 2 Jazzy publishes beside its interfaces (.json): a text, nested types, arrays, sequences, a type without
+// fields.
 INSTANTIATE_TEST_SUITE_P(
     OfRos, TypeHash,
     testing::Values(
@@ -39,10 +40,11 @@ INSTANTIATE_TEST_SUITE_P(
         Published{"sensor_msgs/msg/Imu", "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"},
         Published{"sensor_msgs/msg/NavSatFix",
                   "RIHS01_62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"},
-        Published{"tf2_msgs/msg/TFMessage", "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"}));
+        Published{"tf2_msgs/msg/TFMessage",
+                  "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"}));
 
-// Constants of programs that speak with nodes of ROS 2 Jazzy over Zenoh, whose keys contain them, in public repositories. Of
-// ObstacleArrayMsg nobody publishes one; all others that are heard or sent are among these.
+// Constants of programs that speak with nodes of ROS 2 Jazzy over Zenoh, whose keys contain them, in public
+// repositories. Of ObstacleArrayMsg nobody publishes one; all others that are heard or sent are among these.
 INSTANTIATE_TEST_SUITE_P(
     OfZenoh, TypeHash,
     testing::Values(
