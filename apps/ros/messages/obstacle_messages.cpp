@@ -19,6 +19,8 @@ using logs::Kind;
 
 // What moves faster, or is larger, is no obstacle on the ground but a mistake [m/s], [m].
 constexpr double fastest = 1000.0, largest = 1e6;
+// What is thinner states no width [m].
+constexpr double thinnest = 1e-3;
 
 double read_bounded(CdrCursor& cursor, double least, double most, const char* what) {
   const double value = cursor.number(Kind::f64);
@@ -106,7 +108,8 @@ SeenObstacles read_obstacle_array(std::span<const std::byte> message, double rad
     cursor.skip_numbers(Kind::i64, 1);  // its id
     cursor.skip_numbers(Kind::f64, numbers_of_rotation);
     Obstacle obstacle = ellipse_around(outline, own_radius);
-    if (obstacle.semi_axis_across == 0.0) obstacle = ellipse_around(outline, radius);
+    if (std::min(obstacle.semi_axis_along, obstacle.semi_axis_across) < thinnest)
+      obstacle = ellipse_around(outline, radius);
     obstacle.velocity_x = read_bounded(cursor, -fastest, fastest, "velocity");
     obstacle.velocity_y = read_bounded(cursor, -fastest, fastest, "velocity");
     cursor.skip_numbers(Kind::f64, 4 + numbers_of_covariance);  // upwards, and turning

@@ -21,8 +21,8 @@ struct SeenObstacles {
 SeenObstacles read_obstacle_poses(std::span<const std::byte> message, double radius);
 
 /// A costmap_converter_msgs/ObstacleArrayMsg: points, lines and polygons, each with a radius around it and a velocity.
-/// A point becomes the circle of its radius, or of `radius` [m] where it has none; another outline an ellipse around
-/// the smallest rectangle that it fits into.
+/// A point becomes the circle of its radius, another outline an ellipse around the smallest rectangle that it fits
+/// into. What has less than a millimetre in one direction gets `radius` [m] around it.
 SeenObstacles read_obstacle_array(std::span<const std::byte> message, double radius);
 
 /// The ellipse of the least area around the smallest rectangle around an outline, which has a corner at least, and what

@@ -99,8 +99,11 @@ TEST(ObstacleMessages, EllipsesAreAsSlenderAsWhatTheyAreAround) {
 }
 
 TEST(ObstacleMessages, LinesWithoutAWidthGetTheUsualOne) {
-  const SeenObstacles seen = read_obstacle_array(array_of({{.outline = {{0.0, 0.0}, {4.0, 0.0}}}}).bytes(), usual);
-  EXPECT_NEAR(seen.obstacles.at(0).semi_axis_across, std::numbers::sqrt2 * usual, 1e-12);
+  for (const auto& end : {std::pair{4.0, 0.0}, std::pair{0.0, 4.0}, std::pair{-4.0, 0.0}, std::pair{2.0, 3.0}}) {
+    const SeenObstacles seen = read_obstacle_array(array_of({{.outline = {{0.0, 0.0}, end}}}).bytes(), usual);
+    const Obstacle& line = seen.obstacles.at(0);
+    EXPECT_NEAR(std::min(line.semi_axis_along, line.semi_axis_across), std::numbers::sqrt2 * usual, 1e-6);
+  }
 }
 
 TEST(ObstacleMessages, RefusesNumbersThatCannotBe) {
