@@ -311,13 +311,15 @@ Driving Loop::judge(const Estimate& estimate, Clock::time_point now) const {
 
 void Loop::cycle() {
   const Clock::time_point begin = time_.instant();
-  const Clock::time_point deadline = Clock::now() + step_;
+  const Clock::time_point woken = Clock::now();
+  const Clock::time_point deadline = woken + step_;
   const bool was_triggered = std::exchange(is_triggered_, false);
   set_due(begin, was_triggered);
   change_controller();
   const logs::Stamp when = time_.now();
   const double time = time_of(when);
   const Estimate& estimate = estimator_->estimate(time, deadline);
+  const Clock::time_point estimated = Clock::now();
   note_place(estimate);
   Driving driving = judge(estimate, begin);
   const Controller::Command* command = nullptr;
@@ -333,6 +335,7 @@ void Loop::cycle() {
       command = nullptr;
     }
   }
+  const Clock::time_point controlled = Clock::now();
   rests_ = command == nullptr;
   has_driven_ = has_driven_ || command;
   send_command(estimate, when, command);
@@ -344,8 +347,11 @@ void Loop::cycle() {
   report_.lost += estimate.health.level == HealthLevel::lost ? 1 : 0;
   report_.health = estimate.health.level;
   if (was_triggered) {
-    if (report_.latencies.size() < most_latencies) report_.latencies.push_back(0.0);
-    report_.latencies[latency_place_] = seconds(sent - last_arrival_);
+    if (report_.latencies.size() < most_latencies) report_.latencies.emplace_back();
+    report_.latencies[latency_place_] = {.whole = seconds(sent - last_arrival_),
+                                         .hearing = seconds(woken - last_arrival_),
+                                         .estimate = seconds(estimated - woken),
+                                         .control = seconds(controlled - estimated)};
     latency_place_ = (latency_place_ + 1) % most_latencies;
   }
   const bool has_changed = driving != driving_;

@@ -43,13 +43,21 @@ struct ThreadOptions {
   std::optional<int> processor;  ///< the only one that it runs on
 };
 
+/// The way from the last message to the command, or to the estimate where nobody is steered [s].
+struct Latency {
+  double whole = 0.0;
+  double hearing = 0.0;   ///< from the network to the loop, the messages of the set read
+  double estimate = 0.0;  ///< of which
+  double control = 0.0;   ///< of which
+};
+
 /// What a loop did.
 struct LoopReport {
   std::int64_t cycles = 0, driven = 0;
-  std::int64_t misses = 0;        ///< commands, or estimates, later than a step after they were due
-  std::int64_t unsent = 0;        ///< messages that could not be sent at once
-  std::int64_t jumps = 0;         ///< times that the time of /clock has jumped back: estimates begin anew
-  std::vector<double> latencies;  ///< from the last message to the command or estimate [s], of the last cycles
+  std::int64_t misses = 0;         ///< commands, or estimates, later than a step after they were due
+  std::int64_t unsent = 0;         ///< messages that could not be sent at once
+  std::int64_t jumps = 0;          ///< times that the time of /clock has jumped back: estimates begin anew
+  std::vector<Latency> latencies;  ///< of the last cycles
   std::vector<TopicCount> topics;
   TopicCount other;                                        ///< paths, obstacles, stops, clocks and transforms
   std::size_t obstacles_seen = 0, obstacles_regarded = 0;  ///< of the last message, and what the terms have room for
