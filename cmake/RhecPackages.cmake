@@ -92,7 +92,9 @@ set(CPACK_DEBIAN_ROS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_ROS_PACKAGE_DEPENDS "rhec (= ${RHEC_THIS_VERSION})")
 set(CPACK_COMPONENT_ROS_DESCRIPTION "rhec as a node of ROS 2
 The estimator and the controller of rhec, a framework for receding horizon
-estimation and control, as a node of ROS 2.")
+estimation and control, live: \`rhec ros\` is a node of ROS 2 on Cyclone DDS that
+hears a robot's sensors and steers it, or a simulated robot. ROS itself is not
+needed.")
 
 # What each package has in /usr/share/doc, and why lintian is to overlook what it has found.
 foreach(COMPONENT IN LISTS CPACK_COMPONENTS_ALL)
@@ -110,7 +112,8 @@ endforeach()
 # The terms of what is compiled in, as the packages of these headers have them.
 set(EMBEDDED_RHEC libeigen3-dev libfmt-dev libxsimd-dev libcli11-dev nlohmann-json3-dev)
 set(EMBEDDED_PYTHON pybind11-dev)
-foreach(NAME IN ITEMS RHEC PYTHON)
+set(EMBEDDED_ROS libeigen3-dev libfmt-dev)
+foreach(NAME IN ITEMS RHEC PYTHON ROS)
   string(TOLOWER ${NAME} COMPONENT)
   foreach(PACKAGE IN LISTS EMBEDDED_${NAME})
     if(COMPONENT IN_LIST CPACK_COMPONENTS_ALL AND EXISTS "/usr/share/doc/${PACKAGE}/copyright")

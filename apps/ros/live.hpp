@@ -22,10 +22,18 @@ struct LiveArguments {
   std::vector<std::filesystem::path> plugin_path = {};
 };
 
-// Both need a build with Cyclone DDS; without one they throw Error that says what to install. They return an exit code.
+// Both are in a library of their own, which the program loads. Where it is not installed they throw Error that says
+// what to install. They return an exit code.
 /// A node that estimates and steers.
 int run_node(const Host& host, Settings settings, const LiveArguments& arguments);
 /// A simulated robot.
 int run_robot(const Host& host, Settings settings, const LiveArguments& arguments);
+
+/// The library, in the folder of rhec's libraries, and what it is looked for.
+inline constexpr const char* live_library = "ros_node.so";
+inline constexpr const char* run_node_symbol = "rhec_run_node";
+inline constexpr const char* run_robot_symbol = "rhec_run_robot";
+inline constexpr const char* version_symbol = "rhec_ros_version";
+using RunLive = int(const Host& host, Settings settings, const LiveArguments& arguments);
 
 }  // namespace rhec::apps::ros

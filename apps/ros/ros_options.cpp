@@ -37,6 +37,22 @@ const OptionTable<CommandOptions>& CommandOptions::table() {
   return rows;
 }
 
+const char* type_of(ObstacleForm form) noexcept {
+  return form == ObstacleForm::poses ? "geometry_msgs/msg/PoseArray" : "costmap_converter_msgs/msg/ObstacleArrayMsg";
+}
+
+const OptionTable<ObstacleOptions>& ObstacleOptions::table() {
+  static const auto rows =
+      OptionTable<ObstacleOptions>()
+          .choice("form", &ObstacleOptions::form,
+                  {{"poses", ObstacleForm::poses}, {"obstacle_array", ObstacleForm::obstacle_array}},
+                  "the message of `ros.names.obstacles`: PoseArray, centres at rest; or ObstacleArrayMsg of "
+                  "costmap_converter_msgs, outlines with velocities")
+          .number("radius", &ObstacleOptions::radius, "of obstacles whose message states no size [m]",
+                  greater_than(0.0));
+  return rows;
+}
+
 const OptionTable<NameOptions>& NameOptions::table() {
   static const auto rows =
       OptionTable<NameOptions>()
@@ -50,7 +66,7 @@ const OptionTable<NameOptions>& NameOptions::table() {
           .text("diagnostics", &NameOptions::diagnostics, "sent: health, once a second and when it changes")
           .text("command", &NameOptions::command, "sent, if `ros.command.steer`: the one topic that steers")
           .text("wanted_path", &NameOptions::wanted_path, "heard: a path to follow from now on, as Path")
-          .text("obstacles", &NameOptions::obstacles, "heard: centres of obstacles, as PoseArray")
+          .text("obstacles", &NameOptions::obstacles, "heard: obstacles, as `ros.obstacles.form` says")
           .text("stop", &NameOptions::stop, "heard: true stops the robot until false comes, as std_msgs/Bool")
           .text("clock", &NameOptions::clock, "heard with `ros.use_sim_time`: the time")
           .text("static_transforms", &NameOptions::static_transforms, "heard: places of sensors, for `ros.lever_arms`")
@@ -92,10 +108,9 @@ const OptionTable<RosOptions>& RosOptions::table() {
           .flag("use_sim_time", &RosOptions::use_sim_time, "the time is that of /clock")
           .number("path_speed", &RosOptions::path_speed, "along a path that comes as a message [m/s]",
                   greater_than(0.0))
-          .number("obstacle_radius", &RosOptions::obstacle_radius, "of obstacles that come as messages [m]",
-                  greater_than(0.0))
           .number("patience", &RosOptions::patience, "how long to wait for the transforms of `lever_arms` [s]",
                   greater_than(0.0))
+          .group("obstacles", &RosOptions::obstacles, ObstacleOptions::table())
           .group("command", &RosOptions::command, CommandOptions::table())
           .group("names", &RosOptions::names, NameOptions::table())
           .group("frames", &RosOptions::frames, FrameOptions::table())

@@ -17,6 +17,21 @@ enum class CommandForm {
   inputs          ///< sensor_msgs/JointState with the model's inputs by their names
 };
 
+/// What obstacles come as.
+enum class ObstacleForm {
+  poses,          ///< geometry_msgs/PoseArray: centres, at rest
+  obstacle_array  ///< costmap_converter_msgs/ObstacleArrayMsg: outlines that may move
+};
+/// "geometry_msgs/msg/PoseArray"
+const char* type_of(ObstacleForm form) noexcept;
+
+/// The section `ros.obstacles`.
+struct ObstacleOptions {
+  ObstacleForm form = ObstacleForm::poses;
+  double radius = 0.5;  ///< [m]
+  static const OptionTable<ObstacleOptions>& table();
+};
+
 /// The section `ros.command`: who steers, and when not.
 struct CommandOptions {
   bool steer = false;
@@ -56,9 +71,9 @@ struct CheckOptions {
 struct RosOptions {
   std::string node = "rhec", interface = "lo", trigger;
   bool use_sim_time = false;
-  double path_speed = 1.0;       ///< along a path that comes as a message [m/s]
-  double obstacle_radius = 0.5;  ///< [m]
-  double patience = 10.0;        ///< for transforms that lever arms come from [s]
+  double path_speed = 1.0;  ///< along a path that comes as a message [m/s]
+  double patience = 10.0;   ///< for transforms that lever arms come from [s]
+  ObstacleOptions obstacles;
   CommandOptions command;
   NameOptions names;
   FrameOptions frames;

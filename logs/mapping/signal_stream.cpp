@@ -100,6 +100,14 @@ std::span<const SignalRow> SignalStream::take(const Record& record) {
   return rows_;
 }
 
+void SignalStream::begin_anew() {
+  for (Channel& channel : channels_) {
+    channel.is_fresh.assign(channel.is_fresh.size(), false);
+    channel.last = no_value;
+    channel.last_stamp = channel.newest = no_stamp;
+  }
+}
+
 void SignalStream::read(const Record& record, Reading& reading) {
   const Stamp stamp = reading.reader->read(record, reading.values.data());
   if (stamp == no_stamp) return;

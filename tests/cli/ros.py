@@ -8,6 +8,7 @@ import json
 import pathlib
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -134,6 +135,9 @@ def who_does_not_steer(rhec, findings):
     used = {topic["topic"]: topic["used"] for topic in node_report.get("topics", [])}
     findings.expect(min(used.get(topic, 0) for topic in ("/fix", "/imu", "/joint_states")) > 10 and node_report["steered"] == 0
                     and node_report["latency_ms"]["median"] > 0, "the report as JSON", node_text)
+    parts = [node_report[part]["median"] for part in ("hearing_ms", "estimate_ms", "control_ms")]
+    findings.expect(all(part >= 0 for part in parts) and parts[1] > 0, "parts of the latency", node_text)
+    findings.expect(node_report["jumps_of_time"] == 0, "no jump of the time", node_text)
 
 
 def mistakes(rhec, findings):
@@ -154,12 +158,51 @@ def mistakes(rhec, findings):
     expect([cli.ROOT / "examples" / "robot" / "robot.yaml", "--simulate"], ERROR, "path")
 
 
+def node_of(rhec):
+    """The library of the node in the build tree."""
+    found = sorted((rhec.path.parent.parent / "lib").glob("**/rhec/ros_node.so"))
+    return found[0] if found else pathlib.Path("no ros_node.so")
+
+
+def without_the_node(rhec, findings):
+    """The same program, in a tree of links that has no node, a broken one, and another version's."""
+    build = rhec.path.parent.parent
+    node = node_of(rhec)
+    with tempfile.TemporaryDirectory() as folder:
+        copy = pathlib.Path(folder).resolve()
+        (copy / "bin").mkdir()
+        shutil.copy2(rhec.path, copy / "bin" / "rhec")
+        inside = copy / node.parent.relative_to(build)
+        inside.mkdir(parents=True)
+        for library in node.parent.parent.glob("librhec_*"):
+            shutil.copy2(library, inside.parent / library.name, follow_symlinks=False)
+        (inside / "plugins").mkdir()
+        for other in (node.parent / "plugins").iterdir():
+            (inside / "plugins" / other.name).symlink_to(other)
+        (inside / "examine_plugin").symlink_to(node.parent / "examine_plugin")
+        program = Program(copy / "bin" / "rhec")
+
+        def expect(what, *parts):
+            result = program("ros", ROBOT, "--seconds", 0.1)
+            findings.expect(result.returncode == ERROR and all(part in result.stderr for part in parts), what,
+                            f"{result.returncode}: {result.stderr}")
+
+        expect("without the node", "the node is not installed", str(inside / node.name), "the package rhec-ros")
+        (inside / node.name).write_text("not a library")
+        expect("a broken node", str(inside / node.name), "cannot be loaded", "rhec-ros")
+        (inside / node.name).unlink()
+        (inside / node.name).symlink_to(next(path for path in node.parent.parent.glob("librhec_core.so") if path.exists()))
+        expect("another library for a node", "install both of one build")
+
+
 def main():
     rhec, findings = Program(sys.argv[1]), Findings("ros")
-    missing = rhec("ros", ROBOT, "--seconds", 0.1)
-    if "no Cyclone DDS" in missing.stderr:
-        findings.expect(missing.returncode == ERROR and "cyclonedds-dev" in missing.stderr, "a build without the wire", missing.stderr)
+    if not node_of(rhec).exists():
+        missing = rhec("ros", ROBOT, "--seconds", 0.1)
+        findings.expect(missing.returncode == ERROR and "rhec-ros" in missing.stderr and "cyclonedds-dev" in missing.stderr,
+                        "a build without the node", missing.stderr)
         return findings.tell()
+    without_the_node(rhec, findings)
     mistakes(rhec, findings)
     commands_of_the_page(rhec, findings)
     a_stopped_node_stops_the_robot(rhec, findings)

@@ -38,6 +38,13 @@ void signals(std::string_view input);
 /// Definitions of messages, in both languages.
 void message_definitions(std::string_view input);
 
+/// A message in CDR, and the definition of its type, two parts.
+void cdr(std::string_view input);
+/// What a live node hears: a letter that says which of its readers, and a message.
+void ros_messages(std::string_view input);
+/// Measurements that a live node hears: parts that are topics, /fix, /imu, /odom or /joint_states.
+void ros_intake(std::string_view input);
+
 /// Calls it, and takes an Error for an answer.
 template <class Call>
 void answered(const Call& call) {
@@ -65,7 +72,10 @@ inline const std::vector<Target>& targets() {
                                        {"mcap", mcap},
                                        {"db3", db3},
                                        {"signals", signals},
-                                       {"message_definitions", message_definitions}};
+                                       {"message_definitions", message_definitions},
+                                       {"cdr", cdr},
+                                       {"ros_messages", ros_messages},
+                                       {"ros_intake", ros_intake}};
   return all;
 }
 

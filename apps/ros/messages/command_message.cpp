@@ -27,8 +27,13 @@ void skip_header(CdrCursor& cursor) {
   cursor.skip_text();
 }
 
-double finite(double value) {
-  if (!std::isfinite(value)) throw logs::RecordError("found a command that is not finite");
+/// No vehicle moves or turns as fast as that [m/s], [rad/s]; far beyond, there are no inputs to be found.
+constexpr double fastest = 1e3;
+
+double possible(double value) {
+  if (!(std::abs(value) <= fastest))
+    throw logs::RecordError(
+        fmt::format("found a command of {}, expected numbers from {} to {}", value, -fastest, fastest));
   return value;
 }
 
@@ -56,6 +61,7 @@ CommandMessage::CommandMessage(std::shared_ptr<const Model> model, const Command
   rates_.resize(about.states.size());
   zeros_.resize(about.inputs.size());
   trial_.resize(about.inputs.size());
+  read_.resize(about.inputs.size());
   if (form_ != CommandForm::inputs && about.roles.heading < 0)
     throw Error(
         fmt::format("the model {} has no heading, so that its motion is no twist; expected ros.command.form: "
@@ -179,8 +185,17 @@ void CommandMessage::inputs_for(const BodyMotion& wanted, const double* state, d
 }
 
 void CommandMessage::read(std::span<const std::byte> message, const double* state, double* inputs) {
-  CdrCursor cursor(message);
+  read_inputs(message, state, read_.data());
   const std::vector<Variable>& variables = model_->description().inputs;
+  for (std::size_t j = 0; j < read_.size(); ++j) {
+    if (!std::isfinite(read_[j])) throw logs::RecordError("found a command that no inputs of the vehicle carry out");
+    read_[j] = std::clamp(read_[j], variables[j].lower, variables[j].upper);
+  }
+  std::ranges::copy(read_, inputs);
+}
+
+void CommandMessage::read_inputs(std::span<const std::byte> message, const double* state, double* inputs) {
+  CdrCursor cursor(message);
   if (form_ != CommandForm::twist) skip_header(cursor);
   if (form_ == CommandForm::inputs) {
     std::vector<std::string> names;
@@ -188,14 +203,11 @@ void CommandMessage::read(std::span<const std::byte> message, const double* stat
     const std::uint64_t count = cursor.length(sizeof(double));
     if (names != names_ || count != names_.size())
       throw logs::RecordError(fmt::format("found a command with other inputs, expected {}", one_of(names_)));
-    for (std::size_t j = 0; j < names_.size(); ++j)
-      inputs[j] = std::clamp(finite(cursor.number(Kind::f64)), variables[j].lower, variables[j].upper);
-    return;
-  }
-  if (form_ == CommandForm::ackermann) {
-    const double angle = finite(cursor.number(Kind::f32));
+    for (std::size_t j = 0; j < names_.size(); ++j) inputs[j] = cursor.number(Kind::f64);
+  } else if (form_ == CommandForm::ackermann) {
+    const double angle = possible(cursor.number(Kind::f32));
     cursor.number(Kind::f32);  // a base that has an angle to go to chooses the rate
-    const double wanted = finite(cursor.number(Kind::f32));
+    const double wanted = possible(cursor.number(Kind::f32));
     // The speed is that of the vehicle as it steers now; the steering goes where it is wanted within the interval.
     std::fill_n(inputs, names_.size(), 0.0);
     const int speed = model_->description().roles.speed;
@@ -204,11 +216,9 @@ void CommandMessage::read(std::span<const std::byte> message, const double* stat
     inputs[steering_rate_] = (angle - state[steering_]) / interval_;
   } else {
     std::array<double, 6> twist{};
-    for (double& value : twist) value = finite(cursor.number(Kind::f64));
-    return inputs_for({twist[0], twist[5]}, state, inputs);
+    for (double& value : twist) value = possible(cursor.number(Kind::f64));
+    inputs_for({twist[0], twist[5]}, state, inputs);
   }
-  for (std::size_t j = 0; j < names_.size(); ++j)
-    inputs[j] = std::clamp(inputs[j], variables[j].lower, variables[j].upper);
 }
 
 }  // namespace rhec::apps::ros

@@ -36,11 +36,12 @@ class CommandMessage {
   std::span<const std::byte> stop(logs::Stamp when, const std::string& frame);
 
   /// The inputs (n_u), within their bounds, that a base gives to its vehicle in a state (n_x) for a message. Throws
-  /// RecordError for one that is broken or not finite.
+  /// RecordError for one that is broken, or that no vehicle carries out; then `inputs` stay as they were.
   void read(std::span<const std::byte> message, const double* state, double* inputs);
 
  private:
   BodyMotion motion_after(const double* state, const double* inputs);
+  void read_inputs(std::span<const std::byte> message, const double* state, double* inputs);
   void inputs_for(const BodyMotion& wanted, const double* state, double* inputs);
   std::span<const std::byte> write_motion(logs::Stamp when, const std::string& frame, const BodyMotion& motion,
                                           double steering_angle, double steering_rate, const double* inputs);
@@ -51,7 +52,7 @@ class CommandMessage {
   int steering_ = -1;       ///< state: the steering angle
   int steering_rate_ = -1;  ///< input: what changes it
   std::vector<std::string> names_;
-  std::vector<double> nominal_, next_, rates_, zeros_, trial_;
+  std::vector<double> nominal_, next_, rates_, zeros_, trial_, read_;
   logs::CdrWriter message_;
 };
 

@@ -1,10 +1,10 @@
 #include "heard_messages.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-
-#include "rhec/logs/cdr/cdr_cursor.hpp"
 
 namespace rhec::apps::ros {
 namespace {
@@ -21,13 +21,6 @@ logs::Stamp read_time(CdrCursor& cursor) {
   return seconds * second + rest;
 }
 
-MessageHeader read_header(CdrCursor& cursor) {
-  MessageHeader header;
-  header.stamp = read_time(cursor);
-  header.frame = cursor.text();
-  return header;
-}
-
 double read_finite(CdrCursor& cursor) {
   const double value = cursor.number(Kind::f64);
   if (!std::isfinite(value)) throw logs::RecordError("found a number that is not finite");
@@ -36,13 +29,29 @@ double read_finite(CdrCursor& cursor) {
 
 Position read_pose(CdrCursor& cursor) {
   Position position;
-  position.x = read_finite(cursor);
-  position.y = read_finite(cursor);
+  position.x = read_coordinate(cursor, Kind::f64);
+  position.y = read_coordinate(cursor, Kind::f64);
   cursor.skip_numbers(Kind::f64, 5);  // z, and the orientation
   return position;
 }
 
 }  // namespace
+
+MessageHeader read_header(CdrCursor& cursor) {
+  MessageHeader header;
+  header.stamp = read_time(cursor);
+  header.frame = cursor.text();
+  return header;
+}
+
+double read_coordinate(CdrCursor& cursor, Kind kind) {
+  constexpr double farthest = 1e8;  // [m]
+  const double value = cursor.number(kind);
+  if (!(std::abs(value) <= farthest))
+    throw logs::RecordError(
+        fmt::format("found a coordinate of {}, expected a number of at most {:g} m", value, farthest));
+  return value;
+}
 
 MessageHeader read_header(std::span<const std::byte> message) {
   CdrCursor cursor(message);
@@ -54,7 +63,10 @@ Positions read_path(std::span<const std::byte> message) {
   CdrCursor cursor(message);
   Positions path{read_header(cursor), {}};
   for (std::uint64_t left = cursor.length(least_pose); left > 0; --left) {
-    read_header(cursor);
+    const MessageHeader own = read_header(cursor);
+    if (!own.frame.empty() && own.frame != path.header.frame)
+      throw logs::RecordError(fmt::format("found a pose in the frame {} on a path in the frame {}",
+                                          logs::in_quotes(own.frame), logs::in_quotes(path.header.frame)));
     path.places.push_back(read_pose(cursor));
   }
   return path;
@@ -87,7 +99,9 @@ bool read_flag(std::span<const std::byte> message) { return CdrCursor(message).n
 
 logs::Stamp read_clock(std::span<const std::byte> message) {
   CdrCursor cursor(message);
-  return read_time(cursor);
+  const logs::Stamp time = read_time(cursor);
+  if (time < 0) throw logs::RecordError("found a time before 1970");
+  return time;
 }
 
 FixQuality read_fix_quality(std::span<const std::byte> message) {

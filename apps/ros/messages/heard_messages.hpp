@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "rhec/logs/cdr/cdr_cursor.hpp"
 #include "rhec/logs/signals/log.hpp"
 
 // What is read of messages beyond single numbers. All throw RecordError for a message that is broken or not finite.
@@ -18,6 +19,9 @@ struct MessageHeader {
 };
 /// Of a message that begins with one.
 MessageHeader read_header(std::span<const std::byte> message);
+MessageHeader read_header(logs::CdrCursor& cursor);
+/// A coordinate on the ground [m], which is not farther away than the earth is large.
+double read_coordinate(logs::CdrCursor& cursor, logs::Kind kind);
 
 struct Position {
   double x = 0.0, y = 0.0;  ///< [m]
@@ -39,7 +43,7 @@ std::vector<PlaceOfFrame> read_transforms(std::span<const std::byte> message);
 
 /// std_msgs/Bool
 bool read_flag(std::span<const std::byte> message);
-/// rosgraph_msgs/Clock
+/// rosgraph_msgs/Clock, which is not before 1970
 logs::Stamp read_clock(std::span<const std::byte> message);
 
 /// What a sensor_msgs/NavSatFix says of itself.

@@ -35,6 +35,12 @@ std::int64_t TopicCount::refusals() const noexcept {
   return std::accumulate(refused.begin(), refused.end(), std::int64_t{0});
 }
 
+std::optional<std::string> stamp_mistake(logs::Stamp stamp, logs::Stamp now, const CheckOptions& checks) {
+  const double age = logs::seconds_between(stamp, now);
+  if (stamp == 0 || (age <= checks.behind && age >= -checks.ahead)) return std::nullopt;
+  return fmt::format("its stamp is {:.3g} s {} the node's clock", std::abs(age), age > 0.0 ? "behind" : "ahead of");
+}
+
 Intake::Intake(const LiveTopics& topics, const logs::SignalMap& map, const ModelDescription& about,
                const CheckOptions& checks)
     : topics_(topics), checks_(checks), about_(about), stream_(topics, map) {
@@ -81,9 +87,8 @@ std::optional<Refusal> Intake::why_not(int topic, std::span<const std::byte> mes
   Known& known = known_[static_cast<std::size_t>(topic)];
   if (!known.has_header) return std::nullopt;
   const MessageHeader header = read_header(message);
-  const double age = logs::seconds_between(header.stamp, now);
-  if (known.has_own_clock && header.stamp != 0 && !(age <= checks_.behind && age >= -checks_.ahead)) {
-    found_ = fmt::format("its stamp is {:.3g} s {} the node's clock", std::abs(age), age > 0.0 ? "behind" : "ahead of");
+  if (const auto mistake = known.has_own_clock ? stamp_mistake(header.stamp, now, checks_) : std::nullopt) {
+    found_ = *mistake;
     return Refusal::stamp;
   }
   if (known.is_fix) {

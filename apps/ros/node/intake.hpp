@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -34,6 +35,9 @@ struct TopicCount {
   std::int64_t refusals() const noexcept;
 };
 
+/// What is wrong with a message's stamp, in words: it is too old, or from the future. A stamp of 0 says nothing.
+std::optional<std::string> stamp_mistake(logs::Stamp stamp, logs::Stamp now, const CheckOptions& checks);
+
 /// Messages checked, and turned into outputs and inputs: what is refused is counted, and goes no further.
 class Intake {
  public:
@@ -47,6 +51,9 @@ class Intake {
   const std::vector<bool>& measured() const noexcept { return measured_; }
   /// The outputs and inputs that a message completes; none if it is refused. Valid until the next call.
   std::span<const logs::SignalRow> take(int topic, std::span<const std::byte> message, logs::Stamp now);
+
+  /// The time has jumped back: what comes next has nothing to do with what came before. Counts and the origin stay.
+  void begin_anew() { stream_.begin_anew(); }
 
   const std::vector<TopicCount>& counts() const noexcept { return counts_; }
   std::optional<logs::GeodeticPoint> origin() const { return stream_.origin(); }

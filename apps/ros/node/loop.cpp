@@ -28,7 +28,8 @@ constexpr double longest_hold = 1.0;
 // on without it.
 constexpr double early = 0.25, late = 0.5;
 constexpr std::size_t most_latencies = 100000;
-constexpr auto between_diagnostics = std::chrono::seconds(1);
+// Without a step that is due, the loop looks around so often.
+constexpr auto between_looks = std::chrono::milliseconds(100);
 constexpr std::size_t most_events = 1000;
 
 double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
@@ -48,6 +49,8 @@ CommandOptions command_options(const RosOptions& options) {
 
 const char* in_words(Driving driving) noexcept {
   switch (driving) {
+    case Driving::clock:
+      return "waits for the time on /clock";
     case Driving::waiting:
       return "waits for measurements";
     case Driving::heading:
@@ -75,12 +78,9 @@ Loop::Loop(Participant& wire, const LiveTopics& topics, Intake& intake, const Ro
       options_(options),
       command_message_(robot.model(), command_options(options), robot.step()),
       track_messages_(robot, {options.frames.fixed, options.frames.vehicle}),
-      step_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(robot.step()))) {
-  const ModelDescription& about = robot.model()->description();
-  for (const bool is_measured : intake.measured()) seen_.push_back(!is_measured);
-  inputs_.assign(about.inputs.size(), missing);
-  input_times_.assign(about.inputs.size(), -std::numeric_limits<double>::infinity());
-  held_ = inputs_;
+      step_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(robot.step()))),
+      time_(options.use_sim_time) {
+  forget_inputs_and_outputs();
   report_.latencies.reserve(most_latencies);
   report_.other.topic = "others";
   subscribe(topics);
@@ -160,7 +160,18 @@ LoopReport Loop::report() const {
   report.origin = intake_.origin();
   report.driving = driving_;
   if (estimator_) report.estimator = estimator_->counts();
+  report.jumps = jumps_;
   return report;
+}
+
+void Loop::forget_inputs_and_outputs() {
+  const ModelDescription& about = robot_.model()->description();
+  seen_.clear();
+  for (const bool is_measured : intake_.measured()) seen_.push_back(!is_measured);
+  inputs_.assign(about.inputs.size(), missing);
+  input_times_.assign(about.inputs.size(), -std::numeric_limits<double>::infinity());
+  held_ = inputs_;
+  gathered_.clear();
 }
 
 void Loop::say(std::string text) {
@@ -168,16 +179,15 @@ void Loop::say(std::string text) {
   if (events_.size() < most_events) events_.push_back(std::move(text));
 }
 
-logs::Stamp Loop::now() const {
-  if (options_.use_sim_time) return simulated_now_;
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 Clock::time_point Loop::next_look() const {
-  if (!estimator_) return Clock::now() + std::chrono::milliseconds(100);
   if (!is_triggered_) return due_ + of_step(step_, late);
   return last_received_ >= due_ - of_step(step_, early) ? last_received_ : due_;
+}
+
+/// The computer's time. A time that others tell goes on with their messages, which end any wait.
+Clock::time_point Loop::wait_until() const {
+  const bool is_due = estimator_ && !time_.is_simulated();
+  return is_due ? next_look() : Clock::now() + between_looks;
 }
 
 /// Steps lie on a grid, so that quick sensors do not hasten them, which follows sensors that are as quick as the steps:
@@ -193,13 +203,15 @@ void Loop::set_due(Clock::time_point begin, bool was_triggered) {
 
 void Loop::run() {
   while (!is_asked_to_stop_) {
-    wire_.wait(next_look());
+    wire_.wait(wait_until());
     wire_.take([this](const Arrival& arrival) { hear(arrival); });
+    watch_clock();
     if (!estimator_) {
       begin_if_possible();
+      tell_waiting();
       continue;
     }
-    if (Clock::now() >= next_look()) cycle();
+    if (time_.instant() >= next_look()) cycle();
   }
   if (controller_) controller_->finish();
   if (estimator_) estimator_->end_drive();
@@ -207,21 +219,23 @@ void Loop::run() {
 
 void Loop::hear(const Arrival& arrival) {
   const int meaning = meaning_of_reader_[static_cast<std::size_t>(arrival.reader)];
-  if (meaning < 0) return hear_special(-1 - meaning, arrival.cdr);
-  for (const logs::SignalRow& row : intake_.take(meaning, arrival.cdr, now()))
+  if (meaning < 0) return hear_special(-1 - meaning, arrival);
+  if (!time_.is_known()) return;  // what a stamp means is not known
+  for (const logs::SignalRow& row : intake_.take(meaning, arrival.cdr, time_.now()))
     use(row, triggers_[static_cast<std::size_t>(meaning)], arrival.received);
 }
 
 void Loop::use(const logs::SignalRow& row, bool triggers, Clock::time_point received) {
   if (row.is_output) {
-    last_measured_ = received;
+    last_measured_ = time_.instant_of(received);
     if (triggers) {
       is_triggered_ = true;
-      last_received_ = received;
+      last_received_ = last_measured_;
+      last_arrival_ = received;
     }
   }
   if (estimator_) return push(row);
-  if (gathered_.empty()) gathering_since_ = Clock::now();
+  if (gathered_.empty()) gathering_since_ = time_.instant();
   if (gathered_.size() < most_gathered) gathered_.push_back(row);
   if (!row.is_output) return;
   for (std::size_t j = 0; j < row.values.size(); ++j)
@@ -246,7 +260,7 @@ void Loop::push(const logs::SignalRow& row) {
 void Loop::begin_if_possible() {
   const bool has_output = std::ranges::any_of(gathered_, [](const logs::SignalRow& row) { return row.is_output; });
   const bool has_all = std::ranges::all_of(seen_, [](bool seen) { return seen; });
-  if (!has_output || (!has_all && seconds(Clock::now() - gathering_since_) < longest_gathering)) return;
+  if (!has_output || (!has_all && seconds(time_.instant() - gathering_since_) < longest_gathering)) return;
   logs::Drive drive;
   drive.outputs = static_cast<int>(seen_.size());
   drive.inputs = static_cast<int>(inputs_.size());
@@ -259,7 +273,7 @@ void Loop::begin_if_possible() {
   estimator_ = robot_.make_estimator(sim::start_of(robot_, drive));
   for (const logs::SignalRow& row : gathered_) push(row);
   gathered_.clear();
-  due_ = Clock::now();
+  due_ = time_.instant();
   {
     const std::lock_guard lock(mutex_);
     slip_ahead_ = estimator_->slip_ahead();
@@ -272,10 +286,11 @@ void Loop::change_controller() {
   if (!lock.owns_lock() || !next_controller_ || last_controller_) return;
   last_controller_ = std::exchange(controller_, std::move(next_controller_));  // freed by the other thread
   lock.unlock();
-  controller_->set_obstacles(obstacles_, obstacles_time_);
+  has_told_crowd_ = false;
+  regard_obstacles();
   is_finished_ = false;
   const int writer = track_writers_[static_cast<std::size_t>(sim::TrackTopic::path)];
-  track_messages_.write_path(controller_->path(), now(),
+  track_messages_.write_path(controller_->path(), time_.now(),
                              [&](sim::TrackTopic, logs::Stamp, std::span<const std::byte> message) {
                                if (writer >= 0 && !wire_.write(writer, message)) ++report_.unsent;
                              });
@@ -295,14 +310,17 @@ Driving Loop::judge(const Estimate& estimate, Clock::time_point now) const {
 }
 
 void Loop::cycle() {
-  const Clock::time_point begin = Clock::now();
-  const Clock::time_point deadline = begin + step_;
+  const Clock::time_point begin = time_.instant();
+  const Clock::time_point woken = Clock::now();
+  const Clock::time_point deadline = woken + step_;
   const bool was_triggered = std::exchange(is_triggered_, false);
   set_due(begin, was_triggered);
   change_controller();
-  const logs::Stamp when = now();
+  const logs::Stamp when = time_.now();
   const double time = time_of(when);
   const Estimate& estimate = estimator_->estimate(time, deadline);
+  const Clock::time_point estimated = Clock::now();
+  note_place(estimate);
   Driving driving = judge(estimate, begin);
   const Controller::Command* command = nullptr;
   if (driving == Driving::driving) {
@@ -317,6 +335,7 @@ void Loop::cycle() {
       command = nullptr;
     }
   }
+  const Clock::time_point controlled = Clock::now();
   rests_ = command == nullptr;
   has_driven_ = has_driven_ || command;
   send_command(estimate, when, command);
@@ -328,8 +347,11 @@ void Loop::cycle() {
   report_.lost += estimate.health.level == HealthLevel::lost ? 1 : 0;
   report_.health = estimate.health.level;
   if (was_triggered) {
-    if (report_.latencies.size() < most_latencies) report_.latencies.push_back(0.0);
-    report_.latencies[latency_place_] = seconds(sent - last_received_);
+    if (report_.latencies.size() < most_latencies) report_.latencies.emplace_back();
+    report_.latencies[latency_place_] = {.whole = seconds(sent - last_arrival_),
+                                         .hearing = seconds(woken - last_arrival_),
+                                         .estimate = seconds(estimated - woken),
+                                         .control = seconds(controlled - estimated)};
     latency_place_ = (latency_place_ + 1) % most_latencies;
   }
   const bool has_changed = driving != driving_;
@@ -355,7 +377,7 @@ void Loop::send_command(const Estimate& estimate, logs::Stamp when, const Contro
 void Loop::stop_robot() noexcept {
   if (command_writer_ < 0 || !has_driven_) return;
   try {
-    if (!wire_.write(command_writer_, command_message_.stop(now(), options_.frames.vehicle))) ++report_.unsent;
+    if (!wire_.write(command_writer_, command_message_.stop(time_.now(), options_.frames.vehicle))) ++report_.unsent;
     wire_.flush(command_writer_, std::chrono::milliseconds(200));
   } catch (const std::bad_alloc&) {  // the base stops by its own time-out
     ++report_.unsent;

@@ -1,6 +1,7 @@
 // What the loop subscribes to and publishes, beside measurements and commands.
 #include <fmt/format.h>
 
+#include <optional>
 #include <utility>
 
 #include "../messages/type_hash.hpp"
@@ -41,7 +42,7 @@ void Loop::subscribe(const LiveTopics& topics) {
   if (options_.command.steer) {
     // Whoever publishes a path, does so reliably; it is large, and comes once.
     hear(Other::path, options_.names.wanted_path, "nav_msgs/msg/Path", Delivery::sure);
-    hear(Other::obstacles, options_.names.obstacles, "geometry_msgs/msg/PoseArray", Delivery::latest);
+    hear(Other::obstacles, options_.names.obstacles, type_of(options_.obstacles.form), Delivery::latest);
     // A stop is heard from everybody, reliable or not.
     hear(Other::stop, options_.names.stop, "std_msgs/msg/Bool", Delivery::latest);
   }
@@ -71,46 +72,47 @@ void Loop::publish() {
   if (steers) command_writer_ = wire_.add_writer(topic_of(names.command, command_message_.type()), Delivery::sure);
 }
 
-void Loop::hear_special(int which, std::span<const std::byte> message) {
+void Loop::hear_special(int which, const Arrival& arrival) {
+  const std::span<const std::byte> message = arrival.cdr;
   TopicCount& count = report_.other;
   const auto refuse = [&](Refusal refusal, std::string text) {
     ++count.refused[static_cast<std::size_t>(refusal)];
     count.last = std::move(text);
   };
-  const auto has_frame = [&](const Positions& positions) {
-    if (positions.header.frame == options_.frames.fixed) return true;
-    refuse(Refusal::frame, fmt::format("its frame is {}, expected '{}'", logs::in_quotes(positions.header.frame),
-                                       options_.frames.fixed));
+  const auto has_frame = [&](const MessageHeader& header) {
+    if (header.frame == options_.frames.fixed) return true;
+    refuse(Refusal::frame,
+           fmt::format("its frame is {}, expected '{}'", logs::in_quotes(header.frame), options_.frames.fixed));
     return false;
+  };
+  const auto is_of_now = [&](const MessageHeader& header) {
+    const std::optional<std::string> mistake = stamp_mistake(header.stamp, time_.now(), options_.checks);
+    if (mistake) refuse(Refusal::stamp, *mistake);
+    return !mistake;
   };
   if (message.empty()) return refuse(Refusal::too_large, "it was too large");
   try {
     switch (static_cast<Other>(which)) {
       case Other::path: {
         Positions path = read_path(message);
-        if (!has_frame(path)) return;
+        if (!has_frame(path.header)) return;
         const std::lock_guard lock(mutex_);
         wanted_path_ = std::move(path.places);
         break;
       }
       case Other::obstacles: {
-        const Positions poses = read_pose_array(message);
-        if (!has_frame(poses)) return;
-        obstacles_.clear();
-        for (const Position& place : poses.places)
-          obstacles_.push_back({.x = place.x,
-                                .y = place.y,
-                                .semi_axis_along = options_.obstacle_radius,
-                                .semi_axis_across = options_.obstacle_radius});
-        obstacles_time_ = time_of(poses.header.stamp);
-        if (controller_) controller_->set_obstacles(obstacles_, obstacles_time_);
+        if (!time_.is_known()) return;
+        const auto read = options_.obstacles.form == ObstacleForm::poses ? read_obstacle_poses : read_obstacle_array;
+        SeenObstacles seen = read(message, options_.obstacles.radius);
+        if (!has_frame(seen.header) || !is_of_now(seen.header)) return;
+        hear_obstacles(std::move(seen));
         break;
       }
       case Other::stop:
         is_stopped_by_topic_ = read_flag(message);
         break;
       case Other::clock:
-        simulated_now_ = read_clock(message);
+        hear_clock(read_clock(message), arrival.received);
         break;
       case Other::transforms:
         look_for_rival(read_transforms(message));
@@ -169,6 +171,10 @@ void Loop::tell_health(const Estimate& estimate, logs::Stamp when) {
       values.push_back({"refused of " + count.topic, fmt::format("{}: {}", count.refusals(), count.last)});
   }
   values.push_back({"messages refused", std::to_string(refused)});
+  if (!options_.names.obstacles.empty() && options_.command.steer)
+    values.push_back(
+        {"obstacles", fmt::format("{} seen, {} regarded", report_.obstacles_seen, report_.obstacles_regarded)});
+  if (time_.is_simulated()) values.push_back({"jumps of the time", std::to_string(jumps_)});
   const std::string findings = estimate.health.level != HealthLevel::ok && estimator_->watch()
                                    ? rhec::in_words(estimate.health, estimator_->watch()->sensors())
                                    : rhec::name_of(estimate.health.level);
@@ -179,6 +185,21 @@ void Loop::tell_health(const Estimate& estimate, logs::Stamp when) {
   message_.clear();
   sim::write_diagnostics(when, level, options_.node + ": estimate", findings + "; " + in_words(driving_), values,
                          message_);
+  if (!wire_.write(diagnostics_writer_, message_.bytes())) ++report_.unsent;
+}
+
+/// Before there is an estimate, too, a node says why.
+void Loop::tell_waiting() {
+  const Clock::time_point computer = Clock::now();
+  if (computer - told_health_ < between_diagnostics) return;
+  told_health_ = computer;
+  const Driving driving = time_.is_known() && !has_told_standstill_ ? Driving::waiting : Driving::clock;
+  if (std::exchange(driving_, driving) != driving || !has_told_waiting_) say(in_words(driving));
+  has_told_waiting_ = true;
+  if (diagnostics_writer_ < 0) return;
+  constexpr std::uint8_t warning = 1;
+  message_.clear();
+  sim::write_diagnostics(time_.now(), warning, options_.node + ": estimate", in_words(driving), {}, message_);
   if (!wire_.write(diagnostics_writer_, message_.bytes())) ++report_.unsent;
 }
 

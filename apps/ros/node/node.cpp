@@ -52,6 +52,14 @@ void print_topics(const LiveTopics& topics, const Intake& intake, const RosOptio
   std::fflush(out);
 }
 
+/// Of one part of all latencies [ms].
+sim::Spread spread_of_part(const LoopReport& report, double Latency::*part) {
+  std::vector<double> values;
+  values.reserve(report.latencies.size());
+  for (const Latency& latency : report.latencies) values.push_back(1e3 * latency.*part);
+  return sim::spread_of(values);
+}
+
 void print_report(const LoopReport& report) {
   fmt::print("\n{:<28} {:>8} {:>8}   {}\n", "TOPIC", "USED", "REFUSED", "WHY");
   const auto print = [](const TopicCount& count) {
@@ -70,13 +78,18 @@ void print_report(const LoopReport& report) {
                report.origin->longitude, report.origin->height);
   fmt::print("{} steps, {} of them steered; {} deadlines missed; {} messages not sent\n", report.cycles, report.driven,
              report.misses, report.unsent);
+  if (report.jumps > 0) fmt::print("the time jumped back {} times: estimates began anew\n", report.jumps);
   fmt::print("health: degraded in {} steps, lost in {}; {} measurements rejected, {} of {} estimates fell back\n",
              report.degraded, report.lost, report.estimator.rejected, report.estimator.fallbacks,
              report.estimator.estimates);
-  const sim::Spread latency = sim::spread_of(report.latencies);
-  if (!report.latencies.empty())
-    fmt::print("latency from the last measurement to the {} [ms]: median {:.3f}, p99 {:.3f}, max {:.3f}\n",
-               report.driven > 0 ? "command" : "estimate", 1e3 * latency.median, 1e3 * latency.p99, 1e3 * latency.max);
+  if (report.latencies.empty()) return;
+  const sim::Spread latency = spread_of_part(report, &Latency::whole);
+  fmt::print(
+      "latency from the last measurement to the {} [ms]: median {:.3f}, p99 {:.3f}, max {:.3f}\n"
+      "medians of its parts: {:.3f} until the loop has it, {:.3f} for the estimate, {:.3f} for the command\n",
+      report.driven > 0 ? "command" : "estimate", latency.median, latency.p99, latency.max,
+      spread_of_part(report, &Latency::hearing).median, spread_of_part(report, &Latency::estimate).median,
+      spread_of_part(report, &Latency::control).median);
 }
 
 sim::Json json_of(const TopicCount& count) {
@@ -99,32 +112,72 @@ void print_json_report(const LoopReport& report) {
   json["steered"] = report.driven;
   json["missed_deadlines"] = report.misses;
   json["not_sent"] = report.unsent;
+  json["jumps_of_time"] = report.jumps;
   json["degraded"] = report.degraded;
   json["lost"] = report.lost;
   json["rejected"] = report.estimator.rejected;
   json["estimates"] = report.estimator.estimates;
   json["fallbacks"] = report.estimator.fallbacks;
   if (!report.latencies.empty()) {
-    const sim::Spread latency = sim::spread_of(report.latencies);
-    json["latency_ms"] = {{"median", 1e3 * latency.median}, {"p99", 1e3 * latency.p99}, {"max", 1e3 * latency.max}};
+    const auto json_of_part = [&](double Latency::*part) -> sim::Json {
+      const sim::Spread spread = spread_of_part(report, part);
+      return {{"median", spread.median}, {"p99", spread.p99}, {"max", spread.max}};
+    };
+    json["latency_ms"] = json_of_part(&Latency::whole);
+    json["hearing_ms"] = json_of_part(&Latency::hearing);
+    json["estimate_ms"] = json_of_part(&Latency::estimate);
+    json["control_ms"] = json_of_part(&Latency::control);
   }
   fmt::print("{}\n", json.dump(2));
 }
 
-/// Makes a controller for a path that has come, and hands it to the loop; what cannot be followed is told.
-void follow(const std::vector<Position>& places, const Robot& robot, const RosOptions& options, Loop& loop, double time,
-            std::FILE* out) {
-  std::vector<Waypoint> waypoints;
-  waypoints.reserve(places.size());
-  for (const Position& place : places) waypoints.push_back({place.x, place.y, options.path_speed});
-  try {
-    const Path path(waypoints);
-    loop.follow(robot.make_controller(path, loop.slip_ahead()));
-    fmt::print(out, "{:8.2f} s  a path of {:.1f} m has come\n", time, path.length());
-  } catch (const Error& mistake) {
-    fmt::print(out, "{:8.2f} s  a path was refused: {}\n", time, mistake.what());
+/// The path that is followed: handed to the loop with a controller, as often as that has to begin anew.
+class Pursuit {
+ public:
+  Pursuit(const Robot& robot, const RosOptions& options, Loop& loop, std::unique_ptr<const Path> path)
+      : robot_(robot), options_(options), loop_(loop), path_(std::move(path)) {
+    if (path_ && !robot_.memory().is_given()) hand_over();
   }
-}
+
+  /// A controller that looks ahead on a map needs the estimator that keeps it; and when the time has jumped back,
+  /// another one.
+  void look() {
+    if (const std::int64_t jumps = loop_.jumps(); jumps != jumps_) {
+      jumps_ = jumps;
+      is_handed_over_ = false;
+    }
+    if (path_ && !is_handed_over_ && (!robot_.memory().is_given() || loop_.slip_ahead())) hand_over();
+  }
+
+  /// Follows a path that has come; one that cannot be followed is told.
+  void change(const std::vector<Position>& places, double time, std::FILE* out) {
+    std::vector<Waypoint> waypoints;
+    waypoints.reserve(places.size());
+    for (const Position& place : places) waypoints.push_back({place.x, place.y, options_.path_speed});
+    try {
+      auto path = std::make_unique<const Path>(waypoints);
+      loop_.follow(robot_.make_controller(*path, loop_.slip_ahead()));
+      path_ = std::move(path);
+      is_handed_over_ = true;
+      fmt::print(out, "{:8.2f} s  a path of {:.1f} m has come\n", time, path_->length());
+    } catch (const Error& mistake) {
+      fmt::print(out, "{:8.2f} s  a path was refused: {}\n", time, mistake.what());
+    }
+  }
+
+ private:
+  void hand_over() {
+    loop_.follow(robot_.make_controller(*path_, loop_.slip_ahead()));
+    is_handed_over_ = true;
+  }
+
+  const Robot& robot_;
+  const RosOptions& options_;
+  Loop& loop_;
+  std::unique_ptr<const Path> path_;
+  bool is_handed_over_ = false;
+  std::int64_t jumps_ = 0;
+};
 
 }  // namespace
 
@@ -150,15 +203,14 @@ int run_node(const Host& host, Settings settings, const LiveArguments& arguments
   std::FILE* const out = arguments.json ? stderr : stdout;
   print_topics(topics, intake, options, wire_setup, out);
   loop.start({arguments.priority, arguments.cpu >= 0 ? std::optional(arguments.cpu) : std::nullopt});
-  if (path && !robot.memory().is_given()) loop.follow(robot.make_controller(*std::exchange(path, nullptr)));
+  Pursuit pursuit(robot, options, loop, std::move(path));
   const auto begin = Clock::now();
   while (!StopRequest::asked() && !(arguments.once && loop.is_finished()) &&
          (arguments.seconds <= 0.0 || seconds_since(begin) < arguments.seconds)) {
     std::this_thread::sleep_for(between_looks);
     loop.check();
-    // A controller that looks ahead on a map needs the estimator that keeps it.
-    if (path && loop.slip_ahead()) loop.follow(robot.make_controller(*std::exchange(path, nullptr), loop.slip_ahead()));
-    if (const auto places = loop.take_wanted_path()) follow(*places, robot, options, loop, seconds_since(begin), out);
+    pursuit.look();
+    if (const auto places = loop.take_wanted_path()) pursuit.change(*places, seconds_since(begin), out);
     for (const std::string& event : loop.take_events()) fmt::print(out, "{:8.2f} s  {}\n", seconds_since(begin), event);
     std::fflush(out);
   }

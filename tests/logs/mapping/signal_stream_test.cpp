@@ -43,6 +43,24 @@ TEST_F(SignalStreamTest, RowsComeRecordByRecordOutputsFirst) {
   EXPECT_FALSE(stream.origin());
 }
 
+TEST_F(SignalStreamTest, BegunAnewItForgetsWhatDerivativesHaveInHand) {
+  const auto log = open_csv(write("d.csv", "time,delta\n10,0.1\n11,0.3\n1,0.5\n2,0.6\n"));
+  for (const bool begins_anew : {false, true}) {
+    SignalStream stream(*log, map("{outputs: {x_gps: none, y_gps: none, psi_m: none, delta: none}, "
+                                  "inputs: {v: none, delta_rate: {from: delta, derivative: true}}}"));
+    std::vector<double> rates;
+    int records = 0;
+    log->read(stream.wanted(), [&](const Record& record) {
+      if (++records == 3 && begins_anew) stream.begin_anew();
+      for (const SignalRow& row : stream.take(record)) rates.push_back(row.values[1]);
+      return true;
+    });
+    ASSERT_EQ(rates.size(), begins_anew ? 4u : 2u);  // each rate holds at both ends
+    EXPECT_NEAR(rates.front(), 0.2, 1e-12);
+    EXPECT_NEAR(rates.back(), begins_anew ? 0.1 : 0.2, 1e-12);
+  }
+}
+
 TEST_F(SignalStreamTest, TheFirstGoodFixIsTheOrigin) {
   const auto log = open_csv(write("d.csv", "time,lat,lon\n1,95,7\n2,51,7\n3,52,7\n"));
   SignalStream stream(*log, map("{outputs: {x_gps: {from: [lat, lon], as: east}, y_gps: {from: [lat, lon], as: north}, "

@@ -96,6 +96,9 @@ TEST(CommandMessage, RefusesWhatIsBrokenOrNotFinite) {
   message.numbers(std::array{1.0, 0.0, 0.0, 0.0, 0.0, std::numeric_limits<double>::infinity()});
   EXPECT_THROW(command.read(message.bytes(), state.data(), given.data()), logs::RecordError);
   EXPECT_THROW(command.read(message.bytes().first(20), state.data(), given.data()), logs::RecordError);
+  message.clear();
+  message.numbers(std::array{1e308, 0.0, 0.0, 0.0, 0.0, -1e308});  // finite, and nobody's motion
+  EXPECT_THROW(command.read(message.bytes(), state.data(), given.data()), logs::RecordError);
   EXPECT_EQ(given, (std::array{1.0, 2.0}));
 }
 

@@ -43,6 +43,9 @@ class RHEC_EXPORT SignalStream {
   /// The rows that a record completes, outputs first; valid until the next call. Throws RecordError for one that is
   /// broken.
   std::span<const SignalRow> take(const Record& record);
+  /// Forgets what parts of signals, and derivatives, have in hand: the next records belong to another time. Counts and
+  /// the local plane stay.
+  void begin_anew();
 
   /// By signal.
   std::vector<SignalCount> counts() const;
