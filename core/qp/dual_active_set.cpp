@@ -26,6 +26,8 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
     : states_(capacity.states),
       stride_(capacity.row()),
       limit_row_(capacity.limit_row()),
+      most_columns_(capacity.limits > 0 ? max_columns_with_limits : max_columns),
+      batch_count_(most_columns_ / batch_size + 1),
       has_limits_(capacity.limits > 0),
       held_(capacity),
       claimed_(capacity),
@@ -44,11 +46,11 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
   side_.assign(most, 0);
   number_.assign(most, none);
   held_places_.reserve(most);
-  batches_.resize(batch_count);
+  batches_.resize(batch_count_);
   for (Batch& batch : batches_) batch.sensitivities = Riccati::Sensitivities(capacity);
-  for (auto* places : {&columns_, &base_places_}) places->reserve(max_columns);
-  for (auto* v : {&multipliers_, &base_multipliers_}) v->assign(max_columns, 0.0);
-  factor_.assign(static_cast<std::size_t>(max_columns) * max_columns, 0.0);
+  for (auto* places : {&columns_, &base_places_}) places->reserve(most_columns_);
+  for (auto* v : {&multipliers_, &base_multipliers_}) v->assign(most_columns_, 0.0);
+  factor_.assign(static_cast<std::size_t>(most_columns_) * most_columns_, 0.0);
 }
 
 bool DualActiveSet::is_equality_bound(int place) const noexcept {
@@ -74,7 +76,7 @@ void DualActiveSet::take_claims(const StageQp& qp, const ActiveSet& claimed) noe
       hold_[place] = Hold::held;
       held_.row(stage)[j] = side;
       held_places_.push_back(place);
-    } else if (column_count() < max_columns) {
+    } else if (column_count() < most_columns_) {
       hold_[place] = Hold::column;
       multipliers_[column_count()] = 0.0;
       columns_.push_back(place);
@@ -271,7 +273,7 @@ DualActiveSet::Violations DualActiveSet::find_violations() noexcept {
 bool DualActiveSet::add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept {
   if (number_[worst] == none && !find_sensitivities_of_next(qp, riccati, &worst, 1)) return false;
   for (const Batch& batch : batches_) {
-    for (int c = 0; c < batch.count && column_count() < max_columns; ++c) {
+    for (int c = 0; c < batch.count && column_count() < most_columns_; ++c) {
       const int place = batch.of[c];
       if (!is_control(place) || hold_[place] != Hold::free || number_[place] == none || !(violation_[place] > 0.0))
         continue;
@@ -317,7 +319,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     if (number_[entering] == none && !find_sensitivities_of_next(qp, riccati, &entering, 1)) return Outcome::too_much;
     // Change of values and multipliers while the entering multiplier grows and the active bounds stay met.
     const int count = column_count();
-    double pull[max_columns], row[max_columns];
+    double pull[max_columns_with_limits], row[max_columns_with_limits];
     const double square = eliminate(entering, count, row);
     std::copy_n(row, count, pull);
     back_substitute(pull);
@@ -384,7 +386,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       relaxed_[entering] = 1;
       multiplier = side * linear(entering);
     } else {
-      if (count == max_columns) return Outcome::too_much;
+      if (count == most_columns_) return Outcome::too_much;
       value_[entering] = target(entering, multiplier);
       std::copy_n(row, count, factor_row(count));
       append_column(entering, square, multiplier);
