@@ -15,7 +15,7 @@ namespace {
 // A solution is accepted if active bounds are met to within this fraction of the tolerance for violations.
 constexpr double exactness = 0.1;
 // With more violated bounds, the allowed number of changes is unlikely to suffice.
-constexpr int max_violated = 2 * DualActiveSet::max_columns;
+constexpr int violated_for_each_column = 2;
 // Number of solutions with an unchanged active set before rounding errors are assumed, and how many of them are
 // combined from sensitivities.
 constexpr int max_refinements = 4, max_combined = 2;
@@ -28,6 +28,7 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
       limit_row_(capacity.limit_row()),
       most_columns_(capacity.limits > 0 ? max_columns_with_limits : max_columns),
       batch_count_(most_columns_ / batch_size + 1),
+      most_changes_(capacity.limits > 0 ? max_changes_with_limits : max_changes),
       has_limits_(capacity.limits > 0),
       held_(capacity),
       claimed_(capacity),
@@ -314,7 +315,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     if (is_capped && linear(entering) == 0.0) relaxed_[entering] = 1;
   }
   for (;;) {
-    if (++changes_ > max_changes) return Outcome::too_much;
+    if (++changes_ > most_changes_) return Outcome::too_much;
     if (is_past(deadline)) return Outcome::out_of_time;
     if (number_[entering] == none && !find_sensitivities_of_next(qp, riccati, &entering, 1)) return Outcome::too_much;
     // Change of values and multipliers while the entering multiplier grows and the active bounds stay met.
@@ -454,7 +455,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     }
     bool needs_factor = drop_wrong(riccati);
     Violations violations = find_violations();
-    if (violations.count > max_violated) return Outcome::too_much;
+    if (violations.count > violated_for_each_column * most_columns_) return Outcome::too_much;
     if (!needs_factor && may_add_together && violations.worst != none) {
       may_add_together = false;
       if (!add_controls_together(qp, riccati, violations.worst)) return Outcome::too_much;
@@ -462,7 +463,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
       violations = find_violations();
     }
     if (needs_factor) {
-      if (changes_ > max_changes) return Outcome::too_much;
+      if (changes_ > most_changes_) return Outcome::too_much;
       if (is_past(deadline)) return Outcome::out_of_time;
       if (!refactor(qp, riccati)) return Outcome::not_convex;
     }

@@ -263,6 +263,7 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   defect_penalty_ = bound_penalty_ = 0.0;
   was_elastic_ = is_priced_ = false;
   attempts_ = 0;
+  qp_solver_.set_cheap(false);
   futile_ = 0;
   penalty_cuts_left_ = most_penalty_cuts;
   best_ = iterate;

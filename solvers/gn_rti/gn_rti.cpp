@@ -169,6 +169,7 @@ Report GnRti::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
 Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   report.status = Status::step_taken;
+  qp_solver_.set_cheap(true);
   bool is_ready = is_prepared_ && linearisation_->is_at(iterate);
   for (int iteration = 0; iteration < options_.iterations; ++iteration) {
     if (iteration > 0 && is_past(deadline)) {

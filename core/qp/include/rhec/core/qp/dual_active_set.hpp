@@ -39,9 +39,10 @@ class RHEC_EXPORT DualActiveSet {
     too_much,     ///< too many changes of the active set, or rounding errors; use another method
     out_of_time
   };
-  /// Largest number of active bounds besides the held ones, of active bounds and limits where there are limits, and of
-  /// changes of the active set.
-  static constexpr int max_columns = 32, max_columns_with_limits = 96, max_changes = 96;
+  /// Largest number of active bounds besides the held ones, and of changes of the active set. With limits there are
+  /// more of both, and a soft one takes up to three changes until it is violated; the interior-point method takes as
+  /// long as some hundred.
+  static constexpr int max_columns = 32, max_columns_with_limits = 96, max_changes = 96, max_changes_with_limits = 288;
 
   DualActiveSet() = default;
   explicit DualActiveSet(const Capacity& capacity);
@@ -57,6 +58,8 @@ class RHEC_EXPORT DualActiveSet {
   void reset() noexcept { rows_change_ = false; }
   /// After `solve`: also computes the policy (Riccati::feedback), which `solve` may omit.
   void complete_policy(const StageQp& qp, Riccati& riccati) noexcept;
+  /// Whether the last factorisation was without any bound.
+  bool holds_nothing() const noexcept { return held_places_.empty(); }
   /// Number since the last `prepare`.
   int factorisations() const noexcept { return factorisations_; }
 
@@ -155,7 +158,7 @@ class RHEC_EXPORT DualActiveSet {
 
   int factorisations_ = 0, changes_ = 0;
   int states_ = 0, stride_ = 0, limit_row_ = 0;
-  int most_columns_ = 0, batch_count_ = 0;
+  int most_columns_ = 0, batch_count_ = 0, most_changes_ = 0;
   int places_ = 0, all_places_ = 0;  ///< number of places that the QP uses: of variables, and of limits too
   bool has_limits_ = false, base_is_saturated_ = false;
   bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
