@@ -257,6 +257,7 @@ std::vector<Finding> check_drives(const CheckedModel& checked, std::vector<Drive
   const std::vector<std::string> errors = maker.names_of_errors();
   if (errors.empty()) return findings;
   std::vector<DriveInformation> with_errors;
+  with_errors.reserve(driven.size());
   for (const Drive& drive : driven) with_errors.push_back(maker.information(drive, true));
   for (Finding& finding : judge_errors(checked, errors, drives, with_errors)) findings.push_back(std::move(finding));
   return findings;
