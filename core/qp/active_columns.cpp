@@ -20,13 +20,13 @@ constexpr double dependence = 1e-10;
 bool DualActiveSet::find_sensitivities(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept {
   const auto choose = [&] {
     int batch = 0;
-    while (batch < batch_count && is_needed(batch, places, count)) ++batch;
+    while (batch < batch_count_ && is_needed(batch, places, count)) ++batch;
     return batch;
   };
   int chosen = choose();
-  if (chosen == batch_count) {
+  if (chosen == batch_count_) {
     // Columns are spread over all batches: recomputing them together frees a batch.
-    for (int k = 0; k < batch_count; ++k) forget(k);
+    for (int k = 0; k < batch_count_; ++k) forget(k);
     if (!find_sensitivities_of_columns(qp, riccati, 0)) return false;
     chosen = choose();
   }
@@ -127,7 +127,7 @@ void DualActiveSet::back_substitute(double* x) const noexcept {
 
 /// Changes the multipliers of the columns so that their bounds are met.
 void DualActiveSet::return_to_bounds(const Riccati& riccati) noexcept {
-  double change[max_columns];
+  double change[max_columns_with_limits];
   const int count = column_count();
   for (int k = 0; k < count; ++k) {
     const double* row = factor_row(k);

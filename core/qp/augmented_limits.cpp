@@ -15,6 +15,8 @@ namespace {
 // Weights relative to the largest curvature of the stage.
 constexpr double weights[] = {1e1, 1e3};
 constexpr int most_sets = 4;
+// QPs that are not convex before one is tried again where each has to be cheap.
+constexpr int most_wait = 16;
 // What the augmentation takes over of the quadratic weight of a slack.
 constexpr double share_of_slack = 0.9;
 
@@ -107,6 +109,14 @@ void StageQpSolver::shift_multipliers(const StageQp& qp, double relative, Iterat
       });
 }
 
+/// Most augmentations that fail do so because the QP is not convex on its active limits either, and then those of the
+/// next samples fail, too.
+bool StageQpSolver::may_augment() noexcept {
+  if (!is_cheap_ || has_fitted_) return true;
+  if (wait_ > 0) --wait_;
+  return not_convex_ > 1 && wait_ == 0;
+}
+
 /// Solves a QP that is not convex but for its active limits; false if it is not convex on them either, or no active set
 /// settles.
 bool StageQpSolver::solve_augmented(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept {
@@ -122,6 +132,7 @@ bool StageQpSolver::solve_augmented(const StageQp& qp, Iterate& step, Clock::tim
       out_of_time_ = outcome == DualActiveSet::Outcome::out_of_time || is_past(deadline);
       if (outcome == DualActiveSet::Outcome::solved && augmentation_fits(qp, relative)) {
         shift_multipliers(qp, relative, step);
+        has_fitted_ = true;
         return true;
       }
       if (outcome != DualActiveSet::Outcome::solved || out_of_time_) break;
@@ -129,7 +140,8 @@ bool StageQpSolver::solve_augmented(const StageQp& qp, Iterate& step, Clock::tim
     if (out_of_time_) break;
   }
   active_ = guessed_;
-  is_convexified_ = is_dual_ = false;
+  is_convexified_ = is_dual_ = has_fitted_ = false;
+  wait_ = most_wait;
   return false;
 }
 

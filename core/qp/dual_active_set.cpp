@@ -15,7 +15,7 @@ namespace {
 // A solution is accepted if active bounds are met to within this fraction of the tolerance for violations.
 constexpr double exactness = 0.1;
 // With more violated bounds, the allowed number of changes is unlikely to suffice.
-constexpr int max_violated = 2 * DualActiveSet::max_columns;
+constexpr int violated_for_each_column = 2;
 // Number of solutions with an unchanged active set before rounding errors are assumed, and how many of them are
 // combined from sensitivities.
 constexpr int max_refinements = 4, max_combined = 2;
@@ -26,6 +26,9 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
     : states_(capacity.states),
       stride_(capacity.row()),
       limit_row_(capacity.limit_row()),
+      most_columns_(capacity.limits > 0 ? max_columns_with_limits : max_columns),
+      batch_count_(most_columns_ / batch_size + 1),
+      most_changes_(capacity.limits > 0 ? max_changes_with_limits : max_changes),
       has_limits_(capacity.limits > 0),
       held_(capacity),
       claimed_(capacity),
@@ -44,11 +47,11 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
   side_.assign(most, 0);
   number_.assign(most, none);
   held_places_.reserve(most);
-  batches_.resize(batch_count);
+  batches_.resize(batch_count_);
   for (Batch& batch : batches_) batch.sensitivities = Riccati::Sensitivities(capacity);
-  for (auto* places : {&columns_, &base_places_}) places->reserve(max_columns);
-  for (auto* v : {&multipliers_, &base_multipliers_}) v->assign(max_columns, 0.0);
-  factor_.assign(static_cast<std::size_t>(max_columns) * max_columns, 0.0);
+  for (auto* places : {&columns_, &base_places_}) places->reserve(most_columns_);
+  for (auto* v : {&multipliers_, &base_multipliers_}) v->assign(most_columns_, 0.0);
+  factor_.assign(static_cast<std::size_t>(most_columns_) * most_columns_, 0.0);
 }
 
 bool DualActiveSet::is_equality_bound(int place) const noexcept {
@@ -74,7 +77,7 @@ void DualActiveSet::take_claims(const StageQp& qp, const ActiveSet& claimed) noe
       hold_[place] = Hold::held;
       held_.row(stage)[j] = side;
       held_places_.push_back(place);
-    } else if (column_count() < max_columns) {
+    } else if (column_count() < most_columns_) {
       hold_[place] = Hold::column;
       multipliers_[column_count()] = 0.0;
       columns_.push_back(place);
@@ -271,7 +274,7 @@ DualActiveSet::Violations DualActiveSet::find_violations() noexcept {
 bool DualActiveSet::add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept {
   if (number_[worst] == none && !find_sensitivities_of_next(qp, riccati, &worst, 1)) return false;
   for (const Batch& batch : batches_) {
-    for (int c = 0; c < batch.count && column_count() < max_columns; ++c) {
+    for (int c = 0; c < batch.count && column_count() < most_columns_; ++c) {
       const int place = batch.of[c];
       if (!is_control(place) || hold_[place] != Hold::free || number_[place] == none || !(violation_[place] > 0.0))
         continue;
@@ -312,12 +315,12 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     if (is_capped && linear(entering) == 0.0) relaxed_[entering] = 1;
   }
   for (;;) {
-    if (++changes_ > max_changes) return Outcome::too_much;
+    if (++changes_ > most_changes_) return Outcome::too_much;
     if (is_past(deadline)) return Outcome::out_of_time;
     if (number_[entering] == none && !find_sensitivities_of_next(qp, riccati, &entering, 1)) return Outcome::too_much;
     // Change of values and multipliers while the entering multiplier grows and the active bounds stay met.
     const int count = column_count();
-    double pull[max_columns], row[max_columns];
+    double pull[max_columns_with_limits], row[max_columns_with_limits];
     const double square = eliminate(entering, count, row);
     std::copy_n(row, count, pull);
     back_substitute(pull);
@@ -384,7 +387,7 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       relaxed_[entering] = 1;
       multiplier = side * linear(entering);
     } else {
-      if (count == max_columns) return Outcome::too_much;
+      if (count == most_columns_) return Outcome::too_much;
       value_[entering] = target(entering, multiplier);
       std::copy_n(row, count, factor_row(count));
       append_column(entering, square, multiplier);
@@ -452,7 +455,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     }
     bool needs_factor = drop_wrong(riccati);
     Violations violations = find_violations();
-    if (violations.count > max_violated) return Outcome::too_much;
+    if (violations.count > violated_for_each_column * most_columns_) return Outcome::too_much;
     if (!needs_factor && may_add_together && violations.worst != none) {
       may_add_together = false;
       if (!add_controls_together(qp, riccati, violations.worst)) return Outcome::too_much;
@@ -460,7 +463,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
       violations = find_violations();
     }
     if (needs_factor) {
-      if (changes_ > max_changes) return Outcome::too_much;
+      if (changes_ > most_changes_) return Outcome::too_much;
       if (is_past(deadline)) return Outcome::out_of_time;
       if (!refactor(qp, riccati)) return Outcome::not_convex;
     }

@@ -23,7 +23,7 @@ void DualActiveSet::take_limit_claims(const StageQp& qp, const ActiveSet& claime
       if (is_violated && qp.limit_quadratic(i)[r] == 0.0) {
         hold_[place] = Hold::saturated;
         saturated_.push_back(place);
-      } else if (column_count() < max_columns) {
+      } else if (column_count() < most_columns_) {
         hold_[place] = Hold::column;
         relaxed_[place] = is_violated ? 1 : 0;
         multipliers_[column_count()] = 0.0;
@@ -105,7 +105,7 @@ void DualActiveSet::compare_rows(const StageQp& qp) noexcept {
   const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(stride_) * qp.capacity().limits * (qp.intervals() + 1);
   if (std::memcmp(qp.G(0), rows_.data(), static_cast<std::size_t>(count) * sizeof(double)) == 0) return;
   rows_change_ = true;
-  for (int batch = 0; batch < batch_count; ++batch) forget(batch);
+  for (int batch = 0; batch < batch_count_; ++batch) forget(batch);
 }
 
 /// Whether a step that was found without limits violates one. Leaves the limits' values.

@@ -139,6 +139,30 @@ void Riccati::null_space(const double* D, const double* E, int width, const bool
     for (int c = 0; c < ns_; ++c) v.Y[c * width_ + v.pivot_column[k]] = -E[c * ld + v.pivot_row[k]];
 }
 
+namespace {
+
+// Of reflected eigenvalues: the least size of the largest, and of all relative to it.
+constexpr double least_curvature = 1e-12, least_ratio = 1e-8;
+
+/// Reflects the negative eigenvalues of a symmetric matrix of two rows: the sum of |eigenvalue| times the projection on
+/// its eigenvector. Most vehicles have two inputs, and the general method takes many times as long.
+void reflect_two(double* matrix) noexcept {
+  double &a = matrix[0], &b = matrix[1], &c = matrix[3];
+  const double mean = 0.5 * (a + c), radius = std::hypot(0.5 * (a - c), b);
+  const double upper = mean + radius, lower = mean - radius;
+  const double top = std::max({std::abs(upper), std::abs(lower), least_curvature});
+  const double first = std::max(std::abs(upper), least_ratio * top),
+               second = std::max(std::abs(lower), least_ratio * top);
+  // M = upper P + lower (1 - P), so |M| = second + (first - second) P.
+  const double share = radius > 0.0 ? (first - second) / (2.0 * radius) : 0.0;
+  const double left = second - share * lower;
+  a = left + share * a;
+  b = matrix[2] = share * b;
+  c = left + share * c;
+}
+
+}  // namespace
+
 /// Cholesky factor of a reduced Hessian, which is convexified first if necessary.
 void Riccati::factor_reduced(double* reduced, int n, double tolerance, double* factor) noexcept {
   for (int j = 0; j < n; ++j) std::copy_n(reduced + j * width_, n, factor + j * width_);
@@ -157,13 +181,17 @@ void Riccati::factor_reduced(double* reduced, int n, double tolerance, double* f
     for (int j = 0; j < n; ++j) factor[j * width_ + j] = std::nan("");
     return;
   }
-  const Eigen::SelfAdjointEigenSolver<Small> eigen(matrix);
-  Small values = Small::Zero(n, n);
-  const double top = std::max(eigen.eigenvalues().cwiseAbs().maxCoeff(), 1e-12);
-  for (int j = 0; j < n; ++j) values(j, j) = std::max(std::abs(eigen.eigenvalues()[j]), 1e-8 * top);
-  Small half(n, n);
-  half.noalias() = eigen.eigenvectors().lazyProduct(values);
-  matrix.noalias() = half.lazyProduct(eigen.eigenvectors().transpose());
+  if (n == 2) {
+    reflect_two(matrix.data());
+  } else {
+    const Eigen::SelfAdjointEigenSolver<Small> eigen(matrix);
+    Small values = Small::Zero(n, n);
+    const double top = std::max(eigen.eigenvalues().cwiseAbs().maxCoeff(), least_curvature);
+    for (int j = 0; j < n; ++j) values(j, j) = std::max(std::abs(eigen.eigenvalues()[j]), least_ratio * top);
+    Small half(n, n);
+    half.noalias() = eigen.eigenvectors().lazyProduct(values);
+    matrix.noalias() = half.lazyProduct(eigen.eigenvectors().transpose());
+  }
   for (int c = 0; c < n; ++c) std::copy_n(matrix.data() + c * n, n, factor + c * width_);
   small::factor(factor, width_, n, 0.0);
 }

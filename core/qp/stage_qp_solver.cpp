@@ -44,8 +44,8 @@ StageQpSolver::StageQpSolver(const Capacity& capacity)
 void StageQpSolver::reset() noexcept {
   active_.clear();
   dual_.reset();
-  factored_ = prepared_ = false;
-  factorisations_ = 0;
+  factored_ = prepared_ = has_fitted_ = false;
+  factorisations_ = not_convex_ = wait_ = 0;
 }
 
 void StageQpSolver::guess_from(const StageQp& qp, const Iterate& iterate) noexcept {
@@ -182,11 +182,13 @@ StageQpSolver::Outcome StageQpSolver::solve_limited(const StageQp& qp, Iterate& 
   if (mark_bounds(qp, step, bound_tolerance, marks_.data()) || limits_cross(qp, bound_tolerance))
     return Outcome::infeasible;
   auto outcome = solve_from_guess(qp, step, deadline);
+  not_convex_ = outcome == DualActiveSet::Outcome::not_convex ? not_convex_ + 1 : 0;
   if (outcome == DualActiveSet::Outcome::not_convex) {
     if (is_past(deadline)) return Outcome::out_of_time;
-    if (solve_augmented(qp, step, deadline)) return Outcome::active_set;
+    const bool is_factored = !may_augment();
+    if (!is_factored && solve_augmented(qp, step, deadline)) return Outcome::active_set;
     if (out_of_time_) return Outcome::out_of_time;
-    const StageQp& convex = convexify(qp);
+    const StageQp& convex = is_factored && dual_.holds_nothing() ? take_convexified(qp) : convexify(qp);
     prepared_ = false;
     outcome = solve_from_guess(convex, step, deadline);
   }
@@ -263,7 +265,12 @@ const StageQp& StageQpSolver::convexify(const StageQp& qp) noexcept {
   const StageQp& now = solved(qp);
   riccati_.factor(now, no_bounds_);
   ++factorisations_;
-  if (!riccati_.was_convexified()) return now;
+  return take_convexified(qp);
+}
+
+/// The QP as it was convexified by the last factorisation, which was without bounds.
+const StageQp& StageQpSolver::take_convexified(const StageQp& qp) noexcept {
+  if (!riccati_.was_convexified()) return solved(qp);
   if (!is_convexified_) convexified_ = qp;
   riccati_.write_convexified(convexified_);
   is_convexified_ = was_convexified_ = true;

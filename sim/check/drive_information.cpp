@@ -19,11 +19,11 @@ constexpr double largest_null_part = 1e-6;  // of a unit vector, in the undeterm
 
 }  // namespace
 
-void Drives::add_parameters(const Drive& drive, int interval, Eigen::Ref<Matrix> by_unknowns) const {
+void Drives::add_parameters(const Drive& drive, int interval, int first, Eigen::Ref<Matrix> by_unknowns) const {
   const Matrix& jacobian = drive.jacobians[interval];
   const bool with_end = jacobian.cols() > nx_ + nu_ + np_;
   for (int j = 0; j < np_; ++j) {
-    const int now = nx_ + blocks_.unknown[j][interval];
+    const int now = first + blocks_.unknown[j][interval];
     const auto at_start = jacobian.col(nx_ + nu_ + j);
     // On a ramp the interval starts with the previous block's value.
     by_unknowns.col(blocks_.ramp[j][interval] ? now - 1 : now) += at_start;
@@ -31,15 +31,23 @@ void Drives::add_parameters(const Drive& drive, int interval, Eigen::Ref<Matrix>
   }
 }
 
-std::string Drives::name_of_unknown(int unknown) const {
+std::vector<std::string> Drives::names_of_errors() const {
+  std::vector<std::string> names;
+  for (const int j : checked_.options.biased) names.push_back(about_.outputs[j].name + "_bias");
+  for (const int j : checked_.options.scaled) names.push_back(about_.outputs[j].name + "_scale");
+  return names;
+}
+
+std::string Drives::name_of_unknown(int unknown, int errors) const {
   if (unknown < nx_) return about_.states[unknown].name;
-  const int block = unknown - nx_, parameter = blocks_.parameter_of[block];
+  if (unknown < nx_ + errors) return names_of_errors()[unknown - nx_];
+  const int block = unknown - nx_ - errors, parameter = blocks_.parameter_of[block];
   const int first = blocks_.unknown[parameter].front(), last = blocks_.unknown[parameter].back();
   const std::string& name = about_.parameters[parameter].name;
   return first == last ? name : fmt::format("{}[{}]", name, block - first);
 }
 
-std::vector<std::string> Drives::combinations(Matrix null_space) const {
+std::vector<std::string> Drives::combinations(Matrix null_space, int errors) const {
   std::vector<std::pair<int, std::string>> texts;  // with the first unknown as sort key
   for (Eigen::Index c = 0; c < null_space.cols(); ++c) {
     Eigen::Index pivot = 0;
@@ -64,7 +72,7 @@ std::vector<std::string> Drives::combinations(Matrix null_space) const {
         break;
       }
       const double sign = v[order[0]] < 0.0 ? -1.0 : 1.0, weight = sign * v[order[k]];
-      const std::string name = name_of_unknown(order[k]);
+      const std::string name = name_of_unknown(order[k], errors);
       if (order.size() == 1)
         text = name;
       else
@@ -79,9 +87,12 @@ std::vector<std::string> Drives::combinations(Matrix null_space) const {
   return sorted;
 }
 
-DriveInformation Drives::information(const Drive& drive) const {
-  const int blocks = static_cast<int>(blocks_.parameter_of.size()), unknowns = nx_ + blocks, steps = nu_ * intervals_,
-            rows = ny_ * (intervals_ + 1);
+DriveInformation Drives::information(const Drive& drive, bool with_errors) const {
+  const std::vector<int>&biased = checked_.options.biased, &scaled = checked_.options.scaled;
+  const int biases = with_errors ? static_cast<int>(biased.size()) : 0,
+            errors = biases + (with_errors ? static_cast<int>(scaled.size()) : 0);
+  const int blocks = static_cast<int>(blocks_.parameter_of.size()), first_block = nx_ + errors,
+            unknowns = first_block + blocks, steps = nu_ * intervals_, rows = ny_ * (intervals_ + 1);
   DriveInformation found;
   found.name = drive.name;
   found.meaning = drive.meaning;
@@ -89,6 +100,7 @@ DriveInformation Drives::information(const Drive& drive) const {
   found.unknowns = unknowns;
   found.parameter_sigma.assign(np_, infinity);
   found.state_determined.assign(nx_, false);
+  found.error_sigma.assign(errors, infinity);
   if (!drive.unusable.empty()) return found;
 
   // Unknowns in scales, inputs in standard deviations, rows in standard deviations: [inputs, unknowns] of the outputs,
@@ -99,26 +111,44 @@ DriveInformation Drives::information(const Drive& drive) const {
   };
   Vector scales(unknowns);
   for (int j = 0; j < nx_; ++j) scales[j] = about_.states[j].scale;
-  for (int b = 0; b < blocks; ++b) scales[nx_ + b] = about_.parameters[blocks_.parameter_of[b]].scale;
+  for (int e = 0; e < errors; ++e) scales[nx_ + e] = e < biases ? about_.outputs[biased[e]].scale : 1.0;
+  for (int b = 0; b < blocks; ++b) scales[first_block + b] = about_.parameters[blocks_.parameter_of[b]].scale;
   Matrix by_unknowns = Matrix::Zero(nx_, unknowns), by_inputs = Matrix::Zero(nx_, steps);
   by_unknowns.leftCols(nx_).setIdentity();
   Matrix stacked = Matrix::Zero(rows + steps, steps + unknowns);
   stacked.block(rows, 0, steps, steps).setIdentity();
+  const auto input_sigma = [&](int j) { return noise(checked_.input_sigmas[j], about_.inputs[j].scale); };
+  const auto is_of_motion = [&](int r) {
+    return std::find(motion_.which().begin(), motion_.which().end(), r) != motion_.which().end();
+  };
   for (int k = 0; k <= intervals_; ++k) {
     const Matrix& seen = drive.output_jacobians[k];
+    Matrix outputs_by_unknowns = seen * by_unknowns, outputs_by_inputs = seen * by_inputs;
+    for (int m = 0; m < motion_.count() && k > 0; ++m) {
+      const int r = motion_.which()[m], interval = k - 1;
+      const auto slopes = drive.motion_jacobians[interval].row(m);
+      outputs_by_unknowns.row(r) = slopes.head(nx_) * by_unknowns;
+      outputs_by_inputs.row(r) = slopes.head(nx_) * by_inputs;
+      for (int j = 0; j < np_; ++j)
+        outputs_by_unknowns(r, first_block + blocks_.unknown[j][interval]) += slopes[nx_ + nu_ + j];
+      for (int j = 0; j < nu_; ++j) outputs_by_inputs(r, interval * nu_ + j) += slopes[nx_ + j] * input_sigma(j);
+    }
+    for (int e = 0; e < errors; ++e) {
+      const int r = e < biases ? biased[e] : scaled[e - biases];
+      outputs_by_unknowns(r, nx_ + e) = e < biases ? 1.0 : drive.outputs(r, k);
+    }
     for (int r = 0; r < ny_; ++r) {
+      if (k == 0 && is_of_motion(r)) continue;
       const double weight = 1.0 / noise(checked_.output_sigmas[r], about_.outputs[r].scale);
-      stacked.row(k * ny_ + r).head(steps) = weight * seen.row(r) * by_inputs;
-      stacked.row(k * ny_ + r).tail(unknowns) = weight * (seen.row(r) * by_unknowns).cwiseProduct(scales.transpose());
+      stacked.row(k * ny_ + r).head(steps) = weight * outputs_by_inputs.row(r);
+      stacked.row(k * ny_ + r).tail(unknowns) = weight * outputs_by_unknowns.row(r).cwiseProduct(scales.transpose());
     }
     if (k == intervals_) break;
     const auto by_state = drive.jacobians[k].leftCols(nx_);
     by_unknowns = (by_state * by_unknowns).eval();
     by_inputs = (by_state * by_inputs).eval();
-    add_parameters(drive, k, by_unknowns);
-    for (int j = 0; j < nu_; ++j)
-      by_inputs.col(k * nu_ + j) +=
-          noise(checked_.input_sigmas[j], about_.inputs[j].scale) * drive.jacobians[k].col(nx_ + j);
+    add_parameters(drive, k, first_block, by_unknowns);
+    for (int j = 0; j < nu_; ++j) by_inputs.col(k * nu_ + j) += input_sigma(j) * drive.jacobians[k].col(nx_ + j);
   }
   if (!stacked.allFinite()) {
     found.unusable = "its sensitivities are not finite";
@@ -131,6 +161,11 @@ DriveInformation Drives::information(const Drive& drive) const {
 
   const Eigen::JacobiSVD<Matrix> svd(root, Eigen::ComputeFullV);
   const Vector& values = svd.singularValues();
+  // Squares of sensitivities that are finite need not be.
+  if (!root.allFinite() || !values.allFinite() || !svd.matrixV().allFinite()) {
+    found.unusable = "its sensitivities are not finite";
+    return found;
+  }
   while (found.rank < unknowns && values[found.rank] > rank_threshold * values[0]) ++found.rank;
   if (found.rank > 0) found.condition = values[0] / values[found.rank - 1];
   const Matrix& directions = svd.matrixV();
@@ -142,10 +177,11 @@ DriveInformation Drives::information(const Drive& drive) const {
   for (int j = 0; j < nx_; ++j) found.state_determined[j] = std::isfinite(sigma(j));
   for (int b = 0; b < blocks; ++b) {
     double& best = found.parameter_sigma[blocks_.parameter_of[b]];
-    best = std::min(best, sigma(nx_ + b));
+    best = std::min(best, sigma(first_block + b));
   }
-  found.undetermined = combinations(directions.rightCols(unknowns - found.rank));
-  if (found.rank > 0) found.weakest = combinations(directions.col(found.rank - 1)).front();
+  for (int e = 0; e < errors; ++e) found.error_sigma[e] = sigma(nx_ + e);
+  found.undetermined = combinations(directions.rightCols(unknowns - found.rank), errors);
+  if (found.rank > 0) found.weakest = combinations(directions.col(found.rank - 1), errors).front();
   return found;
 }
 

@@ -30,7 +30,8 @@ Drives::Drives(const CheckedModel& checked)
       nu_(checked.model.input_count()),
       np_(checked.model.parameter_count()),
       ny_(checked.model.output_count()),
-      intervals_(std::min(checked.options.horizon, ModelCheckOptions::longest_horizon)) {
+      intervals_(std::min(checked.options.horizon, ModelCheckOptions::longest_horizon)),
+      motion_(checked.model) {
   for (const Variable& p : about_.parameters) {
     const double middle = 0.5 * (p.lower + p.upper);
     parameters_.push_back(std::isfinite(middle) ? middle : std::clamp(p.nominal, p.lower, p.upper));
@@ -158,6 +159,7 @@ Drive Drives::drive(const CourseName& named) {
   observe(made);
   bool finite = made.states.allFinite() && made.outputs.allFinite();
   for (const Matrix& each : made.jacobians) finite = finite && each.allFinite();
+  for (const Matrix& each : made.motion_jacobians) finite = finite && each.allFinite();
   for (const Matrix& each : made.output_jacobians) finite = finite && each.allFinite();
   if (!finite) made.unusable = "states, outputs or derivatives along it are not finite";
   return made;
@@ -187,6 +189,21 @@ void Drives::observe(Drive& made) const {
                             .outputs = made.outputs.col(k).data(),
                             .jacobians = by_state.data()});
     made.output_jacobians.push_back(std::move(by_state));
+  }
+  const int nm = motion_.count();
+  for (int k = 0; k < intervals_; ++k) {
+    Vector values(nm);
+    Matrix slopes(nm, nx_ + nu_ + np_);
+    motion_.evaluate({.count = 1,
+                      .states = made.states.col(k + 1).data(),
+                      .inputs = made.inputs.col(k).data(),
+                      .parameters = parameters_.data(),
+                      .outputs = values.data(),
+                      .jacobians = slopes.data()});
+    // The first node has no interval that ends there.
+    for (int m = 0; m < nm; ++m)
+      for (int node = k == 0 ? 0 : k + 1; node <= k + 1; ++node) made.outputs(motion_.which()[m], node) = values[m];
+    made.motion_jacobians.push_back(std::move(slopes));
   }
 }
 

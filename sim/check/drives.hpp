@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "model_checks.hpp"
+#include "rhec/core/model/motion_outputs.hpp"
 
 namespace rhec::sim {
 
@@ -14,7 +15,8 @@ struct Drive {
   std::string name, meaning, unusable;
   Eigen::MatrixXd states, inputs;                 ///< one column per node, one per interval
   std::vector<Eigen::MatrixXd> jacobians;         ///< by interval, dF/d[x; u; p] or dF/d[x; u; p; p_end]
-  std::vector<Eigen::MatrixXd> output_jacobians;  ///< by node
+  std::vector<Eigen::MatrixXd> output_jacobians;  ///< by node, of the outputs of the state
+  std::vector<Eigen::MatrixXd> motion_jacobians;  ///< by interval, at its end: dh/d[x; u; p] of the outputs of motion
   Eigen::MatrixXd outputs;                        ///< one column per node
 };
 
@@ -31,7 +33,10 @@ class Drives {
   explicit Drives(const CheckedModel& checked);
 
   std::vector<Drive> all();
-  DriveInformation information(const Drive& drive) const;
+  /// With or without the errors of sensors that the options name among the unknowns.
+  DriveInformation information(const Drive& drive, bool with_errors = false) const;
+  /// "yaw_rate_bias", "ground_speed_scale": the errors in the order of DriveInformation::error_sigma.
+  std::vector<std::string> names_of_errors() const;
   /// The largest condition number of the Jacobians of F along a drive, in scales.
   double condition_of_jacobians(const Drive& drive) const;
   double duration() const { return intervals_ * checked_.options.interval; }
@@ -67,10 +72,10 @@ class Drives {
   void observe(Drive& made) const;
 
   /// Adds the sensitivity of an interval's end state to its parameters to `by_unknowns` (n_x rows).
-  void add_parameters(const Drive& drive, int interval, Eigen::Ref<Matrix> by_unknowns) const;
-  std::string name_of_unknown(int unknown) const;
+  void add_parameters(const Drive& drive, int interval, int first, Eigen::Ref<Matrix> by_unknowns) const;
+  std::string name_of_unknown(int unknown, int errors) const;
   /// The undetermined subspace as short linear combinations, each reduced so that it has an unknown of its own.
-  std::vector<std::string> combinations(Matrix null_space) const;
+  std::vector<std::string> combinations(Matrix null_space, int errors) const;
 
   const CheckedModel& checked_;
   const ModelDescription& about_;
@@ -79,6 +84,7 @@ class Drives {
   bool makes_speed_ = false;
   double speed_ = 1.0;
   DriveBlocks blocks_;
+  MotionOutputs motion_;
 };
 
 }  // namespace rhec::sim

@@ -77,6 +77,11 @@ void require_fitting(const Model& model, const ModelDescription& within, const M
     throw Error("check of a model: interval, horizon, substeps and samples are to be greater than 0");
   if (options.speed && !(*options.speed > 0.0 && std::isfinite(*options.speed)))
     throw Error("check of a model: the speed is to be greater than 0");
+  for (const auto* which : {&options.biased, &options.scaled})
+    for (const int j : *which)
+      if (j < 0 || j >= std::ssize(within.outputs))
+        throw Error(fmt::format("check of a model: an error of output {}; it has {} outputs, from 0 on", j,
+                                within.outputs.size()));
   if (!options.blockings.empty() && options.blockings.size() != within.parameters.size())
     throw Error(fmt::format("check of a model: {} blockings for {} parameters", options.blockings.size(),
                             within.parameters.size()));
@@ -275,6 +280,10 @@ ModelCheck check_model(const Host& host, const Robot& robot, ModelCheckOptions o
   options.output_sigmas = robot.output_sigmas();
   options.input_sigmas = robot.input_sigmas();
   options.blockings = robot.make_blockings();
+  for (std::size_t j = 0; j < robot.output_biases().size(); ++j)
+    if (robot.output_biases()[j].sigma > 0.0) options.biased.push_back(static_cast<int>(j));
+  for (std::size_t j = 0; j < robot.output_scales().size(); ++j)
+    if (robot.output_scales()[j].sigma > 0.0) options.scaled.push_back(static_cast<int>(j));
   // The robot's own model is shared; its instruction set must not change.
   const PluginChoice choice = robot.model_choice();
   std::shared_ptr<Model> model = host.make_model(choice.name, choice.options);

@@ -192,6 +192,55 @@ std::vector<Finding> judge_observability(const CheckedModel& checked, const std:
   return findings.take();
 }
 
+/// The combination, on the first drive that has one, in which something is not determined.
+std::string combination_with(const std::vector<DriveInformation>& drives, const std::string& name) {
+  for (const DriveInformation& drive : drives)
+    for (const std::string& text : drive.undetermined)
+      if (text == name || text.find(' ' + name) != std::string::npos)
+        return fmt::format("{} (on '{}')", text, drive.name);
+  return name;
+}
+
+/// Errors of sensors that no drive tells from the state, from slip, or from each other, and slip that no drive tells
+/// from them.
+std::vector<Finding> judge_errors(const CheckedModel& checked, const std::vector<std::string>& names,
+                                  const std::vector<DriveInformation>& without,
+                                  const std::vector<DriveInformation>& drives) {
+  FindingList findings("observability");
+  std::vector<std::string> notes;
+  const auto is_usable = [](const DriveInformation& drive) { return drive.unusable.empty(); };
+  if (std::none_of(drives.begin(), drives.end(), is_usable)) return findings.take();
+  const auto best_of = [](const std::vector<DriveInformation>& all, const auto& sigma_of) {
+    double best = infinity;
+    for (const DriveInformation& drive : all)
+      if (drive.unusable.empty()) best = std::min(best, sigma_of(drive));
+    return best;
+  };
+  for (std::size_t e = 0; e < names.size(); ++e) {
+    const double best = best_of(drives, [&](const DriveInformation& drive) { return drive.error_sigma[e]; });
+    if (std::isfinite(best)) {
+      notes.push_back(fmt::format("{} to {:.2g}", names[e], best));
+      continue;
+    }
+    findings.warn(names[e],
+                  fmt::format("no drive tells it without a prior; what the data cannot separate: {}",
+                              combination_with(drives, names[e])),
+                  "it stays as uncertain as its sigma and the start are: leave it out, or measure what it is confused "
+                  "with by another sensor");
+  }
+  for (std::size_t j = 0; j < checked.about.parameters.size(); ++j) {
+    const auto sigma_of = [j](const DriveInformation& drive) { return drive.parameter_sigma[j]; };
+    if (!std::isfinite(best_of(without, sigma_of)) || std::isfinite(best_of(drives, sigma_of))) continue;
+    const std::string& name = checked.about.parameters[j].name;
+    findings.warn(fmt::format("parameter {}", name),
+                  fmt::format("no drive tells it beside the errors of sensors; what the data cannot separate: {}",
+                              combination_with(drives, name)),
+                  "give one of the errors up, or measure what tells them apart");
+  }
+  if (!notes.empty()) findings.pass(fmt::format("errors of sensors, over one horizon: {}", fmt::join(notes, "; ")));
+  return findings.take();
+}
+
 }  // namespace
 
 std::vector<Finding> check_drives(const CheckedModel& checked, std::vector<DriveInformation>& drives) {
@@ -205,6 +254,12 @@ std::vector<Finding> check_drives(const CheckedModel& checked, std::vector<Drive
   std::vector<Finding> findings = scaling.findings();
   for (Finding& finding : judge_observability(checked, drives, maker.duration()))
     findings.push_back(std::move(finding));
+  const std::vector<std::string> errors = maker.names_of_errors();
+  if (errors.empty()) return findings;
+  std::vector<DriveInformation> with_errors;
+  with_errors.reserve(driven.size());
+  for (const Drive& drive : driven) with_errors.push_back(maker.information(drive, true));
+  for (Finding& finding : judge_errors(checked, errors, drives, with_errors)) findings.push_back(std::move(finding));
   return findings;
 }
 

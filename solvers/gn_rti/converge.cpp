@@ -7,6 +7,7 @@
 #include "gn_rti.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
 #include "rhec/core/qp/kkt.hpp"
+#include "step_costs.hpp"
 
 namespace rhec::gn_rti {
 namespace {
@@ -27,46 +28,13 @@ constexpr double low_share = 0.1, little_less = 0.9, stuck = 0.999;
 // limits.
 constexpr int most_futile = 15;
 constexpr double most_left = 0.9;
+// Steps shorter than this, so many of them in a row, make little progress.
+constexpr double short_step = 0.2, halved = 0.5;
+constexpr int most_short_steps = 8;
+// How often steps at a price begin at the guess.
+constexpr int most_attempts = 2;
 // How often penalties fall.
 constexpr int most_penalty_cuts = 20;
-
-/// The distance of a limit's value beyond its side after a step, as far as the linearisation knows.
-double excess_after(const StageQp& qp, const Iterate& step, int stage, int r) noexcept {
-  const double* row = qp.G(stage) + static_cast<std::ptrdiff_t>(r) * qp.stride();
-  double value = 0.0;
-  for (int j = 0; j < qp.capacity().states + qp.controls(stage); ++j) value += row[j] * step.row(stage)[j];
-  return std::max({0.0, qp.limit_lower(stage)[r] - value, value - qp.limit_upper(stage)[r]});
-}
-
-/// What the slacks cost after a step.
-double slack_costs_after(const StageQp& qp, const Iterate& step) noexcept {
-  double costs = 0.0;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    for (int r = 0; r < qp.limits(i); ++r) {
-      const double linear = qp.limit_linear(i)[r];
-      if (!std::isfinite(linear)) continue;
-      const double slack = excess_after(qp, step, i, r);
-      costs += (linear + 0.5 * qp.limit_quadratic(i)[r] * slack) * slack;
-    }
-  }
-  return costs;
-}
-
-/// Sum by which hard limits are violated after a step, as far as the linearisation knows.
-double violation_after(const StageQp& qp, const Iterate& step) noexcept {
-  double violation = 0.0;
-  for (int i = 0; i <= qp.intervals(); ++i)
-    for (int r = 0; r < qp.limits(i); ++r)
-      if (!std::isfinite(qp.limit_linear(i)[r])) violation += excess_after(qp, step, i, r);
-  return violation;
-}
-
-double largest_gradient(const StageQp& qp) noexcept {
-  double largest = 0.0;
-  for (int i = 0; i <= qp.intervals(); ++i)
-    for (int j = 0; j < qp.stride(); ++j) largest = std::max(largest, std::abs(qp.h(i)[j]));
-  return largest;
-}
 
 }  // namespace
 
@@ -99,7 +67,7 @@ double GnRti::merit(const Iterate& iterate) noexcept {
   const double without = objective + defect_penalty_ * defect + bound_penalty_ * total_violation(*ocp_, iterate);
   if (limits_.empty()) return without;
   const LimitCosts limits = costs_of_limits(iterate);
-  return without + limits.slack + bound_penalty_ * limits.violation;
+  return without + limits.slack + (is_priced_ ? price_ : bound_penalty_) * limits.violation;
 }
 
 LimitCosts GnRti::costs_of_limits(const Iterate& iterate) noexcept {
@@ -124,9 +92,37 @@ void GnRti::raise(double& penalty, double least) noexcept {
   penalty = std::max(penalty, least);
 }
 
+/// Second-order correction (Nocedal & Wright 2006, section 18.3): the step with the values that limits and
+/// dynamics have at its end, in `trial_`, by a QP in `trial_qp_`. False if there is none. The step itself is kept in
+/// `first_step_`.
+bool GnRti::correct_step(const StageQp& first, Report& report, Clock::time_point deadline) noexcept {
+  ocp_->evaluate_limits(trial_, limits_.data(), scratch_);
+  trial_qp_ = first;
+  first_step_ = step_;
+  if (!std::isfinite(ocp_->evaluate(trial_, defects_.data(), scratch_))) return false;
+  for (int i = 0; i <= trial_qp_.intervals(); ++i) {
+    const double* values = limits_.data() + static_cast<std::ptrdiff_t>(i) * ocp_->capacity().limit_row();
+    for (int r = 0; r < trial_qp_.limits(i); ++r) {
+      const double* row = trial_qp_.G(i) + static_cast<std::ptrdiff_t>(r) * trial_qp_.stride();
+      double along = 0.0;
+      for (int j = 0; j < trial_qp_.capacity().states + trial_qp_.controls(i); ++j) along += row[j] * step_.row(i)[j];
+      if (!std::isfinite(values[r] - along)) return false;
+      trial_qp_.limit_lower(i)[r] = ocp_->limit_lower(i)[r] - values[r] + along;
+      trial_qp_.limit_upper(i)[r] = ocp_->limit_upper(i)[r] - values[r] + along;
+    }
+    for (int j = 0; i < trial_qp_.intervals() && j < trial_qp_.states(i + 1); ++j)
+      trial_qp_.b(i)[j] += defects_[static_cast<std::ptrdiff_t>(i) * ocp_->capacity().states + j];
+  }
+  qp_solver_.guess_from(trial_qp_, step_);
+  const auto outcome = solve_qp(report, deadline);
+  return (outcome == StageQpSolver::Outcome::active_set || outcome == StageQpSolver::Outcome::interior_point) &&
+         is_finite(*ocp_, step_);
+}
+
 /// Line search along the step from `best_` on the l1 merit function; the accepted iterate goes to `trial_`. False if no
 /// step length is acceptable.
-bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
+bool GnRti::search_along_step(Report& report, double residual, double& merit_after,
+                              Clock::time_point deadline) noexcept {
   was_elastic_ = is_elastic_;
   raise(defect_penalty_, 1.5 * largest_costate(*ocp_, step_));
   raise(bound_penalty_, 1.5 * largest_bound_multiplier(*ocp_, step_));
@@ -145,6 +141,7 @@ bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
     // Where hard limits have a price in the QP, their violation is among these costs.
     if (!is_elastic_) slope -= bound_penalty_ * asked_share_ * costs_of_limits(best_).violation;
   }
+  slope_ = slope;
   const auto acceptable = [&](double length) {
     merit_after = merit(trial_);
     const double allowed =
@@ -154,21 +151,36 @@ bool GnRti::search_along_step(double residual, double& merit_after) noexcept {
   // Control starts from a given state and follows the policy. Estimation has measurements at every node and takes the
   // linearised states; it tries the policy only if they are not acceptable.
   const bool policy_first = ocp_->can_roll_out();
-  for (double length = 1.0; length >= shortest_step; length *= 0.5) {
-    if (policy_first) {
-      roll_out_step(best_, length, trial_);
-    } else {
-      add_step(best_, length, trial_);
-    }
+  const auto take = [&](double length) {
+    policy_first ? roll_out_step(best_, length, trial_) : add_step(best_, length, trial_);
+  };
+  for (double length = 1.0; length >= std::max(shortest_step, shortest_length_); length *= 0.5) {
+    step_length_ = length;
+    take(length);
     if (acceptable(length)) return true;
     // Near the solution the merit function may reject a good Newton step.
     if (length == 1.0 && residual < near_solution && std::isfinite(merit_after)) {
       ocp_->linearise(all_stages(*ocp_), trial_, Hessian::gauss_newton, trial_qp_, scratch_);
       if (kkt_residual(trial_qp_, trial_).largest() < 0.5 * residual) return true;
     }
-    if (policy_first) continue;
-    roll_out_step(best_, length, trial_);
-    if (acceptable(length)) return true;
+    if (!policy_first) {
+      roll_out_step(best_, length, trial_);
+      if (acceptable(length)) return true;
+    }
+    // A full step may be rejected because limits curve (Maratos' effect), however near the solution is.
+    if (length < 1.0 || limits_.empty()) continue;
+    take(length);
+    const StageQp* const first = std::exchange(qp_, &trial_qp_);
+    if (correct_step(*first, report, deadline)) {
+      take(length);
+      if (acceptable(length)) return true;
+    }
+    // Shorter steps are those of the QP as it was, and so is their policy.
+    qp_ = first;
+    qp_solver_.guess_from(*qp_, first_step_);
+    if (const auto outcome = solve_qp(report, deadline);
+        outcome == StageQpSolver::Outcome::infeasible || outcome == StageQpSolver::Outcome::out_of_time)
+      return false;
   }
   return false;
 }
@@ -194,6 +206,16 @@ void GnRti::relax_qp(double share) noexcept {
     relax(relaxed_qp_.control_lower(i), relaxed_qp_.control_upper(i), relaxed_qp_.controls(i));
     for (int j = 0; j < relaxed_qp_.states(i + 1); ++j) relaxed_qp_.b(i)[j] *= share;
   }
+}
+
+/// Where a QP has no solution: asks for less until it has.
+StageQpSolver::Outcome GnRti::relax_until_feasible(StageQpSolver::Outcome outcome, Report& report,
+                                                   Clock::time_point deadline) noexcept {
+  for (asked_share_ = 1.0; outcome == StageQpSolver::Outcome::infeasible && asked_share_ > least_asked_share;) {
+    relax_qp(0.5);
+    outcome = solve_qp(report, deadline);
+  }
+  return outcome;
 }
 
 /// Solves the QP with a price on the violation of hard limits, an l1 penalty (Nocedal & Wright 2006, section 18.5).
@@ -239,15 +261,18 @@ bool GnRti::is_futile() noexcept {
 Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   defect_penalty_ = bound_penalty_ = 0.0;
-  was_elastic_ = false;
+  was_elastic_ = is_priced_ = false;
+  attempts_ = 0;
+  qp_solver_.set_cheap(false);
   futile_ = 0;
   penalty_cuts_left_ = most_penalty_cuts;
   best_ = iterate;
   // The line search does not vary a given initial state.
   if (ocp_->initial_state()) std::copy_n(ocp_->initial_state(), ocp_->state_count(0), best_.state(0));
   report.status = Status::iteration_limit;
-  double least_residual = std::numeric_limits<double>::infinity();
-  int slow = 0;
+  double least_residual = std::numeric_limits<double>::infinity(), last_residual = least_residual;
+  double halved_residual = least_residual;
+  int slow = 0, short_steps = 0, stagnant = 0;
   for (;; ++report.iterations) {
     linearise(best_);
     report.kkt = kkt_residual(*qp_, best_);
@@ -273,14 +298,25 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
     }
     least_residual = std::min(least_residual, residual);
 
+    if (!limits_.empty() && !is_priced_ && is_violation_stuck(report.iterations)) {
+      begin_priced_at(iterate);
+      continue;
+    }
+    // Damped steps do better than short ones, and than those of a Hessian that is not convex.
+    stagnant = residual > halved * halved_residual ? stagnant + 1 : 0;
+    if (stagnant == 0) halved_residual = residual;
+    if (std::max(short_steps, stagnant) > most_short_steps && !limits_.empty() && !is_priced_ && is_nearly_feasible())
+      begin_priced(2.0 * largest_bound_multiplier(*ocp_, best_));
     double merit_after = 0.0;
     bool feasible = false, accepted = false, late = false;
     // Large multipliers of priced limits would dominate the exact Hessian.
     bool may_be_elastic = !limits_.empty() && hessian() != Hessian::exact;
     const auto try_step = [&] {
+      StageQpSolver::Outcome outcome{};
+      if (is_priced_) return take_priced_step(report, residual, merit_after, deadline, feasible, late);
       is_elastic_ = false;
       qp_solver_.guess_from(*qp_, best_);
-      auto outcome = solve_qp(report, deadline);
+      outcome = solve_qp(report, deadline);
       if (outcome == StageQpSolver::Outcome::infeasible && !limits_.empty()) {
         if (!may_be_elastic) return false;
         outcome = solve_elastic(report, deadline);
@@ -291,40 +327,49 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
       }
       // Linearised equations can contradict bounds even if the nonlinear ones do not: then a single step has to remove
       // less.
-      for (asked_share_ = 1.0; outcome == StageQpSolver::Outcome::infeasible && asked_share_ > least_asked_share;) {
-        relax_qp(0.5);
-        outcome = solve_qp(report, deadline);
-      }
+      outcome = relax_until_feasible(outcome, report, deadline);
       late = outcome == StageQpSolver::Outcome::out_of_time;
       if (late || outcome == StageQpSolver::Outcome::infeasible || !is_finite(*ocp_, step_)) return false;
       feasible = true;
-      return search_along_step(residual, merit_after);
+      return search_along_step(report, residual, merit_after, deadline);
     };
     accepted = try_step();
     // Where the exact Hessian had to be convexified its step is unreliable, so the Gauss-Newton step is tried too and
     // the better one is taken. Near the solution merits differ by rounding only, and it is the exact Hessian that
-    // converges.
-    if (!late && hessian() == Hessian::exact &&
-        (!accepted || (qp_solver_.was_convexified() && residual > near_solution))) {
+    // converges, unless it does not.
+    const bool is_unreliable =
+        qp_solver_.was_convexified() && (residual > near_solution || residual > little_less * last_residual);
+    if (!late && hessian() == Hessian::exact && (!accepted || is_unreliable)) {
       std::swap(trial_, other_trial_);
       const bool exact_accepted = accepted;
-      const double exact_merit = merit_after;
       linearisation_->linearise(best_, Hessian::gauss_newton);
       qp_ = &linearisation_->qp();
       may_be_elastic = !limits_.empty();
       accepted = try_step();
-      if (exact_accepted && (!accepted || exact_merit < merit_after)) {
+      // The price may be another one now.
+      if (exact_accepted && (!accepted || merit(other_trial_) < merit_after)) {
         std::swap(trial_, other_trial_);
         accepted = true;
       }
     }
-    if (!accepted || is_futile()) {
-      report.status = accepted   ? Status::infeasible
-                      : late     ? Status::deadline
-                      : feasible ? Status::stalled
-                                 : Status::infeasible;
+    last_residual = residual;
+    const bool is_hopeless = accepted && (is_futile() || (is_priced_ && !raise_price(merit_after)));
+    // The least violation around one point need not be the least of all: from a guess that is left in another direction
+    // there may be none.
+    if ((!accepted || is_hopeless) && !late && !limits_.empty() && attempts_ < most_attempts) {
+      begin_priced_at(iterate);
+      continue;
+    }
+    if (!accepted || is_hopeless) {
+      // A point that meets everything is no sign of infeasibility, whatever became of the QP there.
+      const bool is_feasible_point = std::max(report.kkt.defect, report.kkt.bound_violation) <= options_.tolerance;
+      const bool is_violated = is_priced_ && !limits_.empty() && !is_nearly_feasible();
+      report.status = late                                                           ? Status::deadline
+                      : !is_feasible_point && (accepted || is_violated || !feasible) ? Status::infeasible
+                                                                                     : Status::stalled;
       break;
     }
+    short_steps = step_length_ < short_step ? short_steps + 1 : 0;
     std::swap(best_, trial_);
   }
   const double objective = ocp_->evaluate(best_, nullptr, scratch_);

@@ -84,7 +84,7 @@ void GnRti::setup(const Ocp& ocp) {
   trial_qp_ = relaxed_qp_ = StageQp(capacity);
   qp_ = &linearisation_->qp();
   qp_solver_ = StageQpSolver(capacity);
-  for (Iterate* iterate : {&step_, &trial_, &best_, &other_trial_}) *iterate = Iterate(capacity);
+  for (Iterate* iterate : {&step_, &trial_, &best_, &other_trial_, &first_step_}) *iterate = Iterate(capacity);
   scratch_.assign(ocp.scratch_size(), 0.0);
   if (options_.hessian == Curvature::automatic && options_.mode == Mode::rti) choice_.setup(ocp);
   limits_.assign((static_cast<std::size_t>(capacity.intervals) + 1) * capacity.limit_row(), 0.0);
@@ -169,6 +169,7 @@ Report GnRti::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
 Report GnRti::real_time(Iterate& iterate, Clock::time_point deadline) noexcept {
   Report report;
   report.status = Status::step_taken;
+  qp_solver_.set_cheap(true);
   bool is_ready = is_prepared_ && linearisation_->is_at(iterate);
   for (int iteration = 0; iteration < options_.iterations; ++iteration) {
     if (iteration > 0 && is_past(deadline)) {

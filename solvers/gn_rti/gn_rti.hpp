@@ -27,7 +27,7 @@ struct GnRtiOptions {
   Curvature hessian = Curvature::automatic;
   int iterations = 1;
   double residual = 0.0;
-  int max_iterations = 60;
+  int max_iterations = 100;
   double tolerance = 1e-8;
 
   static const OptionTable<GnRtiOptions>& table();
@@ -72,10 +72,23 @@ class GnRti final : public Solver {
   LimitCosts costs_of_limits(const Iterate& iterate) noexcept;
   StageQpSolver::Outcome solve_qp(Report& report, Clock::time_point deadline) noexcept;
   void relax_qp(double share) noexcept;
+  StageQpSolver::Outcome relax_until_feasible(StageQpSolver::Outcome outcome, Report& report,
+                                              Clock::time_point deadline) noexcept;
   void raise(double& penalty, double least) noexcept;
   bool is_futile() noexcept;
   StageQpSolver::Outcome solve_elastic(Report& report, Clock::time_point deadline) noexcept;
-  bool search_along_step(double residual, double& merit_after) noexcept;
+  bool search_along_step(Report& report, double residual, double& merit_after, Clock::time_point deadline) noexcept;
+  bool correct_step(const StageQp& first, Report& report, Clock::time_point deadline) noexcept;
+  // priced_steps.cpp
+  void begin_priced_at(const Iterate& guess) noexcept;
+  void begin_priced(double price) noexcept;
+  bool is_violation_stuck(int iterations) noexcept;
+  bool is_nearly_feasible() noexcept;
+  void set_price(double price) noexcept;
+  bool raise_price(double merit_after) noexcept;
+  StageQpSolver::Outcome solve_priced(Report& report, Clock::time_point deadline) noexcept;
+  bool take_priced_step(Report& report, double residual, double& merit_after, Clock::time_point deadline,
+                        bool& feasible, bool& late) noexcept;
 
   Options options_;
   const Ocp* ocp_ = nullptr;
@@ -83,7 +96,7 @@ class GnRti final : public Solver {
   StageQp trial_qp_, relaxed_qp_;
   const StageQp* qp_ = nullptr;  ///< the QP being solved: the linearisation's, or `relaxed_qp_`
   StageQpSolver qp_solver_;
-  Iterate step_, trial_, best_, other_trial_;
+  Iterate step_, trial_, best_, other_trial_, first_step_;
   std::vector<double> scratch_, defects_, limits_;
   bool is_prepared_ = false;
   bool is_pending_ = false;  ///< the last step is not assessed yet; `step_` holds the iterate before it
@@ -94,6 +107,18 @@ class GnRti final : public Solver {
   int penalty_cuts_left_ = 0, futile_ = 0;
   double violation_before_ = 0.0;  ///< of the hard limits before the last `futile_` steps
   double asked_share_ = 1.0;       ///< share of the defects and violations that the step must remove
+  // Of steps at a price.
+  bool is_priced_ = false;
+  double price_ = 0.0, damping_ = 0.0;
+  int attempts_ = 0;          ///< that began at the guess
+  double first_price_ = 0.0;  ///< relative to the gradient
+  int futile_prices_ = 0;
+  double settled_violation_ = 0.0;                    ///< before the last futile prices
+  double step_length_ = 1.0, shortest_length_ = 0.0;  ///< of the last search along a step: accepted, and allowed
+  double slope_ = 0.0;                                ///< of the merit along it
+  double first_violation_ = 0.0,
+         least_violation_ = 0.0;  ///< of the hard limits, and at which iteration it was half of that before
+  int least_violation_at_ = 0;
 };
 
 }  // namespace rhec::gn_rti

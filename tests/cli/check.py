@@ -86,6 +86,38 @@ class Test(cli.Findings):
         self.expect(louder[0] > 1.5 * sigma[0] and sigma[3] is None, "noise", f"{sigma} -> {louder}")
         self.check("a recorded drive's", cli.ROOT / "scenarios" / "victoria_park.yaml")
 
+    def errors_of_sensors(self):
+        """Biases and scale errors on every vehicle: what GPS and the start share is named, and what is seen has a sigma."""
+        gyro = cli.ROOT / "scenarios" / "gyro.yaml"
+        found = self.check("gyro", gyro)
+        self.expect(found["verdict"] == "pass", "gyro", f"{found['findings']}")
+        told = [finding["found"] for finding in found["findings"] if "yaw_rate_bias to" in finding["found"]]
+        self.expect(len(told) == 1, "gyro", f"{found['findings']}")
+        for vehicle, antenna, yaw, place in [("bicycle_slip", "x_gps", "yaw_rate", "x_pos"), ("skid_steer", "x_gps", "yaw_rate", "x"),
+                                             ("unicycle_traction", "x_gps", "yaw_rate", "x"),
+                                             ("bicycle_sideslip", "x_gps", "yaw_rate", "x"),
+                                             ("tractor_trailer", "x_tractor_gps", "tractor_yaw_rate", None)]:
+            scenario = "figure8" if vehicle == "bicycle_slip" else vehicle
+            path = cli.ROOT / "scenarios" / f"{scenario}.yaml"
+            errors = assignments("model.outputs=all", f"noise.biases={{{antenna}: {{sigma: 1}}, {yaw}: {{sigma: 0.05}}}}")
+            result = self.rhec("check", path, *errors, "--json")
+            findings = json.loads(result.stdout)["findings"]
+            warned = {finding["where"]: finding["found"] for finding in findings
+                      if finding["verdict"] == "warn" and finding["check"] == "observability"}
+            seen = [finding["found"] for finding in findings if f"{yaw}_bias to" in finding["found"]]
+            self.expect(len(seen) == 1, vehicle, f"{findings}")
+            if place:
+                self.expect(list(warned) == [f"{antenna}_bias"] and f"0.71 {place} - 0.71 {antenna}_bias" in warned[f"{antenna}_bias"],
+                            vehicle, f"{warned}")
+            else:  # two antennas: the other one tells this one's bias
+                self.expect(not warned and f"{antenna}_bias to" in seen[0], vehicle, f"{warned} {seen}")
+        both = self.rhec("check", cli.ROOT / "scenarios" / "tractor_trailer.yaml",
+                         *assignments("model.outputs=all", "noise.biases={x_tractor_gps: {sigma: 1}, x_trailer_gps: {sigma: 1}}"), "--json")
+        warned = {finding["where"]: finding["found"] for finding in json.loads(both.stdout)["findings"] if finding["verdict"] == "warn"}
+        self.expect({"x_tractor_gps_bias", "x_trailer_gps_bias"} <= set(warned), "two antennas", f"{warned}")
+        self.expect(all("x_tractor_gps_bias" in text and "x_trailer_gps_bias" in text for text in warned.values()),
+                    "two antennas", f"{warned}")
+
     def faults(self):
         found = self.check("bounds over a pole", FIGURE8, *assignments("bounds.delta=[-3, 3]"))
         warned = [finding for finding in found["findings"] if finding["verdict"] == "warn"]
@@ -115,7 +147,7 @@ class Test(cli.Findings):
 
 def main():
     test = Test(Program(sys.argv[1]))
-    for part in (test.every_model, test.scenario, test.faults, test.bad_input, test.others):
+    for part in (test.every_model, test.scenario, test.errors_of_sensors, test.faults, test.bad_input, test.others):
         part()
     test.tell()
 

@@ -8,6 +8,7 @@
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/estimation/estimator.hpp"
+#include "rhec/core/estimation/prior_bank.hpp"
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/core/model/sensor_model.hpp"
 #include "rhec/core/model/state_noise_model.hpp"
@@ -150,6 +151,39 @@ struct BiasFilter {
   }
 };
 
+/// The same filter without the input as a state: what disturbs the motion, B n, and what disturbs the accelerometer, n
+/// + v, are correlated (Bar-Shalom, Li & Kirubarajan 2001, section 8.3).
+struct CorrelatedFilter {
+  Eigen::Vector3d mean{0.0, 0.0, 0.0};
+  Eigen::Matrix3d covariance = Eigen::Vector3d(1.0, 1.0, 0.25).asDiagonal();
+  /// To the next node, and its outputs, NaN where one is missing.
+  void advance(const Model& trolley, double duration, double input, const double* outputs, double input_sigma,
+               double drift, const Eigen::Vector2d& sigmas) {
+    const double zero[] = {0.0, 0.0};
+    double J[6];
+    trolley.integrate(
+        {.count = 1, .states = zero, .inputs = zero, .parameters = zero, .durations = &duration, .jacobians = J});
+    Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
+    A.topLeftCorner<2, 2>() = Eigen::Map<const Eigen::Matrix2d>(J);
+    const Eigen::Vector3d B(J[4], J[5], 0.0);
+    const double Q = input_sigma * input_sigma;
+    mean = (A * mean + B * input).eval();
+    covariance = (A * covariance * A.transpose() + Q * B * B.transpose()).eval();
+    covariance(2, 2) += drift * drift * duration;
+    const int count = std::isnan(outputs[1]) ? 1 : 2;
+    Eigen::Matrix<double, 2, 3> H;
+    H << 1.0, 0.0, 0.0, -0.4, -0.2, 1.0;
+    const Eigen::Vector2d D(0.0, 1.0);
+    const Eigen::MatrixXd h = H.topRows(count), d = D.head(count),
+                          shared = covariance * h.transpose() + Q * B * d.transpose();
+    Eigen::MatrixXd S = h * shared + Q * d * (B.transpose() * h.transpose()) + Q * d * d.transpose();
+    S.diagonal() += sigmas.head(count).cwiseAbs2();
+    const Eigen::MatrixXd gain = shared * S.inverse();
+    mean += gain * (Eigen::Map<const Eigen::VectorXd>(outputs, count) - h * mean - d * input);
+    covariance = (covariance - gain * S * gain.transpose()).eval();
+  }
+};
+
 TEST(FilterEstimation, FindsABiasThatDriftsAsTheFilterByHandDoes) {
   ModelDescription about;
   about.states.resize(2);
@@ -182,12 +216,26 @@ TEST(FilterEstimation, FindsABiasThatDriftsAsTheFilterByHandDoes) {
   of_window.initial_covariance = covariance;
   RecedingHorizonEstimation window(model, gn_rti(), of_window);
 
+  PriorBank::Setup of_bank;
+  of_bank.members = {PriorCombination{}};
+  of_bank.output_variances = of_filter.noise.output_variances;
+  of_bank.input_variances = of_filter.noise.input_variances;
+  of_bank.adapts_noise = false;
+  PriorBank bank(model, of_bank);
+  bank.reset(mean, covariance);
+  Eigen::VectorXd bank_mean;
+  Eigen::MatrixXd bank_covariance;
+
   BiasFilter by_hand;
+  CorrelatedFilter correlated;
   Estimate of_both[] = {empty_estimate(*model), empty_estimate(*model)};
   const double first[] = {0.1, nan};
   filter.start(first);
   window.start(first);
+  bank.update(first);
   by_hand.update({1.0, 0.0, 0.0, 0.0}, 0.1, of_position);
+  correlated.mean = by_hand.mean.head(3);
+  correlated.covariance = by_hand.covariance.topLeftCorner(3, 3);
   for (int k = 1; k <= 40; ++k) {
     const double duration = 0.1 + 0.02 * (k % 5), inputs[] = {std::sin(0.4 * k), 0.0},
                  outputs[] = {0.3 * std::sin(0.2 * k), k % 7 == 3 ? nan : 0.4 + 0.2 * std::cos(0.3 * k)};
@@ -196,6 +244,14 @@ TEST(FilterEstimation, FindsABiasThatDriftsAsTheFilterByHandDoes) {
     by_hand.predict(*trolley, duration, inputs[0], of_input, drift);
     by_hand.update({1.0, 0.0, 0.0, 0.0}, outputs[0], of_position);
     if (!std::isnan(outputs[1])) by_hand.update({-0.4, -0.2, 1.0, 1.0}, outputs[1], of_acceleration);
+    bank.predict(inputs, duration);
+    bank.update(outputs);
+    bank.moments(bank_mean, bank_covariance);
+    correlated.advance(*trolley, duration, inputs[0], outputs, of_input, drift, {of_position, of_acceleration});
+    EXPECT_LT((correlated.mean - by_hand.mean.head(3)).cwiseAbs().maxCoeff(), 1e-9) << k;
+    EXPECT_LT((correlated.covariance - by_hand.covariance.topLeftCorner(3, 3)).cwiseAbs().maxCoeff(), 1e-9) << k;
+    EXPECT_LT((bank_mean.head(3) - correlated.mean).cwiseAbs().maxCoeff(), 1e-9) << k;
+    EXPECT_LT((bank_covariance.topLeftCorner(3, 3) - correlated.covariance).cwiseAbs().maxCoeff(), 1e-9) << k;
     filter.estimate(of_both[0], Clock::time_point::max());
     window.estimate(of_both[1], Clock::time_point::max());
     for (const Estimate& estimate : of_both) {

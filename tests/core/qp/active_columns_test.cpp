@@ -76,5 +76,36 @@ TEST(ActiveColumns, LeavesMoreBoundsThanItProvidesForToOthers) {
   EXPECT_LT(distance(qp, step, again), 1e-9);
 }
 
+TEST(ActiveColumns, HaveRoomForManyLimits) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  constexpr int intervals = 2 * DualActiveSet::max_columns;
+  StageQp qp(Capacity{intervals, 1, 1, 1});
+  qp.set_intervals(intervals);
+  qp.initial_state_is_given = true;
+  for (int i = 0; i <= intervals; ++i) {
+    const bool has_control = i < intervals;
+    qp.set_sizes(i, 1, has_control);
+    qp.H(i)[0] = 1.0;
+    qp.h(i)[0] = -100.0;
+    if (!has_control) break;
+    qp.AB(i)[0] = qp.AB(i)[1] = 1.0;
+    qp.H(i)[qp.stride() + 1] = 1.0;
+    qp.control_lower(i)[0] = -infinity;
+    qp.control_upper(i)[0] = infinity;
+    // As a limit, not as a bound of the control, which would be held.
+    qp.set_limits(i, 1);
+    qp.G(i)[1] = 1.0;
+    qp.limit_lower(i)[0] = -infinity;
+    qp.limit_upper(i)[0] = 0.1;
+    qp.limit_linear(i)[0] = infinity;
+  }
+  StageQpSolver solver(qp.capacity());
+  Iterate step(qp.capacity());
+  solver.guess_from(qp, step);
+  ASSERT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::active_set);
+  for (int i = 0; i < intervals; ++i) EXPECT_NEAR(step.control(i)[0], 0.1, 1e-9);
+  EXPECT_LT(testing::kkt_violation(qp, step), 1e-7);  // of multipliers of some thousand
+}
+
 }  // namespace active_columns_test
 }  // namespace rhec

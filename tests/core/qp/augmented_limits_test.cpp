@@ -81,5 +81,43 @@ TEST(AugmentedLimits, StandBesideBoundsOfStates) {
   EXPECT_GT(count.exact, 0.9 * count.bent);
 }
 
+TEST(AugmentedLimits, WaitForASecondQpWhereEachHasToBeCheap) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  // Of x and u = 0, the objective 1/2 x^2 - 1/2 u^2 + 4 u with u >= -1 as a limit has a minimiser only on the limit.
+  StageQp qp(Capacity{1, 1, 1, 1});
+  qp.set_intervals(1);
+  qp.initial_state_is_given = true;
+  qp.set_sizes(0, 1, 1);
+  qp.set_sizes(1, 1, 0);
+  qp.set_limits(0, 1);
+  qp.AB(0)[0] = 1.0;
+  qp.control_lower(0)[0] = -infinity;
+  qp.control_upper(0)[0] = infinity;
+  qp.H(0)[0] = qp.H(1)[0] = 1.0;
+  qp.H(0)[qp.stride() + 1] = -1.0;
+  qp.h(0)[1] = 4.0;
+  qp.G(0)[1] = 1.0;
+  qp.limit_lower(0)[0] = -1.0;
+  qp.limit_upper(0)[0] = infinity;
+  qp.limit_linear(0)[0] = infinity;
+  Iterate claim(qp.capacity()), step(qp.capacity());
+  claim.limit_bound(0)[0] = -5.0;
+  for (const bool is_cheap : {false, true}) {
+    StageQpSolver solver(qp.capacity());
+    solver.set_cheap(is_cheap);
+    bool convexified[2];
+    for (bool& one : convexified) {
+      solver.guess_from(qp, claim);
+      solver.prepare(qp);
+      ASSERT_EQ(solver.solve(qp, step), StageQpSolver::Outcome::active_set);
+      one = solver.was_convexified();
+      EXPECT_NEAR(step.control(0)[0], -1.0, 1e-9);
+    }
+    EXPECT_EQ(convexified[0], is_cheap);
+    EXPECT_FALSE(convexified[1]);
+    EXPECT_NEAR(step.limit_bound(0)[0], -5.0, 1e-9);
+  }
+}
+
 }  // namespace augmented_limits_test
 }  // namespace rhec

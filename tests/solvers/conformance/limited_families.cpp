@@ -134,6 +134,16 @@ Make limited(Spec spec, const Limits& limits) {
   };
 }
 
+/// The same over horizons of 2 to 40 intervals, one other of each seed.
+template <class Spec>
+Make of_any_length(Spec spec, const Limits& limits) {
+  return [=](const ModelPointer& model, unsigned seed) {
+    Spec one = spec;
+    one.intervals = static_cast<int>(RandomProblem(model, 12000 + seed).uniform(2.0, 41.0));
+    return limited(one, limits)(model, seed);
+  };
+}
+
 /// Control of a vehicle that starts on its path.
 RhcSpec on_its_path() {
   RhcSpec spec;
@@ -162,6 +172,27 @@ Limits soft(bool has_linear, bool has_quadratic) {
     limit.linear_weight = has_linear ? some_weight(random) : 0.0;
     limit.quadratic_weight = has_quadratic ? 10.0 * some_weight(random) : 0.0;
   });
+}
+
+/// Each of some limits is inactive, hard or soft, or there twice.
+Limits of_any_kind() {
+  return [](const Stage& stage, RandomProblem& random) {
+    std::vector<Limit> all;
+    for (Limit limit : some_of_all(stage)) {
+      const double kind = random.uniform(0.0, 4.0);
+      if (kind < 1.0) {
+        limit.lower -= 10.0;
+        limit.upper += 10.0;
+      } else if (kind < 2.0) {
+        limit.linear_weight = some_weight(random);
+        limit.quadratic_weight = random.uniform(0.0, 1.0) < 0.5 ? 0.0 : some_weight(random);
+      } else if (kind < 3.0) {
+        all.push_back(limit);
+      }
+      all.push_back(limit);
+    }
+    return all;
+  };
 }
 
 /// What one limit demands another one of the same stage forbids.
@@ -246,6 +277,9 @@ std::vector<Family> limited_families() {
       true;
   add("rhe_limits_blocks", "the same with blocks", limited(rhe([](RheSpec& s) { s.block = 4; }), plain()))
       .several_optima = true;
+  add("rhc_limits_any", "limits of all kinds over horizons of any length", of_any_length(on_its_path(), of_any_kind()))
+      .several_optima = true;
+  add("rhe_limits_any", "the same on estimates", of_any_length(RheSpec{}, of_any_kind())).several_optima = true;
   add("rhc_limits_corridor", "a corridor, which is linear",
       limited(on_its_path(), with([](const Stage& stage) { return std::vector<Limit>{corridor(stage)}; })));
   add("rhc_limits_first_last", "limits on inputs at the first node, on states at the last",

@@ -39,8 +39,10 @@ class RHEC_EXPORT DualActiveSet {
     too_much,     ///< too many changes of the active set, or rounding errors; use another method
     out_of_time
   };
-  /// Largest number of active bounds besides the held ones, and of changes of the active set.
-  static constexpr int max_columns = 32, max_changes = 96;
+  /// Largest number of active bounds besides the held ones, and of changes of the active set. With limits there are
+  /// more of both, and a soft one takes up to three changes until it is violated; the interior-point method takes as
+  /// long as some hundred.
+  static constexpr int max_columns = 32, max_columns_with_limits = 96, max_changes = 96, max_changes_with_limits = 288;
 
   DualActiveSet() = default;
   explicit DualActiveSet(const Capacity& capacity);
@@ -56,6 +58,8 @@ class RHEC_EXPORT DualActiveSet {
   void reset() noexcept { rows_change_ = false; }
   /// After `solve`: also computes the policy (Riccati::feedback), which `solve` may omit.
   void complete_policy(const StageQp& qp, Riccati& riccati) noexcept;
+  /// Whether the last factorisation was without any bound.
+  bool holds_nothing() const noexcept { return held_places_.empty(); }
   /// Number since the last `prepare`.
   int factorisations() const noexcept { return factorisations_; }
 
@@ -64,7 +68,7 @@ class RHEC_EXPORT DualActiveSet {
   enum class Found { nothing, values, step, solution };
   static constexpr int none = -1, batch_size = Riccati::Sensitivities::size;
   /// Enough for all columns and for the bounds that are likely to follow.
-  static constexpr int batch_count = max_columns / batch_size + 1;
+  static constexpr int most_batches = max_columns_with_limits / batch_size + 1;
   struct Batch {
     Riccati::Sensitivities sensitivities;
     std::array<int, batch_size> of{};  ///< places
@@ -73,7 +77,7 @@ class RHEC_EXPORT DualActiveSet {
   struct Violations {
     int worst = none, count = 0;
   };
-  using Weights = std::array<std::array<double, batch_size>, batch_count>;
+  using Weights = std::array<std::array<double, batch_size>, most_batches>;
 
   void take_claims(const StageQp& qp, const ActiveSet& claimed) noexcept;
   bool take_bounds(const StageQp& qp) noexcept;
@@ -110,9 +114,9 @@ class RHEC_EXPORT DualActiveSet {
     return weights[number_[place] / batch_size][number_[place] % batch_size];
   }
   void add_sensitivities(const Riccati& riccati, const Weights& weights, std::vector<double>& sums) const noexcept;
-  double* factor_row(int k) noexcept { return factor_.data() + static_cast<std::ptrdiff_t>(k) * max_columns; }
+  double* factor_row(int k) noexcept { return factor_.data() + static_cast<std::ptrdiff_t>(k) * most_columns_; }
   const double* factor_row(int k) const noexcept {
-    return factor_.data() + static_cast<std::ptrdiff_t>(k) * max_columns;
+    return factor_.data() + static_cast<std::ptrdiff_t>(k) * most_columns_;
   }
   int column_count() const noexcept { return static_cast<int>(columns_.size()); }
 
@@ -154,6 +158,7 @@ class RHEC_EXPORT DualActiveSet {
 
   int factorisations_ = 0, changes_ = 0;
   int states_ = 0, stride_ = 0, limit_row_ = 0;
+  int most_columns_ = 0, batch_count_ = 0, most_changes_ = 0;
   int places_ = 0, all_places_ = 0;  ///< number of places that the QP uses: of variables, and of limits too
   bool has_limits_ = false, base_is_saturated_ = false;
   bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;

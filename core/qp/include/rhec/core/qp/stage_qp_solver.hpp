@@ -62,6 +62,10 @@ class RHEC_EXPORT StageQpSolver {
   /// True if the Hessian has been convexified since the last `guess_from`.
   bool was_convexified() const noexcept { return was_convexified_ || riccati_.was_convexified(); }
   int factorisations() const noexcept { return factorisations_; }
+  /// With limits, whether QPs that are not convex are consecutive ones of a controller, each of which has to be cheap:
+  /// one is convexified at once, unless augmenting the last one for its active limits has done, or was not tried
+  /// lately.
+  void set_cheap(bool cheap) noexcept { is_cheap_ = cheap; }
   void reset() noexcept;
 
  private:
@@ -82,12 +86,14 @@ class RHEC_EXPORT StageQpSolver {
   void augment(const StageQp& qp, double relative) noexcept;
   bool augmentation_fits(const StageQp& qp, double relative) const noexcept;
   void shift_multipliers(const StageQp& qp, double relative, Iterate& step) const noexcept;
+  bool may_augment() noexcept;
   bool solve_augmented(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   void take_interior_set() noexcept;
   bool polish(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   Outcome solve_robustly(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted, Clock::time_point deadline) noexcept;
   const StageQp& convexify(const StageQp& qp) noexcept;
+  const StageQp& take_convexified(const StageQp& qp) noexcept;
 
   /// One bounded variable or limit in the interior-point method: slacks and multipliers of its two sides. A soft side
   /// has the slack of its violation too, with a multiplier of its own; it is eliminated from the Newton system.
@@ -127,7 +133,9 @@ class RHEC_EXPORT StageQpSolver {
   bool prepared_ = false;         ///< for the active set of the warm start
   bool is_dual_ = false;          ///< the last solution is from `dual_`
   bool out_of_time_ = false;
-  bool any_active_ = true;  ///< false: certainly no bound is active
+  bool is_cheap_ = false, has_fitted_ = false;  ///< the augmentation for the last QP that was not convex
+  int not_convex_ = 0, wait_ = 0;  ///< consecutive QPs that were not, and those before the augmentation is tried again
+  bool any_active_ = true;         ///< false: certainly no bound is active
   int factorisations_ = 0;
   double gradient_scale_ = 1.0;      ///< of the last interior-point solution: scale of a slack of one
   std::vector<std::uint8_t> marks_;  ///< stages at which a bound may be active

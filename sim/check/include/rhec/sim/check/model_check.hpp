@@ -34,15 +34,16 @@ struct Finding {
 /// Information that one estimation horizon of a drive contains, without a prior, about its initial state and the
 /// parameters. Measured inputs are unknowns too, measured with their noise.
 struct DriveInformation {
-  std::string name;        ///< "straight", "turn", "slalom" or "standing"
-  std::string meaning;     ///< a phrase with the speed
-  int unknowns = 0;        ///< entries of the state and blocks of parameters
-  int rank = 0;            ///< singular values of the square root of the information, in scales, above rank_threshold
-                           ///< times the largest
-  double condition = 0.0;  ///< of that square root, over those singular values
-  std::vector<double> parameter_sigma;    ///< by parameter: attainable standard deviation (Cramer-Rao) of the
-                                          ///< best-determined block; infinite if none is determined
-  std::vector<bool> state_determined;     ///< by state
+  std::string name;     ///< "straight", "turn", "slalom" or "standing"
+  std::string meaning;  ///< a phrase with the speed
+  int unknowns = 0;     ///< entries of the state, blocks of parameters, and errors of sensors where these are unknown
+  int rank = 0;         ///< singular values of the square root of the information, in scales, above rank_threshold
+                        ///< times the largest
+  double condition = 0.0;               ///< of that square root, over those singular values
+  std::vector<double> parameter_sigma;  ///< by parameter: attainable standard deviation (Cramer-Rao) of the
+                                        ///< best-determined block; infinite if none is determined
+  std::vector<bool> state_determined;   ///< by state
+  std::vector<double> error_sigma;  ///< by error of a sensor that is unknown (ModelCheckOptions), as parameter_sigma
   std::vector<std::string> undetermined;  ///< combinations of unknowns, each in its scale: "0.71 x - 0.71 p"
   std::string weakest;                    ///< the least determined of the determined combinations
   std::string unusable;                   ///< why the analysis failed; empty: it succeeded
@@ -76,6 +77,8 @@ struct ModelCheckOptions {
   std::optional<int> substeps = {};  ///< none: as many as the model needs
   /// Standard deviations; empty: as in Robot. Clamped to between 1e-9 and 1e9 scales.
   std::vector<double> output_sigmas = {}, input_sigmas = {};
+  /// Which outputs have a bias or a scale error that is estimated: judged are these, and the parameters beside them.
+  std::vector<int> biased = {}, scaled = {};
   std::vector<std::shared_ptr<const Blocking>> blockings = {};  ///< by parameter; empty: one value over the horizon
   static constexpr int longest_horizon = 100;
 };
