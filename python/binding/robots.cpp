@@ -10,6 +10,7 @@
 #include "arrays.hpp"
 #include "binding.hpp"
 #include "hosts.hpp"
+#include "jobs.hpp"
 #include "models.hpp"
 #include "reports.hpp"
 #include "rhec/core/base/error.hpp"
@@ -99,8 +100,10 @@ void bind_robots(py::module_& module) {
 
   py::class_<RobotObject, std::shared_ptr<RobotObject>>(module, "Robot")
       .def(py::init([](const std::vector<std::string>& plugin_path, const Settings& settings) {
-             return std::make_shared<RobotObject>(
+             const auto made = std::make_shared<RobotObject>(
                  Robot(examined_host(plugin_path), RobotOptions::table().parse(settings, "robot")));
+             warn_of(made->robot.notes());
+             return made;
            }),
            py::arg("plugin_path"), py::arg("settings"))
       .def_property_readonly("step", [](const RobotObject& self) { return self.robot.step(); })

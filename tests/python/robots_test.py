@@ -183,6 +183,12 @@ def test_paths():
         rhec.Path([(numpy.nan, 0.0, 1.0), (1.0, 0.0, 1.0)])
 
 
+def test_notes_are_warnings():
+    with pytest.warns(rhec.Note, match="step: 1.5 s from node to node is long") as told:
+        rhec.Robot(ROBOT, set={"step": 1.5})
+    assert told[0].filename == __file__ and told[0].message.key == "step" and told[0].message.file is None
+
+
 def test_a_map_is_kept(tmp_path):
     file = tmp_path / "map.sqlite"
     robot = rhec.Robot(ROBOT, set={"blocking": None, "estimator.memory": {"name": "place", "file": str(file)}})

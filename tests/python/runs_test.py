@@ -7,6 +7,7 @@ import signal
 import subprocess
 import threading
 import time
+import warnings
 
 import numpy
 import pytest
@@ -143,6 +144,24 @@ def test_mistakes_in_scenarios():
     with pytest.raises(rhec.Error, match="did you mean") as caught:
         rhec.run(FIGURE8, set={"sped": 3})
     assert caught.value.key == "sped"
+
+
+def test_notes_are_warnings(tmp_path):
+    changes = {**SHORT, "model.outputs": ["x_gps", "y_gps"]}
+    with pytest.warns(rhec.Note, match="passed over, since model.outputs leaves this sensor out") as told:
+        rhec.run(FIGURE8, set=changes)
+    note = told[0]
+    assert len(told) == 1 and note.filename == __file__  # the line that called the package
+    assert (note.message.key, note.message.file) == ("noise.outputs.delta", str(FIGURE8)) and note.message.line > 1
+    with pytest.warns(rhec.Note, match="noise.outputs.delta"):
+        rhec.smooth(FIGURE8, set=changes)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", rhec.Note)  # an error ends the run at once
+        start = time.monotonic()
+        with pytest.raises(rhec.Note):
+            rhec.run(FIGURE8, set={**changes, "path.laps": 100})
+        assert time.monotonic() - start < 20.0
+        rhec.run(FIGURE8, set=SHORT)  # nothing is told where nothing is wrong
 
 
 def test_a_drive_is_smoothed(run):
