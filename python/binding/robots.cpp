@@ -115,6 +115,8 @@ void bind_robots(py::module_& module) {
            py::arg("lateral_acceleration") = INFINITY)
       .def_property_readonly("length", &Path::length, "[m]")
       .def_property_readonly("duration", &Path::duration, "at the reference speeds [s]")
+      .def("__repr__",
+           [](const Path& self) { return fmt::format("<path: {} waypoints, {:.1f} m>", self.size(), self.length()); })
       .def("__len__", &Path::size, "Number of distinct waypoints.")
       .def("at", &waypoint_at, py::arg("arc_length"),
            "x [m], y [m], heading [rad], speed [m/s] and curvature [1/m] at an arc length [m], (5).");

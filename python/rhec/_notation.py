@@ -350,6 +350,9 @@ class CasadiReader:
     def read_all(self, terms):
         """The texts of several terms."""
         casadi = self._casadi
+        if any(isinstance(term, casadi.MX) for term in terms):
+            raise Error("found CasADi's MX, whose terms are matrices; write the equations with SX, or of a Function f of MX take "
+                        "f.expand() of SX symbols")
         terms = [casadi.SX(term) for term in terms]
         for term in terms:
             if term.shape != (1, 1):

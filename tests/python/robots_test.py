@@ -236,6 +236,12 @@ def test_robots_are_pickled_and_others_say_what_to_do(tmp_path, monkeypatch):
     assert pickle.loads(pickle.dumps(command.report)).kkt == command.report.kkt
 
 
+def test_how_things_are_shown():
+    robot = rhec.Robot(ROBOT)
+    assert repr(robot.vehicle) == "<vehicle 'bicycle_slip': 4 states, 2 inputs, 2 parameters, 3 outputs>"
+    assert repr(rhec.Path([(0, 0, 1), (3, 4, 1)])) == "<path: 2 waypoints, 5.0 m>"
+
+
 def test_notes_are_warnings():
     with pytest.warns(rhec.Note, match="step: 1.5 s from node to node is long") as told:
         rhec.Robot(ROBOT, set={"step": 1.5})
