@@ -174,3 +174,14 @@ def test_a_problem_is_solved_by_several_threads():
         numpy.testing.assert_array_equal(problem.solve("sparse_sqp").states, expected)
 
     assert not Threads(solve, solve, solve).failures
+
+
+def test_what_was_not_made_is_refused():
+    estimate = Driven().step()[0]
+    for kind, call in ((rhec.Estimator, lambda it: it.estimate(0.0)), (rhec.Controller, lambda it: it.control(estimate)),
+                       (rhec.Path, lambda it: it.length), (rhec.Vehicle, lambda it: it.name), (rhec.Estimate, lambda it: it.time),
+                       (rhec.Command, lambda it: it.inputs), (rhec.Report, lambda it: it.status), (rhec.Solution, lambda it: it.states)):
+        with pytest.raises(TypeError, match="an object that was not made; call its class"):
+            call(kind.__new__(kind))
+    with pytest.raises(TypeError, match="must be called when overriding __init__"):
+        type("Empty", (rhec.Path,), {"__init__": lambda self: None})()
