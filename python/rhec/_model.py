@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -149,6 +150,8 @@ class Model:
 
         Takes cmake and the compiler that rhec was built with.
         """
+        if not re.fullmatch(r"[A-Za-z]\w*", self.name, re.ASCII):
+            raise Error(f"build: the model's name is '{self.name}'; a plugin takes letters, digits and underscores, and begins with a letter")
         return _Builder(self, folder, instruction_sets).build()
 
     def __repr__(self) -> str:
