@@ -1,5 +1,7 @@
 #include "completion_words.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -101,7 +103,8 @@ Words named(const std::string& key, const Variables& variables) {
         const std::size_t after = std::min(part.find_first_of(", ", at), part.size());
         const std::string rest = part.substr(at + capitals.size(), after - at - capitals.size());
         for (const std::string& name : names)
-          for (std::string& whole : named(key.substr(0, begin) + name + rest + key.substr(end), variables))
+          for (std::string& whole :
+               named(fmt::format("{}{}{}{}", key.substr(0, begin), name, rest, key.substr(end)), variables))
             found.push_back(std::move(whole));
       }
       if (found.empty()) found.push_back(key.substr(0, begin));

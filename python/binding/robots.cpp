@@ -123,7 +123,7 @@ void bind_robots(py::module_& module) {
 
   py::class_<RobotObject, std::shared_ptr<RobotObject>>(module, "Robot")
       .def(py::init([](const std::vector<std::string>& plugin_path, const Settings& settings) {
-             const auto made = std::make_shared<RobotObject>(
+             auto made = std::make_shared<RobotObject>(
                  Robot(examined_host(plugin_path), RobotOptions::table().parse(settings, "robot")));
              warn_of(made->robot.notes());
              return made;
