@@ -96,12 +96,15 @@ Command Program::add(const std::string& name, const std::string& about, const st
 std::vector<CommandDescription> Program::commands() const {
   std::vector<CommandDescription> all;
   for (const CLI::App* command : std::as_const(*app_).get_subcommands([](const CLI::App*) { return true; })) {
-    all.push_back({command->get_name(), command->get_description(), {}});
+    all.push_back({command->get_name(), command->get_description(), {}, {}});
     for (const CLI::Option* option : command->get_options()) {
-      CommandDescription::Option one{{}, option->get_description(), option->get_items_expected_max() > 0};
+      CommandDescription::Option one{
+          {}, option->get_description(), option->get_items_expected_max() > 0, option->get_type_name()};
       for (const std::string& name : option->get_snames()) one.names.push_back("-" + name);
       for (const std::string& name : option->get_lnames()) one.names.push_back("--" + name);
-      if (!one.names.empty()) all.back().options.push_back(std::move(one));
+      const bool is_placed = one.names.empty();
+      if (is_placed) one.names.push_back(option->get_name());
+      (is_placed ? all.back().places : all.back().options).push_back(std::move(one));
     }
   }
   return all;

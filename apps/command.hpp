@@ -64,12 +64,14 @@ class Command {
 /// What a command takes, for those who show it in other forms.
 struct CommandDescription {
   struct Option {
-    std::vector<std::string> names;  ///< with their dashes
+    std::vector<std::string> names;  ///< with their dashes; of what is given by its place, its name
     std::string meaning;
     bool takes_value = false;
+    std::string value;  ///< the word for its value in the help
   };
   std::string name, about;
   std::vector<Option> options;
+  std::vector<Option> places;  ///< what is given by its place, in order
 };
 
 /// The program: one of its commands is called.

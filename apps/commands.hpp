@@ -6,6 +6,7 @@
 
 #include "command.hpp"
 #include "rhec/core/config/settings.hpp"
+#include "rhec/plugins/robot/option_section.hpp"
 
 namespace rhec::apps {
 
@@ -44,5 +45,7 @@ void add_plugin_path(Command& command, std::vector<std::filesystem::path>& direc
 void add_assignments(Command& command, std::vector<std::string>& assignments, const std::string& what);
 /// Applies the assignments of `--set` to `settings`, in the order given.
 void apply_assignments(Settings& settings, const std::vector<std::string>& assignments);
+/// Every section of a scenario with its keys: of simulations, recorded drives, signals and ROS.
+std::vector<OptionSection> option_sections();
 
 }  // namespace rhec::apps

@@ -79,10 +79,20 @@ void ask_for_sensors(const Host& host, sim::StarterWishes& wishes) {
 }
 
 void refuse_what_is_there(const fs::path& folder, bool force) {
+  std::error_code none;  // what else is wrong with the folder is told where it is made
   for (const char* name : {sim::StarterFiles::robot_name, sim::StarterFiles::scenario_name})
-    if (!force && fs::exists(folder / name))
+    if (!force && fs::exists(folder / name, none))
       throw Error(fmt::format("{}: is there already; name another folder, or replace it with --force",
                               (folder / name).string()));
+}
+
+/// As a shell takes it for one word.
+std::string in_shell(const std::string& word) {
+  constexpr const char* plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./+,:=@%";
+  if (word.find_first_not_of(plain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
 }
 
 void tell(const fs::path& folder, const sim::StarterFiles& files) {
@@ -93,12 +103,13 @@ void tell(const fs::path& folder, const sim::StarterFiles& files) {
     fmt::print("no scenario: {}\n", files.why_no_scenario);
   else
     fmt::print("{}: a simulated drive\n", scenario);
-  fmt::print("\nNext:\n  rhec check {}\n", robot);
-  if (!files.scenario.empty()) fmt::print("  rhec run {}\n", scenario);
+  fmt::print("\nNext:\n  rhec check {}\n", in_shell(robot));
+  if (!files.scenario.empty()) fmt::print("  rhec run {}\n", in_shell(scenario));
   fmt::print("  rhec log LOG --vehicle {}        which signals of a log are its sensors\n", robot);
 }
 
 int init(const InitArguments& arguments) {
+  if (arguments.folder.empty()) throw Error("folder: found nothing; give the folder that the files shall go to");
   const fs::path folder(arguments.folder);
   refuse_what_is_there(folder, arguments.force);
   const Host host = examined_host(arguments.plugin_path);

@@ -153,10 +153,7 @@ std::vector<PluginRecord> listed_plugins(const Host& host) {
 }
 
 int show(const OptionsArguments& arguments) {
-  std::vector<OptionSection> sections = sim::scenario_sections();
-  for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
-  for (OptionSection& section : logs::signal_sections()) sections.push_back(std::move(section));
-  for (OptionSection& section : ros::ros_sections()) sections.push_back(std::move(section));
+  const std::vector<OptionSection> sections = option_sections();
   if (!arguments.section.empty()) {
     const std::vector<OptionSection> found = named(sections, arguments.section);
     fmt::print("{}", arguments.json ? json_of(found).dump(2) + "\n" : text_of(found, arguments.section));
@@ -180,6 +177,14 @@ int show(const OptionsArguments& arguments) {
 }
 
 }  // namespace
+
+std::vector<OptionSection> option_sections() {
+  std::vector<OptionSection> sections = sim::scenario_sections();
+  for (OptionSection& section : sim::log_sections()) sections.push_back(std::move(section));
+  for (OptionSection& section : logs::signal_sections()) sections.push_back(std::move(section));
+  for (OptionSection& section : ros::ros_sections()) sections.push_back(std::move(section));
+  return sections;
+}
 
 void add_options(Program& program) {
   auto arguments = std::make_shared<OptionsArguments>();

@@ -180,12 +180,25 @@ std::vector<std::string> Settings::as_names() const {
   return read_each<std::string>(*this, "a list of names", [](const Settings& item) { return item.as_text(); });
 }
 
+namespace {
+
+/// As much of a text as helps to find it.
+std::string shortened(const std::string& text) {
+  constexpr std::size_t most = 200, kept = 60;
+  if (text.size() <= most) return text;
+  std::size_t end = kept;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;  // not within a letter of UTF-8
+  return fmt::format("{}...", text.substr(0, end));
+}
+
+}  // namespace
+
 std::string Settings::found() const {
   switch (kind_) {
     case Kind::null:
       return "nothing";
     case Kind::scalar:
-      return fmt::format("'{}'", text_);
+      return fmt::format("'{}'", shortened(text_));
     case Kind::list:
       return fmt::format("a list of {}", items_.size());
     case Kind::map:

@@ -14,6 +14,8 @@ WholeFile::WholeFile(const std::filesystem::path& file) : file_(file), part_(fil
   std::error_code ignored;  // the stream says what is wrong
   if (std::filesystem::is_directory(file_, ignored))
     throw Error(fmt::format("{}: is a folder; give the name of a file", file_.string()));
+  if (std::filesystem::is_other(std::filesystem::status(file_, ignored)))  // in whose place a rename would put a file
+    throw Error(fmt::format("{}: is a device or a pipe; give the name of a file", file_.string()));
   if (file_.has_parent_path()) std::filesystem::create_directories(file_.parent_path(), ignored);
   errno = 0;
   stream_.open(part_, std::ios::binary | std::ios::trunc);

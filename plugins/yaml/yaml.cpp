@@ -138,17 +138,27 @@ Settings parse(const std::string& text, const Source& source) {
 
 }  // namespace
 
+namespace {
+constexpr std::size_t most_bytes = 50'000'000;
+}
+
 Settings load_yaml(const std::filesystem::path& file) {
   std::error_code problem;
   const std::filesystem::file_status status = std::filesystem::status(file, problem);
   if (!std::filesystem::exists(status)) {
-    throw Error(fmt::format("{}: no such file; give the path of a YAML file", file.string()));
+    throw Error(fmt::format("{}: no such file; give the path of a YAML file", file.empty() ? "''" : file.string()));
   }
   if (std::filesystem::is_directory(status)) {
     throw Error(fmt::format("{}: is a directory; give the path of a YAML file in it", file.string()));
   }
   std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::string text;
+  for (std::istreambuf_iterator<char> next(stream), end; next != end; ++next) {
+    if (text.size() == most_bytes)  // a device gives as much as is read
+      throw Error(fmt::format("{}: more than {} MB; expected a configuration in YAML; is it another file?",
+                              file.string(), most_bytes / 1'000'000));
+    text += *next;
+  }
   if (!stream) throw Error(fmt::format("{}: cannot be read; check its permissions", file.string()));
   Settings read = parse_yaml(text, file.string());
   if (read.is_null())

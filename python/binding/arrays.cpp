@@ -25,6 +25,16 @@ Shape strides_of(const Shape& shape) {
 
 }  // namespace
 
+py::object doubles_of(py::handle given) {
+  py::object plain = py::reinterpret_borrow<py::object>(given);
+  if (py::hasattr(plain, "mask") && py::hasattr(plain, "filled"))
+    plain = plain.attr("astype")("float64").attr("filled")(NAN);
+  const py::array any = py::array::ensure(plain);
+  // Objects become numbers one by one, where they can: None is NaN.
+  if (!any || std::string_view("biufO").find(any.dtype().kind()) == std::string_view::npos) return {};
+  return py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(any);
+}
+
 py::array view(const double* numbers, const Shape& shape, py::handle owner) {
   py::array_t<double> made(shape, strides_of(shape), numbers, owner);
   py::detail::array_proxy(made.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;

@@ -18,6 +18,9 @@ struct Numbers : py::array_t<double, py::array::c_style | py::array::forcecast> 
 };
 using Shape = std::vector<py::ssize_t>;
 
+/// An array of doubles, row after row, of what numpy makes an array of; none of what is no real numbers: texts, dates,
+/// complex ones. What a mask hides is NaN.
+py::object doubles_of(py::handle given);
 /// A read-only view, row after row, of numbers that belong to `owner`, which it keeps alive.
 py::array view(const double* numbers, const Shape& shape, py::handle owner);
 /// A new array with these numbers, row after row.
@@ -40,7 +43,7 @@ struct pybind11::detail::type_caster<rhec::python::Numbers> {
 
   /// pybind11's own way asks numpy in any case, which takes as long as the rest of a call.
   static bool is_plain(handle source) {
-    if (!npy_api::get().PyArray_Check_(source.ptr())) return false;
+    if (Py_TYPE(source.ptr()) != npy_api::get().PyArray_Type_) return false;
     const auto* array = array_proxy(source.ptr());
     constexpr int wanted = npy_api::NPY_ARRAY_C_CONTIGUOUS_ | npy_api::NPY_ARRAY_ALIGNED_;
     const auto* type = array_descriptor_proxy(array->descr);
@@ -52,8 +55,7 @@ struct pybind11::detail::type_caster<rhec::python::Numbers> {
       return true;
     }
     if (!convert) return false;
-    using Any = array_t<double, array::c_style | array::forcecast>;
-    object made = Any::ensure(source);
+    object made = rhec::python::doubles_of(source);
     if (!made) return false;
     value = reinterpret_steal<rhec::python::Numbers>(made.release());
     return true;

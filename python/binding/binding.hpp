@@ -2,7 +2,18 @@
 
 #include <pybind11/pybind11.h>
 
+#include <string>
+
 namespace rhec::python {
+
+/// The method by which copy and pickle would take an object apart, of a class whose objects stay where they are;
+/// `instead` says what to do.
+inline auto not_copied(const char* instead) {
+  return [instead](const pybind11::object& self, int) -> pybind11::object {
+    const auto name = pybind11::str(pybind11::type::of(self).attr("__name__")).cast<std::string>();
+    throw pybind11::type_error("cannot pickle or copy an object of the class " + name + "; " + instead);
+  };
+}
 
 // Each adds to the module what one source of this folder is about.
 void bind_settings(pybind11::module_& module);

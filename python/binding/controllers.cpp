@@ -64,6 +64,8 @@ void check_fit(const Estimate& estimate, const Model& vehicle) {
 py::object control(ControllerObject& self, const EstimateObject& estimate, std::optional<double> deadline,
                    const py::object& out) {
   const Clock::time_point end = deadline_in(deadline);
+  if (!out.is_none() && !py::isinstance<CommandObject>(out))
+    throw py::type_error("out: expected a Command that this controller has made before");
   const ControllerLock lock(self);
   check_fit(estimate.value, self.controller->vehicle());
   self.seen = estimate.value;
@@ -146,6 +148,7 @@ std::string plan_line(ControllerObject& self, const std::string& id) {
 void bind_commands(py::module_& module) {
   py::class_<CommandObject>(
       module, "Command", "The inputs to be applied until the next call. It stays as it is when the controller goes on.")
+      .def("__reduce_ex__", not_copied("keep copies of its arrays, such as inputs.copy()"))
       .def_property_readonly(
           "inputs",
           [](const py::object& self) {
@@ -191,6 +194,7 @@ void bind_controllers(py::module_& module) {
   py::class_<ControllerObject, std::shared_ptr<ControllerObject>>(
       module, "Controller",
       "Follows a path: estimate in, inputs out. Several threads may use it; each call waits for the others.")
+      .def("__reduce_ex__", not_copied("make another one with make_controller() of the robot, which can be pickled"))
       .def(py::init(&make_controller), py::arg("robot").none(false), py::arg("path"), py::arg("ahead") = nullptr)
       .def("control", &control, py::arg("estimate"), py::arg("deadline") = py::none(), py::kw_only(),
            py::arg("out") = py::none(),

@@ -2,6 +2,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -48,6 +49,7 @@ std::shared_ptr<NamedEstimator> make_estimator(const std::shared_ptr<RobotObject
     const std::vector<Variable>& states = hooked.bounded_description().states;
     start = Eigen::Map<const Eigen::VectorXd>(vector_of(*initial_state, states, "initial_state"),
                                               static_cast<Eigen::Index>(states.size()));
+    if (!start->allFinite()) throw Error("initial_state: found a number that is not finite; expected finite ones");
   }
   made->estimator = hooked.make_estimator(start);
   made->about = described(hooked, *made->estimator);
@@ -70,6 +72,8 @@ void push_input(NamedEstimator& self, double time, const Numbers& inputs) {
 
 py::object estimate(NamedEstimator& self, double time, std::optional<double> deadline, const py::object& out) {
   const Clock::time_point end = deadline_in(deadline);
+  if (!out.is_none() && !py::isinstance<EstimateObject>(out))
+    throw py::type_error("out: expected an Estimate that this estimator has made before");
   const Lock lock(self.mutex);
   const Estimate* now = nullptr;
   double microseconds = 0.0;
@@ -101,6 +105,12 @@ void without_interpreter(NamedEstimator& self, const Call& call) {
   call();
 }
 
+bool is_covariance(const Eigen::MatrixXd& matrix) {
+  const double rounding = 1e-9 * matrix.cwiseAbs().maxCoeff();
+  return matrix.allFinite() && (matrix - matrix.transpose()).cwiseAbs().maxCoeff() <= rounding &&
+         matrix.llt().info() == Eigen::Success;
+}
+
 void reset_to(NamedEstimator& self, const std::optional<Numbers>& mean, const std::optional<Numbers>& covariance) {
   if (mean.has_value() != covariance.has_value())
     throw Error("reset: expected both the mean and the covariance, or neither");
@@ -111,6 +121,9 @@ void reset_to(NamedEstimator& self, const std::optional<Numbers>& mean, const st
     throw Error(fmt::format("reset: expected the mean of [state; parameters] ({0}) and its covariance ({0}, {0})", n));
   const Eigen::VectorXd to = Eigen::Map<const Eigen::VectorXd>(mean->data(), n);
   const Eigen::MatrixXd with = Eigen::Map<const Eigen::MatrixXd>(covariance->data(), n, n);
+  if (!is_covariance(with))
+    throw Error(
+        "reset: the covariance is not symmetric, or not positive definite; expected that of [state; parameters]");
   bool done = false;
   without_interpreter(self, [&] { done = self.estimator->reset(to, with); });
   if (!done)
@@ -191,6 +204,7 @@ void bind_estimates(py::module_& module) {
                              "State and slip at one time, with their covariance. It stays as it is when the estimator "
                              "goes on. Its arrays are\n"
                              "read-only views; they keep the estimate alive.")
+      .def("__reduce_ex__", not_copied("keep copies of its arrays, such as state.copy()"))
       .def_property_readonly(
           "time", [](const EstimateObject& self) { return self.value.time; }, "[s]")
       .def_property_readonly(
@@ -251,6 +265,7 @@ void bind_estimators(py::module_& module) {
       module, "Estimator",
       "Estimates state and slip: push stamped measurements and inputs, and ask for the estimate at a time.\n\n"
       "Measurements and inputs may come in any order. Several threads may use it; each call waits for the others.")
+      .def("__reduce_ex__", not_copied("make another one with make_estimator() of the robot, which can be pickled"))
       .def(py::init(&make_estimator), py::arg("robot").none(false), py::arg("initial_state") = py::none())
       .def("push_measurement", &push_measurement, py::arg("time"), py::arg("outputs"),
            "Measured y, (n_y), NaN where missing, at a time [s].")

@@ -1,5 +1,7 @@
 #include "jobs.hpp"
 
+#include <pybind11/stl.h>
+
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -52,8 +54,9 @@ class Worker {
 };
 
 /// With the interpreter held: throws what a signal or the progress raises.
-void look(const py::object& progress, const Job& job) {
+void look(const py::object& progress, Job& job) {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  warn_of(job.take_notes());
   if (progress.is_none()) return;
   const auto [share, text] = job.state();
   progress(share, text);
@@ -68,9 +71,23 @@ void Job::show(double share, const std::string& text) {
   text_ = text;
 }
 
+void Job::tell(const std::vector<std::string>& notes) {
+  const std::lock_guard lock(mutex_);
+  notes_.insert(notes_.end(), notes.begin(), notes.end());
+}
+
+std::vector<std::string> Job::take_notes() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(notes_, {});
+}
+
 std::pair<double, std::string> Job::state() const {
   const std::lock_guard lock(mutex_);
   return {share_, text_};
+}
+
+void warn_of(const std::vector<std::string>& notes) {
+  if (!notes.empty()) py::module_::import("rhec._errors").attr("warn_of")(notes);
 }
 
 void do_watched(const py::object& progress, const std::function<void(Job&)>& work) {

@@ -80,8 +80,9 @@ void save_replays(const Replays& self, const std::string& name) {
 }
 
 void read_log(const std::vector<std::string>& plugin_path, const Settings& settings, const LogFiles& files,
-              Replays& made) {
+              Replays& made, Job& job) {
   made.scenario = std::make_unique<const sim::LogScenario>(examined_host(plugin_path), settings, files.variants);
+  job.tell(made.scenario->variants().front().robot.notes());
   made.log = sim::read_recorded_log(files.dead_reckoning, files.gps, *made.scenario);
   made.hold_out = files.hold_out;
 }
@@ -97,7 +98,7 @@ std::unique_ptr<Replays> estimate_log(const std::vector<std::string>& plugin_pat
                                       const LogFiles& files, const py::object& progress) {
   auto made = std::make_unique<Replays>();
   do_watched(progress, [&](Job& job) {
-    read_log(plugin_path, settings, files, *made);
+    read_log(plugin_path, settings, files, *made, job);
     std::vector<sim::HorizonLog> horizons;
     std::vector<std::shared_ptr<sim::MapKeeper>> keepers;
     const double seconds = made->log.rows.back().time - made->log.rows.front().time;
@@ -123,7 +124,7 @@ std::unique_ptr<Replays> smooth_log(const std::vector<std::string>& plugin_path,
                                     const LogFiles& files, const py::object& progress) {
   auto made = std::make_unique<Replays>();
   do_watched(progress, [&](Job& job) {
-    read_log(plugin_path, settings, files, *made);
+    read_log(plugin_path, settings, files, *made, job);
     std::vector<sim::HorizonLog> none;
     const auto& variants = made->scenario->variants();
     for (std::size_t i = 0; i < variants.size(); ++i) {

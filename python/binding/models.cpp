@@ -179,7 +179,15 @@ void bind_models(py::module_& module) {
     return [of](const Vehicle& self) { return self.about.*of; };
   };
   py::class_<Vehicle>(module, "Vehicle", "A vehicle's model: dx/dt = f(x, u, p), y = h(x).")
+      .def("__reduce_ex__", not_copied("keep the model or the robot that it is of"))
       .def_property_readonly("name", [](const Vehicle& self) { return self.about.name; })
+      .def("__repr__",
+           [](const Vehicle& self) {
+             const ModelDescription& about = self.about;
+             return fmt::format("<vehicle '{}': {} states, {} inputs, {} parameters, {} outputs>", about.name,
+                                about.states.size(), about.inputs.size(), about.parameters.size(),
+                                about.outputs.size());
+           })
       .def_property_readonly(
           "source", [](const Vehicle& self) { return self.about.source; }, "where the equations were published")
       .def_property_readonly("states", variables(&ModelDescription::states), "x, n_x variables")

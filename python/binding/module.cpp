@@ -1,6 +1,7 @@
 // The module rhec._rhec: what the package rhec is made of.
 #include <pybind11/pybind11.h>
 
+#include <cstddef>
 #include <exception>
 
 #include "binding.hpp"
@@ -24,6 +25,17 @@ void translate(std::exception_ptr thrown) {
   }
 }
 
+/// pybind11 would give memory to an object that __new__ has made and __init__ has not, and take what is in it for an
+/// object.
+void* refuse_memory(std::size_t) { throw py::type_error("an object that was not made; call its class, not __new__"); }
+
+void refuse_what_was_not_made(const py::module_& module) {
+  for (const auto& [name, value] : module.attr("__dict__").cast<py::dict>())
+    if (PyType_Check(value.ptr()))
+      if (auto* type = py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(value.ptr())))
+        type->operator_new = &refuse_memory;
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_rhec, module) {
@@ -40,4 +52,5 @@ PYBIND11_MODULE(_rhec, module) {
   rhec::python::bind_studies(module);
   rhec::python::bind_logs(module);
   rhec::python::bind_runs(module);
+  refuse_what_was_not_made(module);
 }

@@ -162,6 +162,7 @@ void bind_solutions(py::module_& module) {
   };
   py::class_<Solution>(module, "Solution",
                        "What a solver made of a problem. Its arrays are read-only views; they keep it alive.")
+      .def("__reduce_ex__", not_copied("keep copies of its arrays, or its line()"))
       .def_property_readonly("report", [](const Solution& self) { return self.report; })
       .def_property_readonly("status", [](const Solution& self) { return name_of(self.report.status); })
       .def_property_readonly(

@@ -130,6 +130,7 @@ std::unique_ptr<Drive> run_drive(const std::vector<std::string>& plugin_path, co
   do_watched(progress, [&](Job& job) {
     drive->scenario = std::make_shared<const sim::Scenario>(examined_host(plugin_path), settings);
     const sim::Scenario& scenario = *drive->scenario;
+    job.tell(scenario.notes());
     const double samples = scenario.path().length() / (scenario.options().speed * scenario.robot().step());
     sim::HorizonLog horizons(scenario.robot(), static_cast<std::int64_t>(samples) + 1);
     const auto keeper = std::make_shared<sim::MapKeeper>();
@@ -153,6 +154,7 @@ std::unique_ptr<Drive> smooth_drive(const std::vector<std::string>& plugin_path,
   do_watched(progress, [&](Job& job) {
     drive->scenario = std::make_shared<const sim::Scenario>(examined_host(plugin_path), settings);
     const sim::Scenario& scenario = *drive->scenario;
+    job.tell(scenario.notes());
     sim::SmoothedDrive made = sim::smooth_closed_loop(scenario, {.progress = [&](double share) { job.show(share); }});
     drive->summary = sim::summary_json(made, scenario);
     drive->horizons = sim::horizons_text(sim::HorizonLog(scenario.robot(), 1), made.smoothed, scenario);

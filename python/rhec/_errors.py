@@ -1,7 +1,11 @@
-"""The one exception that rhec raises for what a user can correct."""
+"""The one exception that rhec raises for what a user can correct, and the warning for what one should know."""
 from __future__ import annotations
 
+import os
 import re
+import sys
+import warnings
+from collections.abc import Sequence
 
 # "file.yaml:12: key.path: what", "file.yaml:12:3: what", "file.jsonl:3: key: what"
 _IN_A_FILE = re.compile(r"^(?P<file>[^:\n]+):(?P<line>\d+)(?::\d+)?: (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
@@ -9,7 +13,23 @@ _IN_A_FILE = re.compile(r"^(?P<file>[^:\n]+):(?P<line>\d+)(?::\d+)?: (?:(?P<key>
 _IN_PYTHON = re.compile(r"^(?:configuration|set '[^']*'): (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
 
 
-class Error(Exception):
+# "step: what", of a configuration as a whole
+_OF_A_KEY = re.compile(r"^(?P<key>[a-z_][\w.\[\]]*): ")
+
+
+class _Placed:
+    """A text that begins with where it is about."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(text)  # type: ignore[call-arg]
+        found = _IN_A_FILE.match(text)
+        self.file: str | None = found["file"] if found else None
+        self.line: int | None = int(found["line"]) if found else None
+        found = found or _IN_PYTHON.match(text)
+        self.key: str | None = found["key"] if found else None
+
+
+class Error(_Placed, Exception):
     """Something that you can correct: the text says where, what was found, what was expected, and what to do.
 
     file: the file that it is about, or None
@@ -17,10 +37,26 @@ class Error(Exception):
     key: the dotted key of a configuration, such as 'estimator.horizon', or None
     """
 
+
+class Note(_Placed, UserWarning):
+    """What you should know of a configuration though it can be used: keys that count for nothing, numbers that look like a
+    wrong unit. It is warned of, so that warnings.simplefilter("ignore", rhec.Note) silences it, and "error" raises it.
+
+    file, line, key: as of an Error
+    """
+
     def __init__(self, text: str = "") -> None:
         super().__init__(text)
-        found = _IN_A_FILE.match(text)
-        self.file: str | None = found["file"] if found else None
-        self.line: int | None = int(found["line"]) if found else None
-        found = found or _IN_PYTHON.match(text)
-        self.key: str | None = found["key"] if found else None
+        found = _OF_A_KEY.match(text)
+        if found and self.key is None:
+            self.key = found["key"]
+
+
+def warn_of(notes: Sequence[str]) -> None:
+    """Warns of each of them where this package was called."""
+    folder = os.path.dirname(__file__) + os.sep
+    frame, level = sys._getframe(0), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(folder):
+        frame, level = frame.f_back, level + 1
+    for text in notes:
+        warnings.warn(Note(text), stacklevel=level)

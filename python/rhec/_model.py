@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -30,6 +31,8 @@ def by_name(given: Any, what: str) -> dict[str, Any]:
     """A dict by name of a dict by names or symbols, a list of them, or pairs."""
     if given is None:
         return {}
+    if hasattr(given, "numel"):  # a vector of CasADi's symbols: its entries are x_0, x_1, ...
+        given = [given[i] for i in range(given.numel())]
     pairs = given.items() if isinstance(given, dict) else [each if isinstance(each, tuple) else (each, None) for each in given]
     made = {}
     for key, value in pairs:
@@ -44,7 +47,7 @@ class Model:
     """A vehicle's equations, written once: dx/dt = f(x, u, p), y = h(x).
 
     name: of the vehicle
-    states, inputs, parameters, outputs, options: by name or symbol what docs/equations.md says of a variable, such as
+    states, inputs, parameters, outputs, options: by name or symbol (or, of nothing but symbols, a list or a vector) what docs/equations.md says of a variable, such as
         {"unit": "m", "typical": 10, "role": "position_x"}, or None; a list where there is nothing to say
     rates: f: by state, or as many in their order, a term of the others, a number or a text in the notation of equations
     measured: h: by output, or as many in their order; an output with the name of a state needs none
@@ -147,6 +150,8 @@ class Model:
 
         Takes cmake and the compiler that rhec was built with.
         """
+        if not re.fullmatch(r"[A-Za-z]\w*", self.name, re.ASCII):
+            raise Error(f"build: the model's name is '{self.name}'; a plugin takes letters, digits and underscores, and begins with a letter")
         return _Builder(self, folder, instruction_sets).build()
 
     def __repr__(self) -> str:

@@ -169,12 +169,20 @@ class SympyReader:
 
     def read_all(self, terms):
         """The texts of several terms."""
-        terms = [self._sympy.sympify(term) for term in terms]
+        terms = [self._term(term) for term in terms]
         if sum(term.count_ops() for term in terms) > _MANY:
             parts, terms = self._sympy.cse(terms, symbols=self._sympy.numbered_symbols("rhec_part"))
             for symbol, part in parts:
                 self._known[symbol] = self._notes.define(self.read(part))
         return [self.read(term).text for term in terms]
+
+    def _term(self, given):
+        """A term, or a number; sympy itself would make terms of nearly anything by its text."""
+        try:
+            return self._sympy.sympify(given, strict=True)
+        except self._sympy.SympifyError:
+            raise Error(f"found an object of the class '{type(given).__name__}' as an equation, expected a term of sympy, a number or "
+                        "a text") from None
 
     def read(self, term):
         if term not in self._known:
@@ -262,6 +270,8 @@ class SympyReader:
             return self._notes.step(self.read(term.args[0]), f"{term}: a step")
         if isinstance(term, sympy.Piecewise):
             return self._piecewise(term)
+        if isinstance(term, (sympy.Derivative, sympy.Integral)):
+            raise Error(f"{term}: not evaluated; write term.doit(), or simplify the equation until no {name} is left")
         plain = term.rewrite(sympy.exp if name in ("sinh", "cosh", "coth", "sech", "csch") else sympy.tan)
         if plain != term and not plain.has(type(term)):
             return self.read(plain)
@@ -350,6 +360,9 @@ class CasadiReader:
     def read_all(self, terms):
         """The texts of several terms."""
         casadi = self._casadi
+        if any(isinstance(term, casadi.MX) for term in terms):
+            raise Error("found CasADi's MX, whose terms are matrices; write the equations with SX, or of a Function f of MX take "
+                        "f.expand() of SX symbols")
         terms = [casadi.SX(term) for term in terms]
         for term in terms:
             if term.shape != (1, 1):

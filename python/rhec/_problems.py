@@ -15,8 +15,11 @@ from ._types import ArrayLike, File, PluginPath
 class Problem:
     """One problem: of estimation (kind 'rhe') or control ('rhc')."""
 
-    def __init__(self, made: _rhec.ProblemBase) -> None:
-        self._made = made
+    def __init__(self, made: _rhec.ProblemBase, plugin_path: PluginPath = ()) -> None:
+        self._made, self._plugin_path = made, plugin_path
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _problem_of, (self.line(), self.id, self._plugin_path)
 
     @classmethod
     def from_dict(cls, keys: dict[str, Any], *, plugin_path: PluginPath = ()) -> Problem:
@@ -84,7 +87,12 @@ class Problem:
 
 def problems_of(text: str, name: str, plugin_path: PluginPath) -> list[Problem]:
     """The problems of lines of JSON; `name` stands for the file in errors."""
-    return [Problem(made) for made in _rhec.problems(_configuration.folders_of(plugin_path), text, name)]
+    folders = _configuration.folders_of(plugin_path)
+    return [Problem(made, folders) for made in _rhec.problems(folders, text, name)]
+
+
+def _problem_of(line: str, name: str, plugin_path: PluginPath) -> Problem:
+    return problems_of(line, name, plugin_path)[0]
 
 
 def read_problems(file: File, *, plugin_path: PluginPath = ()) -> list[Problem]:

@@ -1,6 +1,9 @@
 """A robot, sample by sample."""
 from __future__ import annotations
 
+import os
+from typing import Any
+
 from . import _configuration, _rhec
 from ._types import ArrayLike, Changes, Configuration, PluginPath
 
@@ -16,6 +19,12 @@ class Robot:
     def __init__(self, configuration: Configuration, *, set: Changes = None, plugin_path: PluginPath = ()) -> None:
         settings, folders = _configuration.read(configuration, set, plugin_path)
         self._robot = _rhec.Robot(folders, settings)
+        file = os.path.abspath(configuration) if isinstance(configuration, (str, os.PathLike)) else configuration
+        self._made_of = (file, set, plugin_path)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """To another process goes what it is made of; it is made there again."""
+        return _robot_of, self._made_of
 
     @property
     def step(self) -> float:
@@ -38,3 +47,7 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"<robot: {self.vehicle.name}, a step of {self.step} s>"
+
+
+def _robot_of(configuration: Configuration, changes: Changes, plugin_path: PluginPath) -> Robot:
+    return Robot(configuration, set=changes, plugin_path=plugin_path)

@@ -38,6 +38,30 @@ class _Result:
     def _repr_html_(self) -> str:
         return f"<p>{html.escape(repr(self)[1:-1])}</p>{self.svg}"
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_made": _Kept(self._made)}
+
+
+class _Kept:
+    """What goes to another process of what was made in C++: the files that it writes, and what else is asked of it."""
+
+    def __init__(self, made: Any) -> None:
+        self.__dict__.update({name: getattr(made, name) for name in ("name", "completed", "ended") if hasattr(made, name)})
+        with tempfile.TemporaryDirectory(prefix="rhec-") as folder:
+            made.save(os.path.join(folder, "results"))
+            self._files = {file.name: file.read_bytes() for file in pathlib.Path(folder, "results").iterdir()}
+
+    def svg(self) -> str:
+        return self._files["run.svg"].decode()
+
+    def save(self, folder: str) -> None:
+        os.makedirs(folder, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".rhec-", dir=folder) as aside:
+            for name, content in self._files.items():
+                pathlib.Path(aside, name).write_bytes(content)
+            for name in self._files:
+                os.replace(os.path.join(aside, name), os.path.join(folder, name))
+
 
 class Run(_Result):
     """A simulated drive.

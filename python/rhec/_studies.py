@@ -68,11 +68,12 @@ def _runs_table(rows):
     table = Table(run=numpy.array([row["run"] for row in rows], dtype=int))
     for key in varied:
         table[key] = _column([each.get(key) for each in flat])
-    for name in ("status", "reason", "steps", "solves", "fallbacks", "nees"):
-        table[name] = numpy.array([row[name] for row in rows])
+    for name in ("status", "reason", "steps", "solves", "fallbacks"):
+        table[name] = _column([row[name] for row in rows])
+    table["nees"] = numpy.array([_number(row["nees"]) for row in rows])
     for name in dict.fromkeys(name for each in measures for name in each):
         table[name] = numpy.array([_number(each.get(name)) for each in measures])
-    table["seconds"] = numpy.array([row["seconds"] for row in rows])
+    table["seconds"] = _column([row["seconds"] for row in rows])
     return table
 
 
@@ -80,13 +81,23 @@ def _number(value):
     return math.nan if value is None else float(value)
 
 
+def _is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
 def _column(values):
-    """Numbers as numbers, texts as texts; what is neither as objects, as it is written."""
+    """Numbers as numbers, NaN where there is none; flags and texts as such, what is neither as it is written, None where
+    there is none."""
     import numpy
 
-    if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
-        return numpy.array(values)
-    return numpy.array([value if isinstance(value, str) else json.dumps(value) for value in values])
+    known = [value for value in values if value is not None]
+    if known and all(map(_is_number, known)):
+        return numpy.array([math.nan if value is None else value for value in values])
+    whole = len(known) == len(values)
+    if known and all(isinstance(value, bool) for value in known):
+        return numpy.array(values, dtype=bool if whole else object)
+    texts = [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
+    return numpy.array(texts, dtype=None if whole and values else object)
 
 
 def sweep(description: Configuration, file: File, *, threads: int = 0, plugin_path: PluginPath = (),

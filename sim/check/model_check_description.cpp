@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "model_checks.hpp"
 #include "rhec/sim/check/derivative_check.hpp"
@@ -38,13 +39,14 @@ class Description {
     if (about_.name.empty()) fail("model", "it has no name", "give ModelDescription::name");
     if (about_.source.empty())
       findings_.warn("model", "it does not say where its equations were published",
-                     "give ModelDescription::source, or say there that they are your own");
+                     "give `source` (in C++ ModelDescription::source), or say there that they are your own");
     if (about_.states.empty()) stop("model", "it has no states", "a vehicle has at least one");
     if (about_.outputs.empty())
       findings_.warn("model", "it has no outputs that are measured: nothing can be estimated",
                      "add outputs, or mark some as usual");
     for (const Kind& kind : kinds_)
       for (const Variable& variable : kind.variables) check(kind, variable);
+    check_meanings();
     check_names();
     check_roles();
     can_go_on = can_go_on_;
@@ -65,6 +67,16 @@ class Description {
     fail(std::move(where), std::move(found), std::move(advice));
   }
 
+  /// One finding, since a vehicle that is written down quickly has none at all.
+  void check_meanings() {
+    const std::size_t count = without_meaning_.size();
+    constexpr const char* advice = "give `meaning` (in C++ Variable::meaning), one phrase for people";
+    if (count == 1) findings_.warn(without_meaning_.front(), "it has no meaning", advice);
+    if (count > 1)
+      findings_.warn(fmt::format("{} variables", count),
+                     fmt::format("they have no meaning: {}", fmt::join(without_meaning_, ", ")), advice);
+  }
+
   void check(const Kind& kind, const Variable& v) {
     const std::string where = fmt::format("{} {}", kind.word, v.name);
     const auto bad = [](unsigned char c) { return std::isspace(c) || std::iscntrl(c) || c == '.' || c == ','; };
@@ -74,7 +86,7 @@ class Description {
       fail(where, fmt::format("the name '{}' holds a space, a dot or a comma", v.name),
            "write it as a key of a configuration is written, e.g. with underscores");
     if (v.unit.empty()) fail(where, "it has no unit", "give Variable::unit, \"1\" for a pure number");
-    if (v.meaning.empty()) findings_.warn(where, "it has no meaning", "give Variable::meaning, one phrase for people");
+    if (v.meaning.empty()) without_meaning_.push_back(where);
     if (!(v.lower <= v.upper))
       return stop(where, fmt::format("its bounds are [{:g}, {:g}]", v.lower, v.upper), "lower has to be at most upper");
     if (!(v.scale > 0.0 && std::isfinite(v.scale)))
@@ -149,6 +161,7 @@ class Description {
   const Kind kinds_[4] = {
       {"state", about_.states}, {"input", about_.inputs}, {"parameter", about_.parameters}, {"output", about_.outputs}};
   FindingList findings_{"description"};
+  std::vector<std::string> without_meaning_;
   bool can_go_on_ = true;
 };
 

@@ -80,6 +80,10 @@ void OutputFolder::commit() {
           fmt::format("{}: a folder of this name is in the way of a result; move it away. Nothing was put into place",
                       (folder_ / name).string()));
     }
+    // A rename would put a file in the place of the device.
+    if (fs::is_other(fs::status(folder_ / name, failure)))
+      throw Error(fmt::format("{}: is a device or a pipe; give the name of a file. Nothing was put into place",
+                              (folder_ / name).string()));
   }
   committed_ = true;
   if (!fs::exists(folder_, failure)) {

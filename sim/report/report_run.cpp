@@ -292,11 +292,12 @@ class RunReport {
     return list;
   }
 
-  /// What went wrong, and what the estimator thought of it, as spans of time; runs of older programs do not say.
+  /// What went wrong, and what the estimator found, as spans of time; runs of older programs do not say.
   void faults() {
-    Json& spans = document_["faults"] = Json::array();
-    for (const char* column : {"faults", "findings"})
+    for (const char* column : {"faults", "findings"}) {
+      Json& spans = document_[column] = Json::array();
       if (steps_.has(column) && time_.size() > 1) add_spans(column, spans);
+    }
   }
 
   void add_spans(const char* column, Json& spans) {

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -12,9 +13,28 @@
 #include "rhec/core/config/option_values.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 #include "rhec/plugins/robot/noise_section.hpp"
+#include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
 namespace {
+
+/// A text as YAML has it: in quotes where it would be read as something else, as {x}, #x or null would.
+std::string scalar(const std::string& text) {
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '.' || c == '/';
+  };
+  const bool begins = !text.empty() && text.front() != '-';
+  if (begins && std::all_of(text.begin(), text.end(), is_plain) && text != "null" && text != "Null" && text != "NULL")
+    return text;
+  return Json(text).dump();
+}
+
+/// For a comment.
+std::string on_one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
+  return text;
+}
 
 /// Lines of YAML whose comments stand below each other.
 class CommentedLines {
@@ -77,7 +97,7 @@ void add_options(const Host& host, const StarterWishes& wishes, CommentedLines& 
   for (const OptionRow& option : host.options(PluginKind::model, wishes.vehicle)) {
     if (option.name == "outputs") continue;
     const Settings* given = wishes.options.find(option.name);
-    const std::string value = given ? given->text() : option.default_value;
+    const std::string value = given ? scalar(given->text()) : option.default_value;
     if (value.empty()) continue;
     lines.add(fmt::format("  {}: {}", option.name, value), option.meaning);
   }
@@ -89,7 +109,7 @@ void add_model(const Host& host, const StarterWishes& wishes, const ModelDescrip
   if (is_equations_file(wishes.vehicle)) {
     const std::filesystem::path file =
         std::filesystem::absolute(wishes.vehicle).lexically_relative(std::filesystem::absolute(wishes.folder));
-    lines.add(fmt::format("  equations: {}", file.string()), "relative to this file");
+    lines.add(fmt::format("  equations: {}", scalar(file.string())), "relative to this file");
   } else {
     lines.add(fmt::format("  name: {}", wishes.vehicle), fmt::format("rhec plugins {}", wishes.vehicle));
   }
@@ -137,8 +157,9 @@ bool has_bounds(const ModelDescription& about) {
 std::string robot_text(const Host& host, const StarterWishes& wishes, const ModelDescription& about,
                        const std::vector<Variable>& sensors) {
   CommentedLines lines;
-  lines.add(fmt::format(
-      "# {}: what the robot is, and how it is estimated and controlled. 'rhec options' lists every key.", wishes.name));
+  lines.add(
+      fmt::format("# {}: what the robot is, and how it is estimated and controlled. 'rhec options' lists every key.",
+                  on_one_line(wishes.name)));
   lines.add("step: 0.2", "[s] between the estimator's nodes, and between the controller's inputs");
   lines.add("");
   add_model(host, wishes, about, sensors, lines);
@@ -186,10 +207,10 @@ std::pair<double, double> ground_range(const Variable& parameter) {
 std::string scenario_text(const StarterWishes& wishes, const ModelDescription& about) {
   const double speed = usual_speed(about);
   CommentedLines lines;
-  lines.add(fmt::format("# Drives {} over simulated ground that slips: rhec run {}", wishes.name,
-                        (wishes.folder / StarterFiles::scenario_name).string()));
+  lines.add(fmt::format("# Drives {} over simulated ground that slips: rhec run {}", on_one_line(wishes.name),
+                        on_one_line((wishes.folder / StarterFiles::scenario_name).string())));
   lines.add(fmt::format("robot: {}", StarterFiles::robot_name), "its keys are as if they stood here");
-  lines.add(fmt::format("name: {}", wishes.name));
+  lines.add(fmt::format("name: {}", scalar(wishes.name)));
   lines.add(fmt::format("speed: {}", short_number(speed)), "over ground [m/s]");
   lines.add("seed: 1", "of ground and noise");
   lines.add("");

@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import pty
+import re
 import subprocess
 import sys
 import tempfile
@@ -52,6 +53,21 @@ def choices(rhec, findings, work):
     findings.expect(json.loads(replaced.stdout)["scenario"] == "mine/field.yaml", "--force --json", replaced.stdout + replaced.stderr)
 
 
+def names(rhec, findings, work):
+    """Files of a robot with an unusual name are read again, and what is to be typed next is one word."""
+    for name in ("a b", "\u00fc", "#x", "{x}", "null", "&a", "*b", "x: y", "it's", 'say "x"', "two\nlines", "-x", "1", "true"):
+        made = rhec("init", "--vehicle", "skid_steer", "--", name, cwd=work)
+        findings.expect(made.returncode == FINE, f"init of {name!r}", made.stderr)
+        word = re.search(r"^  rhec run ((?:.|\n)*?)\n  rhec log", made.stdout, re.MULTILINE)
+        told = subprocess.run(["bash", "-c", f"printf %s {word.group(1)}"], capture_output=True, text=True).stdout if word else made.stdout
+        findings.expect(told == f"{name}/field.yaml", f"next, of {name!r}", told)
+        run = rhec("run", f"./{name}/field.yaml", "--set", "path.laps=1", "--set", "path.radius=3", "--out", work / "named" / str(len(name)), "--json", cwd=work)
+        findings.expect(run.returncode == FINE and json.loads(run.stdout)["steps"] > 10, f"run of {name!r}", run.stdout[:200] + run.stderr)
+    for name, expected in (("", "folder: found nothing"), ("x" * 300, "File name too long")):
+        wrong = rhec("init", name, "--vehicle", "skid_steer", cwd=work)
+        findings.expect(wrong.returncode == ERROR and expected in wrong.stderr and "unexpectedly" not in wrong.stderr, f"init of {name[:9]!r}", wrong.stderr)
+
+
 def asks(rhec, findings, work):
     """On a terminal it asks; an empty answer is the proposal."""
     leader, follower = pty.openpty()
@@ -84,6 +100,7 @@ def main():
         work = pathlib.Path(folder)
         files_run(rhec, findings, work)
         choices(rhec, findings, work)
+        names(rhec, findings, work)
         asks(rhec, findings, work)
         robots_are_shared(rhec, findings, work)
     findings.tell()

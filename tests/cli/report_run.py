@@ -16,8 +16,8 @@ WALL = ["controller.speed_bound_factor=.inf", "bounds.u1=[4, 20]", "bounds.x_pos
 
 
 class RunReports(Reports):
-    parts = ("numbers_of_a_run", "horizons_of_a_run", "other_estimators", "fallbacks", "long_run", "older_program",
-             "harmless_names", "figures")
+    parts = ("numbers_of_a_run", "horizons_of_a_run", "faults_and_findings", "other_estimators", "fallbacks", "long_run",
+             "older_program", "harmless_names", "figures")
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
@@ -166,6 +166,24 @@ class RunReports(Reports):
         self.expect(document["horizons"] is None and document["map"] is None, "older", "there are horizons")
         self.expect("older program" in self.notes(document, "horizons"), "older", f"notes: {document['notes']}")
         self.expect([series["name"] for series in document["parameters"]] == ["kappa", "mu"], "older", "parameters")
+
+    def faults_and_findings(self):
+        """What a simulation did to the sensors, and what the estimator found, are told apart."""
+        fault = "{kind: offset, sensors: [x_gps], start: 4, length: 3, size: 20}"
+        folder = self.make_run("fault", f"faults=[{fault}]")
+        document, _ = self.page_of(folder)
+        rows = rows_of(folder / "steps.csv")
+        for column in ("faults", "findings"):
+            told = {row[column] for row in rows} - {""}
+            self.expect(told and {span["what"] for span in document[column]} == told, column, f"{document[column]}, {told}")
+            inside = [row for row in rows if any(span["from"] <= float(row["time"]) <= span["to"] for span in document[column])]
+            self.expect(inside == [row for row in rows if row[column]], column, "spans are not where the rows are")
+        self.expect(not {span["what"] for span in document["faults"]} & {span["what"] for span in document["findings"]}, "faults",
+                    "a finding is among them")
+        figures = self.work / "fault_figures"
+        result = self.rhec("report", folder, "-o", self.work / "fault.html", "--svg", figures, timeout=240)
+        legend = (figures / "state-beta.svg").read_text() if result.returncode == FINE else result.stderr
+        self.expect(">fault</text>" in legend and ">finding</text>" in legend, "stripes", legend[:300])
 
     def harmless_names(self):
         name = "</script><script>alert('x')</script><!-- \u2028"

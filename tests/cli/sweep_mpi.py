@@ -4,6 +4,7 @@
     sweep_mpi.py <rhec> <mpirun>
     sweep_mpi.py <rhec>             of a build without MPI: what it says
 """
+import math
 import os
 import pathlib
 import random
@@ -69,11 +70,26 @@ class Test(cli.Findings):
                         f"{result.returncode}: {result.stdout}{result.stderr}")
             self.expect(rows(out) == expected, f"{ranks} ranks", "other rows than alone")
 
+    def long_sweep(self, alone):
+        """A sweep of 300 runs that lasts long enough to be killed four times, in whatever build: its rows come in batches
+        of a fifth of a second, and are seen a little later. `alone` becomes its database."""
+        laps, seconds, enough = 1, 0.0, 5.0
+        for _ in range(3):
+            text = self.sweep(SHORT.replace("path.laps: 1", f"path.laps: {laps}") + "grid: {seed: {from: 1, to: 300}}\n")
+            alone.unlink(missing_ok=True)
+            start = time.monotonic()
+            self.rhec("sweep", text, "--out", alone, timeout=240)
+            seconds = time.monotonic() - start
+            if seconds >= enough:
+                break
+            laps = math.ceil(1.5 * laps * enough / seconds)
+        self.expect(seconds >= enough, "killed", f"the sweep lasts {seconds:.1f} s alone, with {laps} laps")
+        return text
+
     def killed(self):
         """Any rank, mpirun, or all at once: what was written stays, and the rest is made by who comes after."""
-        text = self.sweep(SHORT + "grid: {seed: {from: 1, to: 300}}\n")
         alone, out = self.work / "whole.sqlite", self.work / "killed.sqlite"
-        self.rhec("sweep", text, "--out", alone)
+        text = self.long_sweep(alone)
         chance, before, kills = random.Random(1), 0, 0
         for victim in (0, 1, "mpirun", "all"):
             with subprocess.Popen(self.command(3, text, "--out", out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,

@@ -37,6 +37,7 @@ SUITES = {
 # Sources without a test of their own -> the file that tests them, and what it does with them.
 UNTESTED = {
     "apps/command.cpp": "tests/cli/bad_input.py: wrong commands and arguments; tests/cli/runs.py: the help",
+    "apps/completion_words.cpp": "tests/cli/completion.py: the words that a shell shows",
     "apps/estimate.cpp": "tests/cli/report_log.py: the files of an estimation are those that its report is held against",
     "apps/examine_plugin/main.cpp": "tests/plugins/host/examiner_test.cpp: plugins that do harm, each in another way",
     "apps/examine_plugin/walls.cpp": "tests/plugins/host/examiner_test.cpp: memory, time, other processes",

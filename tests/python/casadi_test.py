@@ -71,6 +71,16 @@ def test_vectors_of_casadi():
     numpy.testing.assert_allclose(model.load().rates([1.0, 2.0], [0.5], []), [2.0, -7.5])
 
 
+def test_states_may_be_a_vector():
+    x, u = casadi.SX.sym("x", 3), casadi.SX.sym("u", 2)
+    rates = casadi.vertcat(u[0] * casadi.cos(x[2]), u[0] * casadi.sin(x[2]), u[1])
+    model = rhec.Model("point", states=x, inputs=u, outputs=["x_0", "x_1"], rates=rates)
+    assert [each.name for each in model.load().states] == ["x_0", "x_1", "x_2"]
+    numpy.testing.assert_allclose(model.load().rates([0, 0, 0.3], [2, 0.5], []), [2 * numpy.cos(0.3), 2 * numpy.sin(0.3), 0.5])
+    with pytest.raises(rhec.Error, match="found CasADi's MX.*write the equations with SX"):
+        rhec.Model("point", states=["a"], inputs=["b"], rates=[casadi.MX.sym("a")])
+
+
 def test_a_vehicle_becomes_functions():
     for name in ("bicycle_slip", "skid_steer", "tractor_trailer"):
         vehicle = rhec.Robot({"model": name}).vehicle

@@ -1,5 +1,7 @@
 """What Python may do with objects whose memory is in C++: let owners go, keep views, use them from threads."""
 import gc
+import os
+import signal
 import threading
 import time
 import weakref
@@ -174,3 +176,41 @@ def test_a_problem_is_solved_by_several_threads():
         numpy.testing.assert_array_equal(problem.solve("sparse_sqp").states, expected)
 
     assert not Threads(solve, solve, solve).failures
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_children_of_a_fork_go_on_by_themselves():
+    """Also where another thread of the parent is within an estimator at that moment."""
+    driven, busy, stop = Driven(), Driven(), threading.Event()
+    estimate = driven.step()[0]
+
+    def work():
+        while not stop.is_set():
+            busy.step()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        for _ in range(5):
+            child = os.fork()
+            if not child:
+                signal.alarm(30)  # who waits for ever is ended
+                own = Driven().step()[0]
+                driven.step()
+                os._exit(3 if numpy.array_equal(own.state, estimate.state) else 1)
+            assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 3
+    finally:
+        stop.set()
+        thread.join()
+    driven.step()
+
+
+def test_what_was_not_made_is_refused():
+    estimate = Driven().step()[0]
+    for kind, call in ((rhec.Estimator, lambda it: it.estimate(0.0)), (rhec.Controller, lambda it: it.control(estimate)),
+                       (rhec.Path, lambda it: it.length), (rhec.Vehicle, lambda it: it.name), (rhec.Estimate, lambda it: it.time),
+                       (rhec.Command, lambda it: it.inputs), (rhec.Report, lambda it: it.status), (rhec.Solution, lambda it: it.states)):
+        with pytest.raises(TypeError, match="an object that was not made; call its class"):
+            call(kind.__new__(kind))
+    with pytest.raises(TypeError, match="must be called when overriding __init__"):
+        type("Empty", (rhec.Path,), {"__init__": lambda self: None})()

@@ -61,6 +61,11 @@ def test_smoothing_a_log(log):
     assert len(smoothed.variants) == 2 and any(name.endswith(" causal") for name in smoothed.variants)
 
 
+def test_notes_are_warnings(log):
+    with pytest.warns(rhec.Note, match="step: 1.5 s"):
+        rhec.estimate(PARK, *log, set={**CHANGES, "step": 1.5})
+
+
 def test_mistakes_in_logs(log, tmp_path):
     with pytest.raises(rhec.Error, match=r"gps: expected a file or an array \(n, 3\)"):
         rhec.estimate(PARK, log[0], numpy.zeros((3, 2)), set=CHANGES)

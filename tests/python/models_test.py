@@ -122,6 +122,26 @@ def test_what_equations_do_not_have(term, word):
         one_rate(term, smooth=0.1).load()
 
 
+@pytest.mark.parametrize("given", [None, lambda: 0, object(), [1.0]])
+def test_what_is_no_term(given):
+    with pytest.raises(rhec.Error, match=f"an object of the class '{type(given).__name__}' as an equation, expected a term of sympy"):
+        one_rate(given)
+
+
+def test_what_is_not_evaluated():
+    with pytest.raises(rhec.Error, match=r"not evaluated; write term.doit\(\)"):
+        one_rate(sympy.Derivative(sympy.sin(x), x))
+    assert one_rate(sympy.Derivative(sympy.sin(x), x).doit()).load().rates([0.0], [0.0], [])[0] == 1.0
+
+
+def test_the_name_of_a_plugin(tmp_path):
+    model = rhec.Model("my own / vehicle", states=[x], inputs=[u], outputs=["x"], rates=[u])
+    assert model.load().name == "my own / vehicle"
+    with pytest.raises(rhec.Error, match="build: the model's name is 'my own / vehicle'; a plugin takes letters"):
+        model.build(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_sum_that_is_long_and_one_that_is_deep():
     long = sum(sympy.sin(k * x + u) for k in range(1, 200))
     deep = x

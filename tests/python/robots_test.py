@@ -1,5 +1,7 @@
 """Robots, estimators and controllers, sample by sample."""
+import copy
 import os
+import pickle
 import subprocess
 
 import numpy
@@ -181,6 +183,69 @@ def test_paths():
     assert slowed.at(10.0)[3] == pytest.approx(numpy.sqrt(2 * 0.1 * 10.0))
     with pytest.raises(rhec.Error, match="waypoint 1"):
         rhec.Path([(numpy.nan, 0.0, 1.0), (1.0, 0.0, 1.0)])
+
+
+def test_what_is_no_row_of_numbers_is_refused():
+    driven = Driven()
+    for wrong in ("abc", b"abc", numpy.zeros(3, complex), numpy.array(["2020"] * 3, "datetime64[D]"), [[1, 2], [3]], [1, "a", 2], {}):
+        with pytest.raises(TypeError):
+            driven.estimator.push_measurement(0.0, wrong)
+    # What a mask hides is not there.
+    hidden, told = (rhec.Robot(ROBOT).make_estimator() for _ in range(2))
+    for time in (0.0, 0.2, 0.4):
+        hidden.push_measurement(time, numpy.ma.masked_array([time, 3, 0], mask=[False, True, False]))
+        told.push_measurement(time, [time, None, 0])
+    numpy.testing.assert_array_equal(hidden.estimate(0.4).state, told.estimate(0.4).state)
+    matrix = numpy.asfortranarray(numpy.arange(9.0).reshape(3, 3))
+    driven.estimator.push_measurement(0.0, matrix[1])  # neither contiguous nor owned
+
+
+def test_what_no_estimator_can_begin_with():
+    robot = rhec.Robot(ROBOT)
+    with pytest.raises(rhec.Error, match="initial_state: found a number that is not finite"):
+        robot.make_estimator([0, numpy.nan, 0, 0])
+    driven = Driven(robot)
+    driven.step()
+    for covariance in (-numpy.eye(6), numpy.arange(36.0).reshape(6, 6), numpy.full((6, 6), numpy.nan)):
+        with pytest.raises(rhec.Error, match="not symmetric, or not positive definite"):
+            driven.estimator.reset(numpy.zeros(6), covariance)
+    estimate = driven.estimator.estimate(0.2)
+    command = driven.controller.control(estimate)
+    with pytest.raises(TypeError, match="out: expected an Estimate"):
+        driven.estimator.estimate(0.4, out=command)
+    with pytest.raises(TypeError, match="out: expected a Command"):
+        driven.controller.control(estimate, out=estimate)
+    for wrong in ({"acceleration": -1}, {"lateral_acceleration": 0}, {"acceleration": numpy.nan}):
+        with pytest.raises(rhec.Error, match=f"{next(iter(wrong))}: expected more than 0"):
+            rhec.Path([(0, 0, 1), (1, 0, 1)], **wrong)
+
+
+def test_robots_are_pickled_and_others_say_what_to_do(tmp_path, monkeypatch):
+    robot = rhec.Robot(ROBOT, set={"estimator.horizon": 7})
+    driven = Driven(robot)
+    estimate, command = driven.step()
+    monkeypatch.chdir(tmp_path)  # another process may have another folder
+    for again in (pickle.loads(pickle.dumps(robot)), copy.copy(robot), copy.deepcopy(robot)):
+        numpy.testing.assert_array_equal(Driven(again).step()[0].state, estimate.state)
+    vehicle = rhec.Robot({"model": rhec.Robot(ROBOT).vehicle.name})
+    assert pickle.loads(pickle.dumps(vehicle)).vehicle.name == "bicycle_slip"
+    for thing in (driven.estimator, driven.controller, estimate, command, line(), robot.vehicle):
+        for attempt in (pickle.dumps, copy.copy, copy.deepcopy):
+            with pytest.raises(TypeError, match="cannot pickle or copy an object of the class .*; (make|keep)"):
+                attempt(thing)
+    assert pickle.loads(pickle.dumps(command.report)).kkt == command.report.kkt
+
+
+def test_how_things_are_shown():
+    robot = rhec.Robot(ROBOT)
+    assert repr(robot.vehicle) == "<vehicle 'bicycle_slip': 4 states, 2 inputs, 2 parameters, 3 outputs>"
+    assert repr(rhec.Path([(0, 0, 1), (3, 4, 1)])) == "<path: 2 waypoints, 5.0 m>"
+
+
+def test_notes_are_warnings():
+    with pytest.warns(rhec.Note, match="step: 1.5 s from node to node is long") as told:
+        rhec.Robot(ROBOT, set={"step": 1.5})
+    assert told[0].filename == __file__ and told[0].message.key == "step" and told[0].message.file is None
 
 
 def test_a_map_is_kept(tmp_path):

@@ -1,12 +1,16 @@
 """Runs of scenarios: the same as those of the command line, stopped, shown, and saved."""
+import concurrent.futures
 import csv
 import io
 import json
+import multiprocessing
 import os
+import pickle
 import signal
 import subprocess
 import threading
 import time
+import warnings
 
 import numpy
 import pytest
@@ -143,6 +147,39 @@ def test_mistakes_in_scenarios():
     with pytest.raises(rhec.Error, match="did you mean") as caught:
         rhec.run(FIGURE8, set={"sped": 3})
     assert caught.value.key == "sped"
+
+
+def test_results_go_to_other_processes(run, tmp_path):
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as processes:
+        there = processes.submit(rhec.run, FIGURE8, set=SHORT, problems_every=40).result(timeout=120)
+    assert (there.completed, there.ended, repr(there), there.summary["mae"]) == (run.completed, run.ended, repr(run), run.summary["mae"])
+    numpy.testing.assert_array_equal(there.steps["kappa"], run.steps["kappa"])
+    assert [problem.line() for problem in there.problems] == [problem.line() for problem in run.problems]
+    assert there.svg == run.svg and there._repr_html_() == run._repr_html_()
+    for name in ("steps.csv", "horizons.jsonl", "run.svg"):
+        assert (there.save(tmp_path / "there") / name).read_bytes() == (run.save(tmp_path / "here") / name).read_bytes()
+    assert sorted(os.listdir(tmp_path / "there")) == sorted(os.listdir(tmp_path / "here"))
+    smoothed = rhec.smooth(FIGURE8, set=SHORT)
+    again = pickle.loads(pickle.dumps(smoothed))
+    assert again.report.status == smoothed.report.status and again.svg == smoothed.svg
+
+
+def test_notes_are_warnings(tmp_path):
+    changes = {**SHORT, "model.outputs": ["x_gps", "y_gps"]}
+    with pytest.warns(rhec.Note, match="passed over, since model.outputs leaves this sensor out") as told:
+        rhec.run(FIGURE8, set=changes)
+    note = told[0]
+    assert len(told) == 1 and note.filename == __file__  # the line that called the package
+    assert (note.message.key, note.message.file) == ("noise.outputs.delta", str(FIGURE8)) and note.message.line > 1
+    with pytest.warns(rhec.Note, match="noise.outputs.delta"):
+        rhec.smooth(FIGURE8, set=changes)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", rhec.Note)  # an error ends the run at once
+        start = time.monotonic()
+        with pytest.raises(rhec.Note):
+            rhec.run(FIGURE8, set={**changes, "path.laps": 100})
+        assert time.monotonic() - start < 20.0
+        rhec.run(FIGURE8, set=SHORT)  # nothing is told where nothing is wrong
 
 
 def test_a_drive_is_smoothed(run):

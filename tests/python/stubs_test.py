@@ -15,7 +15,7 @@ from shared import ROOT
 STUB = pathlib.Path(rhec.__file__).parent / "_rhec.pyi"
 # What Python adds to every class, and pybind11 to its own.
 COMMON = set(dir(object)) | {"__module__", "__dict__", "__weakref__", "_pybind11_conduit_v1_"}
-SHOWN_ANYHOW = {"__repr__", "__init__"}
+SHOWN_ANYHOW = {"__repr__", "__init__", "__setstate__"}
 
 
 def members(value):

@@ -41,6 +41,26 @@ def test_a_sweep_goes_to_pandas(swept):
     assert swept.to_pandas().groupby("speed")["mae.kappa"].mean().shape == (2,)
 
 
+def test_columns_where_keys_are_missing(tmp_path):
+    blocks = [{"name": "full_horizon"}, {"name": "structured", "size": 2}, {"name": "structured", "size": 3, "overlap": 4}]
+    grid = {"scenario": str(FIGURE8), "set": {"path": {"name": "figure8", "laps": 1, "radius": 8}, "speed": 10},
+            "grid": {"blocking.kappa": blocks, "estimator.horizon": [3, 12], "noise.adapt": [True, False],
+                     "estimator.robust": [None, {"outputs": ["x_gps", "y_gps"]}]}}
+    runs = rhec.sweep(grid, tmp_path / "blocks.sqlite", threads=2).runs
+    assert runs.rows == 24
+    size, overlap = runs["blocking.kappa.size"], runs["blocking.kappa.overlap"]
+    assert size.dtype == overlap.dtype == float  # NaN where a blocking has no size
+    assert numpy.isnan(size).sum() == 8 and (size == 2).sum() == (size == 3).sum() == (overlap == 4).sum() == 8
+    assert runs["noise.adapt"].dtype == bool and runs["noise.adapt"].sum() == 12
+    assert runs["estimator.horizon"].dtype == int
+    assert list(runs["estimator.robust.outputs"]).count(None) == list(runs["estimator.robust.outputs"]).count('["x_gps", "y_gps"]') == 12
+    # A run that is refused (an overlap that is longer than the horizon) has no measures.
+    refused = runs["status"] == "refused"
+    assert refused.sum() == 4
+    for name in ("nees", "mae.kappa", "rmse.position"):
+        assert runs[name].dtype == float and (numpy.isnan(runs[name]) == refused).all(), name
+
+
 def test_ctrl_c_keeps_what_was_made(tmp_path):
     many = {**GRID, "grid": {"speed": [10], "seed": {"from": 1, "to": 500, "step": 1}}}
     file = tmp_path / "many.sqlite"

@@ -6,7 +6,7 @@ export const light = {
   ...shared, name: "light",
   ground: "#ffffff", text: "#1b1f24", faint: "#57606a", line: "#8c959f", grid: "#e4e8ec", panel: "#f6f8fa",
   estimate: "#0072b2", truth: "#1b1f24", reference: "#b35900", measured: "#007a55", plan: "#a3417c", bound: "#57606a",
-  band: "rgba(0, 114, 178, 0.20)", alarm: "#b00020", gap: "rgba(87, 96, 106, 0.16)", halo: "rgba(255, 255, 255, 0.85)",
+  band: "rgba(0, 114, 178, 0.20)", alarm: "#b00020", gap: "rgba(87, 96, 106, 0.16)", finding: "rgba(213, 94, 0, 0.16)", halo: "rgba(255, 255, 255, 0.85)",
   blocks: ["#0072b2", "#c44e00", "#007a55", "#a3417c", "#7a6000", "#2b8cbe"],
   kinds: ["#0072b2", "#c44e00", "#007a55", "#a3417c", "#7a6000", "#1b1f24"],
 };
@@ -15,7 +15,7 @@ export const dark = {
   ...shared, name: "dark",
   ground: "#14181d", text: "#e8ebee", faint: "#a5aeb8", line: "#6b7580", grid: "#2a3138", panel: "#1c2127",
   estimate: "#56b4e9", truth: "#f0f2f4", reference: "#f0a040", measured: "#35c798", plan: "#e191c0", bound: "#a5aeb8",
-  band: "rgba(86, 180, 233, 0.25)", alarm: "#ff7b88", gap: "rgba(165, 174, 184, 0.18)", halo: "rgba(20, 24, 29, 0.85)",
+  band: "rgba(86, 180, 233, 0.25)", alarm: "#ff7b88", gap: "rgba(165, 174, 184, 0.18)", finding: "rgba(240, 160, 64, 0.20)", halo: "rgba(20, 24, 29, 0.85)",
   blocks: ["#56b4e9", "#f28e4b", "#35c798", "#e191c0", "#d9c24a", "#9ad0f0"],
   kinds: ["#56b4e9", "#f28e4b", "#35c798", "#e191c0", "#d9c24a", "#f0f2f4"],
 };

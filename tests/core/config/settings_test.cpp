@@ -128,6 +128,12 @@ TEST(Settings, ErrorsSayWhereAndWhat) {
               HasSubstr("expected a list of numbers"));
 }
 
+TEST(Settings, ErrorsShowTheBeginningOfALongText) {
+  const std::string found = written(std::string(59, 'a') + "\u00e4" + std::string(1'000'000, 'b')).found();
+  EXPECT_EQ(found, "'" + std::string(59, 'a') + "...'");  // and no half of a letter
+  EXPECT_EQ(written(std::string(200, 'a')).found(), "'" + std::string(200, 'a') + "'");
+}
+
 TEST(Settings, ListErrorsNameTheItem) {
   Settings root;
   root.set("sigma", Settings::list());

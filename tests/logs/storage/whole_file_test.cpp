@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <optional>
 
@@ -36,6 +37,9 @@ TEST_F(WholeFileTest, WithoutCloseWhatWasThereStays) {
 
 TEST_F(WholeFileTest, SaysWhyItCannotBeWritten) {
   EXPECT_THAT(error_of([&] { WholeFile file(path("")); }), HasSubstr("is a folder; give the name of a file"));
+  ASSERT_EQ(mkfifo(path("pipe").c_str(), 0600), 0);
+  EXPECT_THAT(error_of([&] { WholeFile file(path("pipe")); }),
+              HasSubstr("pipe: is a device or a pipe; give the name of a file"));
   write("file", "");
   EXPECT_THAT(error_of([&] { WholeFile file(path("file/below")); }), HasSubstr("file/below: cannot be written: Not a"));
   EXPECT_THAT(error_of([&] {

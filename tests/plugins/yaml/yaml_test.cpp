@@ -126,6 +126,12 @@ TEST(Yaml, FilesAreNamedInErrors) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(Yaml, DevicesHaveAnEnd) {
+  EXPECT_THAT(error_of([] { load_yaml("/dev/zero"); }),
+              StartsWith("/dev/zero: more than 50 MB; expected a configuration"));
+  EXPECT_THAT(error_of([] { load_yaml(""); }), StartsWith("'': no such file"));
+}
+
 TEST(Assignment, PutsValuesInTheirPlace) {
   Settings root = yaml("horizon:\n  length: 20\n  rate: 5\n");
   apply_assignment(root, "horizon.length=25");

@@ -39,6 +39,14 @@ TEST(ModelCheck, FindsWhatADescriptionGetsWrong) {
   EXPECT_THAT(faults(check([](About& a) { a.outputs[0].name = "x"; })), ElementsAre());
 }
 
+TEST(ModelCheck, TellsMissingMeaningsOnce) {
+  const ModelCheck found = check([](ModelDescription& about) {
+    for (Variable& state : about.states) state.meaning.clear();
+  });
+  EXPECT_THAT(faults(found), ElementsAre("warn description: 4 variables"));
+  EXPECT_THAT(finding_of(found, "description").found, HasSubstr("no meaning: state x, state y, "));
+}
+
 TEST(ModelCheck, FindsARoleThatPointsAtAnotherVariable) {
   const ModelCheck found = check([](ModelDescription& about) { about.roles.speed = 1; });
   EXPECT_THAT(faults(found), Contains("fail description: roles.speed"));

@@ -23,6 +23,32 @@ struct Tank {
   void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
+/// What turns it settles far within an interval: explicit steps as long as that explode.
+template <class Scalar>
+struct Stiff {
+  static constexpr int state_count = 2, input_count = 1, parameter_count = 0, output_count = 1;
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar*, Scalar* dxdt) const {
+    using std::sin;
+    dxdt[0] = sin(x[0] + x[1]) * x[1];
+    dxdt[1] = (u[0] - x[1]) / 0.005;
+  }
+  void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
+};
+
+TEST(ModelCheck, LooksAtDerivativesOfStiffModelsInStepsThatDoNotGrow) {
+  ModelDescription about;
+  about.name = "stiff";
+  about.source = "this test";
+  about.states = {{.name = "angle", .unit = "1", .meaning = "turned"},
+                  {.name = "rate", .unit = "1/s", .meaning = "speed"}};
+  about.inputs = {{.name = "set_point", .unit = "1/s", .meaning = "wanted speed", .lower = -2.0, .upper = 2.0}};
+  about.outputs = {{.name = "angle", .unit = "1", .meaning = "measured"}};
+  FormulaModel<Stiff> model({}, about);
+  const Finding derivatives =
+      finding_of(check_model(model, ModelCheckOptions{.samples = 16, .substeps = 1}), "derivatives");
+  EXPECT_EQ(derivatives.verdict, Verdict::pass) << derivatives.found;
+}
+
 TEST(ModelCheck, FindsNothingWrongWithAGoodModel) {
   const ModelCheck found = check();
   EXPECT_THAT(faults(found), ElementsAre());

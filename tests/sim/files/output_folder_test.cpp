@@ -1,6 +1,7 @@
 #include "rhec/sim/files/output_folder.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -68,6 +69,21 @@ TEST_F(OutputFolderTest, ReplacesItsFilesAndKeepsOthers) {
   EXPECT_EQ(read_text(root_ / "run" / "b.csv"), "by another writer");
   EXPECT_EQ(read_text(root_ / "run" / "notes.txt"), "mine");
   EXPECT_THROW(folder.write("late.csv", ""), Error);
+}
+
+TEST_F(OutputFolderTest, LeavesDevicesAndPipesWhatTheyAre) {
+  const fs::path pipe = root_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  put(root_ / "first", "before");
+  OutputFolder folder(root_);
+  folder.write("first", "after");
+  folder.write("pipe", "a page");
+  EXPECT_NE(error_of([&] { folder.commit(); }).find("pipe: is a device or a pipe; give the name of a file"),
+            std::string::npos);
+  EXPECT_TRUE(fs::is_fifo(pipe));
+  std::string content;
+  std::ifstream(root_ / "first") >> content;
+  EXPECT_EQ(content, "before");
 }
 
 TEST_F(OutputFolderTest, TwoRunsAtOnceDoNotMix) {

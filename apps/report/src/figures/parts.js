@@ -94,7 +94,7 @@ export function addBand(option, frame, name, x, low, high, colour) {
   }, {itemStyle: {color: colour}});
 }
 
-/// Grey stripes over whole frames, for spans [{from, to}] of x.
+/// Stripes over whole frames, for spans [{from, to}] of x.
 export function addStripes(option, frame, name, spans, colour, [low, high]) {
   if (spans.length === 0) return;
   addShapes(option, frame, name, [spans[0].from, low], (at) => spans.map(({from, to}) => {

@@ -37,12 +37,12 @@ function extentWithBand(lines, low, high) {
   return [Math.max(Math.min(bandLow, least), least - 0.6 * span), Math.min(Math.max(bandHigh, most), most + 0.6 * span)];
 }
 
-/// Spans of time that figures shade: where a log has no fix, and where a simulation had a fault.
-export function gapStripes(document) {
-  return document.gaps || document.faults || [];
+/// Spans of time that figures shade: where a log has no fix; where a simulation had a fault, and where the estimator found
+/// something wrong.
+export function stripesOf(document) {
+  return [["no fix", document.gaps, "gap"], ["fault", document.faults, "gap"], ["finding", document.findings, "finding"]]
+    .filter(([, spans]) => spans && spans.length > 0).map(([name, spans, colour]) => ({name, spans, colour}));
 }
-
-const stripeName = (document) => (document.gaps ? "no fix" : "fault");
 
 /// A figure of one state or parameter: above its values, below what it is wrong by where the truth is known.
 function estimateFigure(document, column, variable, kind, prefix) {
@@ -61,7 +61,7 @@ function estimateFigure(document, column, variable, kind, prefix) {
     frames: hasError ? 2 : 1,
     height: (width) => (hasError ? (width < 500 ? 330 : 380) : 240),
     option: (look, {width, height, view}) =>
-      estimateOption(look, width, height, view, column, times[column.time], unit, gapStripes(document), stripeName(document), bounds),
+      estimateOption(look, width, height, view, column, times[column.time], unit, stripesOf(document), bounds),
     table: () => estimateTable(column, times[column.time], unit),
   };
 }
@@ -81,7 +81,7 @@ function boundsWords(values, bounds) {
   return bounds.map(({name, value}) => ` At its ${name} in ${percent(values.filter((one) => isAt(one, value)).length / known)} of the samples shown.`).join("");
 }
 
-function estimateOption(look, width, height, view, column, wholeTime, unit, gaps, gapName, bounds) {
+function estimateOption(look, width, height, view, column, wholeTime, unit, stripes, bounds) {
   const option = base(look);
   const {time, estimate, sigma, error, truth} =
     inView(wholeTime, view, {estimate: column.estimate, sigma: column.sigma, error: column.error, truth: column.true});
@@ -92,7 +92,7 @@ function estimateOption(look, width, height, view, column, wholeTime, unit, gaps
   const range = axisRange(extentWithBand([estimate, truth, bounds.map(({value}) => value)], low, high));
   const frame = addFrame(option, look, {top: TOP, height: upper, width, y: {name: withUnit(column.name, unit), ...range},
     x: error ? {...axis, name: "", axisLabel: {show: false}} : axis});
-  addStripes(option, frame, gapName, gaps, look.gap, [range.min, range.max]);
+  for (const {name, spans, colour} of stripes) addStripes(option, frame, name, spans, look[colour], [range.min, range.max]);
   if (sigma) {
     addBand(option, frame, "± 2σ", time, low, high, look.band);
     names.push("± 2σ");
@@ -107,7 +107,7 @@ function estimateOption(look, width, height, view, column, wholeTime, unit, gaps
     addLine(option, frame, name, time.map((at) => [at, value]), {color: look.bound, type});
     names.push(name);
   }
-  if (gaps.length) names.push(gapName);
+  for (const {name} of stripes) names.push(name);
   if (error) {
     const below = sigma && sigma.map((value) => (isKnown(value) ? -2 * value : null));
     const above = sigma && sigma.map((value) => (isKnown(value) ? 2 * value : null));
@@ -148,7 +148,8 @@ export function columnFigure(document, {name, title, caption, about, label, unit
       const range = log ? powersOf(part.values) : axisRange(extentOf(part.values, [expected]), {zero}), top = isKnown(expected) ? TOP : 12;
       const frame = addFrame(option, look, {top, height: height - top - BOTTOM, width, x: timeAxis(time, view),
         y: {name: withUnit(label, unit), ...range}});
-      addStripes(option, frame, stripeName(document), gapStripes(document), look.gap, [range.min, range.max]);
+      for (const {name: kind, spans, colour: shade} of stripesOf(document))
+        addStripes(option, frame, kind, spans, look[shade], [range.min, range.max]);
       if (dots) addDots(option, frame, label, pairs(part.time, part.values), look[colour], {symbolSize: 3});
       else addLine(option, frame, label, pairs(part.time, part.values), {color: look[colour]});
       if (isKnown(expected)) {
