@@ -113,6 +113,17 @@ struct RheProblem::BetweenBatch {
     }
   }
 
+  /// The same for the points of an interval, the first of which is entry i, to `said`.
+  void write_points(int i, std::ptrdiff_t output_row) const noexcept {
+    for (int k = 0; k < point_count; ++k) write_said(i + k, output_row, said + k * said_size);
+  }
+  /// `entries` of that, from `from` on, at a measurement with these parts of the points.
+  void combine(const double* of_points, const double* from, std::ptrdiff_t entries, double* to) const noexcept {
+    std::fill_n(to, entries, 0.0);
+    for (int k = 0; k < point_count; ++k, from += said_size)
+      for (std::ptrdiff_t e = 0; e < entries; ++e) to[e] += of_points[k] * from[e];
+  }
+
   const int row, nx, nz, ny, width;
   const std::ptrdiff_t said_size;  ///< of what write_said writes
   const int point_count;           ///< of an interval that has many measurements

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "rhec/core/base/aligned.hpp"
@@ -20,8 +21,9 @@ class BetweenCache {
   double* key() noexcept { return key_.data(); }
   /// Whether an interval's results are those of `key()` and of measurements at these times.
   bool holds(int interval, const BetweenNodes& between) const noexcept;
-  /// Whether the measurements' times are those of the last `begin`.
-  bool has_times(int interval, const BetweenNodes& between) const noexcept;
+  /// Whether the measurements' times are those of the last `begin`, and so is entry `same` of the key, whatever was
+  /// forgotten since.
+  bool has_times(int interval, const BetweenNodes& between, std::ptrdiff_t same) const noexcept;
   /// From now on they are; the caller writes them.
   void begin(int interval, const BetweenNodes& between) noexcept;
   double* results(int interval, int measurement) noexcept {
@@ -34,13 +36,15 @@ class BetweenCache {
   void move(int steps) noexcept { first_ = (first_ + steps) % intervals_; }
 
  private:
+  bool has_times(int interval, const BetweenNodes& between) const noexcept;
   int slot(int interval) const noexcept { return (first_ + interval) % intervals_; }
 
   int intervals_, most_, first_ = 0;
   std::ptrdiff_t each_, each_together_;
   AlignedDoubles key_, keys_, results_, together_;
   std::vector<double> times_;
-  std::vector<int> counts_;  ///< by slot; -1: none is known
+  std::vector<int> counts_;             ///< by slot; -1: none was ever known
+  std::vector<std::uint8_t> is_known_;  ///< by slot: not forgotten
 };
 
 }  // namespace rhec

@@ -60,15 +60,6 @@ double RheProblem::add_between(StageRange range, const Iterate& iterate, Hessian
   return total;
 }
 
-/// `count` entries of what the model says at the points of an interval (BetweenBatch::write_said, at `from` in it), at
-/// a measurement with these parts.
-void RheProblem::combine(const BetweenBatch& batch, const double* parts, const double* said, std::ptrdiff_t step,
-                         std::ptrdiff_t count, double* to) const noexcept {
-  std::fill_n(to, count, 0.0);
-  for (int k = 0; k < batch.point_count; ++k, said += step)
-    for (std::ptrdiff_t e = 0; e < count; ++e) to[e] += parts[k] * said[e];
-}
-
 void RheProblem::linearise_between(int interval, const Iterate& iterate, double* weights, double* rows,
                                    std::span<double> scratch) const noexcept {
   BetweenBatch batch(*this, scratch.data());
@@ -90,13 +81,12 @@ void RheProblem::linearise_between(int interval, const Iterate& iterate, double*
       take(batch.place[i], batch.of_outputs);
     }
     if (batch.is_point[0]) {
-      write_points(batch, 0);
+      batch.write_points(0, output_row_);
       for (int k = 0; k < between(interval).count(); ++k) {
         double parts[padded(PointSums::most_points)];
         write_parts(interval, k, parts);
-        combine(batch, parts, batch.said, batch.said_size, output_row_, batch.predicted);
-        combine(batch, parts, batch.said + output_row_, batch.said_size, batch.said_size - output_row_,
-                batch.of_outputs);
+        batch.combine(parts, batch.said, output_row_, batch.predicted);
+        batch.combine(parts, batch.said + output_row_, batch.said_size - output_row_, batch.of_outputs);
         take(k, batch.of_outputs);
       }
     }
@@ -151,7 +141,7 @@ double RheProblem::add_known_between(StageRange range, const Iterate& iterate, c
     key[batch.row] = duration(i);
     std::copy_n(interval_data(i), model().data_count(), key + batch.row + 1);
     if (known.holds(i, between(i))) continue;
-    const bool has_parts = known.has_times(i, between(i));
+    const bool has_parts = known.has_times(i, between(i), batch.row);
     known.begin(i, between(i));
     gather_interval(i, iterate, batch, flush);
     for (int k = 0; has_many(i) && !has_parts && k < between(i).count(); ++k) {
@@ -183,24 +173,9 @@ double RheProblem::add_known_between(StageRange range, const Iterate& iterate, c
   return total;
 }
 
-/// What the model says at the points of an interval, the first of which is entry i.
-void RheProblem::write_points(const BetweenBatch& batch, int i) const noexcept {
-  for (int k = 0; k < batch.point_count; ++k) batch.write_said(i + k, output_row_, batch.said + k * batch.said_size);
-}
-
 void RheProblem::write_parts(int interval, int place, double* parts) const noexcept {
   PointSums::write_parts(between_points_.data(), static_cast<int>(between_points_.size()),
                          between(interval).time(place) / duration(interval), parts);
-}
-
-/// Factors for the weights of an interval's measurements. Without robust losses, and as long as nothing new is
-/// measured, these are the ones that they had before.
-void RheProblem::find_weights(BetweenBatch& batch, int interval, const OfPoints& points) const noexcept {
-  const int count = between(interval).count();
-  batch.sums.begin_weights();
-  for (int m = 0; m < count; ++m)
-    batch.sums.add_weights(points.parts + m * points.parts_step, points.weights + m * points.weights_step);
-  for (int j = 0; j < ny_; ++j) batch.sums.factor(j, PointSums::Factors(points.factors + j * PointSums::Factors::size));
 }
 
 /// The costs of the measurements of an interval that has points.
@@ -221,7 +196,14 @@ double RheProblem::add_points(BetweenBatch& batch, int interval, const OfPoints&
     std::copy_n(batch.weight, ny_, known);
   }
   if (!view) return total;
-  if (has_new_weights) find_weights(batch, interval, points);
+  if (has_new_weights) {
+    // Without robust losses, and as long as nothing new is measured, weights are those that they were before.
+    batch.sums.begin_weights();
+    for (int m = 0; m < measured.count(); ++m)
+      batch.sums.add_weights(points.parts + m * points.parts_step, points.weights + m * points.weights_step);
+    for (int j = 0; j < ny_; ++j)
+      batch.sums.factor(j, PointSums::Factors(points.factors + j * PointSums::Factors::size));
+  }
   for (int j = 0; j < ny_; ++j) {
     const PointSums::Factors factors(points.factors + j * PointSums::Factors::size);
     const auto are_zero = [&](const double* values) {
@@ -245,7 +227,7 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
     const std::ptrdiff_t at = i * output_row_;
     double cost;
     if (batch.is_point[i]) {
-      if (view) write_points(batch, i);
+      if (view) batch.write_points(i, output_row_);
       const OfPoints points{.said = view ? batch.said : batch.outputs + at,
                             .said_step = view ? batch.said_size : output_row_,
                             .parts = batch.parts,
@@ -345,12 +327,12 @@ void RheProblem::add_curvature_of_losses(BetweenBatch& batch, const CostView& vi
       add(batch.interval[i], measured.outputs(batch.place[i]), batch.of_outputs);
       continue;
     }
-    write_points(batch, i);
+    batch.write_points(i, output_row_);
     for (int m = 0; m < measured.count(); ++m) {
       double parts[padded(PointSums::most_points)];
       write_parts(batch.interval[i], m, parts);
-      combine(batch, parts, batch.said, batch.said_size, output_row_, batch.predicted);
-      combine(batch, parts, batch.said + output_row_, batch.said_size, batch.said_size - output_row_, batch.of_outputs);
+      batch.combine(parts, batch.said, output_row_, batch.predicted);
+      batch.combine(parts, batch.said + output_row_, batch.said_size - output_row_, batch.of_outputs);
       add(batch.interval[i], measured.outputs(m), batch.of_outputs);
     }
   }

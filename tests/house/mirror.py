@@ -72,7 +72,6 @@ UNTESTED = {
     "core/estimation/node_grid.cpp": "tests/core/estimation/estimator_test.cpp: every rule of where nodes lie",
     "core/estimation/prior_bank_between.cpp": "tests/core/estimation/between_nodes_test.cpp: against a window's problem",
     "core/estimation/stamped_rows.cpp": "tests/core/estimation/estimator_test.cpp: order, equal stamps, and what is full",
-    "core/horizon/between_cache.cpp": "tests/core/horizon/rhe_between_test.cpp: against linearisations without it",
     "core/horizon/measured_interval.cpp": "tests/core/horizon/rhe_between_test.cpp: whatever a problem has between nodes",
     "sim/comparison/bench.cpp": "tests/sim/comparison/comparison_test.cpp: every answer is of a bench; refusals, too",
     "sim/problems/problem_dump.cpp": "tests/cli/dump.py: what a loop saves, attempts and failures, and its replay",

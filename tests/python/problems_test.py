@@ -22,7 +22,7 @@ def options_of(solver):
 def test_problems_of_a_run(problems):
     assert {problem.kind for problem in problems} == {"rhe", "rhc"}
     control = next(problem for problem in problems if problem.kind == "rhc")
-    assert control.intervals == 15 and control.names["inputs"] == ["u1", "u2"] and control.vehicle.name == "bicycle_slip"
+    assert control.intervals == 15 and control.names["inputs"] == ["u1", "u2_rate"] and control.vehicle.name == "bicycle_slip"
 
 
 @pytest.mark.parametrize("solver", BACKENDS)

@@ -159,13 +159,9 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void turn_ramp(const BetweenBatch& batch, double share, double* J, double* H) const noexcept;
   void evaluate_batch(BetweenBatch& batch, bool with_gradients) const noexcept;
   double add_batch(BetweenBatch& batch, Hessian hessian, const CostView* view, double* stage_costs) const noexcept;
-  void write_points(const BetweenBatch& batch, int i) const noexcept;
   void write_parts(int interval, int place, double* parts) const noexcept;
-  void combine(const BetweenBatch& batch, const double* parts, const double* said, std::ptrdiff_t step,
-               std::ptrdiff_t count, double* to) const noexcept;
   struct OfPoints;
   double add_points(BetweenBatch& batch, int interval, const OfPoints& points, const CostView* view) const noexcept;
-  void find_weights(BetweenBatch& batch, int interval, const OfPoints& points) const noexcept;
   void add_rows(BetweenBatch& batch, int interval, const double* rows, int count, const double* weights,
                 const double* pulls, const CostView& view) const noexcept;
   void add_curvature_of_dynamics(BetweenBatch& batch, const CostView& view) const noexcept;
@@ -173,8 +169,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void add_curvature_of_losses(BetweenBatch& batch, const CostView& view) const noexcept;
   double weigh(const double* measured, const double* predicted, double* difference, double* weights, double* pulls,
                double* curvatures) const noexcept;
-  std::ptrdiff_t between_key_size() const noexcept;
-  std::ptrdiff_t between_said_size() const noexcept;
+  std::ptrdiff_t between_key_size() const noexcept, between_said_size() const noexcept;
   std::ptrdiff_t between_factors_size() const noexcept;
   double add_known_between(StageRange range, const Iterate& iterate, const CostView& view, BetweenCache& known,
                            double* memory) const noexcept;
