@@ -9,8 +9,8 @@
 namespace rhec {
 
 std::vector<double> PointSums::shares(int points) {
-  std::vector<double> shares;
-  for (int k = 0; k < points; ++k) shares.push_back(0.5 - 0.5 * std::cos(std::numbers::pi * (k + 0.5) / points));
+  std::vector<double> shares(static_cast<std::size_t>(points));
+  for (int k = 0; k < points; ++k) shares[k] = 0.5 - 0.5 * std::cos(std::numbers::pi * (k + 0.5) / points);
   return shares;
 }
 
