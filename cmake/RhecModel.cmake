@@ -66,6 +66,9 @@ int main(int count, char** arguments) try {
   add_executable(${PREFIX}_write "${FOLDER}/write.cpp")
   target_compile_features(${PREFIX}_write PRIVATE cxx_std_20)
   target_link_libraries(${PREFIX}_write PRIVATE rhec::core)
+  if(TARGET rhec_flags)  # a core with sanitizers needs a program with their runtimes
+    target_link_options(${PREFIX}_write PRIVATE $<TARGET_PROPERTY:rhec_flags,INTERFACE_LINK_OPTIONS>)
+  endif()
   # It runs once: what is optimised away is not worth its time.
   target_compile_options(${PREFIX}_write PRIVATE -O0 -g0)
   set_target_properties(${PREFIX}_write PROPERTIES CXX_EXTENSIONS OFF)
