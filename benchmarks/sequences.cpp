@@ -221,10 +221,7 @@ const std::vector<Drive>& usual_drives() {
       "{x: 30.7, y: -38, length: 4, width: 1.5, heading: 0.2, velocity_x: -0.5, velocity_y: -0.1}]}]";
   static const std::vector<Drive> drives = {
       {"figure8/fhb", figure8, {"path.laps=1", without_rates, "blocking.kappa=" + full}},
-      {"figure8/rates",
-       figure8,
-       {"path.laps=1", "blocking.kappa=" + full, without_rates, "controller.weights.stage.u2=0.1",
-        "controller.weights.rates.u2=0.02"}},
+      {"figure8/rates", figure8, {"path.laps=1", "blocking.kappa=" + full}},
       {"figure8/sbo_5_3", figure8, {"path.laps=1", without_rates, "blocking.kappa=" + blocks}},
       {"figure8/sbo_5_3_both",
        figure8,

@@ -237,10 +237,10 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
                             .factors = batch.factors};
       for (int m = 0; m < between(interval).count(); ++m) {
         write_parts(interval, m, batch.parts + m * points.parts_step);
-        std::fill_n(batch.known_weights + m * points.weights_step, ny_, no_factors);
+        if (view) std::fill_n(batch.known_weights + m * points.weights_step, ny_, no_factors);
       }
       cost = add_points(batch, interval, points, view);
-      for (int k = 0; k < batch.point_count; ++k)
+      for (int k = 0; view && k < batch.point_count; ++k)
         for (int j = 0; j < ny_; ++j) batch.pulls[at + k * output_row_ + j] = batch.sums.pulls(j)[k];
     } else {
       cost = weigh(between(interval).outputs(batch.place[i]), batch.outputs + at, batch.difference, batch.weights + at,

@@ -42,10 +42,17 @@ bool bounds_are_numbers(const Ocp& ocp) noexcept {
   return numbers;
 }
 
+/// A guess can be finite where what is given of its first node is not.
+bool given_state_is_finite(const Ocp& ocp) noexcept {
+  const double* const given = ocp.initial_state();
+  return !given || std::all_of(given, given + ocp.state_count(0), [](double value) { return std::isfinite(value); });
+}
+
 }  // namespace
 
 bool has_sound_numbers(const Ocp& ocp, const Iterate& iterate) noexcept {
-  return iterate.capacity() == ocp.capacity() && is_finite(ocp, iterate) && bounds_are_numbers(ocp);
+  return iterate.capacity() == ocp.capacity() && is_finite(ocp, iterate) && given_state_is_finite(ocp) &&
+         bounds_are_numbers(ocp);
 }
 
 bool is_sound_start(const Ocp& ocp, const Iterate& iterate, std::span<double> scratch) noexcept {

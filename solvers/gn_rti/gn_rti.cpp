@@ -38,12 +38,6 @@ bool has_costates(const Ocp& ocp, const Iterate& iterate) noexcept {
   return false;
 }
 
-/// A guess can be finite where what is given of its first node is not.
-bool has_sound_initial_state(const Ocp& ocp) noexcept {
-  const double* const given = ocp.initial_state();
-  return !given || std::all_of(given, given + ocp.state_count(0), [](double value) { return std::isfinite(value); });
-}
-
 }  // namespace
 
 const OptionTable<GnRtiOptions>& GnRtiOptions::table() {
@@ -164,7 +158,7 @@ Report GnRti::feedback(Iterate& iterate, Clock::time_point deadline) noexcept {
     // A real-time iteration continues from the previous sample; an iterate without costates has no previous sample.
     if (options_.mode == Mode::rti && has_costates(*ocp_, iterate)) {
       report = real_time(iterate, deadline);
-    } else if (is_sound_start(*ocp_, iterate, scratch_) && has_sound_initial_state(*ocp_)) {
+    } else if (is_sound_start(*ocp_, iterate, scratch_)) {
       report = converge(iterate, deadline);
     }
   }

@@ -17,7 +17,6 @@ EXACT = {"steps", "completed", "mae", "rmse", "nees", "nees_expected", "within_t
          "fallbacks", "integration"}
 ERRORS = {"kappa", "mu", "position", "heading", "tracking"}
 TIMES = {"median", "p99", "max"}
-OFF = 2.0  # [m]; the short path is about as tight as the steering allows where mu is least
 # The bicycle with slip, whose steering motor follows the wanted rate with a lag of 10 ms.
 LAG = """
 states:
@@ -141,7 +140,7 @@ class Test(cli.Findings):
         self.expect(bool(rhe) == (name not in ("estimator truth", "estimator ekf")), name, f"statuses of rhe: {rhe}")
         self.expect((summary["nees"] is None) == truth, name, f"nees: {summary['nees']}")
         if name not in LOOSE:
-            self.expect(summary["mae"]["tracking"] < OFF and summary["mae"]["kappa"] < 0.15, name, f"{summary['mae']}")
+            self.expect(summary["mae"]["tracking"] < 1.5 and summary["mae"]["kappa"] < 0.15, name, f"{summary['mae']}")
         if truth:
             self.expect(summary["mae"]["kappa"] == 0 and summary["mae"]["position"] == 0, name, f"{summary['mae']}")
 
@@ -187,9 +186,11 @@ class Test(cli.Findings):
         """A vehicle with a lag that is far shorter than an interval."""
         (self.work / "lag.yaml").write_text(LAG)
         vehicle = "model={equations: lag.yaml}"
-        out = self.run("a fast lag", [vehicle])
+        # The path is as tight as the steering allows, where rates that cost something track worse.
+        weights = ["controller.weights.stage.u2=0.8", "controller.weights.rates.u2=0"]
+        out = self.run("a fast lag", [vehicle, *weights])
         summary = json.loads((out / "summary.json").read_text())
-        self.expect(summary["completed"] is True and summary["mae"]["tracking"] < OFF, "a fast lag", f"{summary}")
+        self.expect(summary["completed"] is True and summary["mae"]["tracking"] < 1.5, "a fast lag", f"{summary}")
         self.expect(summary["integration"]["checked"] > 0 and summary["integration"]["coarse"] == 0, "a fast lag",
                     f"{summary['integration']}")
         implicit = ["estimator.integrator=implicit", "controller.integrator=implicit"]
@@ -202,8 +203,8 @@ class Test(cli.Findings):
                 "a lag of 1 ms, bank": [stiff, "estimator.name=bank", *implicit],
                 "a lag of 1 ms, blocks": [stiff, "blocking.kappa=full_horizon", "blocking.mu=full_horizon", *implicit],
                 "a lag of 1 ms, rates": [stiff, "controller.weights.rates.u2=0.1", *implicit]}.items():
-            summary = json.loads((self.run(name, settings) / "summary.json").read_text())
-            self.expect(summary["completed"] is True and summary["mae"]["tracking"] < OFF, name, f"{summary}")
+            summary = json.loads((self.run(name, [*weights, *settings]) / "summary.json").read_text())
+            self.expect(summary["completed"] is True and summary["mae"]["tracking"] < 1.5, name, f"{summary}")
             self.expect(summary["integration"]["coarse"] == 0, name, f"{summary['integration']}")
         for section in ("estimator", "controller"):
             result = self.rhec("run", FIGURE8, "--out", self.work / "refused",

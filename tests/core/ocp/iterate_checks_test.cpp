@@ -60,6 +60,10 @@ TEST_F(PointTest, IsNoStartWhereTheProblemIsBroken) {
   problem->input_lower(1, 0) = -infinity;
   problem->finish(scratch);
   EXPECT_TRUE(is_sound(point)) << "and one that is not there may be infinite";
+  for (const double bad : {nan, infinity}) {
+    problem->given_state()[0] = bad;
+    EXPECT_FALSE(is_sound(point)) << "what is given of the first node is no number";
+  }
 }
 
 TEST_F(PointTest, HasLargestMultipliers) {
