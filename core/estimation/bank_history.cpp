@@ -22,7 +22,8 @@ BankHistory::BankHistory(PriorBank bank, int nodes, int filtered)
       outputs_(intervals_.size() * ny_),
       given_weights_(outputs_.size()),
       used_weights_(outputs_.size()),
-      predicted_(intervals_.size() * bank_.state_size()) {
+      predicted_(intervals_.size() * bank_.state_size()),
+      rehearsed_(bank_.state_size()) {
   if (!keeps_filtered_) return;
   filtered_.assign(predicted_.size(), 0.0);
   means_.assign(intervals_.size() * np_, 0.0);
@@ -73,6 +74,15 @@ void BankHistory::predict(std::size_t place) noexcept {
   bank_.predict(between_[place].over(intervals_[place].duration, inputs_.data() + place * nu_));
   intervals_[place].distance = bank_.distance();
   intervals_[place].between_log_likelihood = bank_.between_log_likelihood();
+}
+
+void BankHistory::rehearse() noexcept {
+  if (count_ < 2) return;  // there is no interval yet
+  const std::size_t at = place(newest_);
+  bank_.save(rehearsed_.data());
+  bank_.predict(between_[at].over(intervals_[at].duration, inputs_.data() + at * nu_));
+  bank_.update(outputs_.data() + at * ny_, given_weights_.data() + at * ny_);
+  bank_.restore(rehearsed_.data());
 }
 
 bool BankHistory::rewind(int nodes) noexcept {

@@ -209,6 +209,14 @@ void PriorHorizonEstimation::combine(Estimate& result) noexcept {
           weight * (found[static_cast<std::ptrdiff_t>(entries_[c]) * ns + entries_[r]] - member_covariance_(r, c));
 }
 
+void PriorHorizonEstimation::rehearse() noexcept {
+  filters_.rehearse();
+  if (!has_solution_ || filters_.is_searching()) return;
+  covariance_->find(problem_, *solver_, point_, window_.intervals);
+  solver_->prepare(point_);
+  has_rehearsed_ = true;
+}
+
 void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   if (filters_.is_searching()) return filters_.estimate(result, deadline);
   const int nx = model().state_count(), np = model().parameter_count();
@@ -216,8 +224,11 @@ void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadli
   filters_.history().bank().moments(mean_, mixture_);
   choose_law();
   fill_window();
+  // What the solver has prepared in a rehearsal was for other data.
+  if (std::exchange(has_rehearsed_, false)) solver_->prepare(point_);
   result.report = solver_->solve(point_, deadline);
   has_solution_ = result.report.status == Status::solved;
+  if (!has_solution_) has_solution_ = PriorRestart::is_convincing(problem_, result.report);
   if (!has_solution_) {
     start_cold(prior_);
     has_solution_ =

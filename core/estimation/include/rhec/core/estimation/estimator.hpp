@@ -54,6 +54,11 @@ class RHEC_EXPORT Estimator {
 
   /// Does work for the next sample in advance; optional, but always saves time later.
   void prepare() noexcept;
+  /// Goes through the computation of the next estimate, without effect. Optional, for a loop that has slept since the
+  /// last one and will be asked in a moment: code and data are in the processor's caches then.
+  void rehearse() noexcept {
+    if (has_started()) method_->rehearse();
+  }
   void reset() noexcept;
   /// Goes on from moments of [x; p] (n, n x n) at the newest node, e.g. after the vehicle was carried. False if there
   /// is no node yet, sizes do not match, a number is not finite, or the method cannot.
