@@ -14,8 +14,8 @@ class PriorRestart {
  public:
   explicit PriorRestart(const RheProblem& problem);
 
-  /// Whether a solution that has not converged explains the measurements so well, by a chi-square test of its objective,
-  /// that no other could do better by more than noise. It then need not be reconsidered.
+  /// Whether a solution that has not converged explains the measurements so well, by a chi-square test of its
+  /// objective, that no other could do better by more than noise. It then need not be reconsidered.
   static bool is_convincing(const RheProblem& problem, const Report& report) noexcept;
 
   /// `prior` is the window's prior, simulated. If it explains the measurements better than `point`, the result of a

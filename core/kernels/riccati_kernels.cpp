@@ -425,7 +425,7 @@ inline bool factor_general(const RiccatiView& view, int i, double tolerance) {
     if (most <= 24 || width == 24) return factor_general_stage<width, 24>(view, i, tolerance);
   if constexpr (width > 24)
     if (most <= 32 || width == 32) return factor_general_stage<width, 32>(view, i, tolerance);
-  return factor_general_stage<width, width < 64 ? width : 64>(view, i, tolerance);
+  return factor_general_stage < width, width < 64 ? width : 64 > (view, i, tolerance);
 }
 
 /// Replaces p of the next node by p of this one. It stays in registers, since a value just written to memory takes a
@@ -934,13 +934,14 @@ int carry_covariance(const RiccatiView& view, int first, double* covariance, dou
   return view.intervals;
 }
 
-/// Sigma given what half of H, a matrix of n rows, says as well: with H / 2 = L D L', one measurement after the other, with
-/// the gradient l and the variance 1 / d.
+/// Sigma given what half of H, a matrix of n rows, says as well: with H / 2 = L D L', one measurement after the other,
+/// with the gradient l and the variance 1 / d.
 template <int width>
 inline bool condition(const double* H, long stride, int n, double* sigma) {
   using R = Row<width / lane_count>;
   constexpr double zero_pivot = 1e-13;  // relative: what is left of a pivot by rounding
-  // Mostly, few states are measured. Where the diagonal is zero, so is the row of a matrix that is positive semidefinite.
+  // Mostly, few states are measured. Where the diagonal is zero, so is the row of a matrix that is positive
+  // semidefinite.
   int count = 0, states[width];
   for (int r = 0; r < n; ++r)
     if (H[r * (stride + 1)] != 0.0) states[count++] = r;

@@ -197,7 +197,8 @@ Clock::time_point Loop::wait_until() const {
 /// When the next step probably begins: a step after the last sample, even where that came early.
 Clock::time_point Loop::expected() const { return std::min(due_, last_received_ + step_); }
 
-/// Between two steps other programs use the processor's caches. What comes just before a step brings code and data back.
+/// Between two steps other programs use the processor's caches. What comes just before a step brings code and data
+/// back.
 bool Loop::may_rehearse() const {
   return !is_triggered_ && rehearsed_ != expected() && rehearsal_ < of_step(step_, most_of_step);
 }

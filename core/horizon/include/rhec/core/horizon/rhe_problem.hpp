@@ -162,6 +162,15 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void write_parts(int interval, int place, double* parts) const noexcept;
   struct OfPoints;
   double add_points(BetweenBatch& batch, int interval, const OfPoints& points, const CostView* view) const noexcept;
+  double sum_up(BetweenBatch& batch, int interval, const OfPoints& points, const CostView* view) const noexcept;
+  double sum_up_known(BetweenBatch& batch, int interval, const OfPoints& points) const noexcept;
+  /// Rows `step` apart.
+  struct ModelRows {
+    const double* first;
+    std::ptrdiff_t step;
+  };
+  int stage_columns(int interval) const noexcept { return capacity().states + control_count(interval); }
+  ModelRows in_order_of_stage(BetweenBatch& batch, int interval, const ModelRows& rows, int count) const noexcept;
   void add_rows(BetweenBatch& batch, int interval, const double* rows, int count, const double* weights,
                 const double* pulls, const CostView& view) const noexcept;
   void add_curvature_of_dynamics(BetweenBatch& batch, const CostView& view) const noexcept;
@@ -170,7 +179,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   double weigh(const double* measured, const double* predicted, double* difference, double* weights, double* pulls,
                double* curvatures) const noexcept;
   std::ptrdiff_t between_key_size() const noexcept, between_said_size() const noexcept;
-  std::ptrdiff_t between_factors_size() const noexcept;
+  std::ptrdiff_t between_kept_size() const noexcept;
   double add_known_between(StageRange range, const Iterate& iterate, const CostView& view, BetweenCache& known,
                            double* memory) const noexcept;
   double* H_of(const CostView& view, int stage) const noexcept;

@@ -128,9 +128,9 @@ class RHEC_EXPORT Riccati {
   /// covariance + i * n_s^2, if not null; the last node's to `last`.
   void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
 
-  /// The last node's alone, without a factorisation, for an H whose controls are coupled to nothing and whose first node
-  /// is known: what the Kalman filter computes. False, and nothing written, for others. It leaves the factorisation as it
-  /// was.
+  /// The last node's alone, without a factorisation, for an H whose controls are coupled to nothing and whose first
+  /// node is known: what the Kalman filter computes. False, and nothing written, for others. It leaves the
+  /// factorisation as it was.
   bool filter_covariance(const StageQp& qp, double* last) noexcept;
 
   /// The largest number of controls, and of states, of one stage.
