@@ -1,5 +1,6 @@
 // How a PriorBank uses measurements between two nodes.
 #include <algorithm>
+#include <cmath>
 
 #include "prior_bank_views.hpp"
 #include "rhec/core/base/assertion.hpp"
@@ -47,11 +48,13 @@ void PriorBank::take_between(double seconds, double share, const double* y) noex
   const int a = wide_count(), columns = nx_ + nu_ + 2 * np_;
   integrate_members(wide_mean_.data(), true, seconds, share);
   observe_members(next_rows_.data());
-  std::fill(wide_gradient_.begin(), wide_gradient_.end(), 0.0);
-  for (int m = 0; m < lanes_; ++m) {
-    const double *J = jacobian_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * columns,
-                 *C = gradient_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * ny_;
-    for (int j = 0; j < ny_; ++j) {
+  const std::ptrdiff_t of_output = static_cast<std::ptrdiff_t>(a) * lanes_;
+  for (int j = 0; j < ny_; ++j) {
+    if (std::isnan(y[j])) continue;  // nothing is measured by it
+    std::fill_n(wide_gradient_.data() + j * of_output, of_output, 0.0);
+    for (int m = 0; m < lanes_; ++m) {
+      const double *J = jacobian_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * columns,
+                   *C = gradient_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * ny_;
       const auto by = [&](int column) {
         double sum = 0.0;
         for (int r = 0; r < nx_; ++r) sum += C[r * ny_ + j] * J[column * nx_ + r];

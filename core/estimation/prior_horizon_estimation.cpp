@@ -229,6 +229,12 @@ void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadli
   result.report = solver_->solve(point_, deadline);
   has_solution_ = result.report.status == Status::solved;
   if (!has_solution_) has_solution_ = PriorRestart::is_convincing(problem_, result.report);
+  // Without time to doubt it, a solution is the next one's guess, and the filters speak.
+  const bool is_doubtful = !has_solution_ && is_usable(result.report.status) && is_past(deadline);
+  if (is_doubtful) {
+    has_solution_ = true;
+    result.report.status = Status::deadline;
+  }
   if (!has_solution_) {
     start_cold(prior_);
     has_solution_ =
@@ -240,7 +246,7 @@ void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadli
   if (result.fallback) {
     start_cold(point_);
     solver_->reset();
-  } else {
+  } else if (!is_doubtful) {
     combine(result);
   }
   filters_.fuse_place(mean_, mixture_);
