@@ -215,9 +215,14 @@ def test_a_key_that_is_not_known():
     assert caught.value.key and "states.x" in caught.value.key
 
 
-def test_a_model_becomes_a_plugin(tmp_path):
+def test_a_model_becomes_a_plugin(tmp_path, monkeypatch):
+    checked = []
+    check = rhec._rhec.check
+    monkeypatch.setattr(rhec._rhec, "check", lambda *arguments: checked.append(arguments) or check(*arguments))
     built = bicycle().build(tmp_path / "built", instruction_sets=["generic"])
+    assert len(checked) == 1  # of what is compiled, before it is
     assert not built.check.failed
+    assert built.check is built.check and len(checked) == 2
     header = next(pathlib.Path(built.folder).glob("*.hpp")).read_text()
     assert "speed" in header and "Kraus et al. 2013" in (header + "".join(f.read_text() for f in pathlib.Path(built.folder).glob("*.cpp")))
     assert built.vehicle.instruction_sets[-1] == "generic"  # compiled, not interpreted

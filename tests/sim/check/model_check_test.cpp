@@ -35,7 +35,7 @@ struct Stiff {
   void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
-TEST(ModelCheck, LooksAtDerivativesOfStiffModelsInStepsThatDoNotGrow) {
+ModelDescription about_stiff() {
   ModelDescription about;
   about.name = "stiff";
   about.source = "this test";
@@ -43,10 +43,24 @@ TEST(ModelCheck, LooksAtDerivativesOfStiffModelsInStepsThatDoNotGrow) {
                   {.name = "rate", .unit = "1/s", .meaning = "speed"}};
   about.inputs = {{.name = "set_point", .unit = "1/s", .meaning = "wanted speed", .lower = -2.0, .upper = 2.0}};
   about.outputs = {{.name = "angle", .unit = "1", .meaning = "measured"}};
-  FormulaModel<Stiff> model({}, about);
+  return about;
+}
+
+TEST(ModelCheck, LooksAtDerivativesOfStiffModelsInStepsThatDoNotGrow) {
+  FormulaModel<Stiff> model({}, about_stiff());
   const Finding derivatives =
       finding_of(check_model(model, ModelCheckOptions{.samples = 16, .substeps = 1}), "derivatives");
   EXPECT_EQ(derivatives.verdict, Verdict::pass) << derivatives.found;
+}
+
+TEST(ModelCheck, SaysAtHowManySamplesItLookedAtSecondDerivatives) {
+  FormulaModel<Stiff> model({}, about_stiff());
+  const auto numbers = [&model](int substeps) {
+    return finding_of(check_model(model, ModelCheckOptions{.samples = 300, .substeps = substeps}), "numbers").found;
+  };
+  EXPECT_THAT(numbers(16), testing::Not(HasSubstr("second derivatives")));
+  EXPECT_THAT(numbers(40), HasSubstr("second derivatives, which take 40 substeps, at 128 of them"));
+  EXPECT_THAT(numbers(400), HasSubstr("at 64 of them"));
 }
 
 TEST(ModelCheck, FindsNothingWrongWithAGoodModel) {
