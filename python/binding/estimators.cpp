@@ -118,7 +118,11 @@ void reset_to(NamedEstimator& self, const std::optional<Numbers>& mean, const st
   const Eigen::Index n = self.estimator->model().state_count() + self.estimator->model().parameter_count();
   if (mean->ndim() != 1 || mean->size() != n || covariance->ndim() != 2 || covariance->shape(0) != n ||
       covariance->shape(1) != n)
-    throw Error(fmt::format("reset: expected the mean of [state; parameters] ({0}) and its covariance ({0}, {0})", n));
+    throw Error(
+        fmt::format("reset: found a mean that is {1} and a covariance that is {2}, expected the mean of [state; "
+                    "parameters] ({0}) and "
+                    "its covariance ({0}, {0})",
+                    n, shape_of(*mean), shape_of(*covariance)));
   const Eigen::VectorXd to = Eigen::Map<const Eigen::VectorXd>(mean->data(), n);
   const Eigen::MatrixXd with = Eigen::Map<const Eigen::MatrixXd>(covariance->data(), n, n);
   if (!is_covariance(with))

@@ -23,7 +23,7 @@ class Rows {
  public:
   /// Lengthens the common number of rows.
   void add(const Numbers& given, const std::vector<Variable>& variables, const char* what) {
-    const py::ssize_t rows = rows_of(given, variables.size(), what);
+    const py::ssize_t rows = rows_of(given, variables, what);
     if (given.ndim() == 2) has_rows_ = true;
     if (count_ != 1 && rows != 1 && rows != count_)
       throw Error(

@@ -41,6 +41,11 @@ class Error(_Placed, Exception):
     """
 
 
+class ArgumentError(Error, TypeError):
+    """An argument of a call that is no such thing as the call takes: the text names it, and says what was found and what was
+    expected."""
+
+
 class Note(_Placed, UserWarning):
     """What you should know of a configuration though it can be used: keys that count for nothing, numbers that look like a
     wrong unit. It is warned of, so that warnings.simplefilter("ignore", rhec.Note) silences it, and "error" raises it.
