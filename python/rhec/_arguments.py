@@ -54,6 +54,9 @@ _OF_TYPES = ((r"[Ll]ist\[|Sequence\[", "a list of texts"), (r"ndarray", "numbers
              (r"\bfloat\b|SupportsFloat", "a number"), (r"\bint\b|SupportsInt", "a whole number"), (r"\bstr\b", "a text"), (r"\bdict\b", "a dict"))
 
 
+_LARGEST = 2**31 - 1  # of C's int
+
+
 class _Parameter(NamedTuple):
     name: str
     type: str
@@ -133,7 +136,7 @@ def _fits(value: Any, kind: str) -> bool:
     if re.search(r"\bfloat\b|SupportsFloat", kind):
         return isinstance(value, numbers.Real) or hasattr(value, "__float__") and not _is_text(value)
     if re.search(r"\bint\b|SupportsInt", kind):
-        return isinstance(value, int) or hasattr(value, "__index__")
+        return hasattr(value, "__index__") and -_LARGEST <= int(value) <= _LARGEST
     if re.search(r"\bstr\b", kind):
         return _is_text(value)
     if re.search(r"\bdict\b", kind):

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from . import _rhec
-from ._errors import ArgumentError
+from ._errors import ArgumentError, Error
 from ._types import Changes, Configuration, PluginPath
 
 
@@ -39,7 +39,10 @@ def read(source: Configuration, changes: Changes = None, plugin_path: PluginPath
     if isinstance(source, (str, os.PathLike)):
         settings = _rhec.Settings.load(os.fspath(source))
     elif isinstance(source, dict):
-        settings = _rhec.Settings.of(plain(source, folders), "configuration")
+        try:
+            settings = _rhec.Settings.of(plain(source, folders), "configuration")
+        except RecursionError:
+            raise Error("configuration: a dict or a list in it contains itself, or they are nested too deep") from None
     else:
         raise ArgumentError(f"configuration: found an object of the class '{type(source).__name__}', expected the name of a YAML "
                     "file or a dict")

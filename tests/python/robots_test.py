@@ -220,6 +220,8 @@ CALLS = {
     "Estimator: initial_state: found 'a' (str), expected a number for each state, (n_x)": lambda on: on.robot.make_estimator("a"),
     "Vehicle.integrate: substeps: found 1.5 (float), expected a whole number":
         lambda on: on.robot.vehicle.integrate([0] * 4, [0] * 2, [1, 1], 0.2, 1.5),
+    "Vehicle.integrate: substeps: found 1099511627776 (int), expected a whole number":
+        lambda on: on.robot.vehicle.integrate([0] * 4, [0] * 2, [1, 1], 0.2, 2**40),
     "Path: waypoints: found 'x' (str), expected rows of x [m], y [m], speed [m/s], (n, 3)": lambda on: rhec.Path("x"),
     "Path: acceleration: found 'a' (str), expected a number [m/s^2]": lambda on: rhec.Path([(0, 0, 1), (1, 0, 1)], acceleration="a"),
     "Path.at: arc_length is missing; expected a number [m]: Path.at(arc_length)": lambda on: line().at(),
@@ -251,6 +253,35 @@ def test_shapes_that_are_refused_are_named_with_units():
         with pytest.raises(rhec.Error) as caught:
             call()
         assert str(caught.value).startswith(words)
+
+
+def test_no_rows_are_no_rows():
+    """There is nothing to read of them."""
+    vehicle = rhec.Robot(ROBOT).vehicle
+    none, inputs = numpy.zeros((0, 4)), numpy.zeros((0, 2))
+    assert vehicle.integrate(none, inputs, [1, 1], 0.2).shape == (0, 4)
+    assert vehicle.rates(none, [0, 0], [1, 1]).shape == (0, 4)
+    assert vehicle.integrate(none, inputs, [1, 1], 0.2, with_jacobian=True)[1].shape == (0, 4, 8)
+    assert vehicle.observe(none).shape == (0, 3)
+    with pytest.raises(rhec.Error, match="inputs: found 3 rows, expected 0"):
+        vehicle.rates(none, numpy.zeros((3, 2)), [1, 1])
+
+
+def test_a_configuration_that_contains_itself():
+    configuration = {"step": 0.2}
+    configuration["model"] = configuration
+    with pytest.raises(rhec.Error, match="contains itself"):
+        rhec.Robot(configuration)
+
+
+def test_states_of_motion_are_told():
+    robot = rhec.Robot(ROBOT, set={"model.outputs": ["x_gps", "y_gps", "delta", "yaw_rate"], "noise.outputs.yaw_rate": 0.01})
+    estimator = robot.make_estimator()
+    estimator.push_measurement(0.0, [0, 0, 0, 0])
+    assert len(estimator.estimate(0.0).state) == len(robot.vehicle.states) + 1
+    with pytest.raises(rhec.Error, match="5 states as an Estimate has them, and 2 parameters"):
+        estimator.reset(numpy.zeros(6), numpy.eye(6))
+    estimator.reset(numpy.zeros(7), numpy.eye(7))
 
 
 def test_what_a_callback_raises_stays_as_it_is():
