@@ -26,6 +26,7 @@ Shape strides_of(const Shape& shape) {
 /// "x [m], beta [rad], mu"
 std::string with_units(const std::vector<Variable>& variables) {
   std::vector<std::string> texts;
+  texts.reserve(variables.size());
   for (const Variable& each : variables)
     texts.push_back(each.unit == "1" ? each.name : fmt::format("{} [{}]", each.name, each.unit));
   return fmt::format("{}", fmt::join(texts, ", "));

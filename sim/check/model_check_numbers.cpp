@@ -219,6 +219,7 @@ std::string region_of(Explorer& explorer, const std::vector<Explorer::Point>& ba
     for (const auto& point : bad) values.push_back(point[j]);
     for (std::size_t k = 0; k < bad.size(); k += step) {
       std::vector<Explorer::Point> others;
+      others.reserve(redraws);
       for (int i = 0; i < redraws; ++i) others.push_back(explorer.redrawn(bad[k], static_cast<int>(j)));
       const std::vector<Look> looks = explorer.look(others, depth);
       for (std::size_t i = 0; i < others.size(); ++i) {

@@ -82,7 +82,7 @@ struct Mistake {
   const char *text, *message;
 };
 TEST(Statements, MistakesNamePlaceExpectationAndRemedy) {
-  for (const auto& [text, message] : {
+  for (const Mistake& mistake : {
            Mistake{"x = 2 y",
                    "vehicle.yaml:10:11: found 'y', expected an operator or the end of the line; a product "
                    "is written with '*'"},
@@ -124,7 +124,7 @@ TEST(Statements, MistakesNamePlaceExpectationAndRemedy) {
            {"x = y \u00b7 2", "found '\u00b7', which means nothing here; a product is written with '*'"},
            {"x = \xce", "found '\\xce'"},
        })
-    EXPECT_CONTAINS(error_of([&] { parse_statements(source_of(text)); }), message) << text;
+    EXPECT_CONTAINS(error_of([&] { parse_statements(source_of(mistake.text)); }), mistake.message) << mistake.text;
 }
 
 TEST(Statements, LongLinesAreShownAroundTheMistake) {
