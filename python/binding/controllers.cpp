@@ -104,9 +104,9 @@ void applied(ControllerObject& self, const Numbers& inputs) {
 int set_obstacles(ControllerObject& self, const Numbers& obstacles, double time) {
   constexpr py::ssize_t width = 7;
   if (obstacles.ndim() != 2 || obstacles.shape(1) != width)
-    throw Error(
-        "obstacles: expected rows of x [m], y [m], semi-axes along and across [m], heading [rad], velocity in x and y "
-        "[m/s] (n x 7)");
+    throw Error("obstacles: found " + shape_of(obstacles) +
+                ", expected rows of x [m], y [m], semi-axes along and across [m], heading [rad], velocity in x and y "
+                "[m/s] (n x 7)");
   std::vector<Obstacle> all;
   for (py::ssize_t i = 0; i < obstacles.shape(0); ++i) {
     const double* row = obstacles.data() + i * width;

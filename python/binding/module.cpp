@@ -36,6 +36,61 @@ void refuse_what_was_not_made(const py::module_& module) {
         type->operator_new = &refuse_memory;
 }
 
+/// That of a function, a method, a static method or an accessor of a property which pybind11 has made; null of all
+/// else.
+PyCFunctionObject* function_of(PyObject* value) {
+  if (PyInstanceMethod_Check(value)) value = PyInstanceMethod_GET_FUNCTION(value);
+  if (!PyCFunction_Check(value)) return nullptr;
+  auto* const function = reinterpret_cast<PyCFunctionObject*>(value);
+  return function->m_ml->ml_flags == (METH_VARARGS | METH_KEYWORDS) ? function : nullptr;
+}
+
+/// What pybind11 calls for every function.
+PyCFunctionWithKeywords dispatcher() {
+  static const auto found = [] {
+    const py::cpp_function any([] {});
+    const PyCFunctionObject* function = function_of(any.ptr());
+    return function ? reinterpret_cast<PyCFunctionWithKeywords>(reinterpret_cast<void*>(function->m_ml->ml_meth))
+                    : nullptr;
+  }();
+  return found;
+}
+
+/// Calls what pybind11 would call, and says in the package's words what a function expects that refuses its arguments.
+/// A call that is not refused takes no longer.
+PyObject* call_in_words(PyObject* self, PyObject* arguments, PyObject* by_name) {
+  PyObject* const made = dispatcher()(self, arguments, by_name);
+  if (made || !PyErr_ExceptionMatches(PyExc_TypeError)) return made;
+  py::error_already_set refused;
+  if (refused.trace()) {  // raised in Python, by what the function has called
+    refused.restore();
+    return nullptr;
+  }
+  try {
+    const py::object words = py::module_::import("rhec._arguments")
+                                 .attr("in_words")(py::str(refused.value()), py::handle(arguments),
+                                                   by_name ? py::handle(by_name) : py::none());
+    if (words.is_none())
+      refused.restore();
+    else
+      PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(words.ptr())), words.ptr());
+  } catch (py::error_already_set&) {
+    refused.restore();
+  }
+  return nullptr;
+}
+
+void speak_of_arguments(const py::handle& holder) {
+  for (const auto& [name, value] : holder.attr("__dict__").attr("copy")().cast<py::dict>()) {
+    py::object callable = py::reinterpret_borrow<py::object>(value);
+    if (Py_TYPE(value.ptr()) == &PyStaticMethod_Type) callable = value.attr("__func__");
+    if (PyCFunctionObject* const function = function_of(callable.ptr());
+        function && reinterpret_cast<void*>(function->m_ml->ml_meth) == reinterpret_cast<void*>(dispatcher()))
+      function->m_ml->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void*>(&call_in_words));
+    if (PyType_Check(value.ptr())) speak_of_arguments(value);
+  }
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_rhec, module) {
@@ -53,4 +108,5 @@ PYBIND11_MODULE(_rhec, module) {
   rhec::python::bind_logs(module);
   rhec::python::bind_runs(module);
   refuse_what_was_not_made(module);
+  speak_of_arguments(module);
 }

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 _IN_A_FILE = re.compile(r"^(?P<file>[^:\n]+):(?P<line>\d+)(?::\d+)?: (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
 # "configuration: key.path: what", "set 'key.path': key.path: what"
 _IN_PYTHON = re.compile(r"^(?:configuration|set '[^']*'): (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
+# "configuration: key.path: file.yaml:12:3: what", of a file that a configuration names
+_IN_A_NAMED_FILE = re.compile(r"(?P<file>[^:\n]+):(?P<line>\d+)(?::\d+)?: ")
 
 
 # "step: what", of a configuration as a whole
@@ -22,10 +24,11 @@ class _Placed:
 
     def __init__(self, text: str = "") -> None:
         super().__init__(text)  # type: ignore[call-arg]
-        found = _IN_A_FILE.match(text)
-        self.file: str | None = found["file"] if found else None
-        self.line: int | None = int(found["line"]) if found else None
-        found = found or _IN_PYTHON.match(text)
+        in_python = _IN_PYTHON.match(text)
+        in_a_file = _IN_A_NAMED_FILE.match(text, in_python.end()) if in_python else _IN_A_FILE.match(text)
+        self.file: str | None = in_a_file["file"] if in_a_file else None
+        self.line: int | None = int(in_a_file["line"]) if in_a_file else None
+        found = in_python or in_a_file
         self.key: str | None = found["key"] if found else None
 
 
@@ -36,6 +39,11 @@ class Error(_Placed, Exception):
     line: the line of that file, counted from 1, or None
     key: the dotted key of a configuration, such as 'estimator.horizon', or None
     """
+
+
+class ArgumentError(Error, TypeError):
+    """An argument of a call that is no such thing as the call takes: the text names it, and says what was found and what was
+    expected."""
 
 
 class Note(_Placed, UserWarning):

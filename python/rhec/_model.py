@@ -1,6 +1,7 @@
 """A vehicle that is written in Python: with sympy's or CasADi's terms."""
 from __future__ import annotations
 
+import functools
 import json
 import pathlib
 import re
@@ -142,7 +143,7 @@ class Model:
         return Check.of(self)
 
     def build(self, folder: File | None = None, *, instruction_sets: Sequence[str] | None = None) -> BuiltModel:
-        """Writes it as a plugin in C++, compiles that against the rhec that this package belongs to, checks it and loads
+        """Checks it, writes it as a plugin in C++, compiles that against the rhec that this package belongs to, and loads
         it. Returns a BuiltModel, for configurations as this one is.
 
         folder: of the sources; without one a folder of the user's cache, where it is found again the next time
@@ -161,14 +162,17 @@ class Model:
 class BuiltModel:
     """A model that was compiled, for configurations: {"model": built}.
 
-    folder: its sources; vehicle: the Vehicle; check: what `rhec check` says of it
+    folder: its sources; vehicle: the Vehicle; check: what `rhec check` says of what was compiled, when it is first asked for
     """
 
     def __init__(self, plugin: str, folder: pathlib.Path, options: dict[str, Any]) -> None:
         self.plugin, self.folder, self._options = plugin, folder, options
         self._plugin_path = [str(folder.absolute() / "build")]
         self.vehicle = _vehicle_of(self)
-        self.check = Check.of(self)
+
+    @functools.cached_property
+    def check(self) -> Check:
+        return Check.of(self)
 
     def _section(self):
         return {"name": self.plugin, **self._options}
@@ -201,15 +205,11 @@ class _Builder:
     def build(self) -> BuiltModel:
         file = self._folder / f"{self._model.name}.yaml"
         _compile.write(file, self._yaml)
-        self._reject(self._model.check(), file)  # before it is compiled, which takes longer
+        check = self._model.check()  # before it is compiled, which takes longer
+        if check.failed:
+            raise Error(f"{file}: the check of the model '{self._model.name}' failed: {check.failures()}")
         sources = _rhec.vehicle_as_cpp(str(file))
         for name, content in sources["files"].items():
             _compile.write(self._folder / name, content)
         _compile.compile_in(self._folder, [f"-DRHEC_MODEL_INSTRUCTION_SETS={';'.join(self._sets)}"] if self._sets else [])
-        built = BuiltModel(sources["plugin"], self._folder, self._model._options)
-        self._reject(built.check, file)
-        return built
-
-    def _reject(self, check: Check, file: pathlib.Path) -> None:
-        if check.failed:
-            raise Error(f"{file}: the check of the model '{self._model.name}' failed: {check.failures()}")
+        return BuiltModel(sources["plugin"], self._folder, self._model._options)
