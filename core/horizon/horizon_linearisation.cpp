@@ -53,14 +53,16 @@ void HorizonLinearisation::forget() noexcept {
 
 double HorizonLinearisation::linearise(const Iterate& iterate, Hessian hessian) noexcept {
   const CostParts parts = hessian == Hessian::none ? CostParts::vectors : CostParts::all;
-  linearise_stages(iterate, hessian);
+  linearise_stages(iterate, hessian, LimitParts::all);
   const double total = write_cost(all_stages(problem_), iterate, hessian, parts);
   return total + add_terms(iterate, hessian, parts);
 }
 
 double HorizonLinearisation::linearise_for_residual(const Iterate& iterate, Hessian next) noexcept {
   if (next != Hessian::exact || !problem_.keeps_curvature()) return linearise(iterate, Hessian::none);
-  linearise_stages(iterate, Hessian::exact);
+  // The gradients of limits without multipliers are no part of the residual, and `refresh` writes them anew.
+  const bool needs_slopes = !problem_.has_late_bounds() || problem_.terms().any_pulls(problem_.structure(), iterate);
+  linearise_stages(iterate, Hessian::exact, needs_slopes ? LimitParts::all : LimitParts::values);
   const double total = write_cost(all_stages(problem_), iterate, Hessian::exact, CostParts::all);
   // The next sample has other data for the terms, and so another Hessian of theirs.
   keep_curvature();
@@ -69,13 +71,16 @@ double HorizonLinearisation::linearise_for_residual(const Iterate& iterate, Hess
 
 void HorizonLinearisation::prepare(const Iterate& iterate, Hessian hessian) noexcept {
   const bool has_moved = move_along(iterate, hessian);
-  if (!has_moved) linearise_stages(iterate, hessian);
+  if (!has_moved) linearise_stages(iterate, hessian, LimitParts::all);
   if (!has_moved || hessian != Hessian::exact) write_cost(all_stages(problem_), iterate, hessian, CostParts::matrices);
   add_terms(iterate, hessian, CostParts::matrices);
 }
 
 void HorizonLinearisation::refresh(const Iterate& iterate) noexcept {
-  if (problem_.has_late_bounds()) problem_.write_bounds(iterate, all_stages(problem_), qp_, scratch_);
+  if (problem_.has_late_bounds()) {
+    problem_.write_bounds(iterate, all_stages(problem_), qp_, scratch_);
+    has_slopes_ = true;
+  }
   write_cost(all_stages(problem_), iterate, Hessian::none, CostParts::vectors);
   add_terms(iterate, Hessian::none, CostParts::vectors);
 }
@@ -113,7 +118,7 @@ bool HorizonLinearisation::has_lifted_rows() const noexcept {
 }
 
 /// Evaluates sizes, dynamics with their curvature, and bounds anew.
-void HorizonLinearisation::linearise_stages(const Iterate& iterate, Hessian hessian) noexcept {
+void HorizonLinearisation::linearise_stages(const Iterate& iterate, Hessian hessian, LimitParts limits) noexcept {
   const int N = problem_.intervals();
   const StageRange all{0, N};
   IntervalDynamics::Options options{.hessian = hessian, .has_lifted_rows = has_lifted_rows()};
@@ -129,7 +134,9 @@ void HorizonLinearisation::linearise_stages(const Iterate& iterate, Hessian hess
     options.extension = &extension;
   }
   if (N > 0) dynamics.linearise({0, N - 1}, iterate, options, qp_, scratch_.data());
-  problem_.write_bounds(iterate, all, qp_, scratch_);
+  problem_.write_own_bounds(iterate, all, qp_);
+  problem_.write_limits(iterate, all, limits, qp_, scratch_);
+  has_slopes_ = limits == LimitParts::all;
 }
 
 /// Records that AB and b belong to this iterate; its rows before `first` are already in the cache.
@@ -279,7 +286,20 @@ void HorizonLinearisation::evaluate_unknown(const Iterate& iterate, Hessian hess
 /// along, with data that held for the same time; `refresh` writes all of them once the newest data are known.
 void HorizonLinearisation::write_new_limits(const Iterate& iterate, int end, const int* unknown, int count) noexcept {
   const int N = problem_.intervals();
-  const auto write = [&](int first, int last) { problem_.write_limits(iterate, {first, last}, qp_, scratch_); };
+  const HorizonTerms& terms = problem_.terms();
+  if (!terms.has_limits()) return;
+  // Without multipliers no limit is likely to be active.
+  const bool is_open = !terms.any_pulls(problem_.structure_, iterate);
+  const auto write = [&](int first, int last) {
+    if (is_open)
+      terms.write_open_limits(problem_.horizon_of_terms(), {first, last}, qp_);
+    else
+      problem_.write_limits(iterate, {first, last}, LimitParts::all, qp_, scratch_);
+  };
+  if (!is_open && !has_slopes_) {
+    write(0, N);
+    return;
+  }
   const int first_kept = 1, last_kept = std::min(end, N) - 1;  // the first and the last node have rows of their own
   write(0, std::min(first_kept - 1, N));
   for (int k = 0; k < count; ++k)

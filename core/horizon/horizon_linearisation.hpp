@@ -31,6 +31,7 @@ class HorizonLinearisation : public Linearisation {
 
  protected:
   using CostParts = HorizonProblem::CostParts;
+  using LimitParts = HorizonTerms::LimitParts;
 
   /// Writes the cost of a range of stages without terms, as HorizonProblem::write_cost.
   virtual double write_cost(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts) noexcept {
@@ -49,7 +50,7 @@ class HorizonLinearisation : public Linearisation {
   double* row(AlignedDoubles& rows, int stage) const noexcept;
   const double* row(const AlignedDoubles& rows, int stage) const noexcept;
   std::uint8_t* starts(int interval) noexcept;
-  void linearise_stages(const Iterate& iterate, Hessian hessian) noexcept;
+  void linearise_stages(const Iterate& iterate, Hessian hessian, LimitParts limits) noexcept;
   double add_terms(const Iterate& iterate, Hessian hessian, CostParts parts) noexcept;
   void keep_curvature() noexcept;
   bool has_structure() const noexcept;
@@ -73,6 +74,7 @@ class HorizonLinearisation : public Linearisation {
   AlignedDoubles rows_, costates_;   ///< of the iterate at which the QP was made
   AlignedDoubles curvature_behind_;  ///< H of the interval behind the horizon
   AlignedDoubles without_terms_;     ///< H without what terms add to it; empty if there are none
+  bool has_slopes_ = true;           ///< G is of this iterate, and not of an older one
   std::vector<double> durations_, data_;  ///< of the intervals
   std::vector<std::uint8_t> starts_;      ///< of each interval's lifted variables
   /// Per node: 2 if the whole row matches, 1 if the state does; per interval, the same for costates.

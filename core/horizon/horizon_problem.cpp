@@ -184,7 +184,7 @@ void HorizonProblem::refresh(const Iterate& iterate, StageQp& qp, std::span<doub
 void HorizonProblem::write_bounds(const Iterate& iterate, StageRange range, StageQp& qp,
                                   std::span<double> scratch) const noexcept {
   write_own_bounds(iterate, range, qp);
-  write_limits(iterate, range, qp, scratch);
+  write_limits(iterate, range, HorizonTerms::LimitParts::all, qp, scratch);
 }
 
 void HorizonProblem::write_own_bounds(const Iterate& iterate, StageRange range, StageQp& qp) const noexcept {
@@ -197,9 +197,9 @@ void HorizonProblem::write_own_bounds(const Iterate& iterate, StageRange range, 
       qp.initial_step()[j] = initial_state()[j] - iterate.state(0)[j];
 }
 
-void HorizonProblem::write_limits(const Iterate& iterate, StageRange range, StageQp& qp,
+void HorizonProblem::write_limits(const Iterate& iterate, StageRange range, HorizonTerms::LimitParts parts, StageQp& qp,
                                   std::span<double> scratch) const noexcept {
-  if (terms_.has_limits()) terms_.write_limits(horizon_of_terms(), range, iterate, qp, scratch.data());
+  if (terms_.has_limits()) terms_.write_limits(horizon_of_terms(), range, iterate, parts, qp, scratch.data());
 }
 
 void HorizonProblem::clear_cost(StageRange range, Hessian hessian, CostParts parts, StageQp& qp) const noexcept {

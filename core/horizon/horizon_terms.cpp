@@ -22,11 +22,17 @@ LossAt loss_at(const Loss& loss, double r) noexcept {
   return {2.0 * square * (root - 1.0), 1.0 / root, -0.5 / (square * root * root * root)};
 }
 
-bool any_pull(const Iterate& iterate, StageRange stages, int limits) noexcept {
-  const auto is_set = [](double multiplier) { return multiplier != 0.0; };
-  for (int i = stages.first; i <= stages.last; ++i)
-    if (std::any_of(iterate.limit_bound(i), iterate.limit_bound(i) + limits, is_set)) return true;
-  return false;
+/// The stages from the first to the last one of which a limit has a multiplier.
+StageRange pulled(const Iterate& iterate, StageRange stages, int limits) noexcept {
+  const auto pulls = [&](int i) {
+    const double* const multipliers = iterate.limit_bound(i);
+    bool any = false;
+    for (int r = 0; r < limits; ++r) any |= multipliers[r] != 0.0;
+    return any;
+  };
+  while (stages.first <= stages.last && !pulls(stages.first)) ++stages.first;
+  while (stages.first < stages.last && !pulls(stages.last)) --stages.last;
+  return stages;
 }
 
 }  // namespace
@@ -102,11 +108,16 @@ void HorizonTerms::for_each_kind(const Horizon& horizon, StageRange range, const
 void HorizonTerms::gather(const Horizon& horizon, StageRange range, const Iterate& iterate,
                           double* arguments) const noexcept {
   const int N = horizon.structure.intervals(), row = functions_->argument_row();
+  const bool begins_alike = has_fixed_columns(horizon.structure);
   for (int i = range.first; i <= range.last; ++i, arguments += row) {
-    double* to = std::copy_n(iterate.state(i), nx_, arguments);
+    double* to = std::copy_n(iterate.state(i), begins_alike && i < N ? nx_ + np_ + nu_ : nx_, arguments);
     if (i < N) {
-      horizon.structure.parameters_on(iterate, i, to);
-      horizon.structure.inputs_on(iterate, i, to + np_);
+      if (begins_alike) {
+        to -= np_ + nu_;
+      } else {
+        horizon.structure.parameters_on(iterate, i, to);
+        horizon.structure.inputs_on(iterate, i, to + np_);
+      }
       to[np_ + nu_] = horizon.durations[i];
       to = std::copy_n(horizon.data + at(i, horizon.data_count), horizon.data_count, to + np_ + nu_ + 1);
     } else {
@@ -116,6 +127,11 @@ void HorizonTerms::gather(const Horizon& horizon, StageRange range, const Iterat
     to = std::copy_n(data(i), data_row_, to);
     std::fill(to, arguments + row, 0.0);
   }
+}
+
+/// Whether every variable of [x; p; u] is at its place in the row [s; w] of every stage.
+bool HorizonTerms::has_fixed_columns(const HorizonStructure& structure) const noexcept {
+  return structure.is_direct() && !structure.any_start();
 }
 
 /// The column of [s; w] of a variable of [x; p; u].
@@ -159,46 +175,94 @@ void HorizonTerms::mark_limits(const Horizon& horizon, int node, std::uint8_t* s
   }
 }
 
-void HorizonTerms::write_limits(const Horizon& horizon, StageRange range, const Iterate& iterate, StageQp& qp,
-                                double* scratch) const noexcept {
-  if (!has_limits()) return;
-  const int stride = qp.stride(), N = horizon.structure.intervals();
+void HorizonTerms::write_limit_counts(const Horizon& horizon, StageRange range, StageQp& qp) const noexcept {
+  const int N = horizon.structure.intervals();
   for (int i = range.first; i <= range.last; ++i) {
     const TermFunctions::Rows* const rows = this->rows(i, N, horizon.is_given);
     qp.set_limits(i, rows ? rows->limits : 0);
   }
+}
+
+/// The bounds of limits, of which the upper ones have the values at first, and their prices.
+void HorizonTerms::complete_limits(const TermFunctions::Rows& rows, StageRange stages, StageQp& qp) const noexcept {
+  const double *linear = functions_->linear() + rows.first_limit,
+               *quadratic = functions_->quadratic() + rows.first_limit;
+  for (int i = stages.first; i <= stages.last; ++i) {
+    const double *least = lower(i) + rows.first_limit, *most = upper(i) + rows.first_limit;
+    double *to_lower = qp.limit_lower(i), *to_upper = qp.limit_upper(i);
+    double *to_linear = qp.limit_linear(i), *to_quadratic = qp.limit_quadratic(i);
+    for (int r = 0; r < rows.limits; ++r) {
+      const double value = to_upper[r];
+      to_lower[r] = least[r] - value;
+      to_upper[r] = most[r] - value;
+      to_linear[r] = linear[r];
+      to_quadratic[r] = quadratic[r];
+    }
+  }
+}
+
+void HorizonTerms::write_limits(const Horizon& horizon, StageRange range, const Iterate& iterate, LimitParts parts,
+                                StageQp& qp, double* scratch) const noexcept {
+  if (!has_limits()) return;
+  write_limit_counts(horizon, range, qp);
+  const bool is_fixed = has_fixed_columns(horizon.structure);
   for_each_kind(horizon, range, [&](TermFunctions::Stage stage, StageRange stages) {
     const TermFunctions::Rows& rows = functions_->rows(stage);
-    const int count = stages.last - stages.first + 1;
-    const auto slope_count = static_cast<std::ptrdiff_t>(rows.slopes.size());
+    const int count = stages.last - stages.first + 1, last = stages.first + (count > 1 ? 1 : 0);
     Scratch memory(scratch);
     double* const arguments = memory.take(at(count, functions_->argument_row()));
-    double* const values = memory.take(at(count, rows.count()));
-    double* const slopes = memory.take(count * slope_count);
     gather(horizon, stages, iterate, arguments);
-    functions_->evaluate(stage, count, arguments, values, slopes, memory.rest());
-    const double *linear = functions_->linear() + rows.first_limit,
-                 *quadratic = functions_->quadratic() + rows.first_limit;
-    for (int i = stages.first; i <= stages.last; ++i) {
-      const std::ptrdiff_t k = i - stages.first;
-      const double *least = lower(i) + rows.first_limit, *most = upper(i) + rows.first_limit;
-      double *to_lower = qp.limit_lower(i), *to_upper = qp.limit_upper(i), *G = qp.G(i);
-      double *to_linear = qp.limit_linear(i), *to_quadratic = qp.limit_quadratic(i);
-      for (int r = 0; r < rows.limits; ++r) {
-        const double value = values[k * rows.count() + r];
-        to_lower[r] = least[r] - value;
-        to_upper[r] = most[r] - value;
-        to_linear[r] = linear[r];
-        to_quadratic[r] = quadratic[r];
+    for (int i = stages.first; parts == LimitParts::all && i <= stages.last; ++i)
+      std::fill_n(qp.G(i), at(rows.limits, qp.stride()), 0.0);
+    TermFunctions::LimitPlaces places{.values = qp.limit_upper(stages.first),
+                                      .values_step = qp.limit_upper(last) - qp.limit_upper(stages.first)};
+    if (parts == LimitParts::values || is_fixed) {
+      if (parts == LimitParts::all) {
+        places.slopes = qp.G(stages.first);
+        places.slopes_step = qp.G(last) - qp.G(stages.first);
+        places.row_length = qp.stride();
       }
-      std::fill_n(G, at(rows.limits, stride), 0.0);
-      const double* slope = slopes + k * slope_count;
-      for (const auto& [r, c] : rows.slopes) {
-        if (r < rows.limits) G[at(r, stride) + column(horizon.structure, i, c)] += *slope;
-        ++slope;
-      }
+      functions_->evaluate_limits(stage, count, arguments, places, memory.rest());
+    } else {
+      write_moved_slopes(horizon, stage, stages, arguments, qp, memory.rest());
     }
+    complete_limits(rows, stages, qp);
   });
+}
+
+void HorizonTerms::write_open_limits(const Horizon& horizon, StageRange range, StageQp& qp) const noexcept {
+  write_limit_counts(horizon, range, qp);
+  for (int i = range.first; i <= range.last; ++i) {
+    std::fill_n(qp.G(i), at(qp.limits(i), qp.stride()), 0.0);
+    std::fill_n(qp.limit_lower(i), qp.limits(i), -infinity);
+    std::fill_n(qp.limit_upper(i), qp.limits(i), infinity);
+  }
+}
+
+bool HorizonTerms::any_pulls(const HorizonStructure& structure, const Iterate& iterate) const noexcept {
+  const StageRange all{0, structure.intervals()};
+  return limits_ > 0 && pulled(iterate, all, limits_).first <= all.last;
+}
+
+/// Values, as `complete_limits` expects them, and slopes by variables that are elsewhere in [s; w] than in [x; p; u].
+void HorizonTerms::write_moved_slopes(const Horizon& horizon, TermFunctions::Stage stage, StageRange stages,
+                                      const double* arguments, StageQp& qp, double* scratch) const noexcept {
+  const TermFunctions::Rows& rows = functions_->rows(stage);
+  const int count = stages.last - stages.first + 1;
+  const auto slope_count = static_cast<std::ptrdiff_t>(rows.slopes.size());
+  Scratch memory(scratch);
+  double* const values = memory.take(at(count, rows.count()));
+  double* const slopes = memory.take(count * slope_count);
+  functions_->evaluate(stage, count, arguments, values, slopes, memory.rest());
+  for (int i = stages.first; i <= stages.last; ++i) {
+    const std::ptrdiff_t k = i - stages.first;
+    std::copy_n(values + k * rows.count(), rows.limits, qp.limit_upper(i));
+    const double* slope = slopes + k * slope_count;
+    for (const auto& [r, c] : rows.slopes) {
+      if (r < rows.limits) qp.G(i)[at(r, qp.stride()) + column(horizon.structure, i, c)] += *slope;
+      ++slope;
+    }
+  }
 }
 
 double HorizonTerms::cost(const Horizon& horizon, const Iterate& iterate, double* stage_costs,
@@ -235,7 +299,8 @@ double HorizonTerms::add_cost(const Horizon& horizon, StageRange range, const It
   for_each_kind(horizon, range, [&](TermFunctions::Stage stage, StageRange stages) {
     const TermFunctions::Rows& rows = functions_->rows(stage);
     // Without residuals there is only the curvature of limits, which that of limits without multipliers is no part of.
-    if (rows.residuals.empty() && !(curves && any_pull(iterate, stages, rows.limits))) return;
+    if (rows.residuals.empty()) stages = pulled(iterate, stages, rows.limits);
+    if (stages.first > stages.last) return;
     const int count = stages.last - stages.first + 1, row_count = rows.count();
     const auto slope_count = static_cast<std::ptrdiff_t>(rows.slopes.size());
     const auto bend_count = static_cast<std::ptrdiff_t>(rows.bends.size());

@@ -107,12 +107,17 @@ void GuessShifter::move_rows(int steps, const HorizonProblem& to, Iterate& guess
 void GuessShifter::move_limits(int steps, const HorizonProblem& to, Iterate& guess) const noexcept {
   const bool given = to.initial_state() != nullptr;
   for (int i = 0; i <= to.intervals(); ++i) {
-    const TermFunctions::Rows* const rows = to.terms().rows(i, to.intervals(), given);
     double* const multipliers = guess.limit_bound(i);
     std::fill_n(multipliers, kept_.capacity().limit_row(), 0.0);
-    if (!rows || i + steps > intervals_) continue;
-    const TermFunctions::Rows* const kept = to.terms().rows(i + steps, intervals_, given);
-    const double *lower = to.limit_lower(i), *upper = to.limit_upper(i), *before = kept_.limit_bound(i + steps);
+    if (i + steps > intervals_) continue;
+    const double* const before = kept_.limit_bound(i + steps);
+    const auto is_zero = [](double multiplier) { return multiplier == 0.0; };
+    if (std::all_of(before, before + kept_.capacity().limits, is_zero)) continue;
+    const TermFunctions::Rows *const rows = to.terms().rows(i, to.intervals(), given), *const kept = to.terms().rows(
+                                                                                           i + steps, intervals_,
+                                                                                           given);
+    if (!rows) continue;
+    const double *lower = to.limit_lower(i), *upper = to.limit_upper(i);
     for (int r = 0; kept && r < rows->limits; ++r) {
       const int from = rows->first_limit + r - kept->first_limit;
       if (from < 0 || from >= kept->limits || before[from] == 0.0) continue;

@@ -1,11 +1,15 @@
 // Compiled once per instruction set RHEC_SET; its table is qp_kernels_<RHEC_SET>.
 #include "rhec/core/kernels/qp_kernels.hpp"
 
+#include "rhec/core/kernels/lane_sums.hpp"
 #include "rhec/core/kernels/lanes.hpp"
 
 namespace rhec {
 namespace kernels {
 namespace {
+
+/// The number of registers of a row of eight.
+constexpr int parts_of_eight = 8 / lane_count;
 
 /// The number of registers of a row that a stage uses.
 inline int parts_of(const QpView& view, int stage) {
@@ -109,14 +113,14 @@ KktParts kkt(const QpView& view) {
   }
 }
 
-/// For rows that fit into one register, or rows of any length.
-template <bool is_one_part>
+/// For rows of a known number of registers, or of any length (0).
+template <int known_parts>
 StepParts check_step_of(const QpView& view, double tolerance) {
-  const long stride = is_one_part ? lane_count : view.stride;
-  const int state_parts = is_one_part ? 1 : (view.states + lane_count - 1) / lane_count;
+  const long stride = known_parts > 0 ? known_parts * lane_count : view.stride;
+  const int state_parts = known_parts == 1 ? 1 : (view.states + lane_count - 1) / lane_count;
   Lanes excess = all(-1.0), costates{}, rest{}, unordered{};  // the last two stay 0 as long as everything is finite
   for (int i = 0; i <= view.intervals; ++i) {
-    const int parts = is_one_part ? 1 : parts_of(view, i);
+    const int parts = known_parts > 0 ? known_parts : parts_of(view, i);
     for (int v = 0; v < parts; ++v) {
       const long at = i * stride + v * lane_count;
       const Lanes z = load(view.values + at), lower = load(view.lower + at), upper = load(view.upper + at);
@@ -141,16 +145,16 @@ StepParts check_step_of(const QpView& view, double tolerance) {
 }
 
 StepParts check_step(const QpView& view, double tolerance) {
-  return view.stride == lane_count ? check_step_of<true>(view, tolerance) : check_step_of<false>(view, tolerance);
+  return view.stride == 8 ? check_step_of<parts_of_eight>(view, tolerance) : check_step_of<0>(view, tolerance);
 }
 
 /// Whether there is nothing to mark: all multipliers are zero and no bounds coincide.
-template <bool is_one_part>
+template <int known_parts>
 inline bool is_unmarked(const QpView& view) {
-  const long stride = is_one_part ? lane_count : view.stride;
+  const long stride = known_parts > 0 ? known_parts * lane_count : view.stride;
   Lanes found{};
   for (int i = 0; i <= view.intervals; ++i) {
-    const int parts = is_one_part ? 1 : parts_of(view, i);
+    const int parts = known_parts > 0 ? known_parts : parts_of(view, i);
     for (int v = 0; v < parts; ++v) {
       const long at = i * stride + v * lane_count;
       const Lanes lower = load(view.lower + at), gap = load(view.upper + at) - lower;
@@ -163,7 +167,7 @@ inline bool is_unmarked(const QpView& view) {
 
 bool mark_bounds(const QpView& view, double tolerance, unsigned char* marks) {
   const long stride = view.stride;
-  if (stride == lane_count ? is_unmarked<true>(view) : is_unmarked<false>(view)) {
+  if (stride == 8 ? is_unmarked<parts_of_eight>(view) : is_unmarked<0>(view)) {
     for (int i = 0; i <= view.intervals; ++i) marks[i] = 0;
     return false;
   }
@@ -215,14 +219,117 @@ void add(const double* from, double* to, long count) {
   for (long k = 0; k < count; k += lane_count) store(load(from + k) + load(to + k), to + k);
 }
 
+constexpr double no_bound = __builtin_inf();
+
+bool limits_are_sound(const LimitView& view, double tolerance) {
+  Lanes rest{};
+  LaneMask wrong{};
+  const long slot = static_cast<long>(view.limits) * view.stride;
+  for (int i = 0; i <= view.intervals; ++i) {
+    const double *sides = view.sides + 4L * i * view.row, *G = view.G + i * slot;
+    for (int r = 0; r < view.counts[i]; r += lane_count) {
+      const Lanes lower = load(sides + r), upper = load(sides + view.row + r);
+      const Lanes linear = load(sides + 2L * view.row + r), quadratic = load(sides + 3L * view.row + r);
+      const LaneMask fits = (lower < no_bound) & (upper > -no_bound) & (linear >= 0.0) &
+                            (lower - upper <= tolerance * (1.0 + absolute(lower)));
+      const LaneMask is_used = lane_numbers < static_cast<long long>(view.counts[i] - r);
+      wrong |= is_used & ~(fits & ((linear + quadratic > 0.0) | (linear == no_bound)));
+    }
+    for (long k = 0; k < static_cast<long>(view.counts[i]) * view.stride; k += lane_count) rest += 0.0 * load(G + k);
+  }
+  return sum_of(rest) + sum_of(wrong ? all(1.0) : Lanes{}) == 0.0;
+}
+
+/// For rows of a known number of registers, or of any length (0).
+template <int known_parts>
+bool limit_values_of(const LimitView& view, const double* z, double tolerance, double* values) {
+  const long stride = known_parts > 0 ? known_parts * lane_count : view.stride;
+  const long parts = known_parts > 0 ? known_parts : stride / lane_count;
+  LaneMask violated{};
+  for (int i = 0; i <= view.intervals; ++i, z += stride) {
+    const double *G = view.G + i * view.limits * stride, *lower = view.sides + 4L * i * view.row,
+                 *upper = lower + view.row;
+    const int count = view.counts[i];
+    for (int first = 0; first < view.row; first += 8, values += 8) {
+      for (int r = 0; r < 8; r += lane_count) store(Lanes{}, values + r);
+      if (first >= count) continue;
+      Lanes products[8] = {};
+      for (int r = 0; r < 8 && first + r < count; ++r, G += stride) {
+        products[r] = load(G) * load(z);
+        for (long v = 1; v < parts; ++v) products[r] += load(G + v * lane_count) * load(z + v * lane_count);
+      }
+      add_sums_of(products, values);
+      // Entries without a limit are zero, and so are their bounds.
+      for (int r = 0; r < 8; r += lane_count) {
+        const Lanes value = load(values + r), least = load(lower + first + r), most = load(upper + first + r);
+        violated |=
+            (value < least - tolerance * (1.0 + absolute(least))) | (value > most + tolerance * (1.0 + absolute(most)));
+      }
+    }
+  }
+  return sum_of(violated ? all(1.0) : Lanes{}) != 0.0;
+}
+
+bool limit_values(const LimitView& view, const double* z, double tolerance, double* values) {
+  return view.stride == 8 ? limit_values_of<parts_of_eight>(view, z, tolerance, values)
+                          : limit_values_of<0>(view, z, tolerance, values);
+}
+
+/// The columns of G that are not zero in all stages, which has few of them: most limits depend on the same variables.
+/// Returns their number.
+int find_columns(const LimitView& view, int used, short* columns) {
+  const long stride = view.stride, slot = view.limits * stride;
+  int count = 0;
+  for (int first = 0; first < used; first += lane_count) {
+    LaneMask any{};
+    for (int i = 0; i <= view.intervals; ++i) {
+      const double* G = view.G + i * slot + first;
+      for (int r = 0; r < view.counts[i]; ++r, G += stride) any |= load(G) != 0.0;
+    }
+    for (int j = 0; j < lane_count && first + j < used; ++j)
+      if (any[j] != 0) columns[count++] = static_cast<short>(first + j);
+  }
+  return count;
+}
+
+void limit_sensitivities(const LimitView& view, const int* control_counts, int states, const std::int8_t* held,
+                         const double* steps, double* values) {
+  constexpr int size = 8, max_columns = 128;  // twice the most states or controls of a stage
+  using Steps = Row<size / lane_count>;
+  const long stride = view.stride;
+  short columns[max_columns];
+  const int most = states + view.controls < max_columns ? states + view.controls : max_columns;
+  const int column_count = find_columns(view, most, columns);
+  int state_columns = 0;
+  while (state_columns < column_count && columns[state_columns] < states) ++state_columns;
+  for (int i = 0; i <= view.intervals; ++i, held += stride, steps += stride * size) {
+    const double* G = view.G + i * view.limits * stride;
+    const int used = states + (i < view.intervals ? control_counts[i] : 0);
+    for (int r = 0; r < view.counts[i]; ++r, G += stride, values += size) {
+      Steps sum{};
+      for (int k = 0; k < state_columns; ++k) sum.add(Steps::from(steps + columns[k] * size), G[columns[k]]);
+      for (int k = state_columns; k < column_count && columns[k] < used; ++k)
+        if (held[columns[k]] == 0) sum.add(Steps::from(steps + columns[k] * size), G[columns[k]]);
+      sum.to(values);
+    }
+    for (int r = view.counts[i]; r < view.row; ++r, values += size) Steps{}.to(values);
+  }
+}
+
 }  // namespace
 }  // namespace kernels
 
 #define RHEC_JOIN(a, b) a##b
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const QpKernels RHEC_TABLE(qp_kernels_, RHEC_SET);
-constinit const QpKernels RHEC_TABLE(qp_kernels_, RHEC_SET) = {&kernels::kkt,          &kernels::check_step,
-                                                               &kernels::mark_bounds,  &kernels::find_violations,
-                                                               &kernels::widen_bounds, &kernels::add};
+constinit const QpKernels RHEC_TABLE(qp_kernels_, RHEC_SET) = {&kernels::kkt,
+                                                               &kernels::check_step,
+                                                               &kernels::mark_bounds,
+                                                               &kernels::find_violations,
+                                                               &kernels::widen_bounds,
+                                                               &kernels::add,
+                                                               &kernels::limits_are_sound,
+                                                               &kernels::limit_values,
+                                                               &kernels::limit_sensitivities};
 
 }  // namespace rhec

@@ -1,6 +1,7 @@
 // Compiled once per instruction set RHEC_SET; its table is riccati_kernels_<RHEC_SET>.
 #include "rhec/core/kernels/riccati_kernels.hpp"
 
+#include "rhec/core/kernels/lane_sums.hpp"
 #include "rhec/core/kernels/lanes.hpp"
 
 namespace rhec {
@@ -631,7 +632,7 @@ inline void sensitivities_stage_forward(const RiccatiView& view, int i, int last
     for (int k = stage.offset; k < stage.columns; ++k) next_state[l].add(z[k], AB[l * stride + k]);
   }
   const double* P_next = view.P + (i + 1) * view.states * stride;
-  for (int l = 0; l < stage.next_states; ++l) {
+  for (int l = 0; costates && l < stage.next_states; ++l) {
     Batch sum = gradient_at(next, l, i < last);
     for (int j = 0; j < stage.next_states; ++j) sum.add(next_state[j], P_next[l * stride + j]);
     sum.to(costates + ((i + 1) * stride + l) * response_batch);

@@ -37,8 +37,9 @@ double slack_costs(const StageQp& qp, StageRange range) noexcept {
   double costs = 0.0;
   for (int i = range.first; qp.has_limits() && i <= range.last; ++i)
     for (int r = 0; r < qp.limits(i); ++r) {
-      const double linear = qp.limit_linear(i)[r];
       const double slack = std::max({0.0, qp.limit_lower(i)[r], -qp.limit_upper(i)[r]});
+      if (slack == 0.0) continue;
+      const double linear = qp.limit_linear(i)[r];
       if (linear < infinity) costs += (linear + 0.5 * qp.limit_quadratic(i)[r] * slack) * slack;
     }
   return costs;

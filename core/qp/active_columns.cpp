@@ -27,7 +27,7 @@ bool DualActiveSet::find_sensitivities(const StageQp& qp, Riccati& riccati, cons
   if (chosen == batch_count_) {
     // Columns are spread over all batches: recomputing them together frees a batch.
     for (int k = 0; k < batch_count_; ++k) forget(k);
-    if (!find_sensitivities_of_columns(qp, riccati, 0)) return false;
+    if (!find_sensitivities_of_columns(qp, riccati, false)) return false;
     chosen = choose();
   }
   Batch& batch = batches_[chosen];
@@ -67,21 +67,26 @@ void DualActiveSet::forget(int batch) noexcept {
   batches_[batch].count = 0;
 }
 
-bool DualActiveSet::find_sensitivities_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept {
-  for (; first < column_count(); first += batch_size)
-    if (!find_sensitivities(qp, riccati, columns_.data() + first, std::min(batch_size, column_count() - first)))
-      return false;
+/// Those of the last batch together with those of violated bounds, if these are wanted.
+bool DualActiveSet::find_sensitivities_of_columns(const StageQp& qp, Riccati& riccati, bool and_violated) noexcept {
+  for (int first = 0; first < column_count(); first += batch_size) {
+    const int* const places = columns_.data() + first;
+    const int count = std::min(batch_size, column_count() - first);
+    const bool found = and_violated && count < batch_size ? find_sensitivities_of_next(qp, riccati, places, count, 0.0)
+                                                          : find_sensitivities(qp, riccati, places, count);
+    if (!found) return false;
+  }
   return true;
 }
 
-/// For the given places and, at no extra cost, for the bounds that are likely to follow: the most violated ones, or
-/// those closest to violation, as found by `find_violations`.
-bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& riccati, const int* first,
-                                               int count) noexcept {
+/// For the given places and, at hardly any extra cost, for the bounds that are likely to follow: the most violated
+/// ones, or those closest to violation, as found by `find_violations`, of those that are violated by more than `least`.
+bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count,
+                                               double least) noexcept {
   std::array<int, batch_size> places{};
   std::copy_n(first, count, places.begin());
   const int given = count;
-  double least = -infinity;  // smallest violation among the chosen ones, once the batch is full
+  // `least` is the smallest violation among the chosen ones, once the batch is full.
   for (int place = 0; place < all_places_; ++place) {
     if (!(violation_[place] > least) || number_[place] != none) continue;
     if (std::find(first, first + given, place) != first + given) continue;
@@ -97,9 +102,10 @@ bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& ricca
 /// sums += weighted sum of the sensitivities.
 void DualActiveSet::add_sensitivities(const Riccati& riccati, const Weights& weights,
                                       std::vector<double>& sums) const noexcept {
-  for_each_weighted(weights, [&](int k) {
-    riccati.add_values(batches_[k].sensitivities, weights[k].data(), all_places_, sums.data());
-  });
+  const auto is_zero = [](double weight) { return weight == 0.0; };
+  for (int k = 0; k < batch_count_; ++k)
+    if (batches_[k].count > 0 && !std::all_of(weights[k].begin(), weights[k].end(), is_zero))
+      riccati.add_values(batches_[k].sensitivities, weights[k].data(), all_places_, sums.data());
 }
 
 /// Computes the row that a bound would add to the factor below `count` others. Returns the square of its diagonal

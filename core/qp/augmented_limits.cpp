@@ -59,7 +59,7 @@ void StageQpSolver::for_each_augmented(const StageQp& qp, double relative, const
 /// Writes the QP, augmented for the active set, to `convexified_`.
 void StageQpSolver::augment(const StageQp& qp, double relative) noexcept {
   augmented_ = active_;
-  convexified_ = qp;
+  convexified_.take_stages(qp);
   const int stride = qp.stride();
   for_each_augmented(
       qp, relative,

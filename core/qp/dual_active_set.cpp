@@ -16,6 +16,9 @@ namespace {
 constexpr double exactness = 0.1;
 // With more violated bounds, the allowed number of changes is unlikely to suffice.
 constexpr int violated_for_each_column = 2;
+// So many of a batch of sensitivities are for bounds that are likely to be active, the others for those that are
+// violated.
+constexpr int most_foreseen = 6;
 // Number of solutions with an unchanged active set before rounding errors are assumed, and how many of them are
 // combined from sensitivities.
 constexpr int max_refinements = 4, max_combined = 2;
@@ -42,7 +45,7 @@ DualActiveSet::DualActiveSet(const Capacity& capacity)
     relaxed_.assign(most, 0);
     saturated_.reserve(stages * capacity.limits);
   }
-  for (auto* v : {&value_, &direction_, &violation_, &least_, &most_, &h_}) v->assign(most, 0.0);
+  for (auto* v : {&value_, &violation_, &least_, &most_, &h_}) v->assign(most, 0.0);
   hold_.assign(most, Hold::free);
   side_.assign(most, 0);
   number_.assign(most, none);
@@ -112,9 +115,13 @@ bool DualActiveSet::take_bounds(const StageQp& qp) noexcept {
 }
 
 void DualActiveSet::factor(const StageQp& qp, Riccati& riccati) noexcept {
-  riccati.factor(qp, held_);
+  if (has_limits_) {
+    is_convex_ = riccati.factor_if_convex(qp, held_);
+  } else {
+    riccati.factor(qp, held_);
+    is_convex_ = !riccati.was_convexified();
+  }
   ++factorisations_;
-  is_convex_ = !riccati.was_convexified();
   has_base_ = false;
   for (Batch& batch : batches_) {
     for (int c = 0; c < batch.count; ++c) number_[batch.of[c]] = none;
@@ -136,21 +143,19 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   if (claimed) take_claims(qp, *claimed);
   factor(qp, riccati);
   if (has_limits_) keep_rows(qp);
-  if (!claimed || !is_convex_ || !take_bounds(qp)) return;
+  if (!claimed || !is_convex_) return;
   // Where rows change with the newest data, their sensitivities are not worth finding before.
   const auto is_of_row = [this](int place) { return is_limit(place); };
-  if (rows_change_ && std::any_of(columns_.begin(), columns_.end(), is_of_row)) {
-    has_bounds_ = false;
-    return;
-  }
+  if (rows_change_ && std::any_of(columns_.begin(), columns_.end(), is_of_row)) return;
+  if (!take_bounds(qp)) return;
   // Claims are mostly those of the last sample, and in control further bounds are likely to follow: those to which the
   // last trajectory came closest.
   if (qp.initial_state_is_given && column_count() < batch_size) {
     std::fill_n(value_.data(), all_places_, 0.0);
     find_violations();
-    find_sensitivities_of_next(qp, riccati, columns_.data(), column_count());
+    find_sensitivities_of_next(qp, riccati, columns_.data(), column_count(), -infinity);
   } else {
-    find_sensitivities_of_columns(qp, riccati, 0);
+    find_sensitivities_of_columns(qp, riccati, false);
   }
   has_bounds_ = false;
 }
@@ -180,7 +185,7 @@ bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
 /// Updates a step from the multipliers with which it was found to the present ones; false if some have no
 /// sensitivities.
 bool DualActiveSet::combine(const StageQp& qp, Riccati& riccati, Iterate& step) noexcept {
-  if (!has_base_ || base_is_saturated_ || !saturated_.empty()) return false;
+  if (has_limits_ || !has_base_) return false;
   const auto has_sensitivities = [this](int place) { return number_[place] != none; };
   if (!std::all_of(columns_.begin(), columns_.end(), has_sensitivities) ||
       !std::all_of(base_places_.begin(), base_places_.end(), has_sensitivities))
@@ -272,7 +277,7 @@ DualActiveSet::Violations DualActiveSet::find_violations() noexcept {
 /// Makes columns of all violated bounds of controls that have sensitivities: most of these will be active. This does
 /// not hold for states, where a single active bound often prevents a series of violations.
 bool DualActiveSet::add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept {
-  if (number_[worst] == none && !find_sensitivities_of_next(qp, riccati, &worst, 1)) return false;
+  if (number_[worst] == none && !find_sensitivities_of_next(qp, riccati, &worst, 1, -infinity)) return false;
   for (const Batch& batch : batches_) {
     for (int c = 0; c < batch.count && column_count() < most_columns_; ++c) {
       const int place = batch.of[c];
@@ -314,26 +319,34 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
     side_[entering] = static_cast<std::int8_t>(side);
     if (is_capped && linear(entering) == 0.0) relaxed_[entering] = 1;
   }
+  // Values change with the multipliers, but only few of them are needed before the entering bound is met.
+  Weights changes{};
+  bool has_changes = false;
+  const auto value_of = [&](int place) {
+    double value = value_[place];
+    for (int k = 0; has_changes && k < batch_count_; ++k)
+      if (batches_[k].count > 0) value += dot(changes[k].data(), sensitivities_at(k, place), batch_size);
+    return value;
+  };
+  const auto write_values = [&] {
+    if (has_changes) add_sensitivities(riccati, changes, value_);
+    has_changes = false;
+    changes = {};
+  };
   for (;;) {
     if (++changes_ > most_changes_) return Outcome::too_much;
     if (is_past(deadline)) return Outcome::out_of_time;
-    if (number_[entering] == none && !find_sensitivities_of_next(qp, riccati, &entering, 1)) return Outcome::too_much;
+    if (number_[entering] == none && !find_sensitivities_of_next(qp, riccati, &entering, 1, -infinity))
+      return Outcome::too_much;
     // Change of values and multipliers while the entering multiplier grows and the active bounds stay met.
     const int count = column_count();
     double pull[max_columns_with_limits], row[max_columns_with_limits];
     const double square = eliminate(entering, count, row);
     std::copy_n(row, count, pull);
     back_substitute(pull);
-    Weights weights{};
-    weight_of(entering, weights) = side;
-    for (int k = 0; k < count; ++k) {
-      pull[k] *= side;
-      weight_of(columns_[k], weights) = -pull[k];
-    }
-    std::fill_n(direction_.data(), all_places_, 0.0);
-    add_sensitivities(riccati, weights, direction_);
+    for (int k = 0; k < count; ++k) pull[k] *= side;
     // Until the entering bound is met, or a multiplier reaches zero.
-    double length = square > 0.0 ? side * (value_[entering] - target(entering, multiplier)) / square : infinity;
+    double length = square > 0.0 ? side * (value_of(entering) - target(entering, multiplier)) / square : infinity;
     int blocking_column = none, blocking_held = none;
     bool reaches_end = false, grows = false;
     if (is_capped && relaxed_[entering] == 0) {
@@ -356,38 +369,46 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
       if (until < length) length = until, blocking_column = k, grows = false;
     }
     for (const int other : held_places_) {
-      const double loss = -side_[other] * direction_[other];
+      double direction = side * sensitivity(entering, other);
+      for (int k = 0; k < count; ++k) direction -= pull[k] * sensitivity(columns_[k], other);
+      const double loss = -side_[other] * direction;
       if (!(loss > 0.0) || is_equality_bound(other)) continue;
-      const double until = std::max(side_[other] * value_[other], 0.0) / loss;
+      const double until = std::max(side_[other] * value_of(other), 0.0) / loss;
       if (until < length) length = until, blocking_held = other;
     }
     if (length == infinity) return Outcome::no_solution;
     multiplier += side * length;
     for (int k = 0; k < count; ++k) multipliers_[k] -= length * pull[k];
-    for (int k = 0; k < all_places_; ++k) value_[k] += length * direction_[k];
+    has_changes = true;
+    weight_of(entering, changes) += side * length;
+    for (int k = 0; k < count; ++k) weight_of(columns_[k], changes) -= length * pull[k];
     if (blocking_held != none) {
+      write_values();
       std::erase(held_places_, blocking_held);
       let_go(blocking_held);
       value_[blocking_held] = bound(blocking_held);
       if (!refactor(qp, riccati)) return Outcome::not_convex;
       find_violations();
-      if (!find_sensitivities_of_columns(qp, riccati, 0) || !factor_columns(0, false)) return Outcome::too_much;
+      if (!find_sensitivities_of_columns(qp, riccati, has_limits_) || !factor_columns(0, false))
+        return Outcome::too_much;
     } else if (blocking_column != none) {
       if (!pass_end(blocking_column, grows)) return Outcome::too_much;
     } else if (reaches_end) {
-      if (was_saturated) {
-        let_go(entering);
-        return Outcome::solved;
-      }
-      if (softness(entering) == 0.0) {
-        saturated_.push_back(entering);
-        saturate(entering);
+      if (was_saturated || softness(entering) == 0.0) {
+        write_values();
+        if (was_saturated) {
+          let_go(entering);
+        } else {
+          saturated_.push_back(entering);
+          saturate(entering);
+        }
         return Outcome::solved;
       }
       relaxed_[entering] = 1;
       multiplier = side * linear(entering);
     } else {
       if (count == most_columns_) return Outcome::too_much;
+      write_values();
       value_[entering] = target(entering, multiplier);
       std::copy_n(row, count, factor_row(count));
       append_column(entering, square, multiplier);
@@ -396,32 +417,51 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
   }
 }
 
+/// The columns, and with limits also what follows one stage behind an active bound: where a horizon moves along, that
+/// was active in the last sample. Leaves room for a few others. Returns their number.
+int DualActiveSet::list_with_next(int* places) const noexcept {
+  int count = column_count();
+  std::copy_n(columns_.data(), count, places);
+  const auto add_next = [&](int place) {
+    const int next = place + (is_limit(place) ? limit_row_ : stride_);
+    const bool is_there = is_limit(place) ? next < all_places_ : next < places_;
+    if (count >= most_foreseen || !is_there || hold_[next] != Hold::free || !(violation_[next] > -infinity)) return;
+    if (std::find(places, places + count, next) == places + count) places[count++] = next;
+  };
+  if (!has_limits_) return count;
+  for (const int place : held_places_) add_next(place);
+  for (const int place : columns_) add_next(place);
+  return count;
+}
+
 /// Finds the values at the present multipliers.
 DualActiveSet::Found DualActiveSet::find_values(const StageQp& qp, Riccati& riccati, bool may_combine,
                                                 Iterate& step) noexcept {
   // A few claims without multipliers get their sensitivities together with those of the bounds that are violated then.
   const bool lacks_sensitivities = column_count() > 0 && number_[columns_[0]] == none;
   const bool may_wait = lacks_sensitivities && !has_base_ && changes_ == 0 && column_count() < batch_size;
-  if (lacks_sensitivities && !may_wait && !find_sensitivities_of_columns(qp, riccati, 0)) return Found::nothing;
+  // After a change, the violations are known.
+  if (lacks_sensitivities && !may_wait && !find_sensitivities_of_columns(qp, riccati, has_limits_ && changes_ > 0))
+    return Found::nothing;
   if (!has_base_ && !may_wait) factor_columns(0, true);
   if (!(may_combine && combine(qp, riccati, step)) && !solve_with_multipliers(qp, riccati, step)) return Found::nothing;
   has_base_ = true;
-  base_is_saturated_ = !saturated_.empty();
   base_places_ = columns_;
   std::copy_n(multipliers_.begin(), column_count(), base_multipliers_.begin());
   const StepCheck check = check_step(qp, step, bound_tolerance);
   if (!check.is_finite) return Found::nothing;
   pull_tolerance_ = multiplier_tolerance * (1.0 + check.largest_costate);
-  if (columns_.empty() && held_places_.empty() && !check.violates &&
-      !(has_limits_ && (!saturated_.empty() || violates_limits(qp, step))))
+  const bool violates_limits = has_limits_ && find_limit_values(qp, step);
+  if (columns_.empty() && held_places_.empty() && saturated_.empty() && !check.violates && !violates_limits)
     return Found::solution;
   if (!has_bounds_) take_bounds(qp);
   std::copy_n(step.row(0), places_, value_.begin());
-  if (has_limits_) find_limit_values(qp, step);
   for (const int place : held_places_) value_[place] = step.bound_row(0)[place];
   if (may_wait) {
     find_violations();
-    if (!find_sensitivities_of_next(qp, riccati, columns_.data(), column_count())) return Found::nothing;
+    std::array<int, batch_size> first{};
+    if (!find_sensitivities_of_next(qp, riccati, first.data(), list_with_next(first.data()), -infinity))
+      return Found::nothing;
     factor_columns(0, true);
     // `base_places_` may have columns that are left out now; their multipliers are zero.
     base_places_ = columns_;

@@ -5,7 +5,9 @@
 #include <cstring>
 #include <utility>
 
+#include "qp_view.hpp"
 #include "rhec/core/base/infinity.hpp"
+#include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/qp/dual_active_set.hpp"
 #include "tolerances.hpp"
 
@@ -43,14 +45,13 @@ bool DualActiveSet::take_limits(const StageQp& qp) noexcept {
   lower_ = own_lower_.data();
   upper_ = own_upper_.data();
   for (int i = 0; i <= qp.intervals(); ++i) {
-    const int first = limit_place(i, 0);
+    const int first = limit_place(i, 0), count = qp.limits(i);
     std::copy_n(qp.limit_lower(i), limit_row_, own_lower_.data() + first);
     std::copy_n(qp.limit_upper(i), limit_row_, own_upper_.data() + first);
-    for (int r = 0; r < limit_row_; ++r) {
-      const double quadratic = qp.limit_quadratic(i)[r];
-      linear_[first - places_ + r] = qp.limit_linear(i)[r];
-      softness_[first - places_ + r] = quadratic > 0.0 ? 1.0 / quadratic : 0.0;
-    }
+    const double *linears = qp.limit_linear(i), *quadratics = qp.limit_quadratic(i);
+    double *linear = linear_.data() + (first - places_), *softness = softness_.data() + (first - places_);
+    std::copy_n(linears, count, linear);
+    for (int r = 0; r < count; ++r) softness[r] = quadratics[r] > 0.0 ? 1.0 / quadratics[r] : 0.0;
   }
   const bool are_relaxed = std::all_of(columns_.begin(), columns_.end(), [this](int place) {
     return relaxed_[place] == 0 || (is_soft(place) && softness(place) > 0.0);
@@ -81,18 +82,9 @@ void DualActiveSet::add_limit_gradients(const StageQp& qp) noexcept {
   for (const int place : saturated_) add(place, side_[place] * linear(place));
 }
 
-void DualActiveSet::find_limit_values(const StageQp& qp, const Iterate& step) noexcept {
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    double* values = value_.data() + limit_place(i, 0);
-    const double *G = qp.G(i), *z = step.row(i);
-    const int used = states_ + qp.controls(i);
-    for (int r = 0; r < qp.limits(i); ++r, G += stride_) {
-      double sum = 0.0;
-      for (int j = 0; j < used; ++j) sum += G[j] * z[j];
-      values[r] = sum;
-    }
-    std::fill(values + qp.limits(i), values + limit_row_, 0.0);
-  }
+/// The values of limits. Returns whether one of them is violated.
+bool DualActiveSet::find_limit_values(const StageQp& qp, const Iterate& step) noexcept {
+  return qp_kernels().limit_values(view_of_limits(qp), step.row(0), bound_tolerance, value_.data() + places_);
 }
 
 void DualActiveSet::keep_rows(const StageQp& qp) noexcept {
@@ -104,43 +96,16 @@ void DualActiveSet::keep_rows(const StageQp& qp) noexcept {
 void DualActiveSet::compare_rows(const StageQp& qp) noexcept {
   const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(stride_) * qp.capacity().limits * (qp.intervals() + 1);
   if (std::memcmp(qp.G(0), rows_.data(), static_cast<std::size_t>(count) * sizeof(double)) == 0) return;
-  rows_change_ = true;
+  const auto is_of_row = [this](int place) { return is_limit(place); };
+  rows_change_ |= std::any_of(columns_.begin(), columns_.end(), is_of_row);
   for (int batch = 0; batch < batch_count_; ++batch) forget(batch);
-}
-
-/// Whether a step that was found without limits violates one. Leaves the limits' values.
-bool DualActiveSet::violates_limits(const StageQp& qp, const Iterate& step) noexcept {
-  find_limit_values(qp, step);
-  bool violates = false;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    const double* values = value_.data() + limit_place(i, 0);
-    const double *lower = qp.limit_lower(i), *upper = qp.limit_upper(i);
-    for (int r = 0; r < qp.limits(i); ++r)
-      violates |= values[r] < lower[r] - bound_tolerance * (1.0 + std::abs(lower[r])) ||
-                  values[r] > upper[r] + bound_tolerance * (1.0 + std::abs(upper[r]));
-  }
-  return violates;
 }
 
 /// Sensitivities of the limits' values, from those of the variables. Held controls do not move.
 void DualActiveSet::find_limit_sensitivities(const StageQp& qp, double* values) const noexcept {
-  double* limits = values + static_cast<std::ptrdiff_t>(places_) * batch_size;
-  for (int i = 0; i <= qp.intervals(); ++i) {
-    const double* G = qp.G(i);
-    const double* of_stage = values + static_cast<std::ptrdiff_t>(i) * stride_ * batch_size;
-    const std::int8_t* held = held_.row(i);
-    const int count = qp.limits(i), used = states_ + qp.controls(i);
-    for (int r = 0; r < count; ++r, limits += batch_size, G += stride_) {
-      double sums[batch_size] = {};
-      for (int j = 0; j < used; ++j) {
-        const double entry = G[j];
-        if (entry == 0.0 || held[j] != 0) continue;
-        for (int c = 0; c < batch_size; ++c) sums[c] += entry * of_stage[j * batch_size + c];
-      }
-      std::copy_n(sums, batch_size, limits);
-    }
-    limits = std::fill_n(limits, (limit_row_ - count) * batch_size, 0.0);
-  }
+  static_assert(batch_size == 8);
+  qp_kernels().limit_sensitivities(view_of_limits(qp), qp.control_counts(), states_, held_.row(0), values,
+                                   values + static_cast<std::ptrdiff_t>(places_) * batch_size);
 }
 
 /// Corrects a soft column whose multiplier is out of its range: one below it is released, one above it is relaxed or

@@ -101,22 +101,21 @@ void add_pulled_stage(const StageQp& qp, const Iterate& iterate, int i, KktTerms
   for (int j = 0; i < qp.intervals() && j < qp.states(i + 1); ++j) take(terms.defect, std::abs(qp.b(i)[j]));
 }
 
-bool limits_pull(const StageQp& qp, const Iterate& iterate, int i) noexcept {
-  const double* multipliers = iterate.limit_bound(i);
-  return std::any_of(multipliers, multipliers + qp.limits(i), [](double each) { return each != 0.0; });
-}
-
-void add_limits(const StageQp& qp, const Iterate& iterate, int i, KktTerms& terms) noexcept {
+/// Returns whether any limit of the stage has a multiplier.
+bool add_limits(const StageQp& qp, const Iterate& iterate, int i, KktTerms& terms) noexcept {
   const double *most = qp.limit_upper(i), *least = qp.limit_lower(i), *multipliers = iterate.limit_bound(i);
   const double *linear = qp.limit_linear(i), *quadratic = qp.limit_quadratic(i);
+  bool any_pulls = false;
   for (int r = 0; r < qp.limits(i); ++r) {
     const double multiplier = multipliers[r];
     if (multiplier == 0.0 && least[r] <= 0.0 && most[r] >= 0.0) continue;  // met, without a multiplier
+    any_pulls |= multiplier != 0.0;
     take(terms.largest_term, std::abs(multiplier));
     add_side(-most[r], std::max(0.0, multiplier), linear[r], quadratic[r], terms);
     add_side(least[r], std::max(0.0, -multiplier), linear[r], quadratic[r], terms);
     if (std::isnan(multiplier)) terms.stationarity = multiplier;
   }
+  return any_pulls;
 }
 
 }  // namespace
@@ -143,8 +142,7 @@ void KktTerms::add(const StageQp& qp, const Iterate& iterate, StageRange range) 
   };
   int first = range.first;
   for (int i = range.first; qp.has_limits() && i <= range.last; ++i) {
-    add_limits(qp, iterate, i, found);
-    if (!limits_pull(qp, iterate, i)) continue;
+    if (!add_limits(qp, iterate, i, found)) continue;
     add_others(first, i - 1);
     add_pulled_stage(qp, iterate, i, found);
     first = i + 1;

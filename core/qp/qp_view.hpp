@@ -25,4 +25,15 @@ inline QpView view_of(const StageQp& qp, const Iterate& iterate) noexcept {
           .bounds = iterate.bound_row(0)};
 }
 
+inline LimitView view_of_limits(const StageQp& qp) noexcept {
+  return {.intervals = qp.intervals(),
+          .controls = qp.capacity().controls,
+          .limits = qp.capacity().limits,
+          .row = qp.capacity().limit_row(),
+          .stride = qp.stride(),
+          .counts = qp.limit_counts(),
+          .G = qp.G(0),
+          .sides = qp.limit_lower(0)};
+}
+
 }  // namespace rhec

@@ -121,7 +121,8 @@ void Riccati::factor_for_covariances(const StageQp& qp, const ActiveSet& active)
   factor_stages(qp, active, nullptr);
 }
 
-void Riccati::factor_stages(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept {
+/// Sizes, and the value function of the last node.
+RiccatiView Riccati::begin_factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept {
   RHEC_ASSERT(qp.capacity() == capacity_ && qp.window() == 0, "a whole QP of the capacity");
   const int N = qp.intervals(), n = qp.states(N);
   convexified_ = false;
@@ -129,14 +130,20 @@ void Riccati::factor_stages(const StageQp& qp, const ActiveSet& active, const do
   std::copy_n(qp.control_counts(), N, control_counts_.data());
   control_counts_[N] = 0;
   std::fill_n(is_special_.data(), N + 1, std::uint8_t{0});
-  // A stage is special if bounds of the next state are active, which its controls must satisfy.
-  if (!active.is_empty())
-    for (int i = 0; i < N; ++i) is_special_[i] = holds_any(active.state(i + 1), ns_);
   RiccatiView view = view_of(qp, active.row(0));
   view.diagonal = diagonal;
   std::copy_n(qp.H(N), n * stride_, P(N));
   for (int c = 0; diagonal && c < n; ++c)
     P(N)[c * stride_ + c] += diagonal[static_cast<std::ptrdiff_t>(N) * stride_ + c];
+  return view;
+}
+
+void Riccati::factor_stages(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept {
+  const RiccatiView view = begin_factor(qp, active, diagonal);
+  const int N = qp.intervals();
+  // A stage is special if bounds of the next state are active, which its controls must satisfy.
+  if (!active.is_empty())
+    for (int i = 0; i < N; ++i) is_special_[i] = holds_any(active.state(i + 1), ns_);
   int left = 0;
   for (int i = kernels_->factor(view, N - 1, definite_tolerance); i >= 0;
        i = kernels_->factor(view, i - 1, definite_tolerance)) {
@@ -150,11 +157,44 @@ void Riccati::factor_stages(const StageQp& qp, const ActiveSet& active, const do
     factor_special(qp, active, view, i);
     if (i > 0 && reduction.left > 0) is_special_[i - 1] = 1;
   }
+  factor_node_0(qp, active);
+}
+
+void Riccati::factor_node_0(const StageQp& qp, const ActiveSet& active) noexcept {
+  const int N = qp.intervals();
   Reduction& initial = reductions_[N];
   initial = {};
   initial.rows = count_active(qp, active, 0) + (N > 0 && is_special_[0] != 0 ? reductions_[0].left : 0);
   write_active_rows(qp, active, 0);
   if (!qp.initial_state_is_given) factor_initial(qp, active);
+}
+
+bool Riccati::factor_if_convex(const StageQp& qp, const ActiveSet& active) noexcept {
+  for_steps_ = true;
+  const RiccatiView view = begin_factor(qp, active, nullptr);
+  if (kernels_->factor(view, qp.intervals() - 1, definite_tolerance) >= 0) return false;
+  factor_node_0(qp, active);
+  return !convexified_;
+}
+
+bool Riccati::convexify(StageQp& qp, const ActiveSet& no_bounds) noexcept {
+  for_steps_ = true;
+  const RiccatiView view = begin_factor(qp, no_bounds, nullptr);
+  double* const formed = work_.data();
+  double* const reduced = formed + static_cast<std::ptrdiff_t>(ns_ + nw_) * stride_;
+  double* const factor = reduced + static_cast<std::ptrdiff_t>(width_) * width_;
+  for (int i = qp.intervals() - 1, last = -1; i >= 0; last = i) {
+    i = kernels_->factor(view, i, definite_tolerance);
+    if (i < 0) break;
+    if (i == last) return false;
+    const int m = qp.controls(i);
+    kernels_->form(view, i, formed);
+    for (int c = 0; c < m; ++c) std::copy_n(formed + (ns_ + c) * stride_ + ns_, m, reduced + c * width_);
+    factor_reduced(reduced, m, definite_tolerance, factor);
+    write_change(reduced, factor, i, qp);
+  }
+  factor_node_0(qp, no_bounds);
+  return true;
 }
 
 Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iterate& step, const double* h) noexcept {
@@ -185,7 +225,7 @@ Riccati::Outcome Riccati::solve(const StageQp& qp, const ActiveSet& active, Iter
 Riccati::Sensitivities::Sensitivities(const Capacity& capacity) {
   const std::size_t stages = static_cast<std::size_t>(capacity.intervals) + 1;
   values.assign(stages * (capacity.row() + capacity.limit_row()) * size, 0.0);
-  costates.assign(stages * capacity.row() * size, 0.0);
+  if (capacity.limits == 0) costates.assign(stages * capacity.row() * size, 0.0);
   control_counts.assign(capacity.intervals, 0);
 }
 
@@ -196,7 +236,8 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
   const int N = qp.intervals(), n = qp.states(0);
   const auto is_set = [](std::uint8_t flag) { return flag != 0; };
   if (std::any_of(is_special_.data(), is_special_.data() + N, is_set) || reductions_[N].rows > 0) return false;
-  double *values = sensitivities.values.data(), *costates = sensitivities.costates.data();
+  double* const values = sensitivities.values.data();
+  double* const costates = sensitivities.costates.empty() ? nullptr : sensitivities.costates.data();
   // Entries that stages do not use stay zero.
   if (!std::equal(qp.control_counts(), qp.control_counts() + N, sensitivities.control_counts.begin()) ||
       (qp.has_limits() && sensitivities.intervals != N)) {
@@ -225,9 +266,9 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
   const RiccatiView view = view_of(qp, active.row(0));
   kernels_->sensitivities_backward(view, last, has_gradient_.data(), values);
   if (qp.initial_state_is_given) {
-    std::copy_n(values, n * size, costates);
+    if (costates) std::copy_n(values, n * size, costates);
     std::fill_n(values, n * size, 0.0);
-  } else if (std::fill_n(costates, n * size, 0.0); has_initial_inverse_) {
+  } else if (std::fill_n(costates, costates ? n * size : 0, 0.0); has_initial_inverse_) {
     kernels_->answer(initial_inverse_.data(), n, stride_, values);
   } else {
     // Multiplies the gradients by -(G G')^-1, with the factor's lower triangle.
@@ -254,6 +295,7 @@ bool Riccati::find_sensitivities(const StageQp& qp, const ActiveSet& active, con
 
 void Riccati::combine(const StageQp& qp, const ActiveSet& active, const Sensitivities& sensitivities,
                       const double* weights, Iterate& step) noexcept {
+  RHEC_ASSERT(!sensitivities.costates.empty(), "sensitivities of costates");
   const long entries = static_cast<long>(qp.intervals() + 1) * stride_;
   const auto each_fixed = [&](const auto& function) {
     for (int i = 0; i < qp.intervals(); ++i) {

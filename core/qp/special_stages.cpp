@@ -198,19 +198,21 @@ void Riccati::factor_reduced(double* reduced, int n, double tolerance, double* f
 
 void Riccati::write_convexified(StageQp& qp) noexcept {
   qp.drop_identity_rows();
-  for (int i = 0; i < qp.intervals(); ++i) {
-    if (is_special_[i] == 0) continue;
-    const Special v = special(i);
-    const int m = qp.controls(i);
-    auto R = R_of(qp, i);
-    for (int c = 0; c < m; ++c) {
-      for (int r = c; r < m; ++r) {
-        double now = 0.0;
-        for (int k = 0; k <= c; ++k) now += v.factor[k * width_ + r] * v.factor[k * width_ + c];
-        const double change = now - v.G[c * width_ + r];
-        R(r, c) += change;
-        if (r != c) R(c, r) += change;
-      }
+  for (int i = 0; i < qp.intervals(); ++i)
+    if (is_special_[i] != 0) write_change(special(i).G, special(i).factor, i, qp);
+}
+
+/// Adds to R what a reduced Hessian has become, given by its Cholesky factor.
+void Riccati::write_change(const double* reduced, const double* factor, int i, StageQp& qp) const noexcept {
+  const int m = qp.controls(i);
+  auto R = R_of(qp, i);
+  for (int c = 0; c < m; ++c) {
+    for (int r = c; r < m; ++r) {
+      double now = 0.0;
+      for (int k = 0; k <= c; ++k) now += factor[k * width_ + r] * factor[k * width_ + c];
+      const double change = now - reduced[c * width_ + r];
+      R(r, c) += change;
+      if (r != c) R(c, r) += change;
     }
   }
 }

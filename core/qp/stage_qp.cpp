@@ -42,6 +42,34 @@ void StageQp::look_at(int first) noexcept {
   first_ = first_bounds_ = -first;
 }
 
+void StageQp::take_stages(const StageQp& from) noexcept {
+  RHEC_ASSERT(capacity_ == from.capacity_ && window_ == 0 && from.window_ == 0, "whole QPs of one capacity");
+  set_intervals(from.intervals_);
+  initial_state_is_given = from.initial_state_is_given;
+  first_ = first_bounds_ = 0;
+  const int stages = intervals_ + 1;
+  // Stage by stage: that is as much as fits into registers at a time, and the next one is fetched meanwhile.
+  const auto take = [&](AlignedDoubles& to, const AlignedDoubles& of, int first, std::ptrdiff_t slot) {
+    for (int i = 0; i < stages; ++i) std::copy_n(of.data() + (first + i) * slot, slot, to.data() + i * slot);
+  };
+  const std::ptrdiff_t row = stride_;
+  take(AB_, from.AB_, from.first_, capacity_.states * row);
+  take(H_, from.H_, from.first_, wide_ * row);
+  take(h_, from.h_, from.first_, row);
+  take(b_, from.b_, from.first_, row);
+  take(lower_, from.lower_, from.first_bounds_, row);
+  take(upper_, from.upper_, from.first_bounds_, row);
+  std::copy(from.initial_step_.begin(), from.initial_step_.end(), initial_step_.begin());
+  if (has_limits()) {
+    take(G_, from.G_, from.first_, capacity_.limits * row);
+    take(limits_, from.limits_, from.first_, static_cast<std::ptrdiff_t>(rows_of_limits) * capacity_.limit_row());
+  }
+  state_counts_ = from.state_counts_;
+  control_counts_ = from.control_counts_;
+  identity_counts_ = from.identity_counts_;
+  limit_counts_ = from.limit_counts_;
+}
+
 void StageQp::drop_identity_rows() noexcept {
   if (window_ > 0)
     std::fill_n(identity_counts_.begin() - first_, window_, 0);

@@ -185,10 +185,9 @@ StageQpSolver::Outcome StageQpSolver::solve_limited(const StageQp& qp, Iterate& 
   not_convex_ = outcome == DualActiveSet::Outcome::not_convex ? not_convex_ + 1 : 0;
   if (outcome == DualActiveSet::Outcome::not_convex) {
     if (is_past(deadline)) return Outcome::out_of_time;
-    const bool is_factored = !may_augment();
-    if (!is_factored && solve_augmented(qp, step, deadline)) return Outcome::active_set;
+    if (may_augment() && solve_augmented(qp, step, deadline)) return Outcome::active_set;
     if (out_of_time_) return Outcome::out_of_time;
-    const StageQp& convex = is_factored && dual_.holds_nothing() ? take_convexified(qp) : convexify(qp);
+    const StageQp& convex = convexify_limited(qp);
     prepared_ = false;
     outcome = solve_from_guess(convex, step, deadline);
   }
@@ -265,14 +264,19 @@ const StageQp& StageQpSolver::convexify(const StageQp& qp) noexcept {
   const StageQp& now = solved(qp);
   riccati_.factor(now, no_bounds_);
   ++factorisations_;
-  return take_convexified(qp);
+  if (!riccati_.was_convexified()) return now;
+  if (!is_convexified_) convexified_.take_stages(qp);
+  riccati_.write_convexified(convexified_);
+  is_convexified_ = was_convexified_ = true;
+  return convexified_;
 }
 
-/// The QP as it was convexified by the last factorisation, which was without bounds.
-const StageQp& StageQpSolver::take_convexified(const StageQp& qp) noexcept {
+/// The same for a QP with limits, in a fraction of the time.
+const StageQp& StageQpSolver::convexify_limited(const StageQp& qp) noexcept {
+  if (!is_convexified_) convexified_.take_stages(qp);
+  ++factorisations_;
+  if (!riccati_.convexify(convexified_, no_bounds_)) return convexify(qp);
   if (!riccati_.was_convexified()) return solved(qp);
-  if (!is_convexified_) convexified_ = qp;
-  riccati_.write_convexified(convexified_);
   is_convexified_ = was_convexified_ = true;
   return convexified_;
 }

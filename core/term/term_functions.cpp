@@ -182,13 +182,38 @@ void for_each_block(const Tape& tape, int count, const Run& run) {
   }
 }
 
+/// One result of some stages.
+void store(const Tape& tape, std::size_t which, const double* registers, int lanes, int count, double* to,
+           std::ptrdiff_t step) {
+  const std::ptrdiff_t source = tape.results()[which];
+  if (source < 0) {
+    const double value = tape.uniforms()[static_cast<std::size_t>(~source)];
+    for (int i = 0; i < count; ++i) to[i * step] = value;
+    return;
+  }
+  const double* const from = registers + source * lanes;
+  for (int i = 0; i < count; ++i) to[i * step] = from[i];
+}
+
 void store(const Tape& tape, std::size_t first_result, std::size_t results, const double* registers, int lanes,
            int count, double* to) {
-  for (int i = 0; i < count; ++i)
-    for (std::size_t k = 0; k < results; ++k) *to++ = tape.result(first_result + k, registers, lanes, i);
+  for (std::size_t k = 0; k < results; ++k)
+    store(tape, first_result + k, registers, lanes, count, to + k, static_cast<std::ptrdiff_t>(results));
 }
 
 }  // namespace
+
+/// Runs a tape for all stages: use(first, count, lanes) finds the results of some of them in the registers.
+template <class Use>
+void TermFunctions::run(const Tape& tape, int count, const double* arguments, double* registers,
+                        const Use& use) const noexcept {
+  for_each_block(tape, count, [&](int first, int here, int lanes) {
+    kernels_->load_rows(arguments + static_cast<std::ptrdiff_t>(first) * argument_row(), argument_row(), here,
+                        argument_count_, registers, lanes, lanes);
+    tape.run(*kernels_, registers, lanes, here);
+    use(first, here, lanes);
+  });
+}
 
 void TermFunctions::evaluate(Stage stage, int count, const double* arguments, double* values, double* slopes,
                              double* scratch) const noexcept {
@@ -196,12 +221,29 @@ void TermFunctions::evaluate(Stage stage, int count, const double* arguments, do
   const Tape& tape = slopes ? rows.jacobians : rows.values;
   const auto row_count = static_cast<std::size_t>(rows.count());
   double* const registers = Scratch(scratch).rest();
-  for_each_block(tape, count, [&](int first, int here, int lanes) {
-    kernels_->load_rows(arguments + static_cast<std::ptrdiff_t>(first) * argument_row(), argument_row(), here,
-                        argument_count_, registers, lanes, lanes);
-    tape.run(*kernels_, registers, lanes, here);
+  run(tape, count, arguments, registers, [&](int first, int here, int lanes) {
     store(tape, 0, row_count, registers, lanes, here, values + first * row_count);
     if (slopes) store(tape, row_count, rows.slopes.size(), registers, lanes, here, slopes + first * rows.slopes.size());
+  });
+}
+
+void TermFunctions::evaluate_limits(Stage stage, int count, const double* arguments, const LimitPlaces& places,
+                                    double* scratch) const noexcept {
+  const Rows& rows = this->rows(stage);
+  double* const registers = Scratch(scratch).rest();
+  const Tape& tape = places.slopes ? rows.jacobians : rows.values;
+  run(tape, count, arguments, registers, [&](int first, int here, int lanes) {
+    double* const values = places.values + first * places.values_step;
+    for (int r = 0; r < rows.limits; ++r)
+      store(tape, static_cast<std::size_t>(r), registers, lanes, here, values + r, places.values_step);
+    if (!places.slopes) return;
+    double* const slopes = places.slopes + first * places.slopes_step;
+    auto which = static_cast<std::size_t>(rows.count());
+    for (const auto& [r, c] : rows.slopes) {
+      if (r < rows.limits)
+        store(tape, which, registers, lanes, here, slopes + r * places.row_length + c, places.slopes_step);
+      ++which;
+    }
   });
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "rhec/core/horizon/rhc_problem.hpp"
 #include "rhec/core/horizon/shift.hpp"
 #include "rhec/core/ocp/linearisation.hpp"
+#include "rhec/core/qp/kkt.hpp"
 #include "support/cart.hpp"
 #include "support/unicycle.hpp"
 
@@ -204,6 +206,37 @@ TEST_P(HorizonTermsTest, ACacheGivesWhatALinearisationGives) {
       std::copy_n(point.state(1), problem->model().state_count(), problem->given_state());
       problem->finish(scratch);
       ASSERT_TRUE(shifter.apply(1, *problem, point));
+    }
+  }
+}
+
+TEST_P(HorizonTermsTest, AStepWithoutMultipliersIsJudgedWithoutTheSlopesOfLimits) {
+  const auto problem = make_problem(GetParam());
+  std::vector<double> scratch(problem->scratch_size());
+  const auto cache = problem->make_linearisation();
+  Iterate point = point_of(*problem);
+  for (const bool pulls : {false, true, false}) {
+    for (int i = 0; i <= 5; ++i)
+      for (int r = 0; r < problem->limit_count(i); ++r) point.limit_bound(i)[r] = pulls ? 0.4 - 0.1 * i + r : 0.0;
+    point.state(2)[0] += 0.01;
+    cache->linearise_for_residual(point, Hessian::exact);
+    StageQp expected(problem->capacity());
+    problem->linearise(all_stages(*problem), point, Hessian::exact, expected, scratch);
+    const KktResidual found = kkt_residual(cache->qp(), point), wanted = kkt_residual(expected, point);
+    EXPECT_NEAR(found.stationarity, wanted.stationarity, 1e-12);
+    EXPECT_NEAR(found.bound_violation, wanted.bound_violation, 1e-12);
+    EXPECT_NEAR(found.complementarity, wanted.complementarity, 1e-12);
+    // The same, and one whose multipliers are new.
+    for (const bool will_pull : {pulls, true}) {
+      for (int i = 0; will_pull && i <= 5; ++i) point.limit_bound(i)[0] = 0.3;
+      cache->prepare(point, Hessian::exact);
+      cache->refresh(point);
+      for (int i = 0; i <= 5; ++i)
+        for (int r = 0; r < expected.limits(i); ++r) {
+          EXPECT_NEAR(cache->qp().limit_lower(i)[r], expected.limit_lower(i)[r], 1e-12);
+          for (int j = 0; j < expected.stride(); ++j)
+            EXPECT_NEAR(cache->qp().G(i)[r * expected.stride() + j], expected.G(i)[r * expected.stride() + j], 1e-12);
+        }
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/core/ocp/linearisation.hpp"
 #include "rhec/core/prior/prior.hpp"
 #include "support/cart.hpp"
 #include "support/random_problem.hpp"

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "core/qp/qp_view.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
@@ -120,6 +123,117 @@ TEST(QpKernels, ComputeWhatTheySay) {
       EXPECT_EQ(found.count, violated) << set.instruction_set;
       EXPECT_EQ(found.largest, worst) << set.instruction_set;
     }
+  }
+}
+
+/// Random limits, some of them without a bound on one side.
+StageQp with_limits(RandomQp& random) {
+  const int intervals = random.integer(1, 6), states = random.integer(1, 9), controls = random.integer(1, 3);
+  StageQp qp({intervals, states, controls, random.integer(1, 11)});
+  qp.set_intervals(intervals);
+  for (int i = 0; i <= intervals; ++i) {
+    qp.set_sizes(i, states, i < intervals ? controls : 0);
+    qp.set_limits(i, random.integer(0, qp.capacity().limits));
+    for (int r = 0; r < qp.limits(i); ++r) {
+      for (int j = 0; j < states + qp.controls(i); ++j)
+        if (random.integer(0, 2) > 0) qp.G(i)[r * qp.stride() + j] = random.uniform(-1.0, 1.0);
+      double multiplier = 0.0;
+      RandomRows::set_bounds(random, qp.limit_lower(i)[r], qp.limit_upper(i)[r], multiplier);
+      qp.limit_linear(i)[r] = random.integer(0, 1) == 0 ? infinity : 1.0;
+      qp.limit_quadratic(i)[r] = random.integer(0, 1);
+    }
+  }
+  return qp;
+}
+
+double value_of(const StageQp& qp, const double* z, int i, int r, const std::int8_t* held = nullptr) {
+  double sum = 0.0;
+  for (int j = 0; j < qp.capacity().states + qp.controls(i); ++j)
+    if (!held || held[i * qp.stride() + j] == 0) sum += qp.G(i)[r * qp.stride() + j] * z[i * qp.stride() + j];
+  return sum;
+}
+
+TEST(QpKernels, LimitsHaveTheValuesOfTheirRows) {
+  RandomQp random(23);
+  int violated = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    const StageQp qp = with_limits(random);
+    const int N = qp.intervals(), row = qp.capacity().limit_row(), stride = qp.stride();
+    const LimitView view = view_of_limits(qp);
+    Iterate z(qp.capacity());
+    const double size = trial % 2 == 0 ? 0.05 : 1.0;
+    for (int i = 0; i <= N; ++i)
+      for (int j = 0; j < qp.capacity().states + qp.controls(i); ++j) z.row(i)[j] = size * random.uniform(-1.0, 1.0);
+    bool violates = false;
+    for (int i = 0; i <= N; ++i)
+      for (int r = 0; r < qp.limits(i); ++r) {
+        const double value = value_of(qp, z.row(0), i, r);
+        violates |= value < qp.limit_lower(i)[r] - 1e-10 || value > qp.limit_upper(i)[r] + 1e-10;
+      }
+    violated += violates;
+    std::vector<std::int8_t> held(static_cast<std::size_t>(N + 1) * stride, 0);
+    for (int i = 0; i < N; ++i)
+      held[i * stride + qp.capacity().states] = static_cast<std::int8_t>(random.integer(-1, 1));
+    const AlignedDoubles steps = numbers(random, static_cast<std::size_t>(N + 1) * stride * 8);
+    for (const KernelSet& set : runnable_kernels()) {
+      AlignedDoubles values(static_cast<std::size_t>(N + 1) * row, 7.0), many(values.size() * 8, 7.0);
+      EXPECT_EQ(set.qp->limit_values(view, z.row(0), 1e-10, values.data()), violates) << set.instruction_set;
+      set.qp->limit_sensitivities(view, qp.control_counts(), qp.capacity().states, held.data(), steps.data(),
+                                  many.data());
+      AlignedDoubles one(static_cast<std::size_t>(N + 1) * stride);
+      for (int c = 0; c < 8; ++c) {
+        for (std::size_t k = 0; k < one.size(); ++k) one[k] = steps[k * 8 + c];
+        for (int i = 0; i <= N; ++i)
+          for (int r = 0; r < row; ++r) {
+            const bool is_there = r < qp.limits(i);
+            const int at = i * row + r;
+            EXPECT_NEAR(values[at], is_there ? value_of(qp, z.row(0), i, r) : 0.0, 1e-14) << set.instruction_set;
+            EXPECT_NEAR(many[at * 8 + c], is_there ? value_of(qp, one.data(), i, r, held.data()) : 0.0, 1e-14)
+                << set.instruction_set;
+          }
+      }
+    }
+  }
+  EXPECT_GT(violated, 10);
+  EXPECT_LT(violated, 50);
+}
+
+TEST(QpKernels, SeeLimitsThatMakeNoSense) {
+  RandomQp random(29);
+  const double nan = std::nan("");
+  for (int trial = 0; trial < 20; ++trial) {
+    StageQp qp = with_limits(random);
+    qp.set_limits(0, qp.capacity().limits);
+    const int r = random.integer(0, qp.limits(0) - 1);
+    for (int k = 0; k < qp.limits(0); ++k) {
+      qp.limit_linear(0)[k] = 1.0;
+      qp.limit_lower(0)[k] = -1.0;
+      qp.limit_upper(0)[k] = 1.0;
+    }
+    const auto are_sound = [&](bool expected, const char* what) {
+      for (const KernelSet& set : runnable_kernels())
+        EXPECT_EQ(set.qp->limits_are_sound(view_of_limits(qp), 1e-10), expected) << set.instruction_set << ": " << what;
+    };
+    are_sound(true, "all");
+    const auto with = [&](double& entry, double value, bool expected, const char* what) {
+      const double before = std::exchange(entry, value);
+      are_sound(expected, what);
+      entry = before;
+    };
+    with(qp.G(0)[r * qp.stride()], nan, false, "a slope that is no number");
+    with(qp.G(0)[r * qp.stride()], infinity, false, "an infinite slope");
+    with(qp.limit_lower(0)[r], nan, false, "no number as a lower bound");
+    with(qp.limit_upper(0)[r], nan, false, "no number as an upper bound");
+    with(qp.limit_lower(0)[r], infinity, false, "out of reach");
+    with(qp.limit_upper(0)[r], -infinity, false, "out of reach");
+    with(qp.limit_lower(0)[r], -infinity, true, "one side");
+    with(qp.limit_lower(0)[r], 1.0, true, "an equality");
+    with(qp.limit_lower(0)[r], 1.01, false, "bounds that cross");
+    with(qp.limit_linear(0)[r], infinity, true, "hard");
+    with(qp.limit_linear(0)[r], nan, false, "no number as a price");
+    with(qp.limit_linear(0)[r], -1.0, false, "a negative price");
+    qp.limit_quadratic(0)[r] = 0.0;
+    with(qp.limit_linear(0)[r], 0.0, false, "no price");
   }
 }
 

@@ -104,5 +104,35 @@ TEST(SpecialStages, ConvexifiesWhatIsNotPositiveDefiniteAndCanWriteItBack) {
   EXPECT_GT(convexified, 25);
 }
 
+TEST(SpecialStages, ConvexifiesStageByStageAsItDoesTheWhole) {
+  RandomQp random(41);
+  int convexified = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    StageQp qp = random.make(random.integer(1, 7), random.integer(1, 8), random.integer(1, 3), trial % 2 == 0);
+    for (int i = 0; i < qp.intervals(); ++i)
+      for (int j = 0; trial % 4 > 0 && j < qp.controls(i); ++j) R_of(qp, i)(j, j) -= random.uniform(0.0, 4.0);
+    const ActiveSet none(qp.capacity());
+    Riccati whole(qp.capacity()), stages(qp.capacity());
+    whole.factor(qp, none);
+    StageQp expected = qp, found = qp;
+    EXPECT_EQ(stages.factor_if_convex(qp, none), !whole.was_convexified());
+    if (whole.was_convexified()) whole.write_convexified(expected);
+    ASSERT_TRUE(stages.convexify(found, none));
+    EXPECT_EQ(stages.was_convexified(), whole.was_convexified());
+    convexified += whole.was_convexified();
+    for (int i = 0; i <= qp.intervals(); ++i)
+      for (int k = 0; k < (qp.capacity().states + qp.controls(i)) * qp.stride(); ++k)
+        EXPECT_NEAR(found.H(i)[k], expected.H(i)[k], 1e-8 * (1.0 + std::abs(expected.H(i)[k]))) << trial << ": " << i;
+    if (qp.initial_state_is_given) {
+      EXPECT_TRUE(stages.factor_if_convex(found, none));
+    }
+  }
+  EXPECT_GT(convexified, 10);
+  StageQp wrong = random.make(3, 2, 2, true);
+  R_of(wrong, 1)(0, 0) = std::nan("");
+  Riccati riccati(wrong.capacity());
+  EXPECT_FALSE(riccati.convexify(wrong, ActiveSet(wrong.capacity())));
+}
+
 }  // namespace special_stages_test
 }  // namespace rhec

@@ -80,5 +80,42 @@ TEST(StageQp, MovesTowardsTheFrontAndLeavesZerosBehind) {
   }
 }
 
+TEST(StageQp, TakesTheStagesOfAnother) {
+  RandomQp random(7);
+  for (int trial = 0; trial < 10; ++trial) {
+    const int most = random.integer(1, 7), limits = random.integer(0, 2);
+    StageQp from({most, 3, 2, limits}), to(from.capacity());
+    double number = 1.0;
+    const auto write = [&](StageQp& qp, int i) {
+      qp.set_sizes(i, 3, random.integer(0, 2), random.integer(0, 3));
+      for (double* row : {qp.AB(i), qp.h(i), qp.b(i), qp.H(i), qp.lower(i), qp.upper(i)}) std::fill_n(row, 3, number++);
+      qp.set_limits(i, random.integer(0, limits));
+      for (int r = 0; r < qp.limits(i); ++r) qp.G(i)[r * qp.stride()] = qp.limit_lower(i)[r] = number++;
+    };
+    from.set_intervals(most);
+    to.set_intervals(random.integer(0, most));
+    for (int i = 0; i <= most; ++i) write(from, i);
+    for (int i = 0; i <= to.intervals(); ++i) write(to, i);
+    const int steps = random.integer(0, most);
+    from.drop_first(steps);
+    from.set_intervals(most - steps);
+    from.initial_state_is_given = trial % 2 == 0;
+    from.initial_step()[1] = number;
+    to.take_stages(from);
+    ASSERT_EQ(to.intervals(), from.intervals());
+    EXPECT_EQ(to.initial_state_is_given, from.initial_state_is_given);
+    EXPECT_EQ(to.initial_step()[1], number);
+    for (int i = 0; i <= from.intervals(); ++i) {
+      EXPECT_EQ(contents(to, i), contents(from, i));
+      EXPECT_TRUE(std::equal(to.lower(i), to.lower(i) + to.stride(), from.lower(i)));
+      EXPECT_TRUE(std::equal(to.upper(i), to.upper(i) + to.stride(), from.upper(i)));
+      EXPECT_EQ(to.states(i), from.states(i));
+      EXPECT_EQ(to.controls(i), from.controls(i));
+      EXPECT_EQ(to.limits(i), from.limits(i));
+      EXPECT_EQ(to.identity_counts()[i], from.identity_counts()[i]);
+    }
+  }
+}
+
 }  // namespace stage_qp_test
 }  // namespace rhec

@@ -14,6 +14,7 @@
 namespace rhec {
 namespace term_functions_test {
 
+using ::testing::DoubleNear;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::unicycle;
@@ -91,6 +92,39 @@ TEST(TermFunctions, EvaluatesManyStagesAsItDoesEach) {
       EXPECT_NEAR(slopes[i * rows.slopes.size() + e], slope, 1e-15) << i;
     }
     EXPECT_EQ(bends[static_cast<std::size_t>(i)], weights[i * 3]);
+  }
+}
+
+TEST(TermFunctions, WritesLimitsWhereTheyAreWanted) {
+  const auto model = unicycle();
+  const TermFunctions functions(*model, {{"one", std::make_shared<Two>()}});
+  constexpr int count = 45;
+  const int row = functions.argument_row();
+  std::vector<double> arguments(static_cast<std::size_t>(count) * row, 0.0), scratch(functions.scratch_size());
+  for (int i = 0; i < count; ++i)
+    for (int j = 0; j < functions.argument_count(); ++j) arguments[i * row + j] = 0.1 * i - 0.3 * j;
+  constexpr int values_step = 5, slopes_step = 20, row_length = 8;
+  std::vector<double> values(count * values_step, -1.0), slopes(count * slopes_step, -1.0), only_values(values);
+  functions.evaluate_limits(Stage::middle, count, arguments.data(),
+                            {.values = values.data(),
+                             .values_step = values_step,
+                             .slopes = slopes.data(),
+                             .slopes_step = slopes_step,
+                             .row_length = row_length},
+                            scratch.data());
+  functions.evaluate_limits(Stage::middle, count, arguments.data(),
+                            {.values = only_values.data(), .values_step = values_step}, scratch.data());
+  for (int i = 0; i < count; ++i) {
+    const double* a = arguments.data() + i * row;
+    const std::vector<double> of_stage(values.begin() + i * values_step, values.begin() + (i + 1) * values_step);
+    EXPECT_THAT(of_stage,
+                ElementsAre(DoubleNear(a[0] * a[1] + a[8], 1e-14), DoubleNear(a[5] * a[7], 1e-14), -1.0, -1.0, -1.0));
+    for (int r = 0; r < 2; ++r) EXPECT_NEAR(only_values[i * values_step + r], of_stage[r], 1e-14);
+    for (int r = 0; r < 2; ++r)
+      for (int c = 0; c < row_length; ++c) {
+        const double expected = r == 0 && c == 0 ? a[1] : r == 0 && c == 1 ? a[0] : r == 1 && c == 5 ? a[7] : -1.0;
+        EXPECT_NEAR(slopes[i * slopes_step + r * row_length + c], expected, 1e-15) << i << ": " << r << ", " << c;
+      }
   }
 }
 

@@ -142,7 +142,8 @@ class RHEC_EXPORT HorizonProblem : public Ocp {
   /// Bounds, the initial step, and limits.
   void write_bounds(const Iterate& iterate, StageRange range, StageQp& qp, std::span<double> scratch) const noexcept;
   void write_own_bounds(const Iterate& iterate, StageRange range, StageQp& qp) const noexcept;
-  void write_limits(const Iterate& iterate, StageRange range, StageQp& qp, std::span<double> scratch) const noexcept;
+  void write_limits(const Iterate& iterate, StageRange range, HorizonTerms::LimitParts parts, StageQp& qp,
+                    std::span<double> scratch) const noexcept;
   /// `write_cost`, with what terms add.
   double write_costs(StageRange range, const Iterate& iterate, Hessian hessian, CostParts parts, StageQp& qp,
                      std::span<double> scratch) const noexcept;

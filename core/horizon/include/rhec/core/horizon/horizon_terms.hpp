@@ -51,9 +51,18 @@ class RHEC_EXPORT HorizonTerms {
   void evaluate_limits(const Horizon& horizon, const Iterate& iterate, double* values, double* scratch) const noexcept;
   void mark_limits(const Horizon& horizon, int node, std::uint8_t* state_flags,
                    std::uint8_t* control_flags) const noexcept;
+  /// Which parts of limits to write.
+  enum class LimitParts {
+    all,
+    values  ///< all but G, which keeps what it had
+  };
   /// The limits of a range of stages of a QP.
-  void write_limits(const Horizon& horizon, StageRange range, const Iterate& iterate, StageQp& qp,
+  void write_limits(const Horizon& horizon, StageRange range, const Iterate& iterate, LimitParts parts, StageQp& qp,
                     double* scratch) const noexcept;
+  /// The limits of stages of which nothing is known yet: none of them can be violated.
+  void write_open_limits(const Horizon& horizon, StageRange range, StageQp& qp) const noexcept;
+  /// Whether any limit has a multiplier.
+  bool any_pulls(const HorizonStructure& structure, const Iterate& iterate) const noexcept;
   /// The cost of residuals; adds those of single stages to `stage_costs`, if not null.
   double cost(const Horizon& horizon, const Iterate& iterate, double* stage_costs, double* scratch) const noexcept;
   /// Which parts of a QP to add to.
@@ -70,7 +79,12 @@ class RHEC_EXPORT HorizonTerms {
   template <class Use>
   void for_each_kind(const Horizon& horizon, StageRange range, const Use& use) const noexcept;
   void gather(const Horizon& horizon, StageRange range, const Iterate& iterate, double* arguments) const noexcept;
+  bool has_fixed_columns(const HorizonStructure& structure) const noexcept;
   int column(const HorizonStructure& structure, int node, int argument) const noexcept;
+  void write_limit_counts(const Horizon& horizon, StageRange range, StageQp& qp) const noexcept;
+  void complete_limits(const TermFunctions::Rows& rows, StageRange stages, StageQp& qp) const noexcept;
+  void write_moved_slopes(const Horizon& horizon, TermFunctions::Stage stage, StageRange stages,
+                          const double* arguments, StageQp& qp, double* scratch) const noexcept;
 
   std::shared_ptr<const TermFunctions> functions_;
   int nx_ = 0, np_ = 0, nu_ = 0, limits_ = 0, data_row_ = 0;

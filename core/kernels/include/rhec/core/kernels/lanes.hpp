@@ -95,24 +95,6 @@ inline double largest_of(const Lanes& lanes) {
   return twos[1] > twos[0] ? twos[1] : twos[0];
 }
 
-/// sums[j] += sum_of(lanes[j]) for j = 0 .. 7.
-inline void add_sums_of(const Lanes* lanes, double* sums) {
-#if defined(__AVX512F__)
-  Lanes twos[4], fours[2];
-  for (int j = 0; j < 4; ++j)
-    twos[j] = __builtin_shufflevector(lanes[2 * j], lanes[2 * j + 1], 0, 8, 2, 10, 4, 12, 6, 14) +
-              __builtin_shufflevector(lanes[2 * j], lanes[2 * j + 1], 1, 9, 3, 11, 5, 13, 7, 15);
-  for (int j = 0; j < 2; ++j)
-    fours[j] = __builtin_shufflevector(twos[2 * j], twos[2 * j + 1], 0, 1, 8, 9, 4, 5, 12, 13) +
-               __builtin_shufflevector(twos[2 * j], twos[2 * j + 1], 2, 3, 10, 11, 6, 7, 14, 15);
-  const Lanes eights = __builtin_shufflevector(fours[0], fours[1], 0, 1, 2, 3, 8, 9, 10, 11) +
-                       __builtin_shufflevector(fours[0], fours[1], 4, 5, 6, 7, 12, 13, 14, 15);
-  store(load(sums) + eights, sums);
-#else
-  for (int j = 0; j < 8; ++j) sums[j] += sum_of(lanes[j]);
-#endif
-}
-
 /// A row, or a part of one, in registers.
 template <int registers>
 struct Row {

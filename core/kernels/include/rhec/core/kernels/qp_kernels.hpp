@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 namespace rhec {
 
 // Initialise all members of a view at once, by designated initialisers: a view that is zeroed first and filled later
@@ -36,6 +38,16 @@ struct ViolationParts {
   int count;
 };
 
+/// The limits of all stages of a QP, as StageQp stores them: `limits` rows of G each, of `stride` entries, and four
+/// rows of `row` entries: lower and upper bounds, linear and quadratic prices. What stages do not use is zero.
+struct LimitView {
+  int intervals = 0;
+  int controls = 0;  ///< of the capacity
+  int limits = 0, row = 0, stride = 0;
+  const int* counts = nullptr;  ///< of limits
+  const double *G = nullptr, *sides = nullptr;
+};
+
 /// Inner loops over the stages of a QP and an iterate.
 struct QpKernels {
   KktParts (*kkt)(const QpView& view);
@@ -51,6 +63,16 @@ struct QpKernels {
                        double* most);
   /// to += from.
   void (*add)(const double* from, double* to, long count);
+  /// Whether all numbers of the limits make sense: G is finite, no bound is NaN or out of reach, none exceeds its upper
+  /// one by more than the tolerance, and no price is NaN, negative or zero.
+  bool (*limits_are_sound)(const LimitView& view, double tolerance);
+  /// values := G z of all stages, rows of `view.row` entries. Returns whether one is out of its bounds by more than the
+  /// tolerance.
+  bool (*limit_values)(const LimitView& view, const double* z, double tolerance, double* values);
+  /// The same for eight steps at once, interleaved, without the controls that `held` marks (rows as those of z), of
+  /// which `states` is the first column. Only the columns that a stage has are read.
+  void (*limit_sensitivities)(const LimitView& view, const int* control_counts, int states, const std::int8_t* held,
+                              const double* steps, double* values);
 };
 
 }  // namespace rhec

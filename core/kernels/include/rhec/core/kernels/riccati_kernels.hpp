@@ -51,7 +51,7 @@ struct RiccatiKernels {
   /// Sensitivities to `response_batch` gradients at once, interleaved: each entry of a row holds those of all
   /// gradients. Backward: from the gradients of the stages up to `last` (zero unless `has_gradient` is set) to those of
   /// the value functions, in place. Forward: from these and the initial states to the sensitivities, in place, and
-  /// their costates. Rows without gradients are not read. There must be no special stage.
+  /// their costates, unless that is null. Rows without gradients are not read. There must be no special stage.
   void (*sensitivities_backward)(const RiccatiView& view, int last, const unsigned char* has_gradient,
                                  double* gradients);
   void (*sensitivities_forward)(const RiccatiView& view, int last, double* sensitivities, double* costates);

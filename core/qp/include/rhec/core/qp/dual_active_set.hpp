@@ -58,8 +58,6 @@ class RHEC_EXPORT DualActiveSet {
   void reset() noexcept { rows_change_ = false; }
   /// After `solve`: also computes the policy (Riccati::feedback), which `solve` may omit.
   void complete_policy(const StageQp& qp, Riccati& riccati) noexcept;
-  /// Whether the last factorisation was without any bound.
-  bool holds_nothing() const noexcept { return held_places_.empty(); }
   /// Number since the last `prepare`.
   int factorisations() const noexcept { return factorisations_; }
 
@@ -102,13 +100,16 @@ class RHEC_EXPORT DualActiveSet {
   bool find_sensitivities(const StageQp& qp, Riccati& riccati, const int* places, int count) noexcept;
   bool is_needed(int batch, const int* places, int count) const noexcept;
   void forget(int batch) noexcept;
-  bool find_sensitivities_of_columns(const StageQp& qp, Riccati& riccati, int first) noexcept;
-  bool find_sensitivities_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count) noexcept;
+  bool find_sensitivities_of_columns(const StageQp& qp, Riccati& riccati, bool and_violated) noexcept;
+  bool find_sensitivities_of_next(const StageQp& qp, Riccati& riccati, const int* first, int count,
+                                  double least) noexcept;
   /// Sensitivity of the variable at one place to the gradient of another, which must have sensitivities.
   double sensitivity(int of, int at) const noexcept {
     const int number = number_[of];
-    return batches_[number / batch_size]
-        .sensitivities.values[static_cast<std::ptrdiff_t>(at) * batch_size + number % batch_size];
+    return sensitivities_at(number / batch_size, at)[number % batch_size];
+  }
+  const double* sensitivities_at(int batch, int place) const noexcept {
+    return batches_[batch].sensitivities.values.data() + static_cast<std::ptrdiff_t>(place) * batch_size;
   }
   double& weight_of(int place, Weights& weights) const noexcept {
     return weights[number_[place] / batch_size][number_[place] % batch_size];
@@ -134,6 +135,7 @@ class RHEC_EXPORT DualActiveSet {
   bool drop_wrong(const Riccati& riccati) noexcept;
   Violations find_violations() noexcept;
   bool add_controls_together(const StageQp& qp, Riccati& riccati, int worst) noexcept;
+  int list_with_next(int* places) const noexcept;
   void append_column(int place, double square, double multiplier) noexcept;
   Outcome add(const StageQp& qp, Riccati& riccati, int entering, Clock::time_point deadline) noexcept;
   Found find_values(const StageQp& qp, Riccati& riccati, bool may_combine, Iterate& step) noexcept;
@@ -149,8 +151,7 @@ class RHEC_EXPORT DualActiveSet {
   void add_limit_gradients(const StageQp& qp) noexcept;
   void keep_rows(const StageQp& qp) noexcept;
   void compare_rows(const StageQp& qp) noexcept;
-  bool violates_limits(const StageQp& qp, const Iterate& step) noexcept;
-  void find_limit_values(const StageQp& qp, const Iterate& step) noexcept;
+  bool find_limit_values(const StageQp& qp, const Iterate& step) noexcept;
   void find_limit_sensitivities(const StageQp& qp, double* values) const noexcept;
   bool pass_end(int column, bool grows) noexcept;
   bool correct_soft_column(int k, Weights& weights) noexcept;
@@ -160,13 +161,13 @@ class RHEC_EXPORT DualActiveSet {
   int states_ = 0, stride_ = 0, limit_row_ = 0;
   int most_columns_ = 0, batch_count_ = 0, most_changes_ = 0;
   int places_ = 0, all_places_ = 0;  ///< number of places that the QP uses: of variables, and of limits too
-  bool has_limits_ = false, base_is_saturated_ = false;
+  bool has_limits_ = false;
   bool is_convex_ = false, has_bounds_ = false, has_policy_ = false, has_base_ = false;
   double pull_tolerance_ = 0.0;
   const double *lower_ = nullptr, *upper_ = nullptr;  ///< of the QP that is being solved
   ActiveSet held_, claimed_;
   // By place. For a held variable, the value is its multiplier, since this is what changes.
-  std::vector<double> value_, direction_, violation_;
+  std::vector<double> value_, violation_;
   /// The bounds widened by their tolerance; infinite for variables that are not free.
   std::vector<double> least_, most_;
   std::vector<Hold> hold_;

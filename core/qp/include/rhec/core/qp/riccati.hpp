@@ -78,6 +78,11 @@ class RHEC_EXPORT Riccati {
   /// `diagonal`, if not null, is added to the diagonals of H (barrier terms): one row of the QP's stride per stage.
   void factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
   void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, nullptr); }
+  /// Without active bounds of states. False, and nothing to solve with, if a stage would have to be convexified.
+  bool factor_if_convex(const StageQp& qp, const ActiveSet& active) noexcept;
+  /// What `factor` without active bounds and `write_convexified` do, in little more time than a convex QP takes. False
+  /// if that did not succeed (rounding, or numbers that are not finite).
+  bool convexify(StageQp& qp, const ActiveSet& no_bounds) noexcept;
   /// Only what `covariances` needs; a `solve` that follows factorises again.
   void factor_for_covariances(const StageQp& qp, const ActiveSet& active) noexcept;
   bool was_convexified() const noexcept { return convexified_; }
@@ -95,7 +100,7 @@ class RHEC_EXPORT Riccati {
   /// Sensitivities of the minimiser to gradients of one entry, or one row of a stage, each: with h = e_k and all other
   /// vectors of the QP zero, the values z of all stages, and in place of fixed controls their multipliers. Interleaved:
   /// entry c of the row of stage i is at values[(i * stride + c) * size + (number of the gradient)]. Behind the last
-  /// stage there is room for the values of all limits, which the caller may fill.
+  /// stage there is room for the values of all limits, which the caller may fill. With limits there are no costates.
   struct Sensitivities {
     static constexpr int size = 8;
     AlignedDoubles values, costates;
@@ -158,7 +163,10 @@ class RHEC_EXPORT Riccati {
   double* P(int node) noexcept { return P_.data() + static_cast<std::ptrdiff_t>(node) * ns_ * stride_; }
   double* p(int node) noexcept { return p_.data() + static_cast<std::ptrdiff_t>(node) * stride_; }
 
+  RiccatiView begin_factor(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
   void factor_stages(const StageQp& qp, const ActiveSet& active, const double* diagonal) noexcept;
+  void factor_node_0(const StageQp& qp, const ActiveSet& active) noexcept;
+  void write_change(const double* reduced, const double* factor, int i, StageQp& qp) const noexcept;
   void factor_special(const StageQp& qp, const ActiveSet& active, const RiccatiView& view, int i) noexcept;
   void factor_initial(const StageQp& qp, const ActiveSet& active) noexcept;
   int count_active(const StageQp& qp, const ActiveSet& active, int node) const noexcept;

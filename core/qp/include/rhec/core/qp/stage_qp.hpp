@@ -43,6 +43,7 @@ class RHEC_EXPORT StageQp {
   const int* state_counts() const noexcept { return state_counts_.data(); }
   const int* control_counts() const noexcept { return control_counts_.data(); }  ///< for intervals 0 .. N - 1
   const int* identity_counts() const noexcept { return identity_counts_.data(); }
+  const int* limit_counts() const noexcept { return limit_counts_.data(); }
   void set_intervals(int intervals) noexcept {
     RHEC_ASSERT(intervals >= 0 && intervals <= capacity_.intervals, "at most the capacity");
     intervals_ = intervals;
@@ -66,6 +67,8 @@ class RHEC_EXPORT StageQp {
   }
   /// Moves AB, b, H, h, the limits and sizes towards the front by `stages`; zeros follow.
   void drop_first(int stages) noexcept;
+  /// Becomes a copy of a whole QP of the same capacity, of as many stages as that has.
+  void take_stages(const StageQp& from) noexcept;
   bool initial_state_is_given = false;
   /// For callers that write to AB: no row counts as a row of the identity any more.
   void drop_identity_rows() noexcept;

@@ -93,7 +93,7 @@ class RHEC_EXPORT StageQpSolver {
   Outcome solve_robustly(const StageQp& qp, Iterate& step, Clock::time_point deadline) noexcept;
   bool interior_point(const StageQp& qp, Iterate& step, const Accuracy& wanted, Clock::time_point deadline) noexcept;
   const StageQp& convexify(const StageQp& qp) noexcept;
-  const StageQp& take_convexified(const StageQp& qp) noexcept;
+  const StageQp& convexify_limited(const StageQp& qp) noexcept;
 
   /// One bounded variable or limit in the interior-point method: slacks and multipliers of its two sides. A soft side
   /// has the slack of its violation too, with a multiplier of its own; it is eliminated from the Newton system.

@@ -83,6 +83,18 @@ class RHEC_EXPORT TermFunctions {
   /// (count x slopes).
   void evaluate(Stage stage, int count, const double* arguments, double* values, double* slopes,
                 double* scratch) const noexcept;
+  /// Where limits of consecutive stages are written: the value of row r of stage i to values[i values_step + r], and,
+  /// unless `slopes` is null, its derivative by entry c of [x; p; u] to slopes[i slopes_step + r row_length + c].
+  /// Derivatives that are zero by structure are not written.
+  struct LimitPlaces {
+    double* values;
+    std::ptrdiff_t values_step;
+    double* slopes = nullptr;
+    std::ptrdiff_t slopes_step = 0, row_length = 0;
+  };
+  /// The limits alone.
+  void evaluate_limits(Stage stage, int count, const double* arguments, const LimitPlaces& places,
+                       double* scratch) const noexcept;
   /// The Hessian of sum_r weights_r row_r: bends (count x bends).
   void curve(Stage stage, int count, const double* arguments, const double* weights, double* bends,
              double* scratch) const noexcept;
@@ -90,6 +102,9 @@ class RHEC_EXPORT TermFunctions {
   std::size_t scratch_size() const noexcept;
 
  private:
+  template <class Use>
+  void run(const Tape& tape, int count, const double* arguments, double* registers, const Use& use) const noexcept;
+
   std::vector<NamedTerm> terms_;
   std::vector<Rows> rows_;
   std::vector<double> linear_, quadratic_;
