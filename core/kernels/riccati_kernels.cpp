@@ -857,7 +857,26 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
   stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { rows[l] = next[l].first(stage.next_states); });
 }
 
-/// The same for any sizes, with rows of `width` states in memory.
+/// Row r of `to`: the sum over k of factor(r, k) times row k of `from`, which has `width` entries. Two rows at a time,
+/// for the processor's pipelines; an odd last one twice.
+template <int width, class Factor>
+RHEC_ALWAYS_INLINE inline void combine_rows(int count, int terms, const double* from, const Factor& factor, double* to,
+                                            long step) {
+  using R = Row<width / lane_count>;
+  for (int r = 0; r < count; r += 2) {
+    const int other = r + 1 < count ? r + 1 : r;
+    R rows[2] = {};
+    for (int k = 0; k < terms; ++k) {
+      const R term = R::from(from + k * width);
+      rows[0].add(term, factor(r, k));
+      rows[1].add(term, factor(other, k));
+    }
+    rows[0].to(to + r * step);
+    rows[1].to(to + other * step);
+  }
+}
+
+/// What carry_stage does, for any sizes, with rows of `width` states in memory.
 template <int width>
 inline void carry_general_stage(const RiccatiView& view, int i, double* sigma) {
   using R = Row<width / lane_count>;
@@ -890,11 +909,8 @@ inline void carry_general_stage(const RiccatiView& view, int i, double* sigma) {
     column.to(A + j * width);
   }
   // Sigma A'
-  for (int j = 0; j < states; ++j) {
-    R row{};
-    for (int k = 0; k < states; ++k) row.add(R::from(A + k * width), sigma[j * stride + k]);
-    row.to(M + j * width);
-  }
+  combine_rows<width>(
+      states, states, A, [&](int j, int k) RHEC_ALWAYS_INLINE { return sigma[j * stride + k]; }, M, width);
   for (int l = 0; l < next_states; ++l) {
     R row{};
     for (int k = 0; k < controls; ++k) row.add(R::from(scaled + k * width), 2.0 * B[k * width + l]);
@@ -996,29 +1012,11 @@ inline bool predict_covariance(const RiccatiView& view, int i, double* sigma) {
   for (int j = 0; j < states; ++j) R{}.to(A + j * width);
   for (int l = 0; l < next_states; ++l)
     for (int j = 0; j < states; ++j) A[j * width + l] = AB[l * stride + j];
-  // Sigma A', two rows at a time; an odd last one twice.
-  for (int j = 0; j < states; j += 2) {
-    const int other = j + 1 < states ? j + 1 : j;
-    R rows[2] = {};
-    for (int k = 0; k < states; ++k) {
-      const R column = R::from(A + k * width);
-      rows[0].add(column, sigma[j * stride + k]);
-      rows[1].add(column, sigma[other * stride + k]);
-    }
-    rows[0].to(M + j * width);
-    rows[1].to(M + other * width);
-  }
-  for (int l = 0; l < next_states; l += 2) {
-    const int other = l + 1 < next_states ? l + 1 : l;
-    R rows[2] = {};
-    for (int j = 0; j < states; ++j) {
-      const R column = R::from(M + j * width);
-      rows[0].add(column, A[j * width + l]);
-      rows[1].add(column, A[j * width + other]);
-    }
-    rows[0].to(sigma + l * stride);
-    rows[1].to(sigma + other * stride);
-  }
+  // Sigma A', then A times that.
+  combine_rows<width>(
+      states, states, A, [&](int j, int k) RHEC_ALWAYS_INLINE { return sigma[j * stride + k]; }, M, width);
+  combine_rows<width>(
+      next_states, states, M, [&](int l, int j) RHEC_ALWAYS_INLINE { return A[j * width + l]; }, sigma, stride);
   for (int k = 0; k < controls; ++k) {
     alignas(64) double effects[width] = {};
     bool any = false;
