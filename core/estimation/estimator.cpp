@@ -438,7 +438,8 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
     is_all_judged = judge_waiting(time, extended(0.5, before_solving));
   }
   if (has_started() || !std::isnan(time))
-    is_all_taken_in = take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time, extended(1.0, before_solving));
+    is_all_taken_in =
+        take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time, extended(1.0, before_solving));
   if (!has_started()) {
     assess(estimate_, time);
     return estimate_;

@@ -137,6 +137,12 @@ struct RheProblem::BetweenBatch {
   double* rest;
 };
 
+/// Rows `step` apart.
+struct RheProblem::ModelRows {
+  const double* first;
+  std::ptrdiff_t step;
+};
+
 /// What is known of an interval with points: what the model says at each (BetweenBatch::write_said), the measurements'
 /// parts of the points and their weights, and the sums of these (PointSums).
 struct RheProblem::OfPoints {

@@ -15,6 +15,10 @@ namespace {
 constexpr double no_sums = -1.0;       // the weight of measurements whose weights have not been summed up yet
 constexpr double nothing_kept = -1.0;  // the number of measurements of sums that are not known yet
 
+int stage_columns(const HorizonProblem& problem, int interval) noexcept {
+  return problem.capacity().states + problem.control_count(interval);
+}
+
 }  // namespace
 
 bool RheProblem::has_between() const noexcept {
@@ -204,7 +208,8 @@ double RheProblem::add_points(BetweenBatch& batch, int interval, const OfPoints&
         batch, interval, {points.said + output_row_ + static_cast<std::ptrdiff_t>(j) * batch.width, points.said_step},
         batch.point_count);
     transcription_kernels().add_sums({rows.first, rows.step, batch.point_count, kept.weights(), PointSums::row, v},
-                                     stage_columns(interval), stride(), H_of(*view, interval), h_of(*view, interval));
+                                     stage_columns(*this, interval), stride(), H_of(*view, interval),
+                                     h_of(*view, interval));
   }
   return total;
 }
@@ -341,7 +346,7 @@ RheProblem::ModelRows RheProblem::in_order_of_stage(BetweenBatch& batch, int int
                                                     int count) const noexcept {
   // Where no block starts, the orders are the same.
   if (control_count(interval) == nu() && !structure().any_ramp()) return rows;
-  const std::ptrdiff_t width = padded(stage_columns(interval));
+  const std::ptrdiff_t width = padded(stage_columns(*this, interval));
   const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
   std::fill_n(batch.gradients, count * width, 0.0);
   for (int z = 0; z < batch.nz; ++z) {
@@ -362,7 +367,8 @@ void RheProblem::add_rows(BetweenBatch& batch, int interval, const double* rows,
   const ModelRows ordered = in_order_of_stage(
       batch, interval, {rows + static_cast<std::ptrdiff_t>(first) * batch.width, batch.width}, count - first);
   transcription_kernels().add_products(ordered.first, weights ? weights + first : nullptr, pulls + first, count - first,
-                                       stage_columns(interval), stride(), H_of(view, interval), h_of(view, interval));
+                                       stage_columns(*this, interval), stride(), H_of(view, interval),
+                                       h_of(view, interval));
 }
 
 /// Second derivatives of robust losses: 4 rho'' (J' W r)(J' W r)' for each measurement.

@@ -32,8 +32,8 @@ class RHEC_EXPORT Estimator {
     /// By output, how much later than it was measured it is stamped [s]; none: not at all. Outputs of one measurement
     /// go to the times at which each was measured.
     std::vector<double> delays = {};
-    /// For so long a call whose deadline has passed goes on with what waits, beside one row and one node [s]: an estimator
-    /// that is always late keeps up.
+    /// For so long a call whose deadline has passed goes on with what waits, beside one row and one node [s]: an
+    /// estimator that is always late keeps up.
     double grace = 5e-4;
   };
   explicit Estimator(std::unique_ptr<EstimationMethod> method) : Estimator(std::move(method), Timeline{}) {}
