@@ -426,7 +426,10 @@ inline bool factor_general(const RiccatiView& view, int i, double tolerance) {
     if (most <= 24 || width == 24) return factor_general_stage<width, 24>(view, i, tolerance);
   if constexpr (width > 24)
     if (most <= 32 || width == 32) return factor_general_stage<width, 32>(view, i, tolerance);
-  return factor_general_stage < width, width < 64 ? width : 64 > (view, i, tolerance);
+  if constexpr (width > 64)
+    return factor_general_stage<width, 64>(view, i, tolerance);
+  else
+    return factor_general_stage<width, width>(view, i, tolerance);
 }
 
 /// Replaces p of the next node by p of this one. It stays in registers, since a value just written to memory takes a
