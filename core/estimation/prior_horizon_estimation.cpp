@@ -64,7 +64,7 @@ void PriorHorizonEstimation::reset() noexcept {
   solver_->reset();
   shifter_.forget();
   window_ = {};
-  has_window_ = has_solution_ = false;
+  has_window_ = has_solution_ = has_rehearsed_ = false;
   law_ = 0;
   std::fill(advances_.begin(), advances_.end(), Advance{});
 }
@@ -73,7 +73,7 @@ bool PriorHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::Ma
   solver_->reset();
   shifter_.forget();
   window_ = {};
-  has_window_ = has_solution_ = false;
+  has_window_ = has_solution_ = has_rehearsed_ = false;
   return filters_.rebase(mean, covariance);
 }
 

@@ -417,19 +417,26 @@ inline bool factor_general_stage(const RiccatiView& view, int i, double toleranc
   return true;
 }
 
+/// Calls `function` with the least compiled width of rows for so many states.
+template <class Function>
+inline auto with_width_of_states(int states, const Function& function) {
+  if (states <= 8) return function.template operator()<8>();
+  if (states <= 16) return function.template operator()<16>();
+  if (states <= 24) return function.template operator()<24>();
+  if (states <= 32) return function.template operator()<32>();
+  return function.template operator()<64>();
+}
+
+inline int most_states(const RiccatiView& view, int i) {
+  return view.state_counts[i] > view.state_counts[i + 1] ? view.state_counts[i] : view.state_counts[i + 1];
+}
+
 template <int width>
 inline bool factor_general(const RiccatiView& view, int i, double tolerance) {
-  const int most = view.state_counts[i] > view.state_counts[i + 1] ? view.state_counts[i] : view.state_counts[i + 1];
-  if (most <= 8) return factor_general_stage<width, 8>(view, i, tolerance);
-  if (most <= 16) return factor_general_stage<width, 16>(view, i, tolerance);
-  if constexpr (width > 16)
-    if (most <= 24 || width == 24) return factor_general_stage<width, 24>(view, i, tolerance);
-  if constexpr (width > 24)
-    if (most <= 32 || width == 32) return factor_general_stage<width, 32>(view, i, tolerance);
-  if constexpr (width > 64)
-    return factor_general_stage<width, 64>(view, i, tolerance);
-  else
-    return factor_general_stage<width, width>(view, i, tolerance);
+  return with_width_of_states(most_states(view, i), [&]<int state_width>() {
+    constexpr int fitting = state_width < width ? state_width : width;  // states are columns, too
+    return factor_general_stage<width, fitting>(view, i, tolerance);
+  });
 }
 
 /// Replaces p of the next node by p of this one. It stays in registers, since a value just written to memory takes a
@@ -923,12 +930,7 @@ inline void carry_general_stage(const RiccatiView& view, int i, double* sigma) {
 }
 
 inline void carry_general(const RiccatiView& view, int i, double* sigma) {
-  const int most = view.state_counts[i] > view.state_counts[i + 1] ? view.state_counts[i] : view.state_counts[i + 1];
-  if (most <= 8) return carry_general_stage<8>(view, i, sigma);
-  if (most <= 16) return carry_general_stage<16>(view, i, sigma);
-  if (most <= 24) return carry_general_stage<24>(view, i, sigma);
-  if (most <= 32) return carry_general_stage<32>(view, i, sigma);
-  return carry_general_stage<64>(view, i, sigma);
+  with_width_of_states(most_states(view, i), [&]<int width>() { carry_general_stage<width>(view, i, sigma); });
 }
 
 int carry_covariance(const RiccatiView& view, int first, double* covariance, double* all) {
@@ -1050,11 +1052,7 @@ inline bool filter_covariance_of(const RiccatiView& view, double* sigma) {
 }
 
 bool filter_covariance(const RiccatiView& view, double* sigma) {
-  if (view.states <= 8) return filter_covariance_of<8>(view, sigma);
-  if (view.states <= 16) return filter_covariance_of<16>(view, sigma);
-  if (view.states <= 24) return filter_covariance_of<24>(view, sigma);
-  if (view.states <= 32) return filter_covariance_of<32>(view, sigma);
-  return filter_covariance_of<64>(view, sigma);
+  return with_width_of_states(view.states, [&]<int width>() { return filter_covariance_of<width>(view, sigma); });
 }
 
 void form(const RiccatiView& view, int i, double* out) {

@@ -28,8 +28,10 @@ constexpr double longest_hold = 1.0;
 // on without it.
 constexpr double early = 0.25, late = 0.5;
 constexpr std::size_t most_latencies = 100000;
-// A rehearsal ends so long before a step is due, and is left out if it would take more than this share of the steps.
+// A rehearsal ends so long before a step is due. There are no more of them once so many in a row have taken more than
+// this share of the steps: one alone has been interrupted.
 constexpr auto after_rehearsal = std::chrono::microseconds(200);
+constexpr int most_long_rehearsals = 3;
 constexpr double most_of_step = 0.1;
 // Without a step that is due, the loop looks around so often.
 constexpr auto between_looks = std::chrono::milliseconds(100);
@@ -200,7 +202,7 @@ Clock::time_point Loop::expected() const { return std::min(due_, last_received_ 
 /// Between two steps other programs use the processor's caches. What comes just before a step brings code and data
 /// back.
 bool Loop::may_rehearse() const {
-  return !is_triggered_ && rehearsed_ != expected() && rehearsal_ < of_step(step_, most_of_step);
+  return !is_triggered_ && rehearsed_ != expected() && long_rehearsals_ < most_long_rehearsals;
 }
 
 void Loop::rehearse() {
@@ -209,7 +211,13 @@ void Loop::rehearse() {
   rehearsed_ = expected();
   if (begin > expected() - rehearsal_) return;
   estimator_->rehearse();
-  rehearsal_ = Clock::now() - begin;
+  const Clock::duration taken = Clock::now() - begin;
+  if (taken > of_step(step_, most_of_step)) {
+    ++long_rehearsals_;
+    return;
+  }
+  rehearsal_ = taken;
+  long_rehearsals_ = 0;
 }
 
 /// Steps lie on a grid, so that quick sensors do not hasten them, which follows sensors that are as quick as the steps:
@@ -300,6 +308,7 @@ void Loop::begin_if_possible() {
   for (const logs::SignalRow& row : gathered_) push(row);
   gathered_.clear();
   due_ = time_.instant();
+  long_rehearsals_ = 0;
   {
     const std::lock_guard lock(mutex_);
     slip_ahead_ = estimator_->slip_ahead();
