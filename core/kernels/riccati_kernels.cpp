@@ -431,10 +431,12 @@ inline int most_states(const RiccatiView& view, int i) {
   return view.state_counts[i] > view.state_counts[i + 1] ? view.state_counts[i] : view.state_counts[i + 1];
 }
 
+constexpr int smaller_of(int a, int b) { return a < b ? a : b; }
+
 template <int width>
 inline bool factor_general(const RiccatiView& view, int i, double tolerance) {
   return with_width_of_states(most_states(view, i), [&]<int state_width>() {
-    constexpr int fitting = state_width < width ? state_width : width;  // states are columns, too
+    constexpr int fitting = smaller_of(state_width, width);  // states are columns, too
     return factor_general_stage<width, fitting>(view, i, tolerance);
   });
 }

@@ -18,13 +18,6 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/telemetry/robot_messages.hpp"
 
-#if defined(__SANITIZE_ADDRESS__)
-// Fast DDS deletes its readers' statistics by the size of their base. That is not ours to mend.
-extern "C" __attribute__((visibility("default"))) const char* __asan_default_options() {
-  return "new_delete_type_mismatch=0";
-}
-#endif
-
 namespace rhec::apps::ros::participant_strangers_test {
 namespace {
 
