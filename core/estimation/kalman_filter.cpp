@@ -35,9 +35,12 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   scratch_.assign(model_->rows_scratch(1), 0.0);
   work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
   gain_ = image_ = zeros_ = correction_ = Eigen::VectorXd::Zero(n);
-  if (!uses_between) return;
-  const int wide = n + nu_ + np_;
-  wide_mean_ = wide_before_ = wide_gradient_ = wide_gain_ = wide_image_ = Eigen::VectorXd::Zero(wide);
+  if (!uses_between && noise_.motion_outputs.empty()) return;
+  const int wide = n + nu_ + np_, motion = static_cast<int>(noise_.motion_outputs.size());
+  wide_mean_ = point_ = wide_gradient_ = wide_gain_ = wide_image_ = Eigen::VectorXd::Zero(wide);
+  motion_innovations_ = Eigen::VectorXd::Zero(motion);
+  motion_images_ = motion_gradients_ = Eigen::MatrixXd::Zero(wide, motion);
+  motion_covariance_ = Eigen::MatrixXd::Zero(motion, motion);
   wide_end_ = Eigen::VectorXd::Zero(np_);
   wide_covariance_ = Eigen::MatrixXd::Zero(wide, wide);
   transition_ = wide_work_ = Eigen::MatrixXd::Zero(n, wide);

@@ -132,9 +132,10 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   }
   surprises_.assign(setup_.robust.empty() ? 0 : ny_ * M, 0.0);
   find_loss_scales();
-  if (setup_.most_between > 0) {
+  if (setup_.most_between > 0 || looks_ahead()) {
     const auto a = static_cast<std::size_t>(wide_count());
-    for (auto* v : {&wide_mean_, &wide_before_}) v->assign(a * M, 0.0);
+    for (auto* v : {&wide_mean_, &wide_before_, &point_}) v->assign(a * M, 0.0);
+    moved_.assign(M, 0.0);
     wide_covariance_.assign(a * a * M, 0.0);
     wide_work_.assign((2 * a * a + 3 * a) * M, 0.0);
     wide_gradient_.assign(ny_ * a * M, 0.0);

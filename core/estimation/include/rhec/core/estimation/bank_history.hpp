@@ -68,7 +68,7 @@ class RHEC_EXPORT BankHistory {
   std::size_t place(std::int64_t number) const noexcept {
     return static_cast<std::size_t>(number % static_cast<std::int64_t>(intervals_.size()));
   }
-  void begin_node(const double* outputs) noexcept;
+  void begin_node() noexcept;
   void predict(std::size_t place) noexcept;
   void update(std::size_t place) noexcept;
   void filter_from(std::int64_t number) noexcept;
