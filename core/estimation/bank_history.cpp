@@ -92,9 +92,7 @@ bool BankHistory::rewind(int nodes) noexcept {
   if (nodes == 0) return true;
   newest_ -= nodes;
   count_ -= nodes;
-  const std::size_t at = place(newest_);
-  bank_.restore(predicted_.data() + at * bank_.state_size());
-  update(at);
+  begin_again(newest_);
   return true;
 }
 
@@ -108,16 +106,21 @@ bool BankHistory::amend(int back, const double* outputs) noexcept {
   return true;
 }
 
-/// Anew from a node's measurements on, and where these decide where the interval before is linearised, over that, too.
-void BankHistory::filter_from(std::int64_t number) noexcept {
+/// A node's measurements, and where these decide where the interval before is linearised, that interval, too.
+void BankHistory::begin_again(std::int64_t number) noexcept {
+  const std::size_t at = place(number);
   if (bank_.looks_ahead() && number > newest_ - count_ + 1) {
     bank_.restore(filtered_.data() + place(number - 1) * bank_.state_size());
-    predict(place(number));
-    bank_.save(predicted_.data() + place(number) * bank_.state_size());
+    predict(at);
+    bank_.save(predicted_.data() + at * bank_.state_size());
   } else {
-    bank_.restore(predicted_.data() + place(number) * bank_.state_size());
+    bank_.restore(predicted_.data() + at * bank_.state_size());
   }
-  update(place(number));
+  update(at);
+}
+
+void BankHistory::filter_from(std::int64_t number) noexcept {
+  begin_again(number);
   for (++number; number <= newest_; ++number) {
     const std::size_t at = place(number);
     predict(at);

@@ -29,7 +29,9 @@ void KalmanFilter::predict(const MeasuredInterval& interval, const double* input
   point_ = wide_mean_;
   if (ends_with_motion) find_point(interval.duration, 1.0, end_outputs);
   integrate_wide(point_, interval.duration, 1.0);
+  if (ends_with_motion) end_point_ = next_;
   narrow();
+  has_end_point_ = ends_with_motion;
 }
 
 bool KalmanFilter::has_motion(const double* y) const noexcept {

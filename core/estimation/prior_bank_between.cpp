@@ -24,6 +24,9 @@ void PriorBank::predict(const MeasuredInterval& interval, const double* end_outp
   point_ = wide_mean_;
   if (ends_with_motion) find_point(interval.duration, 1.0, end_outputs);
   narrow(interval.duration);
+  if (!ends_with_motion) return;
+  end_point_ = next_rows_;
+  has_end_point_ = true;
 }
 
 bool PriorBank::has_motion(const double* y) const noexcept {

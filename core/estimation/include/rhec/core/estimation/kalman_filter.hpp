@@ -82,6 +82,9 @@ class RHEC_EXPORT KalmanFilter {
   Noise noise_;
   int substeps_, nx_, nu_, np_, ny_;
   std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
+  /// Where the outputs of an interval's end are linearised, if that is not the mean.
+  std::vector<double> end_point_;
+  bool has_end_point_ = false;
   AlignedDoubles row_, next_row_, jacobian_rows_, scratch_;  ///< for Model::integrate_rows
   Eigen::MatrixXd work_, next_covariance_;
   Eigen::VectorXd gain_, image_, zeros_, correction_;

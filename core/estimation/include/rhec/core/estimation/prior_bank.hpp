@@ -172,6 +172,10 @@ class RHEC_EXPORT PriorBank {
   /// transition to [x; z] at its end.
   AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, wide_gradient_, transition_;
   AlignedDoubles point_, moved_;  ///< where the interval is linearised, and how far that has moved at last
+  /// The vehicle's states there at the interval's end, as rows of the model: where the outputs of that end are
+  /// linearised.
+  std::vector<double> end_point_;
+  bool has_end_point_ = false;
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;
