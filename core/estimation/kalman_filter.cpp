@@ -38,7 +38,7 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   gain_ = image_ = zeros_ = correction_ = Eigen::VectorXd::Zero(n);
   if (!uses_between && noise_.motion_outputs.empty()) return;
   const int wide = n + nu_ + np_, motion = static_cast<int>(noise_.motion_outputs.size());
-  wide_mean_ = point_ = wide_gradient_ = wide_gain_ = wide_image_ = Eigen::VectorXd::Zero(wide);
+  wide_mean_ = point_ = next_point_ = wide_gradient_ = wide_gain_ = wide_image_ = Eigen::VectorXd::Zero(wide);
   motion_innovations_ = Eigen::VectorXd::Zero(motion);
   motion_images_ = motion_gradients_ = Eigen::MatrixXd::Zero(wide, motion);
   motion_covariance_ = Eigen::MatrixXd::Zero(motion, motion);

@@ -26,9 +26,7 @@ void KalmanFilter::predict(const MeasuredInterval& interval, const double* input
     take_between(interval.times[k], interval.times[k] / interval.duration,
                  interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_,
                  robust_weights ? robust_weights + static_cast<std::ptrdiff_t>(k) * ny_ : nullptr);
-  point_ = wide_mean_;
-  if (ends_with_motion) find_point(interval.duration, 1.0, end_outputs);
-  integrate_wide(point_, interval.duration, 1.0);
+  linearise_wide(interval.duration, 1.0, ends_with_motion ? end_outputs : nullptr);
   if (ends_with_motion) end_point_ = next_;
   narrow();
   has_end_point_ = ends_with_motion;
@@ -95,19 +93,21 @@ double KalmanFilter::expect_wide(int output, double measured) noexcept {
   return innovation - (wide_gradient_.dot(wide_mean_) - wide_gradient_.dot(point_));
 }
 
-/// Gauss-Newton steps from the mean to where the outputs of motion put what is unknown of the interval. A point that
-/// has moved by less than a tenth of a standard deviation will do.
-void KalmanFilter::find_point(double seconds, double share, const double* y) noexcept {
+/// Next state and Jacobian at the mean or, where outputs y are given, where those of motion put what is unknown of the
+/// interval: Gauss-Newton steps, until the point does not move by a tenth of a standard deviation.
+void KalmanFilter::linearise_wide(double seconds, double share, const double* y) noexcept {
   constexpr int most_steps = 5;
-  for (int step = 0; step < most_steps; ++step) {
+  point_ = wide_mean_;
+  for (int step = 0; step <= most_steps; ++step) {
     integrate_wide(point_, seconds, share);
+    if (!y || step == most_steps) return;
     model_->observe(
         {.count = 1, .states = next_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
     if (!move_point(y)) return;
   }
 }
 
-/// The mean given the outputs of motion, linearised about the point before. Whether that has moved it by much.
+/// Moves the point to the mean given the outputs of motion, linearised about the point, unless that is near.
 bool KalmanFilter::move_point(const double* y) noexcept {
   constexpr double little = 0.1, most_surprise = 16.0;
   Eigen::Index count = 0;
@@ -149,15 +149,14 @@ bool KalmanFilter::move_point(const double* y) noexcept {
     for (Eigen::Index k = 0; k < count; ++k) next += motion_images_(r, k) * innovations[k];
     const double change = next - point_[r];
     has_moved = has_moved || change * change > little * little * wide_covariance_(r, r);
-    point_[r] = next;
+    next_point_[r] = next;
   }
+  if (has_moved) point_.swap(next_point_);
   return has_moved;
 }
 
 void KalmanFilter::take_between(double seconds, double share, const double* y, const double* robust_weights) noexcept {
-  point_ = wide_mean_;
-  if (has_motion(y)) find_point(seconds, share, y);
-  integrate_wide(point_, seconds, share);
+  linearise_wide(seconds, share, has_motion(y) ? y : nullptr);
   model_->observe(
       {.count = 1, .states = next_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
   // All outputs are linearised there; `expect_wide` is about the mean as it is after each of them.

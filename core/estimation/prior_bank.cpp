@@ -134,8 +134,9 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   find_loss_scales();
   if (setup_.most_between > 0 || looks_ahead()) {
     const auto a = static_cast<std::size_t>(wide_count());
-    for (auto* v : {&wide_mean_, &wide_before_, &point_}) v->assign(a * M, 0.0);
+    for (auto* v : {&wide_mean_, &wide_before_, &point_, &next_point_}) v->assign(a * M, 0.0);
     moved_.assign(M, 0.0);
+    end_point_.assign(M * nx, 0.0);
     wide_covariance_.assign(a * a * M, 0.0);
     wide_work_.assign((2 * a * a + 3 * a) * M, 0.0);
     wide_gradient_.assign(ny_ * a * M, 0.0);
@@ -449,6 +450,11 @@ void PriorBank::integrate_members(const double* mean, bool is_wide, double secon
 
 void PriorBank::take_step(double duration) noexcept {
   integrate_members(mean_.data(), false, duration, 1.0);
+  take_linearised_step();
+}
+
+/// The moments at the interval's end, by the next states and the Jacobian of `integrate_members`.
+void PriorBank::take_linearised_step() noexcept {
   const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
   bank_kernels().predict(view, {.inputs = nu_,
                                 .processes = np_,

@@ -21,9 +21,12 @@ void PriorBank::predict(const MeasuredInterval& interval, const double* end_outp
   for (int k = 0; k < interval.between; ++k)
     take_between(interval.times[k], interval.times[k] / interval.duration,
                  interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_);
-  point_ = wide_mean_;
-  if (ends_with_motion) find_point(interval.duration, 1.0, end_outputs);
-  narrow(interval.duration);
+  linearise_wide(interval.duration, 1.0, ends_with_motion ? end_outputs : nullptr);
+  if (interval.between > 0) {
+    narrow();
+  } else {
+    take_step_from_point();
+  }
   if (!ends_with_motion) return;
   end_point_ = next_rows_;
   has_end_point_ = true;
@@ -85,14 +88,16 @@ void PriorBank::write_wide_gradient(int output, double share) noexcept {
   }
 }
 
-/// Gauss-Newton steps of every member from the mean to where the outputs of motion put what is unknown of the interval,
-/// until no point moves by a tenth of a standard deviation.
-void PriorBank::find_point(double seconds, double share, const double* y) noexcept {
+/// Next states and Jacobians at the mean or, where outputs y are given, where those of motion put what is unknown of
+/// the interval: Gauss-Newton steps of every member, until no point moves by a tenth of a standard deviation.
+void PriorBank::linearise_wide(double seconds, double share, const double* y) noexcept {
   constexpr int most_steps = 5;
   constexpr double little = 0.1;
   const int a = wide_count();
-  for (int step = 0; step < most_steps; ++step) {
+  point_ = wide_mean_;
+  for (int step = 0; step <= most_steps; ++step) {
     integrate_members(point_.data(), true, seconds, share);
+    if (!y || step == most_steps) return;
     observe_members(next_rows_.data());
     int taken = 0;
     for (const int j : setup_.motion_outputs) {
@@ -104,9 +109,11 @@ void PriorBank::find_point(double seconds, double share, const double* y) noexce
                                   .measured = y[j],
                                   .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
     }
+    next_point_ = point_;
     bank_kernels().move_point({lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()},
-                              views_->outputs.data(), taken, setup_.gate, point_.data(), moved_.data());
+                              views_->outputs.data(), taken, setup_.gate, next_point_.data(), moved_.data());
     if (*std::max_element(moved_.begin(), moved_.begin() + members_) <= little * little) return;
+    std::swap(point_, next_point_);
   }
 }
 
@@ -123,9 +130,7 @@ void PriorBank::expect_at_mean(int output) noexcept {
 /// Takes in outputs at a time within the interval.
 void PriorBank::take_between(double seconds, double share, const double* y) noexcept {
   const int a = wide_count();
-  point_ = wide_mean_;
-  if (has_motion(y)) find_point(seconds, share, y);
-  integrate_members(point_.data(), true, seconds, share);
+  linearise_wide(seconds, share, has_motion(y) ? y : nullptr);
   observe_members(next_rows_.data());
   for (int j = 0; j < ny_; ++j) {
     if (std::isnan(y[j])) continue;  // nothing is measured by it
@@ -142,10 +147,36 @@ void PriorBank::take_between(double seconds, double share, const double* y) noex
                    y, nullptr);
 }
 
+/// Of an interval without measurements between its nodes, linearised about `point_`: as `take_step` from the mean.
+void PriorBank::take_step_from_point() noexcept {
+  const std::ptrdiff_t M = lanes_;
+  const auto off = [&](std::ptrdiff_t entry, std::ptrdiff_t m) {
+    return wide_mean_[entry * M + m] - point_[entry * M + m];
+  };
+  const auto add = [&](int column, std::ptrdiff_t m, double change) {
+    for (std::ptrdiff_t r = 0; r < nx_; ++r) next_[r * M + m] += jacobian_[(column * nx_ + r) * M + m] * change;
+  };
+  for (std::ptrdiff_t m = 0; m < M; ++m) {
+    for (int c = 0; c < nx_; ++c) add(c, m, off(c, m));
+    for (int j = 0; j < nu_; ++j) add(nx_ + j, m, off(n_ + j, m));
+    for (int j = 0; j < np_; ++j) {
+      const Process& process = processes_[j];
+      double end = off(process.first, m);
+      add(nx_ + nu_ + j, m, end);
+      if (process.ramp[m] != 0.0) {
+        end = off(n_ + nu_ + process.first - nx_, m);
+        for (std::ptrdiff_t k = 0; k < process.count; ++k)
+          end += process.F[k * process.count * M + m] * off(process.first + k, m);
+      }
+      add(nx_ + nu_ + np_ + j, m, end);
+    }
+  }
+  take_linearised_step();
+}
+
 /// Moves to the interval's end, linearised about `point_`: z+ = F z + q, and x as integrated from there.
-void PriorBank::narrow(double duration) noexcept {
+void PriorBank::narrow() noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
-  integrate_members(point_.data(), true, duration, 1.0);
   std::fill(transition_.begin(), transition_.end(), 0.0);
   const auto T = [&](std::ptrdiff_t r, std::ptrdiff_t c) { return transition_.data() + (c * n_ + r) * M; };
   const auto J = [&](std::ptrdiff_t r, std::ptrdiff_t c) { return jacobian_.data() + (c * nx_ + r) * M; };

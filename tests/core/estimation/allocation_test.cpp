@@ -2,12 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <vector>
 
 #include "rhec/core/base/aligned.hpp"
 #include "rhec/core/control/controller.hpp"
+#include "rhec/core/estimation/bank_history.hpp"
 #include "rhec/core/estimation/banked_covariance.hpp"
 #include "rhec/core/estimation/estimator.hpp"
 #include "rhec/core/estimation/filter_estimation.hpp"
@@ -18,6 +20,8 @@
 #include "rhec/sim/world/paths.hpp"
 #include "rhec/sim/world/truth.hpp"
 #include "support/allocations.hpp"
+#include "support/bank_case.hpp"
+#include "support/turntable.hpp"
 
 namespace rhec {
 namespace allocation_test {
@@ -203,6 +207,34 @@ TEST(EstimationAllocation, NoneWhereTheHeadingIsSearchedFor) {
   EXPECT_EQ(allocations_in_the_loop({.filter = true, .heading_starts = 8}), 0);
   EXPECT_EQ(allocations_in_the_loop({.bank = true, .heading_starts = 8}), 0);
   EXPECT_EQ(allocations_in_the_loop({.priors = true, .heading_starts = 8}), 0);
+}
+
+TEST(EstimationAllocation, NoneWhereOutputsOfMotionAreLinearised) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const testing::TurntableNoise noise;
+  PriorBank::Setup setup;
+  setup.members = {{testing::prior("walk", "{sigma: 0.1, along: time}")}, {testing::prior("constant", "{}")}};
+  setup.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro};
+  setup.input_variances = {noise.omega * noise.omega};
+  setup.motion_outputs = {1};
+  setup.most_between = 1;
+  BankHistory bank(PriorBank(testing::turntable(), setup), 8);
+  bank.bank().reset(Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity());
+  KalmanFilter filter(testing::turntable(), {setup.output_variances, setup.input_variances, {-1.0}, {2.0}, {1}}, 1);
+  filter.mean << 0.0, 0.0, 0.75;
+  filter.covariance.setIdentity();
+  const double nothing[] = {nan, nan}, zero = 0.0, omega = 0.1, time = 0.1, outputs[] = {0.1, 0.07};
+  const long before = allocation_count();
+  bank.start(nothing);
+  for (int k = 0; k < 20; ++k) {
+    const MeasuredInterval interval{
+        .duration = 0.2, .inputs = &omega, .between = k % 2, .times = &time, .outputs = outputs};
+    bank.add(interval, outputs);
+    bank.amend(1, outputs);
+    filter.predict({.duration = 0.2, .inputs = &omega}, &zero, nullptr, nullptr, outputs);
+    filter.update(outputs, nullptr);
+  }
+  EXPECT_EQ(allocation_count() - before, 0);
 }
 
 }  // namespace allocation_test

@@ -68,7 +68,7 @@ class RHEC_EXPORT KalmanFilter {
   void integrate_wide(const Eigen::VectorXd& wide, double seconds, double share) noexcept;
   bool has_motion(const double* y) const noexcept;
   double expect_wide(int output, double measured) noexcept;
-  void find_point(double seconds, double share, const double* y) noexcept;
+  void linearise_wide(double seconds, double share, const double* y) noexcept;
   bool move_point(const double* y) noexcept;
   void take_between(double seconds, double share, const double* y, const double* robust_weights) noexcept;
   void take_wide(double innovation, double variance) noexcept;
@@ -92,7 +92,7 @@ class RHEC_EXPORT KalmanFilter {
   Eigen::VectorXd wide_mean_, wide_gradient_, wide_gain_, wide_image_, wide_end_;
   Eigen::MatrixXd wide_covariance_, transition_, wide_work_;
   /// Where an interval is linearised; images and gradients of the outputs of motion, and their innovations.
-  Eigen::VectorXd point_, motion_innovations_;
+  Eigen::VectorXd point_, next_point_, motion_innovations_;
   Eigen::MatrixXd motion_images_, motion_gradients_, motion_covariance_;
   double between_log_likelihood_ = 0.0;
 };

@@ -130,15 +130,18 @@ class RHEC_EXPORT PriorBank {
   double take_outputs(const Frame& frame, const double* y, const double* robust_weights) noexcept;
   void begin_step(const double* measured_input, double duration) noexcept;
   void take_step(double duration) noexcept;
+  void take_linearised_step() noexcept;
   void integrate_members(const double* mean, bool is_wide, double seconds, double share) noexcept;
   void observe_members(const double* states) noexcept;
   void widen() noexcept;
   bool has_motion(const double* y) const noexcept;
+  bool is_of_motion(int output) const noexcept;
   void write_wide_gradient(int output, double share) noexcept;
-  void find_point(double seconds, double share, const double* y) noexcept;
+  void linearise_wide(double seconds, double share, const double* y) noexcept;
+  void take_step_from_point() noexcept;
   void expect_at_mean(int output) noexcept;
   void take_between(double seconds, double share, const double* y) noexcept;
-  void narrow(double duration) noexcept;
+  void narrow() noexcept;
   int wide_count() const noexcept { return 2 * n_ - nx_ + nu_; }
   void find_distance(const double* input, double duration) noexcept;
   void advance_processes(double duration) noexcept;
@@ -171,7 +174,7 @@ class RHEC_EXPORT PriorBank {
   /// Within an interval: [x; z; u; q], with the noise q of the processes (docs/method.md, section 8), and the
   /// transition to [x; z] at its end.
   AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, wide_gradient_, transition_;
-  AlignedDoubles point_, moved_;  ///< where the interval is linearised, and how far that has moved at last
+  AlignedDoubles point_, next_point_, moved_;  ///< where the interval is linearised, and how far that would move on
   /// The vehicle's states there at the interval's end, as rows of the model: where the outputs of that end are
   /// linearised.
   std::vector<double> end_point_;
