@@ -73,7 +73,7 @@ void push_input(NamedEstimator& self, double time, const Numbers& inputs) {
 py::object estimate(NamedEstimator& self, double time, std::optional<double> deadline, const py::object& out) {
   const Clock::time_point end = deadline_in(deadline);
   if (!out.is_none() && !py::isinstance<EstimateObject>(out))
-    throw py::type_error("out: expected an Estimate that this estimator has made before");
+    throw ArgumentError("out: expected an Estimate that this estimator has made before");
   const Lock lock(self.mutex);
   const Estimate* now = nullptr;
   double microseconds = 0.0;

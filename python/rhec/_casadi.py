@@ -6,13 +6,15 @@ import math
 from typing import Any
 
 from . import _graphs
-from ._errors import Error
+from ._arguments import checked
+from ._errors import Error, module_of
 from ._problems import Problem
 from ._types import Array
 
 _FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "tanh", "atan2")
 
 
+@checked
 @dataclasses.dataclass
 class CasadiModel:
     """rates: Function (x, u, p) -> dx/dt; outputs: Function (x, u, p) -> y; their columns are the vehicle's variables."""
@@ -21,6 +23,7 @@ class CasadiModel:
     outputs: Any
 
 
+@checked
 @dataclasses.dataclass
 class CasadiProblem:
     """A problem by multiple shooting.
@@ -54,11 +57,14 @@ class CasadiProblem:
         return float(casadi.Function("objective", [self.nlp["x"]], [self.nlp["f"]])(x))
 
 
+@checked
 def to_casadi(thing: Any) -> Any:
     """A Vehicle or a Model as a CasadiModel, a Problem as a CasadiProblem. Needs CasADi (pip install casadi)."""
-    if isinstance(thing, Problem):
+    vehicle = None if isinstance(thing, Problem) else _graphs.vehicle_of(thing, "to_casadi")
+    module_of("casadi", "to_casadi")
+    if vehicle is None:
         return _Transcription(thing).made()
-    return _model(_graphs.vehicle_of(thing))
+    return _model(vehicle)
 
 
 def _model(vehicle):

@@ -5,9 +5,11 @@ import os
 from typing import Any
 
 from . import _configuration, _rhec
+from ._arguments import checked
 from ._types import ArrayLike, Changes, Configuration, PluginPath
 
 
+@checked
 class Robot:
     """What a robot is, and how it is estimated and controlled.
 

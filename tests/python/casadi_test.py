@@ -6,6 +6,9 @@ import pytest
 import rhec
 from shared import FIGURE8, ROOT, SHORT
 
+# to_casadi takes no rates of inputs.
+WITHOUT_RATES = {**SHORT, "controller.weights.rates": None}
+
 casadi = pytest.importorskip("casadi")
 
 QUIET = {"ipopt.print_level": 0, "print_time": 0, "ipopt.sb": "yes"}
@@ -105,7 +108,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_problems_are_the_same(name):
-    problems = rhec.run(FIGURE8, set={**SHORT, **CASES[name]}, problems_every=45).problems
+    problems = rhec.run(FIGURE8, set={**WITHOUT_RATES, **CASES[name]}, problems_every=45).problems
     compared = 0
     for problem in problems:
         try:
@@ -122,7 +125,7 @@ def test_problems_are_the_same(name):
 
 @pytest.mark.parametrize("kind", ["rhe", "rhc"])
 def test_solutions_are_the_same(kind):
-    problem = [each for each in rhec.run(FIGURE8, set=SHORT, problems_every=40).problems if each.kind == kind][1]
+    problem = [each for each in rhec.run(FIGURE8, set=WITHOUT_RATES, problems_every=40).problems if each.kind == kind][1]
     theirs, ours = rhec.to_casadi(problem).solve("ipopt", **QUIET), problem.solve("sparse_sqp")
     assert theirs["stats"]["success"] and ours.status == "solved"
     assert theirs["objective"] == pytest.approx(ours.objective, rel=1e-6)
@@ -138,9 +141,32 @@ def test_what_is_not_handed_over():
 
 def test_a_slow_peer_is_told_apart():
     """The comparison of docs/python.md: the same problem, timed alike."""
-    problem = [each for each in rhec.run(FIGURE8, set=SHORT, problems_every=40).problems if each.kind == "rhc"][1]
+    problem = [each for each in rhec.run(FIGURE8, set=WITHOUT_RATES, problems_every=40).problems if each.kind == "rhc"][1]
     made = rhec.to_casadi(problem)
     start = time.perf_counter()
     made.solve("ipopt", **QUIET)
     theirs = time.perf_counter() - start
     assert 0.0 < problem.solve("gn_rti", mode="converge").seconds < theirs
+
+
+def test_terms_of_casadi(tmp_path):
+    """A limit and a cost, with bounds that have corners, without a compiler and with one; as sympy has them."""
+    speed, rate, most, along = (casadi.SX.sym(name) for name in ("ground_speed", "heading_rate", "most", "arc_length"))
+    with pytest.raises(rhec.Error, match="limits: g: .*no derivative everywhere"):
+        rhec.Term("wrong", limits={"g": (0, casadi.fabs(speed), 1)})
+    with pytest.raises(rhec.Error, match="costs: c: 'spede' is not known"):
+        rhec.Term("wrong", costs={"c": casadi.SX.sym("spede")})
+    term = rhec.Term("both", options={most: 2.0}, costs={"smooth": {"term": casadi.fmax(rate, 0), "weight": 1e-3}},
+                     limits={"side": (-most, speed * rate, casadi.fmin(most, 5)),
+                             "zone": (None, speed, casadi.if_else(casadi.logic_and(along > 20, along < 40), 3, casadi.inf))}, smooth=0.01)
+    changes = {**SHORT, "controller.solver": {"name": "gn_rti", "iterations": 5, "residual": 0.01}}
+    loaded, built = (rhec.run(FIGURE8, set={**changes, "controller.terms": [each]}) for each in (term.load(), term.build(tmp_path)))
+    assert loaded.completed
+    numpy.testing.assert_allclose(loaded.steps["u1"], built.steps["u1"], rtol=1e-9)
+    texts = rhec.Term("texts", options={"most": 2.0}, costs={"smooth": {"term": "smooth_max(heading_rate, 0, 0.01)", "weight": 1e-3}},
+                      limits={"side": ("-most", "ground_speed * heading_rate", "min(most, 5)"),
+                              "zone": (None, "ground_speed", "where(arc_length - 20, where(40 - arc_length, 3, infinity), infinity)")})
+    same = rhec.run(FIGURE8, set={**changes, "controller.terms": [texts]})
+    numpy.testing.assert_allclose(loaded.steps["u1"], same.steps["u1"], rtol=1e-9)
+    free = rhec.run(FIGURE8, set=changes)
+    assert loaded.steps.rows > free.steps.rows

@@ -203,6 +203,17 @@ def test_twelve_states_of_a_paper():
     (dict(states=["x"], inputs=["u"], rates=["u", "u"]), "found 2 terms, expected 1: x"),
     (dict(states=["x"], inputs=["u"], rates={"z": "u"}), "'z' is none of the states"),
     (dict(states=[3], inputs=["u"], rates=["u"]), "found 3 as the name"),
+    (dict(states="xy", inputs=["u"], rates=["u"]), "states: found 'xy', expected a dict"),
+    (dict(states=["x"], inputs=["u"], rates=3), "rates: found 3, expected a dict"),
+    (dict(states=["x"], inputs=["u"], rates=["u +"]), r"the model 'wrong': rates: x: the text 'u \+': found the end, expected a number"),
+    (dict(states=["x"], inputs=["u"], rates=["z"]), "the model 'wrong': rates: x: 'z' is not known; expected one of u, x"),
+    (dict(states=["x"], inputs=["u"], rates=[sympy.Symbol("z") + u]), "rates: x: 'z' is not known; expected one of u, x"),
+    (dict(states=["x"], inputs=["u"], rates=[sympy.Abs(u)]), "the model 'wrong': rates: x: .*no derivative everywhere"),
+    (dict(states=["x"], inputs=["u"], rates=["abs(u)"]), "there is no function 'abs'.*no derivative everywhere"),
+    (dict(states=["x"], inputs=["u"], outputs=["y"], rates=["u"], measured=["x y"]), "measured: y: the text 'x y': found 'y'"),
+    (dict(states=["x"], inputs=["u"], rates=["d"], definitions={"d": "e"}), "definitions: d: 'e' is not known"),
+    (dict(states=["x"], inputs=["u"], rates=["u"], straight_motion={"u": "speed"}), "straight_motion: u: 'speed' is not known"),
+    (dict(states=["x"], inputs=["u"], rates=["u"], smooth=0.0), "smooth: found 0.0, expected a width"),
 ])
 def test_mistakes_in_models(keys, word):
     with pytest.raises(rhec.Error, match=word):

@@ -109,12 +109,17 @@ def test_a_file_is_written_whole_or_not_at_all(problems, tmp_path):
     rhec.write_problems(file, problems[:1])
     before = file.read_text()
 
-    class Broken:
+    class Broken(rhec.Problem):
+        def __init__(self):
+            pass
+
         def line(self):
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
         rhec.write_problems(file, [problems[0], Broken()])
+    with pytest.raises(rhec.ArgumentError, match=r"write_problems: problems\[1\]: found 3, expected a Problem"):
+        rhec.write_problems(file, [problems[0], 3])
     assert file.read_text() == before and [each.name for each in tmp_path.iterdir()] == ["problems.jsonl"]
 
 

@@ -66,7 +66,7 @@ def test_mistakes_in_files_name_file_line_and_key(tmp_path):
     assert (caught.value.file, caught.value.line, caught.value.key) == (str(file), 3, "estimator.horizon")
     with pytest.raises(rhec.Error, match="gone.yaml"):
         rhec.Robot(tmp_path / "gone.yaml")
-    with pytest.raises(rhec.Error, match="class 'int'"):
+    with pytest.raises(rhec.ArgumentError, match="Robot: configuration: found 3, expected the name of a YAML file or a dict"):
         rhec.Robot(3)
     with pytest.raises(rhec.Error, match="the key 1, expected a text"):
         rhec.Robot({"model": {1: 2}})
