@@ -186,7 +186,7 @@ def tune_controller(scenario: Configuration, *, cases: dict[str, Changes] | None
     seeds, first_seed: drives to tune on in each case; judges: further ones that judge the result
     effort: at most so many times the inputs' changes of the scenario
     """
-    check_range("tune_controller", seeds=(seeds, 1, math.inf), judges=(judges, 1, math.inf), effort=(effort, 0, math.inf),
+    check_range("tune_controller", seeds=(seeds, 1, math.inf), judges=(judges, 0, math.inf), effort=(effort, 0, math.inf),
                 evaluations=(evaluations, 1, math.inf), threads=(threads, 0, math.inf), most_seconds=(most_seconds, 0, math.inf))
     settings, folders = _configuration.read(scenario, set, plugin_path)
     worlds = []

@@ -10,7 +10,7 @@ from typing import Any
 
 from . import _compile, _configuration, _notation, _rhec
 from ._arguments import checked, found_in_words
-from ._errors import ArgumentError, Error
+from ._errors import Error
 from ._model import by_name, check_known, labelled_texts, parts_of
 from ._types import File, Terms
 
