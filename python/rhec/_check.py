@@ -62,6 +62,7 @@ def check(model: Any, *, plugin_path: PluginPath = (), **options: Any) -> Check:
     if isinstance(model, os.PathLike):
         model = os.fspath(model)
     if not isinstance(model, str):
-        raise ArgumentError(f"check: model: found {found_in_words(model)}, expected a Model, the name of a plugin, or a file with equations", "model")
+        raise ArgumentError(f"check: model: found {found_in_words(model)}, expected a Model, the name of a plugin, or a file with "
+                            "equations", "model")
     folders = _configuration.folders_of(plugin_path)
     return Check(_rhec.check(folders, _rhec.Settings.of({"name": model, **options}, "configuration")))
