@@ -1,14 +1,15 @@
 // How long calls of an estimator and a controller take once their deadline has passed, on the worst samples that
 // we know: a cold start, a burst of measurements that have waited, data that come late by a window, a silence, jumps of
-// the position. Every call is given a deadline that has passed already, so all that it computes is overrun; it is
-// measured in time of the thread, which other programs do not lengthen.
+// the position. Every call is given a deadline that has passed already, so all that it computes is overrun, or one that
+// is a budget away; it is measured in time of the thread, which other programs do not lengthen.
 //
-//     deadlines [SCENARIO ...]
+//     deadlines [--budget MICROSECONDS] [SCENARIO ...]
 //
 // One line of JSON per scenario, estimator and kind of trouble: the longest call of each function [us]. Without
 // arguments it takes scenarios of all vehicles. scripts/measure/deadlines makes a table of that.
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -128,7 +129,7 @@ void push(const Row& row, Estimator& estimator, Longest& longest) {
   });
 }
 
-Longest drive(const sim::Scenario& scenario, Trouble trouble) {
+Longest drive(const sim::Scenario& scenario, Trouble trouble, std::chrono::microseconds budget) {
   const Robot& robot = scenario.robot();
   const bool is_cold = trouble == Trouble::cold_start;
   const auto estimator = is_cold ? robot.make_estimator() : robot.make_estimator(scenario.initial_state());
@@ -172,7 +173,7 @@ Longest drive(const sim::Scenario& scenario, Trouble trouble) {
       push(row, *estimator, longest);
     }
     const bool may_settle = !is_cold && k < begin_of_trouble;  // the trouble is to begin in a usual state
-    const auto deadline = may_settle ? Clock::time_point::max() : Clock::now();
+    const auto deadline = may_settle ? Clock::time_point::max() : Clock::now() + budget;
     Longest settling;
     Longest& counted = may_settle ? settling : longest;
     const Estimate* estimate = nullptr;
@@ -190,7 +191,7 @@ Longest drive(const sim::Scenario& scenario, Trouble trouble) {
   return longest;
 }
 
-void run(const std::vector<std::string>& names) {
+void run(const std::vector<std::string>& names, std::chrono::microseconds budget) {
   const Host host;
   for (const std::string& name : names) {
     for (const Variant& variant : variants) {
@@ -198,7 +199,7 @@ void run(const std::vector<std::string>& names) {
       for (const std::string& assignment : variant.assignments) apply_assignment(settings, assignment);
       const sim::Scenario scenario(host, settings);
       for (const auto& [trouble, words] : troubles) {
-        const Longest longest = drive(scenario, trouble);
+        const Longest longest = drive(scenario, trouble, budget);
         fmt::print("{{\"scenario\": \"{}\", \"estimator\": \"{}\", \"trouble\": \"{}\"{}}}\n", name, variant.name,
                    words, longest.json());
       }
@@ -211,8 +212,13 @@ void run(const std::vector<std::string>& names) {
 
 int main(int count, char** words) {
   try {
-    const std::vector<std::string> names(words + 1, words + count);
-    rhec::bench::run(names.empty() ? rhec::bench::all_vehicles : names);
+    std::vector<std::string> names(words + 1, words + count);
+    std::chrono::microseconds budget{0};
+    if (names.size() > 1 && names.front() == "--budget") {
+      budget = std::chrono::microseconds(std::stol(names[1]));
+      names.erase(names.begin(), names.begin() + 2);
+    }
+    rhec::bench::run(names.empty() ? rhec::bench::all_vehicles : names, budget);
   } catch (const std::exception& mistake) {
     fmt::print(stderr, "deadlines: {}\n", mistake.what());
     return EXIT_FAILURE;

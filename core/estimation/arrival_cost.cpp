@@ -193,7 +193,7 @@ void ArrivalCost::filter_first_interval(const RheProblem& problem, const Iterate
   if (!problem.setup().robust.empty())
     problem.linearise_between(0, solution, between_weights_.data(), nullptr, between_scratch_);
   filter_.predict(problem.between(0).over(problem.duration(0), problem.measured_input(0)), inputs_.data(),
-                  ramp ? ramp_variances_.data() : nullptr, between_weights_.data());
+                  ramp ? ramp_variances_.data() : nullptr, between_weights_.data(), problem.output(1));
 }
 
 /// Rows in [dx; du; dp; dramp] about the solution: prior, outputs, measured inputs, ramp. Their QR factor R gives the

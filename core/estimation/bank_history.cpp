@@ -22,17 +22,17 @@ BankHistory::BankHistory(PriorBank bank, int nodes, int filtered)
       outputs_(intervals_.size() * ny_),
       given_weights_(outputs_.size()),
       used_weights_(outputs_.size()),
-      predicted_(intervals_.size() * bank_.state_size()) {
+      predicted_(intervals_.size() * bank_.state_size()),
+      rehearsed_(bank_.state_size()) {
+  if (keeps_filtered_ || bank_.looks_ahead()) filtered_.assign(predicted_.size(), 0.0);
   if (!keeps_filtered_) return;
-  filtered_.assign(predicted_.size(), 0.0);
   means_.assign(intervals_.size() * np_, 0.0);
   covariances_.assign(intervals_.size() * np_ * np_, 0.0);
   bank_.moments(mean_, covariance_);  // takes on their sizes
 }
 
-void BankHistory::begin_node(const double* outputs) noexcept {
+void BankHistory::begin_node() noexcept {
   const std::size_t at = place(newest_);
-  std::copy_n(outputs, ny_, outputs_.data() + at * ny_);
   std::fill_n(given_weights_.data() + at * ny_, ny_, std::numeric_limits<double>::quiet_NaN());
   bank_.save(predicted_.data() + at * bank_.state_size());
   update(at);
@@ -43,8 +43,8 @@ void BankHistory::update(std::size_t place) noexcept {
   bank_.update(outputs_.data() + place * ny_, given_weights_.data() + place * ny_);
   for (std::size_t j = 0; j < ny_; ++j) used_weights_[place * ny_ + j] = bank_.robust_weight(static_cast<int>(j));
   intervals_[place].log_likelihood = bank_.log_likelihood() + intervals_[place].between_log_likelihood;
+  if (!filtered_.empty()) bank_.save(filtered_.data() + place * bank_.state_size());
   if (!keeps_filtered_) return;
-  bank_.save(filtered_.data() + place * bank_.state_size());
   bank_.moments(mean_, covariance_);
   std::copy_n(mean_.data(), np_, means_.data() + place * np_);
   std::copy_n(covariance_.data(), np_ * np_, covariances_.data() + place * np_ * np_);
@@ -55,7 +55,8 @@ void BankHistory::start(const double* outputs, std::int64_t number) noexcept {
   count_ = 0;
   intervals_[place(number)] = {};
   between_[place(number)].clear();
-  begin_node(outputs);
+  std::copy_n(outputs, ny_, outputs_.data() + place(number) * ny_);
+  begin_node();
 }
 
 void BankHistory::add(const MeasuredInterval& interval, const double* outputs) noexcept {
@@ -64,15 +65,26 @@ void BankHistory::add(const MeasuredInterval& interval, const double* outputs) n
   intervals_[at] = {.duration = interval.duration};
   between_[at].assign(interval);
   std::copy_n(interval.inputs, nu_, inputs_.data() + at * nu_);
+  std::copy_n(outputs, ny_, outputs_.data() + at * ny_);
   predict(at);
-  begin_node(outputs);
+  begin_node();
 }
 
 /// Over the interval before a node.
 void BankHistory::predict(std::size_t place) noexcept {
-  bank_.predict(between_[place].over(intervals_[place].duration, inputs_.data() + place * nu_));
+  bank_.predict(between_[place].over(intervals_[place].duration, inputs_.data() + place * nu_),
+                outputs_.data() + place * ny_);
   intervals_[place].distance = bank_.distance();
   intervals_[place].between_log_likelihood = bank_.between_log_likelihood();
+}
+
+void BankHistory::rehearse() noexcept {
+  if (count_ < 2) return;  // there is no interval yet
+  const std::size_t at = place(newest_);
+  bank_.save(rehearsed_.data());
+  bank_.predict(between_[at].over(intervals_[at].duration, inputs_.data() + at * nu_), outputs_.data() + at * ny_);
+  bank_.update(outputs_.data() + at * ny_, given_weights_.data() + at * ny_);
+  bank_.restore(rehearsed_.data());
 }
 
 bool BankHistory::rewind(int nodes) noexcept {
@@ -80,9 +92,7 @@ bool BankHistory::rewind(int nodes) noexcept {
   if (nodes == 0) return true;
   newest_ -= nodes;
   count_ -= nodes;
-  const std::size_t at = place(newest_);
-  bank_.restore(predicted_.data() + at * bank_.state_size());
-  update(at);
+  begin_again(newest_);
   return true;
 }
 
@@ -96,9 +106,21 @@ bool BankHistory::amend(int back, const double* outputs) noexcept {
   return true;
 }
 
+/// A node's measurements, and where these decide where the interval before is linearised, that interval, too.
+void BankHistory::begin_again(std::int64_t number) noexcept {
+  const std::size_t at = place(number);
+  if (bank_.looks_ahead() && number > newest_ - count_ + 1) {
+    bank_.restore(filtered_.data() + place(number - 1) * bank_.state_size());
+    predict(at);
+    bank_.save(predicted_.data() + at * bank_.state_size());
+  } else {
+    bank_.restore(predicted_.data() + at * bank_.state_size());
+  }
+  update(at);
+}
+
 void BankHistory::filter_from(std::int64_t number) noexcept {
-  bank_.restore(predicted_.data() + place(number) * bank_.state_size());
-  update(place(number));
+  begin_again(number);
   for (++number; number <= newest_; ++number) {
     const std::size_t at = place(number);
     predict(at);

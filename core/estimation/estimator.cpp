@@ -15,9 +15,6 @@ namespace {
 
 constexpr int checked_interval = 16;  // of so many, the integration of one is checked
 constexpr int most_parts = 1000;      // largest number of parts of one prediction
-// What a call does even if its deadline has passed: more than usually comes between two calls, so that one that is
-// always late keeps up.
-constexpr int least_rows = 16, least_nodes = 2, least_parts = 16;
 // Parts of the rest of a prediction whose time is up.
 constexpr int hasty_parts = 2;
 // A source is overdue after so many of its usual intervals.
@@ -30,6 +27,8 @@ NodeGrid::Setup grid_setup(const EstimationMethod& method, const Estimator::Time
   if (!(timeline.tolerance >= 0.0 && timeline.tolerance < timeline.longest_interval))
     throw Error(fmt::format("estimator: tolerance {} s; expected a number from 0 to below the longest interval, {} s",
                             timeline.tolerance, timeline.longest_interval));
+  if (!(timeline.grace >= 0.0 && timeline.grace <= 1.0))
+    throw Error(fmt::format("estimator: grace {} s; expected a number from 0 to 1", timeline.grace));
   if (!timeline.delays.empty() && std::ssize(timeline.delays) != method.model().output_count())
     throw Error(fmt::format("estimator: {} delays given; expected {}, one an output, or none", timeline.delays.size(),
                             method.model().output_count()));
@@ -210,12 +209,18 @@ bool Estimator::take_in(double until, Clock::time_point deadline) noexcept {
     stale_ = true;
   }
   grid_.take_back(outdated, until);
+  const bool has_deadline = deadline != Clock::time_point::max();
+  Clock::time_point last = has_deadline ? Clock::now() : Clock::time_point{};
   int made = 0;
   bool is_late = false;
   for (; !is_late && grid_.has_next(until); ++made) {
     grid_.make_next(until);
     add_node();
-    is_late = made + 1 >= least_nodes && is_past(deadline);
+    if (!has_deadline) continue;
+    // The next one probably takes as long.
+    const Clock::time_point now = Clock::now();
+    is_late = now + (now - last) > deadline;
+    last = now;
   }
   if (made > 0) grid_.settle(method_->reach());
   return !is_late || !grid_.has_next(until);
@@ -234,7 +239,7 @@ void Estimator::add_node() noexcept {
 /// Judges what is stamped up to a time, in its order, and hands on what passes. False if the time was up before.
 bool Estimator::judge_waiting(double until, Clock::time_point deadline) noexcept {
   for (int judged = 0; waiting_->size() > 0 && waiting_->time(0) <= until + timeline_.tolerance; ++judged) {
-    if (judged >= least_rows && is_past(deadline)) return false;
+    if (judged > 0 && is_past(deadline)) return false;
     const double time = waiting_->time(0);
     std::fill(merged_.begin(), merged_.end(), missing_value);
     std::size_t same = 0;  // rows with this stamp, e.g. of two sensors
@@ -302,7 +307,7 @@ void Estimator::through_motion(double from, double to, Clock::time_point deadlin
   int parts = parts_of(to - from, timeline_.longest_interval);
   bool is_hasty = false;
   for (int i = 0; i < parts; ++i) {
-    if (!is_hasty && i >= least_parts && parts - i > hasty_parts && is_past(deadline)) {
+    if (!is_hasty && i > 0 && parts - i > hasty_parts && is_past(deadline)) {
       from += (to - from) * i / parts;
       parts = hasty_parts;
       i = 0;
@@ -415,20 +420,34 @@ void Estimator::prepare() noexcept {
 const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noexcept {
   double clock_offset = 0.0;
   bool is_all_judged = true, is_all_taken_in = true;
+  // A call that is late goes on for a little, so that one that is always late keeps up, whatever a node costs.
+  const bool has_deadline = deadline != Clock::time_point::max();
+  const Clock::time_point begin = has_deadline ? Clock::now() : Clock::time_point{};
+  const auto extended = [&](double share, Clock::time_point until) {
+    if (!has_deadline) return deadline;
+    return std::max(until, begin + std::chrono::duration_cast<Clock::duration>(
+                                       std::chrono::duration<double>(share * timeline_.grace)));
+  };
+  // What follows the nodes takes its time, too.
+  const Clock::duration left = has_deadline ? std::max(deadline - begin, Clock::duration::zero()) : Clock::duration{};
+  const Clock::time_point before_solving = deadline - std::min(solving_, left / 2);
   if (watch_) {
     watch_->begin_innovations();
     clock_offset = clocks_->offset_of(time);
     time -= clock_offset;
-    is_all_judged = judge_waiting(time, deadline);
+    is_all_judged = judge_waiting(time, extended(0.5, before_solving));
   }
   if (has_started() || !std::isnan(time))
-    is_all_taken_in = take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time, deadline);
+    is_all_taken_in =
+        take_in(has_started() && !(time > grid_.time()) ? grid_.time() : time, extended(1.0, before_solving));
   if (!has_started()) {
     assess(estimate_, time);
     return estimate_;
   }
   if (stale_) {
+    const Clock::time_point solving = has_deadline ? Clock::now() : Clock::time_point{};
     method_->estimate(estimate_, deadline);
+    if (has_deadline) solving_ = Clock::now() - solving;
     clip(estimate_);
     stale_ = false;
     // The judge is where the last sample is that it has judged.
@@ -446,7 +465,7 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
     assess(estimate_, std::isfinite(time) ? time : newest);
     return estimate_;
   }
-  predict_to(time, deadline);
+  predict_to(time, extended(1.0, deadline));
   predicted_.time = time + clock_offset;
   assess(predicted_, time);
   return predicted_;

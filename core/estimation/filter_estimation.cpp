@@ -131,7 +131,7 @@ void FilterEstimation::add(const MeasuredInterval& interval, const double* outpu
   }
   for (std::size_t i = 0; i < alive_; ++i) {
     KalmanFilter& filter = bank_[i].filter;
-    filter.predict(interval, no_input_.data(), setup_.has_ramps ? ramp_variances_.data() : nullptr);
+    filter.predict(interval, no_input_.data(), setup_.has_ramps ? ramp_variances_.data() : nullptr, nullptr, outputs);
     bank_[i].log_likelihood += filter.between_log_likelihood();
     for (std::size_t j = 0; !setup_.has_ramps && j < setup_.walk.size(); ++j)
       filter.add_parameter_variance(static_cast<int>(j), setup_.walk[j] * setup_.walk[j]);

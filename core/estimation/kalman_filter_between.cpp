@@ -1,4 +1,4 @@
-// How a KalmanFilter uses measurements between two nodes.
+// How a KalmanFilter uses measurements between two nodes, and where it linearises an interval with outputs of motion.
 #include <algorithm>
 #include <cmath>
 
@@ -11,22 +11,31 @@ namespace rhec {
 /// What is unknown within an interval are [x; p] at its start, the input, and the change of p. Measurements at later
 /// times tell of all of these; only then they move to the interval's end.
 void KalmanFilter::predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
-                           const double* robust_weights) noexcept {
+                           const double* robust_weights, const double* end_outputs) noexcept {
   between_log_likelihood_ = 0.0;
-  if (interval.between == 0) return predict(interval.inputs, input_guess, interval.duration, ramp_variances);
+  const bool ends_with_motion = end_outputs && has_motion(end_outputs);
+  if (interval.between == 0 && !ends_with_motion)
+    return predict(interval.inputs, input_guess, interval.duration, ramp_variances);
   RHEC_ASSERT(wide_mean_.size() > 0, "a filter that was set up for measurements between nodes");
   for (int j = 0; j < nu_; ++j) {
     input_[j] = std::isnan(interval.inputs[j]) ? input_guess[j] : interval.inputs[j];
     wide_gradient_[nx_ + np_ + j] = input_variance(j, interval.inputs);
   }
   widen(ramp_variances);
-  for (int k = 0; k < interval.between; ++k) {
-    integrate_wide(interval.times[k], interval.times[k] / interval.duration);
-    take_between(interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_,
+  for (int k = 0; k < interval.between; ++k)
+    take_between(interval.times[k], interval.times[k] / interval.duration,
+                 interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_,
                  robust_weights ? robust_weights + static_cast<std::ptrdiff_t>(k) * ny_ : nullptr);
-  }
-  integrate_wide(interval.duration, 1.0);
+  point_ = wide_mean_;
+  if (ends_with_motion) find_point(interval.duration, 1.0, end_outputs);
+  integrate_wide(point_, interval.duration, 1.0);
+  if (ends_with_motion) end_point_ = next_;
   narrow();
+  has_end_point_ = ends_with_motion;
+}
+
+bool KalmanFilter::has_motion(const double* y) const noexcept {
+  return std::ranges::any_of(noise_.motion_outputs, [&](int j) { return !std::isnan(y[j]); });
 }
 
 /// From [x; p]; the variances of the inputs stand in their entries of the gradient.
@@ -48,13 +57,13 @@ void KalmanFilter::widen(const double* ramp_variances) noexcept {
 }
 
 /// Next state and Jacobian at a time within the interval, or at its end.
-void KalmanFilter::integrate_wide(double seconds, double share) noexcept {
+void KalmanFilter::integrate_wide(const Eigen::VectorXd& wide, double seconds, double share) noexcept {
   const int n = nx_ + np_;
-  for (int j = 0; j < np_; ++j) wide_end_[j] = wide_mean_[nx_ + j] + share * wide_mean_[n + nu_ + j];
+  for (int j = 0; j < np_; ++j) wide_end_[j] = wide[nx_ + j] + share * wide[n + nu_ + j];
   model_->integrate({.count = 1,
-                     .states = wide_mean_.data(),
-                     .inputs = wide_mean_.data() + n,
-                     .parameters = wide_mean_.data() + nx_,
+                     .states = wide.data(),
+                     .inputs = wide.data() + n,
+                     .parameters = wide.data() + nx_,
                      .parameters_end = wide_end_.data(),
                      .durations = &seconds,
                      .substeps = substeps_,
@@ -73,19 +82,88 @@ void KalmanFilter::integrate_wide(double seconds, double share) noexcept {
   }
 }
 
-void KalmanFilter::take_between(const double* y, const double* robust_weights) noexcept {
+/// Writes an output's gradient by the wide vector, about `point_`. Its innovation as that of the linearised output at
+/// `wide_mean_`.
+double KalmanFilter::expect_wide(int output, double measured) noexcept {
+  for (Eigen::Index c = 0; c < wide_gradient_.size(); ++c) {
+    wide_gradient_[c] = 0.0;
+    for (int r = 0; r < nx_; ++r) wide_gradient_[c] += output_jacobian_[r * ny_ + output] * transition_(r, c);
+  }
+  const double expected = predicted_[output];
+  const double innovation =
+      model_->description().outputs[output].is_angle ? angle_difference(measured, expected) : measured - expected;
+  return innovation - (wide_gradient_.dot(wide_mean_) - wide_gradient_.dot(point_));
+}
+
+/// Gauss-Newton steps from the mean to where the outputs of motion put what is unknown of the interval. A point that
+/// has moved by less than a tenth of a standard deviation will do.
+void KalmanFilter::find_point(double seconds, double share, const double* y) noexcept {
+  constexpr int most_steps = 5;
+  for (int step = 0; step < most_steps; ++step) {
+    integrate_wide(point_, seconds, share);
+    model_->observe(
+        {.count = 1, .states = next_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
+    if (!move_point(y)) return;
+  }
+}
+
+/// The mean given the outputs of motion, linearised about the point before. Whether that has moved it by much.
+bool KalmanFilter::move_point(const double* y) noexcept {
+  constexpr double little = 0.1, most_surprise = 16.0;
+  Eigen::Index count = 0;
+  for (const int j : noise_.motion_outputs) {
+    if (std::isnan(y[j])) continue;
+    motion_innovations_[count] = expect_wide(j, y[j]);
+    motion_gradients_.col(count) = wide_gradient_;
+    for (Eigen::Index r = 0; r < wide_gradient_.size(); ++r) {
+      motion_images_(r, count) = 0.0;
+      for (Eigen::Index c = 0; c < wide_gradient_.size(); ++c)
+        motion_images_(r, count) += wide_covariance_(r, c) * wide_gradient_[c];
+    }
+    for (Eigen::Index k = 0; k <= count; ++k)
+      motion_covariance_(count, k) = motion_gradients_.col(k).dot(motion_images_.col(count));
+    double& total = motion_covariance_(count, count);
+    // An outlier decides nothing.
+    total = std::max(total + noise_.output_variances[j],
+                     motion_innovations_[count] * motion_innovations_[count] / most_surprise);
+    ++count;
+  }
+  // S^-1 of the innovations by S = L D L', in place: below the diagonal L D.
+  auto S = motion_covariance_.topLeftCorner(count, count);
+  auto innovations = motion_innovations_.head(count);
+  for (Eigen::Index c = 0; c < count; ++c) {
+    for (Eigen::Index k = c + 1; k < count; ++k) {
+      const double factor = S(k, c) / S(c, c);
+      for (Eigen::Index r = k; r < count; ++r) S(r, k) -= factor * S(r, c);
+      innovations[k] -= factor * innovations[c];
+    }
+  }
+  for (Eigen::Index c = count - 1; c >= 0; --c) {
+    for (Eigen::Index r = c + 1; r < count; ++r) innovations[c] -= S(r, c) * innovations[r];
+    innovations[c] /= S(c, c);
+  }
+  if (!innovations.allFinite()) return false;
+  bool has_moved = false;
+  for (Eigen::Index r = 0; r < point_.size(); ++r) {
+    double next = wide_mean_[r];
+    for (Eigen::Index k = 0; k < count; ++k) next += motion_images_(r, k) * innovations[k];
+    const double change = next - point_[r];
+    has_moved = has_moved || change * change > little * little * wide_covariance_(r, r);
+    point_[r] = next;
+  }
+  return has_moved;
+}
+
+void KalmanFilter::take_between(double seconds, double share, const double* y, const double* robust_weights) noexcept {
+  point_ = wide_mean_;
+  if (has_motion(y)) find_point(seconds, share, y);
+  integrate_wide(point_, seconds, share);
   model_->observe(
       {.count = 1, .states = next_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
-  wide_before_ = wide_mean_;  // all outputs are linearised there
+  // All outputs are linearised there; `expect_wide` is about the mean as it is after each of them.
   for (int j = 0; j < ny_; ++j) {
     if (std::isnan(y[j])) continue;
-    for (Eigen::Index c = 0; c < wide_gradient_.size(); ++c) {
-      wide_gradient_[c] = 0.0;
-      for (int r = 0; r < nx_; ++r) wide_gradient_[c] += output_jacobian_[r * ny_ + j] * transition_(r, c);
-    }
-    double innovation =
-        model_->description().outputs[j].is_angle ? angle_difference(y[j], predicted_[j]) : y[j] - predicted_[j];
-    innovation -= wide_gradient_.dot(wide_mean_) - wide_gradient_.dot(wide_before_);
+    const double innovation = expect_wide(j, y[j]);
     take_wide(innovation, noise_.output_variances[j] / (robust_weights ? robust_weights[j] : 1.0));
   }
 }
@@ -110,7 +188,7 @@ void KalmanFilter::take_wide(double innovation, double variance) noexcept {
   between_log_likelihood_ -= 0.5 * std::min(innovation * innovation / total, 16.0) + 0.5 * std::log(total);
 }
 
-/// To the interval's end: x as integrated, p with its change.
+/// To the interval's end, linearised about `point_`: x as integrated from there, p with its change.
 void KalmanFilter::narrow() noexcept {
   const int n = nx_ + np_;
   const Eigen::Index a = wide_mean_.size();
@@ -132,6 +210,9 @@ void KalmanFilter::narrow() noexcept {
       next_covariance_(r, c) = sum;
     }
   }
+  for (int r = 0; r < nx_; ++r)
+    for (Eigen::Index c = 0; c < a; ++c) next_[r] += transition_(r, c) * (wide_mean_[c] - point_[c]);
+  for (int j = 0; j < np_; ++j) wide_end_[j] = wide_mean_[nx_ + j] + wide_mean_[n + nu_ + j];
   const bool finite = std::all_of(next_.begin(), next_.end(), [](double value) { return std::isfinite(value); });
   if (!finite || !next_covariance_.allFinite() || !wide_end_.allFinite()) return;
   make_symmetric();

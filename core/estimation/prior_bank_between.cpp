@@ -1,5 +1,7 @@
-// How a PriorBank uses measurements between two nodes.
+// How a PriorBank uses measurements between two nodes, and where it linearises an interval with outputs of motion.
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "prior_bank_views.hpp"
 #include "rhec/core/base/assertion.hpp"
@@ -10,15 +12,25 @@ namespace rhec {
 /// Within an interval, what is unknown are the state at its start, the input's noise and that of the processes: a
 /// measurement at a later time tells of all of them. The vector [x; z; u; q] takes such measurements in one after the
 /// other, and only then moves to the interval's end.
-void PriorBank::predict(const MeasuredInterval& interval) noexcept {
-  if (interval.between == 0) return predict(interval.inputs, interval.duration);
-  RHEC_ASSERT(setup_.most_between > 0, "a bank that was set up for measurements between nodes");
+void PriorBank::predict(const MeasuredInterval& interval, const double* end_outputs) noexcept {
+  const bool ends_with_motion = end_outputs && has_motion(end_outputs);
+  if (interval.between == 0 && !ends_with_motion) return predict(interval.inputs, interval.duration);
+  RHEC_ASSERT(!wide_mean_.empty(), "a bank that was set up for measurements between nodes");
   begin_step(interval.inputs, interval.duration);
   widen();
   for (int k = 0; k < interval.between; ++k)
     take_between(interval.times[k], interval.times[k] / interval.duration,
                  interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_);
+  point_ = wide_mean_;
+  if (ends_with_motion) find_point(interval.duration, 1.0, end_outputs);
   narrow(interval.duration);
+  if (!ends_with_motion) return;
+  end_point_ = next_rows_;
+  has_end_point_ = true;
+}
+
+bool PriorBank::has_motion(const double* y) const noexcept {
+  return std::ranges::any_of(setup_.motion_outputs, [&](int j) { return !std::isnan(y[j]); });
 }
 
 /// Adds inputs and noise of the processes, which are not correlated with anything yet.
@@ -42,39 +54,83 @@ void PriorBank::widen() noexcept {
   }
 }
 
-/// Takes in outputs at a time within the interval.
-void PriorBank::take_between(double seconds, double share, const double* y) noexcept {
+/// Gradient of an output by the wide vector, where it was integrated and observed last.
+void PriorBank::write_wide_gradient(int output, double share) noexcept {
   const int a = wide_count(), columns = nx_ + nu_ + 2 * np_;
-  integrate_members(wide_mean_.data(), true, seconds, share);
-  observe_members(next_rows_.data());
-  std::fill(wide_gradient_.begin(), wide_gradient_.end(), 0.0);
+  double* const gradient = wide_gradient_.data() + static_cast<std::ptrdiff_t>(output) * a * lanes_;
+  std::fill_n(gradient, static_cast<std::ptrdiff_t>(a) * lanes_, 0.0);
   for (int m = 0; m < lanes_; ++m) {
     const double *J = jacobian_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * columns,
                  *C = gradient_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * ny_;
-    for (int j = 0; j < ny_; ++j) {
-      const auto by = [&](int column) {
-        double sum = 0.0;
-        for (int r = 0; r < nx_; ++r) sum += C[r * ny_ + j] * J[column * nx_ + r];
-        return sum;
-      };
-      const auto g = [&](int entry) -> double& {
-        return wide_gradient_[(static_cast<std::ptrdiff_t>(j) * a + entry) * lanes_ + m];
-      };
-      for (int c = 0; c < nx_; ++c) g(c) = by(c);
-      for (int c = 0; c < nu_; ++c) g(n_ + c) = by(nx_ + c);
-      for (int p = 0; p < np_; ++p) {
-        const Process& process = processes_[p];
-        const double start = by(nx_ + nu_ + p), end = by(nx_ + nu_ + np_ + p);
-        if (process.ramp[m] == 0.0) {
-          g(process.first) = start + end;
-          continue;
-        }
-        g(process.first) = start + (1.0 - share) * end;
-        for (int k = 0; k < process.count; ++k)
-          g(process.first + k) += share * end * process.F[(k * process.count) * lanes_ + m];
-        g(n_ + nu_ + process.first - nx_) = share * end;
+    const auto by = [&](int column) {
+      double sum = 0.0;
+      for (int r = 0; r < nx_; ++r) sum += C[r * ny_ + output] * J[column * nx_ + r];
+      return sum;
+    };
+    const auto g = [&](int entry) -> double& { return gradient[static_cast<std::ptrdiff_t>(entry) * lanes_ + m]; };
+    for (int c = 0; c < nx_; ++c) g(c) = by(c);
+    for (int c = 0; c < nu_; ++c) g(n_ + c) = by(nx_ + c);
+    for (int p = 0; p < np_; ++p) {
+      const Process& process = processes_[p];
+      const double start = by(nx_ + nu_ + p), end = by(nx_ + nu_ + np_ + p);
+      if (process.ramp[m] == 0.0) {
+        g(process.first) = start + end;
+        continue;
       }
+      g(process.first) = start + (1.0 - share) * end;
+      for (int k = 0; k < process.count; ++k)
+        g(process.first + k) += share * end * process.F[(k * process.count) * lanes_ + m];
+      g(n_ + nu_ + process.first - nx_) = share * end;
     }
+  }
+}
+
+/// Gauss-Newton steps of every member from the mean to where the outputs of motion put what is unknown of the interval,
+/// until no point moves by a tenth of a standard deviation.
+void PriorBank::find_point(double seconds, double share, const double* y) noexcept {
+  constexpr int most_steps = 5;
+  constexpr double little = 0.1;
+  const int a = wide_count();
+  for (int step = 0; step < most_steps; ++step) {
+    integrate_members(point_.data(), true, seconds, share);
+    observe_members(next_rows_.data());
+    int taken = 0;
+    for (const int j : setup_.motion_outputs) {
+      if (std::isnan(y[j])) continue;
+      write_wide_gradient(j, share);
+      views_->outputs[taken++] = {.predicted = predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
+                                  .gradient = wide_gradient_.data() + static_cast<std::ptrdiff_t>(j) * a * lanes_,
+                                  .variance = output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
+                                  .measured = y[j],
+                                  .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
+    }
+    bank_kernels().move_point({lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()},
+                              views_->outputs.data(), taken, setup_.gate, point_.data(), moved_.data());
+    if (*std::max_element(moved_.begin(), moved_.begin() + members_) <= little * little) return;
+  }
+}
+
+/// From an output's prediction at `point_` to that of the linearised output at the mean.
+void PriorBank::expect_at_mean(int output) noexcept {
+  const std::ptrdiff_t a = wide_count(), M = lanes_;
+  double* const predicted = predicted_.data() + output * M;
+  const double* const gradient = wide_gradient_.data() + output * a * M;
+  for (std::ptrdiff_t e = 0; e < a; ++e)
+    for (std::ptrdiff_t m = 0; m < M; ++m)
+      predicted[m] += gradient[e * M + m] * (wide_mean_[e * M + m] - point_[e * M + m]);
+}
+
+/// Takes in outputs at a time within the interval.
+void PriorBank::take_between(double seconds, double share, const double* y) noexcept {
+  const int a = wide_count();
+  point_ = wide_mean_;
+  if (has_motion(y)) find_point(seconds, share, y);
+  integrate_members(point_.data(), true, seconds, share);
+  observe_members(next_rows_.data());
+  for (int j = 0; j < ny_; ++j) {
+    if (std::isnan(y[j])) continue;  // nothing is measured by it
+    write_wide_gradient(j, share);
+    expect_at_mean(j);
   }
   if (setup_.adapts_noise) wide_before_ = wide_mean_;
   between_log_likelihood_ +=
@@ -86,10 +142,10 @@ void PriorBank::take_between(double seconds, double share, const double* y) noex
                    y, nullptr);
 }
 
-/// Moves to the interval's end: z+ = F z + q, and x as integrated.
+/// Moves to the interval's end, linearised about `point_`: z+ = F z + q, and x as integrated from there.
 void PriorBank::narrow(double duration) noexcept {
   const std::ptrdiff_t a = wide_count(), M = lanes_;
-  integrate_members(wide_mean_.data(), true, duration, 1.0);
+  integrate_members(point_.data(), true, duration, 1.0);
   std::fill(transition_.begin(), transition_.end(), 0.0);
   const auto T = [&](std::ptrdiff_t r, std::ptrdiff_t c) { return transition_.data() + (c * n_ + r) * M; };
   const auto J = [&](std::ptrdiff_t r, std::ptrdiff_t c) { return jacobian_.data() + (c * nx_ + r) * M; };
@@ -125,6 +181,10 @@ void PriorBank::narrow(double duration) noexcept {
       }
     }
   }
+  for (std::ptrdiff_t c = 0; c < a; ++c)
+    for (std::ptrdiff_t r = 0; r < nx_; ++r)
+      for (std::ptrdiff_t m = 0; m < M; ++m)
+        next[r * M + m] += T(r, c)[m] * (wide_mean_[c * M + m] - point_[c * M + m]);
   const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()},
       wide{lanes_,           static_cast<int>(a), static_cast<int>(a), wide_mean_.data(), wide_covariance_.data(),
            wide_work_.data()};

@@ -64,7 +64,7 @@ void PriorHorizonEstimation::reset() noexcept {
   solver_->reset();
   shifter_.forget();
   window_ = {};
-  has_window_ = has_solution_ = false;
+  has_window_ = has_solution_ = has_rehearsed_ = false;
   law_ = 0;
   std::fill(advances_.begin(), advances_.end(), Advance{});
 }
@@ -73,7 +73,7 @@ bool PriorHorizonEstimation::rebase(const Eigen::VectorXd& mean, const Eigen::Ma
   solver_->reset();
   shifter_.forget();
   window_ = {};
-  has_window_ = has_solution_ = false;
+  has_window_ = has_solution_ = has_rehearsed_ = false;
   return filters_.rebase(mean, covariance);
 }
 
@@ -209,6 +209,14 @@ void PriorHorizonEstimation::combine(Estimate& result) noexcept {
           weight * (found[static_cast<std::ptrdiff_t>(entries_[c]) * ns + entries_[r]] - member_covariance_(r, c));
 }
 
+void PriorHorizonEstimation::rehearse() noexcept {
+  filters_.rehearse();
+  if (!has_solution_ || filters_.is_searching()) return;
+  covariance_->find(problem_, *solver_, point_, window_.intervals);
+  solver_->prepare(point_);
+  has_rehearsed_ = true;
+}
+
 void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadline) noexcept {
   if (filters_.is_searching()) return filters_.estimate(result, deadline);
   const int nx = model().state_count(), np = model().parameter_count();
@@ -216,8 +224,17 @@ void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadli
   filters_.history().bank().moments(mean_, mixture_);
   choose_law();
   fill_window();
+  // What the solver has prepared in a rehearsal was for other data.
+  if (std::exchange(has_rehearsed_, false)) solver_->prepare(point_);
   result.report = solver_->solve(point_, deadline);
   has_solution_ = result.report.status == Status::solved;
+  if (!has_solution_) has_solution_ = PriorRestart::is_convincing(problem_, result.report);
+  // Without time to doubt it, a solution is the next one's guess, and the filters speak.
+  const bool is_doubtful = !has_solution_ && is_usable(result.report.status) && is_past(deadline);
+  if (is_doubtful) {
+    has_solution_ = true;
+    result.report.status = Status::deadline;
+  }
   if (!has_solution_) {
     start_cold(prior_);
     has_solution_ =
@@ -229,7 +246,7 @@ void PriorHorizonEstimation::estimate(Estimate& result, Clock::time_point deadli
   if (result.fallback) {
     start_cold(point_);
     solver_->reset();
-  } else {
+  } else if (!is_doubtful) {
     combine(result);
   }
   filters_.fuse_place(mean_, mixture_);

@@ -11,6 +11,22 @@ namespace {
 /// Two objectives that differ by no more than rounding are equal: the earlier result stays.
 bool is_better(double objective, double than) noexcept { return objective + 1e-9 * (1.0 + std::abs(objective)) < than; }
 
+// Defects up to this size leave the objective what it is.
+constexpr double small_defect = 1e-3;
+
+int measured_count(const RheProblem& problem) noexcept {
+  const int outputs = problem.model().output_count();
+  int count = 0;
+  const auto add = [&](const double* row) {
+    for (int j = 0; j < outputs; ++j) count += !std::isnan(row[j]);
+  };
+  for (int i = 0; i <= problem.intervals(); ++i) {
+    add(problem.output(i));
+    for (int k = 0; i < problem.intervals() && k < problem.between(i).count(); ++k) add(problem.between(i).outputs(k));
+  }
+  return count;
+}
+
 }  // namespace
 
 PriorRestart::PriorRestart(const RheProblem& problem)
@@ -22,6 +38,14 @@ double PriorRestart::objective_from_start(const RheProblem& problem, const Itera
   problem.simulate(simulated_, scratch_);
   const double objective = problem.evaluate(simulated_, nullptr, scratch_);
   return std::isnan(objective) ? std::numeric_limits<double>::infinity() : objective;
+}
+
+bool PriorRestart::is_convincing(const RheProblem& problem, const Report& report) noexcept {
+  if (!is_usable(report.status) || !(report.kkt.defect <= small_defect)) return false;
+  // The least objective has as many degrees of freedom as there are measurements: what is decided has a prior each.
+  constexpr double sigmas = 3.0;
+  const double freedom = measured_count(problem);
+  return report.objective <= freedom + sigmas * std::sqrt(2.0 * freedom);
 }
 
 bool PriorRestart::reconsider(const RheProblem& problem, Solver& solver, const Iterate& prior, StageQp& qp,

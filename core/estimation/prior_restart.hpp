@@ -14,6 +14,10 @@ class PriorRestart {
  public:
   explicit PriorRestart(const RheProblem& problem);
 
+  /// Whether a solution that has not converged explains the measurements so well, by a chi-square test of its
+  /// objective, that no other could do better by more than noise. It then need not be reconsidered.
+  static bool is_convincing(const RheProblem& problem, const Report& report) noexcept;
+
   /// `prior` is the window's prior, simulated. If it explains the measurements better than `point`, the result of a
   /// solve with this report, the window is solved again from there. Leaves the best of the three in `point`, and what
   /// is known of it in `report`. Returns whether it is a solver's, and not the prior. `qp` has the problem's capacity.

@@ -12,6 +12,8 @@
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/scratch.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
+#include "rhec/core/kernels/kernel_sets.hpp"
+#include "rhec/core/kernels/transcription_kernels.hpp"
 
 namespace rhec {
 
@@ -56,8 +58,8 @@ struct RheProblem::BetweenBatch {
     said = scratch.take(PointSums::most_points * said_size);
     parts = scratch.take(problem.setup_.most_between * padded(PointSums::most_points));
     known_weights = scratch.take(problem.setup_.most_between * problem.output_row_);
-    factors = scratch.take(problem.between_factors_size());
-    sums = PointSums(point_count, ny, width, scratch.take(PointSums::size(ny, width)));
+    kept = scratch.take(ny * PointSums::Kept::size);
+    sums = PointSums(point_count, ny, scratch.take(static_cast<std::ptrdiff_t>(PointSums::size(ny))));
     rest = scratch.rest();
   }
   static std::size_t size(const RheProblem& problem) noexcept {
@@ -66,9 +68,9 @@ struct RheProblem::BetweenBatch {
     const std::size_t interval = row * (3 + nx + row) + 8 + padded(problem.model().data_count());
     const std::size_t each = 4 * problem.output_row_ + (ny + nx) * of_states;
     return at_once * (interval + each) + 5 * problem.output_row_ + (std::max({ny, nx, most}) + nx) * stride + ny * row +
-           most * (problem.output_row_ + ny * row) + problem.between_factors_size() +
+           most * (problem.output_row_ + ny * row) + ny * PointSums::Kept::size +
            problem.setup_.most_between * (padded(PointSums::most_points) + problem.output_row_) +
-           PointSums::size(problem.ny_, static_cast<int>(row)) + problem.model().rows_scratch(at_once) + 16;
+           PointSums::size(problem.ny_) + problem.model().rows_scratch(at_once) + 16;
   }
 
   /// Requests for the intervals, and for the outputs at their ends, without results.
@@ -104,13 +106,8 @@ struct RheProblem::BetweenBatch {
   }
   void write_gradients(int i, double* to) const noexcept {
     const double* const J = jacobian(i);
-    const double* C = output_jacobians + static_cast<std::ptrdiff_t>(i) * ny * padded(nx);
-    for (int j = 0; j < ny; ++j, C += padded(nx), to += width) {
-      std::fill_n(to, width, 0.0);
-      for (int r = 0; r < nx; ++r)
-        if (C[r] != 0.0)
-          for (int k = 0; k < nz; ++k) to[k] += C[r] * J[r * row + k];
-    }
+    const double* const C = output_jacobians + static_cast<std::ptrdiff_t>(i) * ny * padded(nx);
+    transcription_kernels().multiply_rows(C, padded(nx), J, row, {ny, nx, nz}, width, to);
   }
 
   /// The same for the points of an interval, the first of which is entry i, to `said`.
@@ -135,21 +132,30 @@ struct RheProblem::BetweenBatch {
   double *z, *next, *jacobians, *multipliers, *hessians, *durations, *data;
   double *outputs, *output_jacobians, *pulls, *weights, *curvatures, *output_hessians, *difference, *predicted, *weight,
       *pull, *curvature, *of_outputs, *gradients, *product;
-  double *said, *parts, *known_weights, *factors;  ///< room for one interval with points: see OfPoints
+  double *said, *parts, *known_weights, *kept;  ///< room for one interval with points: see OfPoints
   PointSums sums;
   double* rest;
 };
 
+/// Rows `step` apart.
+struct RheProblem::ModelRows {
+  const double* first;
+  std::ptrdiff_t step;
+};
+
 /// What is known of an interval with points: what the model says at each (BetweenBatch::write_said), the measurements'
-/// parts of the points and their weights, and the factors of the sums of these (PointSums).
+/// parts of the points and their weights, and the sums of these (PointSums).
 struct RheProblem::OfPoints {
   const double* said;
   std::ptrdiff_t said_step;
   const double* parts;
   std::ptrdiff_t parts_step;
-  double* weights;  ///< for which there are factors
+  double* weights;  ///< for which there are sums
   std::ptrdiff_t weights_step;
-  double* factors;  ///< by output
+  double* kept;  ///< PointSums::Kept by output
+  /// What those of quadratic costs hold for: how many measurements, the outputs' weights, and the measurements. Null:
+  /// for nothing.
+  double* holds_for = nullptr;
 };
 
 }  // namespace rhec

@@ -32,18 +32,15 @@ void PointSums::write_parts(const double* shares, int points, double share, doub
   for (int k = 0; k < points; ++k) parts[k] /= sum;
 }
 
-PointSums::PointSums(int points, int outputs, int width, double* memory) noexcept
-    : points_(points), outputs_(outputs), width_(width) {
+PointSums::PointSums(int points, int outputs, double* memory) noexcept : points_(points), outputs_(outputs) {
   Scratch scratch(memory);
   said_ = scratch.take(outputs * row);
   weights_ = scratch.take(outputs * most_points * row);
   pulls_ = scratch.take(outputs * row);
-  rows_ = scratch.take(static_cast<std::ptrdiff_t>(most_points) * width);
-  reduced_ = scratch.take(row);
 }
 
-std::size_t PointSums::size(int outputs, int width) noexcept {
-  return static_cast<std::size_t>(outputs * (most_points + 2) * row + most_points * width + row) + 7;
+std::size_t PointSums::size(int outputs) noexcept {
+  return static_cast<std::size_t>(outputs * (most_points + 2) * row) + 7;
 }
 
 void PointSums::begin(const double* outputs, std::ptrdiff_t step) noexcept {
@@ -72,6 +69,49 @@ void PointSums::add_pulls(const double* parts, const double* pulls) noexcept {
   }
 }
 
+void PointSums::keep_weights(int output, Kept kept) const noexcept {
+  const double* const W = weights_ + output * most_points * row;
+  std::fill_n(kept.weights(), points_ * row, 0.0);
+  for (int k = 0; k < points_; ++k)
+    for (int l = 0; l <= k; ++l) kept.weights()[k * row + l] = kept.weights()[l * row + k] = W[k * row + l];
+}
+
+void PointSums::keep(int output, double cost, double largest, Kept kept) const noexcept {
+  keep_weights(output, kept);
+  std::copy_n(said_ + output * row, row, kept.said());
+  std::copy_n(pulls_ + output * row, row, kept.pulls());
+  kept.cost() = cost;
+  kept.largest() = largest;
+}
+
+bool PointSums::revise(int output, Kept kept, double period, double& cost) noexcept {
+  // A polynomial is nowhere larger than this, in parts of the largest of its values at up to nine points (Brutman
+  // 1997).
+  constexpr double lebesgue = 2.4;
+  constexpr double least = 1e-3;  // of the cost
+  const double* const said = said_ + output * row;
+  const int used = (points_ + block - 1) / block * block;
+  double change[row], product[row] = {}, largest = 0.0;
+  for (int k = 0; k < used; ++k) {
+    change[k] = said[k] - kept.said()[k];
+    largest = std::max(largest, std::abs(change[k]));
+  }
+  if (!(largest < 1e300) || (period > 0.0 && !(kept.largest() + lebesgue * largest < 0.5 * period))) return false;
+  for (int k = 0; k < used; k += block) {
+    double sums[block] = {};
+    for (int l = 0; l < points_; ++l)
+      for (int e = 0; e < block; ++e) sums[e] += kept.weights()[l * row + k + e] * change[l];
+    std::copy_n(sums, block, product + k);
+  }
+  double sum = kept.cost();
+  for (int k = 0; k < points_; ++k) sum += (kept.pulls()[k] + 0.5 * product[k]) * change[k];
+  if (!(sum >= least * kept.cost())) return false;
+  double* const v = pulls_ + output * row;
+  for (int k = 0; k < used; ++k) v[k] = kept.pulls()[k] + product[k];
+  cost = sum;
+  return true;
+}
+
 void PointSums::begin_weights() noexcept { std::fill_n(weights_, outputs_ * most_points * row, 0.0); }
 
 void PointSums::add_weights(const double* parts, const double* weights) noexcept {
@@ -84,49 +124,6 @@ void PointSums::add_weights(const double* parts, const double* weights) noexcept
         for (int e = 0; e < block; ++e) W[l + e] += weighted * parts[l + e];
     }
   }
-}
-
-void PointSums::factor(int output, Factors factors) const noexcept {
-  const int n = points_;
-  const double* const W = weights_ + output * most_points * row;
-  double* const pivots = factors.pivots();
-  double largest = 0.0;
-  for (int k = 0; k < n; ++k) largest = std::max(largest, W[k * row + k]);
-  const double least = 1e-14 * largest;
-  for (int k = 0; k < n; ++k) {
-    const double* const of_k = factors.row(k);
-    double pivot = W[k * row + k];
-    for (int l = 0; l < k; ++l) pivot -= of_k[l] * of_k[l] * pivots[l];
-    const bool is_zero = !(pivot > least);
-    pivots[k] = is_zero ? 0.0 : pivot;
-    for (int i = k + 1; i < n; ++i) {
-      double* const of_i = factors.row(i);
-      double sum = W[i * row + k];
-      for (int l = 0; l < k; ++l) sum -= of_i[l] * of_k[l] * pivots[l];
-      of_i[k] = is_zero ? 0.0 : sum / pivot;
-    }
-  }
-}
-
-PointSums::Rows PointSums::rows(int output, const double* gradients, std::ptrdiff_t step,
-                                const Factors* factors) noexcept {
-  const int n = points_;
-  const double* const v = pulls_ + output * row;
-  for (int k = 0; k < n; ++k)
-    std::copy_n(gradients + k * step, width_, rows_ + static_cast<std::ptrdiff_t>(k) * width_);
-  if (!factors) return {rows_, nullptr, v};
-  for (int k = 0; k < n; ++k) {
-    double sum = v[k];
-    for (int l = 0; l < k; ++l) sum -= factors->row(k)[l] * reduced_[l];
-    reduced_[k] = sum;
-    double* const to = rows_ + static_cast<std::ptrdiff_t>(k) * width_;
-    for (int l = k + 1; l < n; ++l) {
-      const double part = factors->row(l)[k];
-      const double* const from = rows_ + static_cast<std::ptrdiff_t>(l) * width_;
-      for (int e = 0; part != 0.0 && e < width_; ++e) to[e] += part * from[e];
-    }
-  }
-  return {rows_, factors->pivots(), reduced_};
 }
 
 }  // namespace rhec

@@ -18,34 +18,44 @@ namespace rhec {
 ///
 ///     sum_m w_m dy/dz' dy/dz = G' W G,   W = sum_m w_m l l',      sum_m q_m dy/dz = G' v,   v = sum_m q_m l:
 ///
-/// a measurement costs the products of its n parts alone, whatever the number of variables. With W = L D L' these are n
-/// rows L'G with the weights D and the pulls L^-1 v. The points are those of Chebyshev of the first kind, so that the
-/// polynomial is close to the best of its degree (Berrut and Trefethen 2004, eq. 5.3).
+/// a measurement costs the products of its n parts alone, whatever the number of variables. The points are those of
+/// Chebyshev of the first kind, so that the polynomial is close to the best of its degree (Berrut and Trefethen 2004,
+/// eq. 5.3).
 class PointSums {
  public:
   static constexpr int most_points = 9;
+  static constexpr std::ptrdiff_t row = padded(most_points);
 
   /// Shares of an interval at which so many points lie, increasing, none at its ends.
   static std::vector<double> shares(int points);
-  /// The parts of points at these shares, at another share: a row of padded(most_points), 0 behind them.
+  /// The parts of points at these shares, at another share: a row, 0 behind them.
   static void write_parts(const double* shares, int points, double share, double* parts) noexcept;
 
-  /// L and D of an output's W.
-  class Factors {
+  /// The sums of an output's costs. Of quadratic ones, with weights and pulls that are derivatives of the cost, what
+  /// the model said at the points when they were formed is kept with them. Where it says other things, ds away from
+  /// these, the same measurements have
+  ///
+  ///     v = v_0 + W ds,      cost = cost_0 + v_0' ds + ds' W ds / 2:
+  ///
+  /// none need be looked at again.
+  class Kept {
    public:
-    static constexpr std::ptrdiff_t size = (most_points + 1) * padded(most_points);
-    explicit Factors(double* memory) noexcept : memory_(memory) {}
-    double* pivots() const noexcept { return memory_; }
-    double* row(int point) const noexcept { return memory_ + (point + 1) * padded(most_points); }
+    static constexpr std::ptrdiff_t size = (most_points + 2) * row + 8;
+    explicit Kept(double* memory) noexcept : memory_(memory) {}
+    double* weights() const noexcept { return memory_; }  ///< W, by rows
+    double* said() const noexcept { return memory_ + most_points * row; }
+    double* pulls() const noexcept { return said() + row; }
+    double& cost() const noexcept { return pulls()[row]; }
+    double& largest() const noexcept { return pulls()[row + 1]; }  ///< of the residuals, absolute
 
    private:
     double* memory_;
   };
 
   PointSums() = default;
-  /// Of `outputs` outputs, whose gradients have rows of `width`, a multiple of eight; `memory` has `size` entries.
-  PointSums(int points, int outputs, int width, double* memory) noexcept;
-  static std::size_t size(int outputs, int width) noexcept;
+  /// Of `outputs` outputs; `memory` has `size` entries.
+  PointSums(int points, int outputs, double* memory) noexcept;
+  static std::size_t size(int outputs) noexcept;
 
   /// Begins with what the model says of the outputs at the points, `step` entries from one point to the next.
   void begin(const double* outputs, std::ptrdiff_t step) noexcept;
@@ -59,24 +69,19 @@ class PointSums {
   void begin_weights() noexcept;
   /// Adds a measurement by its parts, and by the weights of its outputs; 0: not measured.
   void add_weights(const double* parts, const double* weights) noexcept;
-  /// W = L D L' of an output. Fewer measurements than points leave pivots that are zero but for rounding; they and
-  /// their columns are then zero.
-  void factor(int output, Factors factors) const noexcept;
-
-  struct Rows {
-    const double *rows, *weights, *pulls;  ///< `points` rows of `width`; weights may be null
-  };
-  /// The rows of an output, whose gradient at point k is `gradients + k * step`: for H and h with the factors of its W,
-  /// and for h alone without. Valid until the next call.
-  Rows rows(int output, const double* gradients, std::ptrdiff_t step, const Factors* factors) noexcept;
+  void keep_weights(int output, Kept kept) const noexcept;
+  /// Keeps the sums of costs that are quadratic, with their cost and the largest residual.
+  void keep(int output, double cost, double largest, Kept kept) const noexcept;
+  /// After `begin`: the cost and the pulls of an output from kept sums. False, and nothing is changed, where these do
+  /// not tell: an angle's residual could pass half its period (0: not an angle), or the cost is so much less than when
+  /// they were formed that rounding matters.
+  bool revise(int output, Kept kept, double period, double& cost) noexcept;
 
  private:
-  static constexpr std::ptrdiff_t row = padded(most_points);
   static constexpr int block = 4;  ///< rows are gone through in blocks, for the processor's lanes
 
-  int points_ = 0, outputs_ = 0, width_ = 0;
+  int points_ = 0, outputs_ = 0;
   double *said_ = nullptr, *weights_ = nullptr, *pulls_ = nullptr;  ///< by output: at the points; W; v
-  double *rows_ = nullptr, *reduced_ = nullptr;
 };
 
 }  // namespace rhec

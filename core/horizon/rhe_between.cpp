@@ -1,6 +1,7 @@
 // Measurements between the nodes of an RheProblem: y - h(F(s_i, w_i; tau)) at a time tau within interval i.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "between_batch.hpp"
 #include "between_cache.hpp"
@@ -11,7 +12,12 @@
 namespace rhec {
 namespace {
 
-constexpr double no_factors = -1.0;  // the weight of measurements whose sums have no factors yet
+constexpr double no_sums = -1.0;       // the weight of measurements whose weights have not been summed up yet
+constexpr double nothing_kept = -1.0;  // the number of measurements of sums that are not known yet
+
+int stage_columns(const HorizonProblem& problem, int interval) noexcept {
+  return problem.capacity().states + problem.control_count(interval);
+}
 
 }  // namespace
 
@@ -117,7 +123,10 @@ std::ptrdiff_t RheProblem::between_said_size() const noexcept {
   return 2 * output_row_ + static_cast<std::ptrdiff_t>(ny_) * stride() + padded(PointSums::most_points);
 }
 
-std::ptrdiff_t RheProblem::between_factors_size() const noexcept { return ny_ * PointSums::Factors::size; }
+/// Of an interval: OfPoints::kept, and what it holds for.
+std::ptrdiff_t RheProblem::between_kept_size() const noexcept {
+  return ny_ * PointSums::Kept::size + 1 + ny_ + static_cast<std::ptrdiff_t>(setup_.most_between) * ny_;
+}
 
 /// The same as `add_between` without second derivatives, with a cache, which is read and completed.
 double RheProblem::add_known_between(StageRange range, const Iterate& iterate, const CostView& view,
@@ -144,10 +153,12 @@ double RheProblem::add_known_between(StageRange range, const Iterate& iterate, c
     const bool has_parts = known.has_times(i, between(i), batch.row);
     known.begin(i, between(i));
     gather_interval(i, iterate, batch, flush);
-    for (int k = 0; has_many(i) && !has_parts && k < between(i).count(); ++k) {
+    if (!has_many(i) || has_parts) continue;
+    for (int k = 0; k < between(i).count(); ++k) {
       write_parts(i, k, known.results(i, k) + at_parts);
-      std::fill_n(known.results(i, k) + at_weights, ny_, no_factors);
+      std::fill_n(known.results(i, k) + at_weights, ny_, no_sums);
     }
+    known.results_together(i)[ny_ * PointSums::Kept::size] = nothing_kept;
   }
   flush();
   double total = 0.0;
@@ -160,7 +171,8 @@ double RheProblem::add_known_between(StageRange range, const Iterate& iterate, c
                             .parts_step = step,
                             .weights = said + at_weights,
                             .weights_step = step,
-                            .factors = known.results_together(i)};
+                            .kept = known.results_together(i),
+                            .holds_for = known.results_together(i) + ny_ * PointSums::Kept::size};
       total += add_points(batch, i, points, &view);
       continue;
     }
@@ -182,6 +194,29 @@ void RheProblem::write_parts(int interval, int place, double* parts) const noexc
 double RheProblem::add_points(BetweenBatch& batch, int interval, const OfPoints& points,
                               const CostView* view) const noexcept {
   batch.sums.begin(points.said, points.said_step);
+  const bool may_know = points.holds_for && view && setup_.robust.empty();
+  const double total = may_know ? sum_up_known(batch, interval, points) : sum_up(batch, interval, points, view);
+  if (!view) return total;
+  for (int j = 0; j < ny_; ++j) {
+    const PointSums::Kept kept(points.kept + j * PointSums::Kept::size);
+    const double* const v = batch.sums.pulls(j);
+    bool is_zero = std::all_of(v, v + batch.point_count, [](double value) { return value == 0.0; });
+    for (int k = 0; is_zero && view->H && k < batch.point_count; ++k)
+      is_zero = kept.weights()[k * (PointSums::row + 1)] == 0.0;
+    if (is_zero) continue;
+    const ModelRows rows = in_order_of_stage(
+        batch, interval, {points.said + output_row_ + static_cast<std::ptrdiff_t>(j) * batch.width, points.said_step},
+        batch.point_count);
+    transcription_kernels().add_sums({rows.first, rows.step, batch.point_count, kept.weights(), PointSums::row, v},
+                                     stage_columns(*this, interval), stride(), H_of(*view, interval),
+                                     h_of(*view, interval));
+  }
+  return total;
+}
+
+/// Sums over the measurements of an interval, those of weights where H is asked for.
+double RheProblem::sum_up(BetweenBatch& batch, int interval, const OfPoints& points,
+                          const CostView* view) const noexcept {
   double total = 0.0;
   bool has_new_weights = false;
   const BetweenNodes& measured = between(interval);
@@ -195,25 +230,56 @@ double RheProblem::add_points(BetweenBatch& batch, int interval, const OfPoints&
     has_new_weights |= !std::equal(known, known + ny_, batch.weight);
     std::copy_n(batch.weight, ny_, known);
   }
-  if (!view) return total;
-  if (has_new_weights) {
-    // Without robust losses, and as long as nothing new is measured, weights are those that they were before.
-    batch.sums.begin_weights();
-    for (int m = 0; m < measured.count(); ++m)
-      batch.sums.add_weights(points.parts + m * points.parts_step, points.weights + m * points.weights_step);
-    for (int j = 0; j < ny_; ++j)
-      batch.sums.factor(j, PointSums::Factors(points.factors + j * PointSums::Factors::size));
+  if (!has_new_weights) return total;
+  // Without robust losses, and as long as nothing new is measured, weights are those that they were before.
+  batch.sums.begin_weights();
+  for (int m = 0; m < measured.count(); ++m)
+    batch.sums.add_weights(points.parts + m * points.parts_step, points.weights + m * points.weights_step);
+  for (int j = 0; j < ny_; ++j) batch.sums.keep_weights(j, PointSums::Kept(points.kept + j * PointSums::Kept::size));
+  return total;
+}
+
+/// The same of quadratic costs, from the sums that were formed last, or else with all measurements.
+double RheProblem::sum_up_known(BetweenBatch& batch, int interval, const OfPoints& points) const noexcept {
+  const BetweenNodes& measured = between(interval);
+  const auto count = static_cast<std::size_t>(measured.count()) * static_cast<std::size_t>(ny_);
+  double* const known_count = points.holds_for;
+  double *const known_weights = known_count + 1, *const known_outputs = known_weights + ny_;
+  const auto kept = [&](int j) { return PointSums::Kept(points.kept + j * PointSums::Kept::size); };
+  bool is_known = *known_count == measured.count() &&
+                  std::equal(known_weights, known_weights + ny_, setup_.output_weights.data()) &&
+                  std::memcmp(known_outputs, measured.outputs(0), count * sizeof(double)) == 0;
+  double total = 0.0;
+  for (int j = 0; is_known && j < ny_; ++j) {
+    double cost = 0.0;
+    is_known = batch.sums.revise(j, kept(j), output_periods_[j], cost);
+    total += cost;
   }
+  if (is_known) return total;
+  batch.sums.begin(points.said, points.said_step);
+  batch.sums.begin_weights();
+  double *const costs = batch.curvature, *const largest = batch.of_outputs;  // rooms for a row
+  std::fill_n(costs, ny_, 0.0);
+  std::fill_n(largest, ny_, 0.0);
+  for (int m = 0; m < measured.count(); ++m) {
+    const double* const parts = points.parts + m * points.parts_step;
+    batch.sums.predict(parts, batch.predicted);
+    weigh(measured.outputs(m), batch.predicted, batch.difference, batch.weight, batch.pull, nullptr);
+    batch.sums.add_pulls(parts, batch.pull);
+    batch.sums.add_weights(parts, batch.weight);
+    for (int j = 0; j < ny_; ++j) {
+      costs[j] += 0.5 * batch.pull[j] * batch.difference[j];
+      largest[j] = std::max(largest[j], std::abs(batch.difference[j]));
+    }
+  }
+  total = 0.0;
   for (int j = 0; j < ny_; ++j) {
-    const PointSums::Factors factors(points.factors + j * PointSums::Factors::size);
-    const auto are_zero = [&](const double* values) {
-      return std::all_of(values, values + batch.point_count, [](double value) { return value == 0.0; });
-    };
-    if (are_zero(batch.sums.pulls(j)) && (!view->H || are_zero(factors.pivots()))) continue;
-    const double* const gradients = points.said + output_row_ + static_cast<std::ptrdiff_t>(j) * batch.width;
-    const PointSums::Rows all = batch.sums.rows(j, gradients, points.said_step, view->H ? &factors : nullptr);
-    add_rows(batch, interval, all.rows, batch.point_count, all.weights, all.pulls, *view);
+    batch.sums.keep(j, costs[j], largest[j], kept(j));
+    total += costs[j];
   }
+  *known_count = measured.count();
+  std::copy_n(setup_.output_weights.data(), ny_, known_weights);
+  std::memcpy(known_outputs, measured.outputs(0), count * sizeof(double));
   return total;
 }
 
@@ -234,10 +300,10 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
                             .parts_step = padded(PointSums::most_points),
                             .weights = batch.known_weights,
                             .weights_step = output_row_,
-                            .factors = batch.factors};
+                            .kept = batch.kept};
       for (int m = 0; m < between(interval).count(); ++m) {
         write_parts(interval, m, batch.parts + m * points.parts_step);
-        if (view) std::fill_n(batch.known_weights + m * points.weights_step, ny_, no_factors);
+        if (view) std::fill_n(batch.known_weights + m * points.weights_step, ny_, no_sums);
       }
       cost = add_points(batch, interval, points, view);
       for (int k = 0; view && k < batch.point_count; ++k)
@@ -275,30 +341,34 @@ double RheProblem::add_batch(BetweenBatch& batch, Hessian hessian, const CostVie
   return total;
 }
 
-/// Adds products of rows to H and h: gradients by the model's variables, in the order of the stage's. `weights` may be
-/// null if H is.
+/// Rows of gradients by the model's variables, in the order of the stage's. They are valid until the next call.
+RheProblem::ModelRows RheProblem::in_order_of_stage(BetweenBatch& batch, int interval, const ModelRows& rows,
+                                                    int count) const noexcept {
+  // Where no block starts, the orders are the same.
+  if (control_count(interval) == nu() && !structure().any_ramp()) return rows;
+  const std::ptrdiff_t width = padded(stage_columns(*this, interval));
+  const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
+  std::fill_n(batch.gradients, count * width, 0.0);
+  for (int z = 0; z < batch.nz; ++z) {
+    double* const to = batch.gradients + dynamics.column_of(interval, z);
+    for (int j = 0; j < count; ++j) to[j * width] += rows.first[j * rows.step + z];
+  }
+  return {batch.gradients, width};
+}
+
+/// Adds products of rows to H and h. `weights` may be null if H is.
 void RheProblem::add_rows(BetweenBatch& batch, int interval, const double* rows, int count, const double* weights,
                           const double* pulls, const CostView& view) const noexcept {
-  const int columns = capacity().states + control_count(interval);
-  // Where no block starts, the orders are the same.
-  if (control_count(interval) != nu() || structure().any_ramp()) {
-    const std::ptrdiff_t width = padded(columns);
-    const IntervalDynamics dynamics{model(), structure(), nullptr, nullptr, substeps()};
-    std::fill_n(batch.gradients, count * width, 0.0);
-    for (int z = 0; z < batch.nz; ++z) {
-      double* const to = batch.gradients + dynamics.column_of(interval, z);
-      for (int j = 0; j < count; ++j) to[j * width] += rows[j * batch.width + z];
-    }
-    rows = batch.gradients;
-  }
   // The first and the last rows that count.
   int first = 0;
   while (first < count && pulls[first] == 0.0 && (!weights || weights[first] == 0.0)) ++first;
   if (first == count) return;
   while (pulls[count - 1] == 0.0 && (!weights || weights[count - 1] == 0.0)) --count;
-  transcription_kernels().add_products(rows + static_cast<std::ptrdiff_t>(first) * padded(columns),
-                                       weights ? weights + first : nullptr, pulls + first, count - first, columns,
-                                       stride(), H_of(view, interval), h_of(view, interval));
+  const ModelRows ordered = in_order_of_stage(
+      batch, interval, {rows + static_cast<std::ptrdiff_t>(first) * batch.width, batch.width}, count - first);
+  transcription_kernels().add_products(ordered.first, weights ? weights + first : nullptr, pulls + first, count - first,
+                                       stage_columns(*this, interval), stride(), H_of(view, interval),
+                                       h_of(view, interval));
 }
 
 /// Second derivatives of robust losses: 4 rho'' (J' W r)(J' W r)' for each measurement.

@@ -10,7 +10,7 @@ RheLinearisation::RheLinearisation(const RheProblem& problem)
       outputs_(problem.capacity().intervals + 1, padded(problem.model().output_count()),
                static_cast<std::ptrdiff_t>(problem.model().output_count()) * padded(problem.model().state_count())),
       between_(problem.capacity().intervals, problem.setup().most_between, problem.between_key_size(),
-               problem.between_said_size(), problem.between_factors_size()) {}
+               problem.between_said_size(), problem.between_kept_size()) {}
 
 void RheLinearisation::forget() noexcept {
   HorizonLinearisation::forget();

@@ -237,6 +237,61 @@ inline Lanes innovation_of(const BankOutput& output, int m) {
   return innovation;
 }
 
+void move_point(const BankView& bank, const BankOutput* outputs, int count, double gate, double* point, double* moved) {
+  const int n = bank.states, nx = bank.vehicle_states, M = bank.members;
+  for (int m = 0; m < M; m += lane_count) {
+    const Entries mean(bank.mean, M, m), P(bank.covariance, M, m), at(point, M, m);
+    const Entries image(bank.work, M, m), S(bank.work + static_cast<long>(count) * n * M, M, m),
+        nu(bank.work + (static_cast<long>(count) * n + static_cast<long>(count) * count) * M, M, m);
+    for (int j = 0; j < count; ++j) {
+      const ConstEntries h(outputs[j].gradient, M, m);
+      Lanes innovation = innovation_of(outputs[j], m);
+      for (int c = 0; c < nx; ++c) innovation -= h[c] * (mean[c] - at[c]);
+      for (int r = 0; r < n; ++r) {
+        Lanes sum{};
+        for (int c = 0; c < nx; ++c) sum += P[static_cast<long>(c) * n + r] * h[c];
+        image.set(static_cast<long>(j) * n + r, sum);
+      }
+      for (int k = 0; k <= j; ++k) {
+        const ConstEntries other(outputs[k].gradient, M, m);
+        Lanes sum{};
+        for (int c = 0; c < nx; ++c) sum += other[c] * image[static_cast<long>(j) * n + c];
+        if (k == j) sum = larger(sum + load(outputs[j].variance + m), innovation * innovation * (1.0 / gate));
+        S.set(static_cast<long>(k) * count + j, sum);
+      }
+      nu.set(j, innovation);
+    }
+    // S^-1 nu by S = L D L', in place: below the diagonal L D.
+    for (int c = 0; c < count; ++c) {
+      const long column = static_cast<long>(c) * count;
+      for (int k = c + 1; k < count; ++k) {
+        const Lanes factor = S[column + k] / S[column + c];
+        for (int r = k; r < count; ++r) S.add(static_cast<long>(k) * count + r, -factor * S[column + r]);
+        nu.add(k, -factor * nu[c]);
+      }
+    }
+    for (int c = count - 1; c >= 0; --c) {
+      const long column = static_cast<long>(c) * count;
+      Lanes value = nu[c];
+      for (int r = c + 1; r < count; ++r) value -= S[column + r] * nu[r];
+      nu.set(c, value / S[column + c]);
+    }
+    Lanes zeros{};
+    for (int j = 0; j < count; ++j) zeros += 0.0 * nu[j];
+    const LaneMask is_finite = zeros == 0.0;
+    Lanes farthest{};
+    for (int r = 0; r < n; ++r) {
+      Lanes change{};
+      for (int j = 0; j < count; ++j) change += image[static_cast<long>(j) * n + r] * nu[j];
+      const Lanes next = mean[r] + (is_finite ? change : Lanes{}), step = next - at[r],
+                  variance = P[static_cast<long>(r) * n + r];
+      farthest = larger(farthest, variance > 0.0 ? step * step / variance : Lanes{});
+      at.set(r, next);
+    }
+    store(farthest, moved + m);
+  }
+}
+
 void surprise(const BankView& bank, const BankOutput* outputs, int count, double* squares) {
   const int n = bank.states, nx = bank.vehicle_states, M = bank.members;
   for (int m = 0; m < M; m += lane_count) {
@@ -318,6 +373,7 @@ void update(const BankView& bank, const BankOutput* outputs, int count, double g
 #define RHEC_TABLE(name, set) RHEC_JOIN(name, set)
 extern const BankKernels RHEC_TABLE(bank_kernels_, RHEC_SET);
 constinit const BankKernels RHEC_TABLE(bank_kernels_, RHEC_SET) = {
-    &kernels::mix, &kernels::predict, &kernels::update, &kernels::narrow, &kernels::surprise, &kernels::moments};
+    &kernels::mix,        &kernels::predict,  &kernels::update, &kernels::narrow,
+    &kernels::move_point, &kernels::surprise, &kernels::moments};
 
 }  // namespace rhec

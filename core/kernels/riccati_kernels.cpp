@@ -294,6 +294,153 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
   return true;
 }
 
+/// The same for any sizes, with rows in memory: those of controls have `width` columns. Those of states are only needed
+/// up to the states, which fill `state_width`: their columns of controls are the rows of these.
+template <int width, int state_width>
+inline bool factor_general_stage(const RiccatiView& view, int i, double tolerance) {
+  using Stage = Shape<width / 8, 0, 0>;
+  using R = typename Stage::R;
+  using S = Row<state_width / lane_count>;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  const long stride = at.stride;
+  const int states = stage.states, controls = stage.columns - stage.offset, moved = stage.moved, offset = stage.offset;
+  // Rows are summed up two at a time, for the processor's pipelines; an odd last one is summed up twice.
+  R W[state_width];  // rows of P [A B]
+  for (int j = 0; j < stage.next_states; j += 2) {
+    const int other = j + 1 < stage.next_states ? j + 1 : j;
+    R sum = at.row(at.P_next, j).between(moved, stage.next_states),
+      sum_of_other = at.row(at.P_next, other).between(moved, stage.next_states);
+    // P is read from its upper triangle only, so that it stays symmetric.
+    const auto entry = [&](int l, int column) {
+      return l < column ? at.P_next[l * stride + column] : at.P_next[column * stride + l];
+    };
+    for (int l = 0; l < moved; ++l) {
+      const R row = at.row(at.AB, l);
+      sum.add(row, entry(l, j));
+      sum_of_other.add(row, entry(l, other));
+    }
+    W[j] = sum;
+    W[other] = sum_of_other;
+  }
+  // Rows of H + [A B]'P[A B].
+  R of_controls[64];
+  S of_states[state_width];
+  double diagonal[64];
+  bool any_fixed = false;
+  for (int c = 0; c < controls; c += 2) {
+    const int other = c + 1 < controls ? c + 1 : c;
+    R sums[2] = {at.row(at.H, offset + c), at.row(at.H, offset + other)};
+    for (int l = 0; l < moved; ++l) {
+      sums[0].add(W[l], at.AB[l * stride + offset + c]);
+      sums[1].add(W[l], at.AB[l * stride + offset + other]);
+    }
+    of_controls[c] = sums[0];
+    of_controls[other] = sums[1];
+  }
+  for (int c = 0; c < controls; ++c) {
+    const int k = offset + c;
+    R& row = of_controls[c];
+    if (view.diagonal) row = row.with(k, row.entry(k) + view.diagonal[i * stride + k]);
+    diagonal[c] = row.entry(k);
+    if (at.sides[k] == 0) continue;
+    any_fixed = true;
+    row.to(at.U + c * stride);
+  }
+  view.fixes[i] = any_fixed;
+  const auto states_of = [](const R& row) {
+    S part;
+    for (int v = 0; v < state_width / lane_count; ++v) part.part[v] = row.part[v];
+    return part;
+  };
+  for (int k = 0; k < states; k += 2) {
+    const int other = k + 1 < states ? k + 1 : k;
+    S sums[2] = {S::from(at.H + k * stride), S::from(at.H + other * stride)};
+    for (int l = 0; l < moved; ++l) {
+      const S row = states_of(W[l]);
+      sums[0].add(row, at.AB[l * stride + k]);
+      sums[1].add(row, at.AB[l * stride + other]);
+    }
+    of_states[k] = sums[0];
+    of_states[other] = sums[1];
+  }
+  for (int k = 0; k < states; ++k) {
+    S& row = of_states[k];
+    if (k >= moved && k < stage.next_states) row.add(states_of(W[k]));
+    if (view.diagonal) row = row.with(k, row.entry(k) + view.diagonal[i * stride + k]);
+  }
+  // Controls are eliminated one by one: see eliminate_controls.
+  S policies[64];
+  alignas(64) double scaled_row[width];
+  bool is_definite = true;
+  for (int c = controls - 1; c >= 0; --c) {
+    const int k = offset + c;
+    if (at.sides[k] != 0) {
+      at.inverse[c] = 0.0;
+      policies[c] = S{};
+      continue;
+    }
+    const double pivot = of_controls[c].entry(k);
+    is_definite = is_definite && pivot > tolerance * diagonal[c] && pivot > 0.0;
+    const double reciprocal = 1.0 / pivot;
+    R row = of_controls[c].first(k);
+    for (int f = offset; any_fixed && f < k; ++f)
+      if (at.sides[f] != 0) row.part[f / lane_count][f % lane_count] = 0.0;
+    row.to(at.U + c * stride);
+    at.inverse[c] = reciprocal;
+    R scaled{};
+    scaled.add(row, reciprocal);
+    scaled.to(scaled_row);
+    for (int j = 0; j < c; ++j) of_controls[j].add(row, -scaled_row[offset + j]);
+    const S of_row = states_of(row);
+    for (int j = 0; j < states; ++j) of_states[j].add(of_row, -scaled_row[j]);
+    of_controls[c] = scaled;
+    policies[c] = states_of(scaled).first(states);
+  }
+  if (!is_definite) return false;
+  const auto store = [](const S& row, double* to) {
+    row.to(to);
+    for (int v = state_width; v < width; v += lane_count) kernels::store(Lanes{}, to + v);
+  };
+  // From a policy in terms of the state and the controls before, to a policy in terms of the state alone.
+  for (int c = 0; c < controls; ++c) {
+    of_controls[c].to(scaled_row);
+    for (int j = 0; at.sides[offset + c] == 0 && j < c; ++j) policies[c].add(policies[j], -scaled_row[offset + j]);
+    store(policies[c], at.V + c * stride);
+  }
+  for (int j = 0; j < states; ++j) store(of_states[j].first(states), at.P + j * stride);
+  if (view.for_steps) {
+    R drift{};
+    for (int l = 0; l < stage.next_states; ++l) drift.add(at.row(at.P_next, l), at.b[l]);
+    drift.to(at.drift);
+  }
+  return true;
+}
+
+/// Calls `function` with the least compiled width of rows for so many states.
+template <class Function>
+inline auto with_width_of_states(int states, const Function& function) {
+  if (states <= 8) return function.template operator()<8>();
+  if (states <= 16) return function.template operator()<16>();
+  if (states <= 24) return function.template operator()<24>();
+  if (states <= 32) return function.template operator()<32>();
+  return function.template operator()<64>();
+}
+
+inline int most_states(const RiccatiView& view, int i) {
+  return view.state_counts[i] > view.state_counts[i + 1] ? view.state_counts[i] : view.state_counts[i + 1];
+}
+
+constexpr int smaller_of(int a, int b) { return a < b ? a : b; }
+
+template <int width>
+inline bool factor_general(const RiccatiView& view, int i, double tolerance) {
+  return with_width_of_states(most_states(view, i), [&]<int state_width>() {
+    constexpr int fitting = smaller_of(state_width, width);  // states are columns, too
+    return factor_general_stage<width, fitting>(view, i, tolerance);
+  });
+}
+
 /// Replaces p of the next node by p of this one. It stays in registers, since a value just written to memory takes a
 /// while to be readable.
 template <class Stage>
@@ -574,6 +721,8 @@ int factor(const RiccatiView& view, int first, double tolerance) {
   for (int i = first; i >= 0;) {
     if (view.special[i]) return i;
     const bool done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
+      if constexpr (!Stage::is_known && Stage::most_columns > 8)
+        return factor_general<Stage::most_columns>(view, i, tolerance) && (--i, true);
       const int alike = i;
       do
         if (!factor_stage<Stage>(view, i, tolerance)) return false;
@@ -654,6 +803,7 @@ using StateRow = Row<Stage::state_registers>;
 template <class Stage>
 RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, StateRow<Stage>* rows) {
   using R = StateRow<Stage>;
+  static_assert(Stage::is_known);
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
   // The closed-loop dynamics in memory: loading a single entry from there costs no more than a whole register.
@@ -673,15 +823,9 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
   R next[Stage::most_states] = {};
   R effects[Stage::most_columns];  // columns of B
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
-    if constexpr (Stage::is_known) {
-      effects[k] = R{};
-      stage.each_next_state([&](auto l)
-                                RHEC_ALWAYS_INLINE { effects[k] = effects[k].with(l, at.AB[l * at.stride + k]); });
-    } else {
-      double column[Stage::most_columns] = {};
-      for (int l = 0; l < stage.next_states; ++l) column[l] = at.AB[l * at.stride + k];
-      effects[k] = R::from(column);
-    }
+    effects[k] = R{};
+    stage.each_next_state([&](auto l)
+                              RHEC_ALWAYS_INLINE { effects[k] = effects[k].with(l, at.AB[l * at.stride + k]); });
   });
   // The conditional variance of a control given those before it also acts through the later ones.
   stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
@@ -725,16 +869,86 @@ RHEC_ALWAYS_INLINE inline void carry_stage(const RiccatiView& view, int i, State
   stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { rows[l] = next[l].first(stage.next_states); });
 }
 
+/// Row r of `to`: the sum over k of factor(r, k) times row k of `from`, which has `width` entries. Two rows at a time,
+/// for the processor's pipelines; an odd last one twice.
+template <int width, class Factor>
+RHEC_ALWAYS_INLINE inline void combine_rows(int count, int terms, const double* from, const Factor& factor, double* to,
+                                            long step) {
+  using R = Row<width / lane_count>;
+  for (int r = 0; r < count; r += 2) {
+    const int other = r + 1 < count ? r + 1 : r;
+    R rows[2] = {};
+    for (int k = 0; k < terms; ++k) {
+      const R term = R::from(from + k * width);
+      rows[0].add(term, factor(r, k));
+      rows[1].add(term, factor(other, k));
+    }
+    rows[0].to(to + r * step);
+    rows[1].to(to + other * step);
+  }
+}
+
+/// What carry_stage does, for any sizes, with rows of `width` states in memory.
+template <int width>
+inline void carry_general_stage(const RiccatiView& view, int i, double* sigma) {
+  using R = Row<width / lane_count>;
+  constexpr int most_controls = 64;
+  const long stride = view.stride;
+  const int states = view.state_counts[i], next_states = view.state_counts[i + 1], controls = view.control_counts[i];
+  const double *AB = view.AB + i * view.states * stride, *U = view.U + i * view.controls * stride,
+               *inverse = view.inverse + i * view.controls;
+  // Columns of A and B.
+  alignas(64) double A[width * width], B[most_controls * width], scaled[most_controls * width], M[width * width];
+  for (int j = 0; j < states; ++j) R{}.to(A + j * width);
+  for (int k = 0; k < controls; ++k) R{}.to(B + k * width);
+  for (int l = 0; l < next_states; ++l) {
+    const double* const row = AB + l * stride;
+    for (int j = 0; j < states; ++j) A[j * width + l] = row[j];
+    for (int k = 0; k < controls; ++k) B[k * width + l] = row[view.states + k];
+  }
+  // What a control given those before it does, which acts through the later ones, too; and the closed loop.
+  for (int k = controls - 1; k >= 0; --k) {
+    R effect = R::from(B + k * width);
+    for (int j = k + 1; j < controls; ++j) effect.add(R::from(scaled + j * width), -U[j * stride + view.states + k]);
+    effect.to(B + k * width);
+    R product{};
+    product.add(effect, inverse[k]);
+    product.to(scaled + k * width);
+  }
+  for (int j = 0; j < states; ++j) {
+    R column = R::from(A + j * width);
+    for (int k = 0; k < controls; ++k) column.add(R::from(scaled + k * width), -U[k * stride + j]);
+    column.to(A + j * width);
+  }
+  // Sigma A'
+  combine_rows<width>(
+      states, states, A, [&](int j, int k) RHEC_ALWAYS_INLINE { return sigma[j * stride + k]; }, M, width);
+  for (int l = 0; l < next_states; ++l) {
+    R row{};
+    for (int k = 0; k < controls; ++k) row.add(R::from(scaled + k * width), 2.0 * B[k * width + l]);
+    for (int j = 0; j < states; ++j) row.add(R::from(M + j * width), A[j * width + l]);
+    row.to(sigma + l * stride);
+  }
+}
+
+inline void carry_general(const RiccatiView& view, int i, double* sigma) {
+  with_width_of_states(most_states(view, i), [&]<int width>() { carry_general_stage<width>(view, i, sigma); });
+}
+
 int carry_covariance(const RiccatiView& view, int first, double* covariance, double* all) {
   for (int i = first; i < view.intervals;) {
     if (view.special[i]) return i;
     with_shape<matrices_fit>(view, i, [&]<class Stage>() {
-      const int alike = i, states = view.state_counts[i], next_states = view.state_counts[i + 1];
-      StateRow<Stage> rows[Stage::most_states];
-      for (int j = 0; j < states; ++j) rows[j] = StateRow<Stage>::from(covariance + j * view.stride);
-      do carry_stage<Stage>(view, i, rows);
-      while (++i < view.intervals && !all && next_states == states && is_alike(view, alike, i));
-      for (int l = 0; l < next_states; ++l) rows[l].to(covariance + l * view.stride);
+      if constexpr (Stage::is_known) {
+        const int alike = i, states = view.state_counts[i], next_states = view.state_counts[i + 1];
+        StateRow<Stage> rows[Stage::most_states];
+        for (int j = 0; j < states; ++j) rows[j] = StateRow<Stage>::from(covariance + j * view.stride);
+        do carry_stage<Stage>(view, i, rows);
+        while (++i < view.intervals && !all && next_states == states && is_alike(view, alike, i));
+        for (int l = 0; l < next_states; ++l) rows[l].to(covariance + l * view.stride);
+      } else {
+        carry_general(view, i++, covariance);
+      }
     });
     if (!all) continue;
     double* block = all + static_cast<long>(i) * view.states * view.states;
@@ -742,6 +956,105 @@ int carry_covariance(const RiccatiView& view, int first, double* covariance, dou
       for (int r = 0; r < view.states; ++r) block[c * view.states + r] = covariance[c * view.stride + r];
   }
   return view.intervals;
+}
+
+/// Sigma given what half of H, a matrix of n rows, says as well: with H / 2 = L D L', one measurement after the other,
+/// with the gradient l and the variance 1 / d.
+template <int width>
+inline bool condition(const double* H, long stride, int n, double* sigma) {
+  using R = Row<width / lane_count>;
+  constexpr double zero_pivot = 1e-13;  // relative: what is left of a pivot by rounding
+  // Mostly, few states are measured. Where the diagonal is zero, so is the row of a matrix that is positive
+  // semidefinite.
+  int count = 0, states[width];
+  for (int r = 0; r < n; ++r)
+    if (H[r * (stride + 1)] != 0.0) states[count++] = r;
+  alignas(64) double G[width * width];
+  double diagonal[width];
+  for (int a = 0; a < count; ++a) {
+    for (int b = 0; b < count; ++b) G[a * width + b] = 0.5 * H[states[a] * stride + states[b]];
+    diagonal[a] = G[a * width + a];
+  }
+  for (int a = 0; a < count; ++a) {
+    const double pivot = G[a * width + a];
+    if (!(pivot > -zero_pivot * diagonal[a])) return false;
+    if (!(pivot > zero_pivot * diagonal[a])) continue;
+    const double reciprocal = 1.0 / pivot;
+    R products{};
+    for (int b = a; b < count; ++b) products.add(R::from(sigma + states[b] * stride), G[a * width + b] * reciprocal);
+    alignas(64) double entries[width];
+    products.to(entries);
+    double variance = reciprocal;
+    for (int b = a; b < count; ++b) variance += G[a * width + b] * reciprocal * entries[states[b]];
+    R gain{};
+    gain.add(products, -1.0 / variance);
+    for (int r = 0; r < n; ++r) {
+      R row = R::from(sigma + r * stride);
+      row.add(gain, entries[r]);
+      row.to(sigma + r * stride);
+    }
+    for (int r = a + 1; r < count; ++r)
+      for (int c = r; c < count; ++c) G[r * width + c] -= G[a * width + r] * G[a * width + c] * reciprocal;
+  }
+  return true;
+}
+
+/// Sigma of the next node: A Sigma A' + B cov(w) B', of controls that are not coupled to anything.
+template <int width>
+inline bool predict_covariance(const RiccatiView& view, int i, double* sigma) {
+  using R = Row<width / lane_count>;
+  const long stride = view.stride;
+  const int states = view.state_counts[i], next_states = view.state_counts[i + 1], controls = view.control_counts[i];
+  const double* const AB = view.AB + i * view.states * stride;
+  const double* const H = view.H + i * (view.states + view.controls) * stride;
+  alignas(64) double A[width * width], M[width * width], variances[64];
+  for (int k = 0; k < controls; ++k) {
+    const double* const row = H + (view.states + k) * stride;
+    Lanes sum{};
+    for (long j = 0; j < stride; j += lane_count) sum += absolute(load(row + j));
+    const double own = row[view.states + k];
+    if (!(own > 0.0) || sum_of(sum) != own) return false;  // nothing is added to it in a row of zeros
+    variances[k] = 2.0 / own;
+  }
+  for (int j = 0; j < states; ++j) R{}.to(A + j * width);
+  for (int l = 0; l < next_states; ++l)
+    for (int j = 0; j < states; ++j) A[j * width + l] = AB[l * stride + j];
+  // Sigma A', then A times that.
+  combine_rows<width>(
+      states, states, A, [&](int j, int k) RHEC_ALWAYS_INLINE { return sigma[j * stride + k]; }, M, width);
+  combine_rows<width>(
+      next_states, states, M, [&](int l, int j) RHEC_ALWAYS_INLINE { return A[j * width + l]; }, sigma, stride);
+  for (int k = 0; k < controls; ++k) {
+    alignas(64) double effects[width] = {};
+    bool any = false;
+    for (int l = 0; l < next_states; ++l) {
+      effects[l] = AB[l * stride + view.states + k];
+      any |= effects[l] != 0.0;
+    }
+    if (!any) continue;
+    const R effect = R::from(effects);
+    for (int l = 0; l < next_states; ++l) {
+      if (effects[l] == 0.0) continue;
+      R row = R::from(sigma + l * stride);
+      row.add(effect, effects[l] * variances[k]);
+      row.to(sigma + l * stride);
+    }
+  }
+  return true;
+}
+
+template <int width>
+inline bool filter_covariance_of(const RiccatiView& view, double* sigma) {
+  for (int i = 0; i < view.intervals; ++i) {
+    if (!predict_covariance<width>(view, i, sigma)) return false;
+    const double* const H = view.H + static_cast<long>(i + 1) * (view.states + view.controls) * view.stride;
+    if (!condition<width>(H, view.stride, view.state_counts[i + 1], sigma)) return false;
+  }
+  return true;
+}
+
+bool filter_covariance(const RiccatiView& view, double* sigma) {
+  return with_width_of_states(view.states, [&]<int width>() { return filter_covariance_of<width>(view, sigma); });
 }
 
 void form(const RiccatiView& view, int i, double* out) {
@@ -849,6 +1162,7 @@ constinit const RiccatiKernels RHEC_TABLE(riccati_kernels_, RHEC_SET) = {&kernel
                                                                          &kernels::sensitivities_forward,
                                                                          &kernels::combine,
                                                                          &kernels::carry_covariance,
+                                                                         &kernels::filter_covariance,
                                                                          &kernels::form,
                                                                          &kernels::invert,
                                                                          &kernels::answer,

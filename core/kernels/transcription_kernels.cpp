@@ -68,6 +68,42 @@ void add_products(const double* J, const double* weights, const double* pulls, i
   }
 }
 
+void add_sums(const SumsView& sums, int columns, int stride, double* H, double* h) {
+  constexpr int most_points = 9;
+  const int points = sums.points;
+  for (int k = 0; k < padded(columns); k += lane_count) {
+    Lanes G[most_points];
+    for (int p = 0; p < points; ++p) G[p] = load(sums.G + p * sums.G_step + k);
+    if (h) {
+      Lanes gradient = load(h + k);
+      for (int p = 0; p < points; ++p) gradient += G[p] * sums.v[p];
+      store(gradient, h + k);
+    }
+    if (!H) continue;
+    Lanes product[most_points];  // W G
+    for (int p = 0; p < points; ++p) {
+      product[p] = G[0] * sums.W[p * sums.W_step];
+      for (int q = 1; q < points; ++q) product[p] += G[q] * sums.W[p * sums.W_step + q];
+    }
+    for (int c = 0; c < columns; ++c) {
+      double* const column = H + static_cast<long>(c) * stride + k;
+      Lanes sum = load(column);
+      for (int p = 0; p < points; ++p) sum += product[p] * sums.G[p * sums.G_step + c];
+      store(sum, column);
+    }
+  }
+}
+
+void multiply_rows(const double* C, long c_step, const double* J, long j_step, const ProductSizes& sizes, int width,
+                   double* to) {
+  for (int j = 0; j < sizes.rows; ++j, C += c_step, to += width)
+    for (int k = 0; k < width; k += lane_count) {
+      Lanes sum{};
+      for (int r = 0; r < sizes.inner; ++r) sum += load(J + r * j_step + k) * C[r];
+      store(first_of(sum, k / lane_count, sizes.columns), to + k);
+    }
+}
+
 /// Differences on circles: `error` minus the nearest multiple of the period.
 inline Lanes on_circle(const Lanes& error, const Lanes& period, const Lanes& inverse_period) {
   constexpr double to_integer = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer
@@ -304,6 +340,7 @@ extern const TranscriptionKernels RHEC_TABLE(transcription_kernels_, RHEC_SET);
 constinit const TranscriptionKernels RHEC_TABLE(transcription_kernels_, RHEC_SET) = {
     &kernels::write_bounds,   &kernels::match,
     &kernels::adopt,          &kernels::add_products,
+    &kernels::add_sums,       &kernels::multiply_rows,
     &kernels::write_tracking, &kernels::complete_dynamics,
     &kernels::clear_costs,    &kernels::write_measurements};
 

@@ -346,6 +346,20 @@ void Riccati::feedback(const StageQp& qp, int i, const double* s, double* w) noe
   small::add_product(v.Y, width_, s, w, m, n);
 }
 
+bool Riccati::filter_covariance(const StageQp& qp, double* last) noexcept {
+  const int N = qp.intervals(), n0 = qp.states(0), n = qp.states(N);
+  std::copy_n(qp.state_counts(), N + 1, state_counts_.data());
+  std::copy_n(qp.control_counts(), N, control_counts_.data());
+  control_counts_[N] = 0;
+  double* const now = work_.data();
+  if (!kernels_->invert(qp.H(0), n0, stride_, definite_tolerance, now)) return false;
+  for (int k = 0; k < n0 * stride_; ++k) now[k] *= 2.0;
+  if (!kernels_->filter_covariance(view_of(qp, nullptr), now)) return false;
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < n; ++r) last[c * ns_ + r] = 0.5 * (now[c * stride_ + r] + now[r * stride_ + c]);
+  return true;
+}
+
 void Riccati::covariances(const StageQp& qp, double* covariance, double* last) noexcept {
   const int N = qp.intervals(), n0 = qp.states(0), width = ns_ + nw_;
   // Covariance of z = [s; w] at a stage, and of the next state.

@@ -282,6 +282,9 @@ const StageQp& StageQpSolver::convexify_limited(const StageQp& qp) noexcept {
 }
 
 bool StageQpSolver::covariances(const StageQp& qp, double* all, double* last) noexcept {
+  // Kernels are compiled for the sizes of few states, whose factorisation is the shorter way.
+  constexpr int few_states = 8;
+  if (!all && last && qp.capacity().states > few_states && riccati_.filter_covariance(qp, last)) return true;
   riccati_.factor_for_covariances(qp, no_bounds_);
   factored_ = prepared_ = is_dual_ = false;
   if (riccati_.was_convexified()) return false;

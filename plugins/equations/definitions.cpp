@@ -45,7 +45,7 @@ void Definitions::add(std::vector<Statement> statements) {
     if (!is_new)
       throw error_at(file_, statement.place,
                      fmt::format("there is an equation for '{}' in line {} already; remove one of them",
-                                 statement.target, statements_[known->second].place.line));
+                                 statement.target, statements_[known->second].place.shown_line()));
     statements_.push_back(std::move(statement));
   }
 }

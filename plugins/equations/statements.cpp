@@ -73,16 +73,20 @@ std::string advice_for(std::string_view found) {
 class Lexer {
  public:
   explicit Lexer(const SourceText& source) : source_(source) {
-    for (const SourceText::Line& line : source.lines) split(line);
+    int row = 0;
+    for (const SourceText::Line& line : source.lines) split(line, ++row);
     tokens_.push_back({Token::Kind::end, {}, end_});
   }
   std::vector<Token> take() { return std::move(tokens_); }
 
  private:
-  void split(const SourceText::Line& line) {
+  void split(const SourceText::Line& line, int row) {
     const std::string_view text = line.text;
+    if (open_ == 0) target_ = target_of(text);
+    const auto written = std::make_shared<const WrittenLine>(
+        WrittenLine{.text = std::string(text), .target = target_, .where = source_.where, .row = row});
     const auto place = [&](std::size_t at) {
-      return Place{line.number, line.column ? line.column + static_cast<int>(at) : 0};
+      return Place{line.number, line.column ? line.column + static_cast<int>(at) : 0, written, static_cast<int>(at)};
     };
     const auto add = [&](Token::Kind kind, std::size_t from, std::size_t to) {
       tokens_.push_back({kind, text.substr(from, to - from), place(from)});
@@ -116,7 +120,18 @@ class Lexer {
     }
   }
 
-  Error unknown_character(std::string_view rest, Place at) const {
+  /// The name that the line is an equation for, if it is one.
+  static std::string target_of(std::string_view line) {
+    const std::string_view left = line.substr(0, line.find_first_of("=#"));
+    if (left.size() == line.size() || line[left.size()] == '#') return {};
+    const std::size_t from = left.find_first_not_of(" \t\r"), to = left.find_last_not_of(" \t\r");
+    if (from == std::string_view::npos) return {};
+    std::string_view name = left.substr(from, to + 1 - from);
+    const std::string_view plain = name.ends_with('\'') ? name.substr(0, name.size() - 1) : name;
+    return is_name(plain) ? std::string(name) : std::string();
+  }
+
+  Error unknown_character(std::string_view rest, const Place& at) const {
     const std::string found = printable(rest);
     std::string advice = advice_for(found);
     if (advice.empty() && (static_cast<unsigned char>(rest[0]) & 0x80))
@@ -155,6 +170,7 @@ class Lexer {
   const SourceText& source_;
   std::vector<Token> tokens_;
   int open_ = 0;
+  std::string target_;
   Place end_;
 };
 
@@ -244,12 +260,18 @@ class Parser {
     close(opened);
   }
   void close(const Token& opened) {
-    if (is_sign(')'))
+    if (is_sign(')')) {
       ++at_;
-    else
-      throw unexpected("an operator or ')'", opened.place.line != next().place.line
-                                                 ? fmt::format("; the '(' in line {} is not closed", opened.place.line)
-                                                 : "");
+      return;
+    }
+    const Token& found = next();
+    if (opened.place.shown_line() == found.place.shown_line()) throw unexpected("an operator or ')'");
+    // What was found is far from the mistake, often in the next equation.
+    throw error_at(file_, opened.place,
+                   found.kind == Token::Kind::end
+                       ? "this '(' is not closed: found the end, expected an operator or ')'"
+                       : fmt::format("this '(' is not closed: found '{}' in line {}, expected an operator or ')'",
+                                     found.text, found.place.shown_line()));
   }
   void number(const Token& token) {
     double value = 0.0;
@@ -319,12 +341,12 @@ class Parser {
     if (!is_sign(sign)) throw unexpected(expected);
     ++at_;
   }
-  Error unexpected(const std::string& expected, const std::string& more = {}) const {
+  Error unexpected(const std::string& expected) const {
     const Token& token = next();
     std::string found = fmt::format("'{}'", token.text);
     if (token.kind == Token::Kind::end_of_line) found = "the end of the line";
     if (token.kind == Token::Kind::end) found = "the end";
-    std::string advice = more.empty() ? advice_for(token.text) : more;
+    std::string advice = advice_for(token.text);
     if (advice.empty() && is_sign(')') && expected.starts_with("an operator")) advice = "; there is no '(' for it";
     if (advice.empty() && is_sign(',')) advice = "; decimals have a point, as 0.5";
     const bool is_factor = token.kind == Token::Kind::name || token.kind == Token::Kind::number || is_sign('(');
@@ -340,12 +362,38 @@ class Parser {
   int levels_ = 0;
 };
 
+/// A line and a caret under one of its places, each on a line of its own. Of a long line what is near.
+std::string shown(std::string_view text, int place) {
+  constexpr std::size_t before = 60, after = 40;
+  const auto is_inside = [&](std::size_t at) {
+    return at < text.size() && (static_cast<unsigned char>(text[at]) & 0xc0) == 0x80;
+  };
+  const std::size_t at = std::min(static_cast<std::size_t>(place), text.size());
+  std::size_t from = at > before ? at - before : 0, to = std::min(at + after, text.size());
+  while (is_inside(from)) ++from;
+  while (is_inside(to)) ++to;
+  std::string line = from > 0 ? "..." : "", caret(line.size(), ' ');
+  for (std::size_t k = from; k < to; ++k) {
+    line += static_cast<unsigned char>(text[k]) < 32 ? ' ' : text[k];
+    if (k < at && !is_inside(k)) caret += ' ';  // a letter of several bytes is one wide
+  }
+  return fmt::format("\n    {}{}\n    {}^", line, to < text.size() ? "..." : "", caret);
+}
+
 }  // namespace
 
-Error error_at(const std::string& file, Place place, const std::string& text) {
-  if (place.column > 0) return Error(fmt::format("{}:{}:{}: {}", file, place.line, place.column, text));
-  if (place.line > 0) return Error(fmt::format("{}:{}: {}", file, place.line, text));
-  return Error(fmt::format("{}: {}", file, text));
+Error error_at(const std::string& file, const Place& place, const std::string& text) {
+  const WrittenLine* const written = place.written.get();
+  std::string where = file;
+  if (place.column > 0)
+    where = fmt::format("{}:{}:{}", file, place.line, place.column);
+  else if (written && !written->where.empty())
+    where = fmt::format("{}: line {}, column {}", written->where, written->row, place.at + 1);
+  else if (place.line > 0)
+    where = fmt::format("{}:{}", file, place.line);
+  if (!written) return Error(fmt::format("{}: {}", where, text));
+  const std::string in = written->target.empty() ? "" : fmt::format(" (in the equation of {})", written->target);
+  return Error(fmt::format("{}: {}{}{}", where, text, in, shown(written->text, place.at)));
 }
 
 const std::vector<FunctionInfo>& known_functions(Functions which) {

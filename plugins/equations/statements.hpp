@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,14 +18,27 @@ struct SourceText {
   };
   std::string file;
   std::vector<Line> lines;
+  std::string where{};  ///< of the text as a whole, for errors in lines whose place in a file is not known
 };
 
-/// A place in a file.
+/// A line as it is shown below an error.
+struct WrittenLine {
+  std::string text, target;  ///< the name that its equation is for; empty in a single term
+  std::string where;         ///< as of the SourceText
+  int row = 0;               ///< in the text, from 1
+};
+
+/// A place in a file, and in the text that it is in.
 struct Place {
   int line = 0, column = 0;
+  std::shared_ptr<const WrittenLine> written{};
+  int at = 0;  ///< in the line, from 0
+
+  /// The number of the line for people: of the file, or else of the text.
+  int shown_line() const { return line > 0 || !written ? line : written->row; }
 };
-/// "vehicle.yaml:12:8: " and the text.
-Error error_at(const std::string& file, Place place, const std::string& text);
+/// "vehicle.yaml:12:8: " and the text, with the equation that it is in; below it the line, and a caret under the place.
+Error error_at(const std::string& file, const Place& place, const std::string& text);
 
 /// What a term is computed by, in the order of the computation: operands first.
 struct Item {

@@ -201,14 +201,14 @@ void VehicleFile::read_role(std::string_view section, const Settings& role, int 
 Place VehicleFile::place(std::string_view section, const std::string& variable) const {
   const Settings* in = settings_.find(section);
   const Settings* of = in ? in->find(variable) : nullptr;
-  return {of ? of->origin().line : in ? in->origin().line : 1, 0};
+  return {.line = of ? of->origin().line : in ? in->origin().line : 1};
 }
 
 /// Where the lines of a scalar are in the file. A literal block begins below its key; anything else is looked for in
 /// the key's own line, and has no columns if it is not written there as it is read.
 SourceText VehicleFile::text_of(const Settings& scalar) const {
   const bool is_elsewhere = scalar.origin().file != file_;  // --set replaced a part of it
-  SourceText source{scalar.origin().file, {}};
+  SourceText source{scalar.origin().file, {}, fmt::format("{}: {}", scalar.where(), scalar.path())};
   const std::vector<std::string_view> lines = lines_of(scalar.as_text());
   const int key = scalar.origin().line;
   const auto column_in = [&](int number, std::string_view text) {
@@ -243,8 +243,11 @@ std::vector<Statement> VehicleFile::statements_of(const char* section) const {
     return parse_statements(source);
   } catch (const Error& mistake) {
     if (lines_.size() < 2 || std::none_of(source.lines.begin(), source.lines.end(), is_joined)) throw;
-    throw Error(fmt::format("{}. YAML has joined lines of '{}': write '{}: |', with one equation on each line below it",
-                            mistake.what(), section, section));
+    const std::string text = mistake.what();
+    const std::size_t line_end = std::min(text.find('\n'), text.size());  // below it the line is shown
+    throw Error(
+        fmt::format("{}. YAML has joined lines of '{}': write '{}: |', with one equation on each line below it{}",
+                    text.substr(0, line_end), section, section, text.substr(line_end)));
   }
 }
 

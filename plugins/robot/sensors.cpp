@@ -72,10 +72,10 @@ std::vector<double> initial_sensor_sigmas(const RobotContext& vehicle, const Rob
   return sigmas;
 }
 
-bool senses_motion(const Model& model) noexcept {
-  if (const auto* noisy = dynamic_cast<const StateNoiseModel*>(&model)) return senses_motion(noisy->vehicle());
+std::vector<int> motion_outputs_of(const Model& model) {
+  if (const auto* noisy = dynamic_cast<const StateNoiseModel*>(&model)) return motion_outputs_of(noisy->vehicle());
   const auto* const sensors = dynamic_cast<const SensorModel*>(&model);
-  return sensors && sensors->motion().count() > 0;
+  return sensors ? sensors->motion().which() : std::vector<int>{};
 }
 
 }  // namespace rhec

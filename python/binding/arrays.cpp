@@ -24,9 +24,25 @@ Shape strides_of(const Shape& shape) {
   return strides;
 }
 
+/// "x [m], beta [rad], mu"
+std::string with_units(const std::vector<Variable>& variables) {
+  std::vector<std::string> texts;
+  texts.reserve(variables.size());
+  for (const Variable& each : variables)
+    texts.push_back(each.unit == "1" ? each.name : fmt::format("{} [{}]", each.name, each.unit));
+  return fmt::format("{}", fmt::join(texts, ", "));
+}
+
 }  // namespace
 
+std::string shape_of(const Numbers& given) {
+  std::string shape;
+  for (py::ssize_t i = 0; i < given.ndim(); ++i) shape += fmt::format("{}{}", i > 0 ? " x " : "", given.shape(i));
+  return shape.empty() ? "one number" : "an array of " + shape;
+}
+
 py::object doubles_of(py::handle given) {
+  if (given.is_none()) return {};  // numpy has a number for it
   py::object plain = py::reinterpret_borrow<py::object>(given);
   if (py::hasattr(plain, "mask") && py::hasattr(plain, "filled"))
     plain = plain.attr("astype")("float64").attr("filled")(NAN);
@@ -54,18 +70,16 @@ bool all_finite(const Numbers& given) {
 
 const double* vector_of(const Numbers& given, const std::vector<Variable>& variables, std::string_view what) {
   if (given.ndim() == 1 && given.size() == static_cast<py::ssize_t>(variables.size())) return given.data();
-  std::string shape;
-  for (py::ssize_t i = 0; i < given.ndim(); ++i) shape += fmt::format("{}{}", i > 0 ? " x " : "", given.shape(i));
-  throw Error(fmt::format("{}: found an array of {}, expected {} numbers in one dimension: {}", what,
-                          shape.empty() ? "one number" : shape, variables.size(),
-                          fmt::join(names_of(variables), ", ")));
+  throw Error(fmt::format("{}: found {}, expected {} numbers in one dimension: {}", what, shape_of(given),
+                          variables.size(), with_units(variables)));
 }
 
-py::ssize_t rows_of(const Numbers& given, std::size_t width, std::string_view what) {
-  const auto wanted = static_cast<py::ssize_t>(width);
+py::ssize_t rows_of(const Numbers& given, const std::vector<Variable>& variables, std::string_view what) {
+  const auto wanted = static_cast<py::ssize_t>(variables.size());
   if (given.ndim() == 1 && given.shape(0) == wanted) return 1;
   if (given.ndim() == 2 && given.shape(1) == wanted) return given.shape(0);
-  throw Error(fmt::format("{}: expected {} numbers, or rows of so many (n x {})", what, width, width));
+  throw Error(fmt::format("{0}: found {1}, expected {2} numbers in one dimension, or rows of so many (n x {2}): {3}",
+                          what, shape_of(given), wanted, with_units(variables)));
 }
 
 }  // namespace rhec::python

@@ -3,6 +3,7 @@
 #include <pybind11/numpy.h>
 
 #include <cstddef>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -35,7 +36,9 @@ bool all_finite(const Numbers& given);
 /// otherwise.
 const double* vector_of(const Numbers& given, const std::vector<Variable>& variables, std::string_view what);
 /// The same for rows of such vectors, or one of them; and how many rows there are.
-py::ssize_t rows_of(const Numbers& given, std::size_t width, std::string_view what);
+py::ssize_t rows_of(const Numbers& given, const std::vector<Variable>& variables, std::string_view what);
+/// "an array of 2 x 3", or "one number".
+std::string shape_of(const Numbers& given);
 
 }  // namespace rhec::python
 

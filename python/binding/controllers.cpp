@@ -107,9 +107,9 @@ int set_obstacles(ControllerObject& self, const Numbers& obstacles, double time)
   constexpr py::ssize_t width = 7;
   const bool is_none = obstacles.ndim() == 1 && obstacles.size() == 0;
   if (!is_none && (obstacles.ndim() != 2 || obstacles.shape(1) != width))
-    throw Error(
-        "obstacles: expected rows of x [m], y [m], semi-axes along and across [m], heading [rad], velocity in x and y "
-        "[m/s] (n x 7)");
+    throw Error("obstacles: found " + shape_of(obstacles) +
+                ", expected rows of x [m], y [m], semi-axes along and across [m], heading [rad], velocity in x and y "
+                "[m/s] (n x 7)");
   if (!all_finite(obstacles) || !std::isfinite(time))
     throw Error("obstacles, time: found a number that is not finite; leave out what is not known");
   std::vector<Obstacle> all;

@@ -118,7 +118,11 @@ void reset_to(NamedEstimator& self, const std::optional<Numbers>& mean, const st
   const Eigen::Index n = self.estimator->model().state_count() + self.estimator->model().parameter_count();
   if (mean->ndim() != 1 || mean->size() != n || covariance->ndim() != 2 || covariance->shape(0) != n ||
       covariance->shape(1) != n)
-    throw Error(fmt::format("reset: expected the mean of [state; parameters] ({0}) and its covariance ({0}, {0})", n));
+    throw Error(fmt::format(
+        "reset: found a mean that is {} and a covariance that is {}, expected the mean of [state; parameters] ({}) and "
+        "its covariance ({} x {}): {} states as an Estimate has them, and {} parameters",
+        shape_of(*mean), shape_of(*covariance), n, n, n, self.estimator->model().state_count(),
+        self.estimator->model().parameter_count()));
   const Eigen::VectorXd to = Eigen::Map<const Eigen::VectorXd>(mean->data(), n);
   const Eigen::MatrixXd with = Eigen::Map<const Eigen::MatrixXd>(covariance->data(), n, n);
   if (!is_covariance(with))
@@ -213,7 +217,10 @@ void bind_estimates(py::module_& module) {
             const Eigen::VectorXd& state = self.cast<const EstimateObject&>().value.state;
             return view(state.data(), {state.size()}, self);
           },
-          "x, (n_x); biases and scales of sensors that are estimated stand behind the vehicle's states")
+          "x, (n_x); behind the vehicle's states stand biases and scales of sensors that are estimated, and what "
+          "outputs "
+          "of\n"
+          "motion (of inputs, as an accelerometer) tell: state[:len(vehicle.states)] is the vehicle's")
       .def_property_readonly(
           "parameters",
           [](const py::object& self) {

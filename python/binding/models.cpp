@@ -26,13 +26,12 @@ class Rows {
  public:
   /// Lengthens the common number of rows.
   void add(const Numbers& given, const std::vector<Variable>& variables, const char* what) {
-    const py::ssize_t rows = rows_of(given, variables.size(), what);
+    const py::ssize_t rows = rows_of(given, variables, what);
     if (given.ndim() == 2) has_rows_ = true;
-    // No rows are a number of rows, too.
     if (count_ != 1 && rows != 1 && rows != count_)
       throw Error(
           fmt::format("{}: found {} rows, expected {}, as many as the other arguments have", what, rows, count_));
-    if (rows != 1) count_ = rows;
+    if (rows != 1) count_ = rows;  // none is a number, too
     parts_.push_back({given.data(), static_cast<py::ssize_t>(variables.size()), rows});
   }
   py::ssize_t count() const { return count_; }

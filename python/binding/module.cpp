@@ -33,55 +33,6 @@ void raise(const py::object& exception) {
   PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
 }
 
-/// What pybind11 calls all functions by; set once, when the module is made.
-PyCFunctionWithKeywords dispatch = nullptr;
-
-/// Where arguments do not fit, pybind11 lists the signatures that do; the package says which argument does not.
-PyObject* dispatch_in_words(PyObject* self, PyObject* given, PyObject* named) {
-  PyObject* made = dispatch(self, given, named);
-  if (made != nullptr || PyErr_Occurred() != PyExc_TypeError) return made;
-  py::error_already_set mistake;
-  try {
-    const auto text = py::str(mistake.value()).cast<std::string>();
-    const std::size_t name_end = text.find("(): incompatible ");
-    if (name_end == std::string::npos || name_end != text.find('(')) {
-      mistake.restore();
-      return nullptr;
-    }
-    const py::object words = named == nullptr ? py::none() : py::reinterpret_borrow<py::object>(named);
-    raise(
-        py::module_::import("rhec._arguments").attr("refusal")(text, py::reinterpret_borrow<py::object>(given), words));
-  } catch (py::error_already_set& other) {
-    other.restore();
-  }
-  return nullptr;
-}
-
-/// Only functions of pybind11 that are called this way: other ones stay as they are.
-void tell_in_words(py::handle function) {
-  PyObject* plain = function.ptr();
-  if (PyInstanceMethod_Check(plain)) plain = PyInstanceMethod_GET_FUNCTION(plain);
-  if (Py_IS_TYPE(plain, &PyStaticMethod_Type)) {
-    tell_in_words(function.attr("__func__"));
-    return;
-  }
-  if (!PyCFunction_Check(plain)) return;
-  PyMethodDef& about = *reinterpret_cast<PyCFunctionObject*>(plain)->m_ml;
-  if (about.ml_flags != (METH_VARARGS | METH_KEYWORDS)) return;
-  const auto called = reinterpret_cast<PyCFunctionWithKeywords>(reinterpret_cast<void (*)()>(about.ml_meth));
-  if (called == &dispatch_in_words) return;
-  dispatch = called;
-  about.ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(&dispatch_in_words));
-}
-
-void tell_in_words(const py::module_& module) {
-  for (const auto& [name, value] : module.attr("__dict__").cast<py::dict>()) {
-    tell_in_words(value);
-    if (!PyType_Check(value.ptr())) continue;
-    for (const auto& [member_name, member] : py::dict(value.attr("__dict__"))) tell_in_words(member);
-  }
-}
-
 /// Of a class whose objects only C++ makes.
 void refuse_constructors(const py::module_& module) {
   for (const auto& [name, value] : module.attr("__dict__").cast<py::dict>()) {
@@ -109,6 +60,61 @@ void refuse_what_was_not_made(const py::module_& module) {
         type->operator_new = &refuse_memory;
 }
 
+/// That of a function, a method, a static method or an accessor of a property which pybind11 has made; null of all
+/// else.
+PyCFunctionObject* function_of(PyObject* value) {
+  if (PyInstanceMethod_Check(value)) value = PyInstanceMethod_GET_FUNCTION(value);
+  if (!PyCFunction_Check(value)) return nullptr;
+  auto* const function = reinterpret_cast<PyCFunctionObject*>(value);
+  return function->m_ml->ml_flags == (METH_VARARGS | METH_KEYWORDS) ? function : nullptr;
+}
+
+/// What pybind11 calls for every function.
+PyCFunctionWithKeywords dispatcher() {
+  static const auto found = [] {
+    const py::cpp_function any([] {});
+    const PyCFunctionObject* function = function_of(any.ptr());
+    return function ? reinterpret_cast<PyCFunctionWithKeywords>(reinterpret_cast<void*>(function->m_ml->ml_meth))
+                    : nullptr;
+  }();
+  return found;
+}
+
+/// Calls what pybind11 would call, and says in the package's words what a function expects that refuses its arguments.
+/// A call that is not refused takes no longer.
+PyObject* call_in_words(PyObject* self, PyObject* arguments, PyObject* by_name) {
+  PyObject* const made = dispatcher()(self, arguments, by_name);
+  if (made || !PyErr_ExceptionMatches(PyExc_TypeError)) return made;
+  py::error_already_set refused;
+  if (refused.trace()) {  // raised in Python, by what the function has called
+    refused.restore();
+    return nullptr;
+  }
+  try {
+    const py::object words = py::module_::import("rhec._arguments")
+                                 .attr("in_words")(py::str(refused.value()), py::handle(arguments),
+                                                   by_name ? py::handle(by_name) : py::none());
+    if (words.is_none())
+      refused.restore();
+    else
+      raise(words);
+  } catch (py::error_already_set&) {
+    refused.restore();
+  }
+  return nullptr;
+}
+
+void speak_of_arguments(const py::handle& holder) {
+  for (const auto& [name, value] : holder.attr("__dict__").attr("copy")().cast<py::dict>()) {
+    py::object callable = py::reinterpret_borrow<py::object>(value);
+    if (Py_TYPE(value.ptr()) == &PyStaticMethod_Type) callable = value.attr("__func__");
+    if (PyCFunctionObject* const function = function_of(callable.ptr());
+        function && reinterpret_cast<void*>(function->m_ml->ml_meth) == reinterpret_cast<void*>(dispatcher()))
+      function->m_ml->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void*>(&call_in_words));
+    if (PyType_Check(value.ptr())) speak_of_arguments(value);
+  }
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_rhec, module) {
@@ -127,5 +133,5 @@ PYBIND11_MODULE(_rhec, module) {
   rhec::python::bind_runs(module);
   refuse_what_was_not_made(module);
   refuse_constructors(module);
-  tell_in_words(module);
+  speak_of_arguments(module);
 }

@@ -21,9 +21,9 @@ namespace {
 /// Rows of x, y, speed, and perhaps of room to the left and to the right.
 Path path_of(const Numbers& waypoints, double acceleration, double lateral_acceleration) {
   if (waypoints.ndim() != 2 || (waypoints.shape(1) != 3 && waypoints.shape(1) != 5))
-    throw Error(
-        "waypoints: expected rows of x [m], y [m], speed [m/s] (n x 3), or with the room to the left and to the right "
-        "[m] (n x 5)");
+    throw Error("waypoints: found " + shape_of(waypoints) +
+                ", expected rows of x [m], y [m], speed [m/s] (n x 3), or with the room to the left and to the right "
+                "[m] (n x 5)");
   if (!(acceleration > 0.0)) throw Error("acceleration: expected more than 0 [m/s^2]");
   if (!(lateral_acceleration > 0.0)) throw Error("lateral_acceleration: expected more than 0 [m/s^2]");
   const py::ssize_t width = waypoints.shape(1);

@@ -59,11 +59,8 @@ def read(source: Configuration, changes: Changes = None, plugin_path: PluginPath
     folders = folders_of(plugin_path)
     if isinstance(source, (str, os.PathLike)):
         settings = _rhec.Settings.load(os.fspath(source))
-    elif isinstance(source, dict):
-        settings = _rhec.Settings.of(plain(source, folders), "configuration")
     else:
-        raise Error(f"configuration: found an object of the class '{type(source).__name__}', expected the name of a YAML "
-                    "file or a dict")
+        settings = _rhec.Settings.of(plain(source, folders), "configuration")
     for key, value in (changes or {}).items():
         settings.set(key, plain(value, folders))
     return settings, folders

@@ -13,6 +13,8 @@ from typing import Any
 _IN_A_FILE = re.compile(r"^(?P<file>[^:\n]+):(?P<line>\d+)(?::\d+)?: (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
 # "configuration: key.path: what", "set 'key.path': key.path: what"
 _IN_PYTHON = re.compile(r"^(?:configuration|set '[^']*'|the (?:model|term) '[^']*'): (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
+# "configuration: key.path: file.yaml:12:3: what", of a file that a configuration names
+_IN_A_NAMED_FILE = re.compile(r"(?P<file>[^:\n]+):(?P<line>\d+)(?::\d+)?: ")
 
 
 # "step: what", of a configuration as a whole
@@ -25,10 +27,11 @@ class _Placed:
     def __init__(self, text: str = "") -> None:
         text = str(text)
         super().__init__(text)  # type: ignore[call-arg]
-        found = _IN_A_FILE.match(text)
-        self.file: str | None = found["file"] if found else None
-        self.line: int | None = int(found["line"]) if found else None
-        found = found or _IN_PYTHON.match(text)
+        in_python = _IN_PYTHON.match(text)
+        in_a_file = _IN_A_NAMED_FILE.match(text, in_python.end()) if in_python else _IN_A_FILE.match(text)
+        self.file: str | None = in_a_file["file"] if in_a_file else None
+        self.line: int | None = int(in_a_file["line"]) if in_a_file else None
+        found = in_python or in_a_file
         self.key: str | None = found["key"] if found else None
 
 
@@ -42,7 +45,8 @@ class Error(_Placed, Exception):
 
 
 class ArgumentError(Error, TypeError):
-    """An argument that a function does not take: its class, its name, or how many there are. It is a TypeError, too.
+    """An argument that a function does not take: by its class, its name, its range, or because there are too many. The text names
+    it, and says what was found and what was expected. It is a TypeError, too.
 
     argument: its name, or None
     """

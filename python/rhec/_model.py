@@ -1,6 +1,7 @@
 """A vehicle that is written in Python: with sympy's or CasADi's terms."""
 from __future__ import annotations
 
+import functools
 import pathlib
 import re
 from collections.abc import Sequence
@@ -82,8 +83,9 @@ class Model:
         of_straight = [f"straight_motion: {each}" for each in straight]
         texts = labelled_texts(owner, dict(zip([*of_equations, *of_straight], [*equations.values(), *straight.values()])), notes)
         known = {*names, *definitions, *notes.definitions}
-        check_known(owner, dict(zip(of_equations, texts)), known)
-        check_known(owner, dict(zip(of_straight, texts[len(equations):])), {*known, "ground_speed"})
+        for labels, terms, written, further in ((of_equations, equations, texts, ()), (of_straight, straight, texts[len(equations):], ("ground_speed",))):
+            read = {each: text for each, term, text in zip(labels, terms.values(), written) if not isinstance(term, str)}
+            check_known(owner, read, {*known, *further})
         check_known(owner, parts_of(notes), {*known, "ground_speed"})
         self.equations = "".join(f"{left} = {right}\n" for left, right in
                                  [*notes.definitions.items(), *zip(equations, texts)])
@@ -154,7 +156,7 @@ class Model:
         return Check.of(self)
 
     def build(self, folder: File | None = None, *, instruction_sets: Sequence[str] | None = None) -> BuiltModel:
-        """Writes it as a plugin in C++, compiles that against the rhec that this package belongs to, checks it and loads
+        """Checks it, writes it as a plugin in C++, compiles that against the rhec that this package belongs to, and loads
         it. Returns a BuiltModel, for configurations as this one is.
 
         folder: of the sources; without one a folder of the user's cache, where it is found again the next time
@@ -178,14 +180,17 @@ class Model:
 class BuiltModel:
     """A model that was compiled, for configurations: {"model": built}.
 
-    folder: its sources; vehicle: the Vehicle; check: what `rhec check` says of it
+    folder: its sources; vehicle: the Vehicle; check: what `rhec check` says of what was compiled, when it is first asked for
     """
 
     def __init__(self, plugin: str, folder: pathlib.Path, options: dict[str, Any]) -> None:
         self.plugin, self.folder, self._options = plugin, folder, options
         self._plugin_path = [str(folder.absolute() / "build")]
         self.vehicle = _vehicle_of(self, plugin)
-        self.check = Check.of(self)
+
+    @functools.cached_property
+    def check(self) -> Check:
+        return Check.of(self)
 
     def _section(self):
         return {"name": self.plugin, **self._options}
@@ -212,11 +217,14 @@ def texts_of(terms: list[Any], notes: _notation.Notes, reads_texts: bool = False
 
 
 def labelled_texts(owner: str, terms: dict[str, Any], notes: _notation.Notes, writes_texts: bool = False) -> list[str]:
-    """As `texts_of`, of terms by where they stand, which is said with what is wrong with one of them."""
+    """As `texts_of`, of terms by where they stand, which is said with what is wrong with one of them. Of texts that stay as they are
+    the equations' own reader tells, with line and column, when they are loaded."""
     for where, term in terms.items():
+        if isinstance(term, str) and not writes_texts:
+            continue
         alone = _notation.Notes(notes.taken, notes.smooth, notes.style)
         try:
-            texts_of([term], alone, True)
+            texts_of([term], alone, writes_texts)
         except Error as mistake:
             raise type(mistake)(f"{owner}: {where}: {mistake}") from None
     return texts_of(list(terms.values()), notes, writes_texts)
@@ -249,15 +257,11 @@ class _Builder:
     def build(self) -> BuiltModel:
         file = self._folder / f"{self._model.name}.yaml"
         _compile.write(file, self._yaml)
-        self._reject(self._model.check(), file)  # before it is compiled, which takes longer
+        check = self._model.check()  # before it is compiled, which takes longer
+        if check.failed:
+            raise Error(f"{file}: the check of the model '{self._model.name}' failed: {check.failures()}")
         sources = _rhec.vehicle_as_cpp(str(file))
         for name, content in sources["files"].items():
             _compile.write(self._folder / name, content)
         _compile.compile_in(self._folder, [f"-DRHEC_MODEL_INSTRUCTION_SETS={';'.join(self._sets)}"] if self._sets else [])
-        built = BuiltModel(sources["plugin"], self._folder, self._model._options)
-        self._reject(built.check, file)
-        return built
-
-    def _reject(self, check: Check, file: pathlib.Path) -> None:
-        if check.failed:
-            raise Error(f"{file}: the check of the model '{self._model.name}' failed: {check.failures()}")
+        return BuiltModel(sources["plugin"], self._folder, self._model._options)

@@ -107,7 +107,7 @@ def write_problems(file: File, problems: Iterable[Problem]) -> None:
     """Writes problems to a file, one on each line, whole or not at all."""
     lines = []
     for i, problem in enumerate(problems):
-        if not isinstance(problem, Problem):
+        if not callable(getattr(problem, "line", None)):
             raise ArgumentError(f"write_problems: problems[{i}]: found {found_in_words(problem)}, expected a Problem", "problems")
         lines.append(problem.line() + "\n")
     _files.write_text(file, "".join(lines))

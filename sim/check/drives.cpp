@@ -99,7 +99,10 @@ double Drives::excess(const Vector& x) const {
     const Variable& v = about_.states[j];
     const bool bounded = std::isfinite(v.lower) && std::isfinite(v.upper);
     const double middle = bounded ? 0.5 * (v.lower + v.upper) : 0.0;
-    const double half = bounded ? 0.25 * (v.upper - v.lower) : v.scale;
+    double half = bounded ? 0.25 * (v.upper - v.lower) : v.scale;
+    // A speed that the drive begins with is none that it is driven too far to.
+    const double off = std::abs(start_[j] - middle);
+    if (off >= half) half = bounded ? std::min(off + half, 0.5 * (v.upper - v.lower)) : off + half;
     sum += std::max(0.0, std::abs(x[j] - middle) - half) / v.scale;
   }
   return sum;
@@ -143,6 +146,7 @@ Drive Drives::drive(const CourseName& named) {
     made.unusable = "straight_motion is not finite";
     return made;
   }
+  start_ = x;
   const Vector change = excitation(base);
   // A turn becomes steady after a while.
   if (named.course == Course::turn)

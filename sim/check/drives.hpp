@@ -62,7 +62,8 @@ class Drives {
   /// Deviation of the inputs from the straight drive: half the room to a bound or half a scale, whichever is smaller.
   /// If all inputs produce speed (left and right wheels), every other one is raised or lowered by a fraction of it.
   Vector excitation(const Vector& base) const;
-  /// How far states are outside the inner half of their bounds (or beyond their scale if unbounded), in scales.
+  /// How far states are outside the inner half of their bounds (or beyond their scale if unbounded), in scales. Where
+  /// the drive itself begins outside, as with a speed near a bound, as far again is inside.
   double excess(const Vector& x) const;
   Vector moved(const Vector& x, const Vector& u) const;
   /// The inputs of interval k. Omits excitation that would drive a state too far (a steering angle, through its rate).
@@ -84,6 +85,7 @@ class Drives {
   bool makes_speed_ = false;
   double speed_ = 1.0;
   DriveBlocks blocks_;
+  Vector start_;  ///< the state that a drive begins with
   MotionOutputs motion_;
 };
 

@@ -180,6 +180,7 @@ std::vector<Finding> check_derivatives(const CheckedModel& checked) {
 std::vector<Finding> measure_times(const CheckedModel& checked, std::vector<EvaluationTimes>& times) {
   using Clock = std::chrono::steady_clock;
   constexpr int range = 16, calls = 300;
+  constexpr double longest = 0.05;  // of one measurement [s]
   FindingList findings("time");
   const FastestAtTheEnd restore(checked.model);
   Model& model = checked.model;
@@ -192,10 +193,13 @@ std::vector<Finding> measure_times(const CheckedModel& checked, std::vector<Eval
   const auto spread = [&](const auto& call) {
     std::vector<double> nanoseconds;
     call();
-    for (int i = 0; i < calls; ++i) {
+    double seconds = 0.0;
+    for (int i = 0; i < calls && seconds < longest; ++i) {
       const auto start = Clock::now();
       call();
-      nanoseconds.push_back(std::chrono::duration<double, std::nano>(Clock::now() - start).count() / range);
+      const std::chrono::duration<double> taken = Clock::now() - start;
+      seconds += taken.count();
+      nanoseconds.push_back(1e9 * taken.count() / range);
     }
     return spread_of(nanoseconds);
   };

@@ -5,6 +5,7 @@ with its place, what was found or expected, and what to do.
     model.py <rhec>
 """
 import pathlib
+import re
 import shutil
 import sys
 import tempfile
@@ -40,7 +41,7 @@ MISTAKES = [
     (EQUATION, "a = b\n  b = a\n  delta' = u2", 1, "needs itself: a -> b -> a"),
     (EQUATION, "delta' = " + DEEP * "(" + "u2" + DEEP * ")", 0, "nested deeper than 100 levels; give its parts names"),
     (EQUATION, "delta' = u2" + "".join(f" + sin({k} * u2)" for k in range(20000)), None, "expected at most 10000"),
-    ("tan(mu * delta)", "tan(mu * delta", 1, "is not closed"),
+    ("tan(mu * delta)", "tan(mu * delta", 0, "is not closed"),
     ("tan(mu * delta)", "tan(mu * delta))", 0, "there is no '(' for it"),
     ("mu * delta", "\u03bc * delta", 0, "found '\u03bc', which means nothing here; names have the letters a to z"),
     ("kappa * u1", "kappa \u00b7 u1", 0, "a product is written with '*'"),
@@ -72,7 +73,23 @@ class Test(cli.Findings):
     def refused(self, title, file, expected, place=""):
         result = self.rhec("model", file)
         told = result.returncode == ERROR and expected in result.stderr and f"{file}{place}" in result.stderr
-        self.expect(told and result.stderr.count("\n") == 1 and not result.stdout, title, result.stdout + result.stderr[:400])
+        self.expect(told and not result.stdout and self.shows_the_place(file, result.stderr), title, result.stdout + result.stderr[:400])
+
+    @staticmethod
+    def shows_the_place(file, text):
+        """One line, or two more with the file's line and a caret under the place."""
+        lines = text.split("\n")
+        if len(lines) == 2:
+            return True
+        place = re.search(r":(\d+):(\d+): ", lines[0])
+        if len(lines) != 4 or lines[2].strip() != "^":
+            return False
+        if not place:  # lines that YAML has joined are none of the file's
+            return "YAML has joined lines" in lines[0]
+        number, column = int(place[1]), int(place[2])
+        rest, shown = file.read_text(encoding="utf-8").splitlines()[number - 1][column - 1:], lines[1][lines[2].index("^"):]
+        # What is shown may end before the line does, as a value of a map, and a long line is cut.
+        return rest.startswith(shown.removesuffix("...")) and shown != ""
 
     def mistakes(self):
         file = self.work / "wrong.yaml"

@@ -205,19 +205,51 @@ def test_twelve_states_of_a_paper():
     (dict(states=[3], inputs=["u"], rates=["u"]), "found 3 as the name"),
     (dict(states="xy", inputs=["u"], rates=["u"]), "states: found 'xy', expected a dict"),
     (dict(states=["x"], inputs=["u"], rates=3), "rates: found 3, expected a dict"),
-    (dict(states=["x"], inputs=["u"], rates=["u +"]), r"the model 'wrong': rates: x: the text 'u \+': found the end, expected a number"),
-    (dict(states=["x"], inputs=["u"], rates=["z"]), "the model 'wrong': rates: x: 'z' is not known; expected one of u, x"),
     (dict(states=["x"], inputs=["u"], rates=[sympy.Symbol("z") + u]), "rates: x: 'z' is not known; expected one of u, x"),
     (dict(states=["x"], inputs=["u"], rates=[sympy.Abs(u)]), "the model 'wrong': rates: x: .*no derivative everywhere"),
-    (dict(states=["x"], inputs=["u"], rates=["abs(u)"]), "there is no function 'abs'.*no derivative everywhere"),
-    (dict(states=["x"], inputs=["u"], outputs=["y"], rates=["u"], measured=["x y"]), "measured: y: the text 'x y': found 'y'"),
-    (dict(states=["x"], inputs=["u"], rates=["d"], definitions={"d": "e"}), "definitions: d: 'e' is not known"),
-    (dict(states=["x"], inputs=["u"], rates=["u"], straight_motion={"u": "speed"}), "straight_motion: u: 'speed' is not known"),
     (dict(states=["x"], inputs=["u"], rates=["u"], smooth=0.0), "smooth: found 0.0, expected a width"),
 ])
 def test_mistakes_in_models(keys, word):
     with pytest.raises(rhec.Error, match=word):
         rhec.Model("wrong", **keys)
+
+
+@pytest.mark.parametrize("keys, word", [
+    (dict(rates=["u +"]), r"the model 'wrong': equations.equations: .*found the end of the line, expected a number.* \(in the equation of x'\)"),
+    (dict(rates=["z"]), r"the model 'wrong': .*'z' is not known; did you mean 'u'\? \(in the equation of x'\)"),
+    (dict(rates=["abs(u)"]), "there is no function 'abs'; it has no derivative at 0; use smooth_abs"),
+    (dict(rates=["u"], measured={"y": "x y"}, outputs=["y"]), r"found 'y', expected an operator .* \(in the equation of y\)"),
+    (dict(rates=["d"], definitions={"d": "e"}), r"'e' is not known; .* \(in the equation of d\)"),
+    (dict(rates=["u"], straight_motion={"u": "speed"}), r"the model 'wrong': equations.straight_motion: .*'speed' is not known; did you mean 'ground_speed'"),
+])
+def test_mistakes_in_texts_of_models(keys, word):
+    model = rhec.Model("wrong", **{"states": ["x"], "inputs": ["u"], "outputs": ["x"], **keys})
+    with pytest.raises(rhec.Error, match=word):
+        model.load()
+
+
+@pytest.mark.parametrize("term, found", [
+    ("2 * (u - 3 * v", "line 2, column 10: this '(' is not closed: found the end, expected an operator or ')' (in the equation of v')\n"
+                       "    v' = 2 * (u - 3 * v\n             ^"),
+    ("2 * u - * v", "line 2, column 14: found '*', expected a number, a name or '(' (in the equation of v')\n    v' = 2 * u - * v\n                 ^"),
+    ("2 u", "line 2, column 8: found 'u', expected an operator or the end of the line; a product is written with '*' (in the equation of v')"),
+    ("2 * q", "line 2, column 10: 'q' is not known; did you mean 'u'? (in the equation of v')\n    v' = 2 * q\n             ^"),
+    ("u ** 2", "write a power as x^2"),
+    ("", "line 2, column 6: found the end of the line, expected a number, a name or '('"),
+])
+def test_mistakes_in_texts_name_equation_line_and_column(term, found, tmp_path):
+    model = rhec.Model("wrong", states=["x", "v"], inputs=["u"], outputs=["x"], rates={"x": "v", "v": term})
+    for use in (model.load, model.check, lambda: model.build(tmp_path / "built"), lambda: rhec.Robot({"model": model})):
+        with pytest.raises(rhec.Error) as caught:
+            use()
+        assert found in str(caught.value) and caught.value.key.endswith("equations.equations")
+    file = tmp_path / "wrong.yaml"
+    file.write_text(model.yaml())
+    line = 1 + [each.strip() for each in file.read_text().splitlines()].index(f"v' = {term}".strip())
+    with pytest.raises(rhec.Error) as caught:
+        rhec.Robot({"model": {"equations": str(file)}})
+    assert f" {file}:{line}:" in str(caught.value)
+    assert (caught.value.file, caught.value.line, caught.value.key) == (str(file), line, "model")
 
 
 def test_a_key_that_is_not_known():
@@ -226,9 +258,14 @@ def test_a_key_that_is_not_known():
     assert caught.value.key and "states.x" in caught.value.key
 
 
-def test_a_model_becomes_a_plugin(tmp_path):
+def test_a_model_becomes_a_plugin(tmp_path, monkeypatch):
+    checked = []
+    check = rhec._rhec.check
+    monkeypatch.setattr(rhec._rhec, "check", lambda *arguments: checked.append(arguments) or check(*arguments))
     built = bicycle().build(tmp_path / "built", instruction_sets=["generic"])
+    assert len(checked) == 1  # of what is compiled, before it is
     assert not built.check.failed
+    assert built.check is built.check and len(checked) == 2
     header = next(pathlib.Path(built.folder).glob("*.hpp")).read_text()
     assert "speed" in header and "Kraus et al. 2013" in (header + "".join(f.read_text() for f in pathlib.Path(built.folder).glob("*.cpp")))
     assert built.vehicle.instruction_sets[-1] == "generic"  # compiled, not interpreted

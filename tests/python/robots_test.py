@@ -66,7 +66,9 @@ def test_mistakes_in_files_name_file_line_and_key(tmp_path):
     assert (caught.value.file, caught.value.line, caught.value.key) == (str(file), 3, "estimator.horizon")
     with pytest.raises(rhec.Error, match="gone.yaml"):
         rhec.Robot(tmp_path / "gone.yaml")
-    with pytest.raises(rhec.ArgumentError, match="Robot: configuration: found 3, expected the name of a YAML file or a dict"):
+    with pytest.raises(rhec.Error, match="class 'int'"):
+        rhec.Robot(3)
+    with pytest.raises(rhec.ArgumentError, match="Robot: configuration: found an object of the class 'int', expected the name of a YAML file or a dict"):
         rhec.Robot(3)
     with pytest.raises(rhec.Error, match="the key 1, expected a text"):
         rhec.Robot({"model": {1: 2}})
@@ -149,7 +151,7 @@ def test_estimators_are_reset():
 def test_shapes_are_checked():
     driven = Driven()
     for wrong in ([1.0, 2.0], 3.0, numpy.zeros((1, 3)), []):
-        with pytest.raises(rhec.Error, match="outputs: found an array of .*expected 3 numbers.*x_gps, y_gps, delta"):
+        with pytest.raises(rhec.Error, match="outputs: found (an array of .*|one number), expected 3 numbers.*x_gps .*, y_gps .*, delta"):
             driven.estimator.push_measurement(0.0, wrong)
     with pytest.raises(TypeError):
         driven.estimator.push_measurement(0.0, "three")
@@ -198,6 +200,98 @@ def test_what_is_no_row_of_numbers_is_refused():
     numpy.testing.assert_array_equal(hidden.estimate(0.4).state, told.estimate(0.4).state)
     matrix = numpy.asfortranarray(numpy.arange(9.0).reshape(3, 3))
     driven.estimator.push_measurement(0.0, matrix[1])  # neither contiguous nor owned
+
+
+CALLS = {
+    "Estimator.push_measurement: time: found 'a' (str), expected seconds, one number": lambda on: on.estimator.push_measurement("a", [1]),
+    "Estimator.push_measurement: outputs is missing; expected a number for each output, (n_y)": lambda on: on.estimator.push_measurement(1),
+    "Estimator.push_measurement: outputs: found 'abc' (str), expected a number for each": lambda on: on.estimator.push_measurement(1, "abc"),
+    "outputs: found an array of complex128, (3,), expected": lambda on: on.estimator.push_measurement(1, numpy.array([1, 2, 3j])),
+    "outputs: found rows of 1 and 2 entries, expected": lambda on: on.estimator.push_measurement(1, [[1, 2], [3]]),
+    "Estimator.push_input: inputs: found None, expected a number for each input, (n_u), in": lambda on: on.estimator.push_input(1, None),
+    "Estimator.estimate: there is no argument 'deadlin'; did you mean 'deadline'? it is Estimator.estimate(time, deadline=None, *, out=None)":
+        lambda on: on.estimator.estimate(1, deadlin=2),
+    "Estimator.estimate: found 3 arguments without a name, expected at most 2": lambda on: on.estimator.estimate(1, 2, 3),
+    "Estimator.estimate: time is there twice": lambda on: on.estimator.estimate(1, time=2),
+    "Controller.control: estimate: found None, expected an Estimate": lambda on: on.controller.control(None),
+    "Controller.control: deadline: found 'x' (str), expected seconds from now": lambda on: on.controller.control(on.step()[0], "x"),
+    "Controller.control: found 3 (int) before the arguments": lambda on: rhec.Controller.control(3),
+    "Controller: path: found 5 (int), expected a Path": lambda on: on.robot.make_controller(5),
+    "Controller: robot: found an object of the class 'Robot', expected what is inside a Robot; call its make_estimator":
+        lambda on: rhec.Controller(on.robot, line()),
+    "Estimator: initial_state: found 'a' (str), expected a number for each state, (n_x)": lambda on: on.robot.make_estimator("a"),
+    "Vehicle.integrate: substeps: found 1.5 (float), expected a whole number":
+        lambda on: on.robot.vehicle.integrate([0] * 4, [0] * 2, [1, 1], 0.2, 1.5),
+    "Vehicle.integrate: substeps: found 1099511627776 (int), expected a whole number":
+        lambda on: on.robot.vehicle.integrate([0] * 4, [0] * 2, [1, 1], 0.2, 2**40),
+    "Path: waypoints: found 'x' (str), expected rows of x [m], y [m], speed [m/s], (n, 3)": lambda on: rhec.Path("x"),
+    "Path: acceleration: found 'a' (str), expected a number [m/s^2]": lambda on: rhec.Path([(0, 0, 1), (1, 0, 1)], acceleration="a"),
+    "Path.at: arc_length is missing; expected a number [m]: Path.at(arc_length)": lambda on: line().at(),
+    "set: found 5, expected a dict of keys": lambda on: rhec.Robot(ROBOT, set=5),
+    "configuration: found an object of the class 'int'": lambda on: rhec.Robot(5),
+    "plugin_path: found 3, expected a folder or a list of folders": lambda on: rhec.plugins(plugin_path=3),
+    "progress: found 3, expected True, False, None": lambda on: rhec.run(ROBOT.parents[2] / "scenarios" / "figure8.yaml", progress=3),
+}
+
+
+@pytest.mark.parametrize("words", CALLS)
+def test_arguments_that_are_refused_are_named_in_words(words):
+    with pytest.raises(TypeError) as caught:
+        CALLS[words](Driven())
+    assert words in str(caught.value) and "incompatible" not in str(caught.value)
+    assert isinstance(caught.value, rhec.ArgumentError) and isinstance(caught.value, rhec.Error)
+
+
+def test_shapes_that_are_refused_are_named_with_units():
+    driven = Driven()
+    for call, words in (
+            (lambda: driven.estimator.push_measurement(0.0, [1, 2]),
+             "outputs: found an array of 2, expected 3 numbers in one dimension: x_gps [m], y_gps [m], delta [rad]"),
+            (lambda: driven.robot.vehicle.observe([[1, 2]]),
+             "states: found an array of 1 x 2, expected 4 numbers in one dimension, or rows of so many (n x 4): x_pos [m]"),
+            (lambda: rhec.Path([1, 2]), "waypoints: found an array of 2, expected rows of x [m], y [m], speed [m/s] (n x 3)"),
+            (lambda: driven.controller.set_obstacles([[1, 2]], 0.0), "obstacles: found an array of 1 x 2, expected rows of"),
+            (lambda: driven.estimator.reset(1, 2), "reset: found a mean that is one number and a covariance that is one number")):
+        with pytest.raises(rhec.Error) as caught:
+            call()
+        assert str(caught.value).startswith(words)
+
+
+def test_no_rows_are_no_rows():
+    """There is nothing to read of them."""
+    vehicle = rhec.Robot(ROBOT).vehicle
+    none, inputs = numpy.zeros((0, 4)), numpy.zeros((0, 2))
+    assert vehicle.integrate(none, inputs, [1, 1], 0.2).shape == (0, 4)
+    assert vehicle.rates(none, [0, 0], [1, 1]).shape == (0, 4)
+    assert vehicle.integrate(none, inputs, [1, 1], 0.2, with_jacobian=True)[1].shape == (0, 4, 8)
+    assert vehicle.observe(none).shape == (0, 3)
+    with pytest.raises(rhec.Error, match="inputs: found 3 rows, expected 0"):
+        vehicle.rates(none, numpy.zeros((3, 2)), [1, 1])
+
+
+def test_a_configuration_that_contains_itself():
+    configuration = {"step": 0.2}
+    configuration["model"] = configuration
+    with pytest.raises(rhec.Error, match="contains itself"):
+        rhec.Robot(configuration)
+
+
+def test_states_of_motion_are_told():
+    robot = rhec.Robot(ROBOT, set={"model.outputs": ["x_gps", "y_gps", "delta", "yaw_rate"], "noise.outputs.yaw_rate": 0.01})
+    estimator = robot.make_estimator()
+    estimator.push_measurement(0.0, [0, 0, 0, 0])
+    assert len(estimator.estimate(0.0).state) == len(robot.vehicle.states) + 1
+    with pytest.raises(rhec.Error, match="5 states as an Estimate has them, and 2 parameters"):
+        estimator.reset(numpy.zeros(6), numpy.eye(6))
+    estimator.reset(numpy.zeros(7), numpy.eye(7))
+
+
+def test_what_a_callback_raises_stays_as_it_is():
+    def mistaken(share, text):
+        raise TypeError("f(): incompatible function arguments. The following argument types are supported:\n    1. (x: int) -> int")
+    with pytest.raises(TypeError) as caught:
+        rhec.run(ROBOT.parents[2] / "scenarios" / "figure8.yaml", set={"path.laps": 1}, progress=mistaken)
+    assert "incompatible function arguments" in str(caught.value)
 
 
 def test_what_no_estimator_can_begin_with():

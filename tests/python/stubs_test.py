@@ -93,3 +93,21 @@ def test_the_package_passes_mypy():
     result = subprocess.run([sys.executable, "-m", "mypy", "--config-file", str(ROOT / "pyproject.toml"), "--cache-dir", "/dev/null",
                              "-p", "rhec"], cwd=STUB.parent.parent, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stdout
+
+
+def test_every_argument_has_words():
+    """What a call expects is told by name, and each name that is told is one."""
+    from rhec._arguments import MEANINGS
+
+    seen = set()
+    for each in (rhec.Path, rhec.Vehicle, rhec.Estimator, rhec.Controller, rhec.Estimate):
+        for name, value in vars(each).items():
+            text = getattr(value, "__doc__", None) or ""
+            if name.startswith("__") and name not in ("__init__", "__getitem__") or not text.startswith(f"{name}("):
+                continue
+            for parameter in parameters(text):
+                if parameter not in ("self", "*"):
+                    assert parameter in MEANINGS, (each, name, parameter)
+                    seen |= {parameter, f"{each.__name__}.{name}.{parameter}"}
+    inside = {"cold", "covariances", "file", "folder", "solver"}  # of what the package calls itself
+    assert set(MEANINGS) <= seen | inside

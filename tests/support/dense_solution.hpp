@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "rhec/core/qp/riccati.hpp"
 #include "support/random_qp.hpp"
 
 namespace rhec::testing {
@@ -34,6 +35,16 @@ inline void expect_same_as_dense(const StageQp& qp, const ActiveSet& active, con
       ASSERT_NEAR(step.control_bound(i)[j], active.control(i)[j] ? z[size + row++] : 0.0, tolerance);
     }
   }
+}
+
+/// The step of least cost with the bounds of a set held, which is compared with that of the dense system.
+inline void expect_solved(const StageQp& qp, const ActiveSet& active, double tolerance) {
+  Riccati riccati(qp.capacity());
+  Iterate step(qp.capacity());
+  riccati.factor(qp, active);
+  EXPECT_FALSE(riccati.was_convexified());
+  ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
+  expect_same_as_dense(qp, active, step, tolerance);
 }
 
 }  // namespace rhec::testing

@@ -28,6 +28,11 @@ constexpr double longest_hold = 1.0;
 // on without it.
 constexpr double early = 0.25, late = 0.5;
 constexpr std::size_t most_latencies = 100000;
+// A rehearsal ends so long before a step is due. There are no more of them once so many in a row have taken more than
+// this share of the steps: one alone has been interrupted.
+constexpr auto after_rehearsal = std::chrono::microseconds(200);
+constexpr int most_long_rehearsals = 3;
+constexpr double most_of_step = 0.1;
 // Without a step that is due, the loop looks around so often.
 constexpr auto between_looks = std::chrono::milliseconds(100);
 constexpr std::size_t most_events = 1000;
@@ -187,7 +192,32 @@ Clock::time_point Loop::next_look() const {
 /// The computer's time. A time that others tell goes on with their messages, which end any wait.
 Clock::time_point Loop::wait_until() const {
   const bool is_due = estimator_ && !time_.is_simulated();
-  return is_due ? next_look() : Clock::now() + between_looks;
+  if (!is_due) return Clock::now() + between_looks;
+  return may_rehearse() ? std::min(next_look(), expected() - after_rehearsal - rehearsal_) : next_look();
+}
+
+/// When the next step probably begins: a step after the last sample, even where that came early.
+Clock::time_point Loop::expected() const { return std::min(due_, last_received_ + step_); }
+
+/// Between two steps other programs use the processor's caches. What comes just before a step brings code and data
+/// back.
+bool Loop::may_rehearse() const {
+  return !is_triggered_ && rehearsed_ != expected() && long_rehearsals_ < most_long_rehearsals;
+}
+
+void Loop::rehearse() {
+  const Clock::time_point begin = Clock::now();
+  if (begin < expected() - after_rehearsal - rehearsal_) return;
+  rehearsed_ = expected();
+  if (begin > expected() - rehearsal_) return;
+  estimator_->rehearse();
+  const Clock::duration taken = Clock::now() - begin;
+  if (taken > of_step(step_, most_of_step)) {
+    ++long_rehearsals_;
+    return;
+  }
+  rehearsal_ = taken;
+  long_rehearsals_ = 0;
 }
 
 /// Steps lie on a grid, so that quick sensors do not hasten them, which follows sensors that are as quick as the steps:
@@ -211,7 +241,11 @@ void Loop::run() {
       tell_waiting();
       continue;
     }
-    if (time_.instant() >= next_look()) cycle();
+    if (time_.instant() >= next_look()) {
+      cycle();
+    } else if (may_rehearse() && !time_.is_simulated()) {
+      rehearse();
+    }
   }
   if (controller_) controller_->finish();
   if (estimator_) estimator_->end_drive();
@@ -274,6 +308,7 @@ void Loop::begin_if_possible() {
   for (const logs::SignalRow& row : gathered_) push(row);
   gathered_.clear();
   due_ = time_.instant();
+  long_rehearsals_ = 0;
   {
     const std::lock_guard lock(mutex_);
     slip_ahead_ = estimator_->slip_ahead();

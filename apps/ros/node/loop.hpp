@@ -128,6 +128,9 @@ class Loop {
   double time_of(logs::Stamp stamp) const { return logs::seconds_between(start_, stamp); }
   Clock::time_point next_look() const;
   Clock::time_point wait_until() const;
+  Clock::time_point expected() const;
+  bool may_rehearse() const;
+  void rehearse();
   void set_due(Clock::time_point begin, bool was_triggered);
 
   static constexpr auto between_diagnostics = std::chrono::seconds(1);
@@ -154,6 +157,9 @@ class Loop {
   NodeTime time_;
   Clock::time_point gathering_since_, due_, last_measured_, last_received_;  ///< as `time_` has them
   Clock::time_point last_arrival_, told_health_;                             ///< on the computer's clock
+  Clock::time_point rehearsed_;                                              ///< for the step that was due then
+  Clock::duration rehearsal_{};                                              ///< how long one takes
+  int long_rehearsals_ = 0;                                                  ///< in a row
   logs::Stamp start_ = 0;
   bool has_told_standstill_ = false, has_told_waiting_ = false;
   bool is_triggered_ = false, is_stopped_by_topic_ = false, has_driven_ = false, rests_ = true;

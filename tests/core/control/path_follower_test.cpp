@@ -93,6 +93,96 @@ TEST(PathFollower, NeverJumpsBranchesAtACrossing) {
   EXPECT_GT(anywhere.arc_length, path.length() / 4);
 }
 
+// Two tangent circles that are driven in turn, or one alone, from (0, 0) on.
+Path circles(double radius, int circles, bool in_turn, double spacing) {
+  std::vector<Waypoint> waypoints{{0.0, 0.0, {}}};
+  const int count = static_cast<int>(std::ceil(2.0 * pi * radius / spacing));
+  for (int c = 0; c < circles; ++c) {
+    const double side = in_turn && c % 2 == 1 ? -1.0 : 1.0;
+    for (int i = 1; i <= count; ++i) {
+      const double turn = 2.0 * pi * i / count;
+      waypoints.push_back({radius * std::sin(turn), side * radius * (1.0 - std::cos(turn)), {}});
+    }
+  }
+  return Path(waypoints);
+}
+
+/// Follows a vehicle that goes along the path by strides, off it by noise and an offset. The largest error of progress.
+double worst_progress(const Path& path, PathFollower::Window window, double stride, double noise, double offset,
+                      unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> error(0.0, noise);
+  PathFollower follower(path, window);
+  double worst = 0.0;
+  for (double arc_length = 0.0; arc_length < path.length(); arc_length += stride) {
+    const PathPoint point = path.point_at(arc_length);
+    const double x = point.x - offset * std::sin(point.heading) + error(random);
+    const double y = point.y + offset * std::cos(point.heading) + error(random);
+    worst = std::max(worst, std::abs(follower.advance(x, y) - arc_length));
+  }
+  return worst;
+}
+
+TEST(PathFollower, SkipsNoLapOfCirclesShorterThanItsWindow) {
+  for (const double radius : {0.15, 0.3, 0.7, 0.95, 1.3, 3.0})
+    for (const bool in_turn : {false, true}) {
+      const Path path = circles(radius, 6, in_turn, 0.1 * radius);
+      for (unsigned seed = 0; seed < 3; ++seed)
+        for (const double share : {0.02, 0.1, 0.25})          // strides, in radii
+          for (const double offset : {-0.4, -0.2, 0.0, 0.3})  // beside the path, in radii
+            ASSERT_LT(worst_progress(path, {}, share * radius, 0.05 * radius, in_turn ? 0.0 : offset * radius, seed),
+                      0.5 * radius)
+                << "radius " << radius << " m, stride " << share << ", offset " << offset << ", seed " << seed;
+    }
+}
+
+TEST(PathFollower, IsOnTheSameLapAsSeenFromFarOutside) {
+  const Path path = circles(0.3, 6, false, 0.03);
+  PathFollower follower(path);
+  for (double turn = 0.0; turn < 12.0 * pi - 0.1; turn += 0.1)
+    ASSERT_NEAR(follower.advance(1.5 * std::sin(turn), 0.3 - 1.5 * std::cos(turn)), 0.3 * turn, 0.03);
+}
+
+TEST(PathFollower, PassesWhatIsSmallerThanItsStride) {
+  // Waypoints of a vehicle that waited: noise about one place, which makes the path longer by metres.
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  std::vector<Waypoint> waypoints;
+  for (int i = 0; i <= 300; ++i) {
+    const double x = i < 100 ? 0.05 * i : i < 200 ? 5.0 : 5.0 + 0.05 * (i - 200);
+    waypoints.push_back({x + noise(random), noise(random), 1.0});
+  }
+  const Path path(waypoints);
+  PathFollower follower(path);
+  for (double x = 0.0; x <= 10.0; x += 0.2) {
+    const PathPoint place = path.point_at(follower.advance(x, 0.1));
+    ASSERT_NEAR(place.x, x, 0.15) << "at " << x;
+  }
+}
+
+TEST(PathFollower, GetsBehindTheSharpestTurn) {
+  for (const double degrees : {60.0, 120.0, 145.0}) {
+    const double turn = degrees * pi / 180.0;
+    const Path path({{0, 0, 1.0}, {10, 0, 1.0}, {10 + 10 * std::cos(turn), 10 * std::sin(turn), 1.0}});
+    PathFollower follower(path);
+    follower.advance(9.0, 0.0);
+    follower.advance(9.3, 0.2);  // cuts the corner
+    for (double on = 1.0; on < 5.0; on += 0.2)
+      ASSERT_NEAR(follower.advance(10 + on * std::cos(turn), on * std::sin(turn)), 10.0 + on, 1e-9) << degrees;
+  }
+}
+
+TEST(PathFollower, FindsAVehicleThatJumpedAhead) {
+  std::vector<Waypoint> waypoints;
+  for (int i = 0; i <= 1000; ++i) waypoints.push_back({0.1 * i, std::sin(0.05 * i), {}});
+  const Path path(waypoints);
+  PathFollower follower(path);
+  follower.advance(10.0, std::sin(5.0));
+  const double before = follower.arc_length();
+  const PathPoint ahead = path.point_at(before + 6.0);
+  EXPECT_NEAR(follower.advance(ahead.x + 0.1, ahead.y), before + 6.0, 0.2);
+}
+
 TEST(PathFollower, ResultDoesNotDependOnResolution) {
   // A straight line with few and with many waypoints; the window cuts the long segments.
   std::vector<Waypoint> fine;

@@ -135,6 +135,7 @@ long allocations_in_the_loop(const Options& options) {
     fallbacks += estimate.fallback;
     const Controller::Command& command = controller.control(estimate);
     if (k % 2) estimator.prepare();
+    if (k % 5 == 0) estimator.rehearse();
     if (k % 3) controller.prepare();
     if (k % 5 == 4) estimator.push_measurement(time - 0.4, outputs.data());  // late
     vehicle.advance(command.inputs.data(), 0.2);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "support/bank_case.hpp"
+#include "support/turntable.hpp"
 
 namespace rhec {
 namespace bank_history_test {
@@ -50,6 +51,39 @@ TEST(BankHistory, UsesLateMeasurementsAsIfTheyHadComeInTime) {
     for (int k = 40 - late + 1; k <= 40; ++k) ASSERT_TRUE(too_late.amend(40 - k, samples[k].outputs.data()));
     EXPECT_LT(difference(in_time, too_late), 1e-12) << late;
   }
+}
+
+/// Outputs of motion decide where the interval before them is linearised, and so do late ones.
+TEST(BankHistory, LinearisesAnewForLateOutputsOfMotion) {
+  const TurntableNoise noise{.gyro = 0.01};
+  const auto history = [&] {
+    PriorBank::Setup setup;
+    setup.members = {{prior("walk", "{sigma: 0.1, along: time}")}, {prior("constant", "{}")}};
+    setup.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro};
+    setup.input_variances = {noise.omega * noise.omega};
+    setup.motion_outputs = {1};
+    BankHistory made(PriorBank(turntable(), setup), 8);
+    made.bank().reset(Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity());
+    return made;
+  };
+  BankHistory in_time = history(), late = history(), never = history();
+  const double nothing[] = {nan, nan};
+  for (BankHistory* each : {&in_time, &late, &never}) each->start(nothing);
+  double read[2] = {nan, nan};
+  for (int k = 1; k <= 30; ++k) {
+    const double omega = 0.2 * std::sin(0.4 * k), before = read[1];
+    read[1] = 0.15 * std::sin(0.4 * k) + 0.02 * std::cos(7.0 * k);
+    in_time.add({.duration = 0.2, .inputs = &omega}, read);
+    late.add({.duration = 0.2, .inputs = &omega}, nothing);
+    never.add({.duration = 0.2, .inputs = &omega}, nothing);
+    const double of_before[] = {nan, before};
+    if (k > 1) {
+      ASSERT_TRUE(late.amend(1, of_before));
+    }
+  }
+  ASSERT_TRUE(late.amend(0, read));
+  EXPECT_LT(difference(in_time, late), 1e-12);
+  EXPECT_GT(difference(in_time, never), 1e-3);
 }
 
 TEST(BankHistory, ForgetsWhatIsOlderThanItsNodes) {

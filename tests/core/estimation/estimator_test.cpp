@@ -408,22 +408,33 @@ TEST_F(Timeline, WhatADeadlineLeavesNoTimeForWaits) {
   push_all();
   estimator.estimate(0.2 * rows);
   const std::vector<double> expected = durations();
-  estimator = make({.longest_interval = 0.2});
+  estimator = make({.longest_interval = 0.2, .grace = 0.0});
   push_all();
   const Clock::time_point past = Clock::now() - std::chrono::seconds(1);
   std::size_t calls = 0, nodes = 0;
   for (; estimator.estimate(0.2 * rows, past).report.status == Status::deadline && calls < rows; ++calls) {
     EXPECT_GT(recorder->nodes.size(), nodes);
-    EXPECT_LE(recorder->nodes.size(), nodes + 4);
+    EXPECT_LE(recorder->nodes.size(), nodes + 2);
     nodes = recorder->nodes.size();
   }
   EXPECT_GT(calls, 10u);
   EXPECT_EQ(durations(), expected);
 }
 
+/// However late it is, a call goes on for a while with what waits.
+TEST_F(Timeline, ACallThatIsLateHasAGrace) {
+  constexpr int rows = 60;
+  estimator = make({.longest_interval = 0.2, .grace = 1.0});
+  for (int k = 0; k < rows; ++k) measure(0.2 * k, k);
+  const Estimate& estimate = estimator.estimate(0.2 * rows, Clock::now() - std::chrono::seconds(1));
+  EXPECT_NE(estimate.report.status, Status::deadline);
+  EXPECT_GE(recorder->nodes.size(), std::size_t{rows});
+}
+
 /// A gap whose nodes are not all made yet is not begun anew; a measurement within the rest of it divides it anew.
 TEST_F(Timeline, AGapIsGoneThroughInPieces) {
   constexpr double end = 40.0;
+  estimator = make({.longest_interval = 0.2, .grace = 0.0});
   const Clock::time_point past = Clock::now() - std::chrono::seconds(1);
   measure(0.0, 1.0);
   estimator.estimate(0.0);
@@ -490,6 +501,8 @@ TEST_F(Timeline, RefusesNumbersThatMakeNoSense) {
   EXPECT_THAT(message({.tolerance = -1.0}), HasSubstr("tolerance"));
   EXPECT_THAT(message({.tolerance = 0.5}), HasSubstr("tolerance"));
   EXPECT_THAT(message({.capacity = 0}), HasSubstr("capacity"));
+  EXPECT_THAT(message({.grace = -1e-3}), HasSubstr("grace"));
+  EXPECT_THAT(message({.grace = nan}), HasSubstr("grace"));
 }
 
 TEST(Integration, IsHeldAgainstTwiceAsManySteps) {

@@ -203,8 +203,11 @@ TEST(FilterEstimation, FindsABiasThatDriftsAsTheFilterByHandDoes) {
   const Eigen::MatrixXd covariance = Eigen::Vector4d(1.0, 1.0, 0.25, 9.0).asDiagonal();
 
   FilterEstimation::Setup of_filter;
-  of_filter.noise = {
-      {of_position * of_position, of_acceleration * of_acceleration}, {of_input * of_input, drift * drift}, {}, {}};
+  of_filter.noise = {{of_position * of_position, of_acceleration * of_acceleration},
+                     {of_input * of_input, drift * drift},
+                     {},
+                     {},
+                     {1}};
   of_filter.initial_mean = mean;
   of_filter.initial_covariance = covariance;
   FilterEstimation filter(model, of_filter);
@@ -220,6 +223,7 @@ TEST(FilterEstimation, FindsABiasThatDriftsAsTheFilterByHandDoes) {
   of_bank.members = {PriorCombination{}};
   of_bank.output_variances = of_filter.noise.output_variances;
   of_bank.input_variances = of_filter.noise.input_variances;
+  of_bank.motion_outputs = {1};
   of_bank.adapts_noise = false;
   PriorBank bank(model, of_bank);
   bank.reset(mean, covariance);
@@ -244,7 +248,7 @@ TEST(FilterEstimation, FindsABiasThatDriftsAsTheFilterByHandDoes) {
     by_hand.predict(*trolley, duration, inputs[0], of_input, drift);
     by_hand.update({1.0, 0.0, 0.0, 0.0}, outputs[0], of_position);
     if (!std::isnan(outputs[1])) by_hand.update({-0.4, -0.2, 1.0, 1.0}, outputs[1], of_acceleration);
-    bank.predict(inputs, duration);
+    bank.predict({.duration = duration, .inputs = inputs}, outputs);
     bank.update(outputs);
     bank.moments(bank_mean, bank_covariance);
     correlated.advance(*trolley, duration, inputs[0], outputs, of_input, drift, {of_position, of_acceleration});

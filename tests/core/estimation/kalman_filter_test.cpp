@@ -5,9 +5,13 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
 
 #include "support/cart.hpp"
 #include "support/linear_case.hpp"
+#include "support/turntable.hpp"
 
 namespace rhec {
 namespace kalman_filter_test {
@@ -124,6 +128,105 @@ TEST(KalmanFilter, KeepsItsParametersWithinTheirBounds) {
     EXPECT_LE(filter.mean[2], 0.5) << k;
   }
   EXPECT_EQ(filter.mean[2], 0.0);
+}
+
+KalmanFilter turntable_filter(const TurntableNoise& noise, bool looks_ahead) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  KalmanFilter filter(turntable(),
+                      {.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro},
+                       .input_variances = {noise.omega * noise.omega},
+                       .parameter_lower = {-infinity},
+                       .parameter_upper = {infinity},
+                       .motion_outputs = looks_ahead ? std::vector{1} : std::vector<int>{}},
+                      1);
+  filter.mean << 0.0, 0.0, 0.75;
+  filter.covariance = Eigen::Vector3d(1e-4, 1.0, noise.kappa * noise.kappa).asDiagonal();
+  return filter;
+}
+
+/// One interval at whose end the gyro is read: what is left is a sum of three squares in kappa and omega.
+TEST(KalmanFilter, IsTheMinimiserOfAnIntervalWithAnOutputOfMotion) {
+  const TurntableNoise noise{.gyro = 0.02, .omega = 0.2};
+  const double zero = 0.0, nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double omega : {-0.3, -0.02, 0.1, 0.5}) {
+    for (const double gyro : {-0.1, 0.01, 0.3}) {
+      KalmanFilter filter = turntable_filter(noise, true);
+      const double outputs[] = {nan, gyro};
+      filter.predict({.duration = 0.2, .inputs = &omega}, &zero, nullptr, nullptr, outputs);
+      filter.update(outputs, nullptr);
+      Eigen::Vector2d at(0.75, omega);
+      Eigen::Matrix2d information;
+      for (int step = 0; step < 100; ++step) {
+        const Eigen::Vector3d residuals((at[0] - 0.75) / noise.kappa, (at[1] - omega) / noise.omega,
+                                        (at[0] * at[1] - gyro) / noise.gyro);
+        Eigen::Matrix<double, 3, 2> J;
+        J << 1.0 / noise.kappa, 0.0, 0.0, 1.0 / noise.omega, at[1] / noise.gyro, at[0] / noise.gyro;
+        information = J.transpose() * J;
+        at -= information.inverse() * J.transpose() * residuals;
+      }
+      const double sigma = std::sqrt(information.inverse()(0, 0));
+      EXPECT_NEAR(filter.mean[2], at[0], 0.05 * sigma) << omega << ", " << gyro;
+      EXPECT_NEAR(std::sqrt(filter.covariance(2, 2)) / sigma, 1.0, 0.05) << omega << ", " << gyro;
+    }
+  }
+}
+
+/// The drive stands, so that the gyro tells nothing of traction. Linearised about what the drive's encoder reads, its
+/// noise passes for motion.
+TEST(KalmanFilter, DoesNotTakeTheNoiseOfAnInputForKnowledge) {
+  const TurntableNoise noise;
+  const double zero = 0.0;
+  const auto share_within_two_sigmas = [&](bool looks_ahead) {
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> normal;
+    int within = 0, count = 0;
+    for (int drive = 0; drive < 40; ++drive) {
+      const double kappa = 0.75 + noise.kappa * normal(random);
+      KalmanFilter filter = turntable_filter(noise, looks_ahead);
+      for (int k = 0; k < 100; ++k) {
+        const double omega = noise.omega * normal(random);
+        const double outputs[] = {noise.angle * normal(random), noise.gyro * normal(random)};
+        filter.predict({.duration = 0.2, .inputs = &omega}, &zero, nullptr, nullptr, outputs);
+        filter.update(outputs, nullptr);
+        within += std::abs(filter.mean[2] - kappa) < 2.0 * std::sqrt(filter.covariance(2, 2));
+        ++count;
+      }
+    }
+    return static_cast<double>(within) / count;
+  };
+  EXPECT_GT(share_within_two_sigmas(true), 0.85);
+  EXPECT_LT(share_within_two_sigmas(false), 0.3) << "otherwise the case shows nothing";
+}
+
+/// Between two nodes as at them.
+TEST(KalmanFilter, LinearisesMeasurementsBetweenNodesWhereTheyPutTheInterval) {
+  const TurntableNoise noise;
+  const double zero = 0.0, omega = 0.04, nan = std::numeric_limits<double>::quiet_NaN(), time = 0.2 - 1e-9;
+  const double read[] = {nan, 0.001}, nothing[] = {nan, nan};
+  KalmanFilter at_node = turntable_filter(noise, true), between(turntable(), at_node.noise(), 1, true);
+  between.mean = at_node.mean;
+  between.covariance = at_node.covariance;
+  at_node.predict({.duration = 0.2, .inputs = &omega}, &zero, nullptr, nullptr, read);
+  at_node.update(read, nullptr);
+  between.predict({.duration = 0.2, .inputs = &omega, .between = 1, .times = &time, .outputs = read}, &zero, nullptr,
+                  nullptr, nothing);
+  between.update(nothing, nullptr);
+  const double sigma = std::sqrt(at_node.covariance(2, 2));
+  EXPECT_GT(sigma, 0.9 * noise.kappa) << "the drive may well stand";
+  EXPECT_NEAR(between.mean[2], at_node.mean[2], 0.02 * sigma);
+  EXPECT_NEAR(std::sqrt(between.covariance(2, 2)) / sigma, 1.0, 0.02);
+}
+
+TEST(KalmanFilter, IsNotMovedFarByAGyroThatLies) {
+  const TurntableNoise noise;
+  const double zero = 0.0, omega = 0.1;
+  const double lie[] = {0.0, 1e6}, infinite[] = {0.0, std::numeric_limits<double>::infinity()};
+  for (const double* outputs : {lie, infinite}) {
+    KalmanFilter filter = turntable_filter(noise, true);
+    filter.predict({.duration = 0.2, .inputs = &omega}, &zero, nullptr, nullptr, outputs);
+    EXPECT_NEAR(filter.mean[0], 0.2 * 0.75 * omega, 0.1);
+    EXPECT_TRUE(filter.covariance.allFinite());
+  }
 }
 
 }  // namespace kalman_filter_test

@@ -11,10 +11,12 @@
 #include <vector>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/kalman_filter.hpp"
 #include "rhec/core/model/formula_model.hpp"
 #include "rhec/core/prior/standard_bank.hpp"
 #include "support/bank_case.hpp"
 #include "support/error_of.hpp"
+#include "support/turntable.hpp"
 
 namespace rhec {
 namespace prior_bank_test {
@@ -359,6 +361,47 @@ TEST(PriorBank, WeighsItsMembersByAnyNumberOfOutputs) {
     bank.update(y.data());
   }
   EXPECT_GT(bank.weights()[0], 0.9);
+}
+
+/// With outputs of motion, at nodes and between them, a member is linearised where the Kalman filter is.
+TEST(PriorBank, IsTheKalmanFilterWithOutputsOfMotion) {
+  constexpr double sigma = 0.05, nan = std::numeric_limits<double>::quiet_NaN();
+  const TurntableNoise noise{.gyro = 0.01};
+  const auto model = turntable();
+  PriorBank::Setup setup;
+  setup.members = {{prior("walk", "{sigma: 0.05, along: time, course: ramp}")}};
+  setup.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro};
+  setup.input_variances = {noise.omega * noise.omega};
+  setup.most_between = 2;
+  setup.motion_outputs = {1};
+  PriorBank bank(model, setup);
+  const double infinity = std::numeric_limits<double>::infinity();
+  KalmanFilter filter(model, {setup.output_variances, setup.input_variances, {-infinity}, {infinity}, {1}}, 1, true);
+  const Eigen::Vector2d start(0.1, 0.0);
+  const Eigen::Matrix2d spread = Eigen::Vector2d(0.01, 1.0).asDiagonal();
+  bank.reset(start, spread);
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+  bank.moments(mean, covariance);
+  filter.mean = mean;
+  filter.covariance = covariance;
+  EXPECT_TRUE(bank.looks_ahead());
+  for (int k = 1; k <= 60; ++k) {
+    const double duration = 0.2, omega = 0.3 * std::sin(0.1 * k) + 0.05 * std::cos(5.0 * k), zero = 0.0,
+                 ramp = sigma * sigma * duration;
+    const double outputs[] = {0.3 * k * duration,
+                              k % 5 == 0 ? nan : 0.2 * std::sin(0.1 * k) + 0.01 * std::sin(9.0 * k)};
+    const double times[] = {0.05, 0.15}, between[] = {nan, 0.2 * std::sin(0.1 * k - 0.05), 0.3 * k * duration, nan};
+    const MeasuredInterval interval{
+        .duration = duration, .inputs = &omega, .between = k % 3 == 0 ? 2 : 0, .times = times, .outputs = between};
+    bank.predict(interval, outputs);
+    filter.predict(interval, &zero, &ramp, nullptr, outputs);
+    bank.update(outputs);
+    filter.update(outputs, nullptr);
+    bank.moments(mean, covariance);
+    ASSERT_LT(largest(mean - filter.mean), 1e-9) << k;
+    ASSERT_LT(largest(covariance - filter.covariance), 1e-9 * (1.0 + largest(covariance))) << k;
+  }
 }
 
 TEST(PriorBank, RefusesWhatDoesNotFit) {

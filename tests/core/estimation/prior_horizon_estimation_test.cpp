@@ -256,6 +256,32 @@ TEST(PriorHorizonEstimation, DoesNotNeedToBeAskedAtEveryNode) {
   }
 }
 
+/// A rehearsal changes no bit of what follows, whatever comes next: a node, more of the newest one, or one taken back.
+TEST(PriorHorizonEstimation, RehearsesWithoutEffect) {
+  const auto model = linear_model<Hovercraft>();
+  const auto samples = samples_of(*model, 40, 9);
+  PriorHorizonEstimation with = estimation_for(model, 6, linear_priors()),
+                         without = estimation_for(model, 6, linear_priors());
+  Estimate a = empty_estimate(*model), b = a;
+  with.rehearse();
+  for (PriorHorizonEstimation* each : {&with, &without}) each->start(samples[0].outputs.data());
+  with.rehearse();
+  for (int k = 1; k <= 40; ++k) {
+    for (PriorHorizonEstimation* each : {&with, &without}) {
+      each->add_node(samples[k].duration, samples[k].inputs.data(), samples[k].outputs.data());
+      each->estimate(each == &with ? a : b, Clock::time_point::max());
+      if (each == &with) each->rehearse();
+      if (k % 5 == 0) each->add_node(0.0, samples[k].inputs.data(), samples[k - 1].outputs.data());
+      if (k % 7 == 0) each->rewind(1);
+      if (k % 5 == 0 || k % 7 == 0) each->estimate(each == &with ? a : b, Clock::time_point::max());
+      if (each == &with && k % 3 == 0) each->rehearse();
+    }
+    ASSERT_EQ(a.state, b.state) << k;
+    ASSERT_EQ(a.parameters, b.parameters) << k;
+    ASSERT_EQ(a.covariance, b.covariance) << k;
+  }
+}
+
 TEST(PriorHorizonEstimation, SurvivesMeasurementsThatAreNoNumbers) {
   const auto model = linear_model<Hovercraft>();
   const auto samples = samples_of(*model, 20, 9);

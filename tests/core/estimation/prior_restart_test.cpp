@@ -4,6 +4,8 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "rhec/core/ocp/solver_decorator.hpp"
@@ -124,6 +126,30 @@ TEST_F(PriorRestartTest, TakesThePriorWhereNothingIsBetter) {
   EXPECT_FALSE(reconsider(true, Status::bad_input));
   EXPECT_EQ(report_.status, Status::bad_input);
   EXPECT_EQ(found_, prior_.state(0)[0]);
+}
+
+/// Seven nodes of three outputs, some of which are missing: chi-square with as many degrees of freedom.
+TEST_F(PriorRestartTest, IsConvincedByWhatExplainsTheMeasurements) {
+  Report report;
+  report.status = Status::step_taken;
+  int measured = 0;
+  for (int i = 0; i <= 6; ++i)
+    for (int j = 0; j < 3; ++j) measured += !std::isnan(problem_.output(i)[j]);
+  ASSERT_GT(measured, 10);
+  report.objective = measured;
+  EXPECT_TRUE(PriorRestart::is_convincing(problem_, report));
+  report.objective = measured + 3.1 * std::sqrt(2.0 * measured);
+  EXPECT_FALSE(PriorRestart::is_convincing(problem_, report));
+  std::fill_n(problem_.output(2), 3, std::numeric_limits<double>::quiet_NaN());
+  report.objective = measured + 2.9 * std::sqrt(2.0 * measured);
+  EXPECT_FALSE(PriorRestart::is_convincing(problem_, report)) << "fewer measurements";
+  report.objective = 1.0;
+  EXPECT_TRUE(PriorRestart::is_convincing(problem_, report));
+  report.kkt.defect = 0.1;
+  EXPECT_FALSE(PriorRestart::is_convincing(problem_, report)) << "an objective that defects have made";
+  report.kkt.defect = 0.0;
+  report.status = Status::bad_input;
+  EXPECT_FALSE(PriorRestart::is_convincing(problem_, report));
 }
 
 }  // namespace prior_restart_test

@@ -2,11 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <random>
 #include <vector>
 
 #include <Eigen/Dense>
+
+#include "rhec/core/kernels/kernel_sets.hpp"
+#include "rhec/core/kernels/transcription_kernels.hpp"
 
 namespace rhec {
 namespace point_sums_test {
@@ -58,12 +64,12 @@ void compare(int measurements, const std::vector<double>& weights_of_outputs) {
     return Eigen::Map<const Eigen::VectorXd>(said.data() + k * step + 3 + j * width, width);
   };
   alignas(64) double memory[2000];
-  ASSERT_LE(PointSums::size(outputs, width), std::size(memory));
-  PointSums sums(points, outputs, width, memory);
+  ASSERT_LE(PointSums::size(outputs), std::size(memory));
+  PointSums sums(points, outputs, memory);
   sums.begin(said.data(), step);
   sums.begin_weights();
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(width, width), own_H = H;
-  Eigen::VectorXd h = Eigen::VectorXd::Zero(width), own_h = h, own_h_alone = h;
+  Eigen::VectorXd h = Eigen::VectorXd::Zero(width), own_h = h;
   std::vector<double> weights(weights_of_outputs), pulls(weights.size());
   for (int m = 0; m < measurements; ++m) {
     double parts[padded(PointSums::most_points)];
@@ -86,32 +92,145 @@ void compare(int measurements, const std::vector<double>& weights_of_outputs) {
     EXPECT_NEAR(predicted[0], expected, 1e-13);
   }
   for (int j = 0; j < outputs; ++j) {
-    const double* const first = said.data() + 3 + j * width;
-    const auto row_of = [&](const PointSums::Rows& rows, int k) {
-      return Eigen::Map<const Eigen::VectorXd>(rows.rows + k * width, width);
-    };
-    const PointSums::Rows alone = sums.rows(j, first, step, nullptr);
-    EXPECT_EQ(alone.weights, nullptr);
-    for (int k = 0; k < points; ++k) own_h_alone += alone.pulls[k] * row_of(alone, k);
-    double room[PointSums::Factors::size];
-    const PointSums::Factors factors(room);
-    sums.factor(j, factors);
-    const PointSums::Rows rows = sums.rows(j, first, step, &factors);
-    for (int k = 0; k < points; ++k) {
-      EXPECT_GE(rows.weights[k], 0.0);
-      own_H += rows.weights[k] * row_of(rows, k) * row_of(rows, k).transpose();
-      own_h += rows.pulls[k] * row_of(rows, k);
+    double room[PointSums::Kept::size];
+    const PointSums::Kept kept(room);
+    sums.keep_weights(j, kept);
+    for (int k = 0; k < points; ++k)
+      for (int l = 0; l < points; ++l)
+        own_H += kept.weights()[k * PointSums::row + l] * gradients(k, j) * gradients(l, j).transpose();
+    for (int k = 0; k < points; ++k) own_h += sums.pulls(j)[k] * gradients(k, j);
+    // The same by kernels, for every instruction set that runs here.
+    for (const KernelSet& set : runnable_kernels()) {
+      Eigen::MatrixXd by_kernel = Eigen::MatrixXd::Zero(width, width);
+      Eigen::VectorXd h_by_kernel = Eigen::VectorXd::Zero(width), h_alone = h_by_kernel;
+      const SumsView view{said.data() + 3 + j * width, step, points, kept.weights(), PointSums::row, sums.pulls(j)};
+      set.transcription->add_sums(view, width - 1, width, by_kernel.data(), h_by_kernel.data());
+      set.transcription->add_sums(view, width - 1, width, nullptr, h_alone.data());
+      Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(width, width);
+      for (int k = 0; k < points; ++k)
+        for (int l = 0; l < points; ++l)
+          expected += kept.weights()[k * PointSums::row + l] * gradients(k, j) * gradients(l, j).transpose();
+      EXPECT_LE((by_kernel - expected).leftCols(width - 1).cwiseAbs().maxCoeff(),
+                1e-12 * (1e-300 + expected.cwiseAbs().maxCoeff()));
+      EXPECT_EQ(by_kernel.col(width - 1).cwiseAbs().maxCoeff(), 0.0) << "a column that is not there";
+      EXPECT_EQ(h_by_kernel, h_alone);
+      Eigen::VectorXd expected_h = Eigen::VectorXd::Zero(width);
+      for (int k = 0; k < points; ++k) expected_h += sums.pulls(j)[k] * gradients(k, j);
+      EXPECT_LE((h_alone - expected_h).cwiseAbs().maxCoeff(), 1e-12 * (1e-300 + expected_h.cwiseAbs().maxCoeff()));
     }
   }
   EXPECT_LE((own_H - H).cwiseAbs().maxCoeff(), 1e-11 * H.cwiseAbs().maxCoeff());
   EXPECT_LE((own_h - h).cwiseAbs().maxCoeff(), 1e-11 * (1.0 + h.cwiseAbs().maxCoeff()));
-  EXPECT_LE((own_h_alone - h).cwiseAbs().maxCoeff(), 1e-11 * (1.0 + h.cwiseAbs().maxCoeff()));
 }
 
 TEST(PointSums, AreTheProductsOfAllRows) {
   compare(20, {400.0, 1e4, 30.0});
   compare(5, {1.0, 1e-6});
   compare(300, {1e8, 0.0, 2.0});
+}
+
+/// Cost and pulls of measurements of one output where the model says `said` at the points, one after the other.
+struct Quadratic {
+  static constexpr int points = 5;
+  std::vector<double> shares = PointSums::shares(points), weights, measured;
+  double period = 0.0;
+
+  double add_up(const std::vector<double>& said, PointSums& sums, double& largest) const {
+    double cost = 0.0;
+    largest = 0.0;
+    sums.begin(said.data(), 1);
+    sums.begin_weights();
+    for (std::size_t m = 0; m < measured.size(); ++m) {
+      double parts[padded(PointSums::most_points)], predicted;
+      PointSums::write_parts(shares.data(), points,
+                             (static_cast<double>(m) + 0.5) / static_cast<double>(measured.size()), parts);
+      sums.predict(parts, &predicted);
+      double residual = predicted - measured[m];
+      if (period > 0.0) residual -= period * std::round(residual / period);
+      const double weight = weights[m], pull = weight * residual;
+      sums.add_pulls(parts, &pull);
+      sums.add_weights(parts, &weight);
+      cost += 0.5 * weight * residual * residual;
+      largest = std::max(largest, std::abs(residual));
+    }
+    return cost;
+  }
+};
+
+class KeptSums : public ::testing::Test {
+ protected:
+  KeptSums() : sums_(Quadratic::points, 1, memory_), again_(Quadratic::points, 1, more_memory_) {
+    std::mt19937 generator(3);
+    std::normal_distribution<double> normal;
+    for (int m = 0; m < 20; ++m) {
+      data_.weights.push_back(m == 7 ? 0.0 : 2.0 + 0.1 * m);
+      data_.measured.push_back(1000.0 + 0.3 * m + 0.1 * normal(generator));
+    }
+    for (const double share : data_.shares) said_.push_back(1000.0 + 6.0 * share);
+  }
+  void keep(const std::vector<double>& said) {
+    double largest = 0.0;
+    const double cost = data_.add_up(said, sums_, largest);
+    sums_.keep(0, cost, largest, kept_);
+  }
+  bool revise(const std::vector<double>& said) {
+    sums_.begin(said.data(), 1);
+    return sums_.revise(0, kept_, data_.period, cost_);
+  }
+  /// Whether the revised sums are those of all measurements.
+  void expect_same(const std::vector<double>& said, double tolerance) {
+    double largest = 0.0;
+    const double cost = data_.add_up(said, again_, largest);
+    EXPECT_NEAR(cost_, cost, tolerance * cost);
+    double scale = 0.0;
+    for (int k = 0; k < Quadratic::points; ++k) scale = std::max(scale, std::abs(again_.pulls(0)[k]));
+    for (int k = 0; k < Quadratic::points; ++k) EXPECT_NEAR(sums_.pulls(0)[k], again_.pulls(0)[k], tolerance * scale);
+  }
+
+  alignas(64) double memory_[500], more_memory_[500], room_[PointSums::Kept::size];
+  Quadratic data_;
+  PointSums sums_, again_;
+  PointSums::Kept kept_{room_};
+  std::vector<double> said_;
+  double cost_ = 0.0;
+};
+
+TEST_F(KeptSums, AreThoseOfAllMeasurementsWhateverTheModelSays) {
+  keep(said_);
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal;
+  for (const double size : {0.0, 1e-6, 0.01, 1.0, 100.0}) {
+    std::vector<double> said = said_;
+    for (double& value : said) value += size * normal(generator);
+    ASSERT_TRUE(revise(said)) << size;
+    expect_same(said, 1e-9);
+  }
+}
+
+TEST_F(KeptSums, AreFormedAnewWhereRoundingMatters) {
+  std::vector<double> far = said_;
+  for (double& value : far) value += 1e4;
+  keep(far);
+  EXPECT_FALSE(revise(said_));
+  for (double& value : far) value += 10.0;
+  EXPECT_TRUE(revise(far));
+  said_[2] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(revise(said_));
+}
+
+TEST_F(KeptSums, KnowHowFarAnAngleMayTurn) {
+  data_.period = 2.0 * std::numbers::pi;
+  data_.measured.assign(data_.measured.size(), 3.1);
+  std::vector<double> said(Quadratic::points, -3.1);
+  keep(said);
+  for (const double turn : {0.1, 0.5, 1.2}) {
+    std::vector<double> turned = said;
+    for (double& value : turned) value += turn;
+    ASSERT_TRUE(revise(turned)) << turn;
+    expect_same(turned, 1e-9);
+  }
+  for (double& value : said) value += 2.9;
+  EXPECT_FALSE(revise(said)) << "the nearest turn is another one for some, perhaps";
 }
 
 }  // namespace point_sums_test

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <limits>
 #include <numbers>
 
 #include "rhec/core/base/aligned.hpp"
@@ -179,6 +181,52 @@ TEST_P(BankKernelsTest, UpdateAsTheTextbookDoes) {
   }
 }
 
+TEST_P(BankKernelsTest, MovePointsToTheMeanGivenTheOutputs) {
+  constexpr double gate = 1.5;
+  for (const KernelSet& set : runnable_kernels()) {
+    RandomQp random(GetParam());
+    RandomBank bank(random);
+    const int n = bank.n, count = random.integer(1, std::min(3, n));
+    AlignedDoubles point(static_cast<std::size_t>(n) * bank.members), moved(bank.members, -1.0);
+    std::vector<Eigen::VectorXd> points;
+    for (int m = 0; m < bank.members; ++m) {
+      points.emplace_back(RandomBank::matrix(random, n, 1));
+      bank.put(points.back(), point, m);
+    }
+    std::vector<AlignedDoubles> predicted(count), gradients(count), noises(count);
+    std::vector<BankOutput> outputs;
+    std::vector<Eigen::MatrixXd> H(bank.members, Eigen::MatrixXd::Zero(count, n));
+    std::vector<Eigen::VectorXd> innovations(bank.members, Eigen::VectorXd::Zero(count)), noise = innovations;
+    for (int j = 0; j < count; ++j) {
+      predicted[j].assign(bank.members, 0.0);
+      noises[j].assign(bank.members, 0.0);
+      gradients[j].assign(static_cast<std::size_t>(bank.nx) * bank.members, 0.0);
+      const double measured = random.uniform(-1.0, 1.0);
+      outputs.push_back({predicted[j].data(), gradients[j].data(), noises[j].data(), measured, 0.0});
+      for (int m = 0; m < bank.members; ++m) {
+        predicted[j][m] = random.uniform(-1.0, 1.0);
+        noise[m][j] = noises[j][m] = random.uniform(0.01, 1.0);
+        H[m].row(j).head(bank.nx) = RandomBank::matrix(random, 1, bank.nx);
+        bank.put(H[m].row(j).head(bank.nx).transpose(), gradients[j], m);
+        innovations[m][j] = measured - predicted[j][m] - H[m].row(j).dot(bank.means[m] - points[m]);
+      }
+    }
+    const AlignedDoubles mean = bank.mean, covariance = bank.covariance;
+    set.bank->move_point(bank.view(), outputs.data(), count, gate, point.data(), moved.data());
+    EXPECT_EQ(bank.mean, mean) << set.instruction_set;
+    EXPECT_EQ(bank.covariance, covariance) << set.instruction_set;
+    for (int m = 0; m < bank.members; ++m) {
+      const Eigen::MatrixXd& P = bank.covariances[m];
+      Eigen::MatrixXd S = H[m] * P * H[m].transpose();
+      S.diagonal() = (S.diagonal() + noise[m]).cwiseMax(innovations[m].cwiseAbs2() / gate);
+      const Eigen::VectorXd next = bank.means[m] + P * H[m].transpose() * S.inverse() * innovations[m];
+      EXPECT_LT(largest(bank.taken(point, m, n, 1) - next), 1e-9) << set.instruction_set;
+      const double farthest = ((next - points[m]).array().square() / P.diagonal().array()).maxCoeff();
+      EXPECT_NEAR(moved[m] / farthest, 1.0, 1e-9) << set.instruction_set;
+    }
+  }
+}
+
 TEST_P(BankKernelsTest, MixMomentsAsMixturesDo) {
   for (const KernelSet& set : runnable_kernels()) {
     RandomQp random(GetParam());
@@ -213,6 +261,21 @@ TEST_P(BankKernelsTest, MixMomentsAsMixturesDo) {
 }
 
 /// One member in a thousand may go wrong; it stays as it was, and no other notices.
+TEST(BankKernels, MoveAPointToTheMeanWhereNoNumberComesOut) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const KernelSet& set : runnable_kernels()) {
+    AlignedDoubles mean(16, 2.0), covariance(32, 0.0), work(14 * 8, 0.0), point(16, 7.0), moved(8, 0.0);
+    std::fill_n(covariance.begin(), 8, 1.0);
+    std::fill_n(covariance.begin() + 24, 8, 4.0);
+    AlignedDoubles predicted(8, nan), gradient(16, 1.0), noise(8, 1.0);
+    const BankOutput output{predicted.data(), gradient.data(), noise.data(), 3.0, 0.0};
+    set.bank->move_point({8, 2, 2, mean.data(), covariance.data(), work.data()}, &output, 1, 16.0, point.data(),
+                         moved.data());
+    for (const double each : point) EXPECT_EQ(each, 2.0) << set.instruction_set;
+    for (const double each : moved) EXPECT_EQ(each, 25.0) << set.instruction_set;
+  }
+}
+
 TEST(BankKernels, LeaveAMemberAsItWasWhereNoNumberComesOut) {
   for (const KernelSet& set : runnable_kernels()) {
     RandomQp random(11);

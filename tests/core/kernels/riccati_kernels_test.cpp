@@ -93,9 +93,10 @@ TEST(RiccatiKernels, OfTheRecursionAgreeWithTheDenseSystem) {
   RandomQp random(7);
   for (int trial = 0; trial < 300; ++trial) {
     // There are special kernels for five to eight states with two to four controls; long rows take several registers.
-    const int states = trial % 3 == 0 ? random.integer(1, 14) : random.integer(5, 8);
+    const bool is_long = trial % 30 == 0;
+    const int states = is_long ? random.integer(15, 40) : trial % 3 == 0 ? random.integer(1, 14) : random.integer(5, 8);
     const int controls = trial % 3 == 0 ? random.integer(1, 12) : random.integer(2, 4);
-    StageQp qp = random.make(random.integer(1, 7), states, controls, true);
+    StageQp qp = random.make(random.integer(1, is_long ? 3 : 7), states, controls, true);
     if (trial % 2 == 0) random.carry(qp);
     const ActiveSet active = some_active_controls(random, qp);
     const DenseQp dense(qp, active);
@@ -180,6 +181,47 @@ TEST(RiccatiKernels, OfTheRecursionStopWhereTheReducedHessianIsNotDefinite) {
     for (const KernelSet& set : runnable_kernels()) {
       Recursion recursion(qp, none);
       EXPECT_EQ(set.riccati->factor(recursion.view, qp.intervals() - 1, 1e-11), bent) << set.instruction_set;
+    }
+  }
+}
+
+/// One by the closed loop of a factorisation, the other forwards alone, of a QP whose controls are coupled to nothing.
+TEST(RiccatiKernels, BothCovariancesOfTheLastNodeAgree) {
+  RandomQp random(19);
+  for (int trial = 0; trial < 60; ++trial) {
+    const int states = trial % 2 == 0 ? random.integer(1, 12) : random.integer(13, 40),
+              controls = random.integer(1, 12);
+    StageQp qp = random.make(random.integer(1, 6), states, controls, false);
+    const int stride = qp.stride(), N = qp.intervals();
+    for (int i = 0; i < N; ++i)
+      for (int r = 0; r < states + controls; ++r)
+        for (int c = 0; c < states + controls; ++c)
+          if (r != c && std::max(r, c) >= states) qp.H(i)[r * stride + c] = 0.0;
+    const ActiveSet none(qp.capacity());
+    const auto block = [&](const double* rows) {
+      return Eigen::MatrixXd(Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(rows, states, states,
+                                                                                        Eigen::OuterStride<>(stride)));
+    };
+    for (const KernelSet& set : runnable_kernels()) {
+      Recursion recursion(qp, none);
+      ASSERT_EQ(set.riccati->factor(recursion.view, N - 1, 1e-11), -1);
+      AlignedDoubles carried(static_cast<std::size_t>(states * stride)), filtered(carried.size());
+      const Eigen::MatrixXd from_all = 2.0 * block(recursion.P.data()).inverse(),
+                            from_first = 2.0 * block(qp.H(0)).inverse();
+      for (int c = 0; c < states; ++c)
+        for (int r = 0; r < states; ++r) {
+          carried[c * stride + r] = from_all(r, c);
+          filtered[c * stride + r] = from_first(r, c);
+        }
+      ASSERT_EQ(set.riccati->carry_covariance(recursion.view, 0, carried.data(), nullptr), N);
+      ASSERT_TRUE(set.riccati->filter_covariance(recursion.view, filtered.data())) << set.instruction_set;
+      const double scale = block(carried.data()).cwiseAbs().maxCoeff();
+      EXPECT_LE((block(carried.data()) - block(filtered.data())).cwiseAbs().maxCoeff(), 1e-8 * scale)
+          << set.instruction_set << ", " << states << " states, " << controls << " controls";
+      if (qp.controls(0) == 0) continue;
+      qp.H(0)[states * stride] = 1e-3;  // a control and a state
+      EXPECT_FALSE(set.riccati->filter_covariance(recursion.view, filtered.data()));
+      qp.H(0)[states * stride] = 0.0;
     }
   }
 }

@@ -238,6 +238,41 @@ TEST(TranscriptionKernels, ComputeWhatTheySay) {
   }
 }
 
+TEST(TranscriptionKernels, MultiplyRowsAndAddSums) {
+  RandomQp random(15);
+  for (int trial = 0; trial < 40; ++trial) {
+    const int rows = random.integer(1, 9), inner = random.integer(1, 12), columns = random.integer(1, 20),
+              width = padded(columns), c_step = inner + random.integer(0, 3), j_step = width + random.integer(0, 3);
+    AlignedDoubles C = numbers(random, static_cast<std::size_t>(rows * c_step)),
+                   J = numbers(random, static_cast<std::size_t>(inner * j_step + 8)),
+                   W = numbers(random, static_cast<std::size_t>(rows * rows)), v = numbers(random, rows),
+                   H = numbers(random, static_cast<std::size_t>(width * width)), h = numbers(random, width);
+    for (const KernelSet& set : runnable_kernels()) {
+      AlignedDoubles G(static_cast<std::size_t>(rows * width), 7.0), sum_H = H, sum_h = h;
+      set.transcription->multiply_rows(C.data(), c_step, J.data(), j_step, {rows, inner, columns}, width, G.data());
+      for (int r = 0; r < rows; ++r)
+        for (int k = 0; k < width; ++k) {
+          double expected = 0.0;
+          for (int l = 0; k < columns && l < inner; ++l) expected += C[r * c_step + l] * J[l * j_step + k];
+          ASSERT_NEAR(G[r * width + k], expected, 1e-12) << set.instruction_set;
+        }
+      set.transcription->add_sums({G.data(), width, rows, W.data(), rows, v.data()}, columns, width, sum_H.data(),
+                                  sum_h.data());
+      for (int c = 0; c < columns; ++c) {
+        double gradient = h[c];
+        for (int p = 0; p < rows; ++p) gradient += G[p * width + c] * v[p];
+        ASSERT_NEAR(sum_h[c], gradient, 1e-10) << set.instruction_set;
+        for (int r = 0; r < columns; ++r) {
+          double entry = H[c * width + r];
+          for (int p = 0; p < rows; ++p)
+            for (int q = 0; q < rows; ++q) entry += G[p * width + c] * W[p * rows + q] * G[q * width + r];
+          ASSERT_NEAR(sum_H[c * width + r], entry, 1e-8) << set.instruction_set;
+        }
+      }
+    }
+  }
+}
+
 TEST(TranscriptionKernels, CompleteDynamicsWithCarriedChannels) {
   RandomQp random(12);
   for (int trial = 0; trial < 60; ++trial) {

@@ -12,16 +12,6 @@ namespace free_initial_state_test {
 
 using namespace testing;
 
-/// The step of least cost with the bounds of a set held, which is compared with that of the dense system.
-void expect_solved(const StageQp& qp, const ActiveSet& active, double tolerance) {
-  Riccati riccati(qp.capacity());
-  Iterate step(qp.capacity());
-  riccati.factor(qp, active);
-  EXPECT_FALSE(riccati.was_convexified());
-  ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
-  expect_same_as_dense(qp, active, step, tolerance);
-}
-
 TEST(FreeInitialState, IsDecidedWithAllElse) {
   RandomQp random(31);
   for (int trial = 0; trial < 60; ++trial) {

@@ -14,7 +14,7 @@ namespace rhec {
 namespace riccati_test {
 
 using testing::DenseQp;
-using testing::expect_same_as_dense;
+using testing::expect_solved;
 using testing::RandomQp;
 
 TEST(ActiveSet, NamesTheBoundsThatAreHeldInTheirOrder) {
@@ -42,13 +42,23 @@ TEST(Riccati, AgreesWithTheDenseSystemWithoutActiveBounds) {
   for (int trial = 0; trial < 60; ++trial) {
     StageQp qp = random.make(random.integer(1, 8), random.integer(1, 5), random.integer(1, 4), trial % 2 == 0);
     if (trial % 3 == 0) random.carry(qp);
-    Riccati riccati(qp.capacity());
-    const ActiveSet active(qp.capacity());
-    Iterate step(qp.capacity());
-    riccati.factor(qp, active);
-    EXPECT_FALSE(riccati.was_convexified());
-    ASSERT_EQ(riccati.solve(qp, active, step), Riccati::Outcome::done);
-    expect_same_as_dense(qp, active, step, 1e-9);
+    expect_solved(qp, ActiveSet(qp.capacity()), 1e-9);
+  }
+}
+
+/// Rows that are longer than those of the sizes that kernels are compiled for; some of their controls are held.
+TEST(Riccati, AgreesWithTheDenseSystemWhateverTheSizes) {
+  RandomQp random(31);
+  for (int trial = 0; trial < 24; ++trial) {
+    StageQp qp = random.make(random.integer(1, 4), random.integer(5, 40), random.integer(1, 20), trial % 2 == 0);
+    if (trial % 3 == 0) random.carry(qp);
+    ActiveSet active(qp.capacity());
+    for (int i = 0; trial % 4 < 2 && i < qp.intervals(); ++i)
+      for (int j = 0; j < qp.controls(i); ++j) {
+        active.control(i)[j] = random.uniform(0.0, 1.0) < 0.3 ? 1 : 0;
+        qp.control_upper(i)[j] = 0.3;
+      }
+    expect_solved(qp, active, 1e-7);
   }
 }
 
@@ -176,6 +186,50 @@ TEST(Riccati, TheCovarianceIsThatOfTheDenseInverse) {
     ASSERT_EQ(riccati.solve(qp, none, after), Riccati::Outcome::done);
     for (int i = 0; i <= qp.intervals(); ++i)
       for (int k = 0; k < qp.stride(); ++k) ASSERT_EQ(after.row(i)[k], step.row(i)[k]);
+  }
+}
+
+/// A QP whose controls are coupled to nothing in H, and with few measured states behind the first node.
+void decouple(RandomQp& random, StageQp& qp) {
+  const int ns = qp.capacity().states, stride = qp.stride();
+  for (int i = 0; i <= qp.intervals(); ++i) {
+    double* const H = qp.H(i);
+    const auto controls_end = ns + (i < qp.intervals() ? qp.controls(i) : 0);
+    for (int r = 0; r < controls_end; ++r)
+      for (int c = 0; c < controls_end; ++c)
+        if (r != c && (r >= ns || c >= ns)) H[r * stride + c] = 0.0;
+    if (i == 0) continue;
+    std::vector<double> gradient(ns, 0.0);
+    for (int k = 0; k < 3; ++k) gradient[random.integer(0, qp.states(i) - 1)] = random.uniform(-3.0, 3.0);
+    for (int r = 0; r < qp.states(i); ++r)
+      for (int c = 0; c < qp.states(i); ++c) H[r * stride + c] = i % 3 == 0 ? 0.0 : gradient[r] * gradient[c];
+  }
+}
+
+TEST(Riccati, TheCovarianceOfTheFilterIsThatOfTheFactorisation) {
+  RandomQp random(41);
+  for (int trial = 0; trial < 40; ++trial) {
+    StageQp qp = random.make(random.integer(1, 12), random.integer(1, 34), random.integer(1, 14), false);
+    if (trial % 3 == 0) random.carry(qp);
+    const int ns = qp.capacity().states;
+    Riccati riccati(qp.capacity());
+    std::vector<double> expected(ns * ns), found(ns * ns, 7.0);
+    EXPECT_FALSE(riccati.filter_covariance(qp, found.data())) << "its controls are coupled";
+    for (const double each : found) ASSERT_EQ(each, 7.0);
+    decouple(random, qp);
+    riccati.factor_for_covariances(qp, ActiveSet(qp.capacity()));
+    ASSERT_FALSE(riccati.was_convexified());
+    riccati.covariances(qp, nullptr, expected.data());
+    if (qp.states(0) > 16) {
+      EXPECT_FALSE(riccati.filter_covariance(qp, found.data()));
+      continue;
+    }
+    ASSERT_TRUE(riccati.filter_covariance(qp, found.data())) << "trial " << trial;
+    for (int k = 0; k < ns * ns; ++k)
+      ASSERT_NEAR(found[k], expected[k], 1e-9 * (1.0 + std::abs(expected[k]))) << "trial " << trial;
+    // One that is not semidefinite is none of a log-likelihood.
+    qp.H(1)[0] = -1e9;
+    EXPECT_FALSE(riccati.filter_covariance(qp, found.data()));
   }
 }
 

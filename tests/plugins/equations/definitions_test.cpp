@@ -72,21 +72,24 @@ TEST(Definitions, EveryFunctionIsTheOneOfItsName) {
 }
 
 TEST(Definitions, RefuseWhatIsNotKnownNotOnceOrNotWithoutItself) {
-  EXPECT_EQ(why_not("a = 2 * speeed\nspeed = x"), "vehicle.yaml:1:9: 'speeed' is not known; did you mean 'speed'?");
+  EXPECT_EQ(why_not("a = 2 * speeed\nspeed = x"),
+            "vehicle.yaml:1:9: 'speeed' is not known; did you mean 'speed'? (in the equation of a)\n"
+            "    a = 2 * speeed\n"
+            "            ^");
   EXPECT_CONTAINS(why_not("a = somewhere_else"), "'somewhere_else' is not known; expected a state, an input");
-  EXPECT_EQ(why_not("a = x\n\na = y"),
-            "vehicle.yaml:3:1: there is an equation for 'a' in line 1 already; remove one of them");
+  EXPECT_CONTAINS(why_not("a = x\n\na = y"),
+                  "vehicle.yaml:3:1: there is an equation for 'a' in line 1 already; remove one of them");
   EXPECT_CONTAINS(why_not("x = 2"),
                   "the value of 'x' is given; expected an equation for the derivative of a state (x' = ..., if it is "
                   "one)");
   EXPECT_CONTAINS(why_not("a = 2 * t"), "equations do not depend on time");
-  EXPECT_EQ(why_not("a = b + 1\nb = sin(c)\nc = a"),
-            "vehicle.yaml:3:5: 'a' needs itself: a -> b -> c -> a; write one of them without the others");
+  EXPECT_CONTAINS(why_not("a = b + 1\nb = sin(c)\nc = a"),
+                  "vehicle.yaml:3:5: 'a' needs itself: a -> b -> c -> a; write one of them without the others");
   EXPECT_CONTAINS(why_not("a = a"), "vehicle.yaml:1:5: 'a' needs itself: a -> a");
 }
 
 TEST(Definitions, RefuseWhatIsFiniteForNoValues) {
-  EXPECT_EQ(why_not("a = x / 0"), "vehicle.yaml:1:7: this divides by 0");
+  EXPECT_CONTAINS(why_not("a = x / 0"), "vehicle.yaml:1:7: this divides by 0");
   EXPECT_CONTAINS(why_not("a = x / (1 - 1)"), "this divides by 0");
   EXPECT_CONTAINS(why_not("a = x + sqrt(-1)"),
                   "vehicle.yaml:1:9: sqrt(...) is not a finite number, whatever the values");

@@ -82,7 +82,7 @@ struct Mistake {
   const char *text, *message;
 };
 TEST(Statements, MistakesNamePlaceExpectationAndRemedy) {
-  for (const auto& [text, message] : {
+  for (const Mistake& mistake : {
            Mistake{"x = 2 y",
                    "vehicle.yaml:10:11: found 'y', expected an operator or the end of the line; a product "
                    "is written with '*'"},
@@ -104,7 +104,14 @@ TEST(Statements, MistakesNamePlaceExpectationAndRemedy) {
            {"pi = 3", "'pi' is a function or a constant"},
            {"x = 1)", "found ')', expected an operator or the end of the line; there is no '(' for it"},
            {"x = (1 + y\nz = 2",
-            "vehicle.yaml:11:5: found 'z', expected an operator or ')'; the '(' in line 10 is not closed"},
+            "vehicle.yaml:10:9: this '(' is not closed: found 'z' in line 11, expected an operator or ')' (in the "
+            "equation of x)\n    x = (1 + y\n        ^"},
+           {"x = sin(1 +\n 2\n",
+            "vehicle.yaml:10:12: this '(' is not closed: found the end, expected an operator or ')'"},
+           {"y' = 2\nx' = 1 + (\n  2 * * y)",
+            "vehicle.yaml:12:11: found '*', expected a number, a name or '(' (in the equation of x')\n      2 * * y)\n"
+            "          ^"},
+           {"x = y +\t+ μ", "(in the equation of x)\n    x = y + + μ\n              ^"},
            {"x = sin y", "'sin' is a function; expected its argument in parentheses, sin(...)"},
            {"x = 0,5", "decimals have a point, as 0.5"},
            {"x'' = y", "a second derivative is the first one of another state"},
@@ -117,7 +124,27 @@ TEST(Statements, MistakesNamePlaceExpectationAndRemedy) {
            {"x = y \u00b7 2", "found '\u00b7', which means nothing here; a product is written with '*'"},
            {"x = \xce", "found '\\xce'"},
        })
-    EXPECT_CONTAINS(error_of([&] { parse_statements(source_of(text)); }), message) << text;
+    EXPECT_CONTAINS(error_of([&] { parse_statements(source_of(mistake.text)); }), mistake.message) << mistake.text;
+}
+
+TEST(Statements, LongLinesAreShownAroundTheMistake) {
+  std::string text = "x = 1";
+  for (int k = 0; k < 100; ++k) text += k == 50 ? " + * y" : " + y";
+  const std::string error = error_of([&] { parse_statements(source_of(text)); });
+  const std::size_t shown = error.find("\n    ..."), caret = error.rfind("\n    ");
+  ASSERT_NE(shown, std::string::npos) << error;
+  EXPECT_LT(error.size() - shown, 250u) << error;
+  const std::size_t at = error.find('^') - caret;
+  EXPECT_EQ(error.substr(shown + at, 3), "* y") << error;
+  EXPECT_CONTAINS(error, "y + y ...\n");
+}
+
+TEST(Statements, NameTheirLineWhereNoFileHasThem) {
+  const SourceText source{"configuration", {{"a = 1"}, {"b = a a"}}, "configuration: model.equations"};
+  EXPECT_EQ(
+      error_of([&] { parse_statements(source); }),
+      "configuration: model.equations: line 2, column 7: found 'a', expected an operator or the end of the line; a "
+      "product is written with '*' (in the equation of b)\n    b = a a\n          ^");
 }
 
 TEST(Statements, DeepTermsAreRefusedAndLongOnesAreNot) {

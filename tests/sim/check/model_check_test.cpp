@@ -35,7 +35,7 @@ struct Stiff {
   void outputs(const Scalar* x, Scalar* y) const { y[0] = x[0]; }
 };
 
-TEST(ModelCheck, LooksAtDerivativesOfStiffModelsInStepsThatDoNotGrow) {
+ModelDescription about_stiff() {
   ModelDescription about;
   about.name = "stiff";
   about.source = "this test";
@@ -43,10 +43,67 @@ TEST(ModelCheck, LooksAtDerivativesOfStiffModelsInStepsThatDoNotGrow) {
                   {.name = "rate", .unit = "1/s", .meaning = "speed"}};
   about.inputs = {{.name = "set_point", .unit = "1/s", .meaning = "wanted speed", .lower = -2.0, .upper = 2.0}};
   about.outputs = {{.name = "angle", .unit = "1", .meaning = "measured"}};
-  FormulaModel<Stiff> model({}, about);
+  return about;
+}
+
+TEST(ModelCheck, LooksAtDerivativesOfStiffModelsInStepsThatDoNotGrow) {
+  FormulaModel<Stiff> model({}, about_stiff());
   const Finding derivatives =
       finding_of(check_model(model, ModelCheckOptions{.samples = 16, .substeps = 1}), "derivatives");
   EXPECT_EQ(derivatives.verdict, Verdict::pass) << derivatives.found;
+}
+
+TEST(ModelCheck, SaysAtHowManySamplesItLookedAtSecondDerivatives) {
+  FormulaModel<Stiff> model({}, about_stiff());
+  const auto numbers = [&model](int substeps) {
+    return finding_of(check_model(model, ModelCheckOptions{.samples = 300, .substeps = substeps}), "numbers").found;
+  };
+  EXPECT_THAT(numbers(16), testing::Not(HasSubstr("second derivatives")));
+  EXPECT_THAT(numbers(40), HasSubstr("second derivatives, which take 40 substeps, at 128 of them"));
+  EXPECT_THAT(numbers(400), HasSubstr("at 64 of them"));
+}
+
+/// A vehicle whose speed is a state, and which steers.
+template <class Scalar>
+struct Coasting {
+  static constexpr int state_count = 5, input_count = 2, parameter_count = 0, output_count = 2;
+  void dynamics(const Scalar* x, const Scalar* u, const Scalar*, Scalar* dxdt) const {
+    using std::cos, std::sin;
+    dxdt[0] = x[3] * cos(x[2]);
+    dxdt[1] = x[3] * sin(x[2]);
+    dxdt[2] = x[4];
+    dxdt[3] = u[0] - x[3] - x[4] * x[4] * 0.5;  // turning costs speed
+    dxdt[4] = u[1] - x[4];
+  }
+  void outputs(const Scalar* x, Scalar* y) const {
+    y[0] = x[0];
+    y[1] = x[1];
+  }
+};
+
+TEST(ModelCheck, TurnsWithASpeedThatIsFarFromTheMiddleOfItsBounds) {
+  ModelDescription about;
+  about.name = "coasting";
+  about.source = "this test";
+  about.states = {{.name = "x", .unit = "m", .meaning = "x"},
+                  {.name = "y", .unit = "m", .meaning = "y"},
+                  {.name = "psi", .unit = "rad", .meaning = "heading"},
+                  {.name = "v", .unit = "m/s", .meaning = "speed", .lower = 0.0, .upper = 30.0},
+                  {.name = "r", .unit = "rad/s", .meaning = "rate of turn", .lower = -3.0, .upper = 3.0}};
+  about.inputs = {{.name = "u", .unit = "m/s", .meaning = "wanted speed", .lower = 0.0, .upper = 30.0},
+                  {.name = "w", .unit = "rad/s", .meaning = "wanted rate", .lower = -1.0, .upper = 1.0}};
+  about.outputs = {{.name = "x", .unit = "m", .meaning = "x"}, {.name = "y", .unit = "m", .meaning = "y"}};
+  about.states[2].is_angle = true;
+  about.states[3].scale = about.inputs[0].scale = 5.0;
+  about.states[4].scale = about.inputs[1].scale = 0.5;
+  about.roles.position_x = 0;
+  about.roles.position_y = 1;
+  about.roles.heading = 2;
+  about.roles.speed = 0;
+  about.roles.speed_state = 3;
+  FormulaModel<Coasting> model({}, about);
+  const Finding scaling = finding_of(check_model(model, ModelCheckOptions{.samples = 16}), "scaling");
+  EXPECT_EQ(scaling.verdict, Verdict::pass) << scaling.where << ": " << scaling.found;
 }
 
 TEST(ModelCheck, FindsNothingWrongWithAGoodModel) {

@@ -50,6 +50,20 @@ TEST(LoopTimes, FeedbackIsPartOfTheEstimatorsTime) {
   }
 }
 
+TEST(SmallRobots, FinishAllLapsOfCirclesThatAreShorterThanTheWindowOfTheirFollower) {
+  for (const double speed : {0.1, 0.3}) {
+    Settings settings = load_yaml(SCENARIOS "/unicycle_traction.yaml");
+    apply_assignment(settings, "path={name: figure8, radius: 0.3, laps: 3, spacing: 0.02}");
+    apply_assignment(settings, "speed=" + std::to_string(speed));
+    const Scenario scenario(Host(), settings);
+    const RunLog log = run_closed_loop(scenario);
+    ASSERT_TRUE(log.completed) << log.ended;
+    const auto samples = static_cast<double>(log.samples.size());
+    EXPECT_NEAR(samples * scenario.robot().step(), scenario.path().duration(), 0.1 * scenario.path().duration());
+    for (const Sample& sample : log.samples) ASSERT_LT(std::abs(sample.tracking), 0.15) << "at " << sample.time << " s";
+  }
+}
+
 TEST(Ends, ARobotThatOnlyTakesItselfToBeAtTheEndIsNotThere) {
   // Dead reckoning, on wheels that slip more than it believes.
   Settings settings = parse_yaml(R"(

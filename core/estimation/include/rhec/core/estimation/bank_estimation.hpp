@@ -36,6 +36,9 @@ class RHEC_EXPORT BankEstimation final : public EstimationMethod {
   int most_reach() const noexcept override;
   void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
+  void rehearse() noexcept override {
+    if (!searching_) history_.rehearse();
+  }
   void reset() noexcept override;
   bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override;

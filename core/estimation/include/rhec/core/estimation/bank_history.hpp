@@ -38,6 +38,9 @@ class RHEC_EXPORT BankHistory {
   /// window knows them when the node leaves it. Where they differ much from those used, it is filtered anew from there.
   bool reweigh(std::int64_t number, const double* robust_weights) noexcept;
 
+  /// Predicts and updates once, and takes it back.
+  void rehearse() noexcept;
+
   std::int64_t newest() const noexcept { return newest_; }
   /// How many nodes are remembered.
   int count() const noexcept { return count_; }
@@ -65,9 +68,10 @@ class RHEC_EXPORT BankHistory {
   std::size_t place(std::int64_t number) const noexcept {
     return static_cast<std::size_t>(number % static_cast<std::int64_t>(intervals_.size()));
   }
-  void begin_node(const double* outputs) noexcept;
+  void begin_node() noexcept;
   void predict(std::size_t place) noexcept;
   void update(std::size_t place) noexcept;
+  void begin_again(std::int64_t number) noexcept;
   void filter_from(std::int64_t number) noexcept;
 
   PriorBank bank_;
@@ -78,7 +82,7 @@ class RHEC_EXPORT BankHistory {
   std::vector<BetweenNodes> between_;
   std::vector<double> inputs_, outputs_;
   std::vector<double> given_weights_, used_weights_;  ///< n_y a node
-  AlignedDoubles predicted_, filtered_;
+  AlignedDoubles predicted_, filtered_, rehearsed_;
   std::vector<double> means_, covariances_;
   Eigen::VectorXd mean_;
   Eigen::MatrixXd covariance_;

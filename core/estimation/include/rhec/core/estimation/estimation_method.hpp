@@ -40,6 +40,9 @@ class RHEC_EXPORT EstimationMethod {
   virtual void estimate(Estimate& result, Clock::time_point deadline) noexcept = 0;
   /// Does work in advance, before the next node is known; calling it is optional.
   virtual void prepare() noexcept {}
+  /// Goes through what the next node will need, without effect: optional, where code and data have not been used for
+  /// long, and are in the processor's caches then.
+  virtual void rehearse() noexcept {}
   virtual void reset() noexcept = 0;
   /// Goes on at the newest node from moments of [x; p] (n, n x n) that contain all that is known of it: what was
   /// measured before counts no longer. There was a first node. False if the method cannot, and nothing has changed.

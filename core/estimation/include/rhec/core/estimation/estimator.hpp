@@ -32,6 +32,9 @@ class RHEC_EXPORT Estimator {
     /// By output, how much later than it was measured it is stamped [s]; none: not at all. Outputs of one measurement
     /// go to the times at which each was measured.
     std::vector<double> delays = {};
+    /// For so long a call whose deadline has passed goes on with what waits, beside one row and one node [s]: an
+    /// estimator that is always late keeps up.
+    double grace = 5e-4;
   };
   explicit Estimator(std::unique_ptr<EstimationMethod> method) : Estimator(std::move(method), Timeline{}) {}
   /// Throws Error if a number of the timeline is out of range.
@@ -54,6 +57,11 @@ class RHEC_EXPORT Estimator {
 
   /// Does work for the next sample in advance; optional, but always saves time later.
   void prepare() noexcept;
+  /// Goes through the computation of the next estimate, without effect. Optional, for a loop that has slept since the
+  /// last one and will be asked in a moment: code and data are in the processor's caches then.
+  void rehearse() noexcept {
+    if (has_started()) method_->rehearse();
+  }
   void reset() noexcept;
   /// Goes on from moments of [x; p] (n, n x n) at the newest node, e.g. after the vehicle was carried. False if there
   /// is no node yet, sizes do not match, a number is not finite, or the method cannot.
@@ -113,6 +121,7 @@ class RHEC_EXPORT Estimator {
   Estimate estimate_, predicted_;
   Counts counts_;
   StepError step_error_;
+  Clock::duration solving_{};        ///< how long the last estimate took behind its nodes, if it had a deadline
   double worst_error_ = 0.0;         ///< of the intervals that were coarse
   std::size_t measured_inputs_ = 0;  ///< all but process noise, which is 0
   std::vector<double> input_, next_, values_, delayed_;

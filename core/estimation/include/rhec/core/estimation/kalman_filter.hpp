@@ -21,6 +21,8 @@ class RHEC_EXPORT KalmanFilter {
     std::vector<double> output_variances;                  ///< n_y
     std::vector<double> input_variances;                   ///< n_u, of measured inputs
     std::vector<double> parameter_lower, parameter_upper;  ///< bounds of the mean
+    /// Outputs of motion, ascending: an interval is linearised where its measurements of these put it.
+    std::vector<int> motion_outputs = {};
   };
   /// `uses_between`: whether there can be measurements between two nodes.
   KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, bool uses_between = false);
@@ -38,8 +40,13 @@ class RHEC_EXPORT KalmanFilter {
                const double* ramp_variances) noexcept;
   /// The same, and each measurement between the two nodes is used at its own time. The noise of an input, and the
   /// change of a parameter, is one value over the interval. `robust_weights`: one row for each of them, or null.
+  ///
+  /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards.
+  /// An output of motion is a product of slip and of an input that is measured as well: about the measured input, the
+  /// noise of the input counts as knowledge of slip. So the interval is linearised where its outputs of motion put it
+  /// (iterated Kalman filter: Bell and Cathey 1993; docs/method.md, section 5).
   void predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
-               const double* robust_weights = nullptr) noexcept;
+               const double* robust_weights = nullptr, const double* end_outputs = nullptr) noexcept;
   /// Log-likelihood of the measurements between the nodes of the last interval, each given those before it.
   double between_log_likelihood() const noexcept { return between_log_likelihood_; }
   /// Measurement update with the knowledge that a parameter is 0 up to this variance.
@@ -58,8 +65,12 @@ class RHEC_EXPORT KalmanFilter {
  private:
   void differentiate(double duration) noexcept;
   void widen(const double* ramp_variances) noexcept;
-  void integrate_wide(double seconds, double share) noexcept;
-  void take_between(const double* y, const double* robust_weights) noexcept;
+  void integrate_wide(const Eigen::VectorXd& wide, double seconds, double share) noexcept;
+  bool has_motion(const double* y) const noexcept;
+  double expect_wide(int output, double measured) noexcept;
+  void find_point(double seconds, double share, const double* y) noexcept;
+  bool move_point(const double* y) noexcept;
+  void take_between(double seconds, double share, const double* y, const double* robust_weights) noexcept;
   void take_wide(double innovation, double variance) noexcept;
   void narrow() noexcept;
   double input_variance(int input, const double* measured) const noexcept;
@@ -71,12 +82,18 @@ class RHEC_EXPORT KalmanFilter {
   Noise noise_;
   int substeps_, nx_, nu_, np_, ny_;
   std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
+  /// Where the outputs of an interval's end are linearised, if that is not the mean.
+  std::vector<double> end_point_;
+  bool has_end_point_ = false;
   AlignedDoubles row_, next_row_, jacobian_rows_, scratch_;  ///< for Model::integrate_rows
   Eigen::MatrixXd work_, next_covariance_;
   Eigen::VectorXd gain_, image_, zeros_, correction_;
   /// Within an interval: [x; p; u; change of p], the gradient of an output, and the transition to [x; p] at its end.
-  Eigen::VectorXd wide_mean_, wide_before_, wide_gradient_, wide_gain_, wide_image_, wide_end_;
+  Eigen::VectorXd wide_mean_, wide_gradient_, wide_gain_, wide_image_, wide_end_;
   Eigen::MatrixXd wide_covariance_, transition_, wide_work_;
+  /// Where an interval is linearised; images and gradients of the outputs of motion, and their innovations.
+  Eigen::VectorXd point_, motion_innovations_;
+  Eigen::MatrixXd motion_images_, motion_gradients_, motion_covariance_;
   double between_log_likelihood_ = 0.0;
 };
 

@@ -47,7 +47,11 @@ class RHEC_EXPORT PriorBank {
   void predict(const double* measured_input, double duration) noexcept;
   /// The same with measurements between the two nodes, each used at its own time. The noise of an input and of a
   /// process is one value over the interval, as a window has it, so that the moments are those of a window.
-  void predict(const MeasuredInterval& interval) noexcept;
+  /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards:
+  /// the interval is linearised where its outputs of motion put it (KalmanFilter::predict).
+  void predict(const MeasuredInterval& interval, const double* end_outputs = nullptr) noexcept;
+  /// Whether that depends on the outputs of the interval's end.
+  bool looks_ahead() const noexcept { return !setup_.motion_outputs.empty(); }
 
   const Model& model() const noexcept { return *model_; }
   int member_count() const noexcept { return members_; }
@@ -129,6 +133,10 @@ class RHEC_EXPORT PriorBank {
   void integrate_members(const double* mean, bool is_wide, double seconds, double share) noexcept;
   void observe_members(const double* states) noexcept;
   void widen() noexcept;
+  bool has_motion(const double* y) const noexcept;
+  void write_wide_gradient(int output, double share) noexcept;
+  void find_point(double seconds, double share, const double* y) noexcept;
+  void expect_at_mean(int output) noexcept;
   void take_between(double seconds, double share, const double* y) noexcept;
   void narrow(double duration) noexcept;
   int wide_count() const noexcept { return 2 * n_ - nx_ + nu_; }
@@ -163,6 +171,11 @@ class RHEC_EXPORT PriorBank {
   /// Within an interval: [x; z; u; q], with the noise q of the processes (docs/method.md, section 8), and the
   /// transition to [x; z] at its end.
   AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, wide_gradient_, transition_;
+  AlignedDoubles point_, moved_;  ///< where the interval is linearised, and how far that has moved at last
+  /// The vehicle's states there at the interval's end, as rows of the model: where the outputs of that end are
+  /// linearised.
+  std::vector<double> end_point_;
+  bool has_end_point_ = false;
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;

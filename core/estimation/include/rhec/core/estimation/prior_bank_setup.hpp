@@ -41,7 +41,10 @@ struct PriorBankSetup {
   std::shared_ptr<const SlipMap> map;
   std::vector<std::vector<MapDeviation>> deviations;
   int most_between = 0;  ///< measurements that an interval can have between its nodes
-  double gate = 16.0;    ///< largest squared innovation, in variances, by which one output changes the weights
+  /// Outputs of motion, ascending: an interval is linearised where its measurements of these put it, as by a
+  /// KalmanFilter.
+  std::vector<int> motion_outputs = {};
+  double gate = 16.0;  ///< largest squared innovation, in variances, by which one output changes the weights
 };
 
 }  // namespace rhec

@@ -47,6 +47,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   int most_reach() const noexcept override { return filters_.most_reach(); }
   void rewind(int nodes) noexcept override;
   void estimate(Estimate& result, Clock::time_point deadline) noexcept override;
+  void rehearse() noexcept override;
   void reset() noexcept override;
   bool rebase(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance) noexcept override;
   std::optional<OutputNoise> output_noise(int output) const noexcept override { return filters_.output_noise(output); }
@@ -96,7 +97,7 @@ class RHEC_EXPORT PriorHorizonEstimation final : public WindowedEstimation {
   std::vector<int> entries_;        ///< of [x; p] in [x; z]
   std::vector<double> parameter_lower_, parameter_upper_;
   Window window_;
-  bool has_window_ = false, has_solution_ = false;
+  bool has_window_ = false, has_solution_ = false, has_rehearsed_ = false;
   int law_ = 0;
   std::vector<int> laws_;  ///< at the last nodes, in a ring
   Eigen::VectorXd mean_, member_mean_, shift_;

@@ -65,11 +65,9 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   double* measured_input(int interval) noexcept { return measured_inputs_.data() + at_input(interval); }
   const double* output(int node) const noexcept { return outputs_.data() + at_output(node); }
   const double* measured_input(int interval) const noexcept { return measured_inputs_.data() + at_input(interval); }
-
   /// Measurements within an interval, at times of their own.
   BetweenNodes& between(int interval) noexcept { return between_[interval]; }
   const BetweenNodes& between(int interval) const noexcept { return between_[interval]; }
-
   /// Weight of an output from now on.
   void set_output_weight(int output, double weight) noexcept {
     setup_.output_weights[output] = output_weights_[output] = weight;
@@ -144,11 +142,12 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   double write_general_measurements(StageRange range, const Iterate& iterate, Hessian hessian, const CostView& view,
                                     const double* predicted, const double* jacobians, double* memory) const noexcept;
   struct BetweenBatch;
-  bool has_between() const noexcept;
+  struct OfPoints;
+  struct ModelRows;
+  bool has_between() const noexcept, has_many(int interval) const noexcept;
   std::size_t between_scratch_size() const noexcept;
   double add_between(StageRange range, const Iterate& iterate, Hessian hessian, const CostView* view,
                      double* stage_costs, double* memory) const noexcept;
-  bool has_many(int interval) const noexcept;
   std::vector<double> points_of_interval() const;
   template <class Flush>
   void gather_interval(int interval, const Iterate& iterate, BetweenBatch& batch, const Flush& flush) const noexcept;
@@ -160,8 +159,10 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   void evaluate_batch(BetweenBatch& batch, bool with_gradients) const noexcept;
   double add_batch(BetweenBatch& batch, Hessian hessian, const CostView* view, double* stage_costs) const noexcept;
   void write_parts(int interval, int place, double* parts) const noexcept;
-  struct OfPoints;
   double add_points(BetweenBatch& batch, int interval, const OfPoints& points, const CostView* view) const noexcept;
+  double sum_up(BetweenBatch& batch, int interval, const OfPoints& points, const CostView* view) const noexcept;
+  double sum_up_known(BetweenBatch& batch, int interval, const OfPoints& points) const noexcept;
+  ModelRows in_order_of_stage(BetweenBatch& batch, int interval, const ModelRows& rows, int count) const noexcept;
   void add_rows(BetweenBatch& batch, int interval, const double* rows, int count, const double* weights,
                 const double* pulls, const CostView& view) const noexcept;
   void add_curvature_of_dynamics(BetweenBatch& batch, const CostView& view) const noexcept;
@@ -170,7 +171,7 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
   double weigh(const double* measured, const double* predicted, double* difference, double* weights, double* pulls,
                double* curvatures) const noexcept;
   std::ptrdiff_t between_key_size() const noexcept, between_said_size() const noexcept;
-  std::ptrdiff_t between_factors_size() const noexcept;
+  std::ptrdiff_t between_kept_size() const noexcept;
   double add_known_between(StageRange range, const Iterate& iterate, const CostView& view, BetweenCache& known,
                            double* memory) const noexcept;
   double* H_of(const CostView& view, int stage) const noexcept;
@@ -183,15 +184,14 @@ class RHEC_EXPORT RheProblem final : public HorizonProblem {
 
   Setup setup_;
   int ny_, output_row_;
-  const PartsOfIntervals* parts_;                 ///< the model, if its data depend on where an interval ends
-  int bounded_intervals_ = -1;                    ///< for which bounds were written
-  std::vector<std::uint8_t> has_block_bounds_;    ///< per stage
-  std::vector<std::uint8_t> is_one_block_;        ///< per parameter
-  std::vector<int> robust_group_;                 ///< per output, or -1
-  AlignedDoubles lower_pattern_, upper_pattern_;  ///< bounds of [x; p; u] at every stage
-  std::vector<BetweenNodes> between_;             ///< by interval
-  std::vector<double> between_points_;            ///< shares of an interval (PointSums)
-  AlignedDoubles outputs_;                        ///< one row per node, NaN where nothing was measured
+  const PartsOfIntervals* parts_;  ///< the model, if its data depend on where an interval ends
+  int bounded_intervals_ = -1;     ///< for which bounds were written
+  std::vector<std::uint8_t> has_block_bounds_, is_one_block_;  ///< per stage; per parameter
+  std::vector<int> robust_group_;                              ///< per output, or -1
+  AlignedDoubles lower_pattern_, upper_pattern_;               ///< bounds of [x; p; u] at every stage
+  std::vector<BetweenNodes> between_;                          ///< by interval
+  std::vector<double> between_points_;                         ///< shares of an interval (PointSums)
+  AlignedDoubles outputs_;                                     ///< one row per node, NaN where nothing was measured
   AlignedDoubles output_weights_, output_periods_, output_inverse_periods_;  ///< rows; the period of angles, else 0
   AlignedDoubles measured_inputs_, input_weights_;  ///< rows as in Iterate; NaN and 0 outside of the inputs
   std::vector<double> link_information_, block_weights_;

@@ -50,6 +50,12 @@ struct BankKernels {
   /// mean <- next_mean, covariance <- T P T' with the covariance P of a wider vector, `wide`, and T of n rows. A member
   /// whose result is not finite keeps what it has.
   void (*narrow)(const BankView& bank, const BankView& wide, const double* transition, const double* next_mean);
+  /// What [x; z] is given outputs linearised about `point` (n entries): a step from there, to the mean and the
+  /// covariance of the view, which stay. `outputs` predict at `point`. An innovation counts as no more than `gate`,
+  /// squared and in variances. `moved` (1 entry): the largest squared change of an entry, in its variances. A member
+  /// whose result is not finite goes to its mean. At most n outputs.
+  void (*move_point)(const BankView& bank, const BankOutput* outputs, int count, double gate, double* point,
+                     double* moved);
   /// r^2 / S of each output on its own (count entries), before any update.
   void (*surprise)(const BankView& bank, const BankOutput* outputs, int count, double* squares);
   /// Mean (n) and covariance (n x n) of the mixture.

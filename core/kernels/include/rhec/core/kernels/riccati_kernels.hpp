@@ -60,6 +60,11 @@ struct RiccatiKernels {
   /// Propagates the covariance (rows of the stride) from node `first` to the next special stage, which is returned, or
   /// to node N. Writes those of all nodes on the way to `all`, blocks of n_s x n_s, if it is not null.
   int (*carry_covariance)(const RiccatiView& view, int first, double* covariance, double* all);
+  /// Replaces the covariance of node 0, given what H says of it (rows of the stride), by that of node N given what H
+  /// says of all nodes: the covariance recursion of the Kalman filter. It needs no factorisation, but stages whose
+  /// controls are coupled in H neither to each other nor to the states. False, with a covariance of no meaning, if it
+  /// finds others, or an H that is not positive semidefinite.
+  bool (*filter_covariance)(const RiccatiView& view, double* covariance);
   /// H + [A B]'P[A B] of one stage, as rows of `out`.
   void (*form)(const RiccatiView& view, int stage, double* out);
   /// The inverse of a symmetric matrix; both have `count` rows of `stride` entries. False if the matrix is not positive

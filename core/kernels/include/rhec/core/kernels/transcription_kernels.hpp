@@ -26,6 +26,20 @@ struct CostView {
   bool adds_to_curvature;  ///< H already holds the curvature of the dynamics, to which costs are added
 };
 
+/// Rows of gradients at points, and sums over measurements by their parts of these points (PointSums): `W` by rows, and
+/// v.
+struct SumsView {
+  const double* G;
+  long G_step;  ///< at least the columns, filled up to a multiple of eight
+  int points;   ///< at most nine
+  const double* W;
+  long W_step;
+  const double* v;
+};
+struct ProductSizes {
+  int rows, inner, columns;
+};
+
 /// An estimator's measurements, NaN where missing, with weights 1 / variance. Rows of outputs are padded to multiples
 /// of eight; rows of inputs are rows of a stage, with the inputs in the control columns.
 struct MeasurementView {
@@ -72,6 +86,12 @@ struct TranscriptionKernels {
   /// `count` rows J_j of one stage. Rows of J have length `columns`, padded to a multiple of eight.
   void (*add_products)(const double* J, const double* weights, const double* pulls, int count, int columns, int stride,
                        double* H, double* h);
+  /// Adds G'WG to H and G'v to h, either of which may be null.
+  void (*add_sums)(const SumsView& sums, int columns, int stride, double* H, double* h);
+  /// Rows C J, with entries behind their ends zero: `to` has rows of `width`, a multiple of eight, as have at least
+  /// those of J.
+  void (*multiply_rows)(const double* C, long c_step, const double* J, long j_step, const ProductSizes& sizes,
+                        int width, double* to);
   /// weights (z - reference)^2 of stages first .. last; returns their sum if vectors are wanted. Differences of entries
   /// with a non-zero period are taken on the circle.
   double (*write_tracking)(const CostView& view, const TrackingView& tracked, int first, int last);

@@ -80,8 +80,8 @@ class RHEC_EXPORT Riccati {
   void factor(const StageQp& qp, const ActiveSet& active) noexcept { factor(qp, active, nullptr); }
   /// Without active bounds of states. False, and nothing to solve with, if a stage would have to be convexified.
   bool factor_if_convex(const StageQp& qp, const ActiveSet& active) noexcept;
-  /// What `factor` without active bounds and `write_convexified` do, in little more time than a convex QP takes. False
-  /// if that did not succeed (rounding, or numbers that are not finite).
+  /// `factor` without active bounds and `write_convexified`, in little more time than a convex QP takes; false if it
+  /// fails.
   bool convexify(StageQp& qp, const ActiveSet& no_bounds) noexcept;
   /// Only what `covariances` needs; a `solve` that follows factorises again.
   void factor_for_covariances(const StageQp& qp, const ActiveSet& active) noexcept;
@@ -99,8 +99,8 @@ class RHEC_EXPORT Riccati {
 
   /// Sensitivities of the minimiser to gradients of one entry, or one row of a stage, each: with h = e_k and all other
   /// vectors of the QP zero, the values z of all stages, and in place of fixed controls their multipliers. Interleaved:
-  /// entry c of the row of stage i is at values[(i * stride + c) * size + (number of the gradient)]. Behind the last
-  /// stage there is room for the values of all limits, which the caller may fill. With limits there are no costates.
+  /// entry c of the row of stage i is at values[(i * stride + c) * size + (number of the gradient)]. Behind them there
+  /// is room for the values of all limits, which the caller may fill. With limits there are no costates.
   struct Sensitivities {
     static constexpr int size = 8;
     AlignedDoubles values, costates;
@@ -121,17 +121,17 @@ class RHEC_EXPORT Riccati {
   /// that of `solve` with these gradients, except for `feedback`.
   void combine(const StageQp& qp, const ActiveSet& active, const Sensitivities& sensitivities, const double* weights,
                Iterate& step) noexcept;
-
   /// sums += weighted sum of the values of the sensitivities, over the first `places` entries of all rows.
   void add_values(const Sensitivities& sensitivities, const double* weights, int places, double* sums) const noexcept;
-
   /// The control of stage i by the policy of the last `solve` for any stage-state step: w = T v(s) + Y s + y0.
   void feedback(const StageQp& qp, int i, const double* state_step, double* control_step) noexcept;
-
   /// Marginal covariances of all states from the last factorisation, for an objective that is twice a negative
   /// log-likelihood, as in RHE (docs/method.md, section 2: no factor 1/2). The n_s x n_s block of node i goes to
   /// covariance + i * n_s^2, if not null; the last node's to `last`.
   void covariances(const StageQp& qp, double* covariance, double* last) noexcept;
+  /// The last node's alone, as a Kalman filter finds it, without a factorisation: of an H whose controls are coupled to
+  /// nothing, and whose first node is known. False, and nothing written, for others.
+  bool filter_covariance(const StageQp& qp, double* last) noexcept;
 
   /// The largest number of controls, and of states, of one stage.
   static constexpr int max_width = 64;

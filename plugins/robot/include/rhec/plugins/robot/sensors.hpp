@@ -20,7 +20,7 @@ RHEC_EXPORT ModelDescription with_sensor_errors(const RobotContext& context);
 /// Standard deviations at the start of the states that `with_sensors` has added behind the vehicle's.
 RHEC_EXPORT std::vector<double> initial_sensor_sigmas(const RobotContext& vehicle, const RobotContext& with_sensors);
 
-/// Whether a model of `with_sensors`, with or without process noise, has outputs of motion.
-RHEC_EXPORT bool senses_motion(const Model& model) noexcept;
+/// The outputs of motion, ascending, of a model of `with_sensors`, with or without process noise.
+RHEC_EXPORT std::vector<int> motion_outputs_of(const Model& model);
 
 }  // namespace rhec

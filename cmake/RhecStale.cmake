@@ -1,0 +1,43 @@
+# What the program or Python loads when it is there, and what an earlier configuration of this build tree has made though the
+# present one does not, is removed: `rhec ros` would run a node that was left out, and `import rhec` an old module.
+
+# The modules (libraries that are loaded) of a directory and those below it.
+function(rhec_modules_below DIRECTORY RESULT)
+  get_property(TARGETS DIRECTORY "${DIRECTORY}" PROPERTY BUILDSYSTEM_TARGETS)
+  get_property(FOLDERS DIRECTORY "${DIRECTORY}" PROPERTY SUBDIRECTORIES)
+  set(FOUND "")
+  foreach(TARGET IN LISTS TARGETS)
+    get_target_property(TYPE ${TARGET} TYPE)
+    if(TYPE STREQUAL "MODULE_LIBRARY")
+      list(APPEND FOUND ${TARGET})
+    endif()
+  endforeach()
+  foreach(FOLDER IN LISTS FOLDERS)
+    rhec_modules_below("${FOLDER}" BELOW)
+    list(APPEND FOUND ${BELOW})
+  endforeach()
+  set(${RESULT} ${FOUND} PARENT_SCOPE)
+endfunction()
+
+# To be called once all targets are known.
+function(rhec_remove_stale_modules)
+  # One line for each module of the last configuration: its target and its file.
+  set(LIST "${PROJECT_BINARY_DIR}/CMakeFiles/rhec_modules.txt")
+  if(EXISTS "${LIST}")
+    file(STRINGS "${LIST}" LINES)
+    foreach(LINE IN LISTS LINES)
+      string(REGEX REPLACE "[|].*" "" MODULE "${LINE}")
+      string(REGEX REPLACE "^[^|]*[|]" "" FILE "${LINE}")
+      if(NOT TARGET "${MODULE}" AND EXISTS "${FILE}")
+        message(STATUS "rhec: removing ${FILE}, which is no longer built")
+        file(REMOVE "${FILE}")
+      endif()
+    endforeach()
+  endif()
+  rhec_modules_below("${PROJECT_SOURCE_DIR}" MODULES)
+  set(CONTENT "")
+  foreach(MODULE IN LISTS MODULES)
+    string(APPEND CONTENT "${MODULE}|$<TARGET_FILE:${MODULE}>\n")
+  endforeach()
+  file(GENERATE OUTPUT "${LIST}" CONTENT "${CONTENT}")
+endfunction()
