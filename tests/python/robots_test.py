@@ -135,6 +135,21 @@ def test_a_deadline_is_data():
         driven.controller.control(estimate, deadline=-1.0)
 
 
+@pytest.mark.parametrize("changes", [{}, {"blocking": None}, {"blocking": None, "estimator": {"name": "bank"}}], ids=["blocks", "priors", "bank"])
+def test_a_rehearsal_changes_no_bit(changes):
+    robot = rhec.Robot(ROBOT, set=changes)
+    plain, rehearsed = Driven(robot), Driven(robot)
+    assert rehearsed.estimator.rehearse() is None  # there is nothing to go through yet
+    for k in range(30):
+        for _ in range(k % 3):
+            rehearsed.estimator.rehearse()
+        (now, command), (again, same) = plain.step(), rehearsed.step()
+        for name in ("state", "parameters", "covariance"):
+            numpy.testing.assert_array_equal(getattr(now, name), getattr(again, name))
+        numpy.testing.assert_array_equal(command.inputs, same.inputs)
+    assert plain.estimator.counts == rehearsed.estimator.counts
+
+
 def test_estimators_are_reset():
     driven = Driven()
     with pytest.raises(rhec.Error, match="both the mean and the covariance"):
