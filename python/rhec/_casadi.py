@@ -102,7 +102,7 @@ class _Transcription:
 
         self._casadi, self._problem, self._keys, self._names = casadi, problem, problem.to_dict(), problem.names
         keys, horizon = self._keys, self._keys["horizon"]
-        refused = [key for key in ("between", "blocked_noise", "terms", "rates") if keys.get(key)]
+        refused = [key for key in ("between", "blocked_noise", "terms") if keys.get(key)]
         refused += [f"transition of {name}" for name, kind in keys.get("transition", {}).items() if kind != "step"]
         if horizon["integrator"] != "rk4":
             refused.append(f"horizon.integrator {horizon['integrator']}")
@@ -207,7 +207,11 @@ class _Transcription:
     def _next(self, state, inputs, parameters, i):
         casadi, keys = self._casadi, self._keys
         nx, nu, dt = len(self._vehicle.states), len(self._vehicle.inputs), self._durations[i]
-        vehicle, u = state[:nx], inputs[:nu]
+        vehicle, u, held = state[:nx], inputs[:nu], []
+        for k, name in enumerate(keys.get("rates", [])):  # states behind the vehicle's, which change at the rates in their place
+            j = [each.name for each in self._vehicle.inputs].index(name)
+            u[j] = state[nx + k] + dt * inputs[j]
+            held.append(u[j])
         noisy = keys.get("state_noise", [])
         xi, w = inputs[nu:nu + len(noisy)], inputs[nu + len(noisy):]
         begin, end, processes = parameters, parameters, []
@@ -217,7 +221,7 @@ class _Transcription:
         names = [each.name for each in self._vehicle.states]
         for k, name in enumerate(noisy):
             after[names.index(name)] += math.sqrt(dt) * xi[k]
-        return casadi.vertcat(after, *processes)
+        return casadi.vertcat(after, *held, *processes)
 
     def _processes(self, z, w, data):
         casadi, at, first, begin, end, processes = self._casadi, 0, 0, [], [], []
@@ -248,12 +252,12 @@ class _Transcription:
 
     def _control_cost(self, states, inputs, _):
         keys, cost = self._keys, 0
+        angles = {each.name for each in [*self._vehicle.states, *self._vehicle.inputs] if each.is_angle}
         stage, terminal, reference = keys["weights"]["stage"], keys["weights"]["terminal"], keys["reference"]
         for j, name in enumerate(self._names["states"]):
             for i in range(self._n + 1):
                 weight = (stage if i < self._n else terminal).get(name, 0.0)
-                is_angle = self._vehicle.states[j].is_angle
-                cost += weight * self._difference(states[i][j], reference[name][i], is_angle)**2
+                cost += weight * self._difference(states[i][j], reference[name][i], name in angles)**2
         for j, name in enumerate(self._names["inputs"]):
             for i in range(self._n):
                 cost += stage.get(name, 0.0) * (inputs[i][j] - reference[name][i])**2

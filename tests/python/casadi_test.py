@@ -6,9 +6,6 @@ import pytest
 import rhec
 from shared import FIGURE8, ROOT, SHORT
 
-# to_casadi takes no rates of inputs.
-WITHOUT_RATES = {**SHORT, "controller.weights.rates": None}
-
 casadi = pytest.importorskip("casadi")
 
 QUIET = {"ipopt.print_level": 0, "print_time": 0, "ipopt.sb": "yes"}
@@ -100,6 +97,8 @@ CASES = {
     "linked blocks": {"blocking": {"kappa": {"name": "structured", "size": 3, "neighbour_sigma": 0.05}, "mu": {"name": "full_horizon"}}},
     "noise of states": {"noise.states": {"x_pos": 0.05}}, "robust": {"estimator.robust": {"outputs": ["x_gps", "y_gps"], "delta": 3}},
     "blocked inputs": {"controller.blocking": {"u2": {"name": "structured", "size": 2}}},
+    "no rates of inputs": {"controller.weights.rates": None},
+    "rates of both inputs": {"controller.weights.rates": {"u1": 0.1, "u2": 0.02}, "controller.rate_bounds": {"u2": [-0.4, 0.4]}},
     "substeps": {"estimator.substeps": 3, "controller.substeps": 2},
     "a heading": {"model": {"name": "bicycle_slip", "wheelbase": 1.4, "gps_offset": 0.4, "outputs": ["x_gps", "y_gps", "heading"]},
                   "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "heading": 0.02}}},
@@ -108,7 +107,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_problems_are_the_same(name):
-    problems = rhec.run(FIGURE8, set={**WITHOUT_RATES, **CASES[name]}, problems_every=45).problems
+    problems = rhec.run(FIGURE8, set={**SHORT, **CASES[name]}, problems_every=45).problems
     compared = 0
     for problem in problems:
         try:
@@ -123,9 +122,10 @@ def test_problems_are_the_same(name):
     assert compared >= 5
 
 
-@pytest.mark.parametrize("kind", ["rhe", "rhc"])
-def test_solutions_are_the_same(kind):
-    problem = [each for each in rhec.run(FIGURE8, set=WITHOUT_RATES, problems_every=40).problems if each.kind == kind][1]
+@pytest.mark.parametrize("kind, changes", [("rhe", {}), ("rhc", {}), ("rhc", CASES["rates of both inputs"])],
+                         ids=["rhe", "rhc", "rhc with limits of rates"])
+def test_solutions_are_the_same(kind, changes):
+    problem = [each for each in rhec.run(FIGURE8, set={**SHORT, **changes}, problems_every=40).problems if each.kind == kind][1]
     theirs, ours = rhec.to_casadi(problem).solve("ipopt", **QUIET), problem.solve("sparse_sqp")
     assert theirs["stats"]["success"] and ours.status == "solved"
     assert theirs["objective"] == pytest.approx(ours.objective, rel=1e-6)
@@ -141,7 +141,7 @@ def test_what_is_not_handed_over():
 
 def test_a_slow_peer_is_told_apart():
     """The comparison of docs/python.md: the same problem, timed alike."""
-    problem = [each for each in rhec.run(FIGURE8, set=WITHOUT_RATES, problems_every=40).problems if each.kind == "rhc"][1]
+    problem = [each for each in rhec.run(FIGURE8, set=SHORT, problems_every=40).problems if each.kind == "rhc"][1]
     made = rhec.to_casadi(problem)
     start = time.perf_counter()
     made.solve("ipopt", **QUIET)
