@@ -177,7 +177,8 @@ class Lexer {
 /// Recursive descent; a term comes out as items, operands first, so that what reads it needs no recursion.
 class Parser {
  public:
-  explicit Parser(const SourceText& source) : file_(source.file), tokens_(Lexer(source).take()) {}
+  explicit Parser(const SourceText& source, Functions functions = Functions::smooth)
+      : file_(source.file), functions_(functions), tokens_(Lexer(source).take()) {}
 
   std::vector<Statement> statements() {
     std::vector<Statement> all;
@@ -281,14 +282,14 @@ class Parser {
     items_.push_back({Item::Kind::number, token.place, value});
   }
   void name(const Token& token) {
-    if (!is_sign('(') && is_reserved(token.text) && token.text != "pi")
+    if (!is_sign('(') && is_reserved(token.text, functions_) && token.text != "pi")
       throw error_at(file_, token.place,
                      fmt::format("'{0}' is a function; expected its argument in parentheses, {0}(...)", token.text));
     if (!is_sign('(')) {
       items_.push_back({Item::Kind::name, token.place, 0.0, std::string(token.text)});
       return;
     }
-    const auto& functions = known_functions();
+    const auto& functions = known_functions(functions_);
     const auto found =
         std::find_if(functions.begin(), functions.end(), [&](const auto& known) { return known.name == token.text; });
     if (found == functions.end()) throw unknown_function(token);
@@ -306,7 +307,7 @@ class Parser {
   }
   Error unknown_function(const Token& token) const {
     std::vector<std::string> names;
-    for (const FunctionInfo& known : known_functions()) names.emplace_back(known.name);
+    for (const FunctionInfo& known : known_functions(functions_)) names.emplace_back(known.name);
     std::string advice = advice_for(token.text);
     if (advice.empty()) {
       const std::string near = nearest(token.text, names);
@@ -354,6 +355,7 @@ class Parser {
   }
 
   std::string file_;
+  Functions functions_;
   std::vector<Token> tokens_;
   std::size_t at_ = 0;
   std::vector<Item> items_;
@@ -394,12 +396,17 @@ Error error_at(const std::string& file, const Place& place, const std::string& t
   return Error(fmt::format("{}: {}{}{}", where, text, in, shown(written->text, place.at)));
 }
 
-const std::vector<FunctionInfo>& known_functions() {
+const std::vector<FunctionInfo>& known_functions(Functions which) {
   static const std::vector<FunctionInfo> functions = {
       {"sqrt", 1},  {"exp", 1},   {"log", 1},        {"sin", 1},        {"cos", 1},
       {"tan", 1},   {"asin", 1},  {"acos", 1},       {"atan", 1},       {"tanh", 1},
       {"atan2", 2}, {"hypot", 2}, {"smooth_abs", 2}, {"smooth_min", 3}, {"smooth_max", 3}};
-  return functions;
+  static const std::vector<FunctionInfo> cornered = [] {
+    std::vector<FunctionInfo> all = functions;
+    all.insert(all.end(), {{"abs", 1}, {"min", 2}, {"max", 2}, {"where", 3}});
+    return all;
+  }();
+  return which == Functions::smooth ? functions : cornered;
 }
 
 int operands_of(const Item& item) {
@@ -410,7 +417,7 @@ int operands_of(const Item& item) {
     case Item::Kind::negate:
       return 1;
     case Item::Kind::function:
-      for (const FunctionInfo& known : known_functions())
+      for (const FunctionInfo& known : known_functions(Functions::with_corners))
         if (item.name == known.name) return known.arguments;
       return 1;
     default:
@@ -418,8 +425,8 @@ int operands_of(const Item& item) {
   }
 }
 
-bool is_reserved(std::string_view name) {
-  const auto& functions = known_functions();
+bool is_reserved(std::string_view name, Functions which) {
+  const auto& functions = known_functions(which);
   return name == "pi" ||
          std::any_of(functions.begin(), functions.end(), [&](const auto& known) { return known.name == name; });
 }
@@ -431,6 +438,6 @@ bool is_name(std::string_view text) {
 
 std::vector<Statement> parse_statements(const SourceText& source) { return Parser(source).statements(); }
 
-std::vector<Item> parse_term(const SourceText& source) { return Parser(source).term(); }
+std::vector<Item> parse_term(const SourceText& source, Functions functions) { return Parser(source, functions).term(); }
 
 }  // namespace rhec::equations

@@ -61,11 +61,14 @@ struct FunctionInfo {
   const char* name;
   int arguments;
 };
-const std::vector<FunctionInfo>& known_functions();
+/// Which functions there are: those with derivatives everywhere; or, of numbers that nobody differentiates, also those
+/// with corners (abs, min, max) and where(condition, a, b): a where the condition is above 0, else b.
+enum class Functions { smooth, with_corners };
+const std::vector<FunctionInfo>& known_functions(Functions functions = Functions::smooth);
 /// How many parts before it an item combines: 0, 1, 2 or 3.
 int operands_of(const Item& item);
 /// True for functions and constants, which no variable may be named as.
-bool is_reserved(std::string_view name);
+bool is_reserved(std::string_view name, Functions functions = Functions::smooth);
 /// True for a letter or underscore, followed by letters, digits and underscores.
 bool is_name(std::string_view text);
 
@@ -73,6 +76,6 @@ bool is_name(std::string_view text);
 /// mistake, what was found there and what was expected.
 std::vector<Statement> parse_statements(const SourceText& source);
 /// A single term that fills the text.
-std::vector<Item> parse_term(const SourceText& source);
+std::vector<Item> parse_term(const SourceText& source, Functions functions = Functions::smooth);
 
 }  // namespace rhec::equations

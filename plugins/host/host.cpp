@@ -15,6 +15,7 @@
 #include "rhec/core/config/options.hpp"
 #include "rhec/core/prior/prior.hpp"
 #include "rhec/core/term/term.hpp"
+#include "rhec/plugins/equations/equation_term.hpp"
 #include "rhec/plugins/equations/equations.hpp"
 
 namespace rhec {
@@ -308,6 +309,8 @@ std::shared_ptr<Prior> Host::make_prior(std::string_view name, const Settings& s
 }
 
 std::shared_ptr<Term> Host::make_term(std::string_view name, const Settings& settings) const {
+  const Settings* equations = settings.find("equations");
+  if (equations && equations->kind() == Settings::Kind::map) return load_inline_term(settings);
   return search_->make<Term>(PluginKind::term, name, settings, *this);
 }
 

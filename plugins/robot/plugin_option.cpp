@@ -51,7 +51,7 @@ struct Maker<Term> {
   static constexpr const char* word = "a term plugin";
 };
 
-/// The name of a model whose equations stand in the configuration, among its options.
+/// The name of a model or a term whose equations stand in the configuration, among its options.
 constexpr const char* inline_equations = "equations";
 
 /// The file with a vehicle's equations that a section names. If it is named in a file, it is relative to that file.
@@ -76,6 +76,13 @@ std::string name_in(const Settings& section, const char* otherwise) {
   if (section.kind() != Settings::Kind::map)
     throw section.mismatch("the name of a plugin, or a map with the key 'name' and the plugin's options");
   const Settings* name = section.find("name");
+  if constexpr (std::is_same_v<Product, Term>) {
+    const Settings* equations = section.find("equations");
+    if (equations && name) throw equations->error("found equations and a plugin's name; expected one of the keys");
+    if (equations && equations->kind() != Settings::Kind::map)
+      throw equations->mismatch("a map of limits and costs (docs/terms.md)");
+    if (equations) return inline_equations;
+  }
   if constexpr (std::is_same_v<Product, Model>) {
     const Settings* equations = section.find("equations");
     if (equations && name)

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "rhec/core/base/error.hpp"
@@ -61,6 +62,10 @@ py::array copy(const double* numbers, const Shape& shape) {
   py::array_t<double> made(shape, strides_of(shape));
   std::copy_n(numbers, made.size(), made.mutable_data());
   return made;
+}
+
+bool all_finite(const Numbers& given) {
+  return std::all_of(given.data(), given.data() + given.size(), [](double number) { return std::isfinite(number); });
 }
 
 const double* vector_of(const Numbers& given, const std::vector<Variable>& variables, std::string_view what) {

@@ -30,6 +30,8 @@ inline py::array copy(const std::vector<double>& numbers) {
   return copy(numbers.data(), {static_cast<py::ssize_t>(numbers.size())});
 }
 
+/// Whether none of them is NaN or infinite.
+bool all_finite(const Numbers& given);
 /// The numbers of a vector with one entry for each of these variables. Throws Error that names `what` and the variables
 /// otherwise.
 const double* vector_of(const Numbers& given, const std::vector<Variable>& variables, std::string_view what);

@@ -4,7 +4,15 @@
 
 #include <string>
 
+#include "rhec/core/base/error.hpp"
+
 namespace rhec::python {
+
+/// An argument that a function does not take; rhec.ArgumentError in Python.
+class ArgumentError : public Error {
+ public:
+  using Error::Error;
+};
 
 /// The method by which copy and pickle would take an object apart, of a class whose objects stay where they are;
 /// `instead` says what to do.

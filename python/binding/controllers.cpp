@@ -2,6 +2,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -65,7 +66,7 @@ py::object control(ControllerObject& self, const EstimateObject& estimate, std::
                    const py::object& out) {
   const Clock::time_point end = deadline_in(deadline);
   if (!out.is_none() && !py::isinstance<CommandObject>(out))
-    throw py::type_error("out: expected a Command that this controller has made before");
+    throw ArgumentError("out: expected a Command that this controller has made before");
   const ControllerLock lock(self);
   check_fit(estimate.value, self.controller->vehicle());
   self.seen = estimate.value;
@@ -98,15 +99,19 @@ auto locked(ControllerObject& self, const Call& call) {
 
 void applied(ControllerObject& self, const Numbers& inputs) {
   const double* values = vector_of(inputs, self.controller->vehicle().description().inputs, "inputs");
+  if (!all_finite(inputs)) throw Error("inputs: found a number that is not finite; expected what the vehicle has had");
   locked(self, [&](Controller& controller) { controller.applied(values); });
 }
 
 int set_obstacles(ControllerObject& self, const Numbers& obstacles, double time) {
   constexpr py::ssize_t width = 7;
-  if (obstacles.ndim() != 2 || obstacles.shape(1) != width)
+  const bool is_none = obstacles.ndim() == 1 && obstacles.size() == 0;
+  if (!is_none && (obstacles.ndim() != 2 || obstacles.shape(1) != width))
     throw Error("obstacles: found " + shape_of(obstacles) +
                 ", expected rows of x [m], y [m], semi-axes along and across [m], heading [rad], velocity in x and y "
                 "[m/s] (n x 7)");
+  if (!all_finite(obstacles) || !std::isfinite(time))
+    throw Error("obstacles, time: found a number that is not finite; leave out what is not known");
   std::vector<Obstacle> all;
   for (py::ssize_t i = 0; i < obstacles.shape(0); ++i) {
     const double* row = obstacles.data() + i * width;

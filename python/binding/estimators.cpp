@@ -73,7 +73,7 @@ void push_input(NamedEstimator& self, double time, const Numbers& inputs) {
 py::object estimate(NamedEstimator& self, double time, std::optional<double> deadline, const py::object& out) {
   const Clock::time_point end = deadline_in(deadline);
   if (!out.is_none() && !py::isinstance<EstimateObject>(out))
-    throw py::type_error("out: expected an Estimate that this estimator has made before");
+    throw ArgumentError("out: expected an Estimate that this estimator has made before");
   const Lock lock(self.mutex);
   const Estimate* now = nullptr;
   double microseconds = 0.0;
@@ -286,6 +286,10 @@ void bind_estimators(py::module_& module) {
       .def(
           "prepare", [](NamedEstimator& self) { without_interpreter(self, [&] { self.estimator->prepare(); }); },
           "Does work for the next sample in advance.")
+      .def(
+          "rehearse", [](NamedEstimator& self) { without_interpreter(self, [&] { self.estimator->rehearse(); }); },
+          "Goes through the computation of the next estimate, without effect: for a loop that has slept and asks in a\n"
+          "moment. Code and data are in the processor's caches then.")
       .def("reset", &reset_to, py::arg("mean") = py::none(), py::arg("covariance") = py::none(),
            "Begins anew; or goes on from a mean of [state; parameters] (n) and its covariance (n, n).")
       .def(

@@ -4,6 +4,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <cmath>
 #include <string>
 
 #include "arrays.hpp"
@@ -11,6 +12,8 @@
 #include "hosts.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/core/model/vehicle_graph.hpp"
+#include "rhec/core/term/term_functions.hpp"
+#include "rhec/plugins/equations/equation_term.hpp"
 #include "rhec/plugins/equations/vehicle_cpp.hpp"
 #include "rhec/plugins/robot/model_section.hpp"
 #include "rhec/sim/check/model_check.hpp"
@@ -72,7 +75,7 @@ py::array observe(const Vehicle& self, const Numbers& states) {
 
 py::object integrate(const Vehicle& self, const Numbers& states, const Numbers& inputs, const Numbers& parameters,
                      double duration, int substeps, bool with_jacobian) {
-  if (!(duration > 0.0)) throw Error("duration: expected a number greater than 0 [s]");
+  if (!(duration > 0.0) || std::isinf(duration)) throw Error("duration: expected a finite number, greater than 0 [s]");
   if (substeps < 1) throw Error("substeps: expected an integer, at least 1");
   Rows rows;
   rows.add(states, self.about.states, "states");
@@ -132,6 +135,12 @@ std::string check_of(const std::vector<std::string>& plugin_path, const Settings
   const Host host = examined_host(plugin_path);
   const py::gil_scoped_release others_go_on;
   return sim::check_json(sim::check_model(host, Robot(host, options)));
+}
+
+/// Throws Error where a term's equations have a mistake, or do not suit the vehicle.
+void check_term(const Settings& section, const Vehicle* vehicle) {
+  const std::shared_ptr<Term> made = load_inline_term(section);
+  if (vehicle != nullptr) TermFunctions(*vehicle->model, {{.name = "term", .term = made}});
 }
 
 py::dict sources_of(const std::string& file) {
@@ -216,6 +225,7 @@ void bind_models(py::module_& module) {
       },
       py::arg("plugin_path"), py::arg("section"));
   module.def("check", &check_of, py::arg("plugin_path"), py::arg("section"));
+  module.def("check_term", &check_term, py::arg("section"), py::arg("vehicle"));
   module.def("vehicle_as_cpp", &sources_of, py::arg("file"));
 }
 

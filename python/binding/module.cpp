@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <exception>
+#include <string>
 
 #include "binding.hpp"
 #include "rhec/core/base/error.hpp"
@@ -12,22 +13,45 @@ namespace {
 namespace py = pybind11;
 
 /// The package's own class: it finds file, line and key in the text.
-void raise(const rhec::Error& error) {
-  const py::object type = py::module_::import("rhec._errors").attr("Error");
+void raise(const char* name, const rhec::Error& error) {
+  const py::object type = py::module_::import("rhec._errors").attr(name);
   PyErr_SetObject(type.ptr(), py::str(error.what()).ptr());
 }
 
 void translate(std::exception_ptr thrown) {
   try {
     if (thrown) std::rethrow_exception(thrown);
+  } catch (const rhec::python::ArgumentError& error) {
+    raise("ArgumentError", error);
   } catch (const rhec::Error& error) {
-    raise(error);
+    raise("Error", error);
+  }
+}
+
+/// What is raised is an exception of Python's.
+void raise(const py::object& exception) {
+  PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
+}
+
+/// Of a class whose objects only C++ makes.
+void refuse_constructors(const py::module_& module) {
+  for (const auto& [name, value] : module.attr("__dict__").cast<py::dict>()) {
+    if (!PyType_Check(value.ptr())) continue;
+    // pybind11's own one is a slot of the type.
+    if (!Py_IS_TYPE(value.attr("__init__").ptr(), &PyWrapperDescr_Type)) continue;
+    const auto of = name.cast<std::string>();
+    py::setattr(value, "__init__", py::cpp_function([of](const py::args&, const py::kwargs&) {
+                  raise(py::module_::import("rhec._arguments").attr("without_constructor")(of));
+                  throw py::error_already_set();
+                }));
   }
 }
 
 /// pybind11 would give memory to an object that __new__ has made and __init__ has not, and take what is in it for an
 /// object.
-void* refuse_memory(std::size_t) { throw py::type_error("an object that was not made; call its class, not __new__"); }
+void* refuse_memory(std::size_t) {
+  throw rhec::python::ArgumentError("an object that was not made; call its class, not __new__");
+}
 
 void refuse_what_was_not_made(const py::module_& module) {
   for (const auto& [name, value] : module.attr("__dict__").cast<py::dict>())
@@ -73,7 +97,7 @@ PyObject* call_in_words(PyObject* self, PyObject* arguments, PyObject* by_name) 
     if (words.is_none())
       refused.restore();
     else
-      PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(words.ptr())), words.ptr());
+      raise(words);
   } catch (py::error_already_set&) {
     refused.restore();
   }
@@ -108,5 +132,6 @@ PYBIND11_MODULE(_rhec, module) {
   rhec::python::bind_logs(module);
   rhec::python::bind_runs(module);
   refuse_what_was_not_made(module);
+  refuse_constructors(module);
   speak_of_arguments(module);
 }

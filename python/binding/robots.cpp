@@ -37,6 +37,7 @@ Path path_of(const Numbers& waypoints, double acceleration, double lateral_accel
 }
 
 py::array waypoint_at(const Path& self, double arc_length) {
+  if (!std::isfinite(arc_length)) throw Error("arc_length: expected a finite number [m]");
   const PathPoint at = self.point_at(arc_length);
   return copy({at.x, at.y, at.heading, at.speed, at.curvature});
 }

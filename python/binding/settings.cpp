@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 
 #include "binding.hpp"
@@ -27,7 +28,7 @@ class Reader {
   Settings read(py::handle object, const std::string& path) const {
     if (object.is_none()) return Settings::null(origin_);
     if (py::isinstance<py::bool_>(object)) return Settings::scalar(object.cast<bool>() ? "true" : "false", origin_);
-    if (py::isinstance<py::str>(object)) return Settings::scalar(object.cast<std::string>(), origin_);
+    if (py::isinstance<py::str>(object)) return Settings::scalar(text_of(object, path), origin_);
     if (py::isinstance<py::int_>(object)) return Settings::scalar(py::str(object), origin_);
     if (py::isinstance<py::float_>(object)) return read_number(object.cast<double>(), path);
     if (py::isinstance<py::dict>(object)) return read_map(py::reinterpret_borrow<py::dict>(object), path);
@@ -43,6 +44,15 @@ class Reader {
     return Error(path.empty() ? fmt::format("{}: {}", origin_.file, what)
                               : fmt::format("{}: {}: {}", origin_.file, path, what));
   }
+  std::string text_of(py::handle text, const std::string& path) const {
+    py::ssize_t size = 0;
+    const char* letters = PyUnicode_AsUTF8AndSize(text.ptr(), &size);
+    if (letters != nullptr) return {letters, static_cast<std::size_t>(size)};
+    PyErr_Clear();
+    throw mistake(path,
+                  fmt::format("found the text {}, which is not Unicode; expected one that can be written as UTF-8",
+                              py::str(py::module_::import("builtins").attr("ascii")(text)).cast<std::string>()));
+  }
   Settings read_number(double value, const std::string& path) const {
     if (std::isnan(value)) throw mistake(path, "found NaN, expected a number");
     return Settings::scalar(number_text(value), origin_);
@@ -52,7 +62,7 @@ class Reader {
     for (const auto& [key, value] : dict) {
       if (!py::isinstance<py::str>(key))
         throw mistake(path, fmt::format("found the key {}, expected a text", py::repr(key).cast<std::string>()));
-      const auto name = key.cast<std::string>();
+      const std::string name = text_of(key, path);
       map.add(name, read(value, path.empty() ? name : fmt::format("{}.{}", path, name)));
     }
     return map;

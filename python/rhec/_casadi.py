@@ -6,13 +6,15 @@ import math
 from typing import Any
 
 from . import _graphs
-from ._errors import Error
+from ._arguments import checked
+from ._errors import Error, module_of
 from ._problems import Problem
 from ._types import Array
 
 _FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "tanh", "atan2")
 
 
+@checked
 @dataclasses.dataclass
 class CasadiModel:
     """rates: Function (x, u, p) -> dx/dt; outputs: Function (x, u, p) -> y; their columns are the vehicle's variables."""
@@ -21,6 +23,7 @@ class CasadiModel:
     outputs: Any
 
 
+@checked
 @dataclasses.dataclass
 class CasadiProblem:
     """A problem by multiple shooting.
@@ -54,11 +57,14 @@ class CasadiProblem:
         return float(casadi.Function("objective", [self.nlp["x"]], [self.nlp["f"]])(x))
 
 
+@checked
 def to_casadi(thing: Any) -> Any:
     """A Vehicle or a Model as a CasadiModel, a Problem as a CasadiProblem. Needs CasADi (pip install casadi)."""
-    if isinstance(thing, Problem):
+    vehicle = None if isinstance(thing, Problem) else _graphs.vehicle_of(thing, "to_casadi")
+    module_of("casadi", "to_casadi")
+    if vehicle is None:
         return _Transcription(thing).made()
-    return _model(_graphs.vehicle_of(thing))
+    return _model(vehicle)
 
 
 def _model(vehicle):
@@ -96,7 +102,7 @@ class _Transcription:
 
         self._casadi, self._problem, self._keys, self._names = casadi, problem, problem.to_dict(), problem.names
         keys, horizon = self._keys, self._keys["horizon"]
-        refused = [key for key in ("between", "blocked_noise", "terms", "rates") if keys.get(key)]
+        refused = [key for key in ("between", "blocked_noise", "terms") if keys.get(key)]
         refused += [f"transition of {name}" for name, kind in keys.get("transition", {}).items() if kind != "step"]
         if horizon["integrator"] != "rk4":
             refused.append(f"horizon.integrator {horizon['integrator']}")
@@ -201,7 +207,11 @@ class _Transcription:
     def _next(self, state, inputs, parameters, i):
         casadi, keys = self._casadi, self._keys
         nx, nu, dt = len(self._vehicle.states), len(self._vehicle.inputs), self._durations[i]
-        vehicle, u = state[:nx], inputs[:nu]
+        vehicle, u, held = state[:nx], inputs[:nu], []
+        for k, name in enumerate(keys.get("rates", [])):  # states behind the vehicle's, which change at the rates in their place
+            j = [each.name for each in self._vehicle.inputs].index(name)
+            u[j] = state[nx + k] + dt * inputs[j]
+            held.append(u[j])
         noisy = keys.get("state_noise", [])
         xi, w = inputs[nu:nu + len(noisy)], inputs[nu + len(noisy):]
         begin, end, processes = parameters, parameters, []
@@ -211,7 +221,7 @@ class _Transcription:
         names = [each.name for each in self._vehicle.states]
         for k, name in enumerate(noisy):
             after[names.index(name)] += math.sqrt(dt) * xi[k]
-        return casadi.vertcat(after, *processes)
+        return casadi.vertcat(after, *held, *processes)
 
     def _processes(self, z, w, data):
         casadi, at, first, begin, end, processes = self._casadi, 0, 0, [], [], []
@@ -242,12 +252,12 @@ class _Transcription:
 
     def _control_cost(self, states, inputs, _):
         keys, cost = self._keys, 0
+        angles = {each.name for each in [*self._vehicle.states, *self._vehicle.inputs] if each.is_angle}
         stage, terminal, reference = keys["weights"]["stage"], keys["weights"]["terminal"], keys["reference"]
         for j, name in enumerate(self._names["states"]):
             for i in range(self._n + 1):
                 weight = (stage if i < self._n else terminal).get(name, 0.0)
-                is_angle = self._vehicle.states[j].is_angle
-                cost += weight * self._difference(states[i][j], reference[name][i], is_angle)**2
+                cost += weight * self._difference(states[i][j], reference[name][i], name in angles)**2
         for j, name in enumerate(self._names["inputs"]):
             for i in range(self._n):
                 cost += stage.get(name, 0.0) * (inputs[i][j] - reference[name][i])**2

@@ -2,13 +2,17 @@
 from __future__ import annotations
 
 import json
+import os
 from typing import Any
 
 from . import _configuration, _rhec
+from ._arguments import checked, found_in_words
+from ._errors import ArgumentError
 from ._table import Table
 from ._types import PluginPath
 
 
+@checked
 class Check:
     """Derivatives, scales, numbers that are not finite, what can be estimated.
 
@@ -27,6 +31,8 @@ class Check:
     @classmethod
     def of(cls, model: Any) -> Check:
         """That of a Model or a BuiltModel."""
+        if not hasattr(model, "_section"):
+            raise ArgumentError(f"Check.of: model: found {found_in_words(model)}, expected a Model or a BuiltModel", "model")
         folders = list(model._plugin_path)
         return cls(_rhec.check(folders, _rhec.Settings.of(model._section(), "configuration")))
 
@@ -48,9 +54,15 @@ class Check:
         return self.findings._repr_html_()
 
 
+@checked
 def check(model: Any, *, plugin_path: PluginPath = (), **options: Any) -> Check:
     """Looks at a model before its first run: a Model, the name of a plugin, or a file with equations."""
     if hasattr(model, "_section"):
         return Check.of(model)
+    if isinstance(model, os.PathLike):
+        model = os.fspath(model)
+    if not isinstance(model, str):
+        raise ArgumentError(f"check: model: found {found_in_words(model)}, expected a Model, the name of a plugin, or a file with "
+                            "equations", "model")
     folders = _configuration.folders_of(plugin_path)
     return Check(_rhec.check(folders, _rhec.Settings.of({"name": model, **options}, "configuration")))

@@ -7,15 +7,29 @@ import pathlib
 import shutil
 import subprocess
 
-from . import _rhec
+from . import _files, _rhec
 from ._errors import Error
 from ._types import File
+
+
+# Targets that CMake has in every project.
+_TARGETS = ("all", "clean", "depend", "edit_cache", "help", "install", "list_install_components", "package", "package_source",
+            "preinstall", "rebuild_cache", "test")
+
+
+def check_name(name: str) -> None:
+    """Throws Error where CMake keeps a plugin's name for itself."""
+    if name in _TARGETS:
+        raise Error(f"build: the name is '{name}', which CMake keeps for itself; choose another name")
 
 
 def folder_of(given: File | None, name: str, text: str) -> pathlib.Path:
     """Where a plugin's sources are: as given, or in the user's cache, by what they are and by which rhec."""
     folder = pathlib.Path(given) if given is not None else _cached(name, text)
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise Error(f"build: {folder}: {problem.strerror}; expected a folder for the sources, or a place for it") from None
     return folder
 
 
@@ -28,8 +42,8 @@ def _cached(name: str, text: str) -> pathlib.Path:
 
 def write(file: pathlib.Path, content: str) -> None:
     """Writes a file, where it is not there already: else nothing is compiled anew."""
-    if not file.exists() or file.read_text(encoding="utf-8") != content:
-        file.write_text(content, encoding="utf-8")
+    if not file.exists() or _files.read_text(file) != content:
+        _files.write_text(file, content)
 
 
 def compile_in(folder: pathlib.Path, settings: list[str]) -> None:

@@ -1,16 +1,18 @@
-"""The one exception that rhec raises for what a user can correct, and the warning for what one should know."""
+"""The exceptions that rhec raises for what a user can correct, and the warning for what one should know."""
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 # "file.yaml:12: key.path: what", "file.yaml:12:3: what", "file.jsonl:3: key: what"
 _IN_A_FILE = re.compile(r"^(?P<file>[^:\n]+):(?P<line>\d+)(?::\d+)?: (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
 # "configuration: key.path: what", "set 'key.path': key.path: what"
-_IN_PYTHON = re.compile(r"^(?:configuration|set '[^']*'): (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
+_IN_PYTHON = re.compile(r"^(?:configuration|set '[^']*'|the (?:model|term) '[^']*'): (?:(?P<key>[A-Za-z_][\w.\[\]]*): )?")
 # "configuration: key.path: file.yaml:12:3: what", of a file that a configuration names
 _IN_A_NAMED_FILE = re.compile(r"(?P<file>[^:\n]+):(?P<line>\d+)(?::\d+)?: ")
 
@@ -23,6 +25,7 @@ class _Placed:
     """A text that begins with where it is about."""
 
     def __init__(self, text: str = "") -> None:
+        text = str(text)
         super().__init__(text)  # type: ignore[call-arg]
         in_python = _IN_PYTHON.match(text)
         in_a_file = _IN_A_NAMED_FILE.match(text, in_python.end()) if in_python else _IN_A_FILE.match(text)
@@ -42,8 +45,15 @@ class Error(_Placed, Exception):
 
 
 class ArgumentError(Error, TypeError):
-    """An argument of a call that is no such thing as the call takes: the text names it, and says what was found and what was
-    expected."""
+    """An argument that a function does not take: by its class, its name, its range, or because there are too many. The text names
+    it, and says what was found and what was expected. It is a TypeError, too.
+
+    argument: its name, or None
+    """
+
+    def __init__(self, text: str = "", argument: str | None = None) -> None:
+        super().__init__(text)
+        self.argument = argument
 
 
 class Note(_Placed, UserWarning):
@@ -55,9 +65,23 @@ class Note(_Placed, UserWarning):
 
     def __init__(self, text: str = "") -> None:
         super().__init__(text)
-        found = _OF_A_KEY.match(text)
+        found = _OF_A_KEY.match(str(text))
         if found and self.key is None:
             self.key = found["key"]
+
+
+class MissingModule(Error, ModuleNotFoundError):
+    """A module that something takes and that is not there; a ModuleNotFoundError, too."""
+
+
+def module_of(name: str, title: str) -> Any:
+    """A module that is not needed for everything else."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as missing:
+        told = MissingModule(f"{title}: takes {name}, which cannot be imported: {missing}; install it (pip install {name.split('.')[0]})")
+        told.name = name
+        raise told from None
 
 
 def warn_of(notes: Sequence[str]) -> None:

@@ -5,7 +5,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from . import _rhec
-from ._errors import Error
+from ._arguments import checked, found_in_words
+from ._errors import ArgumentError, Error, module_of
 
 
 def evaluate(vehicle: _rhec.Vehicle, library: dict[str, Any], states: Sequence[Any], inputs: Sequence[Any],
@@ -46,19 +47,24 @@ def evaluate(vehicle: _rhec.Vehicle, library: dict[str, Any], states: Sequence[A
     return [values[node] for node in graph["rates"]], [values[node] for node in graph["outputs"]]
 
 
-def vehicle_of(model: Any) -> _rhec.Vehicle:
+def vehicle_of(model: Any, title: str) -> _rhec.Vehicle:
     """The Vehicle of a Model, a BuiltModel or a Vehicle."""
     if isinstance(model, _rhec.Vehicle):
         return model
-    return model.vehicle if hasattr(model, "vehicle") else model.load()
+    made = getattr(model, "vehicle", None)
+    if made is None and hasattr(model, "_section"):
+        made = model.load()
+    if not isinstance(made, _rhec.Vehicle):
+        raise ArgumentError(f"{title}: model: found {found_in_words(model)}, expected a Vehicle, a Model, a BuiltModel or a Robot", "model")
+    return made
 
 
+@checked
 def to_sympy(model: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """The formula of a model as sympy's terms: (rates, outputs), dicts by the names of states and outputs. Symbols have
     the names of variables; options have their values."""
-    import sympy
-
-    vehicle = vehicle_of(model)
+    sympy = module_of("sympy", "to_sympy")
+    vehicle = vehicle_of(model, "to_sympy")
     symbols = [[sympy.Symbol(each.name, real=True) for each in variables]
                for variables in (vehicle.states, vehicle.inputs, vehicle.parameters)]
     names = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "tanh", "atan2")

@@ -2,17 +2,18 @@
 from __future__ import annotations
 
 import functools
-import json
 import pathlib
 import re
 from collections.abc import Sequence
 from typing import Any
 
 from . import _compile, _configuration, _notation, _rhec
+from ._arguments import checked, found_in_words, is_terms
 from ._check import Check
-from ._errors import Error
-from ._types import File
+from ._errors import ArgumentError, Error
+from ._types import File, Terms
 
+_SETS = ("generic", "avx2", "avx512", "neon")
 _KINDS = ("states", "inputs", "parameters", "outputs", "options")
 
 
@@ -24,7 +25,7 @@ def name_of(key: Any) -> str:
         return key.func.__name__
     name = getattr(key, "name", None)
     if name is None:
-        raise Error(f"found {key!r} as the name of a variable, expected a text or a symbol")
+        raise ArgumentError(f"found {key!r} as the name of a variable, expected a text or a symbol")
     return name() if callable(name) else name
 
 
@@ -32,6 +33,8 @@ def by_name(given: Any, what: str) -> dict[str, Any]:
     """A dict by name of a dict by names or symbols, a list of them, or pairs."""
     if given is None:
         return {}
+    if not is_terms(given):
+        raise ArgumentError(f"{what}: found {found_in_words(given)}, expected a dict by names or symbols, or a list of them", what)
     if hasattr(given, "numel"):  # a vector of CasADi's symbols: its entries are x_0, x_1, ...
         given = [given[i] for i in range(given.numel())]
     pairs = given.items() if isinstance(given, dict) else [each if isinstance(each, tuple) else (each, None) for each in given]
@@ -44,6 +47,7 @@ def by_name(given: Any, what: str) -> dict[str, Any]:
     return made
 
 
+@checked
 class Model:
     """A vehicle's equations, written once: dx/dt = f(x, u, p), y = h(x).
 
@@ -60,8 +64,10 @@ class Model:
 
     _plugin_path: list[str] = []
 
-    def __init__(self, name: str, *, states: Any, inputs: Any, rates: Any, measured: Any = None, outputs: Any = None,
-                 parameters: Any = None, options: Any = None, definitions: Any = None, straight_motion: Any = None,
+    def __init__(self, name: str, *, states: Terms, inputs: Terms, rates: Terms, measured: Terms | None = None,
+                 outputs: Terms | None = None,
+                 parameters: Terms | None = None, options: Terms | None = None, definitions: Terms | None = None,
+                 straight_motion: Terms | None = None,
                  source: str = "", smooth: float | None = None) -> None:
         self.name = name
         self._variables = {kind: by_name(given, kind) for kind, given in
@@ -73,7 +79,14 @@ class Model:
         equations |= {f"{state}'": term for state, term in self._matched(rates, "states", "rates").items()}
         equations |= self._matched(measured, "outputs", "measured")
         straight = by_name(straight_motion, "straight_motion")
-        texts = texts_of([*equations.values(), *straight.values()], notes)
+        owner, of_equations = f"the model '{name}'", _where(equations, definitions)
+        of_straight = [f"straight_motion: {each}" for each in straight]
+        texts = labelled_texts(owner, dict(zip([*of_equations, *of_straight], [*equations.values(), *straight.values()])), notes)
+        known = {*names, *definitions, *notes.definitions}
+        for labels, terms, written, further in ((of_equations, equations, texts, ()), (of_straight, straight, texts[len(equations):], ("ground_speed",))):
+            read = {each: text for each, term, text in zip(labels, terms.values(), written) if not isinstance(term, str)}
+            check_known(owner, read, {*known, *further})
+        check_known(owner, parts_of(notes), {*known, "ground_speed"})
         self.equations = "".join(f"{left} = {right}\n" for left, right in
                                  [*notes.definitions.items(), *zip(equations, texts)])
         self._straight = "".join(f"{left} = {right}\n" for left, right in zip(straight, texts[len(equations):]))
@@ -117,9 +130,9 @@ class Model:
         for key, value in made.items():
             if isinstance(value, dict):
                 lines.append(f"{key}:")
-                lines += [f"  {name}: {json.dumps(about)}" for name, about in value.items()]
+                lines += [f"  {name}: {_configuration.as_json(about, f'{key}: {name}')}" for name, about in value.items()]
             else:
-                lines.append(f"{key}: {json.dumps(value)}")
+                lines.append(f"{key}: {_configuration.as_json(value, key)}")
         for key, text in blocks.items():
             lines += [f"{key}: |", *(f"  {line}" for line in text.splitlines())]
         return "\n".join(lines) + "\n"
@@ -136,7 +149,7 @@ class Model:
 
     def load(self) -> _rhec.Vehicle:
         """The Vehicle, at once and without a compiler. In a configuration {"model": model} does the same."""
-        return _vehicle_of(self)
+        return _vehicle_of(self, self.name)
 
     def check(self) -> Check:
         """What `rhec check` says of it (docs/check.md)."""
@@ -153,12 +166,17 @@ class Model:
         """
         if not re.fullmatch(r"[A-Za-z]\w*", self.name, re.ASCII):
             raise Error(f"build: the model's name is '{self.name}'; a plugin takes letters, digits and underscores, and begins with a letter")
+        for each in instruction_sets or ():
+            if each not in _SETS:
+                raise ArgumentError(f"Model.build: instruction_sets: found {found_in_words(each)}, expected some of {', '.join(_SETS)}",
+                                    "instruction_sets")
         return _Builder(self, folder, instruction_sets).build()
 
     def __repr__(self) -> str:
         return f"<model '{self.name}': {', '.join(self._variables['states'])}>"
 
 
+@checked
 class BuiltModel:
     """A model that was compiled, for configurations: {"model": built}.
 
@@ -168,7 +186,7 @@ class BuiltModel:
     def __init__(self, plugin: str, folder: pathlib.Path, options: dict[str, Any]) -> None:
         self.plugin, self.folder, self._options = plugin, folder, options
         self._plugin_path = [str(folder.absolute() / "build")]
-        self.vehicle = _vehicle_of(self)
+        self.vehicle = _vehicle_of(self, plugin)
 
     @functools.cached_property
     def check(self) -> Check:
@@ -185,15 +203,49 @@ class BuiltModel:
         return f"<model '{self.plugin}', compiled in {self.folder}>"
 
 
-def _vehicle_of(model):
-    return _rhec.make_vehicle(list(model._plugin_path), _rhec.Settings.of(model._section(), "configuration"))
+def _vehicle_of(model, name):
+    return _rhec.make_vehicle(list(model._plugin_path), _rhec.Settings.of(model._section(), f"the model '{name}'"))
 
 
-def texts_of(terms: list[Any], notes: _notation.Notes) -> list[str]:
-    """Texts are taken as they are; all others are read together."""
+def texts_of(terms: list[Any], notes: _notation.Notes, reads_texts: bool = False) -> list[str]:
+    """Texts are taken as they are, or read where the style is another one than that of equations; all others are read
+    together."""
     others = [term for term in terms if not isinstance(term, str)]
     read = iter(_notation.reader_of(others, notes).read_all(others) if others else [])
-    return [term if isinstance(term, str) else next(read) for term in terms]
+    texts = _notation.TextReader(notes)
+    return [next(read) if not isinstance(term, str) else texts.read(term).text if reads_texts else term for term in terms]
+
+
+def labelled_texts(owner: str, terms: dict[str, Any], notes: _notation.Notes, writes_texts: bool = False) -> list[str]:
+    """As `texts_of`, of terms by where they stand, which is said with what is wrong with one of them. Of texts that stay as they are
+    the equations' own reader tells, with line and column, when they are loaded."""
+    for where, term in terms.items():
+        if isinstance(term, str) and not writes_texts:
+            continue
+        alone = _notation.Notes(notes.taken, notes.smooth, notes.style)
+        try:
+            texts_of([term], alone, writes_texts)
+        except Error as mistake:
+            raise type(mistake)(f"{owner}: {where}: {mistake}") from None
+    return texts_of(list(terms.values()), notes, writes_texts)
+
+
+def parts_of(notes: _notation.Notes) -> dict[str, str]:
+    """What terms have in common, or what was too deep for one text, by what it is."""
+    return {f"a part of the terms ({name})": text for name, text in notes.definitions.items()}
+
+
+def check_known(owner: str, texts: dict[str, str], known: set[str], hint: str = "") -> None:
+    """Throws Error where a text names what is not known."""
+    for where, text in texts.items():
+        for name in _notation.names_in(text):
+            if name not in known:
+                raise Error(f"{owner}: {where}: '{name}' is not known; expected one of {', '.join(sorted(known))}{hint}")
+
+
+def _where(equations: dict[str, Any], definitions: dict[str, Any]) -> list[str]:
+    return [f"definitions: {each}" if each in definitions else f"rates: {each[:-1]}" if each.endswith("'") else f"measured: {each}"
+            for each in equations]
 
 
 class _Builder:

@@ -4,9 +4,11 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+from collections.abc import Callable
 from typing import Any
 
-from ._errors import Error
+from ._arguments import checked, found_in_words
+from ._errors import ArgumentError, Error
 
 # How tightly a text binds: a sum, a product, a sign, a power, an atom.
 _SUM, _PRODUCT, _SIGNED, _POWER, _ATOM = range(1, 6)
@@ -14,24 +16,39 @@ _SUM, _PRODUCT, _SIGNED, _POWER, _ATOM = range(1, 6)
 _DEEPEST = 40
 # Beyond so many operations common parts become definitions of their own.
 _MANY = 2000
+# By how many arguments they have.
+FUNCTIONS = {"sqrt": 1, "exp": 1, "log": 1, "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "tanh": 1,
+                     "atan2": 2, "hypot": 2, "smooth_abs": 2, "smooth_min": 3, "smooth_max": 3}
+_MOST_LEVELS = 100
+_IDENTIFIER = re.compile(r"(?<![\w.:])[A-Za-z_]\w*")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _SMOOTH = ("has no derivative everywhere; write rhec.smooth_abs, rhec.smooth_max or rhec.smooth_min of a width, or give "
-           "Model(..., smooth=WIDTH), a little below what matters")
+           "smooth=WIDTH, a little below what matters")
 
 
+def _of_numbers(title: str, compute: Callable[[], Any], *given: Any) -> Any:
+    try:
+        return compute()
+    except TypeError:
+        raise ArgumentError(f"{title}: found {', '.join(map(found_in_words, given))}, expected numbers, or terms of sympy or CasADi") from None
+
+
+@checked
 def smooth_abs(x: Any, width: float) -> Any:
     """sqrt(x^2 + width^2): |x| with a derivative everywhere; of numbers, sympy's and CasADi's terms."""
-    return (x * x + width * width) ** 0.5
+    return _of_numbers("smooth_abs", lambda: (x * x + width * width) ** 0.5, x, width)
 
 
+@checked
 def smooth_max(a: Any, b: Any, width: float) -> Any:
     """The larger of a and b, rounded off where they differ by about `width`."""
-    return (a + b + smooth_abs(a - b, width)) / 2
+    return _of_numbers("smooth_max", lambda: (a + b + smooth_abs(a - b, width)) / 2, a, b, width)
 
 
+@checked
 def smooth_min(a: Any, b: Any, width: float) -> Any:
     """The smaller of a and b, likewise."""
-    return (a + b - smooth_abs(a - b, width)) / 2
+    return _of_numbers("smooth_min", lambda: (a + b - smooth_abs(a - b, width)) / 2, a, b, width)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,6 +101,8 @@ class Equations:
 
     pi = "pi"
     has_corners = False
+    # Of styles with corners.
+    corners = {"Abs": "abs", "Max": "max", "Min": "min"}
 
     def number(self, value):
         value = float(value)
@@ -97,11 +116,43 @@ class Equations:
     def power(self, a, b):
         return _joined("{}^{}", _POWER, (a, _ATOM), (b, _POWER))
 
+    def call(self, function, *arguments):
+        return call(function, *arguments)
+
+    def choice(self, a, sign, b, value, otherwise):
+        """`value` where a and b compare as the sign says."""
+        if sign in ("==", "!="):
+            off = call("abs", subtract(a, b))
+            return call("where", off, otherwise, value) if sign == "==" else call("where", off, value, otherwise)
+        above = subtract(a, b) if sign in (">", "<=") else subtract(b, a)
+        return call("where", above, value, otherwise) if sign in ("<", ">") else call("where", above, otherwise, value)
+
+
+class EquationNumbers(Equations):
+    """Numbers that nobody differentiates: they may have corners, and be infinite."""
+
+    has_corners = True
+
+    def number(self, value):
+        if math.isinf(float(value)):
+            return Text("infinity" if value > 0 else "-infinity", _ATOM if value > 0 else _SIGNED)
+        return super().number(value)
+
 
 class Cpp(Equations):
     """How C++ does, for double and rhec::Expression alike."""
 
     pi = "std::numbers::pi"
+
+    def __init__(self, numbers=()):
+        """`numbers`: names that stand for a double in a formula; functions of several arguments need one type."""
+        self._numbers = {*numbers, *FUNCTIONS, "pow", "std", "numbers", "pi"}
+
+    def call(self, function, *arguments):
+        if len(arguments) > 1:
+            arguments = [each if set(_NAME.findall(each.text)) - self._numbers else Text(f"rhec::Expression({each.text})", _ATOM, each.depth)
+                         for each in arguments]
+        return call(function, *arguments)
 
     def _digits(self, value):
         return repr(value)  # 1.0, not 1: 1 / 2 is 0
@@ -113,9 +164,17 @@ class Cpp(Equations):
 
 
 class CppNumbers(Cpp):
-    """Numbers that nobody differentiates: they may have corners, and be infinite."""
+    """As EquationNumbers."""
 
     has_corners = True
+    corners = {"Abs": "fabs", "Max": "fmax", "Min": "fmin"}
+
+    def call(self, function, *arguments):
+        return call(function, *arguments)
+
+    def choice(self, a, sign, b, value, otherwise):
+        return Text(f"({a.within(_SUM)} {sign} {b.within(_SUM)} ? {value.text} : {otherwise.text})", _ATOM,
+                    1 + max(each.depth for each in (a, b, value, otherwise)))
 
     def number(self, value):
         if math.isinf(float(value)):
@@ -127,7 +186,9 @@ class Notes:
     """Definitions that are made on the way, what is smoothed, and how terms are written."""
 
     def __init__(self, taken, smooth, style=None):
-        self.definitions, self._taken, self._smooth = {}, set(taken), smooth
+        if smooth is not None and not 0 < smooth < math.inf:
+            raise Error(f"smooth: found {smooth}, expected a width greater than 0")
+        self.definitions, self.taken, self.smooth = {}, set(taken), smooth
         self.style = style or Equations()
 
     def name(self, text):
@@ -136,11 +197,13 @@ class Notes:
         return Text(text)
 
     def define(self, term):
+        if self.style.has_corners:  # numbers have no definitions
+            return term
         number_of = len(self.definitions) + 1
-        while f"part{number_of}" in self._taken:
+        while f"part{number_of}" in self.taken:
             number_of += 1
         name = f"part{number_of}"
-        self._taken.add(name)
+        self.taken.add(name)
         self.definitions[name] = term.text
         return Text(name)
 
@@ -148,9 +211,9 @@ class Notes:
         return self.define(term) if term.depth > _DEEPEST else term
 
     def width(self, what):
-        if self._smooth is None:
+        if self.smooth is None:
             raise Error(f"{what} {_SMOOTH}")
-        return self.style.number(self._smooth)
+        return self.style.number(self.smooth)
 
     def step(self, difference, what):
         """1 where `difference` is above 0, 0 below, and a slope of the width between."""
@@ -255,14 +318,14 @@ class SympyReader:
         if self._notes.style.has_corners and isinstance(term, (sympy.Abs, sympy.Max, sympy.Min, sympy.Piecewise)):
             return self._corner(term)
         if name in self._FUNCTIONS and len(term.args) in (1, 2 if name == "atan2" else 1):
-            return call(name, *map(self.read, term.args))
+            return self._notes.style.call(name, *map(self.read, term.args))
         if isinstance(term, sympy.Abs):
-            return call("smooth_abs", self.read(term.args[0]), self._notes.width(f"{term}: abs"))
+            return self._notes.style.call("smooth_abs", self.read(term.args[0]), self._notes.width(f"{term}: abs"))
         if isinstance(term, (sympy.Max, sympy.Min)):
             function = "smooth_max" if isinstance(term, sympy.Max) else "smooth_min"
             made, *others = map(self.read, sorted(term.args, key=str))
             for other in others:
-                made = call(function, made, other, self._notes.width(f"{term}: {name.lower()}"))
+                made = self._notes.style.call(function, made, other, self._notes.width(f"{term}: {name.lower()}"))
             return made
         if isinstance(term, sympy.sign):
             return call("tanh", divide(self.read(term.args[0]), self._notes.width(f"{term}: sign")))
@@ -284,23 +347,28 @@ class SympyReader:
         if isinstance(term, sympy.Piecewise):
             made = self.read(self._otherwise(term))
             for value, condition in reversed(term.args[:-1]):
-                made = Text(f"({self._truth(condition)} ? {self.read(value).text} : {made.text})")
+                made = self._chosen(condition, self.read(value), made)
             return made
-        function = {sympy.Abs: "fabs", sympy.Max: "fmax", sympy.Min: "fmin"}[term.func]
+        function = self._notes.style.corners[term.func.__name__]
         made, *others = map(self.read, sorted(term.args, key=str))
-        if function == "fabs":
+        if not others:
             return call(function, made)
         for other in others:
             made = call(function, made, other)
         return made
 
-    def _truth(self, condition):
+    def _chosen(self, condition, value, otherwise):
         sympy = self._sympy
         if isinstance(condition, sympy.core.relational.Relational):
-            return f"({self.read(condition.lhs).within(_SUM)} {condition.rel_op} {self.read(condition.rhs).within(_SUM)})"
-        if isinstance(condition, (sympy.And, sympy.Or)):
-            sign = " && " if isinstance(condition, sympy.And) else " || "
-            return f"({sign.join(self._truth(part) for part in condition.args)})"
+            return self._notes.style.choice(self.read(condition.lhs), condition.rel_op, self.read(condition.rhs), value, otherwise)
+        if isinstance(condition, sympy.And):
+            for part in condition.args:
+                value = self._chosen(part, value, otherwise)
+            return value
+        if isinstance(condition, sympy.Or):
+            for part in condition.args:
+                otherwise = self._chosen(part, value, otherwise)
+            return otherwise
         raise Error(f"the condition {condition}: expected comparisons, 'and' and 'or' of them")
 
     def _otherwise(self, term):
@@ -345,15 +413,25 @@ class CasadiReader:
             "SINH": lambda a: divide(subtract(call("exp", a), call("exp", negate(a))), number(2)),
             "COSH": lambda a: divide(add(call("exp", a), call("exp", negate(a))), number(2)),
             "EXPM1": lambda a: subtract(call("exp", a), one), "LOG1P": lambda a: call("log", add(one, a)),
-            "FABS": lambda a: call("smooth_abs", a, width("fabs")),
-            "FMAX": lambda a, b: call("smooth_max", a, b, width("fmax")),
-            "FMIN": lambda a, b: call("smooth_min", a, b, width("fmin")),
+            "FABS": lambda a: notes.style.call("smooth_abs", a, width("fabs")),
+            "FMAX": lambda a, b: notes.style.call("smooth_max", a, b, width("fmax")),
+            "FMIN": lambda a, b: notes.style.call("smooth_min", a, b, width("fmin")),
             "SIGN": lambda a: call("tanh", divide(a, width("sign"))),
             "LT": lambda a, b: step(subtract(b, a), "a comparison"), "LE": lambda a, b: step(subtract(b, a), "a comparison"),
             "NOT": lambda a: subtract(one, a), "AND": multiply,
             "OR": lambda a, b: subtract(add(a, b), multiply(a, b)), "IF_ELSE_ZERO": multiply,
         }
-        rules |= {name: (lambda *a, function=function: call(function, *a)) for name, function in plain.items()}
+        if notes.style.has_corners:
+            zero, corners, choice = number(0), notes.style.corners, notes.style.choice
+            rules |= {
+                "FABS": lambda a: call(corners["Abs"], a),
+                "FMAX": lambda a, b: call(corners["Max"], a, b), "FMIN": lambda a, b: call(corners["Min"], a, b),
+                "SIGN": lambda a: choice(a, ">", zero, one, choice(a, "<", zero, number(-1), zero)),
+                "LT": lambda a, b: choice(a, "<", b, one, zero), "LE": lambda a, b: choice(a, "<=", b, one, zero),
+                "EQ": lambda a, b: choice(a, "==", b, one, zero), "NE": lambda a, b: choice(a, "!=", b, one, zero),
+                "IF_ELSE_ZERO": lambda a, b: choice(a, "!=", zero, b, zero),  # b may be infinite
+            }
+        rules |= {name: (lambda *a, function=function: notes.style.call(function, *a)) for name, function in plain.items()}
         self._rules = {getattr(casadi, f"OP_{name}"): rule for name, rule in rules.items() if hasattr(casadi, f"OP_{name}")}
         self._names = {getattr(casadi, name): name[3:].lower() for name in dir(casadi) if name.startswith("OP_")}
 
@@ -404,6 +482,123 @@ class CasadiReader:
             raise Error(f"equations do not have CasADi's operation '{self._names.get(operation, operation)}'; write it in others "
                         "(docs/equations.md)")
         return self._rules[operation](*inputs)
+
+
+_TOKEN = re.compile(r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*'?)|(?P<sign>\*\*|\S))", re.ASCII)
+_CORNERS_OF_TEXTS = {"abs": ("Abs", 1), "min": ("Min", 2), "max": ("Max", 2)}
+
+
+def names_in(text: str) -> list[str]:
+    """The names in a text of the notation, but functions and pi."""
+    return [name for name in _IDENTIFIER.findall(text) if name not in FUNCTIONS and name != "pi"]
+
+
+class TextReader:
+    """Reads texts in the notation of equations (docs/equations.md), for other styles than that."""
+
+    def __init__(self, notes):
+        self._notes, self._text, self._tokens, self._at, self._levels = notes, "", [], 0, 0
+
+    def read(self, text):
+        """A text as a Text."""
+        self._text, self._at, self._levels = text, 0, 0
+        text = re.sub(r"#.*", "", text)  # a comment
+        self._tokens = [(found.lastgroup, found[found.lastgroup]) for found in _TOKEN.finditer(text)] + [("end", "")]
+        made = self._sum()
+        if self._next() != ("end", ""):
+            raise self._wrong("an operator + - * / ^ or the end")
+        return made
+
+    def _next(self):
+        return self._tokens[self._at]
+
+    def _take(self, *signs):
+        """The next sign, if it is one of these."""
+        kind, text = self._next()
+        if kind != "sign" or text not in signs:
+            return None
+        self._at += 1
+        return text
+
+    def _wrong(self, expected):
+        kind, text = self._next()
+        found = "the end" if kind == "end" else f"'{text}'"
+        advice = "; write a power as x^2" if text == "**" else "; a product is written with '*'" if kind in ("name", "number") else ""
+        return Error(f"the text '{self._text}': found {found}, expected {expected}{advice}")
+
+    def _sum(self):
+        made = self._product()
+        while sign := self._take("+", "-"):
+            made = self._notes.shallow((add if sign == "+" else subtract)(made, self._product()))
+        return made
+
+    def _product(self):
+        made = self._signed()
+        while sign := self._take("*", "/"):
+            made = self._notes.shallow((multiply if sign == "*" else divide)(made, self._signed()))
+        return made
+
+    def _signed(self):
+        self._levels += 1
+        if self._levels > _MOST_LEVELS:
+            raise Error(f"the text '{self._text[:60]}...' is nested deeper than {_MOST_LEVELS} levels; give its parts to several terms")
+        made = self._unlimited()
+        self._levels -= 1
+        return made
+
+    def _unlimited(self):
+        if self._take("-"):
+            return negate(self._signed())
+        if self._take("+"):
+            return self._signed()
+        base = self._atom()
+        if not self._take("^"):
+            return base
+        exponent = self._signed()
+        return call("sqrt", base) if exponent.text == "0.5" else self._notes.style.power(base, exponent)
+
+    def _atom(self):
+        kind, text = self._next()
+        if kind == "number":
+            self._at += 1
+            return self._notes.style.number(float(text))
+        if kind == "name":
+            self._at += 1
+            return self._call(text) if self._take("(") else self._named(text)
+        if not self._take("("):
+            raise self._wrong("a number, a name or '('")
+        made = self._sum()
+        self._close()
+        return made
+
+    def _named(self, name):
+        if name == "pi":
+            return Text(self._notes.style.pi)
+        if name == "infinity" and self._notes.style.has_corners:
+            return self._notes.style.number(math.inf)
+        if name.endswith("'"):
+            return Text(self._notes.name(name[:-1]).text + "'")
+        return self._notes.name(name)
+
+    def _close(self):
+        if not self._take(")"):
+            raise self._wrong("an operator or ')'")
+
+    def _call(self, name):
+        corner = _CORNERS_OF_TEXTS.get(name) if self._notes.style.has_corners else None
+        count = corner[1] if corner else 3 if name == "where" and self._notes.style.has_corners else FUNCTIONS.get(name)
+        if count is None:
+            what = f" It {_SMOOTH}" if name in (*_CORNERS_OF_TEXTS, "fabs", "fmin", "fmax", "sign", "where") else ""
+            raise Error(f"the text '{self._text}': there is no function '{name}'; expected one of {', '.join(FUNCTIONS)}.{what}")
+        given = [self._sum()]
+        while self._take(","):
+            given.append(self._sum())
+        self._close()
+        if len(given) != count:
+            raise Error(f"the text '{self._text}': {name} has {count} argument{'s' if count > 1 else ''}, found {len(given)}")
+        if name == "where":
+            return self._notes.style.choice(given[0], ">", self._notes.style.number(0), *given[1:])
+        return self._notes.style.call(self._notes.style.corners[corner[0]] if corner else name, *given)
 
 
 def reader_of(terms, notes):

@@ -2,11 +2,13 @@
 from __future__ import annotations
 
 from . import _configuration, _rhec
+from ._arguments import checked
 from ._errors import Error
 from ._table import Table
 from ._types import PluginPath
 
 
+@checked
 def plugins(*, plugin_path: PluginPath = (), refused: bool = False) -> Table:
     """The plugins that are found: a Table of kind, name, version, licence, source, backend, path. With `refused` also
     those that are not used, with the reason."""
@@ -18,6 +20,7 @@ def plugins(*, plugin_path: PluginPath = (), refused: bool = False) -> Table:
     return Table({name: numpy.array([str(each[name] or "") for each in chosen], dtype=object) for name in names})
 
 
+@checked
 def options(name: str = "", *, kind: str = "", plugin_path: PluginPath = ()) -> Table:
     """The options of a plugin, by its name, of a section of scenarios ('estimator'), or, without a name, of a scenario's
     root: a Table of name, type, default, values, meaning."""

@@ -3,15 +3,16 @@ from __future__ import annotations
 
 import json
 import os
-import pathlib
-import tempfile
 from collections.abc import Iterable
 from typing import Any
 
-from . import _configuration, _rhec
+from . import _configuration, _files, _rhec
+from ._arguments import checked, found_in_words
+from ._errors import ArgumentError
 from ._types import ArrayLike, File, PluginPath
 
 
+@checked
 class Problem:
     """One problem: of estimation (kind 'rhe') or control ('rhc')."""
 
@@ -24,7 +25,7 @@ class Problem:
     @classmethod
     def from_dict(cls, keys: dict[str, Any], *, plugin_path: PluginPath = ()) -> Problem:
         """Of a dict with the keys of docs/problem_format.md."""
-        return problems_of(json.dumps(keys), "problem", plugin_path)[0]
+        return problems_of(_configuration.as_json(keys, "problem"), "problem", plugin_path)[0]
 
     @classmethod
     def of(cls, source: _rhec.Estimator | _rhec.Controller, id: str = "live", *, plugin_path: PluginPath = ()) -> Problem:
@@ -95,20 +96,18 @@ def _problem_of(line: str, name: str, plugin_path: PluginPath) -> Problem:
     return problems_of(line, name, plugin_path)[0]
 
 
+@checked
 def read_problems(file: File, *, plugin_path: PluginPath = ()) -> list[Problem]:
     """The problems of a file, one on each line."""
-    return problems_of(pathlib.Path(file).read_text(encoding="utf-8"), os.fspath(file), plugin_path)
+    return problems_of(_files.read_text(file), os.fspath(file), plugin_path)
 
 
+@checked
 def write_problems(file: File, problems: Iterable[Problem]) -> None:
     """Writes problems to a file, one on each line, whole or not at all."""
-    file = pathlib.Path(file)
-    text = "".join(problem.line() + "\n" for problem in problems)
-    handle, aside = tempfile.mkstemp(prefix=f".{file.name}-", dir=file.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as out:
-            out.write(text)
-        os.replace(aside, file)
-    except BaseException:
-        os.unlink(aside)
-        raise
+    lines = []
+    for i, problem in enumerate(problems):
+        if not callable(getattr(problem, "line", None)):
+            raise ArgumentError(f"write_problems: problems[{i}]: found {found_in_words(problem)}, expected a Problem", "problems")
+        lines.append(problem.line() + "\n")
+    _files.write_text(file, "".join(lines))

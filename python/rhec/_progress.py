@@ -5,8 +5,6 @@ import math
 import sys
 import time
 
-from ._errors import ArgumentError
-
 _WIDTH = 40
 
 
@@ -81,8 +79,6 @@ class Bar:
     True, False, or a function of one's own."""
 
     def __init__(self, wanted, title):
-        if not (wanted is None or isinstance(wanted, bool) or callable(wanted)):
-            raise ArgumentError(f"progress: found {wanted!r:.60}, expected True, False, None or a function of (share, text)")
         if callable(wanted):
             self._bar = _Caller(wanted)
         elif wanted is False or (wanted is None and not _in_notebook() and not sys.stderr.isatty()):

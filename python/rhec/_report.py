@@ -9,13 +9,17 @@ import subprocess
 import tempfile
 from typing import Any
 
-from . import _rhec
-from ._errors import Error
+from . import _files, _rhec
+from ._arguments import checked, found_in_words
+from ._errors import ArgumentError, Error
+from ._runs import _Result
+from ._studies import Sweep
 from ._types import File
 
 _HEIGHT = 800  # of the frame in a notebook [px]
 
 
+@checked
 class Page:
     """A page that is a text of HTML, whole: it opens in a browser without a network, and in a notebook by itself."""
 
@@ -25,7 +29,7 @@ class Page:
     def save(self, file: File) -> pathlib.Path:
         """Writes it."""
         path = pathlib.Path(file)
-        path.write_text(self.html, encoding="utf-8")
+        _files.write_text(path, self.html)
         return path
 
     def _repr_html_(self) -> str:
@@ -47,16 +51,20 @@ def _program() -> str:
     return found
 
 
+@checked
 def report(results: Any) -> Page:
     """The page of a Run, SmoothedRun, Estimates or Sweep, or of a folder or database of the command line. It is drawn by the
     program rhec, which must be there."""
     with tempfile.TemporaryDirectory(prefix="rhec-report-") as folder:
         if isinstance(results, (str, os.PathLike)):
             source = os.fspath(results)
-        elif hasattr(results, "save"):
+        elif isinstance(results, _Result):
             source = str(results.save(os.path.join(folder, "results")))
-        else:
+        elif isinstance(results, Sweep):
             source = os.fspath(results.file)
+        else:
+            raise ArgumentError(f"report: results: found {found_in_words(results)}, expected a Run, a SmoothedRun, Estimates, a Sweep, or "
+                                "the name of a folder or a database", "results")
         page = os.path.join(folder, "page.html")
         told = subprocess.run([_program(), "report", source, "-o", page], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                               check=False)

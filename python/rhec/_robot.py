@@ -5,9 +5,11 @@ import os
 from typing import Any
 
 from . import _configuration, _rhec
+from ._arguments import checked, told_below
 from ._types import ArrayLike, Changes, Configuration, PluginPath
 
 
+@checked
 class Robot:
     """What a robot is, and how it is estimated and controlled.
 
@@ -36,10 +38,12 @@ class Robot:
         """The model, with the bounds of this robot."""
         return self._robot.vehicle
 
+    @told_below
     def make_estimator(self, initial_state: ArrayLike | None = None) -> _rhec.Estimator:
         """A new estimator; `initial_state` (n_x) is used where the configuration has none."""
         return _rhec.Estimator(self._robot, initial_state)
 
+    @told_below
     def make_controller(self, path: _rhec.Path, ahead: _rhec.Estimator | None = None) -> _rhec.Controller:
         """A new controller that follows a path. `ahead`: an estimator that remembers places; the controller then plans
         with the slip that its map knows ahead."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 import contextlib
 import html
 import json
+import math
 import os
 import pathlib
 import tempfile
@@ -11,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from . import _configuration, _rhec
+from ._arguments import check_range, checked
 from ._errors import Error
 from ._problems import Problem, problems_of
 from ._progress import Bar
@@ -18,6 +20,7 @@ from ._table import Table
 from ._types import Changes, Configuration, File, LogPart, PluginPath, Progress
 
 
+@checked
 class _Result:
     """What all results have: a summary, a picture, and files for `rhec report`."""
 
@@ -63,6 +66,7 @@ class _Kept:
                 os.replace(os.path.join(aside, name), os.path.join(folder, name))
 
 
+@checked
 class Run(_Result):
     """A simulated drive.
 
@@ -91,6 +95,7 @@ class Run(_Result):
         return f"<run '{self._made.name}': {self.steps.rows} steps, {self.ended}>"
 
 
+@checked
 class SmoothedRun(_Result):
     """A simulated drive, estimated as a whole.
 
@@ -98,7 +103,7 @@ class SmoothedRun(_Result):
     report: of the solver
     """
 
-    def __init__(self, made: Any) -> None:
+    def __init__(self, made: _rhec.Drive) -> None:
         super().__init__(made)
         self.steps, self.causal = Table(made.steps()), Table(made.causal_steps())
         self.report = made.report
@@ -107,6 +112,7 @@ class SmoothedRun(_Result):
         return f"<smoothed run '{self._made.name}': {self.steps.rows} steps, {self.report.status}>"
 
 
+@checked
 class Estimates(_Result):
     """What a recorded drive was estimated to be.
 
@@ -115,7 +121,7 @@ class Estimates(_Result):
     reports: of a smoother, by variant, in order
     """
 
-    def __init__(self, made: Any) -> None:
+    def __init__(self, made: _rhec.Replays) -> None:
         super().__init__(made)
         self.variants = {name: Table(made.estimates(index)) for index, name in enumerate(made.names)}
         self.reports = made.reports
@@ -129,6 +135,7 @@ class Estimates(_Result):
         return f"<estimates of {', '.join(self.variants)}: {self.estimates.rows} rows>"
 
 
+@checked
 def run(scenario: Configuration, *, set: Changes = None, plugin_path: PluginPath = (), problems_every: int = 0,
         progress: Progress = None) -> Run:
     """Runs a scenario: a robot on simulated ground learns its slip and holds its path. Returns a Run.
@@ -140,6 +147,7 @@ def run(scenario: Configuration, *, set: Changes = None, plugin_path: PluginPath
 
     Ctrl-C ends it with KeyboardInterrupt, and nothing is written.
     """
+    check_range("run", problems_every=(problems_every, 0, math.inf))
     settings, folders = _configuration.read(scenario, set, plugin_path)
     with Bar(progress, "run") as bar:
         return Run(_rhec.run(folders, settings, problems_every, bar), folders)
@@ -177,6 +185,7 @@ def _log(function, scenario, log, variants, hold_out, phase, changes, plugin_pat
         return Estimates(function(folders, settings, files, bar))
 
 
+@checked
 def estimate(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, variants: Sequence[str] = (), hold_out: int = 0,
              phase: int | None = None, set: Changes = None, plugin_path: PluginPath = (),
              progress: Progress = None) -> Estimates:
@@ -191,6 +200,7 @@ def estimate(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, 
                 "estimate")
 
 
+@checked
 def smooth(scenario: Configuration, dead_reckoning: LogPart | None = None, gps: LogPart | None = None, *,
            variants: Sequence[str] = (), hold_out: int = 0, phase: int | None = None, set: Changes = None,
            plugin_path: PluginPath = (), progress: Progress = None) -> Estimates | SmoothedRun:
@@ -204,8 +214,8 @@ def smooth(scenario: Configuration, dead_reckoning: LogPart | None = None, gps: 
     if gps is not None:
         return _log(_rhec.smooth_log, scenario, (dead_reckoning, gps), variants, hold_out, phase, set, plugin_path, progress,
                     "smooth")
-    if variants or hold_out:
-        raise Error("smooth: variants and hold_out are those of a recorded drive; give dead_reckoning and gps, too")
+    if variants or hold_out or phase is not None:
+        raise Error("smooth: variants, hold_out and phase are those of a recorded drive; give dead_reckoning and gps, too")
     settings, folders = _configuration.read(scenario, set, plugin_path)
     with Bar(progress, "smooth") as bar:
         return SmoothedRun(_rhec.smooth_drive(folders, settings, bar))

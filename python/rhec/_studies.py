@@ -8,7 +8,8 @@ import pathlib
 from collections.abc import Sequence
 from typing import Any
 
-from . import _configuration, _rhec
+from . import _configuration, _files, _rhec
+from ._arguments import check_range, checked
 from ._errors import Error
 from ._progress import Bar
 from ._runs import log_files
@@ -16,6 +17,7 @@ from ._table import Table
 from ._types import Changes, Configuration, File, LogPart, PluginPath, Progress
 
 
+@checked
 class Sweep:
     """The runs of a grid.
 
@@ -100,6 +102,7 @@ def _column(values):
     return numpy.array(texts, dtype=None if whole and values else object)
 
 
+@checked
 def sweep(description: Configuration, file: File, *, threads: int = 0, plugin_path: PluginPath = (),
           progress: Progress = None) -> Sweep:
     """Runs a scenario over a grid of its keys, on several cores, into one SQLite file. Returns a Sweep.
@@ -110,6 +113,7 @@ def sweep(description: Configuration, file: File, *, threads: int = 0, plugin_pa
 
     Ctrl-C finishes the runs under way, then raises KeyboardInterrupt: the same call goes on where it stopped.
     """
+    check_range("sweep", threads=(threads, 0, math.inf))
     folders = _configuration.folders_of(plugin_path)
     if isinstance(description, dict):
         plain = _configuration.plain(description, folders)
@@ -121,6 +125,7 @@ def sweep(description: Configuration, file: File, *, threads: int = 0, plugin_pa
         return Sweep(_rhec.sweep(folders, settings, os.fspath(file), program, threads, bar), file)
 
 
+@checked
 class Tuning:
     """What was found.
 
@@ -137,7 +142,7 @@ class Tuning:
 
     def save(self, file: File) -> None:
         """Writes the scenario."""
-        pathlib.Path(file).write_text(self.yaml, encoding="utf-8")
+        _files.write_text(file, self.yaml)
 
     def __repr__(self) -> str:
         return f"<tuning of {', '.join(self.numbers['name'])}>"
@@ -146,6 +151,7 @@ class Tuning:
         return self.numbers._repr_html_() + self.judged._repr_html_() + self.svg
 
 
+@checked
 def tune(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, hold_out: int = 5, tune: Sequence[str] = (),
          keep: Sequence[str] = (), variants: Sequence[str] = (), threads: int = 0, smoother: bool = True,
          most_seconds: float = math.inf, set: Changes = None, plugin_path: PluginPath = (),
@@ -161,6 +167,7 @@ def tune(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, hold
 
     Ctrl-C gives it up with KeyboardInterrupt; to keep the best so far use `most_seconds`.
     """
+    check_range("tune", hold_out=(hold_out, 2, math.inf), threads=(threads, 0, math.inf), most_seconds=(most_seconds, 0, math.inf))
     settings, folders = _configuration.read(scenario, set, plugin_path)
     wishes = {"hold_out": hold_out, "tune": list(tune), "keep": list(keep), "variants": list(variants), "threads": threads,
               "smoother": smoother, "most_seconds": most_seconds}
@@ -168,6 +175,7 @@ def tune(scenario: Configuration, dead_reckoning: LogPart, gps: LogPart, *, hold
         return Tuning(_rhec.tune_log(folders, settings, names[0], names[1], wishes, bar))
 
 
+@checked
 def tune_controller(scenario: Configuration, *, cases: dict[str, Changes] | None = None, seeds: int = 3, first_seed: int = 1,
                     judges: int = 6, effort: float = 1.0, evaluations: int = 40, threads: int = 0,
                     most_seconds: float = math.inf, set: Changes = None, plugin_path: PluginPath = (),
@@ -178,6 +186,8 @@ def tune_controller(scenario: Configuration, *, cases: dict[str, Changes] | None
     seeds, first_seed: drives to tune on in each case; judges: further ones that judge the result
     effort: at most so many times the inputs' changes of the scenario
     """
+    check_range("tune_controller", seeds=(seeds, 1, math.inf), judges=(judges, 0, math.inf), effort=(effort, 0, math.inf),
+                evaluations=(evaluations, 1, math.inf), threads=(threads, 0, math.inf), most_seconds=(most_seconds, 0, math.inf))
     settings, folders = _configuration.read(scenario, set, plugin_path)
     worlds = []
     for name, changes in (cases or {"as it is": {}}).items():

@@ -4,11 +4,21 @@ from __future__ import annotations
 import html
 from typing import Any
 
+from ._arguments import checked, found_in_words
+from ._errors import ArgumentError, module_of
+
 _MOST_ROWS = 10
 
 
+@checked
 class Table(dict[str, Any]):
     """Columns by name, each a numpy array of one entry a row."""
+
+    def __init__(self, columns: Any = (), /, **more: Any) -> None:
+        try:
+            super().__init__(columns, **more)
+        except (TypeError, ValueError):
+            raise ArgumentError(f"Table: columns: found {found_in_words(columns)}, expected a dict of names and arrays", "columns") from None
 
     def __len__(self) -> int:
         """Number of columns, as of any dict; `rows` is that of rows."""
@@ -21,14 +31,12 @@ class Table(dict[str, Any]):
 
     def to_pandas(self) -> Any:
         """The same as a pandas.DataFrame; needs pandas."""
-        import pandas
-
+        pandas = module_of("pandas", "Table.to_pandas")
         return pandas.DataFrame(dict(self))
 
     def to_arrow(self) -> Any:
         """The same as a pyarrow.Table; needs pyarrow."""
-        import pyarrow
-
+        pyarrow = module_of("pyarrow", "Table.to_arrow")
         return pyarrow.table({name: column.tolist() if column.dtype == object else column for name, column in self.items()})
 
     def __repr__(self) -> str:

@@ -2,29 +2,53 @@
 from __future__ import annotations
 
 import json
+import math
+import numbers
 import pathlib
 import re
 from typing import Any
 
-from . import _compile, _notation, _rhec
+from . import _compile, _configuration, _notation, _rhec
+from ._arguments import checked, found_in_words
 from ._errors import Error
-from ._model import by_name, texts_of
-from ._types import File
+from ._model import by_name, check_known, labelled_texts, parts_of
+from ._types import File, Terms
 
 # What a formula may name of every vehicle, and how a TermWriter says it.
 _ROLES = {name: f"writer.{name}()" for name in ("position_x", "position_y", "heading", "wheel_speed", "ground_speed", "heading_rate")}
 # What is known of a node, in formulas and in bounds.
 _PLACE = {"path_x": "place.x", "path_y": "place.y", "path_heading": "place.heading", "path_speed": "place.speed",
           "arc_length": "place.arc_length", "time": "place.time", "room_left": "place.left", "room_right": "place.right"}
-_FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "pow", "hypot", "fabs", "fmax",
+_CPP_FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "pow", "hypot", "fabs", "fmax",
               "fmin")
 _SMOOTH = ("smooth_abs", "smooth_max", "smooth_min")
-_WORDS_OF_CPP = set("""alignas and asm auto bool break case catch char class const continue data default delete do double else enum
-explicit export extern false float for friend goto if inline int long lower namespace new not operator options or place private
-protected public register return rhec short signed sizeof static std struct switch template this throw true try typedef typename
-union unsigned upper using virtual void volatile while writer xor""".split())
+# What a name cannot be in C++: its words, macros of its library, and what the source below has already.
+_WORDS_OF_CPP = set("""alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class
+co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue decltype default delete do double
+dynamic_cast else enum explicit export extern false final float for friend goto if import inline int long module mutable namespace
+new noexcept not not_eq nullptr operator or or_eq override private protected public register reinterpret_cast requires return short
+signed sizeof static static_assert static_cast struct switch template this thread_local throw true try typedef typeid typename union
+unsigned using virtual void volatile wchar_t while xor xor_eq
+assert errno linux unix EOF EDOM ERANGE EILSEQ HUGE_VAL HUGE_VALF HUGE_VALL INFINITY NAN NULL""".split())
+_WORDS_OF_SOURCE = set("data infinity lower options place pi rhec std table upper writer write write_data Made TermOptions".split())
+# What the notation of equations has, and of numbers that may have corners.
+_WORDS = (*_notation.FUNCTIONS, "pi")
+_CORNERS = ("abs", "min", "max", "where", "infinity")
 _IDENTIFIER = re.compile(r"(?<![\w.:])[A-Za-z_]\w*")
 _INFINITE = "rhec::infinity"
+
+def _literal(text: str) -> str:
+    """A literal of C++."""
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _without_none(given: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def _shape(value: Any) -> str:
+    return f"{len(value)} of them" if isinstance(value, (tuple, list)) else found_in_words(value)
+
 
 _SOURCE = """\
 // The term '@NAME@', written from Python's terms.
@@ -78,6 +102,7 @@ install(TARGETS @NAME@ LIBRARY DESTINATION "${rhec_PLUGIN_DIRECTORY}")
 """
 
 
+@checked
 class Term:
     """Limits lower <= g <= upper and costs weight r^2 at the nodes of a controller's plan (docs/terms.md).
 
@@ -90,72 +115,171 @@ class Term:
 
     In g and r every vehicle has position_x, position_y, heading, wheel_speed, ground_speed and heading_rate. Of a node
     path_x, path_y, path_heading, path_speed, arc_length, time, and in bounds also room_left and room_right, are known.
+    All are terms of sympy or CasADi, numbers, or texts in the notation of equations; bounds may have abs, max, min and
+    Piecewise. In a configuration {"controller": {"terms": [term]}} takes it without a compiler.
     """
 
-    def __init__(self, name: str, *, limits: Any = None, costs: Any = None, states: Any = None, inputs: Any = None,
-                 options: Any = None, meaning: str = "", smooth: float | None = None) -> None:
+    _plugin_path: list[str] = []
+
+    def __init__(self, name: str, *, limits: Terms | None = None, costs: Terms | None = None,
+                 states: Terms | None = None, inputs: Terms | None = None,
+                 options: Terms | None = None, meaning: str = "", smooth: float | None = None) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
             raise Error(f"name: found '{name}', expected a word of small letters, digits and underscores")
         self.name, self._meaning = name, meaning
-        self._states, self._inputs = list(by_name(states, "states")), list(by_name(inputs, "inputs"))
+        self._states, self._inputs = list(self._by_name(states, "states")), list(self._by_name(inputs, "inputs"))
         self._options = {key: value if isinstance(value, dict) else {"default": value}
-                         for key, value in by_name(options, "options").items()}
-        self._check_names()
-        self._limits, self._costs = by_name(limits, "limits"), by_name(costs, "costs")
+                         for key, value in self._by_name(options, "options").items()}
+        self._limits, self._costs = self._by_name(limits, "limits"), self._by_name(costs, "costs")
+        self._given: dict[str, Any] = {}
         if not self._limits and not self._costs:
             raise Error(f"the term '{name}' has neither limits nor costs")
-        self.source = self._written(smooth)
+        self._check_names()
+        self._check_options()
+        formulas, bounds, weights = self._rows()
+        self._equations = self._as_equations(formulas, bounds, weights, smooth)
+        self.load()
+        self.source = self._as_cpp(formulas, bounds, weights, smooth)
+
+    def _by_name(self, given: Any, what: str) -> dict[str, Any]:
+        try:
+            return by_name(given, what)
+        except Error as mistake:
+            raise type(mistake)(f"the term '{self.name}': {mistake}") from None
+
+    def _wrong(self, where: str, what: str) -> Error:
+        return Error(f"the term '{self.name}': {where}: {what}")
 
     def _check_names(self) -> None:
         names = [*self._states, *self._inputs, *self._options]
+        of_all = {*_ROLES, *_PLACE}
         for each in names:
-            if each in _WORDS_OF_CPP or each in _ROLES or each in _PLACE or names.count(each) > 1:
-                raise Error(f"the name '{each}' is taken; rename it")
+            if not re.fullmatch(r"[A-Za-z_]\w*", each, re.ASCII):
+                raise self._wrong(f"the name '{each}'", "expected letters, digits and underscores, with no digit first; rename it")
+            if names.count(each) > 1:
+                raise self._wrong("a name", f"'{each}' is there twice, among states, inputs and options; rename one of them")
+            if each in of_all:
+                raise self._wrong("a name", f"'{each}' is taken: every vehicle or every node has it; rename it, or leave it out")
+            if each in _WORDS_OF_CPP or each.startswith("_") or "__" in each:
+                raise self._wrong("a name", f"'{each}' is taken: C++, into which `build` writes it, keeps it for itself; rename it")
+            if each in _WORDS_OF_SOURCE or each in (*_CPP_FUNCTIONS, *_WORDS, *_CORNERS):
+                raise self._wrong("a name", f"'{each}' is taken by a function or a constant of the notation, or of the source; rename it")
+        for each in self._options:
+            if each in ("name", "equations", "hard", "soft", "softness"):
+                raise self._wrong(f"options: {each}", "is a key of every term; rename it")
+        for row in (*self._limits, *self._costs):
+            if row in self._limits and row in self._costs:
+                raise self._wrong(f"costs: {row}", "there is a limit of that name; rename one of them")
+            if not row or not row.isprintable():
+                raise self._wrong(f"the name {row!r}", "expected a text that can be printed")
+
+    def _check_options(self) -> None:
         for key, about in self._options.items():
             for word in about:
                 if word not in ("default", "unit", "meaning", "above", "at_least"):
-                    raise Error(f"options: {key}: '{word}' is not known; expected default, unit, meaning, above, at_least")
-            if not isinstance(about.get("default"), (int, float)):
-                raise Error(f"options: {key}: expected a number as its default")
+                    raise self._wrong(f"options: {key}", f"'{word}' is not known; expected default, unit, meaning, above, at_least")
+            for word in ("default", "above", "at_least"):
+                value = about.get(word)
+                if word == "default" or word in about:
+                    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+                        raise self._wrong(f"options: {key}: {word}", f"found {found_in_words(value)}, expected a number"
+                                          + (" as its default" if word == "default" else ""))
+            for word in ("unit", "meaning"):
+                if not isinstance(about.get(word, ""), str):
+                    raise self._wrong(f"options: {key}: {word}", f"found {found_in_words(about[word])}, expected a text")
+            if "above" in about and "at_least" in about:
+                raise self._wrong(f"options: {key}", "found 'above' and 'at_least'; expected one of them")
 
-    def _written(self, smooth: float | None) -> str:
-        formulas, bounds, weights = [], [], []
+    def _rows(self) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+        """Formulas, bounds and weights, by where they stand."""
+        formulas, bounds, weights = {}, {}, {}
         for key, limit in self._limits.items():
             if not isinstance(limit, (tuple, list)) or len(limit) != 3:
-                raise Error(f"limits: {key}: expected (lower, term, upper)")
-            formulas.append(limit[1])
-            bounds += [limit[0], limit[2]]
+                raise self._wrong(f"limits: {key}", f"found {_shape(limit)}, expected (lower, term, upper)")
+            formulas[f"limits: {key}"] = limit[1]
+            bounds[f"limits: {key}: lower"], bounds[f"limits: {key}: upper"] = limit[0], limit[2]
+            if limit[0] is None and limit[2] is None:
+                raise self._wrong(f"limits: {key}", "it has no bound; expected one beside None, or leave it out")
         for key, cost in self._costs.items():
             about = cost if isinstance(cost, dict) else {"term": cost}
+            for word in about:
+                if word not in ("term", "weight", "delta"):
+                    raise self._wrong(f"costs: {key}", f"{word!r} is not known; expected term, weight, delta")
             if "term" not in about:
-                raise Error(f"costs: {key}: 'term' is missing")
-            formulas.append(about["term"])
-            weights.append((about.get("weight", 1), about.get("delta")))
-        known = [*self._states, *self._inputs, *self._options]
-        notes = _notation.Notes([*known, *_ROLES, *_PLACE], smooth, _notation.Cpp())
-        texts = texts_of(formulas, notes)
-        flat = [each for pair in weights for each in pair]
-        numbers = self._numbers([*bounds, *flat])
-        of_limits, of_costs = numbers[:len(bounds)], numbers[len(bounds):]
+                raise self._wrong(f"costs: {key}", "'term' is missing")
+            formulas[f"costs: {key}"] = about["term"]
+            weights[f"costs: {key}: weight"], weights[f"costs: {key}: delta"] = about.get("weight", 1), about.get("delta")
+        return formulas, bounds, weights
+
+    def _texts(self, terms: dict[str, Any], notes: _notation.Notes) -> list[str]:
+        """Texts of terms in a style; what is wrong with one of them says where it stands."""
+        return labelled_texts(f"the term '{self.name}'", terms, notes, writes_texts=True)
+
+    def _numbers(self, terms: dict[str, Any], style: _notation.Equations) -> list[str | None]:
+        """Terms that are numbers at a node: bounds, weights."""
+        given = {where: term for where, term in terms.items() if term is not None}
+        notes = _notation.Notes([*self._options, *_PLACE], None, style)
+        texts = dict(zip(given, self._texts(given, notes)))
+        return [texts.get(where) for where in terms]
+
+    def _as_cpp(self, formulas: dict[str, Any], bounds: dict[str, Any], weights: dict[str, Any], smooth: float | None) -> str:
+        notes = self._notes(smooth, _notation.Cpp(self._options))
+        texts = self._texts(formulas, notes)
+        of_limits, of_costs = ([text or _INFINITE for text in self._numbers(terms, _notation.CppNumbers())] for terms in (bounds, weights))
         formula = self._formula(texts, notes, list(zip(of_costs[::2], of_costs[1::2])))
         return self._fill(formula, self._data(texts, notes, of_limits))
 
-    def _numbers(self, terms: list[Any]) -> list[str]:
-        """Terms that are numbers at a node: bounds, weights."""
-        given = [term for term in terms if term is not None]
-        notes = _notation.Notes([*self._options, *_PLACE], None, _notation.CppNumbers())
-        read = iter(texts_of(given, notes))
-        return [_INFINITE if term is None else next(read) for term in terms]
+    def _as_equations(self, formulas: dict[str, Any], bounds: dict[str, Any], weights: dict[str, Any],
+                      smooth: float | None) -> dict[str, Any]:
+        """What a configuration has for it under `equations`."""
+        notes = self._notes(smooth, _notation.Equations())
+        texts = dict(zip(formulas, self._texts(formulas, notes)))
+        of_limits = dict(zip(bounds, self._numbers(bounds, _notation.EquationNumbers())))
+        of_costs = dict(zip(weights, self._numbers(weights, _notation.EquationNumbers())))
+        self._check_known(texts, notes)
+        self._check_numbers({**of_limits, **of_costs})
+        made: dict[str, Any] = {"name": self.name}
+        for key, names in (("states", self._states), ("inputs", self._inputs)):
+            if names:
+                made[key] = names
+        if self._options:
+            made["options"] = {name: dict(about) for name, about in self._options.items()}
+        if notes.definitions:
+            made["definitions"] = dict(notes.definitions)
+        if self._limits:
+            made["limits"] = {key: _without_none({"lower": of_limits[f"limits: {key}: lower"], "term": texts[f"limits: {key}"],
+                                                  "upper": of_limits[f"limits: {key}: upper"]}) for key in self._limits}
+        if self._costs:
+            made["costs"] = {key: _without_none({"term": texts[f"costs: {key}"], "weight": of_costs[f"costs: {key}: weight"],
+                                                 "delta": of_costs[f"costs: {key}: delta"]}) for key in self._costs}
+        return made
+
+    def _notes(self, smooth: float | None, style: _notation.Equations) -> _notation.Notes:
+        return _notation.Notes([*self._states, *self._inputs, *self._options, *_ROLES, *_PLACE], smooth, style)
+
+    def _check_known(self, texts: dict[str, str], notes: _notation.Notes) -> None:
+        """Names in formulas, also in parts of them."""
+        owner, rooms = f"the term '{self.name}'", {"room_left", "room_right"}
+        known = {*self._states, *self._inputs, *self._options, *_ROLES, *_PLACE, *notes.definitions}
+        all_texts = {**texts, **parts_of(notes)}
+        for where, text in all_texts.items():
+            if rooms & {*_notation.names_in(text)}:
+                raise self._wrong(where, "room_left and room_right may be infinite; expected them in bounds alone")
+        check_known(owner, all_texts, known - rooms, "; name states and inputs by states= and inputs=")
+
+    def _check_numbers(self, texts: dict[str, str | None]) -> None:
+        for where, text in texts.items():
+            is_weight = where.startswith("costs")
+            for name in _notation.names_in(text or ""):
+                if name in self._options or name in _CORNERS or name in _PLACE and not is_weight:
+                    continue
+                raise self._wrong(where, f"a bound or a weight depends on '{name}'; expected options"
+                                  + ("" if is_weight else " and what is known of a node; put the rest into the limit's term"))
 
     # C++, line by line.
 
     def _used(self, texts: list[str]) -> list[str]:
         used = {name for text in texts for name in _IDENTIFIER.findall(text)}
-        known = {*self._states, *self._inputs, *self._options, *_ROLES, *_PLACE}
-        unknown = sorted(name for name in used - known - {*_FUNCTIONS, *_SMOOTH, "std", "rhec"} if not re.fullmatch(r"part\d+", name))
-        if unknown:
-            raise Error(f"the term '{self.name}': '{unknown[0]}' is not known; expected one of {', '.join(sorted(known))}; name states "
-                        "and inputs by states= and inputs=")
         return [name for name in [*self._states, *self._inputs, *self._options, *_ROLES, *_PLACE] if name in used]
 
     def _declared(self, name: str, is_formula: bool) -> str:
@@ -169,31 +293,25 @@ class Term:
 
     def _functions(self, texts: list[str]) -> str:
         used = {name for text in texts for name in _IDENTIFIER.findall(text)}
-        lines = [f"    using std::{name};\n" for name in _FUNCTIONS if name in used]
+        lines = [f"    using std::{name};\n" for name in _CPP_FUNCTIONS if name in used]
         return "".join(lines + [f"    using rhec::{name};\n" for name in _SMOOTH if name in used])
 
     def _formula(self, texts: list[str], notes: _notation.Notes, weights: list[tuple[str, str]]) -> str:
         parts = [text for _, text in notes.definitions.items()]
         all_texts = [*parts, *texts, *(text for pair in weights for text in pair if text != _INFINITE)]
         used = self._used(all_texts)
-        if any(name.startswith("room_") for name in used):
-            raise Error(f"the term '{self.name}': room_left and room_right may be infinite; expected them in bounds alone")
         lines = [self._functions(all_texts), *(self._declared(name, True) for name in used)]
         lines += [f"    const rhec::Expression {name} = {text};\n" for name, text in notes.definitions.items()]
         for key, text in zip(self._limits, texts):
-            lines.append(f'    writer.limit({text}, options_.softness(), "{key}");\n')
+            lines.append(f"    writer.limit({text}, options_.softness(), {_literal(key)});\n")
         for key, text, (weight, delta) in zip(self._costs, texts[len(self._limits):], weights):
-            lines.append(f'    writer.residual({text}, {{.weight = {weight}, .delta = {delta}}}, "{key}");\n')
+            lines.append(f"    writer.residual({text}, {{.weight = {weight}, .delta = {delta}}}, {_literal(key)});\n")
         return "".join(lines)
 
     def _data(self, texts: list[str], notes: _notation.Notes, bounds: list[str]) -> str:
         of_formula = [name for name in self._used([*notes.definitions.values(), *texts]) if name in _PLACE]
         finite = [text for text in bounds if text != _INFINITE]
         used = self._used(finite)
-        wrong = [name for name in used if name not in _PLACE and name not in self._options]
-        if wrong:
-            raise Error(f"the term '{self.name}': a bound or a weight depends on '{wrong[0]}'; expected options and what is known of a "
-                        "node; put the rest into the limit's term")
         lines = [self._functions(finite), *(self._declared(name, False) for name in used)]
         lines += [f"    data[{i}] = {_PLACE[name]};\n" for i, name in enumerate(of_formula)]
         for i, (lower, upper) in enumerate(zip(bounds[::2], bounds[1::2])):
@@ -208,32 +326,55 @@ class Term:
             meaning = f"{about.get('meaning', name)} [{about.get('unit', '1')}]"
             limit = "".join(f", rhec::{function}({number(about[word]).text})" for word, function in
                             (("above", "greater_than"), ("at_least", "at_least")) if word in about)
-            rows += f"\n        .number(\"{name}\", &TermOptions::{name}, {json.dumps(meaning)}{limit})"
+            rows += f"\n        .number(\"{name}\", &TermOptions::{name}, {_literal(meaning)}{limit})"
         filled = {"NAME": self.name, "MEMBERS": members, "ROWS": rows, "FORMULA": formula, "DATA": data,
-                  "MEANING": json.dumps(self._meaning or f"limits and costs: {', '.join([*self._limits, *self._costs])}")}
+                  "MEANING": _literal(self._meaning or f"limits and costs: {', '.join([*self._limits, *self._costs])}")}
         return re.sub(r"@([A-Z]+)@", lambda found: filled[found[1]], _SOURCE)
 
+    def with_options(self, **options: Any) -> Term:
+        """The same with other values of its options; `hard` and `soft` are options of every term with limits."""
+        made = object.__new__(type(self))
+        made.__dict__ = {**self.__dict__, "_given": {**self._given, **options}}
+        return made
+
+    def _section(self) -> dict[str, Any]:
+        """What a configuration has for it among `controller.terms`."""
+        return {"equations": self._equations, **self._given}
+
+    def yaml(self) -> str:
+        """The same as a text, an item of `controller.terms` (docs/terms.md)."""
+        return json.dumps(self._section(), indent=2) + "\n"
+
+    def load(self, vehicle: _rhec.Vehicle | None = None) -> Term:
+        """Reads it as a configuration does, at once and without a compiler, for a vehicle if there is one: whether that has
+        the states and inputs that it names. Returns itself, for {"controller": {"terms": [term]}}."""
+        _rhec.check_term(_rhec.Settings.of(_configuration.plain(self._section(), []), f"the term '{self.name}'"), vehicle)
+        return self
+
     def build(self, folder: File | None = None) -> BuiltTerm:
-        """Compiles it as a plugin against the rhec that this package belongs to. Returns a BuiltTerm, for
+        """Compiles it as a plugin against the rhec that this package belongs to, and loads that. Returns a BuiltTerm, for
         configurations: {"controller": {"terms": [built]}}.
 
         folder: of the sources; without one a folder of the user's cache, where it is found again the next time
         """
+        self.load()
+        _compile.check_name(self.name)
         place = _compile.folder_of(folder, self.name, self.source)
         _compile.write(place / f"{self.name}.cpp", self.source)
         _compile.write(place / "CMakeLists.txt", _CMAKE.replace("@NAME@", self.name))
         _compile.compile_in(place, [])
-        found = [each for each in _rhec.plugins([str(place / "build")]) if each["path"] == str(place.resolve() / "build" / f"{self.name}.so")
-                 or each["path"] == str(place / "build" / f"{self.name}.so")]
-        for each in found:
-            if each["refusal"]:
-                raise Error(f"{each['path']}: {each['refusal']}")
-        return BuiltTerm(self.name, place, {})
+        library = place.resolve() / "build" / f"{self.name}.so"
+        found = [each for each in _rhec.plugins([str(library.parent)]) if pathlib.Path(each["path"]).resolve() == library]
+        if not found or found[0]["refusal"]:
+            raise Error(f"{library}: {found[0]['refusal'] if found else 'is not there after the build; expected a plugin'}")
+        _rhec.plugin_options([str(library.parent)], self.name, "term")  # loads it
+        return BuiltTerm(self.name, place, self._given)
 
     def __repr__(self) -> str:
         return f"<term '{self.name}': {', '.join([*self._limits, *self._costs])}>"
 
 
+@checked
 class BuiltTerm:
     """A term that was compiled, for configurations: {"controller": {"terms": [built]}}; folder: its sources."""
 

@@ -18,6 +18,8 @@ Changes = Union[Mapping[str, Any], None]
 PluginPath = Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]]]
 # A file, or an array (n, 3).
 LogPart = Union[str, "os.PathLike[str]", ArrayLike]
+# By names or symbols a dict, a list, a matrix, or a vector of symbols.
+Terms = Any
 # None for a bar where one can be seen, True, False, or a function of (share, text).
 Progress = Union[bool, Callable[[float, str], object], None]
 File = Union[str, "os.PathLike[str]"]

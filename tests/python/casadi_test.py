@@ -97,6 +97,8 @@ CASES = {
     "linked blocks": {"blocking": {"kappa": {"name": "structured", "size": 3, "neighbour_sigma": 0.05}, "mu": {"name": "full_horizon"}}},
     "noise of states": {"noise.states": {"x_pos": 0.05}}, "robust": {"estimator.robust": {"outputs": ["x_gps", "y_gps"], "delta": 3}},
     "blocked inputs": {"controller.blocking": {"u2": {"name": "structured", "size": 2}}},
+    "no rates of inputs": {"controller.weights.rates": None},
+    "rates of both inputs": {"controller.weights.rates": {"u1": 0.1, "u2": 0.02}, "controller.rate_bounds": {"u2": [-0.4, 0.4]}},
     "substeps": {"estimator.substeps": 3, "controller.substeps": 2},
     "a heading": {"model": {"name": "bicycle_slip", "wheelbase": 1.4, "gps_offset": 0.4, "outputs": ["x_gps", "y_gps", "heading"]},
                   "noise": {"outputs": {"x_gps": 0.03, "y_gps": 0.03, "heading": 0.02}}},
@@ -120,9 +122,10 @@ def test_problems_are_the_same(name):
     assert compared >= 5
 
 
-@pytest.mark.parametrize("kind", ["rhe", "rhc"])
-def test_solutions_are_the_same(kind):
-    problem = [each for each in rhec.run(FIGURE8, set=SHORT, problems_every=40).problems if each.kind == kind][1]
+@pytest.mark.parametrize("kind, changes", [("rhe", {}), ("rhc", {}), ("rhc", CASES["rates of both inputs"])],
+                         ids=["rhe", "rhc", "rhc with limits of rates"])
+def test_solutions_are_the_same(kind, changes):
+    problem = [each for each in rhec.run(FIGURE8, set={**SHORT, **changes}, problems_every=40).problems if each.kind == kind][1]
     theirs, ours = rhec.to_casadi(problem).solve("ipopt", **QUIET), problem.solve("sparse_sqp")
     assert theirs["stats"]["success"] and ours.status == "solved"
     assert theirs["objective"] == pytest.approx(ours.objective, rel=1e-6)
@@ -144,3 +147,26 @@ def test_a_slow_peer_is_told_apart():
     made.solve("ipopt", **QUIET)
     theirs = time.perf_counter() - start
     assert 0.0 < problem.solve("gn_rti", mode="converge").seconds < theirs
+
+
+def test_terms_of_casadi(tmp_path):
+    """A limit and a cost, with bounds that have corners, without a compiler and with one; as sympy has them."""
+    speed, rate, most, along = (casadi.SX.sym(name) for name in ("ground_speed", "heading_rate", "most", "arc_length"))
+    with pytest.raises(rhec.Error, match="limits: g: .*no derivative everywhere"):
+        rhec.Term("wrong", limits={"g": (0, casadi.fabs(speed), 1)})
+    with pytest.raises(rhec.Error, match="costs: c: 'spede' is not known"):
+        rhec.Term("wrong", costs={"c": casadi.SX.sym("spede")})
+    term = rhec.Term("both", options={most: 2.0}, costs={"smooth": {"term": casadi.fmax(rate, 0), "weight": 1e-3}},
+                     limits={"side": (-most, speed * rate, casadi.fmin(most, 5)),
+                             "zone": (None, speed, casadi.if_else(casadi.logic_and(along > 20, along < 40), 3, casadi.inf))}, smooth=0.01)
+    changes = {**SHORT, "controller.solver": {"name": "gn_rti", "iterations": 5, "residual": 0.01}}
+    loaded, built = (rhec.run(FIGURE8, set={**changes, "controller.terms": [each]}) for each in (term.load(), term.build(tmp_path)))
+    assert loaded.completed
+    numpy.testing.assert_allclose(loaded.steps["u1"], built.steps["u1"], rtol=1e-9)
+    texts = rhec.Term("texts", options={"most": 2.0}, costs={"smooth": {"term": "smooth_max(heading_rate, 0, 0.01)", "weight": 1e-3}},
+                      limits={"side": ("-most", "ground_speed * heading_rate", "min(most, 5)"),
+                              "zone": (None, "ground_speed", "where(arc_length - 20, where(40 - arc_length, 3, infinity), infinity)")})
+    same = rhec.run(FIGURE8, set={**changes, "controller.terms": [texts]})
+    numpy.testing.assert_allclose(loaded.steps["u1"], same.steps["u1"], rtol=1e-9)
+    free = rhec.run(FIGURE8, set=changes)
+    assert loaded.steps.rows > free.steps.rows

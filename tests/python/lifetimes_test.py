@@ -146,7 +146,7 @@ def test_one_estimator_in_several_threads():
         assert numpy.isfinite(driven.controller.control(kept).inputs).all()
         driven.controller.plan()
 
-    threads = Threads(push, estimate, estimate, reuse, control, control, driven.estimator.prepare)
+    threads = Threads(push, estimate, estimate, reuse, control, control, driven.estimator.prepare, driven.estimator.rehearse)
     assert not threads.failures
     assert moment[0] > 1.0
 

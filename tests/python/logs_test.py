@@ -1,4 +1,9 @@
 """Recorded drives: estimated, smoothed, tuned."""
+import os
+import signal
+import tempfile
+import threading
+
 import numpy
 import pytest
 import rhec
@@ -76,6 +81,24 @@ def test_mistakes_in_logs(log, tmp_path):
     assert caught.value.file == str(broken) and caught.value.line == 2
     with pytest.raises(rhec.Error, match="hold_out"):
         rhec.estimate(PARK, *log, hold_out=3, phase=3, set=CHANGES)
+
+
+def test_what_stops_long_work_leaves_nothing(log, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    timer = threading.Timer(0.7, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        rhec.tune(PARK, *log, set=CHANGES, threads=1)
+    timer.join()
+
+    def fail(share, text):
+        raise ZeroDivisionError("by the caller")
+
+    for function in (rhec.estimate, rhec.tune):
+        with pytest.raises(ZeroDivisionError, match="by the caller"):
+            function(PARK, *log, set=CHANGES, progress=fail)
+    assert not list(tmp_path.iterdir())
 
 
 def test_tuning_on_a_log(log):

@@ -203,10 +203,29 @@ def test_twelve_states_of_a_paper():
     (dict(states=["x"], inputs=["u"], rates=["u", "u"]), "found 2 terms, expected 1: x"),
     (dict(states=["x"], inputs=["u"], rates={"z": "u"}), "'z' is none of the states"),
     (dict(states=[3], inputs=["u"], rates=["u"]), "found 3 as the name"),
+    (dict(states="xy", inputs=["u"], rates=["u"]), "states: found 'xy', expected a dict"),
+    (dict(states=["x"], inputs=["u"], rates=3), "rates: found 3, expected a dict"),
+    (dict(states=["x"], inputs=["u"], rates=[sympy.Symbol("z") + u]), "rates: x: 'z' is not known; expected one of u, x"),
+    (dict(states=["x"], inputs=["u"], rates=[sympy.Abs(u)]), "the model 'wrong': rates: x: .*no derivative everywhere"),
+    (dict(states=["x"], inputs=["u"], rates=["u"], smooth=0.0), "smooth: found 0.0, expected a width"),
 ])
 def test_mistakes_in_models(keys, word):
     with pytest.raises(rhec.Error, match=word):
         rhec.Model("wrong", **keys)
+
+
+@pytest.mark.parametrize("keys, word", [
+    (dict(rates=["u +"]), r"the model 'wrong': equations.equations: .*found the end of the line, expected a number.* \(in the equation of x'\)"),
+    (dict(rates=["z"]), r"the model 'wrong': .*'z' is not known; did you mean 'u'\? \(in the equation of x'\)"),
+    (dict(rates=["abs(u)"]), "there is no function 'abs'; it has no derivative at 0; use smooth_abs"),
+    (dict(rates=["u"], measured={"y": "x y"}, outputs=["y"]), r"found 'y', expected an operator .* \(in the equation of y\)"),
+    (dict(rates=["d"], definitions={"d": "e"}), r"'e' is not known; .* \(in the equation of d\)"),
+    (dict(rates=["u"], straight_motion={"u": "speed"}), r"the model 'wrong': equations.straight_motion: .*'speed' is not known; did you mean 'ground_speed'"),
+])
+def test_mistakes_in_texts_of_models(keys, word):
+    model = rhec.Model("wrong", **{"states": ["x"], "inputs": ["u"], "outputs": ["x"], **keys})
+    with pytest.raises(rhec.Error, match=word):
+        model.load()
 
 
 @pytest.mark.parametrize("term, found", [

@@ -115,6 +115,8 @@ def test_a_file_is_written_whole_or_not_at_all(problems, tmp_path):
 
     with pytest.raises(ZeroDivisionError):
         rhec.write_problems(file, [problems[0], Broken()])
+    with pytest.raises(rhec.ArgumentError, match=r"write_problems: problems\[1\]: found 3, expected a Problem"):
+        rhec.write_problems(file, [problems[0], 3])
     assert file.read_text() == before and [each.name for each in tmp_path.iterdir()] == ["problems.jsonl"]
 
 

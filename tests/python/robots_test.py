@@ -68,6 +68,8 @@ def test_mistakes_in_files_name_file_line_and_key(tmp_path):
         rhec.Robot(tmp_path / "gone.yaml")
     with pytest.raises(rhec.Error, match="class 'int'"):
         rhec.Robot(3)
+    with pytest.raises(rhec.ArgumentError, match="Robot: configuration: found an object of the class 'int', expected the name of a YAML file or a dict"):
+        rhec.Robot(3)
     with pytest.raises(rhec.Error, match="the key 1, expected a text"):
         rhec.Robot({"model": {1: 2}})
 
@@ -131,6 +133,21 @@ def test_a_deadline_is_data():
     assert command.report.status == "deadline" and command.report.usable and "allow more time" in command.report.advice
     with pytest.raises(rhec.Error, match="at least 0"):
         driven.controller.control(estimate, deadline=-1.0)
+
+
+@pytest.mark.parametrize("changes", [{}, {"blocking": None}, {"blocking": None, "estimator": {"name": "bank"}}], ids=["blocks", "priors", "bank"])
+def test_a_rehearsal_changes_no_bit(changes):
+    robot = rhec.Robot(ROBOT, set=changes)
+    plain, rehearsed = Driven(robot), Driven(robot)
+    assert rehearsed.estimator.rehearse() is None  # there is nothing to go through yet
+    for k in range(30):
+        for _ in range(k % 3):
+            rehearsed.estimator.rehearse()
+        (now, command), (again, same) = plain.step(), rehearsed.step()
+        for name in ("state", "parameters", "covariance"):
+            numpy.testing.assert_array_equal(getattr(now, name), getattr(again, name))
+        numpy.testing.assert_array_equal(command.inputs, same.inputs)
+    assert plain.estimator.counts == rehearsed.estimator.counts
 
 
 def test_estimators_are_reset():

@@ -76,6 +76,29 @@ def test_ctrl_c_keeps_what_was_made(tmp_path):
     assert rhec.sweep(few, file).made < 2  # at least one was there
 
 
+def test_a_failing_progress_ends_a_sweep(tmp_path):
+    def fail(share, text):
+        raise ZeroDivisionError("by the caller")
+
+    many = {**GRID, "grid": {"speed": [10], "seed": {"from": 1, "to": 500, "step": 1}}}
+    with pytest.raises(ZeroDivisionError, match="by the caller"):
+        rhec.sweep(many, tmp_path / "many.sqlite", threads=2, progress=fail)
+    with pytest.raises(TypeError, match="takes 1 positional argument") as caught:
+        rhec.sweep(many, tmp_path / "many.sqlite", threads=2, progress=lambda share: None)
+    assert not isinstance(caught.value, rhec.Error)  # the mistake is the caller's own
+    few = {**many, "grid": {"speed": [10], "seed": [1, 2]}}
+    assert rhec.sweep(few, tmp_path / "many.sqlite").runs.rows == 2
+
+
+def test_ctrl_c_stops_the_tuning_of_a_controller():
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    timer = threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        rhec.tune_controller(FIGURE8, set=SHORT, seeds=3, evaluations=1000, threads=2)
+    timer.join()
+
+
 def test_mistakes_in_sweeps(tmp_path):
     with pytest.raises(rhec.Error) as caught:
         rhec.sweep({**GRID, "grid": {"sped": [1]}}, tmp_path / "x.sqlite")

@@ -71,7 +71,51 @@ def test_bounds_and_costs_of_a_node(tmp_path):
     (dict(costs={"c": {"weight": 1}}), "'term' is missing"),
     (dict(costs={"c": SPEED}, options={"double": 1}), "'double' is taken"),
     (dict(costs={"c": SPEED}, options={"a": {"default": 1, "units": "m"}}), "'units' is not known"),
-    (dict(costs={"c": SPEED}, options={"a": "many"}), "expected a number"),
+    (dict(costs={"c": SPEED}, options={"a": "many"}), "options: a: default: found 'many', expected a number"),
+    (dict(costs={"c": SPEED}, options={"a": float("nan")}), "options: a: default: found nan, expected a number"),
+    (dict(costs={"c": SPEED}, options={"a": {"default": 1, "above": "0"}}), "options: a: above: found '0', expected a number"),
+    (dict(costs={"c": SPEED}, options={"a": {"default": 1, "above": 0, "at_least": 0}}), "expected one of them"),
+    (dict(costs={"c": SPEED}, options={"a": {"default": -1, "above": 0}}), "greater than 0"),
+    (dict(costs={"c": SPEED}, options={"a": {"default": 1, "meaning": 3}}), "options: a: meaning: found 3, expected a text"),
+    (dict(costs={"c": SPEED}, options={"hard": 1}), "options: hard: is a key of every term"),
+    (dict(costs={"c": SPEED}, options={"sin": 1}), "'sin' is taken"),
+    (dict(costs={"c": SPEED}, options={"lower": 1}), "'lower' is taken"),
+    (dict(costs={"c": SPEED}, options={"a__b": 1}), "'a__b' is taken"),
+    (dict(costs={"c": SPEED}, options={"co_await": 1}), "'co_await' is taken"),
+    (dict(costs={"c": SPEED}, options={"NAN": 1}), "'NAN' is taken"),
+    (dict(costs={"c": SPEED}, states=["time"]), "'time' is taken"),
+    (dict(costs={"c": SPEED}, states=["a"], inputs=["a"]), "'a' is there twice"),
+    (dict(costs={"c": SPEED}, states=["a", "a"]), "states: 'a' is there twice"),
+    (dict(costs={"c": SPEED}, states="ab"), "states: found 'ab', expected a dict"),
+    (dict(costs={"c": SPEED}, states=["a b"]), "'a b'.*expected letters"),
+    (dict(costs={"c": SPEED}, limits={"c": (0, SPEED, 1)}), "costs: c: there is a limit of that name"),
+    (dict(costs={"c": {"term": SPEED, "wait": 1}}), "costs: c: 'wait' is not known"),
+    (dict(costs={"c": {"term": SPEED, "weight": LENGTH}}), "costs: c: weight: a bound or a weight depends on 'arc_length'; expected options"),
+    (dict(costs={"c": {"term": SPEED, "weight": -1}}), "costs.c.weight: the weight is -1, expected a finite number, at least 0"),
+    (dict(costs={"c": {"term": SPEED, "delta": 0}}), "costs.c.delta: delta is 0, expected a number greater than 0"),
+    (dict(costs={"c": "ground_speed^^2"}), r"costs: c: the text 'ground_speed\^\^2': found '\^', expected a number, a name"),
+    (dict(costs={"c": "ground_speed**2"}), "found '\\*\\*', expected .*; write a power as x\\^2"),
+    (dict(costs={"c": "2 ground_speed"}), "found 'ground_speed', expected an operator .*; a product is written with"),
+    (dict(costs={"c": "(ground_speed"}), "found the end, expected an operator or"),
+    (dict(costs={"c": "abs(ground_speed)"}), "there is no function 'abs'; .*no derivative everywhere; write rhec.smooth_abs"),
+    (dict(costs={"c": "sine(ground_speed)"}), "there is no function 'sine'; expected one of sqrt"),
+    (dict(costs={"c": "atan2(ground_speed)"}), "atan2 has 2 arguments, found 1"),
+    (dict(costs={"c": "ground_spede"}), "costs: c: 'ground_spede' is not known"),
+    (dict(costs={"c": "part7 + ground_speed"}), "costs: c: 'part7' is not known"),
+    (dict(costs={"c": "(" * 200 + "ground_speed" + ")" * 200}), "nested deeper than 100 levels"),
+    (dict(costs={"c": SPEED / 0}), "expected real, finite numbers"),
+    (dict(costs={"c": "ground_speed / 0"}), "costs.c: this divides by 0|divides by 0"),
+    (dict(costs={"c": object()}), "costs: c: found an object of the class 'object' as an equation"),
+    (dict(costs={"c": sympy.gamma(SPEED)}), "costs: c: gamma.*do not have the function 'gamma'"),
+    (dict(costs={"c": sympy.Min(SPEED, RATE)}), "costs: c: .*no derivative everywhere"),
+    (dict(costs={"c": sympy.Piecewise((SPEED, SPEED > 1), (0, True))}), "costs: c: .*no derivative everywhere; .*smooth=WIDTH"),
+    (dict(costs={"c": sympy.Symbol("y dot")}), "costs: c: the name 'y dot': expected letters"),
+    (dict(limits={"g": (None, SPEED, None)}), "limits: g: it has no bound"),
+    (dict(limits={"g": (0, SPEED, sympy.Symbol("mots"))}), "limits: g: upper: a bound or a weight depends on 'mots'"),
+    (dict(limits={"g": (0, SPEED, sympy.Piecewise((1, LENGTH > 1)))}), "limits: g: upper: .*all other cases"),
+    (dict(limits={"g": (0, SPEED, float("nan"))}), "limits: g: upper: .*not finite|real, finite"),
+    (dict(limits={"g\n": (0, SPEED, 1)}), "expected a text that can be printed"),
+    (dict(costs={"c": SPEED}, smooth=-1.0), "smooth: found -1.0, expected a width greater than 0"),
 ])
 def test_mistakes_in_terms(keys, word):
     with pytest.raises(rhec.Error, match=word):
@@ -85,5 +129,62 @@ TERMS = [SPEED**2, SPEED**-2, sympy.sqrt(SPEED**2 + 1), (SPEED**2 + 1)**sympy.Ra
 
 
 def test_all_functions_compile(tmp_path):
-    term = rhec.Term("functions", costs={f"c{i}": {"term": term, "weight": 1e-9} for i, term in enumerate(TERMS)})
-    assert driven(term.build(tmp_path)).completed
+    """Compiled they are what they are without a compiler: sympy's terms, and texts."""
+    texts = ["-ground_speed^2 / (2 + heading_rate^2)", "ground_speed^0.5 * pi", "hypot(ground_speed, 1)^-1 - -2e-1", "smooth_min(3, ground_speed, .1) + atan2(1, ground_speed) + atan2(scale, 2)"]
+    term = rhec.Term("functions", costs={f"c{i}": {"term": term, "weight": 1e-6} for i, term in enumerate([*TERMS, *texts])}, options={"scale": 2.0},
+                     limits={'with "quotes"': (sympy.Min(-5, -LENGTH), RATE, "where(arc_length - 20, abs(-6), max(5, 4)) + infinity"),
+                             "smoothed": (None, sympy.Max(SPEED, 0) * sympy.Abs(RATE), 100)}, smooth=1e-2)
+    compiled, loaded = driven(term.build(tmp_path)), driven(term)
+    assert compiled.completed and "abs(" not in term.source.replace("fabs(", "").replace("smooth_abs(", "")
+    for name in ("u1", "u2", "x_pos", "kappa"):
+        numpy.testing.assert_allclose(loaded.steps[name], compiled.steps[name], rtol=1e-9, atol=1e-12)
+
+
+def test_a_term_without_a_compiler(side, monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    term = lateral().with_options(most=2.0)
+    ours, theirs = driven(term), driven(side.with_options(most=2.0))
+    for name in ("u1", "u2", "x_pos"):
+        numpy.testing.assert_array_equal(ours.steps[name], theirs.steps[name])
+    assert not (driven().steps["u1"][:50] == ours.steps["u1"][:50]).all()
+    with pytest.raises(rhec.Error, match="most: .*greater than 0"):
+        driven(lateral().with_options(most=-1.0))
+    with pytest.raises(rhec.Error, match="moost"):
+        lateral().with_options(moost=1.0).load()
+    with pytest.raises(rhec.Error, match="cmake is not there"):
+        lateral().build()
+
+
+def test_a_term_for_a_vehicle():
+    term = rhec.Term("still", inputs=["u7"], costs={"c": sympy.Symbol("u7") * SPEED})
+    assert term.load() is term
+    with pytest.raises(rhec.Error, match="u7"):
+        term.load(rhec.Robot({"model": "bicycle_slip"}).vehicle)
+    with pytest.raises(rhec.Error, match="u7"):
+        driven(term)
+
+
+def test_problems_keep_terms_of_equations(tmp_path):
+    run = rhec.run(FIGURE8, set={**SHORT, **SOLVER, "controller.terms": [lateral().with_options(most=2.0)]}, problems_every=60)
+    file = tmp_path / "problems.jsonl"
+    rhec.write_problems(file, run.problems)
+    for problem, again in zip(run.problems, rhec.read_problems(file)):
+        assert again.line() == problem.line()
+        if problem.kind == "rhc":
+            numpy.testing.assert_array_equal(again.solve("sparse_sqp").inputs, problem.solve("sparse_sqp").inputs)
+            assert problem.to_dict()["terms"]
+
+
+def test_names_that_cmake_keeps(tmp_path):
+    with pytest.raises(rhec.Error, match="'test', which CMake keeps for itself"):
+        rhec.Term("test", costs={"c": SPEED}).build(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_bounds_with_corners_are_the_same_compiled_and_loaded():
+    """As C++ and as equations: one by one, by a limit that nothing keeps within."""
+    bounds = [sympy.Abs(LENGTH - 20), sympy.Max(LENGTH, 3, 1), sympy.Min(-1, LENGTH), sympy.Piecewise((1, LENGTH >= 3), (2, LENGTH <= 1), (3, True)),
+              sympy.Piecewise((1, (LENGTH > 3) & (LENGTH < 5) | (LENGTH > 10)), (sympy.oo, True)), sympy.Piecewise((1, sympy.Eq(LENGTH, 3)), (0, True))]
+    term = rhec.Term("bounds", limits={f"g{i}": (None, SPEED, bound) for i, bound in enumerate(bounds)})
+    assert "(arc_length >= 3.0 ? 1.0 : (arc_length <= 1.0 ? 2.0 : 3.0))" in term.source
+    assert term._section()["equations"]["limits"]["g3"]["upper"] == "where(3 - arc_length, where(arc_length - 1, 3, 2), 1)"

@@ -5,6 +5,7 @@
 
 #include "plugins/robot/robots.hpp"
 #include "rhec/core/horizon/blocking.hpp"
+#include "rhec/core/term/term.hpp"
 #include "support/error_of.hpp"
 
 namespace rhec {
@@ -41,6 +42,22 @@ TEST(PluginOption, ErrorsNameThePlace) {
               AllOf(StartsWith("robot.yaml:1: "), HasSubstr("lengths")));
   EXPECT_THAT(error_of([] { option.make(host(), settings("structurd")); }),
               AllOf(StartsWith("robot.yaml:1: "), HasSubstr("structurd")));
+}
+
+TEST(PluginOption, TermsMayBeEquations) {
+  constexpr PluginOption<Term> term{.otherwise = ""};
+  const Settings section = settings("equations: {costs: {c: heading}, options: {a: 1}}\na: 2");
+  EXPECT_NE(term.make(host(), section), nullptr);
+  const PluginChoice choice = term.choice(section);
+  EXPECT_EQ(choice.name, "equations");
+  ASSERT_EQ(choice.options.members().size(), 2U);  // what makes it again
+  EXPECT_NE(host().make_term(choice.name, choice.options), nullptr);
+  EXPECT_THAT(error_of([&] { term.make(host(), settings("name: corridor\nequations: {costs: {c: heading}}")); }),
+              HasSubstr("expected one of the keys"));
+  EXPECT_THAT(error_of([&] { term.make(host(), settings("equations: term.yaml")); }),
+              AllOf(StartsWith("robot.yaml:1: equations"), HasSubstr("expected a map of limits and costs")));
+  EXPECT_THAT(error_of([&] { term.make(host(), settings("equations:\n  costs:\n    c: haeding")); }),
+              AllOf(StartsWith("robot.yaml:3: equations.costs.c: "), HasSubstr("did you mean 'heading'?")));
 }
 
 TEST(PluginOption, DocumentsItsDefault) {

@@ -95,6 +95,7 @@ class RHEC_EXPORT Host {
   std::shared_ptr<Solver> make_solver(std::string_view name, const Settings& settings = {}) const;
   /// To be set up for a parameter.
   std::shared_ptr<Prior> make_prior(std::string_view name, const Settings& settings = {}) const;
+  /// The name is of no account where the settings have a map of equations (rhec/plugins/equations/equation_term.hpp).
   std::shared_ptr<Term> make_term(std::string_view name, const Settings& settings = {}) const;
 
   /// The options of a plugin. Throws Error as above.
