@@ -27,9 +27,8 @@ void PriorBank::predict(const MeasuredInterval& interval, const double* end_outp
   } else {
     take_step_from_point();
   }
-  if (!ends_with_motion) return;
-  end_point_ = next_rows_;
-  has_end_point_ = true;
+  has_end_point_ = ends_with_motion;
+  if (ends_with_motion) end_point_ = next_rows_;
 }
 
 bool PriorBank::has_motion(const double* y) const noexcept {

@@ -396,6 +396,11 @@ TEST(PriorBank, IsTheKalmanFilterWithOutputsOfMotion) {
         .duration = duration, .inputs = &omega, .between = k % 3 == 0 ? 2 : 0, .times = times, .outputs = between};
     bank.predict(interval, outputs);
     filter.predict(interval, &zero, &ramp, nullptr, outputs);
+    if (k % 7 == 0) {  // what was expected of an end goes with it
+      const double nothing[] = {nan, nan};
+      bank.predict(interval, nothing);
+      filter.predict(interval, &zero, &ramp, nullptr, nothing);
+    }
     bank.update(outputs);
     filter.update(outputs, nullptr);
     bank.moments(mean, covariance);
