@@ -13,7 +13,7 @@ namespace rhec {
 void KalmanFilter::predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
                            const double* robust_weights, const double* end_outputs) noexcept {
   between_log_likelihood_ = 0.0;
-  const bool ends_with_motion = end_outputs && has_motion(end_outputs);
+  const bool ends_with_motion = end_outputs && looks_ahead_over(interval) && has_motion(end_outputs);
   if (interval.between == 0 && !ends_with_motion)
     return predict(interval.inputs, input_guess, interval.duration, ramp_variances);
   RHEC_ASSERT(wide_mean_.size() > 0, "a filter that was set up for measurements between nodes");
@@ -26,7 +26,7 @@ void KalmanFilter::predict(const MeasuredInterval& interval, const double* input
     take_between(interval.times[k], interval.times[k] / interval.duration,
                  interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_,
                  robust_weights ? robust_weights + static_cast<std::ptrdiff_t>(k) * ny_ : nullptr);
-  linearise_wide(interval.duration, 1.0, ends_with_motion ? end_outputs : nullptr);
+  linearise_wide(interval.duration, ends_with_motion ? end_outputs : nullptr);
   if (ends_with_motion) end_point_ = next_;
   narrow();
   has_end_point_ = ends_with_motion;
@@ -34,6 +34,14 @@ void KalmanFilter::predict(const MeasuredInterval& interval, const double* input
 
 bool KalmanFilter::has_motion(const double* y) const noexcept {
   return std::ranges::any_of(noise_.motion_outputs, [&](int j) { return !std::isnan(y[j]); });
+}
+
+/// Whether no output of motion is measured between the nodes. Many of them, each linearised where it puts the interval,
+/// would have as many directions, by their noise alone, and together seem to tell the factors of a product apart.
+bool KalmanFilter::looks_ahead_over(const MeasuredInterval& interval) const noexcept {
+  for (int k = 0; k < interval.between; ++k)
+    if (has_motion(interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_)) return false;
+  return true;
 }
 
 /// From [x; p]; the variances of the inputs stand in their entries of the gradient.
@@ -93,13 +101,13 @@ double KalmanFilter::expect_wide(int output, double measured) noexcept {
   return innovation - (wide_gradient_.dot(wide_mean_) - wide_gradient_.dot(point_));
 }
 
-/// Next state and Jacobian at the mean or, where outputs y are given, where those of motion put what is unknown of the
-/// interval: Gauss-Newton steps, until the point does not move by a tenth of a standard deviation.
-void KalmanFilter::linearise_wide(double seconds, double share, const double* y) noexcept {
+/// Next state and Jacobian at the interval's end at the mean or, where outputs y are given, where those of motion put
+/// what is unknown of it: Gauss-Newton steps, until the point does not move by a tenth of a standard deviation.
+void KalmanFilter::linearise_wide(double seconds, const double* y) noexcept {
   constexpr int most_steps = 5;
   point_ = wide_mean_;
   for (int step = 0; step <= most_steps; ++step) {
-    integrate_wide(point_, seconds, share);
+    integrate_wide(point_, seconds, 1.0);
     if (!y || step == most_steps) return;
     model_->observe(
         {.count = 1, .states = next_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
@@ -156,7 +164,8 @@ bool KalmanFilter::move_point(const double* y) noexcept {
 }
 
 void KalmanFilter::take_between(double seconds, double share, const double* y, const double* robust_weights) noexcept {
-  linearise_wide(seconds, share, has_motion(y) ? y : nullptr);
+  point_ = wide_mean_;
+  integrate_wide(point_, seconds, share);
   model_->observe(
       {.count = 1, .states = next_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
   // All outputs are linearised there; `expect_wide` is about the mean as it is after each of them.

@@ -280,7 +280,8 @@ void PriorBank::update(const double* y, const double* robust_weights) noexcept {
                                   .gradient = gradient_.data(),
                                   .before = states_.data(),
                                   .before_entry = 1,
-                                  .before_lane = nx_},
+                                  .before_lane = nx_,
+                                  .is_ahead = is_ahead},
                                  y, robust_weights);
 }
 

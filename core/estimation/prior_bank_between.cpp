@@ -13,7 +13,7 @@ namespace rhec {
 /// measurement at a later time tells of all of them. The vector [x; z; u; q] takes such measurements in one after the
 /// other, and only then moves to the interval's end.
 void PriorBank::predict(const MeasuredInterval& interval, const double* end_outputs) noexcept {
-  const bool ends_with_motion = end_outputs && has_motion(end_outputs);
+  const bool ends_with_motion = end_outputs && looks_ahead_over(interval) && has_motion(end_outputs);
   if (interval.between == 0 && !ends_with_motion) return predict(interval.inputs, interval.duration);
   RHEC_ASSERT(!wide_mean_.empty(), "a bank that was set up for measurements between nodes");
   begin_step(interval.inputs, interval.duration);
@@ -21,7 +21,7 @@ void PriorBank::predict(const MeasuredInterval& interval, const double* end_outp
   for (int k = 0; k < interval.between; ++k)
     take_between(interval.times[k], interval.times[k] / interval.duration,
                  interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_);
-  linearise_wide(interval.duration, 1.0, ends_with_motion ? end_outputs : nullptr);
+  linearise_wide(interval.duration, ends_with_motion ? end_outputs : nullptr);
   if (interval.between > 0) {
     narrow();
   } else {
@@ -33,6 +33,14 @@ void PriorBank::predict(const MeasuredInterval& interval, const double* end_outp
 
 bool PriorBank::has_motion(const double* y) const noexcept {
   return std::ranges::any_of(setup_.motion_outputs, [&](int j) { return !std::isnan(y[j]); });
+}
+
+/// Whether no output of motion is measured between the nodes. Many of them, each linearised where it puts the interval,
+/// would have as many directions, by their noise alone, and together seem to tell the factors of a product apart.
+bool PriorBank::looks_ahead_over(const MeasuredInterval& interval) const noexcept {
+  for (int k = 0; k < interval.between; ++k)
+    if (has_motion(interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_)) return false;
+  return true;
 }
 
 /// Adds inputs and noise of the processes, which are not correlated with anything yet.
@@ -87,21 +95,21 @@ void PriorBank::write_wide_gradient(int output, double share) noexcept {
   }
 }
 
-/// Next states and Jacobians at the mean or, where outputs y are given, where those of motion put what is unknown of
-/// the interval: Gauss-Newton steps of every member, until no point moves by a tenth of a standard deviation.
-void PriorBank::linearise_wide(double seconds, double share, const double* y) noexcept {
+/// Next states and Jacobians at the interval's end at the mean or, where outputs y are given, where those of motion put
+/// what is unknown of it: Gauss-Newton steps of every member, until no point moves by a tenth of a standard deviation.
+void PriorBank::linearise_wide(double seconds, const double* y) noexcept {
   constexpr int most_steps = 5;
   constexpr double little = 0.1;
   const int a = wide_count();
   point_ = wide_mean_;
   for (int step = 0; step <= most_steps; ++step) {
-    integrate_members(point_.data(), true, seconds, share);
+    integrate_members(point_.data(), true, seconds, 1.0);
     if (!y || step == most_steps) return;
     observe_members(next_rows_.data());
     int taken = 0;
     for (const int j : setup_.motion_outputs) {
       if (std::isnan(y[j])) continue;
-      write_wide_gradient(j, share);
+      write_wide_gradient(j, 1.0);
       views_->outputs[taken++] = {.predicted = predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
                                   .gradient = wide_gradient_.data() + static_cast<std::ptrdiff_t>(j) * a * lanes_,
                                   .variance = output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
@@ -116,26 +124,13 @@ void PriorBank::linearise_wide(double seconds, double share, const double* y) no
   }
 }
 
-/// From an output's prediction at `point_` to that of the linearised output at the mean.
-void PriorBank::expect_at_mean(int output) noexcept {
-  const std::ptrdiff_t a = wide_count(), M = lanes_;
-  double* const predicted = predicted_.data() + output * M;
-  const double* const gradient = wide_gradient_.data() + output * a * M;
-  for (std::ptrdiff_t e = 0; e < a; ++e)
-    for (std::ptrdiff_t m = 0; m < M; ++m)
-      predicted[m] += gradient[e * M + m] * (wide_mean_[e * M + m] - point_[e * M + m]);
-}
-
 /// Takes in outputs at a time within the interval.
 void PriorBank::take_between(double seconds, double share, const double* y) noexcept {
   const int a = wide_count();
-  linearise_wide(seconds, share, has_motion(y) ? y : nullptr);
+  integrate_members(wide_mean_.data(), true, seconds, share);
   observe_members(next_rows_.data());
-  for (int j = 0; j < ny_; ++j) {
-    if (std::isnan(y[j])) continue;  // nothing is measured by it
-    write_wide_gradient(j, share);
-    expect_at_mean(j);
-  }
+  for (int j = 0; j < ny_; ++j)
+    if (!std::isnan(y[j])) write_wide_gradient(j, share);
   if (setup_.adapts_noise) wide_before_ = wide_mean_;
   between_log_likelihood_ +=
       take_outputs({.view = {lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()},

@@ -44,7 +44,8 @@ class RHEC_EXPORT KalmanFilter {
   /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards.
   /// An output of motion is a product of slip and of an input that is measured as well: about the measured input, the
   /// noise of the input counts as knowledge of slip. So the interval is linearised where its outputs of motion put it
-  /// (iterated Kalman filter: Bell and Cathey 1993; docs/method.md, section 5).
+  /// (iterated Kalman filter: Bell and Cathey 1993; docs/method.md, section 5), unless there are others between the
+  /// nodes.
   void predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
                const double* robust_weights = nullptr, const double* end_outputs = nullptr) noexcept;
   /// Log-likelihood of the measurements between the nodes of the last interval, each given those before it.
@@ -67,8 +68,9 @@ class RHEC_EXPORT KalmanFilter {
   void widen(const double* ramp_variances) noexcept;
   void integrate_wide(const Eigen::VectorXd& wide, double seconds, double share) noexcept;
   bool has_motion(const double* y) const noexcept;
+  bool looks_ahead_over(const MeasuredInterval& interval) const noexcept;
   double expect_wide(int output, double measured) noexcept;
-  void linearise_wide(double seconds, double share, const double* y) noexcept;
+  void linearise_wide(double seconds, const double* y) noexcept;
   bool move_point(const double* y) noexcept;
   void take_between(double seconds, double share, const double* y, const double* robust_weights) noexcept;
   void take_wide(double innovation, double variance) noexcept;

@@ -135,11 +135,11 @@ class RHEC_EXPORT PriorBank {
   void observe_members(const double* states) noexcept;
   void widen() noexcept;
   bool has_motion(const double* y) const noexcept;
+  bool looks_ahead_over(const MeasuredInterval& interval) const noexcept;
   bool is_of_motion(int output) const noexcept;
   void write_wide_gradient(int output, double share) noexcept;
-  void linearise_wide(double seconds, double share, const double* y) noexcept;
+  void linearise_wide(double seconds, const double* y) noexcept;
   void take_step_from_point() noexcept;
-  void expect_at_mean(int output) noexcept;
   void take_between(double seconds, double share, const double* y) noexcept;
   void narrow() noexcept;
   int wide_count() const noexcept { return 2 * n_ - nx_ + nu_; }
