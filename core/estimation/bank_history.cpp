@@ -31,6 +31,7 @@ BankHistory::BankHistory(PriorBank bank, int nodes, int filtered)
   bank_.moments(mean_, covariance_);  // takes on their sizes
 }
 
+/// With the bank as it is expected at the newest node.
 void BankHistory::begin_node() noexcept {
   const std::size_t at = place(newest_);
   std::fill_n(given_weights_.data() + at * ny_, ny_, std::numeric_limits<double>::quiet_NaN());
@@ -111,22 +112,22 @@ void BankHistory::begin_again(std::int64_t number) noexcept {
   const std::size_t at = place(number);
   if (bank_.looks_ahead() && number > newest_ - count_ + 1) {
     bank_.restore(filtered_.data() + place(number - 1) * bank_.state_size());
-    predict(at);
-    bank_.save(predicted_.data() + at * bank_.state_size());
-  } else {
-    bank_.restore(predicted_.data() + at * bank_.state_size());
+    return go_on(at);
   }
+  bank_.restore(predicted_.data() + at * bank_.state_size());
   update(at);
+}
+
+/// Over the interval before a node, and by its measurements.
+void BankHistory::go_on(std::size_t place) noexcept {
+  predict(place);
+  bank_.save(predicted_.data() + place * bank_.state_size());
+  update(place);
 }
 
 void BankHistory::filter_from(std::int64_t number) noexcept {
   begin_again(number);
-  for (++number; number <= newest_; ++number) {
-    const std::size_t at = place(number);
-    predict(at);
-    bank_.save(predicted_.data() + at * bank_.state_size());
-    update(at);
-  }
+  for (++number; number <= newest_; ++number) go_on(place(number));
 }
 
 bool BankHistory::reweigh(std::int64_t number, const double* robust_weights) noexcept {

@@ -27,7 +27,6 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   predicted_.assign(ny_, 0.0);
   output_jacobian_.assign(static_cast<std::size_t>(ny_) * nx_, 0.0);
   next_.assign(nx_, 0.0);
-  end_point_ = next_;
   jacobian_.assign(static_cast<std::size_t>(nx_) * (nx_ + nu_ + 2 * np_), 0.0);
   input_.assign(nu_, 0.0);
   const std::size_t width = padded(nx_ + np_ + nu_);
@@ -53,15 +52,12 @@ void KalmanFilter::clip() noexcept {
 }
 
 void KalmanFilter::update(const double* y, const double* robust_weights) noexcept {
-  const bool is_ahead = std::exchange(has_end_point_, false);
   Model::Nodes request;
   request.count = 1;
-  request.states = is_ahead ? end_point_.data() : mean.data();
+  request.states = mean.data();
   request.outputs = predicted_.data();
   request.jacobians = output_jacobian_.data();
   model_->observe(request);
-  for (int j = 0; is_ahead && j < ny_; ++j)
-    for (int c = 0; c < nx_; ++c) predicted_[j] += output_jacobian_[c * ny_ + j] * (mean[c] - end_point_[c]);
   // One output after the other, all linearised at the same point; the noises are independent.
   correction_.setZero();
   for (int j = 0; j < ny_; ++j)
@@ -135,7 +131,6 @@ void KalmanFilter::predict(const double* measured_input, const double* input_gue
 
 void KalmanFilter::predict(const double* measured_input, const double* input_guess, double duration,
                            const double* ramp_variances) noexcept {
-  has_end_point_ = false;
   const int n = nx_ + np_;
   for (int j = 0; j < nu_; ++j) input_[j] = std::isnan(measured_input[j]) ? input_guess[j] : measured_input[j];
   if (ramp_variances) {

@@ -2,6 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
+
+#include "look_ahead.hpp"
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/estimation/kalman_filter.hpp"
@@ -13,8 +16,8 @@ namespace rhec {
 void KalmanFilter::predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
                            const double* robust_weights, const double* end_outputs) noexcept {
   between_log_likelihood_ = 0.0;
-  const bool ends_with_motion = end_outputs && looks_ahead_over(interval) && has_motion(end_outputs);
-  if (interval.between == 0 && !ends_with_motion)
+  const bool is_ahead = looks_ahead(noise_.motion_outputs, interval, static_cast<std::size_t>(ny_), end_outputs);
+  if (interval.between == 0 && !is_ahead)
     return predict(interval.inputs, input_guess, interval.duration, ramp_variances);
   RHEC_ASSERT(wide_mean_.size() > 0, "a filter that was set up for measurements between nodes");
   for (int j = 0; j < nu_; ++j) {
@@ -26,22 +29,8 @@ void KalmanFilter::predict(const MeasuredInterval& interval, const double* input
     take_between(interval.times[k], interval.times[k] / interval.duration,
                  interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_,
                  robust_weights ? robust_weights + static_cast<std::ptrdiff_t>(k) * ny_ : nullptr);
-  linearise_wide(interval.duration, ends_with_motion ? end_outputs : nullptr);
-  if (ends_with_motion) end_point_ = next_;
+  linearise_wide(interval.duration, is_ahead ? end_outputs : nullptr);
   narrow();
-  has_end_point_ = ends_with_motion;
-}
-
-bool KalmanFilter::has_motion(const double* y) const noexcept {
-  return std::ranges::any_of(noise_.motion_outputs, [&](int j) { return !std::isnan(y[j]); });
-}
-
-/// Whether no output of motion is measured between the nodes. Many of them, each linearised where it puts the interval,
-/// would have as many directions, by their noise alone, and together seem to tell the factors of a product apart.
-bool KalmanFilter::looks_ahead_over(const MeasuredInterval& interval) const noexcept {
-  for (int k = 0; k < interval.between; ++k)
-    if (has_motion(interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_)) return false;
-  return true;
 }
 
 /// From [x; p]; the variances of the inputs stand in their entries of the gradient.
@@ -102,13 +91,12 @@ double KalmanFilter::expect_wide(int output, double measured) noexcept {
 }
 
 /// Next state and Jacobian at the interval's end at the mean or, where outputs y are given, where those of motion put
-/// what is unknown of it: Gauss-Newton steps, until the point does not move by a tenth of a standard deviation.
+/// what is unknown of it: Gauss-Newton steps, until the point does not move by much.
 void KalmanFilter::linearise_wide(double seconds, const double* y) noexcept {
-  constexpr int most_steps = 5;
   point_ = wide_mean_;
-  for (int step = 0; step <= most_steps; ++step) {
+  for (int step = 0; step <= most_look_ahead_steps; ++step) {
     integrate_wide(point_, seconds, 1.0);
-    if (!y || step == most_steps) return;
+    if (!y || step == most_look_ahead_steps) return;
     model_->observe(
         {.count = 1, .states = next_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
     if (!move_point(y)) return;
@@ -117,7 +105,7 @@ void KalmanFilter::linearise_wide(double seconds, const double* y) noexcept {
 
 /// Moves the point to the mean given the outputs of motion, linearised about the point, unless that is near.
 bool KalmanFilter::move_point(const double* y) noexcept {
-  constexpr double little = 0.1, most_surprise = 16.0;
+  constexpr double little = least_look_ahead_step * least_look_ahead_step, most_surprise = 16.0;
   Eigen::Index count = 0;
   for (const int j : noise_.motion_outputs) {
     if (std::isnan(y[j])) continue;
@@ -136,27 +124,17 @@ bool KalmanFilter::move_point(const double* y) noexcept {
                      motion_innovations_[count] * motion_innovations_[count] / most_surprise);
     ++count;
   }
-  // S^-1 of the innovations by S = L D L', in place: below the diagonal L D.
-  auto S = motion_covariance_.topLeftCorner(count, count);
   auto innovations = motion_innovations_.head(count);
-  for (Eigen::Index c = 0; c < count; ++c) {
-    for (Eigen::Index k = c + 1; k < count; ++k) {
-      const double factor = S(k, c) / S(c, c);
-      for (Eigen::Index r = k; r < count; ++r) S(r, k) -= factor * S(r, c);
-      innovations[k] -= factor * innovations[c];
-    }
-  }
-  for (Eigen::Index c = count - 1; c >= 0; --c) {
-    for (Eigen::Index r = c + 1; r < count; ++r) innovations[c] -= S(r, c) * innovations[r];
-    innovations[c] /= S(c, c);
-  }
+  Eigen::Ref<Eigen::MatrixXd> S = motion_covariance_.topLeftCorner(count, count);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(S);
+  in_place.solveInPlace(innovations);
   if (!innovations.allFinite()) return false;
   bool has_moved = false;
   for (Eigen::Index r = 0; r < point_.size(); ++r) {
     double next = wide_mean_[r];
     for (Eigen::Index k = 0; k < count; ++k) next += motion_images_(r, k) * innovations[k];
     const double change = next - point_[r];
-    has_moved = has_moved || change * change > little * little * wide_covariance_(r, r);
+    has_moved = has_moved || change * change > little * wide_covariance_(r, r);
     next_point_[r] = next;
   }
   if (has_moved) point_.swap(next_point_);

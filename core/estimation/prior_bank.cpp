@@ -136,7 +136,6 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
     const auto a = static_cast<std::size_t>(wide_count());
     for (auto* v : {&wide_mean_, &wide_before_, &point_, &next_point_}) v->assign(a * M, 0.0);
     moved_.assign(M, 0.0);
-    end_point_.assign(M * nx, 0.0);
     wide_covariance_.assign(a * a * M, 0.0);
     wide_work_.assign((2 * a * a + 3 * a) * M, 0.0);
     wide_gradient_.assign(ny_ * a * M, 0.0);
@@ -224,7 +223,6 @@ void PriorBank::write_start(int parameter, const Prior& prior, int lane) noexcep
 
 void PriorBank::replace_vehicle(const Eigen::Ref<const Eigen::VectorXd>& state,
                                 const Eigen::Ref<const Eigen::MatrixXd>& covariance) noexcept {
-  has_end_point_ = false;
   for (int c = 0; c < n_; ++c) {
     for (int r = 0; r < n_; ++r) {
       if (c >= nx_ && r >= nx_) continue;
@@ -252,7 +250,6 @@ void PriorBank::reset(const Eigen::Ref<const Eigen::VectorXd>& state,
   for (int m = 0; m < members_; ++m) weights_[m] = 1.0 / members_;
   reset_noise();
   distance_ = 0.0;
-  has_end_point_ = false;
 }
 
 /// Outputs at states (lanes x n_x), with their gradients: `predicted_` in lanes, `gradient_rows_` in rows.
@@ -266,22 +263,16 @@ void PriorBank::observe_members(const double* states) noexcept {
 void PriorBank::update(const double* y, const double* robust_weights) noexcept {
   for (int m = 0; m < lanes_; ++m)
     for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean_[r * lanes_ + m];
-  const bool is_ahead = std::exchange(has_end_point_, false);
-  observe_members(is_ahead ? end_point_.data() : states_.data());
+  observe_members(states_.data());
   for (int m = 0; m < lanes_; ++m)
     for (int j = 0; j < ny_; ++j)
       for (int c = 0; c < nx_; ++c) gradient_[(j * nx_ + c) * lanes_ + m] = gradient_rows_[(m * nx_ + c) * ny_ + j];
-  for (int j = 0; is_ahead && j < ny_; ++j)
-    for (int c = 0; c < nx_; ++c)
-      for (int m = 0; m < lanes_; ++m)
-        predicted_[j * lanes_ + m] +=
-            gradient_[(j * nx_ + c) * lanes_ + m] * (states_[m * nx_ + c] - end_point_[m * nx_ + c]);
   log_likelihood_ = take_outputs({.view = {lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()},
                                   .gradient = gradient_.data(),
                                   .before = states_.data(),
                                   .before_entry = 1,
                                   .before_lane = nx_,
-                                  .is_ahead = is_ahead},
+                                  .is_between = false},
                                  y, robust_weights);
 }
 
@@ -392,7 +383,6 @@ void PriorBank::mix_members() noexcept {
 }
 
 void PriorBank::predict(const double* measured_input, double duration) noexcept {
-  has_end_point_ = false;
   begin_step(measured_input, duration);
   take_step(duration);
 }
@@ -494,7 +484,6 @@ void PriorBank::restore(const double* state) noexcept {
   take(covariance_);
   take(weights_);
   take(learnt_);
-  has_end_point_ = false;
   spread_variances();
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "look_ahead.hpp"
 #include "prior_bank_views.hpp"
 #include "rhec/core/base/assertion.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
@@ -13,34 +14,20 @@ namespace rhec {
 /// measurement at a later time tells of all of them. The vector [x; z; u; q] takes such measurements in one after the
 /// other, and only then moves to the interval's end.
 void PriorBank::predict(const MeasuredInterval& interval, const double* end_outputs) noexcept {
-  const bool ends_with_motion = end_outputs && looks_ahead_over(interval) && has_motion(end_outputs);
-  if (interval.between == 0 && !ends_with_motion) return predict(interval.inputs, interval.duration);
+  const bool is_ahead = rhec::looks_ahead(setup_.motion_outputs, interval, static_cast<std::size_t>(ny_), end_outputs);
+  if (interval.between == 0 && !is_ahead) return predict(interval.inputs, interval.duration);
   RHEC_ASSERT(!wide_mean_.empty(), "a bank that was set up for measurements between nodes");
   begin_step(interval.inputs, interval.duration);
   widen();
   for (int k = 0; k < interval.between; ++k)
     take_between(interval.times[k], interval.times[k] / interval.duration,
                  interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_);
-  linearise_wide(interval.duration, ends_with_motion ? end_outputs : nullptr);
+  linearise_wide(interval.duration, is_ahead ? end_outputs : nullptr);
   if (interval.between > 0) {
     narrow();
   } else {
     take_step_from_point();
   }
-  has_end_point_ = ends_with_motion;
-  if (ends_with_motion) end_point_ = next_rows_;
-}
-
-bool PriorBank::has_motion(const double* y) const noexcept {
-  return std::ranges::any_of(setup_.motion_outputs, [&](int j) { return !std::isnan(y[j]); });
-}
-
-/// Whether no output of motion is measured between the nodes. Many of them, each linearised where it puts the interval,
-/// would have as many directions, by their noise alone, and together seem to tell the factors of a product apart.
-bool PriorBank::looks_ahead_over(const MeasuredInterval& interval) const noexcept {
-  for (int k = 0; k < interval.between; ++k)
-    if (has_motion(interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_)) return false;
-  return true;
 }
 
 /// Adds inputs and noise of the processes, which are not correlated with anything yet.
@@ -96,15 +83,14 @@ void PriorBank::write_wide_gradient(int output, double share) noexcept {
 }
 
 /// Next states and Jacobians at the interval's end at the mean or, where outputs y are given, where those of motion put
-/// what is unknown of it: Gauss-Newton steps of every member, until no point moves by a tenth of a standard deviation.
+/// what is unknown of it: Gauss-Newton steps of every member, until no point moves by much.
 void PriorBank::linearise_wide(double seconds, const double* y) noexcept {
-  constexpr int most_steps = 5;
-  constexpr double little = 0.1;
+  constexpr double little = least_look_ahead_step * least_look_ahead_step;
   const int a = wide_count();
   point_ = wide_mean_;
-  for (int step = 0; step <= most_steps; ++step) {
+  for (int step = 0; step <= most_look_ahead_steps; ++step) {
     integrate_members(point_.data(), true, seconds, 1.0);
-    if (!y || step == most_steps) return;
+    if (!y || step == most_look_ahead_steps) return;
     observe_members(next_rows_.data());
     int taken = 0;
     for (const int j : setup_.motion_outputs) {
@@ -119,7 +105,7 @@ void PriorBank::linearise_wide(double seconds, const double* y) noexcept {
     next_point_ = point_;
     bank_kernels().move_point({lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()},
                               views_->outputs.data(), taken, setup_.gate, next_point_.data(), moved_.data());
-    if (*std::max_element(moved_.begin(), moved_.begin() + members_) <= little * little) return;
+    if (*std::max_element(moved_.begin(), moved_.begin() + members_) <= little) return;
     std::swap(point_, next_point_);
   }
 }

@@ -42,8 +42,8 @@ bool PriorBank::is_of_motion(int output) const noexcept {
 /// where S tells little about R, R hardly moves. Residuals are those of the most probable member. Outputs of one unit
 /// and one stated noise, like the coordinates of a position, are one sensor and change together.
 ///
-/// An output of motion at which the interval is linearised keeps its noise: that makes its innovations smaller than S
-/// says, and little of S is R.
+/// Of an output of motion, what nodes measure does not count: the interval is linearised where they put it. That makes
+/// innovations smaller than S says, and little of S is R.
 ///
 /// Where a sensor has a robust loss, a function of nu^2 / S that falls again for outliers takes its place, so that they
 /// do not pass for noise (an M-estimator of scale: Huber 1981, chapter 5).
@@ -52,7 +52,7 @@ void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
   constexpr double drift = 2.0 * steady_gain * steady_gain;
   const int best = most_probable(), entries = frame.view.vehicle_states, states = frame.view.states;
   for (int sensor = 0; sensor < ny_; ++sensor) {
-    if (sensor_[sensor] != sensor || (frame.is_ahead && is_of_motion(sensor))) continue;
+    if (sensor_[sensor] != sensor || (!frame.is_between && is_of_motion(sensor))) continue;
     // Sums over the sensor's outputs, which do not depend on the axes of a position.
     double squares = 0.0, spread = 0.0, used = 0.0;
     int count = 0;

@@ -21,7 +21,7 @@ struct PriorBank::Frame {
   /// Means before: entry e of lane m is at e * before_entry + m * before_lane.
   const double* before;
   std::ptrdiff_t before_entry, before_lane;
-  bool is_ahead = false;  ///< linearised where the outputs of motion put the interval
+  bool is_between = true;  ///< the outputs are of a time between two nodes
 };
 
 }  // namespace rhec

@@ -65,7 +65,7 @@ std::unique_ptr<EstimationMethod> make_kalman_filter(const EstimatorParts& parts
   FilterEstimation::Setup setup;
   setup.noise = parts.filter_noise();
   for (const ParameterWalk& walk : parts.walks) setup.walk.push_back(walk.process_noise);
-  setup.has_ramps = !motion_outputs_of(*context.model).empty();
+  setup.has_ramps = senses_motion(*context.model);
   setup.initial_mean = parts.initial_mean;
   setup.initial_covariance = parts.initial_covariance;
   setup.substeps = parts.substeps;
@@ -110,7 +110,7 @@ KalmanFilter::Noise EstimatorParts::filter_noise() const {
           .input_variances = variances_of(context->noise.input_sigmas),
           .parameter_lower = lower_bounds_of(context->about.parameters),
           .parameter_upper = upper_bounds_of(context->about.parameters),
-          .motion_outputs = motion_outputs_of(*context->model)};
+          .motion_outputs = look_ahead_outputs(*context->model)};
 }
 
 BankEstimation::Setup EstimatorParts::filters() const {
@@ -121,7 +121,7 @@ BankEstimation::Setup EstimatorParts::filters() const {
   setup.bank.substeps = substeps;
   setup.bank.memory = bank.memory;
   setup.bank.robust = robust;
-  setup.bank.motion_outputs = motion_outputs_of(*context->model);
+  setup.bank.motion_outputs = look_ahead_outputs(*context->model);
   setup.bank.adapts_noise = context->noise.adapt;
   setup.bank.initial_parameters = initial_parameters;
   setup.parameter_lower = lower_bounds_of(context->about.parameters);

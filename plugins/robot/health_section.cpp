@@ -33,7 +33,7 @@ std::unique_ptr<SensorWatch> make_watch(const HealthOptions& options, const Esti
   const Eigen::Index nx = context.model->state_count(), np = context.model->parameter_count();
   for (Eigen::Index j = 0; j < np; ++j)
     setup.parameter_sigmas.push_back(std::sqrt(parts.initial_covariance(nx + j, nx + j)));
-  setup.has_ramps = !motion_outputs_of(*context.model).empty();
+  setup.has_ramps = senses_motion(*context.model);
   setup.step = context.step;
   setup.substeps = parts.substeps;
   setup.gate = options.gate;

@@ -98,8 +98,9 @@ struct NoiseOptions {
                  sensor_error_rows("the sensor reads (1 + k) times as much, and k is estimated"))
             .flag("adapt", &NoiseOptions::adapt,
                   "bank, and rhe with priors: learn the noise of outputs while driving, from a fifth to five "
-                  "times what is stated; not of outputs of motion, and not beside noise of states or drifting sensors, "
-                  "from which it cannot be told");
+                  "times what is stated; of outputs of motion only what comes between nodes, and not beside noise of "
+                  "states "
+                  "or drifting sensors, from which it cannot be told");
     return rows;
   }
 };

@@ -1,5 +1,6 @@
 #include "rhec/plugins/robot/sensors.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -30,6 +31,12 @@ std::shared_ptr<const SensorModel> sensor_model(const RobotContext& context) {
   SensorModel::Errors errors = errors_of(context.noise);
   if (errors.biased.empty() && errors.scaled.empty() && outputs_of_motion(*context.model).empty()) return nullptr;
   return std::make_shared<const SensorModel>(context.model, std::move(errors));
+}
+
+/// Null if there is none.
+const SensorModel* sensors_in(const Model& model) noexcept {
+  if (const auto* noisy = dynamic_cast<const StateNoiseModel*>(&model)) return sensors_in(noisy->vehicle());
+  return dynamic_cast<const SensorModel*>(&model);
 }
 
 }  // namespace
@@ -72,10 +79,17 @@ std::vector<double> initial_sensor_sigmas(const RobotContext& vehicle, const Rob
   return sigmas;
 }
 
-std::vector<int> motion_outputs_of(const Model& model) {
-  if (const auto* noisy = dynamic_cast<const StateNoiseModel*>(&model)) return motion_outputs_of(noisy->vehicle());
-  const auto* const sensors = dynamic_cast<const SensorModel*>(&model);
-  return sensors ? sensors->motion().which() : std::vector<int>{};
+bool senses_motion(const Model& model) noexcept {
+  const SensorModel* const sensors = sensors_in(model);
+  return sensors && sensors->motion().count() > 0;
+}
+
+std::vector<int> look_ahead_outputs(const Model& model) {
+  const SensorModel* const sensors = sensors_in(model);
+  if (!sensors) return {};
+  std::vector<int> outputs = sensors->motion().which();
+  std::erase_if(outputs, [&](int j) { return std::ranges::binary_search(sensors->errors().scaled, j); });
+  return outputs;
 }
 
 }  // namespace rhec

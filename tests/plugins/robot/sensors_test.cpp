@@ -33,13 +33,23 @@ TEST(SensorErrors, AreStatesOfEstimatorsAlone) {
                                         "yaw_rate_at_node"}));
     EXPECT_EQ(names_of(robot.estimated_description().states),
               (std::vector<std::string>{"x_pos", "y_pos", "beta", "delta", "yaw_rate_bias", "delta_scale"}));
-    EXPECT_FALSE(motion_outputs_of(made->model()).empty());
+    EXPECT_TRUE(senses_motion(made->model()));
     const std::vector<double> fix = {0.0, 0.0, 0.0, 0.0};
     made->push_measurement(0.0, fix.data());
     const Estimate& estimate = made->estimate(0.0);
     EXPECT_NEAR(estimate.covariance(4, 4), 0.02 * 0.02, 1e-5) << estimator;
     EXPECT_NEAR(estimate.covariance(5, 5), 0.1 * 0.1, 1e-5) << estimator;
   }
+}
+
+TEST(SensorErrors, OfScaleKeepAnOutputFromDecidingWhereAnIntervalIsLinearised) {
+  const auto ahead = [](const char* noise) {
+    const Robot robot = robot_with(noise, "[x_gps, y_gps, delta, yaw_rate, ground_speed]");
+    return look_ahead_outputs(robot.make_estimator()->model());
+  };
+  EXPECT_EQ(ahead("{}"), (std::vector{3, 4}));
+  EXPECT_EQ(ahead("{biases: {yaw_rate: {sigma: 0.02}}}"), (std::vector{3, 4}));
+  EXPECT_EQ(ahead("{scales: {yaw_rate: {sigma: 0.1}}}"), std::vector{4});
 }
 
 TEST(SensorErrors, ChangeNothingWhereThereAreNone) {

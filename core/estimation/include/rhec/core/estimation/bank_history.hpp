@@ -71,6 +71,7 @@ class RHEC_EXPORT BankHistory {
   void begin_node() noexcept;
   void predict(std::size_t place) noexcept;
   void update(std::size_t place) noexcept;
+  void go_on(std::size_t place) noexcept;
   void begin_again(std::int64_t number) noexcept;
   void filter_from(std::int64_t number) noexcept;
 

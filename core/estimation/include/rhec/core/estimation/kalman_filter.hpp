@@ -21,7 +21,7 @@ class RHEC_EXPORT KalmanFilter {
     std::vector<double> output_variances;                  ///< n_y
     std::vector<double> input_variances;                   ///< n_u, of measured inputs
     std::vector<double> parameter_lower, parameter_upper;  ///< bounds of the mean
-    /// Outputs of motion, ascending: an interval is linearised where its measurements of these put it.
+    /// Those outputs of motion, ascending, by which an interval is linearised, see `predict`.
     std::vector<int> motion_outputs = {};
   };
   /// `uses_between`: whether there can be measurements between two nodes.
@@ -67,8 +67,6 @@ class RHEC_EXPORT KalmanFilter {
   void differentiate(double duration) noexcept;
   void widen(const double* ramp_variances) noexcept;
   void integrate_wide(const Eigen::VectorXd& wide, double seconds, double share) noexcept;
-  bool has_motion(const double* y) const noexcept;
-  bool looks_ahead_over(const MeasuredInterval& interval) const noexcept;
   double expect_wide(int output, double measured) noexcept;
   void linearise_wide(double seconds, const double* y) noexcept;
   bool move_point(const double* y) noexcept;
@@ -84,9 +82,6 @@ class RHEC_EXPORT KalmanFilter {
   Noise noise_;
   int substeps_, nx_, nu_, np_, ny_;
   std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
-  /// Where the outputs of an interval's end are linearised, if that is not the mean.
-  std::vector<double> end_point_;
-  bool has_end_point_ = false;
   AlignedDoubles row_, next_row_, jacobian_rows_, scratch_;  ///< for Model::integrate_rows
   Eigen::MatrixXd work_, next_covariance_;
   Eigen::VectorXd gain_, image_, zeros_, correction_;

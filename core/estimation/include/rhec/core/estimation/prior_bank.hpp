@@ -48,7 +48,7 @@ class RHEC_EXPORT PriorBank {
   /// The same with measurements between the two nodes, each used at its own time. The noise of an input and of a
   /// process is one value over the interval, as a window has it, so that the moments are those of a window.
   /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards:
-  /// the interval is linearised where its outputs of motion put it (KalmanFilter::predict).
+  /// the interval is linearised where its outputs of motion put it, as by KalmanFilter::predict.
   void predict(const MeasuredInterval& interval, const double* end_outputs = nullptr) noexcept;
   /// Whether that depends on the outputs of the interval's end.
   bool looks_ahead() const noexcept { return !setup_.motion_outputs.empty(); }
@@ -134,8 +134,6 @@ class RHEC_EXPORT PriorBank {
   void integrate_members(const double* mean, bool is_wide, double seconds, double share) noexcept;
   void observe_members(const double* states) noexcept;
   void widen() noexcept;
-  bool has_motion(const double* y) const noexcept;
-  bool looks_ahead_over(const MeasuredInterval& interval) const noexcept;
   bool is_of_motion(int output) const noexcept;
   void write_wide_gradient(int output, double share) noexcept;
   void linearise_wide(double seconds, const double* y) noexcept;
@@ -175,10 +173,6 @@ class RHEC_EXPORT PriorBank {
   /// transition to [x; z] at its end.
   AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, wide_gradient_, transition_;
   AlignedDoubles point_, next_point_, moved_;  ///< where the interval is linearised, and how far that would move on
-  /// The vehicle's states there at the interval's end, as rows of the model: where the outputs of that end are
-  /// linearised.
-  std::vector<double> end_point_;
-  bool has_end_point_ = false;
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;

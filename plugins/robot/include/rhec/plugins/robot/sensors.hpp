@@ -20,7 +20,10 @@ RHEC_EXPORT ModelDescription with_sensor_errors(const RobotContext& context);
 /// Standard deviations at the start of the states that `with_sensors` has added behind the vehicle's.
 RHEC_EXPORT std::vector<double> initial_sensor_sigmas(const RobotContext& vehicle, const RobotContext& with_sensors);
 
-/// The outputs of motion, ascending, of a model of `with_sensors`, with or without process noise.
-RHEC_EXPORT std::vector<int> motion_outputs_of(const Model& model);
+/// Whether a model of `with_sensors`, with or without process noise, has outputs of motion.
+RHEC_EXPORT bool senses_motion(const Model& model) noexcept;
+/// Those outputs of motion, ascending, by which a filter linearises an interval: not those with a scale error, since
+/// the most probable product of slip and input is not its mean, which the scale would make up for (docs/sensors.md).
+RHEC_EXPORT std::vector<int> look_ahead_outputs(const Model& model);
 
 }  // namespace rhec
