@@ -23,7 +23,7 @@ KalmanFilter make_filter(const RheProblem& like) {
   for (const double w : setup.input_weights) noise.input_variances.push_back(w > 0.0 ? 1.0 / w : 1e12);
   noise.parameter_lower = setup.parameter_lower;
   noise.parameter_upper = setup.parameter_upper;
-  return {like.shared_model(), std::move(noise), like.substeps(), setup.most_between > 0};
+  return {like.shared_model(), std::move(noise), like.substeps(), setup.most_between};
 }
 
 /// Householder reduction of the first m rows, of all columns but the last, in place: afterwards the upper triangle

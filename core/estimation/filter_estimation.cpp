@@ -28,7 +28,7 @@ FilterEstimation::FilterEstimation(const std::shared_ptr<const Model>& model, Se
     throw Error(fmt::format("filter: the initial mean and covariance must have the size {} of [x; p]", n));
   const int count = model->description().roles.heading >= 0 ? std::max(1, setup_.heading_starts) : 1;
   for (int i = 0; i < count; ++i)
-    bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps, setup_.most_between > 0), 0.0});
+    bank_.push_back({KalmanFilter(model, setup_.noise, setup_.substeps, setup_.most_between), 0.0});
   if (setup_.remembered_nodes < 0) throw Error("filter: expected 0 remembered nodes or more");
   const Moments moments{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), 0.0};
   nodes_.assign(setup_.remembered_nodes + std::size_t{1}, Node{std::vector<Moments>(bank_.size(), moments), 1, 0});

@@ -6,13 +6,23 @@
 #include <cmath>
 #include <utility>
 
+#include "rhec/core/base/error.hpp"
 #include "rhec/core/base/padded.hpp"
 #include "rhec/core/base/with_size.hpp"
 #include "rhec/core/horizon/rhe_problem.hpp"
 
 namespace rhec {
+namespace {
 
-KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, bool uses_between)
+/// Those of some outputs that are not angles, whose polynomials in time would jump.
+std::vector<int> steady_outputs(const ModelDescription& about, std::vector<int> outputs) {
+  std::erase_if(outputs, [&](int j) { return about.outputs[j].is_angle; });
+  return outputs;
+}
+
+}  // namespace
+
+KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, int most_between)
     : model_(std::move(model)),
       noise_(std::move(noise)),
       substeps_(substeps),
@@ -29,20 +39,45 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   next_.assign(nx_, 0.0);
   jacobian_.assign(static_cast<std::size_t>(nx_) * (nx_ + nu_ + 2 * np_), 0.0);
   input_.assign(nu_, 0.0);
+  added_.assign(ny_, 0.0);
+  is_missing_.assign(nu_, 0);
   const std::size_t width = padded(nx_ + np_ + nu_);
   for (auto* v : {&row_, &next_row_}) v->assign(width, 0.0);
   jacobian_rows_.assign(nx_ * width, 0.0);
   scratch_.assign(model_->rows_scratch(1), 0.0);
   work_ = next_covariance_ = Eigen::MatrixXd::Zero(n, n);
   gain_ = image_ = zeros_ = correction_ = Eigen::VectorXd::Zero(n);
-  if (!uses_between && noise_.motion_outputs.empty()) return;
-  const int wide = n + nu_ + np_, motion = static_cast<int>(noise_.motion_outputs.size());
-  wide_mean_ = point_ = next_point_ = wide_gradient_ = wide_gain_ = wide_image_ = Eigen::VectorXd::Zero(wide);
+  if (most_between == 0 && noise_.motion_outputs.empty()) return;
+  const int motion = static_cast<int>(noise_.motion_outputs.size()), nz = nx_ + nu_ + 2 * np_, plain = n + nu_ + np_;
+  if (motion > 0) curved_ = curved_states(*model_);
+  curved_outputs_ = curved_outputs(*model_, noise_.motion_outputs);
+  output_curvature_ = Curvature(static_cast<int>(curved_outputs_.size()), nx_, ny_);
+  before_ = covariance;
+  curvature_ = Curvature(2 * static_cast<int>(curved_.size()), plain);
+  summary_ = ReadingSummary(steady_outputs(model_->description(), noise_.motion_outputs), ny_, most_between, substeps_);
+  const std::size_t rows = std::max(static_cast<std::size_t>(summary_.most()) + 1, 2 * curved_.size()),
+                    times = static_cast<std::size_t>(summary_.most()) + 1, second = 2 * curved_.size(),
+                    nx = static_cast<std::size_t>(nx_), ny = static_cast<std::size_t>(ny_);
+  times_.assign(times, 0.0);
+  durations_.assign(rows, 0.0);
+  states_.assign(rows * nx, 0.0);
+  inputs_.assign(rows * nu_, 0.0);
+  parameters_.assign(rows * np_, 0.0);
+  ends_ = parameters_;
+  next_states_.assign(times * nx, 0.0);
+  jacobians_.assign(times * nx * nz, 0.0);
+  outputs_.assign(times * ny, 0.0);
+  output_jacobians_.assign(times * ny * nx, 0.0);
+  multipliers_.assign(second * nx, 0.0);
+  hessians_.assign(second * nz * nz, 0.0);
+  const int wide = plain + (curved_.empty() ? 0 : Curvature::factors);
+  for (auto* v : {&wide_mean_, &point_, &next_point_, &start_mean_, &wide_gradient_, &wide_gain_, &wide_image_})
+    *v = Eigen::VectorXd::Zero(wide);
   motion_innovations_ = Eigen::VectorXd::Zero(motion);
   motion_images_ = motion_gradients_ = Eigen::MatrixXd::Zero(wide, motion);
   motion_covariance_ = Eigen::MatrixXd::Zero(motion, motion);
   wide_end_ = Eigen::VectorXd::Zero(np_);
-  wide_covariance_ = Eigen::MatrixXd::Zero(wide, wide);
+  wide_covariance_ = start_covariance_ = posterior_ = Eigen::MatrixXd::Zero(wide, wide);
   transition_ = wide_work_ = Eigen::MatrixXd::Zero(n, wide);
 }
 
@@ -52,19 +87,46 @@ void KalmanFilter::clip() noexcept {
 }
 
 void KalmanFilter::update(const double* y, const double* robust_weights) noexcept {
-  Model::Nodes request;
-  request.count = 1;
-  request.states = mean.data();
-  request.outputs = predicted_.data();
-  request.jacobians = output_jacobian_.data();
-  model_->observe(request);
-  // One output after the other, all linearised at the same point; the noises are independent.
+  model_->observe(
+      {.count = 1, .states = mean.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
+  std::ranges::fill(added_, 0.0);
+  if (std::ranges::any_of(curved_outputs_, [y](int j) { return !std::isnan(y[j]); })) {
+    // Once to see where the outputs put the state, then linearised there.
+    before_ = covariance;
+    take_outputs(y, robust_weights);
+    point_.head(nx_) = mean.head(nx_) + correction_.head(nx_);
+    linearise_outputs();
+    covariance = before_;
+  }
+  take_outputs(y, robust_weights);
+  mean += correction_;
+  clip();
+}
+
+/// One output after the other, all linearised at the same point; the noises are independent.
+void KalmanFilter::take_outputs(const double* y, const double* robust_weights) noexcept {
   correction_.setZero();
   for (int j = 0; j < ny_; ++j)
     if (!std::isnan(y[j]))
-      take_output(j, y[j], noise_.output_variances[j] / (robust_weights ? robust_weights[j] : 1.0));
-  mean += correction_;
-  clip();
+      take_output(j, y[j], noise_.output_variances[j] / (robust_weights ? robust_weights[j] : 1.0) + added_[j]);
+}
+
+/// Outputs as expected at the mean, linearised about `point_`. Those that are curved have means and variances of their
+/// second-order terms, by the covariance after the update and before it.
+void KalmanFilter::linearise_outputs() noexcept {
+  if (!point_.head(nx_).allFinite()) return;
+  model_->observe(
+      {.count = 1, .states = point_.data(), .outputs = predicted_.data(), .jacobians = output_jacobian_.data()});
+  for (int j = 0; j < ny_; ++j)
+    for (int c = 0; c < nx_; ++c) predicted_[j] += output_jacobian_[c * ny_ + j] * (mean[c] - point_[c]);
+  output_curvature_.observe(*model_, curved_outputs_, point_.data());
+  output_curvature_.find_factor([&](std::ptrdiff_t r, std::ptrdiff_t c) { return before_(r, c); });
+  output_curvature_.find_means([&](std::ptrdiff_t r, std::ptrdiff_t c) { return covariance(r, c); });
+  for (std::size_t k = 0; k < curved_outputs_.size(); ++k) {
+    const int row = static_cast<int>(k), j = curved_outputs_[k];
+    predicted_[j] += output_curvature_.mean(row);
+    added_[j] = output_curvature_.variance(row);
+  }
 }
 
 void KalmanFilter::take_output(int output, double measured, double variance) noexcept {

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
+#include "rhec/core/estimation/kalman_filter.hpp"
 #include "rhec/core/kernels/bank_kernels.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
 #include "rhec/core/model/motion_outputs.hpp"
@@ -72,6 +73,9 @@ struct Filling {
 
 }  // namespace
 
+int PriorBank::first_state(int parameter) const noexcept { return processes_[parameter].first; }
+int PriorBank::process_states(int parameter) const noexcept { return processes_[parameter].count; }
+
 PriorBank::PriorBank(PriorBank&&) noexcept = default;
 PriorBank::~PriorBank() = default;
 
@@ -132,13 +136,32 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   }
   surprises_.assign(setup_.robust.empty() ? 0 : ny_ * M, 0.0);
   find_loss_scales();
-  if (setup_.most_between > 0 || looks_ahead()) {
+  if (looks_ahead()) {
+    constexpr double unbounded = std::numeric_limits<double>::infinity();
+    const std::vector<double> lower(np_, -unbounded), upper(np_, unbounded);
+    ahead_ = std::make_unique<LookAhead>(
+        LookAhead{.mixture = {model_,
+                              {setup_.output_variances, setup_.input_variances, lower, upper, setup_.motion_outputs},
+                              setup_.substeps,
+                              setup_.most_between},
+                  .curved_outputs = curved_outputs(*model_, setup_.motion_outputs)});
+    ahead_->output_curvature = Curvature(static_cast<int>(ahead_->curved_outputs.size()), nx_, ny_);
+    ahead_->ramp_variances.assign(np_, 0.0);
+    ahead_->no_input.assign(nu_, 0.0);
+    if (!setup_.robust.empty()) ahead_->ones.assign(static_cast<std::size_t>(setup_.most_between) * ny_, 1.0);
     const auto a = static_cast<std::size_t>(wide_count());
-    for (auto* v : {&wide_mean_, &wide_before_, &point_, &next_point_}) v->assign(a * M, 0.0);
-    moved_.assign(M, 0.0);
+    for (auto* v : {&ahead_->next_point, &ahead_->trial_mean}) v->assign(a * M, 0.0);
+    ahead_->trial_covariance.assign(a * a * M, 0.0);
+    ahead_->moved.assign(M, 0.0);
+  }
+  if (setup_.most_between > 0 || looks_ahead()) {
+    const std::size_t a = static_cast<std::size_t>(wide_count()),
+                      times = std::size_t{1} + (ahead_ ? ahead_->mixture.summary().most() : setup_.most_between);
+    for (auto* v : {&wide_mean_, &wide_before_, &point_}) v->assign(a * M, 0.0);
     wide_covariance_.assign(a * a * M, 0.0);
     wide_work_.assign((2 * a * a + 3 * a) * M, 0.0);
-    wide_gradient_.assign(ny_ * a * M, 0.0);
+    wide_predicted_.assign(times * ny_ * M, 0.0);
+    wide_gradient_.assign(times * ny_ * a * M, 0.0);
     transition_.assign(n * a * M, 0.0);
   }
   next_.assign(nx * M, 0.0);
@@ -157,6 +180,7 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   map_means_.assign(2 * static_cast<std::size_t>(np_), 0.0);
   map_variances_ = map_means_;
   input_.assign(nu_, 0.0);
+  added_.assign(ny_, 0.0);
   variances_.assign(nu_, 0.0);
   for (auto* v : {&start_, &own_, &own_covariance_, &filled_, &filled_covariance_})
     v->assign(std::size_t{Prior::max_states} * Prior::max_states, 0.0);
@@ -263,17 +287,32 @@ void PriorBank::observe_members(const double* states) noexcept {
 void PriorBank::update(const double* y, const double* robust_weights) noexcept {
   for (int m = 0; m < lanes_; ++m)
     for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = mean_[r * lanes_ + m];
+  linearise_nodes();
+  const BankView view{lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()};
+  Frame frame{.view = view,
+              .gradient = gradient_.data(),
+              .before = states_.data(),
+              .before_entry = 1,
+              .before_lane = nx_,
+              .is_between = false};
+  std::ranges::fill(added_, 0.0);
+  if (ahead_ && std::ranges::any_of(ahead_->curved_outputs, [y](int j) { return !std::isnan(y[j]); })) {
+    linearise_given(y);
+    wide_before_ = wide_mean_;
+    frame.before = wide_before_.data();
+    frame.before_entry = lanes_;
+    frame.before_lane = 1;
+  }
+  log_likelihood_ = take_outputs(frame, y, robust_weights);
+  if (frame.before_lane == 1) spread_variances();
+}
+
+/// Outputs and gradients at `states_`.
+void PriorBank::linearise_nodes() noexcept {
   observe_members(states_.data());
   for (int m = 0; m < lanes_; ++m)
     for (int j = 0; j < ny_; ++j)
       for (int c = 0; c < nx_; ++c) gradient_[(j * nx_ + c) * lanes_ + m] = gradient_rows_[(m * nx_ + c) * ny_ + j];
-  log_likelihood_ = take_outputs({.view = {lanes_, nx_, n_, mean_.data(), covariance_.data(), work_.data()},
-                                  .gradient = gradient_.data(),
-                                  .before = states_.data(),
-                                  .before_entry = 1,
-                                  .before_lane = nx_,
-                                  .is_between = false},
-                                 y, robust_weights);
 }
 
 /// Takes in outputs whose predictions and gradients are known, and weighs the members by them. Returns the logarithm of

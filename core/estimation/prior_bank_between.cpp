@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "look_ahead.hpp"
 #include "prior_bank_views.hpp"
 #include "rhec/core/base/assertion.hpp"
+#include "rhec/core/estimation/kalman_filter.hpp"
 #include "rhec/core/kernels/kernel_sets.hpp"
 
 namespace rhec {
@@ -13,20 +15,106 @@ namespace rhec {
 /// Within an interval, what is unknown are the state at its start, the input's noise and that of the processes: a
 /// measurement at a later time tells of all of them. The vector [x; z; u; q] takes such measurements in one after the
 /// other, and only then moves to the interval's end.
-void PriorBank::predict(const MeasuredInterval& interval, const double* end_outputs) noexcept {
-  const bool is_ahead = rhec::looks_ahead(setup_.motion_outputs, interval, static_cast<std::size_t>(ny_), end_outputs);
-  if (interval.between == 0 && !is_ahead) return predict(interval.inputs, interval.duration);
+void PriorBank::predict(const MeasuredInterval& measured, const double* end_outputs) noexcept {
+  is_curved_ = false;
+  const bool has_motion = measures_motion(setup_.motion_outputs, measured, static_cast<std::size_t>(ny_), end_outputs);
+  if (measured.between == 0 && !has_motion) return predict(measured.inputs, measured.duration);
   RHEC_ASSERT(!wide_mean_.empty(), "a bank that was set up for measurements between nodes");
-  begin_step(interval.inputs, interval.duration);
+  begin_step(measured.inputs, measured.duration);
   widen();
-  for (int k = 0; k < interval.between; ++k)
-    take_between(interval.times[k], interval.times[k] / interval.duration,
-                 interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_);
-  linearise_wide(interval.duration, is_ahead ? end_outputs : nullptr);
+  const MeasuredInterval interval = has_motion ? look_ahead(measured, end_outputs) : measured;
+  for (int k = 0; k < interval.between; ++k) take_between(interval, k, has_motion);
+  if (!has_motion) {
+    point_ = wide_mean_;
+    integrate_members(point_.data(), true, interval.duration, 1.0);
+  }
   if (interval.between > 0) {
     narrow();
   } else {
     take_step_from_point();
+  }
+}
+
+int PriorBank::wide_count() const noexcept {
+  return plain_count() + (ahead_ && !ahead_->mixture.curved().empty() ? Curvature::factors : 0);
+}
+
+/// Linearises the interval where its measurements put every member. All start where they put a filter on the mixture,
+/// and have that filter's second-order terms.
+MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, const double* end_outputs) noexcept {
+  const std::ptrdiff_t M = lanes_;
+  for (int j = 0; j < ny_; ++j) ahead_->mixture.set_output_variance(j, learnt_[j]);
+  for (int j = 0; j < np_; ++j) {
+    const Process& process = processes_[j];
+    ahead_->ramp_variances[j] = 0.0;
+    for (int m = 0; m < members_; ++m) ahead_->ramp_variances[j] += weights_[m] * process.ramp[m] * process.Q[m];
+  }
+  moments(ahead_->mixture.mean, ahead_->mixture.covariance);
+  // A robust loss is one of each measurement.
+  const MeasuredInterval interval =
+      ahead_->mixture.look_ahead(measured, ahead_->no_input.data(), ahead_->ramp_variances.data(),
+                                 ahead_->ones.empty() ? nullptr : ahead_->ones.data(), end_outputs);
+  is_curved_ = !ahead_->mixture.curved().empty();
+  const Eigen::VectorXd& found = ahead_->mixture.point();
+  point_ = wide_mean_;
+  for (std::ptrdiff_t m = 0; m < M && found.allFinite(); ++m) {
+    const auto at = [&](std::ptrdiff_t entry) -> double& { return point_[entry * M + m]; };
+    for (int r = 0; r < nx_; ++r) at(r) = found[r];
+    for (int j = 0; j < nu_; ++j) at(n_ + j) = found[nx_ + np_ + j];
+    for (int j = 0; j < np_; ++j) {
+      const Process& process = processes_[j];
+      at(process.first) = found[nx_ + j];
+      if (process.ramp[m] == 0.0) continue;
+      double end = 0.0;
+      for (int k = 0; k < process.count; ++k) end += process.F[k * process.count * M + m] * at(process.first + k);
+      at(n_ + nu_ + process.first - nx_) = found[nx_ + j] + found[nx_ + np_ + nu_ + j] - end;
+    }
+  }
+  for (int step = 0;; ++step) {
+    linearise_about_point(interval, end_outputs);
+    if (step == most_look_ahead_steps || !move_point(interval, end_outputs)) return interval;
+    std::swap(point_, ahead_->next_point);
+  }
+}
+
+/// Outputs as expected at the means, linearised where they put the members. Those of motion that are curved have means
+/// and variances of their second-order terms, as of a KalmanFilter, by the mixture's covariance.
+void PriorBank::linearise_given(const double* y) noexcept {
+  const std::ptrdiff_t M = lanes_;
+  std::copy(mean_.begin(), mean_.end(), wide_mean_.begin());
+  std::copy(mean_.begin(), mean_.end(), ahead_->trial_mean.begin());
+  std::copy(covariance_.begin(), covariance_.end(), ahead_->trial_covariance.begin());
+  moments(ahead_->mixture.mean, ahead_->mixture.covariance);
+  const BankView trial{lanes_, nx_, n_, ahead_->trial_mean.data(), ahead_->trial_covariance.data(), wide_work_.data()};
+  int taken = 0;
+  for (std::ptrdiff_t j = 0; j < ny_; ++j)
+    if (!std::isnan(y[j]))
+      views_->outputs[taken++] = {.predicted = predicted_.data() + j * M,
+                                  .gradient = gradient_.data() + j * nx_ * M,
+                                  .variance = output_variances_.data() + j * M,
+                                  .measured = y[j],
+                                  .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
+  bank_kernels().update(trial, views_->outputs.data(), taken, setup_.gate, squares_.data(),
+                        innovation_variances_.data());
+  for (std::ptrdiff_t m = 0; m < M; ++m)
+    for (int r = 0; r < nx_; ++r) states_[m * nx_ + r] = ahead_->trial_mean[r * M + m];
+  linearise_nodes();
+  for (std::ptrdiff_t j = 0; j < ny_; ++j)
+    for (std::ptrdiff_t c = 0; c < nx_; ++c)
+      for (std::ptrdiff_t m = 0; m < M; ++m)
+        predicted_[j * M + m] += gradient_[(j * nx_ + c) * M + m] * (mean_[c * M + m] - ahead_->trial_mean[c * M + m]);
+  bank_kernels().moments(trial, weights_.data(), full_mean_.data(), full_covariance_.data());
+  Curvature& terms = ahead_->output_curvature;
+  terms.observe(*model_, ahead_->curved_outputs, full_mean_.data());
+  terms.find_factor([&](std::ptrdiff_t r, std::ptrdiff_t c) { return ahead_->mixture.covariance(r, c); });
+  terms.find_means([&](std::ptrdiff_t r, std::ptrdiff_t c) { return full_covariance_(r, c); });
+  for (std::size_t k = 0; k < ahead_->curved_outputs.size(); ++k) {
+    const int row = static_cast<int>(k), j = ahead_->curved_outputs[k];
+    added_[j] = terms.variance(row);
+    for (std::ptrdiff_t m = 0; m < M; ++m) {
+      predicted_[j * M + m] += terms.mean(row);
+      output_variances_[j * M + m] += added_[j];
+    }
   }
 }
 
@@ -49,82 +137,195 @@ void PriorBank::widen() noexcept {
       for (std::ptrdiff_t r = 0; r < process.count; ++r)
         std::copy_n(process.Q.begin() + (c * process.count + r) * M, M, P(first + r, first + c));
   }
+  for (std::ptrdiff_t f = plain_count(); f < a; ++f) std::fill_n(P(f, f), M, 1.0);
+}
+
+/// Part of a factor of the second-order terms in a state, between the first measurement (0) and the end (1).
+double PriorBank::curvature_factor(int state, int factor, double from_first) const noexcept {
+  const Curvature& terms = ahead_->mixture.curvature();
+  const double start = terms.factor(state, factor),
+               end = terms.factor(state + static_cast<int>(ahead_->mixture.curved().size()), factor);
+  return start + from_first * (end - start);
+}
+
+/// Adds the means of the second-order terms to where the members were integrated.
+void PriorBank::add_curvature(double from_first) noexcept {
+  if (!is_curved_) return;
+  const Curvature& terms = ahead_->mixture.curvature();
+  const std::vector<int>& curved = ahead_->mixture.curved();
+  for (std::size_t k = 0; k < curved.size(); ++k) {
+    const double start = terms.mean(static_cast<int>(k)), end = terms.mean(static_cast<int>(k + curved.size())),
+                 mean = start + from_first * (end - start);
+    for (int m = 0; m < lanes_; ++m) {
+      next_rows_[m * nx_ + curved[k]] += mean;
+      next_[curved[k] * lanes_ + m] += mean;
+    }
+  }
 }
 
 /// Gradient of an output by the wide vector, where it was integrated and observed last.
-void PriorBank::write_wide_gradient(int output, double share) noexcept {
-  const int a = wide_count(), columns = nx_ + nu_ + 2 * np_;
-  double* const gradient = wide_gradient_.data() + static_cast<std::ptrdiff_t>(output) * a * lanes_;
-  std::fill_n(gradient, static_cast<std::ptrdiff_t>(a) * lanes_, 0.0);
+void PriorBank::write_wide_gradient(int output, double share, double from_first, double* gradient) const noexcept {
+  const int columns = nx_ + nu_ + 2 * np_, noises = n_ + nu_;
+  std::fill_n(gradient, static_cast<std::ptrdiff_t>(wide_count()) * lanes_, 0.0);
   for (int m = 0; m < lanes_; ++m) {
     const double *J = jacobian_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * columns,
                  *C = gradient_rows_.data() + static_cast<std::ptrdiff_t>(m) * nx_ * ny_;
-    const auto by = [&](int column) {
-      double sum = 0.0;
-      for (int r = 0; r < nx_; ++r) sum += C[r * ny_ + output] * J[column * nx_ + r];
-      return sum;
-    };
     const auto g = [&](int entry) -> double& { return gradient[static_cast<std::ptrdiff_t>(entry) * lanes_ + m]; };
-    for (int c = 0; c < nx_; ++c) g(c) = by(c);
-    for (int c = 0; c < nu_; ++c) g(n_ + c) = by(nx_ + c);
-    for (int p = 0; p < np_; ++p) {
-      const Process& process = processes_[p];
-      const double start = by(nx_ + nu_ + p), end = by(nx_ + nu_ + np_ + p);
-      if (process.ramp[m] == 0.0) {
-        g(process.first) = start + end;
-        continue;
+    // An output depends on few states.
+    for (int r = 0; r < nx_; ++r) {
+      const double by_state = C[r * ny_ + output];
+      if (by_state == 0.0) continue;
+      const auto by = [&](int column) { return by_state * J[column * nx_ + r]; };
+      for (int c = 0; c < nx_; ++c) g(c) += by(c);
+      for (int c = 0; c < nu_; ++c) g(n_ + c) += by(nx_ + c);
+      for (int p = 0; p < np_; ++p) {
+        const Process& process = processes_[p];
+        const double start = by(nx_ + nu_ + p), end = by(nx_ + nu_ + np_ + p);
+        if (process.ramp[m] == 0.0) {
+          g(process.first) += start + end;
+          continue;
+        }
+        g(process.first) += start + (1.0 - share) * end;
+        for (int k = 0; k < process.count; ++k)
+          g(process.first + k) += share * end * process.F[(k * process.count) * lanes_ + m];
+        g(noises + process.first - nx_) += share * end;
       }
-      g(process.first) = start + (1.0 - share) * end;
-      for (int k = 0; k < process.count; ++k)
-        g(process.first + k) += share * end * process.F[(k * process.count) * lanes_ + m];
-      g(n_ + nu_ + process.first - nx_) = share * end;
+    }
+    if (!is_curved_) continue;
+    const std::vector<int>& curved = ahead_->mixture.curved();
+    for (std::size_t k = 0; k < curved.size(); ++k) {
+      const double by_state = C[curved[k] * ny_ + output];
+      if (by_state == 0.0) continue;
+      for (int f = 0; f < Curvature::factors; ++f)
+        g(plain_count() + f) += by_state * curvature_factor(static_cast<int>(k), f, from_first);
     }
   }
 }
 
-/// Next states and Jacobians at the interval's end at the mean or, where outputs y are given, where those of motion put
-/// what is unknown of it: Gauss-Newton steps of every member, until no point moves by much.
-void PriorBank::linearise_wide(double seconds, const double* y) noexcept {
+/// Expected outputs and their gradients, of those that y has (n_y, NaN where missing), where the members were
+/// integrated last: those of measurement number `which` of the interval.
+void PriorBank::linearise_outputs(int which, const double* y, double share, double from_first) noexcept {
+  const std::ptrdiff_t M = lanes_, first = static_cast<std::ptrdiff_t>(which) * ny_;
+  observe_members(next_rows_.data());
+  std::copy(predicted_.begin(), predicted_.end(), wide_predicted_.begin() + first * M);
+  for (int j = 0; j < ny_; ++j)
+    if (!std::isnan(y[j]))
+      write_wide_gradient(j, share, from_first, wide_gradient_.data() + (first + j) * wide_count() * M);
+}
+
+/// All measurements between the nodes, outputs y at the end (null: none), and the end itself, about `point_`.
+void PriorBank::linearise_about_point(const MeasuredInterval& interval, const double* end_outputs) noexcept {
+  for (int k = 0; k < interval.between; ++k) {
+    const double seconds = interval.times[k], first = interval.times[0],
+                 from_first = (seconds - first) / (interval.duration - first);
+    integrate_members(point_.data(), true, seconds, seconds / interval.duration);
+    add_curvature(from_first);
+    linearise_outputs(k, interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_, seconds / interval.duration,
+                      from_first);
+  }
+  integrate_members(point_.data(), true, interval.duration, 1.0);
+  add_curvature(1.0);
+  if (end_outputs) linearise_outputs(interval.between, end_outputs, 1.0, 1.0);
+}
+
+/// The outputs of measurement number `which` as expected at a mean of the wide vector, linearised about `point_`.
+void PriorBank::expect_outputs(int which, const double* y, const double* mean) noexcept {
+  const std::ptrdiff_t a = wide_count(), M = lanes_;
+  for (std::ptrdiff_t j = 0; j < ny_; ++j) {
+    if (std::isnan(y[j])) continue;
+    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(which) * ny_ + j;
+    double* const expected = predicted_.data() + j * M;
+    const double* const gradient = wide_gradient_.data() + row * a * M;
+    std::copy_n(wide_predicted_.data() + row * M, M, expected);
+    for (std::ptrdiff_t e = 0; e < a * M; e += M)
+      for (std::ptrdiff_t m = 0; m < M; ++m) expected[m] += gradient[e + m] * (mean[e + m] - point_[e + m]);
+  }
+}
+
+/// The next points of the members: the means given the measurements between the nodes and the outputs of motion at the
+/// end, linearised about the points. False if no point moves by much.
+bool PriorBank::move_point(const MeasuredInterval& interval, const double* end_outputs) noexcept {
   constexpr double little = least_look_ahead_step * least_look_ahead_step;
   const int a = wide_count();
-  point_ = wide_mean_;
-  for (int step = 0; step <= most_look_ahead_steps; ++step) {
-    integrate_members(point_.data(), true, seconds, 1.0);
-    if (!y || step == most_look_ahead_steps) return;
-    observe_members(next_rows_.data());
-    int taken = 0;
-    for (const int j : setup_.motion_outputs) {
-      if (std::isnan(y[j])) continue;
-      write_wide_gradient(j, 1.0);
-      views_->outputs[taken++] = {.predicted = predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
-                                  .gradient = wide_gradient_.data() + static_cast<std::ptrdiff_t>(j) * a * lanes_,
-                                  .variance = output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
-                                  .measured = y[j],
-                                  .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
-    }
-    next_point_ = point_;
-    bank_kernels().move_point({lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()},
-                              views_->outputs.data(), taken, setup_.gate, next_point_.data(), moved_.data());
-    if (*std::max_element(moved_.begin(), moved_.begin() + members_) <= little) return;
-    std::swap(point_, next_point_);
+  const auto output_of = [&](int which, int j, const double* predicted, double measured) -> BankOutput {
+    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(which) * ny_ + j;
+    return {.predicted = predicted,
+            .gradient = wide_gradient_.data() + row * a * lanes_,
+            .variance = output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
+            .measured = measured,
+            .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
+  };
+  BankView view{lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()};
+  if (interval.between > 0) {
+    ahead_->trial_mean = wide_mean_;
+    ahead_->trial_covariance = wide_covariance_;
+    view.mean = ahead_->trial_mean.data();
+    view.covariance = ahead_->trial_covariance.data();
   }
+  for (int k = 0; k < interval.between; ++k) {
+    const double* const y = interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_;
+    expect_outputs(k, y, ahead_->trial_mean.data());
+    weigh_readings(k);
+    int taken = 0;
+    for (int j = 0; j < ny_; ++j)
+      if (!std::isnan(y[j]))
+        views_->outputs[taken++] = output_of(k, j, predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, y[j]);
+    bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
+                          innovation_variances_.data());
+  }
+  spread_variances();
+  int taken = 0;
+  for (const int j : setup_.motion_outputs)
+    if (end_outputs && !std::isnan(end_outputs[j]))
+      views_->outputs[taken++] = output_of(
+          interval.between, j,
+          wide_predicted_.data() + (static_cast<std::ptrdiff_t>(interval.between) * ny_ + j) * lanes_, end_outputs[j]);
+  ahead_->next_point = point_;
+  bank_kernels().move_point(view, views_->outputs.data(), taken, plain_count(), setup_.gate, ahead_->next_point.data(),
+                            ahead_->moved.data());
+  std::copy(point_.begin() + static_cast<std::ptrdiff_t>(plain_count()) * lanes_, point_.end(),
+            ahead_->next_point.begin() + static_cast<std::ptrdiff_t>(plain_count()) * lanes_);
+  return *std::max_element(ahead_->moved.begin(), ahead_->moved.begin() + members_) > little;
 }
 
-/// Takes in outputs at a time within the interval.
-void PriorBank::take_between(double seconds, double share, const double* y) noexcept {
-  const int a = wide_count();
-  integrate_members(wide_mean_.data(), true, seconds, share);
-  observe_members(next_rows_.data());
-  for (int j = 0; j < ny_; ++j)
-    if (!std::isnan(y[j])) write_wide_gradient(j, share);
+/// How many measurements those of number `which` stand for; null: one.
+const double* PriorBank::reading_weights(int which) const noexcept {
+  return ahead_->ones.empty() ? ahead_->mixture.summary().weights() + static_cast<std::ptrdiff_t>(which) * ny_
+                              : nullptr;
+}
+
+/// Noise variances of the outputs of measurement number `which`.
+void PriorBank::weigh_readings(int which) noexcept {
+  const double* const weights = reading_weights(which);
+  for (std::ptrdiff_t j = 0; j < ny_; ++j)
+    std::fill_n(output_variances_.data() + j * lanes_, lanes_, learnt_[j] / (weights ? weights[j] : 1.0));
+}
+
+/// Takes in the measurements at a time within the interval, linearised about the mean as it is by then or, as they have
+/// been already, about `point_`.
+void PriorBank::take_between(const MeasuredInterval& interval, int which, bool about_point) noexcept {
+  const std::ptrdiff_t a = wide_count(), M = lanes_;
+  const double* const y = interval.outputs + static_cast<std::ptrdiff_t>(which) * ny_;
+  if (!about_point) {
+    const double seconds = interval.times[which], share = seconds / interval.duration;
+    integrate_members(wide_mean_.data(), true, seconds, share);
+    linearise_outputs(which, y, share, 1.0);
+  }
+  if (about_point) {
+    expect_outputs(which, y, wide_mean_.data());
+    weigh_readings(which);
+  }
   if (setup_.adapts_noise) wide_before_ = wide_mean_;
   between_log_likelihood_ +=
-      take_outputs({.view = {lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()},
-                    .gradient = wide_gradient_.data(),
+      take_outputs({.view = {lanes_, static_cast<int>(a), static_cast<int>(a), wide_mean_.data(),
+                             wide_covariance_.data(), wide_work_.data()},
+                    .gradient = wide_gradient_.data() + static_cast<std::ptrdiff_t>(which) * ny_ * a * M,
                     .before = wide_before_.data(),
                     .before_entry = lanes_,
-                    .before_lane = 1},
+                    .before_lane = 1,
+                    .weights = about_point ? reading_weights(which) : nullptr},
                    y, nullptr);
+  if (about_point) spread_variances();
 }
 
 /// Of an interval without measurements between its nodes, linearised about `point_`: as `take_step` from the mean.
@@ -152,6 +353,16 @@ void PriorBank::take_step_from_point() noexcept {
     }
   }
   take_linearised_step();
+  // Second-order terms are noise, not correlated with anything yet.
+  const std::vector<int>& curved = ahead_->mixture.curved();
+  const int count = static_cast<int>(curved.size());
+  for (int k = 0; k < count; ++k)
+    for (int l = 0; l < count; ++l) {
+      double added = 0.0;
+      for (int f = 0; f < Curvature::factors; ++f) added += curvature_factor(k, f, 1.0) * curvature_factor(l, f, 1.0);
+      double* const variance = covariance_.data() + (static_cast<std::ptrdiff_t>(curved[l]) * n_ + curved[k]) * M;
+      for (std::ptrdiff_t m = 0; m < M && std::isfinite(added); ++m) variance[m] += added;
+    }
 }
 
 /// Moves to the interval's end, linearised about `point_`: z+ = F z + q, and x as integrated from there.
@@ -192,6 +403,9 @@ void PriorBank::narrow() noexcept {
       }
     }
   }
+  for (std::size_t k = 0; is_curved_ && k < ahead_->mixture.curved().size(); ++k)
+    for (int f = 0; f < Curvature::factors; ++f)
+      std::fill_n(T(ahead_->mixture.curved()[k], plain_count() + f), M, curvature_factor(static_cast<int>(k), f, 1.0));
   for (std::ptrdiff_t c = 0; c < a; ++c)
     for (std::ptrdiff_t r = 0; r < nx_; ++r)
       for (std::ptrdiff_t m = 0; m < M; ++m)

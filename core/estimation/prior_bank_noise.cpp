@@ -61,17 +61,18 @@ void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
       const auto gradient = [&](int c) {
         return frame.gradient[(static_cast<std::ptrdiff_t>(j) * entries + c) * lanes_ + best];
       };
+      const double weight = frame.weights ? frame.weights[j] : 1.0;
       double residual = y[j] - predicted_[static_cast<std::ptrdiff_t>(j) * lanes_ + best];
       if (model_->description().outputs[j].is_angle) residual = angle_difference(residual, 0.0);
       for (int c = 0; c < entries; ++c) {
         residual -= gradient(c) * (frame.view.mean[static_cast<std::ptrdiff_t>(c) * lanes_ + best] -
                                    frame.before[c * frame.before_entry + best * frame.before_lane]);
         for (int r = 0; r < entries; ++r)
-          spread += gradient(c) * gradient(r) *
+          spread += weight * gradient(c) * gradient(r) *
                     frame.view.covariance[(static_cast<std::ptrdiff_t>(c) * states + r) * lanes_ + best];
       }
-      squares += residual * residual;
-      used += output_variances_[static_cast<std::ptrdiff_t>(j) * lanes_ + best];
+      squares += weight * residual * residual;
+      used += weight * output_variances_[static_cast<std::ptrdiff_t>(j) * lanes_ + best];
       ++count;
     }
     if (count == 0) continue;
@@ -98,7 +99,7 @@ void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
 /// 2 delta^2 (sqrt(1 + s / delta^2) - 1) has the slope 1 / sqrt(1 + s / delta^2).
 void PriorBank::weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept {
   for (int j = 0; j < ny_; ++j)
-    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, learnt_[j]);
+    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, learnt_[j] + added_[j]);
   bank_kernels().surprise(frame.view, views_->outputs.data(), taken, surprises_.data());
   const auto place = [&](int output) {
     return std::count_if(y, y + output, [](double each) { return !std::isnan(each); });
@@ -121,7 +122,8 @@ int PriorBank::most_probable() const noexcept {
 }
 
 double PriorBank::robust_weight(int output) const noexcept {
-  return learnt_[output] / output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + most_probable()];
+  return (learnt_[output] + added_[output]) /
+         output_variances_[static_cast<std::ptrdiff_t>(output) * lanes_ + most_probable()];
 }
 
 /// What a group of outputs with s = sum of nu^2 / S says of their noise, relative to s. The threshold does not follow a

@@ -1,12 +1,38 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
+#include "rhec/core/base/aligned.hpp"
+#include "rhec/core/estimation/curvature.hpp"
+#include "rhec/core/estimation/kalman_filter.hpp"
 #include "rhec/core/estimation/prior_bank.hpp"
 #include "rhec/core/kernels/bank_kernels.hpp"
 
 namespace rhec {
+
+/// Of a parameter.
+struct PriorBank::Process {
+  int first = 0, count = 0;  ///< entries of [x; z]: all states that any of its priors has
+  /// Per kind of state: its place among them, or -1, and the variance with which a member that lacks it is filled up.
+  std::array<int, process_state_kinds> place{};
+  std::array<double, process_state_kinds> filler{};
+  std::vector<const Prior*> kinds;  ///< the different priors of this parameter
+  std::vector<int> kind_of;         ///< per member
+  AlignedDoubles F, Q, ramp;        ///< lanes
+  AlignedDoubles offset;            ///< lanes; of the value, where a map is followed
+};
+
+/// What outputs of motion ask for: a filter on the mixture's [x; p], and the way to where an interval is linearised.
+struct PriorBank::LookAhead {
+  KalmanFilter mixture;
+  std::vector<int> curved_outputs;                                                     ///< of motion
+  Curvature output_curvature = {};                                                     ///< of these, by the state
+  AlignedDoubles next_point = {}, moved = {}, trial_mean = {}, trial_covariance = {};  ///< of the wide vector
+  std::vector<double> ramp_variances = {}, no_input = {};
+  std::vector<double> ones = {};  ///< weights of measurements where there are robust losses, else empty
+};
 
 /// What the kernels are given.
 struct PriorBank::Views {
@@ -21,7 +47,8 @@ struct PriorBank::Frame {
   /// Means before: entry e of lane m is at e * before_entry + m * before_lane.
   const double* before;
   std::ptrdiff_t before_entry, before_lane;
-  bool is_between = true;  ///< the outputs are of a time between two nodes
+  bool is_between = true;           ///< the outputs are of a time between two nodes
+  const double* weights = nullptr;  ///< n_y: how many measurements each stands for; null: one
 };
 
 }  // namespace rhec

@@ -200,7 +200,15 @@ void PriorHorizonEstimation::combine(Estimate& result) noexcept {
     result.fallback = true;
     return;
   }
-  mean_ += weight * shift_;
+  shift_ *= weight;
+  mean_ += shift_;
+  if (bank().looks_ahead()) {
+    // The window's covariance is that of its linearisation, for which a product that is known tells its factors apart.
+    // That of the bank holds about its own mean.
+    for (int c = 0; c < n; ++c)
+      for (int r = 0; r < n; ++r) mixture_(r, c) += shift_[r] * shift_[c];
+    return;
+  }
   const double* const found = covariance_->find(problem_, *solver_, point_, N);
   if (!found) return;
   for (int c = 0; c < n; ++c)
@@ -212,7 +220,7 @@ void PriorHorizonEstimation::combine(Estimate& result) noexcept {
 void PriorHorizonEstimation::rehearse() noexcept {
   filters_.rehearse();
   if (!has_solution_ || filters_.is_searching()) return;
-  covariance_->find(problem_, *solver_, point_, window_.intervals);
+  if (!bank().looks_ahead()) covariance_->find(problem_, *solver_, point_, window_.intervals);
   solver_->prepare(point_);
   has_rehearsed_ = true;
 }

@@ -237,7 +237,8 @@ inline Lanes innovation_of(const BankOutput& output, int m) {
   return innovation;
 }
 
-void move_point(const BankView& bank, const BankOutput* outputs, int count, double gate, double* point, double* moved) {
+void move_point(const BankView& bank, const BankOutput* outputs, int count, int judged, double gate, double* point,
+                double* moved) {
   const int n = bank.states, nx = bank.vehicle_states, M = bank.members;
   for (int m = 0; m < M; m += lane_count) {
     const Entries mean(bank.mean, M, m), P(bank.covariance, M, m), at(point, M, m);
@@ -285,7 +286,7 @@ void move_point(const BankView& bank, const BankOutput* outputs, int count, doub
       for (int j = 0; j < count; ++j) change += image[static_cast<long>(j) * n + r] * nu[j];
       const Lanes next = mean[r] + (is_finite ? change : Lanes{}), step = next - at[r],
                   variance = P[static_cast<long>(r) * n + r];
-      farthest = larger(farthest, variance > 0.0 ? step * step / variance : Lanes{});
+      if (r < judged) farthest = larger(farthest, variance > 0.0 ? step * step / variance : Lanes{});
       at.set(r, next);
     }
     store(farthest, moved + m);

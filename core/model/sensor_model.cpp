@@ -13,6 +13,7 @@ namespace rhec {
 namespace {
 
 constexpr std::size_t sensor_room = 8192;  ///< doubles on the stack
+constexpr int vehicles_at_once = 8;        ///< intervals, as many as a model evaluates side by side
 
 void check_sensors(const ModelDescription& about, const std::vector<int>& chosen, const char* what) {
   for (std::size_t k = 0; k < chosen.size(); ++k)
@@ -56,7 +57,7 @@ SensorModel::SensorModel(std::shared_ptr<const Model> vehicle, Errors errors)
              np = static_cast<std::size_t>(vehicle_->parameter_count()),
              ny = static_cast<std::size_t>(vehicle_->output_count()), nm = motion_.which().size();
   const std::size_t nz = nx + nu + 2 * np, nh = nx + nu + np;
-  const std::size_t interval = nx + nz * (nx + nz) + nm * (1 + nh) + nh * nh + nh * nz + nx,
+  const std::size_t interval = vehicles_at_once * (3 * nx + nz * (nx + nz) + nm * (2 + nh) + nh * nh + nh * nz),
                     node = 2 * ny + ny * nx + nx * nx;
   memory_ = std::max(interval, node);
   if (memory_ > sensor_room) reserve_ = std::make_shared<Reserve>(memory_);
@@ -84,46 +85,43 @@ void SensorModel::straight_motion(double ground_speed, const double* p, double* 
 
 void SensorModel::integrate(const Intervals& request) const noexcept {
   with_memory([&](double* memory) {
-    for (std::ptrdiff_t i = 0; i < request.count; ++i) integrate_one(request, i, memory);
+    for (std::ptrdiff_t first = 0; first < request.count; first += vehicles_at_once)
+      integrate_some(request, first, std::min<std::ptrdiff_t>(vehicles_at_once, request.count - first), memory);
   });
 }
 
 /// With G = d[x_end; u; p_at_end]/dz, the values of motion have the slopes h_z G, and the curvature
-/// G' (sum_j lambda_j d2h_j) G + sum_r (h_x' lambda)_r d2F_r.
-void SensorModel::integrate_one(const Intervals& q, std::ptrdiff_t i, double* memory) const noexcept {
+/// G' (sum_j lambda_j d2h_j) G + sum_r (h_x' lambda)_r d2F_r. The vehicle and h are evaluated for several intervals at
+/// once.
+void SensorModel::integrate_some(const Intervals& q, std::ptrdiff_t first, std::ptrdiff_t count,
+                                 double* memory) const noexcept {
   const std::ptrdiff_t nx = nx_, wide = state_count(), nu = input_count(), np = parameter_count(), nm = motion_.count(),
                        errors = wide - nx - nm, first_m = nx + errors;
   const bool ramp = q.parameters_end != nullptr;
   const std::ptrdiff_t nz = nx + nu + (ramp ? 2 : 1) * np, nZ = nz + wide - nx, nh = nx + nu + np;
   const bool with_slopes = q.jacobians || q.hessians;
   double* next = memory;
-  const auto take = [&next](std::ptrdiff_t size) { return std::exchange(next, next + size); };
-  double *x_end = take(nx), *F = take(nx * nz), *H = take(nz * nz), *m = take(nm), *h = take(nm * nh),
-         *D = take(nh * nh), *DG = take(nh * nz), *multipliers = take(nx);
-  const double* const inputs = q.inputs + i * nu;
-  const double* const parameters = q.parameters + i * np;
-  const double* const at_end = ramp ? q.parameters_end + i * np : parameters;
-  Intervals one{.count = 1,
-                .states = q.states + i * wide,
-                .inputs = inputs,
-                .parameters = parameters,
-                .parameters_end = ramp ? at_end : nullptr,
-                .durations = q.durations + i,
-                .data = q.data ? q.data + i * data_count() : nullptr,
-                .substeps = q.substeps,
-                .next_states = x_end,
-                .jacobians = with_slopes ? F : nullptr};
-  vehicle_->integrate(one);
-  MotionOutputs::Points at{.count = 1, .states = x_end, .inputs = inputs, .parameters = at_end};
-  at.outputs = m;
-  at.jacobians = with_slopes ? h : nullptr;
+  const auto take = [&](std::ptrdiff_t size) { return std::exchange(next, next + count * size); };
+  double *states = take(nx), *x_ends = take(nx), *slopes = take(nx * nz), *values = take(nm), *of_h = take(nm * nh);
+  for (std::ptrdiff_t i = 0; i < count; ++i) std::copy_n(q.states + (first + i) * wide, nx, states + i * nx);
+  Intervals some{.count = static_cast<int>(count),
+                 .states = states,
+                 .inputs = q.inputs + first * nu,
+                 .parameters = q.parameters + first * np,
+                 .parameters_end = ramp ? q.parameters_end + first * np : nullptr,
+                 .durations = q.durations + first,
+                 .data = q.data ? q.data + first * data_count() : nullptr,
+                 .substeps = q.substeps,
+                 .next_states = x_ends,
+                 .jacobians = with_slopes ? slopes : nullptr};
+  vehicle_->integrate(some);
+  MotionOutputs::Points at{.count = some.count,
+                           .states = x_ends,
+                           .inputs = some.inputs,
+                           .parameters = ramp ? some.parameters_end : some.parameters};
+  at.outputs = values;
+  at.jacobians = with_slopes ? of_h : nullptr;
   motion_.evaluate(at);
-  if (q.next_states) {
-    double* const to = q.next_states + i * wide;
-    std::copy_n(x_end, nx, to);
-    std::copy_n(q.states + i * wide + nx, errors, to + nx);
-    std::copy_n(m, nm, to + first_m);
-  }
   // Where a column of the vehicle's z = [x; u; p; p_end] is in ours, and what it is among the arguments of h: -1 where
   // it comes by way of x_end alone.
   const auto place = [&](std::ptrdiff_t c) { return c < nx ? c : c + wide - nx; };
@@ -133,8 +131,16 @@ void SensorModel::integrate_one(const Intervals& q, std::ptrdiff_t i, double* me
     if (ramp) return c < nx + nu + np ? -1 : c - np;
     return c;
   };
-  if (q.jacobians) {
-    double* const J = q.jacobians + i * wide * nZ;
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    if (q.next_states) {
+      double* const to = q.next_states + (first + i) * wide;
+      std::copy_n(x_ends + i * nx, nx, to);
+      std::copy_n(q.states + (first + i) * wide + nx, errors, to + nx);
+      std::copy_n(values + i * nm, nm, to + first_m);
+    }
+    if (!q.jacobians) continue;
+    const double *const F = slopes + i * nx * nz, *const h = of_h + i * nm * nh;
+    double* const J = q.jacobians + (first + i) * wide * nZ;
     std::fill_n(J, wide * nZ, 0.0);
     for (std::ptrdiff_t c = 0; c < nz; ++c) {
       double* const to = J + place(c) * wide;
@@ -148,38 +154,44 @@ void SensorModel::integrate_one(const Intervals& q, std::ptrdiff_t i, double* me
     for (std::ptrdiff_t k = nx; k < first_m; ++k) J[k * wide + k] = 1.0;
   }
   if (!q.hessians) return;
-  const double* const lambda = q.multipliers + i * wide;
-  const double* const of_motion = lambda + first_m;
-  for (std::ptrdiff_t r = 0; r < nx; ++r) {
-    multipliers[r] = lambda[r];
-    for (std::ptrdiff_t j = 0; j < nm; ++j) multipliers[r] += h[r * nm + j] * of_motion[j];
+  double *multipliers = take(nx), *of_motion = take(nm), *hessians = take(nz * nz), *curvatures = take(nh * nh),
+         *DG = take(nh * nz);
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    const double *const lambda = q.multipliers + (first + i) * wide, *const h = of_h + i * nm * nh;
+    std::copy_n(lambda + first_m, nm, of_motion + i * nm);
+    for (std::ptrdiff_t r = 0; r < nx; ++r) {
+      multipliers[i * nx + r] = lambda[r];
+      for (std::ptrdiff_t j = 0; j < nm; ++j) multipliers[i * nx + r] += h[r * nm + j] * lambda[first_m + j];
+    }
   }
-  one.next_states = one.jacobians = nullptr;
-  one.multipliers = multipliers;
-  one.hessians = H;
-  vehicle_->integrate(one);
-  if (nm > 0) {
-    at.outputs = at.jacobians = nullptr;
-    at.multipliers = of_motion;
-    at.hessians = D;
-    motion_.evaluate(at);
-    for (std::ptrdiff_t c = 0; c < nz; ++c)
+  some.next_states = some.jacobians = nullptr;
+  some.multipliers = multipliers;
+  some.hessians = hessians;
+  vehicle_->integrate(some);
+  at.outputs = at.jacobians = nullptr;
+  at.multipliers = of_motion;
+  at.hessians = curvatures;
+  motion_.evaluate(at);
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    const double *const F = slopes + i * nx * nz, *const D = curvatures + i * nh * nh;
+    double* const H = hessians + i * nz * nz;
+    for (std::ptrdiff_t c = 0; c < nz && nm > 0; ++c)
       for (std::ptrdiff_t a = 0; a < nh; ++a) {
         double sum = argument(c) < 0 ? 0.0 : D[argument(c) * nh + a];
         for (std::ptrdiff_t r = 0; r < nx; ++r) sum += D[r * nh + a] * F[c * nx + r];
         DG[c * nh + a] = sum;
       }
-    for (std::ptrdiff_t c = 0; c < nz; ++c)
+    for (std::ptrdiff_t c = 0; c < nz && nm > 0; ++c)
       for (std::ptrdiff_t d = 0; d < nz; ++d) {
         double sum = argument(d) < 0 ? 0.0 : DG[c * nh + argument(d)];
         for (std::ptrdiff_t r = 0; r < nx; ++r) sum += DG[c * nh + r] * F[d * nx + r];
         H[c * nz + d] += sum;
       }
+    double* const all = q.hessians + (first + i) * nZ * nZ;
+    std::fill_n(all, nZ * nZ, 0.0);
+    for (std::ptrdiff_t c = 0; c < nz; ++c)
+      for (std::ptrdiff_t d = 0; d < nz; ++d) all[place(c) * nZ + place(d)] = H[c * nz + d];
   }
-  double* const all = q.hessians + i * nZ * nZ;
-  std::fill_n(all, nZ * nZ, 0.0);
-  for (std::ptrdiff_t c = 0; c < nz; ++c)
-    for (std::ptrdiff_t d = 0; d < nz; ++d) all[place(c) * nZ + place(d)] = H[c * nz + d];
 }
 
 void SensorModel::observe(const Nodes& request) const noexcept {

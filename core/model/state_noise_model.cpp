@@ -17,12 +17,13 @@ namespace rhec {
 namespace {
 
 constexpr std::size_t room = 4096;  ///< doubles on the stack
+constexpr int noisy_at_once = 8;    ///< intervals, as many as a model evaluates side by side
 
-/// The vehicle's derivatives of one interval.
+/// Those of the vehicle, with its derivatives.
 std::size_t dense_size(const Model& vehicle) {
   const auto nx = static_cast<std::size_t>(vehicle.state_count()), nu = static_cast<std::size_t>(vehicle.input_count()),
              np = static_cast<std::size_t>(vehicle.parameter_count()), nz = nx + nu + 2 * np;
-  return nz * nz;
+  return noisy_at_once * (nu + 2 * np + nz * nz);
 }
 
 /// Noise as a variable of the model, which stands for a state of the vehicle.
@@ -153,14 +154,16 @@ void StateNoiseModel::integrate_rows(const IntervalRows& request) const noexcept
 
 void StateNoiseModel::integrate(const Intervals& request) const noexcept {
   const auto all = [&](double* memory) {
-    for (std::ptrdiff_t i = 0; i < request.count; ++i) integrate_one(request, i, memory);
+    for (std::ptrdiff_t first = 0; first < request.count; first += noisy_at_once)
+      integrate_some(request, first, std::min<std::ptrdiff_t>(noisy_at_once, request.count - first), memory);
   };
   if (reserve_) return reserve_->lend(all);
   std::array<double, room> memory;
   all(memory.data());
 }
 
-void StateNoiseModel::integrate_one(const Intervals& request, std::ptrdiff_t i, double* memory) const noexcept {
+void StateNoiseModel::integrate_some(const Intervals& request, std::ptrdiff_t first, std::ptrdiff_t count,
+                                     double* memory) const noexcept {
   const std::ptrdiff_t nx = state_count(), nu = vehicle_->input_count(), np = vehicle_->parameter_count(),
                        ni = std::ssize(states_), nw = std::ssize(blocked_);
   const bool ramp = request.parameters_end != nullptr;
@@ -169,31 +172,43 @@ void StateNoiseModel::integrate_one(const Intervals& request, std::ptrdiff_t i, 
                       .parameters = nx + nu + ni + np,
                       .ends = nx + nu + ni + 2 * np + nw,
                       .share = ramp ? 0.5 : 1.0};
-  const double root = std::sqrt(request.durations[i]), part = noise.share * root;
-  const double *const inputs = request.inputs + i * (nu + ni), *const parameters = request.parameters + i * (np + nw),
-                      *const ends = ramp ? request.parameters_end + i * (np + nw) : nullptr;
-  Model::Intervals one{.count = 1,
-                       .states = request.states + i * nx,
-                       .inputs = inputs,
-                       .parameters = parameters,
-                       .parameters_end = ends,
-                       .durations = request.durations + i,
-                       .data = request.data ? request.data + i * data_count() : nullptr,
-                       .substeps = request.substeps,
-                       .next_states = request.next_states ? request.next_states + i * nx : nullptr};
-  if (request.jacobians) one.jacobians = memory;
-  vehicle_->integrate(one);
+  // Rows without noise.
+  double* next = memory;
+  const auto without_noise = [&](const double* rows, std::ptrdiff_t size, std::ptrdiff_t noises) {
+    rows += first * (size + noises);
+    if (noises == 0) return rows;
+    double* const to = std::exchange(next, next + count * size);
+    for (std::ptrdiff_t i = 0; i < count; ++i) std::copy_n(rows + i * (size + noises), size, to + i * size);
+    return static_cast<const double*>(to);
+  };
+  Model::Intervals some{.count = static_cast<int>(count),
+                        .states = request.states + first * nx,
+                        .inputs = without_noise(request.inputs, nu, ni),
+                        .parameters = without_noise(request.parameters, np, nw),
+                        .parameters_end = ramp ? without_noise(request.parameters_end, np, nw) : nullptr,
+                        .durations = request.durations + first,
+                        .data = request.data ? request.data + first * data_count() : nullptr,
+                        .substeps = request.substeps,
+                        .next_states = request.next_states ? request.next_states + first * nx : nullptr};
+  double* const dense = next;
+  if (request.jacobians) some.jacobians = dense;
+  vehicle_->integrate(some);
   // Where a column of the vehicle's [x; u; p; p_end] is in [x; u; xi; p; w; p_end; w_end].
   const auto place = [&](std::ptrdiff_t c) { return c < nx + nu ? c : c < nx + nu + np ? c + ni : c + ni + nw; };
-  if (one.next_states) {
-    for (std::ptrdiff_t k = 0; k < ni; ++k) one.next_states[states_[k]] += root * inputs[nu + k];
-    for (std::ptrdiff_t k = 0; k < nw; ++k)
-      one.next_states[blocked_[k]] += part * (parameters[np + k] + (ramp ? ends[np + k] : 0.0));
-  }
-  if (request.jacobians) {
-    double* const J = request.jacobians + i * nx * wide;
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    const double root = std::sqrt(some.durations[i]), part = noise.share * root;
+    if (some.next_states) {
+      const double *const xi = request.inputs + (first + i) * (nu + ni) + nu,
+                          *const w = request.parameters + (first + i) * (np + nw) + np,
+                          *const w_end = ramp ? request.parameters_end + (first + i) * (np + nw) + np : nullptr;
+      double* const x = some.next_states + i * nx;
+      for (std::ptrdiff_t k = 0; k < ni; ++k) x[states_[k]] += root * xi[k];
+      for (std::ptrdiff_t k = 0; k < nw; ++k) x[blocked_[k]] += part * (w[k] + (ramp ? w_end[k] : 0.0));
+    }
+    if (!request.jacobians) continue;
+    double* const J = request.jacobians + (first + i) * nx * wide;
     std::fill_n(J, nx * wide, 0.0);
-    for (std::ptrdiff_t c = 0; c < narrow; ++c) std::copy_n(memory + c * nx, nx, J + place(c) * nx);
+    for (std::ptrdiff_t c = 0; c < narrow; ++c) std::copy_n(dense + (i * narrow + c) * nx, nx, J + place(c) * nx);
     for (std::ptrdiff_t k = 0; k < ni; ++k) J[(noise.inputs + k) * nx + states_[k]] = root;
     for (std::ptrdiff_t k = 0; k < nw; ++k) {
       J[(noise.parameters + k) * nx + blocked_[k]] = part;
@@ -201,14 +216,16 @@ void StateNoiseModel::integrate_one(const Intervals& request, std::ptrdiff_t i, 
     }
   }
   if (!request.hessians) return;
-  one.next_states = one.jacobians = nullptr;
-  one.multipliers = request.multipliers + i * nx;
-  one.hessians = memory;
-  vehicle_->integrate(one);
-  double* const H = request.hessians + i * wide * wide;
-  std::fill_n(H, wide * wide, 0.0);
-  for (std::ptrdiff_t c = 0; c < narrow; ++c)
-    for (std::ptrdiff_t r = 0; r < narrow; ++r) H[place(c) * wide + place(r)] = memory[c * narrow + r];
+  some.next_states = some.jacobians = nullptr;
+  some.multipliers = request.multipliers + first * nx;
+  some.hessians = dense;
+  vehicle_->integrate(some);
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    double* const H = request.hessians + (first + i) * wide * wide;
+    std::fill_n(H, wide * wide, 0.0);
+    for (std::ptrdiff_t c = 0; c < narrow; ++c)
+      for (std::ptrdiff_t r = 0; r < narrow; ++r) H[place(c) * wide + place(r)] = dense[(i * narrow + c) * narrow + r];
+  }
 }
 
 }  // namespace rhec

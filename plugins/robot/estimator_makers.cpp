@@ -110,7 +110,7 @@ KalmanFilter::Noise EstimatorParts::filter_noise() const {
           .input_variances = variances_of(context->noise.input_sigmas),
           .parameter_lower = lower_bounds_of(context->about.parameters),
           .parameter_upper = upper_bounds_of(context->about.parameters),
-          .motion_outputs = look_ahead_outputs(*context->model)};
+          .motion_outputs = sensed_motion(*context->model)};
 }
 
 BankEstimation::Setup EstimatorParts::filters() const {
@@ -121,7 +121,7 @@ BankEstimation::Setup EstimatorParts::filters() const {
   setup.bank.substeps = substeps;
   setup.bank.memory = bank.memory;
   setup.bank.robust = robust;
-  setup.bank.motion_outputs = look_ahead_outputs(*context->model);
+  setup.bank.motion_outputs = sensed_motion(*context->model);
   setup.bank.adapts_noise = context->noise.adapt;
   setup.bank.initial_parameters = initial_parameters;
   setup.parameter_lower = lower_bounds_of(context->about.parameters);

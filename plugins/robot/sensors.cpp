@@ -79,17 +79,11 @@ std::vector<double> initial_sensor_sigmas(const RobotContext& vehicle, const Rob
   return sigmas;
 }
 
-bool senses_motion(const Model& model) noexcept {
-  const SensorModel* const sensors = sensors_in(model);
-  return sensors && sensors->motion().count() > 0;
-}
+bool senses_motion(const Model& model) noexcept { return !sensed_motion(model).empty(); }
 
-std::vector<int> look_ahead_outputs(const Model& model) {
+std::vector<int> sensed_motion(const Model& model) {
   const SensorModel* const sensors = sensors_in(model);
-  if (!sensors) return {};
-  std::vector<int> outputs = sensors->motion().which();
-  std::erase_if(outputs, [&](int j) { return std::ranges::binary_search(sensors->errors().scaled, j); });
-  return outputs;
+  return sensors ? sensors->motion().which() : std::vector<int>{};
 }
 
 }  // namespace rhec

@@ -78,4 +78,50 @@ inline void expect_derivatives_of_differences(const Model& model, const RandomIn
   }
 }
 
+/// Expects several intervals in one request to have the results that each has in one of its own.
+inline void expect_the_same_side_by_side(const Model& model, int count, bool ramp) {
+  RandomInterval all(model, 100);
+  std::vector<double> durations{all.duration};
+  for (int i = 1; i < count; ++i) {
+    const RandomInterval next(model, 100 + i);
+    for (auto [to, from] : {std::pair{&all.x, &next.x},
+                            {&all.u, &next.u},
+                            {&all.p, &next.p},
+                            {&all.p_end, &next.p_end},
+                            {&all.multipliers, &next.multipliers}})
+      to->insert(to->end(), from->begin(), from->end());
+    durations.push_back(next.duration + 0.01 * i);
+  }
+  const std::size_t nx = model.state_count(), nz = nx + model.input_count() + (ramp ? 2 : 1) * model.parameter_count();
+  struct Results {
+    std::vector<double> next, jacobian, hessian;
+  };
+  const auto integrate = [&](Model::Intervals request, int first, int number) {
+    const std::size_t rows = number;
+    Results results{std::vector<double>(rows * nx), std::vector<double>(rows * nx * nz),
+                    std::vector<double>(rows * nz * nz)};
+    request.count = number;
+    request.states += first * model.state_count();
+    request.inputs += first * model.input_count();
+    request.parameters += first * model.parameter_count();
+    if (ramp) request.parameters_end += first * model.parameter_count();
+    request.multipliers += first * model.state_count();
+    request.durations = durations.data() + first;
+    request.next_states = results.next.data();
+    request.jacobians = results.jacobian.data();
+    request.hessians = results.hessian.data();
+    model.integrate(request);
+    return results;
+  };
+  const Results together = integrate(all.request(ramp), 0, count);
+  for (int i = 0; i < count; ++i) {
+    const Results alone = integrate(all.request(ramp), i, 1);
+    for (std::size_t e = 0; e < nx; ++e) EXPECT_NEAR(together.next[i * nx + e], alone.next[e], 1e-13) << i;
+    for (std::size_t e = 0; e < nx * nz; ++e)
+      EXPECT_NEAR(together.jacobian[i * nx * nz + e], alone.jacobian[e], 1e-12) << i;
+    for (std::size_t e = 0; e < nz * nz; ++e)
+      EXPECT_NEAR(together.hessian[i * nz * nz + e], alone.hessian[e], 1e-11) << i;
+  }
+}
+
 }  // namespace rhec

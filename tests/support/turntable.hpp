@@ -21,8 +21,8 @@ struct Turntable {
   }
 };
 
-/// States: psi, and the gyro's value at the node.
-inline std::shared_ptr<const Model> turntable() {
+/// States: psi, the gyro's scale error if it has one, and its value at the node.
+inline std::shared_ptr<const Model> turntable(bool has_scale_error = false) {
   ModelDescription about;
   about.states.resize(1);
   about.inputs.resize(1);
@@ -33,8 +33,9 @@ inline std::shared_ptr<const Model> turntable() {
   about.parameters[0].name = "kappa";
   about.outputs[0].name = "angle";
   about.outputs[1].name = "gyro";
-  return std::make_shared<SensorModel>(std::make_shared<FormulaModel<Turntable>>(Turntable<double>{}, about),
-                                       SensorModel::Errors{});
+  return std::make_shared<SensorModel>(
+      std::make_shared<FormulaModel<Turntable>>(Turntable<double>{}, about),
+      SensorModel::Errors{.biased = {}, .scaled = has_scale_error ? std::vector{1} : std::vector<int>{}});
 }
 
 /// Standard deviations.

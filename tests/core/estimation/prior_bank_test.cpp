@@ -363,49 +363,63 @@ TEST(PriorBank, WeighsItsMembersByAnyNumberOfOutputs) {
   EXPECT_GT(bank.weights()[0], 0.9);
 }
 
-/// With outputs of motion, at nodes and between them, a member is linearised where the Kalman filter is.
+/// With outputs of motion, at nodes and between them, few or many, a member is linearised where the Kalman filter is,
+/// and has its second-order terms; with a scale error beside them too.
 TEST(PriorBank, IsTheKalmanFilterWithOutputsOfMotion) {
   constexpr double sigma = 0.05, nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr int most = 12;
   const TurntableNoise noise{.gyro = 0.01};
-  const auto model = turntable();
-  PriorBank::Setup setup;
-  setup.members = {{prior("walk", "{sigma: 0.05, along: time, course: ramp}")}};
-  setup.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro};
-  setup.input_variances = {noise.omega * noise.omega};
-  setup.most_between = 2;
-  setup.motion_outputs = {1};
-  PriorBank bank(model, setup);
-  const double infinity = std::numeric_limits<double>::infinity();
-  KalmanFilter filter(model, {setup.output_variances, setup.input_variances, {-infinity}, {infinity}, {1}}, 1, true);
-  const Eigen::Vector2d start(0.1, 0.0);
-  const Eigen::Matrix2d spread = Eigen::Vector2d(0.01, 1.0).asDiagonal();
-  bank.reset(start, spread);
-  Eigen::VectorXd mean;
-  Eigen::MatrixXd covariance;
-  bank.moments(mean, covariance);
-  filter.mean = mean;
-  filter.covariance = covariance;
-  EXPECT_TRUE(bank.looks_ahead());
-  for (int k = 1; k <= 60; ++k) {
-    const double duration = 0.2, omega = 0.3 * std::sin(0.1 * k) + 0.05 * std::cos(5.0 * k), zero = 0.0,
-                 ramp = sigma * sigma * duration;
-    const double outputs[] = {0.3 * k * duration,
-                              k % 5 == 0 ? nan : 0.2 * std::sin(0.1 * k) + 0.01 * std::sin(9.0 * k)};
-    const double times[] = {0.05, 0.15}, between[] = {nan, 0.2 * std::sin(0.1 * k - 0.05), 0.3 * k * duration, nan};
-    const MeasuredInterval interval{
-        .duration = duration, .inputs = &omega, .between = k % 3 == 0 ? 2 : 0, .times = times, .outputs = between};
-    bank.predict(interval, outputs);
-    filter.predict(interval, &zero, &ramp, nullptr, outputs);
-    if (k % 7 == 0) {  // what was expected of an end goes with it
-      const double nothing[] = {nan, nan};
-      bank.predict(interval, nothing);
-      filter.predict(interval, &zero, &ramp, nullptr, nothing);
-    }
-    bank.update(outputs);
-    filter.update(outputs, nullptr);
+  for (const bool has_scale_error : {false, true}) {
+    const auto model = turntable(has_scale_error);
+    const int nx = model->state_count();
+    PriorBank::Setup setup;
+    setup.members = {{prior("walk", "{sigma: 0.05, along: time, course: ramp}")}};
+    setup.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro};
+    setup.input_variances = {noise.omega * noise.omega};
+    setup.most_between = most;
+    setup.motion_outputs = {1};
+    PriorBank bank(model, setup);
+    const double infinity = std::numeric_limits<double>::infinity();
+    KalmanFilter filter(model, {setup.output_variances, setup.input_variances, {-infinity}, {infinity}, {1}}, 1, most);
+    Eigen::VectorXd start = Eigen::VectorXd::Zero(nx);
+    start[0] = 0.1;
+    Eigen::MatrixXd spread = Eigen::MatrixXd::Identity(nx, nx) * 0.01;
+    spread(nx - 1, nx - 1) = 1.0;
+    bank.reset(start, spread);
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd covariance;
     bank.moments(mean, covariance);
-    ASSERT_LT(largest(mean - filter.mean), 1e-9) << k;
-    ASSERT_LT(largest(covariance - filter.covariance), 1e-9 * (1.0 + largest(covariance))) << k;
+    filter.mean = mean;
+    filter.covariance = covariance;
+    EXPECT_TRUE(bank.looks_ahead());
+    for (int k = 1; k <= 60; ++k) {
+      const double duration = 0.2, omega = 0.3 * std::sin(0.1 * k) + 0.05 * std::cos(5.0 * k), zero = 0.0,
+                   ramp = sigma * sigma * duration;
+      const double outputs[] = {0.3 * k * duration,
+                                k % 5 == 0 ? nan : 0.2 * std::sin(0.1 * k) + 0.01 * std::sin(9.0 * k)};
+      const int readings = k % 3 == 0 ? 2 : k % 3 == 1 ? most : 0;
+      double times[most], between[2 * most];
+      for (int i = 0; i < readings; ++i) {
+        times[i] = duration * (i + 0.3) / readings;
+        between[2 * i] = i == 1 ? 0.3 * k * duration : nan;
+        between[2 * i + 1] =
+            readings == 2 && i == 1 ? nan : 0.2 * std::sin(0.1 * k - 0.05) + 0.01 * std::sin(7.0 * i + k);
+      }
+      const MeasuredInterval interval{
+          .duration = duration, .inputs = &omega, .between = readings, .times = times, .outputs = between};
+      bank.predict(interval, outputs);
+      filter.predict(interval, &zero, &ramp, nullptr, outputs);
+      if (k % 7 == 0) {  // what was expected of an end goes with it
+        const double nothing[] = {nan, nan};
+        bank.predict(interval, nothing);
+        filter.predict(interval, &zero, &ramp, nullptr, nothing);
+      }
+      bank.update(outputs);
+      filter.update(outputs, nullptr);
+      bank.moments(mean, covariance);
+      ASSERT_LT(largest(mean - filter.mean), 1e-9) << k;
+      ASSERT_LT(largest(covariance - filter.covariance), 1e-9 * (1.0 + largest(covariance))) << k;
+    }
   }
 }
 

@@ -101,6 +101,11 @@ TEST(SensorModel, DerivativesAreThoseOfItsValues) {
   }
 }
 
+TEST(SensorModel, EvaluatesAnyNumberOfIntervals) {
+  for (const bool ramp : {false, true})
+    for (const int count : {1, 7, 8, 19}) expect_the_same_side_by_side(bicycle(), count, ramp);
+}
+
 TEST(SensorModel, RefusesSensorsThatAreNotThere) {
   const auto plain = vehicle("bicycle_slip", "[x_gps, delta]");
   EXPECT_NE(error_of([&] { SensorModel(plain, {.biased = {2}, .scaled = {}}); }).find("indices of 0 .. 1"),

@@ -87,6 +87,12 @@ TEST(StateNoiseModel, DerivativesAreThoseOfItsValues) {
   }
 }
 
+TEST(StateNoiseModel, EvaluatesAnyNumberOfIntervals) {
+  for (const auto& [ramp, states, blocked] : cases())
+    for (const int count : {1, 7, 8, 19})
+      expect_the_same_side_by_side(StateNoiseModel(vehicle("bicycle_slip"), states, blocked), count, ramp);
+}
+
 TEST(StateNoiseModel, RowsHoldTheSameNumbers) {
   for (const auto& [ramp, states, blocked] : cases()) {
     const StateNoiseModel noisy(vehicle("bicycle_slip"), states, blocked);

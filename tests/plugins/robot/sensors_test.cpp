@@ -42,14 +42,14 @@ TEST(SensorErrors, AreStatesOfEstimatorsAlone) {
   }
 }
 
-TEST(SensorErrors, OfScaleKeepAnOutputFromDecidingWhereAnIntervalIsLinearised) {
-  const auto ahead = [](const char* noise) {
+TEST(SensorErrors, LeaveTheOutputsOfMotionWhatTheyAre) {
+  const auto sensed = [](const char* noise) {
     const Robot robot = robot_with(noise, "[x_gps, y_gps, delta, yaw_rate, ground_speed]");
-    return look_ahead_outputs(robot.make_estimator()->model());
+    return sensed_motion(robot.make_estimator()->model());
   };
-  EXPECT_EQ(ahead("{}"), (std::vector{3, 4}));
-  EXPECT_EQ(ahead("{biases: {yaw_rate: {sigma: 0.02}}}"), (std::vector{3, 4}));
-  EXPECT_EQ(ahead("{scales: {yaw_rate: {sigma: 0.1}}}"), std::vector{4});
+  EXPECT_EQ(sensed("{}"), (std::vector{3, 4}));
+  EXPECT_EQ(sensed("{biases: {yaw_rate: {sigma: 0.02}}}"), (std::vector{3, 4}));
+  EXPECT_EQ(sensed("{scales: {yaw_rate: {sigma: 0.1}}}"), (std::vector{3, 4}));
 }
 
 TEST(SensorErrors, ChangeNothingWhereThereAreNone) {

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "rhec/core/base/aligned.hpp"
+#include "rhec/core/estimation/curvature.hpp"
+#include "rhec/core/estimation/reading_summary.hpp"
 #include "rhec/core/horizon/measured_interval.hpp"
 #include "rhec/core/model/model.hpp"
 
@@ -24,8 +27,8 @@ class RHEC_EXPORT KalmanFilter {
     /// Those outputs of motion, ascending, by which an interval is linearised, see `predict`.
     std::vector<int> motion_outputs = {};
   };
-  /// `uses_between`: whether there can be measurements between two nodes.
-  KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, bool uses_between = false);
+  /// `most_between`: measurements that there can be between two nodes.
+  KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, int most_between = 0);
 
   Eigen::VectorXd mean;        ///< n_x + n_p
   Eigen::MatrixXd covariance;  ///< symmetric positive semidefinite
@@ -41,13 +44,27 @@ class RHEC_EXPORT KalmanFilter {
   /// The same, and each measurement between the two nodes is used at its own time. The noise of an input, and the
   /// change of a parameter, is one value over the interval. `robust_weights`: one row for each of them, or null.
   ///
+  /// Outputs of motion that are read often are summarised (ReadingSummary), unless there are robust weights.
+  ///
   /// `end_outputs` (n_y, NaN where missing, or null) are those of the interval's end, for `update` to use afterwards.
   /// An output of motion is a product of slip and of an input that is measured as well: about the measured input, the
-  /// noise of the input counts as knowledge of slip. So the interval is linearised where its outputs of motion put it
-  /// (iterated Kalman filter: Bell and Cathey 1993; docs/method.md, section 5), unless there are others between the
-  /// nodes.
+  /// noise of the input counts as knowledge of slip. So an interval with outputs of motion is linearised, with all that
+  /// is measured on it, where its measurements and the outputs of motion at its end put it (iterated Kalman filter:
+  /// Bell and Cathey 1993). What is left of a product is not known better than its factors are: their second-order
+  /// terms have means and covariances (Curvature; docs/method.md, section 5).
   void predict(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
                const double* robust_weights = nullptr, const double* end_outputs = nullptr) noexcept;
+  /// Where `predict` would linearise an interval with outputs of motion, and its second-order terms. Mean and
+  /// covariance stay. Returns the interval with its measurements as they are used, until the next call.
+  MeasuredInterval look_ahead(const MeasuredInterval& interval, const double* input_guess, const double* ramp_variances,
+                              const double* robust_weights, const double* end_outputs) noexcept;
+  const ReadingSummary& summary() const noexcept { return summary_; }
+  /// [x; p; u; change of p], and then others.
+  const Eigen::VectorXd& point() const noexcept { return point_; }
+  /// Of `curved()` at the first measurement, then at the end.
+  const Curvature& curvature() const noexcept { return curvature_; }
+  /// The states that have second-order terms; none without outputs of motion.
+  const std::vector<int>& curved() const noexcept { return curved_; }
   /// Log-likelihood of the measurements between the nodes of the last interval, each given those before it.
   double between_log_likelihood() const noexcept { return between_log_likelihood_; }
   /// Measurement update with the knowledge that a parameter is 0 up to this variance.
@@ -57,23 +74,30 @@ class RHEC_EXPORT KalmanFilter {
   /// Restarts a parameter: it keeps its mean and gets this variance, without correlation to anything else.
   void restart_parameter(int parameter, double variance) noexcept;
 
-  /// The noise of a measured input from now on.
+  /// The noise of a measured input, or of an output, from now on.
   void set_input_variance(int input, double variance) noexcept { noise_.input_variances[input] = variance; }
+  void set_output_variance(int output, double variance) noexcept { noise_.output_variances[output] = variance; }
 
   const Model& model() const noexcept { return *model_; }
   const Noise& noise() const noexcept { return noise_; }
 
  private:
   void differentiate(double duration) noexcept;
-  void widen(const double* ramp_variances) noexcept;
-  void integrate_wide(const Eigen::VectorXd& wide, double seconds, double share) noexcept;
+  void widen(const double* measured_input, const double* input_guess, const double* ramp_variances) noexcept;
   double expect_wide(int output, double measured) noexcept;
-  void linearise_wide(double seconds, const double* y) noexcept;
-  bool move_point(const double* y) noexcept;
-  void take_between(double seconds, double share, const double* y, const double* robust_weights) noexcept;
+  void find_curvature(const MeasuredInterval& interval, int step) noexcept;
+  void write_hessians(const MeasuredInterval& interval) noexcept;
+  void copy_point(int row, double seconds, double share) noexcept;
+  static double from_first(const MeasuredInterval& interval, double seconds) noexcept;
+  void linearise_times(const MeasuredInterval& interval, int count, const double* seconds) noexcept;
+  void use_time(const MeasuredInterval& interval, int which) noexcept;
+  void find_next_point(const double* y) noexcept;
+  void take_between(const MeasuredInterval& interval, int which, const double* weights) noexcept;
   void take_wide(double innovation, double variance) noexcept;
   void narrow() noexcept;
   double input_variance(int input, const double* measured) const noexcept;
+  void take_outputs(const double* y, const double* robust_weights) noexcept;
+  void linearise_outputs() noexcept;
   void take_output(int output, double measured, double variance) noexcept;
   void make_symmetric() noexcept;
   void clip() noexcept;
@@ -81,16 +105,30 @@ class RHEC_EXPORT KalmanFilter {
   std::shared_ptr<const Model> model_;
   Noise noise_;
   int substeps_, nx_, nu_, np_, ny_;
+  std::vector<int> curved_outputs_;  ///< of motion
+  Curvature output_curvature_;       ///< of these, by the state
+  std::vector<double> added_;        ///< n_y: variances of second-order terms
+  Eigen::MatrixXd before_;           ///< an update: the covariance
   std::vector<double> predicted_, output_jacobian_, next_, jacobian_, input_;
   AlignedDoubles row_, next_row_, jacobian_rows_, scratch_;  ///< for Model::integrate_rows
   Eigen::MatrixXd work_, next_covariance_;
   Eigen::VectorXd gain_, image_, zeros_, correction_;
-  /// Within an interval: [x; p; u; change of p], the gradient of an output, and the transition to [x; p] at its end.
+  /// Within an interval: [x; p; u; change of p; f], the gradient of an output, and the transition to [x; p] at its end.
+  /// f are the factors of the second-order terms (Curvature) of `curved_` states at the first measurement, then of
+  /// those at the end.
   Eigen::VectorXd wide_mean_, wide_gradient_, wide_gain_, wide_image_, wide_end_;
   Eigen::MatrixXd wide_covariance_, transition_, wide_work_;
+  std::vector<int> curved_;
+  bool is_curved_ = false;  ///< whether the interval has second-order terms
+  Curvature curvature_;
+  std::vector<std::uint8_t> is_missing_;  ///< per input
+  ReadingSummary summary_;                ///< of outputs of motion
+  /// Rows of the model, one for each time, and what it answers.
+  std::vector<double> times_, states_, inputs_, parameters_, ends_, durations_, next_states_, jacobians_, outputs_,
+      output_jacobians_, multipliers_, hessians_;
   /// Where an interval is linearised; images and gradients of the outputs of motion, and their innovations.
-  Eigen::VectorXd point_, next_point_, motion_innovations_;
-  Eigen::MatrixXd motion_images_, motion_gradients_, motion_covariance_;
+  Eigen::VectorXd point_, next_point_, start_mean_, motion_innovations_;
+  Eigen::MatrixXd start_covariance_, posterior_, motion_images_, motion_gradients_, motion_covariance_;
   double between_log_likelihood_ = 0.0;
 };
 

@@ -68,8 +68,8 @@ class RHEC_EXPORT PriorBank {
   /// Moments of one member: [x; p].
   void moments_of(int member, Eigen::VectorXd& mean, Eigen::MatrixXd& covariance) const noexcept;
   /// Index in [x; z] of the first state of a parameter's process, and the number of states that any of its priors has.
-  int first_state(int parameter) const noexcept { return processes_[parameter].first; }
-  int process_states(int parameter) const noexcept { return processes_[parameter].count; }
+  int first_state(int parameter) const noexcept;
+  int process_states(int parameter) const noexcept;
   int state_count() const noexcept { return n_; }
 
   /// All that changes: moments, weights, and noise learnt. `state_size` doubles.
@@ -113,16 +113,8 @@ class RHEC_EXPORT PriorBank {
   double distance() const noexcept { return distance_; }
 
  private:
-  struct Process {
-    int first = 0, count = 0;  ///< entries of [x; z]: all states that any of its priors has
-    /// Per kind of state: its place among them, or -1, and the variance with which a member that lacks it is filled up.
-    std::array<int, process_state_kinds> place{};
-    std::array<double, process_state_kinds> filler{};
-    std::vector<const Prior*> kinds;  ///< the different priors of this parameter
-    std::vector<int> kind_of;         ///< per member
-    AlignedDoubles F, Q, ramp;        ///< lanes
-    AlignedDoubles offset;            ///< lanes; of the value, where a map is followed
-  };
+  struct Process;    ///< of a parameter
+  struct LookAhead;  ///< what outputs of motion ask for
   void find_places(Process& process) const;
   void write_start(int parameter, const Prior& prior, int lane) noexcept;
   struct Views;  ///< what the kernels are given
@@ -135,12 +127,24 @@ class RHEC_EXPORT PriorBank {
   void observe_members(const double* states) noexcept;
   void widen() noexcept;
   bool is_of_motion(int output) const noexcept;
-  void write_wide_gradient(int output, double share) noexcept;
-  void linearise_wide(double seconds, const double* y) noexcept;
+  void write_wide_gradient(int output, double share, double from_first, double* gradient) const noexcept;
+  MeasuredInterval look_ahead(const MeasuredInterval& measured, const double* end_outputs) noexcept;
+  const double* reading_weights(int which) const noexcept;
+  void weigh_readings(int which) noexcept;
+  void linearise_about_point(const MeasuredInterval& interval, const double* end_outputs) noexcept;
+  void linearise_outputs(int which, const double* y, double share, double from_first) noexcept;
+  void expect_outputs(int which, const double* y, const double* mean) noexcept;
+  bool move_point(const MeasuredInterval& interval, const double* end_outputs) noexcept;
+  void add_curvature(double from_first) noexcept;
+  double curvature_factor(int state, int factor, double from_first) const noexcept;
   void take_step_from_point() noexcept;
-  void take_between(double seconds, double share, const double* y) noexcept;
+  void linearise_nodes() noexcept;
+  void linearise_given(const double* y) noexcept;
+  void take_between(const MeasuredInterval& interval, int which, bool about_point) noexcept;
   void narrow() noexcept;
-  int wide_count() const noexcept { return 2 * n_ - nx_ + nu_; }
+  /// Entries of the wide vector without the factors of second-order terms, and with them.
+  int plain_count() const noexcept { return 2 * n_ - nx_ + nu_; }
+  int wide_count() const noexcept;
   void find_distance(const double* input, double duration) noexcept;
   void advance_processes(double duration) noexcept;
   void mix_members() noexcept;
@@ -169,10 +173,16 @@ class RHEC_EXPORT PriorBank {
   AlignedDoubles learnt_;
   AlignedDoubles mean_, covariance_, work_, weights_, log_likelihoods_, keep_, take_, next_, jacobian_, predicted_,
       gradient_, squares_, innovation_variances_, output_variances_, surprises_;
-  /// Within an interval: [x; z; u; q], with the noise q of the processes (docs/method.md, section 8), and the
-  /// transition to [x; z] at its end.
-  AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, wide_gradient_, transition_;
-  AlignedDoubles point_, next_point_, moved_;  ///< where the interval is linearised, and how far that would move on
+  /// Within an interval: [x; z; u; q; f], with the noise q of the processes (docs/method.md, section 8), and the
+  /// transition to [x; z] at its end. f are the factors of second-order terms, as of a KalmanFilter: they are those of
+  /// the mixture, common to all members, so that they do not tell for or against one of them.
+  AlignedDoubles wide_mean_, wide_before_, wide_covariance_, wide_work_, transition_;
+  /// Per measurement between the nodes, and for the end: outputs as expected at `point_`, and their gradients.
+  AlignedDoubles wide_predicted_, wide_gradient_;
+  AlignedDoubles point_;              ///< where the interval is linearised
+  std::unique_ptr<LookAhead> ahead_;  ///< null without outputs of motion
+  bool is_curved_ = false;            ///< whether the interval has second-order terms
+  std::vector<double> added_;         ///< n_y: variances of second-order terms
   // Rows of the model: one per member.
   std::vector<double> states_, inputs_, parameters_, ends_, durations_, next_rows_, jacobian_rows_, output_rows_,
       gradient_rows_;

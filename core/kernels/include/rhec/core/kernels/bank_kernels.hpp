@@ -52,9 +52,9 @@ struct BankKernels {
   void (*narrow)(const BankView& bank, const BankView& wide, const double* transition, const double* next_mean);
   /// What [x; z] is given outputs linearised about `point` (n entries): a step from there, to the mean and the
   /// covariance of the view, which stay. `outputs` predict at `point`. An innovation counts as no more than `gate`,
-  /// squared and in variances. `moved` (1 entry): the largest squared change of an entry, in its variances. A member
-  /// whose result is not finite goes to its mean. At most n outputs.
-  void (*move_point)(const BankView& bank, const BankOutput* outputs, int count, double gate, double* point,
+  /// squared and in variances. `moved` (1 entry): the largest squared change of the first `judged` entries, in their
+  /// variances. A member whose result is not finite goes to its mean. `work` has count (n + count + 1) entries or more.
+  void (*move_point)(const BankView& bank, const BankOutput* outputs, int count, int judged, double gate, double* point,
                      double* moved);
   /// r^2 / S of each output on its own (count entries), before any update.
   void (*surprise)(const BankView& bank, const BankOutput* outputs, int count, double* squares);

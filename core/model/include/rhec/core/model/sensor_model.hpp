@@ -56,7 +56,8 @@ class RHEC_EXPORT SensorModel final : public Model {
  private:
   template <class Use>
   void with_memory(Use use) const noexcept;
-  void integrate_one(const Intervals& request, std::ptrdiff_t i, double* memory) const noexcept;
+  void integrate_some(const Intervals& request, std::ptrdiff_t first, std::ptrdiff_t count,
+                      double* memory) const noexcept;
   void observe_one(const Nodes& request, std::ptrdiff_t i, double* memory) const noexcept;
 
   std::shared_ptr<const Model> vehicle_;

@@ -47,7 +47,8 @@ class RHEC_EXPORT StateNoiseModel final : public Model {
   bool has_second_derivatives() const noexcept override { return vehicle_->has_second_derivatives(); }
 
  private:
-  void integrate_one(const Intervals& request, std::ptrdiff_t i, double* memory) const noexcept;
+  void integrate_some(const Intervals& request, std::ptrdiff_t first, std::ptrdiff_t count,
+                      double* memory) const noexcept;
   bool is_in_place(bool ramp) const noexcept { return !ramp && blocked_.empty(); }
 
   std::shared_ptr<const Model> vehicle_;

@@ -22,8 +22,7 @@ RHEC_EXPORT std::vector<double> initial_sensor_sigmas(const RobotContext& vehicl
 
 /// Whether a model of `with_sensors`, with or without process noise, has outputs of motion.
 RHEC_EXPORT bool senses_motion(const Model& model) noexcept;
-/// Those outputs of motion, ascending, by which a filter linearises an interval: not those with a scale error, since
-/// the most probable product of slip and input is not its mean, which the scale would make up for (docs/sensors.md).
-RHEC_EXPORT std::vector<int> look_ahead_outputs(const Model& model);
+/// The outputs of motion of such a model, ascending, by which a filter linearises an interval (KalmanFilter::predict).
+RHEC_EXPORT std::vector<int> sensed_motion(const Model& model);
 
 }  // namespace rhec
