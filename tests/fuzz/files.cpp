@@ -8,6 +8,8 @@
 #include <string>
 
 #include "fuzz/targets.hpp"
+#include "plugins/host/elf_file.hpp"
+#include "rhec/core/control/path.hpp"
 #include "rhec/logs/files/open_log.hpp"
 #include "rhec/logs/mapping/drive.hpp"
 #include "rhec/logs/mapping/proposal.hpp"
@@ -15,11 +17,13 @@
 #include "rhec/logs/rosbag2/rosbag2.hpp"
 #include "rhec/logs/signals/survey.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
 #include "rhec/sim/report/report.hpp"
 #include "rhec/sim/store/slip_map_file.hpp"
 #include "rhec/sim/store/sweep_runs.hpp"
+#include "rhec/sim/world/paths.hpp"
 
 namespace rhec::fuzz {
 namespace {
@@ -95,6 +99,34 @@ void db3(std::string_view input) {
   static const Folder folder("db3");
   const fs::path file = folder.write("x.db3", input);
   answered([&] { static_cast<void>(logs::survey(*logs::open_db3(file))); });
+}
+
+void bag(std::string_view input) {
+  const Folder folder("bag");
+  const std::vector<Part> parts = parts_of(input);
+  constexpr std::array names{"metadata.yaml", "0.db3", "1.mcap", "0.db3.zstd", "1.mcap.zstd"};
+  for (const Part& part : parts)
+    if (std::find(names.begin(), names.end(), part.name) != names.end()) folder.write(part.name, part.content);
+  answered([&] { static_cast<void>(logs::survey(*logs::open_log(folder.path()))); });
+  for (const char* compressed : {"0.db3.zstd", "1.mcap.zstd"})
+    answered([&] { static_cast<void>(logs::survey(*logs::open_log(folder.path() / compressed))); });
+}
+
+void waypoints(std::string_view input) {
+  static const Folder folder("waypoints");
+  const fs::path file = folder.write("path.csv", input);
+  answered([&] {
+    const Path path(sim::load_waypoints(file), {.acceleration = 1.0, .lateral_acceleration = 2.0});
+    for (const double part : {-1.0, 0.0, 0.3, 1.0, 2.0}) {
+      const PathPoint point = path.point_at(part * path.length());
+      static_cast<void>(path.closest(point.x, point.y + 1.0, 0.0, path.length()));
+    }
+  });
+}
+
+void library(std::string_view input) {
+  static const Folder folder("library");
+  static_cast<void>(why_not_loadable(folder.write("x.so", input), kManifestSymbol, sizeof(ManifestHead)));
 }
 
 void signals(std::string_view input) {
