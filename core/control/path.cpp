@@ -49,6 +49,9 @@ Path::Path(const std::vector<Waypoint>& waypoints, const Limits& limits) {
       const double step = std::hypot(dx, dy);
       if (step < smallest_segment) continue;
       arc_length = arc_lengths_.back() + step;
+      if (!std::isfinite(arc_length))
+        throw Error(
+            fmt::format("path: the way to waypoint {} has no finite length; expected coordinates in metres", i + 1));
       direction_x_.push_back(dx / step);
       direction_y_.push_back(dy / step);
       directions_.push_back(given_speeds_.back() + waypoint.speed < 0.0 ? -1.0 : 1.0);

@@ -62,6 +62,10 @@ TEST(Path, RefusesWhatIsNoPath) {
   EXPECT_NE(error_of([&] { Path({{0, 0, {}}, {nan, 0, {}}}); }).find("waypoint 2"), std::string::npos);
   EXPECT_NE(error_of([&] { Path({{0, infinity, {}}, {1, 0, {}}}); }).find("waypoint 1"), std::string::npos);
   EXPECT_NE(error_of([&] { Path({{0, 0, {}}, {1, 0, nan}}); }).find("waypoint 2"), std::string::npos);
+  EXPECT_NE(error_of([&] {
+              Path({{0, 0, 1.0}, {1, 0, 1.0}, {1.7e308, 1e308, 1.0}});
+            }).find("waypoint 3"),
+            std::string::npos);
 }
 
 TEST(Path, ClosestPointIsWhatAFineSearchFinds) {
