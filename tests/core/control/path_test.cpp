@@ -135,6 +135,16 @@ TEST(Path, ClosestPointIsTheBestOfAllSegments) {
   }
 }
 
+TEST(Path, ThePointThatIsClosestToNoPlaceIsOneOfThePath) {
+  constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+  const Path path({{0, 0, 2}, {3, 0, 2}, {3, 4, 2}});
+  for (const auto& [x, y] :
+       {std::pair{nothing, 0.0}, {0.0, nothing}, {infinity, 0.0}, {-infinity, infinity}, {1e308, 1e308}}) {
+    const double found = path.closest(x, y, 1.0, 6.0).arc_length;
+    EXPECT_TRUE(found >= 1.0 && found <= 6.0) << x << ", " << y << ": " << found;
+  }
+}
+
 TEST(Path, APointIsTheSameFromWhateverSegmentItIsSearched) {
   std::vector<double> arc_lengths;
   const Path path = winding_path(1, &arc_lengths);
