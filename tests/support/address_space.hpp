@@ -25,7 +25,7 @@ class AddressSpace {
     std::size_t pages = 0;
     std::ifstream("/proc/self/statm") >> pages;
     struct rlimit less = before_;
-    less.rlim_cur = std::min<rlim_t>(before_.rlim_max, pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) + more);
+    less.rlim_cur = std::min<rlim_t>(before_.rlim_max, pages * static_cast<std::size_t>(getpagesize()) + more);
     setrlimit(RLIMIT_AS, &less);
   }
   ~AddressSpace() { setrlimit(RLIMIT_AS, &before_); }
