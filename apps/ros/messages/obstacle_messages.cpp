@@ -55,9 +55,9 @@ struct Rectangle {
 /// The corners of the convex hull, anticlockwise (Andrew's monotone chain).
 std::vector<Position> hull_of(std::span<const Position> outline) {
   std::vector<Position> corners(outline.begin(), outline.end());
-  const auto place = [](const Position& corner) { return std::pair(corner.x, corner.y); };
-  std::ranges::sort(corners, {}, place);
-  corners.erase(std::ranges::unique(corners, {}, place).begin(), corners.end());
+  std::ranges::sort(corners, {}, [](const Position& corner) { return std::pair(corner.x, corner.y); });
+  const auto is_same = [](const Position& a, const Position& b) { return a.x == b.x && a.y == b.y; };
+  corners.erase(std::unique(corners.begin(), corners.end(), is_same), corners.end());
   if (corners.size() < 3) return corners;
   std::vector<Position> hull;
   const auto add = [&hull](const Position& corner, std::size_t kept) {
