@@ -5,6 +5,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -143,6 +144,9 @@ int run_and_tell(int count, char** words) {
       fmt::print(stderr, "rhec: error: {}\n", rhec::apps::why_not_written(failure.code().message()));
     else
       fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr,
+               "rhec: error: there is not enough memory; expected shorter horizons and logs, or a machine with more\n");
   } catch (const std::exception& failure) {
     fmt::print(stderr, "rhec: error: failed unexpectedly: {}\n", failure.what());
   }

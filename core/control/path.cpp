@@ -49,6 +49,9 @@ Path::Path(const std::vector<Waypoint>& waypoints, const Limits& limits) {
       const double step = std::hypot(dx, dy);
       if (step < smallest_segment) continue;
       arc_length = arc_lengths_.back() + step;
+      if (!std::isfinite(arc_length))
+        throw Error(
+            fmt::format("path: the way to waypoint {} has no finite length; expected coordinates in metres", i + 1));
       direction_x_.push_back(dx / step);
       direction_y_.push_back(dy / step);
       directions_.push_back(given_speeds_.back() + waypoint.speed < 0.0 ? -1.0 : 1.0);
@@ -240,7 +243,7 @@ PathProjection Path::closest(double x, double y, double from, double to) const n
   // Upper bound on the smallest distance: that of a point about as far along as the position is away, which is close to
   // the best one unless the path winds.
   double at_most = std::sqrt(nearest_on(first).square);
-  const double ahead = std::min(at_most * (last + 1) / length(), static_cast<double>(last - first));
+  const double ahead = std::min(static_cast<double>(last - first), at_most * (last + 1) / length());  // also if NaN
   if (const int guess = first + static_cast<int>(ahead); arc_lengths_[guess] <= to)
     at_most = std::min(at_most, std::sqrt(nearest_on(guess).square));
 

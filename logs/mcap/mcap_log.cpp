@@ -201,11 +201,11 @@ class McapLog final : public MessageLog {
       if (is_cut && opcode != Opcode::chunk)
         return state.damage_or(
             damage(place, fmt::format("found a record of {} bytes with {} left", length, input.left())));
+      const auto there = std::min<std::uint64_t>(length, static_cast<std::uint64_t>(input.left()));
       if (!is_used(opcode) || (opcode == Opcode::chunk && passes_over(place, state))) {
-        input.seek(input.place() + static_cast<std::int64_t>(length));
+        input.seek(input.place() + static_cast<std::int64_t>(there));
         continue;
       }
-      const auto there = std::min<std::uint64_t>(length, static_cast<std::uint64_t>(input.left()));
       if (there > longest_record)
         return state.damage_or(
             damage(place, fmt::format("found a record of {} bytes, expected {} at most", length, longest_record)));

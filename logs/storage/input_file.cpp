@@ -16,6 +16,10 @@ constexpr std::size_t buffer_size = std::size_t{1} << 18;
 }  // namespace
 
 InputFile::InputFile(const std::filesystem::path& file) : path_(file), buffer_(buffer_size) {
+  const std::filesystem::file_status status = std::filesystem::status(file);
+  if (std::filesystem::exists(status) && !std::filesystem::is_directory(status) &&
+      !std::filesystem::is_regular_file(status))  // opening a pipe would wait for a writer
+    throw Error(fmt::format("{}: is a device or a pipe, which has no end to look for; expected a file", file.string()));
   stream_.rdbuf()->pubsetbuf(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
   errno = 0;
   stream_.open(file, std::ios::binary);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <system_error>
 #include <thread>
 
 #include "examiner_process.hpp"
@@ -41,7 +42,13 @@ void for_each_at_once(std::size_t count, const Work& work) {
     for (std::size_t i = next++; i < count; i = next++) work(i);
   };
   std::vector<std::jthread> threads;
-  for (std::size_t i = 1; i < std::min(count, most_threads); ++i) threads.emplace_back(run);
+  for (std::size_t i = 1; i < std::min(count, most_threads); ++i) {
+    try {
+      threads.emplace_back(run);
+    } catch (const std::system_error&) {  // there are limits of threads; this one does the work, too
+      break;
+    }
+  }
   run();
 }
 

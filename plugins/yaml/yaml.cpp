@@ -1,11 +1,14 @@
 #include "rhec/plugins/yaml/yaml.hpp"
 
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <optional>
+#include <sstream>
 #include <string_view>
 
 namespace rhec {
@@ -120,10 +123,40 @@ std::string remedy_for(const std::string& text, const YAML::Exception& problem) 
   return {};
 }
 
+/// Refuses a text of which yaml-cpp makes documents without end: what can begin nothing, such as a comma, it leaves
+/// where it is, and takes it for an empty document again and again.
+class ProgressCheck final : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    if (last_ && last_->pos == mark.pos)
+      throw YAML::ParserException(mark, "what stands here can begin nothing; expected a key and ':'");
+    last_ = mark;
+  }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+ private:
+  std::optional<YAML::Mark> last_;
+};
+
+std::vector<YAML::Node> documents_of(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  ProgressCheck check;
+  while (parser.HandleNextDocument(check)) continue;
+  return YAML::LoadAll(text);
+}
+
 Settings parse(const std::string& text, const Source& source) {
   std::vector<YAML::Node> documents;
   try {
-    documents = YAML::LoadAll(text);
+    documents = documents_of(text);
   } catch (const YAML::Exception& problem) {
     throw source.error(problem.mark, fmt::format("not valid YAML{}: {}{}", source.column_of(problem.mark), problem.msg,
                                                  remedy_for(text, problem)));

@@ -40,6 +40,7 @@ void require_map(SqliteDatabase& database) {
     refuse(file, fmt::format("is a map of version {}; expected version {}: use the rhec that wrote it, or drive anew",
                              found, version));
   database.require_whole();
+  database.require_tables({"about", "parameters", "cells", "slip"});
 }
 
 }  // namespace

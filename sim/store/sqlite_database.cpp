@@ -12,6 +12,8 @@
 namespace rhec::sim {
 namespace {
 
+constexpr int longest_value = 1 << 25;
+
 /// The error and what to do about it.
 std::string_view explained(int code) {
   switch (code & 0xff) {
@@ -46,6 +48,9 @@ SqliteDatabase::SqliteDatabase(std::filesystem::path file, Access access) : file
   database_.reset(opened);  // set even after an error, since it holds the error message
   require(code);
   sqlite3_extended_result_codes(opened, 1);
+  // A file is data: nothing in it is to be run, and nothing in it is as long as SQLite allows.
+  sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, longest_value);
   if (access == Access::write && sqlite3_db_readonly(opened, "main") == 1) require(SQLITE_READONLY);
 }
 
@@ -62,6 +67,16 @@ void SqliteDatabase::require(int code) const {
 void SqliteDatabase::require_whole() {
   const auto pages = static_cast<std::uintmax_t>(number("PRAGMA page_count") * number("PRAGMA page_size"));
   if (std::filesystem::file_size(file_) < pages) require(SQLITE_CORRUPT);
+}
+
+void SqliteDatabase::require_tables(std::initializer_list<std::string_view> names) {
+  SqliteStatement find = prepare("SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?1");
+  for (const std::string_view name : names) {
+    find.bind(1, name);
+    if (!find.step())
+      throw Error(fmt::format("{}: has no table '{}'; take a copy of it that is whole", file_.string(), name));
+    find.reset();
+  }
 }
 
 void SqliteDatabase::execute(const std::string& statements) {

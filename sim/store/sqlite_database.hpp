@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,6 +38,8 @@ class SqliteDatabase {
   void require(int code) const;
   /// Throws Error if the file is shorter than its pages: SQLite itself does not notice a truncated last page.
   void require_whole();
+  /// Throws Error if one of these is no table: a view may have rows without end.
+  void require_tables(std::initializer_list<std::string_view> names);
 
  private:
   struct Close {

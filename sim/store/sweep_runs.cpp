@@ -83,6 +83,7 @@ void require_sweep(SqliteDatabase& database) {
                     "made it, or make the sweep again with 'rhec sweep'",
                     database.file().string(), version, SweepStore::version));
   database.require_whole();
+  database.require_tables({"runs"});
 }
 
 }  // namespace

@@ -64,12 +64,6 @@ void require_independent(const std::string& key, const std::vector<std::string>&
   }
 }
 
-std::vector<std::string> keys_of(const auto& axes) {
-  std::vector<std::string> keys;
-  for (const auto& axis : axes) keys.insert(keys.end(), axis.keys.begin(), axis.keys.end());
-  return keys;
-}
-
 std::string text_of(const Settings& value) {
   return value.kind() == Settings::Kind::scalar ? value.text() : canonical_text(value);
 }
@@ -191,7 +185,8 @@ Sweep::Axis Sweep::read_zip(const Settings& from) const {
 }
 
 void Sweep::add_axis(Block& block, Axis axis, const Settings& at) const {
-  for (const std::string& key : axis.keys) require_independent(key, keys_of(block.axes), at);
+  for (const std::string& key : axis.keys)
+    for (const Axis& other : block.axes) require_independent(key, other.keys, at);
   if (static_cast<double>(block.count) * static_cast<double>(axis.count) > most_runs)
     throw at.error(fmt::format("with this key the grid has more than {:g} runs; make it smaller", most_runs));
   block.count *= axis.count;

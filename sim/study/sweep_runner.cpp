@@ -1,8 +1,11 @@
 #include "rhec/sim/study/sweep_runner.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <new>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "rhec/core/base/error.hpp"
@@ -64,7 +67,14 @@ SweepWorkers::~SweepWorkers() = default;
 
 ThreadWorkers::ThreadWorkers(const Host& host, const Sweep& sweep, int threads) : host_(host), sweep_(sweep) {
   threads_.reserve(static_cast<std::size_t>(std::max(1, threads)));
-  for (int t = 0; t < std::max(1, threads); ++t) threads_.emplace_back([this] { work(); });
+  for (int t = 0; t < std::max(1, threads); ++t) {
+    try {
+      threads_.emplace_back([this] { work(); });
+    } catch (const std::system_error& refused) {  // there are limits of threads, and of the memory of their stacks
+      if (threads_.empty()) throw Error(fmt::format("sweep: no thread can be started: {}", refused.what()));
+      break;
+    }
+  }
 }
 
 ThreadWorkers::~ThreadWorkers() {

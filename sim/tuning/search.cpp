@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <system_error>
 #include <thread>
 
 #include "rhec/core/base/error.hpp"
@@ -104,7 +105,13 @@ void in_parallel(int count, int threads, const std::function<void(int)>& work) {
     }
   };
   std::vector<std::thread> others;
-  for (int t = 1; t < std::min(threads, count); ++t) others.emplace_back(run);
+  for (int t = 1; t < std::min(threads, count); ++t) {
+    try {
+      others.emplace_back(run);
+    } catch (const std::system_error&) {  // there are limits of threads; those that have started do the work
+      break;
+    }
+  }
   run();
   for (std::thread& other : others) other.join();
   if (failure) std::rethrow_exception(failure);

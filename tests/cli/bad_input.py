@@ -7,6 +7,7 @@ import json
 import math
 import pathlib
 import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -277,6 +278,15 @@ class Test(cli.Findings):
         self.refused("overlap of an input", self.run("controller.blocking={u1: {name: structured, overlap: 20}}"), ERROR,
                      "controller.blocking.u1", "controller.horizon")
 
+    def memory(self):
+        """A horizon that there is no memory for; a program with sanitizers needs more address space than any limit."""
+        if re.search(r"preset +(asan|tsan)", self.rhec("--version").stdout):
+            return
+        most = 600 << 20
+        result = self.rhec("run", FIGURE8, "--out", self.out, "--set", "estimator.horizon=100000",
+                           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)))
+        self.refused("no memory", result, ERROR, "not enough memory", "shorter horizons")
+
     def files(self):
         scenario = self.work / "scenario.yaml"
         for text, line, message in IN_THE_FILE:
@@ -416,7 +426,7 @@ class Test(cli.Findings):
 def main():
     with tempfile.TemporaryDirectory(prefix="rhec-cli-") as work:
         test = Test(Program(sys.argv[1]), pathlib.Path(work).resolve())
-        for part in (test.settings, test.files, test.plugins, test.outputs, test.problems, test.usage, test.first_steps, test.wrong_commands, test.lost):
+        for part in (test.settings, test.memory, test.files, test.plugins, test.outputs, test.problems, test.usage, test.first_steps, test.wrong_commands, test.lost):
             part()
         test.tell()
 

@@ -6,8 +6,11 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "fuzz/targets.hpp"
+#include "plugins/host/elf_file.hpp"
+#include "rhec/core/control/path.hpp"
 #include "rhec/logs/files/open_log.hpp"
 #include "rhec/logs/mapping/drive.hpp"
 #include "rhec/logs/mapping/proposal.hpp"
@@ -15,11 +18,13 @@
 #include "rhec/logs/rosbag2/rosbag2.hpp"
 #include "rhec/logs/signals/survey.hpp"
 #include "rhec/plugins/host/host.hpp"
+#include "rhec/plugins/kit/manifest.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/logs/recorded_log.hpp"
 #include "rhec/sim/report/report.hpp"
 #include "rhec/sim/store/slip_map_file.hpp"
 #include "rhec/sim/store/sweep_runs.hpp"
+#include "rhec/sim/world/paths.hpp"
 
 namespace rhec::fuzz {
 namespace {
@@ -48,6 +53,17 @@ class Folder {
  private:
   fs::path path_;
 };
+
+/// All of a log, then a part of its topics, and none: what is not asked for is passed over.
+void read_log(const logs::Log& log) {
+  static_cast<void>(logs::survey(log));
+  std::vector<bool> wanted(log.topics().size());
+  for (std::size_t i = 1; i < wanted.size(); i += 2) wanted[i] = true;
+  for (const bool more : {true, false}) {
+    if (!more) wanted.assign(wanted.size(), false);
+    answered([&] { static_cast<void>(log.read(wanted, [](const logs::Record&) { return true; })); });
+  }
+}
 
 }  // namespace
 
@@ -88,13 +104,41 @@ void slip_map(std::string_view input) {
 void mcap(std::string_view input) {
   static const Folder folder("mcap");
   const fs::path file = folder.write("x.mcap", input);
-  answered([&] { static_cast<void>(logs::survey(*logs::open_mcap(file))); });
+  answered([&] { read_log(*logs::open_mcap(file)); });
 }
 
 void db3(std::string_view input) {
   static const Folder folder("db3");
   const fs::path file = folder.write("x.db3", input);
-  answered([&] { static_cast<void>(logs::survey(*logs::open_db3(file))); });
+  answered([&] { read_log(*logs::open_db3(file)); });
+}
+
+void bag(std::string_view input) {
+  const Folder folder("bag");
+  const std::vector<Part> parts = parts_of(input);
+  constexpr std::array names{"metadata.yaml", "0.db3", "1.mcap", "0.db3.zstd", "1.mcap.zstd"};
+  for (const Part& part : parts)
+    if (std::find(names.begin(), names.end(), part.name) != names.end()) folder.write(part.name, part.content);
+  answered([&] { read_log(*logs::open_log(folder.path())); });
+  for (const char* compressed : {"0.db3.zstd", "1.mcap.zstd"})
+    answered([&] { read_log(*logs::open_log(folder.path() / compressed)); });
+}
+
+void waypoints(std::string_view input) {
+  static const Folder folder("waypoints");
+  const fs::path file = folder.write("path.csv", input);
+  answered([&] {
+    const Path path(sim::load_waypoints(file), {.acceleration = 1.0, .lateral_acceleration = 2.0});
+    for (const double part : {-1.0, 0.0, 0.3, 1.0, 2.0}) {
+      const PathPoint point = path.point_at(part * path.length());
+      static_cast<void>(path.closest(point.x, point.y + 1.0, 0.0, path.length()));
+    }
+  });
+}
+
+void library(std::string_view input) {
+  static const Folder folder("library");
+  static_cast<void>(why_not_loadable(folder.write("x.so", input), kManifestSymbol, sizeof(ManifestHead)));
 }
 
 void signals(std::string_view input) {

@@ -16,10 +16,16 @@ void configuration(std::string_view input);
 void scenario(std::string_view input);
 /// A vehicle's equations in YAML.
 void vehicle(std::string_view input);
+/// A term's equations in YAML, with its options.
+void term(std::string_view input);
+/// A sweep in YAML, and its first and last runs.
+void sweep(std::string_view input);
 /// Problems as lines of JSON, and the problems that they describe.
 void problems(std::string_view input);
 /// A table of numbers.
 void csv(std::string_view input);
+/// A table of waypoints, and the path through them.
+void waypoints(std::string_view input);
 /// A recorded drive: dead reckoning and fixes, two tables.
 void log(std::string_view input);
 /// The folder of a run, an estimation or a comparison: steps.csv, summary.json, horizons.jsonl and others.
@@ -28,11 +34,17 @@ void results(std::string_view input);
 void sweep_store(std::string_view input);
 /// A map of slip.
 void slip_map(std::string_view input);
+/// A file that may be a plugin: what is looked at before it is loaded.
+void library(std::string_view input);
+/// What is kept of the examination of a plugin.
+void verdict(std::string_view input);
 
 /// A log in MCAP: its records, and the fields of its messages.
 void mcap(std::string_view input);
 /// A bag of rosbag2 in SQLite.
 void db3(std::string_view input);
+/// A bag of rosbag2 in a folder: parts that are metadata.yaml and its files, some of which are compressed.
+void bag(std::string_view input);
 /// A log in a table, and a section `signals`, two parts: what they are to a vehicle.
 void signals(std::string_view input);
 /// Definitions of messages, in both languages.
@@ -63,14 +75,20 @@ inline const std::vector<Target>& targets() {
   static const std::vector<Target> all{{"configuration", configuration},
                                        {"scenario", scenario},
                                        {"vehicle", vehicle},
+                                       {"term", term},
+                                       {"sweep", sweep},
                                        {"problems", problems},
                                        {"csv", csv},
+                                       {"waypoints", waypoints},
                                        {"log", log},
                                        {"results", results},
                                        {"sweep_store", sweep_store},
                                        {"slip_map", slip_map},
+                                       {"library", library},
+                                       {"verdict", verdict},
                                        {"mcap", mcap},
                                        {"db3", db3},
+                                       {"bag", bag},
                                        {"signals", signals},
                                        {"message_definitions", message_definitions},
                                        {"cdr", cdr},

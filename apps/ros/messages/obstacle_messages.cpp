@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "rhec/logs/cdr/cdr_cursor.hpp"
 #include "rhec/logs/signals/log.hpp"
@@ -49,20 +52,63 @@ struct Rectangle {
   double half_across() const { return 0.5 * (across_most - across_least); }
 };
 
+/// The corners of the convex hull, anticlockwise (Andrew's monotone chain).
+std::vector<Position> hull_of(std::span<const Position> outline) {
+  std::vector<Position> corners(outline.begin(), outline.end());
+  std::ranges::sort(corners, {}, [](const Position& corner) { return std::pair(corner.x, corner.y); });
+  const auto is_same = [](const Position& a, const Position& b) { return a.x == b.x && a.y == b.y; };
+  corners.erase(std::unique(corners.begin(), corners.end(), is_same), corners.end());
+  if (corners.size() < 3) return corners;
+  std::vector<Position> hull;
+  const auto add = [&hull](const Position& corner, std::size_t kept) {
+    const auto turns_left = [&] {
+      const Position &a = hull[hull.size() - 2], &b = hull.back();
+      return (b.x - a.x) * (corner.y - a.y) > (b.y - a.y) * (corner.x - a.x);
+    };
+    while (hull.size() >= kept + 2 && !turns_left()) hull.pop_back();
+    hull.push_back(corner);
+  };
+  for (const Position& corner : corners) add(corner, 0);
+  const std::size_t lower = hull.size() - 1;
+  for (auto corner = corners.rbegin() + 1; corner != corners.rend(); ++corner) add(*corner, lower);
+  hull.pop_back();  // the first one again
+  return hull;
+}
+
+/// The smallest rectangle around an outline with a belt around it, whose area between two edges' directions is a
+/// product of concave functions: one side lies on an edge of the hull. The corners that the other sides touch only move
+/// on from edge to edge (Toussaint's rotating calipers), since a message may have a million corners.
+Rectangle smallest_around(std::span<const Position> outline, double radius) {
+  const std::vector<Position> hull = hull_of(outline);
+  const std::size_t count = hull.size();
+  const auto corner = [&](std::size_t k) -> const Position& { return hull[k % count]; };
+  const auto area = [radius](const Rectangle& r) { return (r.half_along() + radius) * (r.half_across() + radius); };
+  Rectangle best(1.0, 0.0, outline);
+  std::size_t ahead = 0, beside = 0, behind = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double dx = corner(i + 1).x - corner(i).x, dy = corner(i + 1).y - corner(i).y, length = std::hypot(dx, dy);
+    if (!(length > 0.0)) continue;
+    const double cosine = dx / length, sine = dy / length;
+    const auto along = [&](std::size_t k) {
+      return cosine * (corner(k + 1).x - corner(k).x) + sine * (corner(k + 1).y - corner(k).y);
+    };
+    const auto across = [&](std::size_t k) {
+      return cosine * (corner(k + 1).y - corner(k).y) - sine * (corner(k + 1).x - corner(k).x);
+    };
+    const std::size_t end = i + count;  // once around, also where rounding sees no end
+    for (ahead = std::max(ahead, i + 1); ahead < end && along(ahead) > 0.0;) ++ahead;
+    for (beside = std::max(beside, ahead); beside < end && across(beside) > 0.0;) ++beside;
+    for (behind = std::max(behind, beside); behind < end && along(behind) < 0.0;) ++behind;
+    const Rectangle touched(cosine, sine, std::array{corner(i), corner(ahead), corner(beside), corner(behind)});
+    if (area(touched) < area(best)) best = touched;
+  }
+  return {best.cosine, best.sine, outline};
+}
+
 }  // namespace
 
-/// One of its sides lies on a line through two corners that follow one another: on an edge, where the outline is
-/// convex.
 Obstacle ellipse_around(std::span<const Position> outline, double radius) {
-  Rectangle best(1.0, 0.0, outline);
-  const auto area = [radius](const Rectangle& r) { return (r.half_along() + radius) * (r.half_across() + radius); };
-  for (std::size_t i = 0; i < outline.size(); ++i) {
-    const Position &from = outline[i], &to = outline[(i + 1) % outline.size()];
-    const double dx = to.x - from.x, dy = to.y - from.y, length = std::hypot(dx, dy);
-    if (!(length > 0.0)) continue;
-    const Rectangle rectangle(dx / length, dy / length, outline);
-    if (area(rectangle) < area(best)) best = rectangle;
-  }
+  const Rectangle best = smallest_around(outline, radius);
   const double along = 0.5 * (best.along_least + best.along_most),
                across = 0.5 * (best.across_least + best.across_most);
   const bool is_point = best.half_along() == 0.0 && best.half_across() == 0.0;

@@ -62,6 +62,10 @@ TEST(Path, RefusesWhatIsNoPath) {
   EXPECT_NE(error_of([&] { Path({{0, 0, {}}, {nan, 0, {}}}); }).find("waypoint 2"), std::string::npos);
   EXPECT_NE(error_of([&] { Path({{0, infinity, {}}, {1, 0, {}}}); }).find("waypoint 1"), std::string::npos);
   EXPECT_NE(error_of([&] { Path({{0, 0, {}}, {1, 0, nan}}); }).find("waypoint 2"), std::string::npos);
+  EXPECT_NE(error_of([&] {
+              Path({{0, 0, 1.0}, {1, 0, 1.0}, {1.7e308, 1e308, 1.0}});
+            }).find("waypoint 3"),
+            std::string::npos);
 }
 
 TEST(Path, ClosestPointIsWhatAFineSearchFinds) {
@@ -128,6 +132,16 @@ TEST(Path, ClosestPointIsTheBestOfAllSegments) {
       nearest = std::min(nearest, std::abs(path.closest(x, y, begin, to).lateral));
       ASSERT_NEAR(std::abs(path.closest(x, y, from, to).lateral), nearest, 1e-12) << "seed " << seed << ", " << trial;
     }
+  }
+}
+
+TEST(Path, ThePointThatIsClosestToNoPlaceIsOneOfThePath) {
+  constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+  const Path path({{0, 0, 2}, {3, 0, 2}, {3, 4, 2}});
+  for (const auto& [x, y] :
+       {std::pair{nothing, 0.0}, {0.0, nothing}, {infinity, 0.0}, {-infinity, infinity}, {1e308, 1e308}}) {
+    const double found = path.closest(x, y, 1.0, 6.0).arc_length;
+    EXPECT_TRUE(found >= 1.0 && found <= 6.0) << x << ", " << y << ": " << found;
   }
 }
 

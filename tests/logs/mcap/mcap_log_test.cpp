@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <cstring>
+
 #include "logs/support/files.hpp"
 #include "logs/support/rows.hpp"
 #include "logs/support/small_mcap.hpp"
@@ -76,6 +79,24 @@ TEST_F(McapLogTest, ALengthThatIsALieTakesNoMemory) {
   content.replace(8 + 1, 8, huge);  // of the first record
   EXPECT_THAT(open_mcap(write("y.mcap", content))->read({true, true, true}, [](const Record&) { return true; })->what,
               HasSubstr("byte 8: found a record of"));
+}
+
+// A length that leads back to the chunk itself, in which nothing is asked for.
+TEST_F(McapLogTest, ALengthThatLeadsBackIsGoneThroughOnce) {
+  std::string content = small(100);
+  std::size_t chunk = 8;
+  const auto length_at = [&](std::size_t place) {
+    std::uint64_t length = 0;
+    std::memcpy(&length, content.data() + place + 1, sizeof(length));
+    return length;
+  };
+  while (content.at(chunk) != '\x06') chunk += 9 + length_at(chunk);
+  const std::uint64_t back = std::uint64_t{0} - 9;
+  std::memcpy(content.data() + chunk + 1, &back, sizeof(back));
+  const auto log = open_mcap(write("y.mcap", content));
+  const auto damage = log->read(std::vector<bool>(log->topics().size(), false), [](const Record&) { return true; });
+  ASSERT_TRUE(damage);
+  EXPECT_THAT(damage->what, HasSubstr("found the end"));
 }
 
 TEST_F(McapLogTest, RefusesWhatIsNoMcap) {

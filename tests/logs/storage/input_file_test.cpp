@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "logs/support/files.hpp"
 #include "support/error_of.hpp"
@@ -28,6 +29,15 @@ TEST_F(InputFileTest, ReadsFromAnyPlaceAndNotBeyondTheEnd) {
 TEST_F(InputFileTest, SaysWhyAFileCannotBeRead) {
   EXPECT_THAT(error_of([&] { InputFile file(path("gone")); }), testing::HasSubstr("No such file"));
   EXPECT_THAT(error_of([&] { InputFile file(path("")); }), testing::HasSubstr("folder"));
+}
+
+// The metadata of a bag may name anything.
+TEST_F(InputFileTest, WaitsForNoPipeAndReadsNoDevice) {
+  const std::filesystem::path pipe = path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), S_IRUSR | S_IWUSR), 0);
+  for (const std::filesystem::path& file : {pipe, std::filesystem::path("/dev/zero")})
+    EXPECT_THAT(error_of([&] { InputFile input(file); }),
+                testing::HasSubstr(file.string() + ": is a device or a pipe"));
 }
 
 TEST_F(InputFileTest, NumbersAndTextsComeBack) {

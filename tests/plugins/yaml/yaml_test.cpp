@@ -88,6 +88,10 @@ TEST(Yaml, WhatIsNoPlainTreeIsRefused) {
   EXPECT_THAT(mistake("a: 1\nb: !include other.yaml\n"),
               HasSubstr("field.yaml:2: the tag '!include' means nothing here"));
   EXPECT_THAT(mistake("a: 1\n---\nb: 2\n"), HasSubstr("found 2 documents, expected one"));
+  EXPECT_THAT(mistake("a: 1\n...\nb: 2\n"), HasSubstr("found 2 documents, expected one"));
+  // Of these yaml-cpp makes documents until there is no memory left.
+  for (const char* text : {"\n,", "\n,{}- ", "\n, a", "--- \n,"})
+    EXPECT_THAT(mistake(text), HasSubstr("field.yaml:2: not valid YAML in column 1: what stands here")) << text;
   EXPECT_EQ(yaml("a: !!float 5\n").find("a")->as_number(), 5);
 }
 

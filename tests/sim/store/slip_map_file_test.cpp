@@ -102,6 +102,11 @@ TEST_F(SlipMapFileTest, RefusesAnotherVersionAndWhatIsDamaged) {
   execute("DELETE FROM about");
   EXPECT_THAT(reading(), HasSubstr("whose map"));
   write_slip_map(file(), content());
+  execute(
+      "DROP TABLE cells; CREATE VIEW cells AS WITH RECURSIVE n(cell) AS (SELECT 1 UNION ALL SELECT cell + 1 FROM n) "
+      "SELECT cell, 1.0 AS x, 1.0 AS y, 1.0 AS time, 1 AS visits, 1 AS observations FROM n");
+  EXPECT_THAT(reading(), HasSubstr("has no table 'cells'"));
+  write_slip_map(file(), content());
   fs::resize_file(file(), fs::file_size(file()) / 2);
   EXPECT_THAT(reading(), HasSubstr(file().string()));
 }

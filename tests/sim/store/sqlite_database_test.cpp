@@ -102,5 +102,21 @@ TEST_F(SqliteDatabaseTest, MissesAPartOfTheLastPage) {
               HasSubstr("is damaged or cut short"));
 }
 
+// A few bytes of a file may stand for more than there is memory.
+TEST_F(SqliteDatabaseTest, AViewIsNoTableAndAValueNotEndless) {
+  SqliteDatabase database(path());
+  database.execute(
+      "CREATE TABLE t (a); INSERT INTO t VALUES (1); ALTER TABLE t ADD COLUMN b AS (zeroblob(400000000));"
+      "CREATE VIEW v AS WITH RECURSIVE n(a) AS (SELECT 1 UNION ALL SELECT a + 1 FROM n) SELECT a FROM n");
+  database.require_tables({"t"});
+  EXPECT_THAT(error_of([&] {
+                database.require_tables({"t", "v"});
+              }),
+              AllOf(StartsWith(path().string() + ": "), HasSubstr("has no table 'v'")));
+  EXPECT_EQ(database.number("SELECT a FROM t"), 1);
+  SqliteStatement endless = database.prepare("SELECT b FROM t");
+  EXPECT_THAT(error_of([&] { endless.step(); }), HasSubstr("too big"));
+}
+
 }  // namespace sqlite_database_test
 }  // namespace rhec::sim

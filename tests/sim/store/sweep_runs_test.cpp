@@ -131,6 +131,8 @@ TEST_F(SweepRunsTest, RefusesWhatIsNoSweep) {
   std::filesystem::remove(path());
   write({});
   EXPECT_THAT(message(), HasSubstr("has no runs yet"));
+  SqliteDatabase(path()).execute("ALTER TABLE runs RENAME TO kept; CREATE VIEW runs AS SELECT * FROM kept");
+  EXPECT_THAT(message(), HasSubstr("has no table 'runs'"));
   SqliteDatabase(path()).execute("PRAGMA user_version = 7");
   EXPECT_THAT(message(), HasSubstr("has version 7 of the schema, and this program reads version 1"));
 }

@@ -12,6 +12,7 @@
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/loop/closed_loop.hpp"
+#include "support/address_space.hpp"
 
 namespace rhec::sim {
 namespace sweep_runner_test {
@@ -75,6 +76,20 @@ TEST_F(SweepRunnerTest, ThreadsMakeTheSameRows) {
   EXPECT_EQ(second.made, 12);
   EXPECT_FALSE(first.stopped);
   EXPECT_EQ(without_times(one.rows()), without_times(three.rows()));
+}
+
+TEST_F(SweepRunnerTest, GoesOnWithTheThreadsThatTheSystemStarts) {
+  const Sweep sweep = small_sweep();
+  host();
+  constexpr int wanted = 1000;
+  std::unique_ptr<ThreadWorkers> workers;
+  {
+    const AddressSpace limit(std::size_t{100} << 20);
+    workers = std::make_unique<ThreadWorkers>(host(), sweep, AddressSpace::is_limited ? wanted : 2);
+  }
+  EXPECT_LT(workers->room(), 2 * wanted);
+  SweepStore store(file());
+  EXPECT_EQ(run_sweep(sweep, store, *workers, {}).made, 12);
 }
 
 TEST_F(SweepRunnerTest, ARunIsThatOfTheScenario) {

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <limits>
+#include <thread>
 
+#include "support/address_space.hpp"
 #include "support/error_of.hpp"
 
 namespace rhec::sim {
@@ -84,6 +87,23 @@ TEST(Search, PassesErrorsOnAndRefusesWhatHasNoValue) {
               });
             }),
             "five");
+}
+
+TEST(Search, WorksWithTheThreadsThatTheSystemStarts) {
+  constexpr int count = 1000;
+  const std::thread::id caller = std::this_thread::get_id();
+  std::atomic<bool> has_begun = false;
+  std::atomic<int> done = 0;
+  const AddressSpace limit(std::size_t{64} << 20);
+  in_parallel(count, AddressSpace::is_limited ? count : 3, [&](int) {
+    if (std::this_thread::get_id() == caller) {
+      has_begun = true;  // with all threads that there will be
+      has_begun.notify_all();
+    }
+    has_begun.wait(false);
+    ++done;
+  });
+  EXPECT_EQ(done, count);
 }
 
 }  // namespace search_test

@@ -98,6 +98,48 @@ TEST(ObstacleMessages, EllipsesAreAsSlenderAsWhatTheyAreAround) {
   EXPECT_NEAR(wall.semi_axis_across, std::numbers::sqrt2 * 0.1, 1e-12);
 }
 
+TEST(ObstacleMessages, EllipsesAreAroundTheSmallestRectangle) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> coordinate(-3.0, 3.0), size(0.0, 0.5);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<Position> outline;
+    for (int corner = 0; corner <= 2 + trial % 9; ++corner) outline.push_back({coordinate(random), coordinate(random)});
+    if (trial % 3 == 0) outline.push_back(outline.front());
+    const double radius = size(random);
+    const Obstacle ellipse = ellipse_around(outline, radius);
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < 1800; ++i) {
+      const double c = std::cos(i * std::numbers::pi / 3600.0), s = std::sin(i * std::numbers::pi / 3600.0);
+      double lower[2] = {1e9, 1e9}, upper[2] = {-1e9, -1e9};
+      for (const Position& corner : outline) {
+        const double place[2] = {c * corner.x + s * corner.y, c * corner.y - s * corner.x};
+        for (int j = 0; j < 2; ++j) {
+          lower[j] = std::min(lower[j], place[j]);
+          upper[j] = std::max(upper[j], place[j]);
+        }
+      }
+      least = std::min(least, (0.5 * (upper[0] - lower[0]) + radius) * (0.5 * (upper[1] - lower[1]) + radius));
+    }
+    const double area = 0.5 * ellipse.semi_axis_along * ellipse.semi_axis_across;
+    EXPECT_LE(area, least * (1.0 + 1e-12)) << trial;
+    EXPECT_GE(area, least * 0.99) << trial;  // in steps of 0.05 degrees
+  }
+}
+
+// A message of 16 MB is taken. Pairs of its corners could not be looked at within hours.
+TEST(ObstacleMessages, OutlinesMayHaveAMillionCorners) {
+  constexpr int corners = 1'000'000;
+  ToldObstacle round{.outline = {}};
+  for (int i = 0; i < corners; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / corners;
+    round.outline.emplace_back(1e7 + 4e6 * std::cos(angle), 3e6 * std::sin(angle));
+  }
+  const Obstacle seen = read_obstacle_array(array_of({round}).bytes(), usual).obstacles.at(0);
+  EXPECT_NEAR(seen.x, 1e7, 2.0);
+  EXPECT_NEAR(std::max(seen.semi_axis_along, seen.semi_axis_across), std::numbers::sqrt2 * 4e6, 10.0);
+  EXPECT_NEAR(std::min(seen.semi_axis_along, seen.semi_axis_across), std::numbers::sqrt2 * 3e6, 10.0);
+}
+
 TEST(ObstacleMessages, LinesWithoutAWidthGetTheUsualOne) {
   for (const auto& end : {std::pair{4.0, 0.0}, std::pair{0.0, 4.0}, std::pair{-4.0, 0.0}, std::pair{2.0, 3.0}}) {
     const SeenObstacles seen = read_obstacle_array(array_of({{.outline = {{0.0, 0.0}, end}}}).bytes(), usual);

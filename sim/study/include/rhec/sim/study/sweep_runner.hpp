@@ -38,7 +38,7 @@ class RHEC_EXPORT SweepWorkers {
 /// Threads of this process. On destruction, running threads finish their run first.
 class RHEC_EXPORT ThreadWorkers final : public SweepWorkers {
  public:
-  /// `host` and `sweep` must outlive this object. At least one thread.
+  /// `host` and `sweep` must outlive this object. As many threads as the system starts; throws Error if it starts none.
   ThreadWorkers(const Host& host, const Sweep& sweep, int threads);
   ~ThreadWorkers() override;
   ThreadWorkers(const ThreadWorkers&) = delete;
