@@ -601,6 +601,22 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     if (has_limits_ && changes_ > 0) write(qp, active, step);
     return Outcome::not_convex;
   };
+  // Of the violated bounds that have sensitivities the one whose addition raises the dual objective most, about; if
+  // none has, the one that is violated most.
+  const auto choose = [this](int most_violated) {
+    int chosen = most_violated;
+    double largest = 0.0;
+    for (int k = 0; has_limits_ && k < batch_count_; ++k) {
+      for (int c = 0; c < batches_[k].count; ++c) {
+        const int place = batches_[k].of[c];
+        const double violation = violation_[place];
+        if (!(violation > 0.0) || number_[place] != k * batch_size + c) continue;
+        const double gain = violation * violation / -sensitivity(place, place);
+        if (gain > largest) largest = gain, chosen = place;
+      }
+    }
+    return chosen;
+  };
   const int most_refinements = has_limits_ ? max_refinements_with_limits : max_refinements;
   for (int refinements = 0; refinements < most_refinements; ++refinements) {
     if (!is_convex_) return give_up_not_convex();
@@ -631,7 +647,7 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
       if (!refactor(qp, riccati)) return give_up_not_convex();
     }
     for (; !needs_factor && violations.worst != none; violations = find_violations())
-      if (const Outcome outcome = add(qp, riccati, violations.worst, deadline); outcome != Outcome::solved)
+      if (const Outcome outcome = add(qp, riccati, choose(violations.worst), deadline); outcome != Outcome::solved)
         return outcome == Outcome::not_convex ? give_up_not_convex() : outcome;
     if (needs_factor || changes_ > changes_before) {
       refinements = 0;
