@@ -1,9 +1,11 @@
 // Takes a number of steps over a recorded drive, for callgrind to count their instructions, in `counted_step` only.
 // scripts/measure/instructions runs it.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <string>
+#include <vector>
 
 #include "rhec/core/base/error.hpp"
 #include "rti_loop.hpp"
@@ -20,13 +22,16 @@ void counted_step(rhec::bench::RtiLoop& loop) { loop.step(); }
 namespace rhec::bench {
 namespace {
 
-void count(const std::string& name, int steps) {
+/// `assignments` are those of another drive, as after --set. Steps: none are those of the whole drive.
+void count(const std::string& name, int steps, const std::vector<std::string>& assignments) {
   const Host host;
-  for (const Drive& how : usual_drives()) {
+  for (Drive how : usual_drives()) {
     if (!name.starts_with(how.name + "/")) continue;
+    how.assignments.insert(how.assignments.end(), assignments.begin(), assignments.end());
     for (const Sequence& sequence : drive(host, how)) {
       if (sequence.name != name) continue;
       RtiLoop loop(sequence, host.make_solver("gn_rti"));
+      if (steps == 0) steps = static_cast<int>(sequence.samples.size()) - uncounted_steps;
       if (steps < 1 || uncounted_steps + steps > static_cast<int>(sequence.samples.size()))
         throw Error("the sequence '" + name + "' has " + std::to_string(sequence.samples.size()) +
                     " samples, of which " + std::to_string(uncounted_steps) + " are not counted");
@@ -44,11 +49,14 @@ void count(const std::string& name, int steps) {
 }  // namespace rhec::bench
 
 int main(int argument_count, char** words) try {
-  if (argument_count != 2 && argument_count != 3) {
-    std::fprintf(stderr, "usage: count_instructions SEQUENCE [STEPS], such as figure8/fhb/rhe 100\n");
+  if (argument_count < 2) {
+    std::fprintf(stderr,
+                 "usage: count_instructions SEQUENCE [STEPS [KEY=VALUE ...]], such as figure8/fhb/rhe 100, or "
+                 "obstacles/limits/rhc 0 seed=2 (0 steps: all)\n");
     return 2;
   }
-  rhec::bench::count(words[1], argument_count > 2 ? std::atoi(words[2]) : counted_steps);
+  rhec::bench::count(words[1], argument_count > 2 ? std::atoi(words[2]) : counted_steps,
+                     {words + std::min(argument_count, 3), words + argument_count});
   return 0;
 } catch (const std::exception& mistake) {
   std::fprintf(stderr, "%s\n", mistake.what());

@@ -292,6 +292,31 @@ int find_columns(const LimitView& view, int used, short* columns) {
   return count;
 }
 
+/// For limits that depend on a known number of states alone, `columns`, and on no control.
+template <int known_columns>
+void limit_sensitivities_of(const LimitView& view, const short* columns, const double* steps, double* values) {
+  constexpr int size = 8;
+  const long stride = view.stride;
+  int at[known_columns];
+  for (int k = 0; k < known_columns; ++k) at[k] = columns[k];
+  for (int i = 0; i <= view.intervals; ++i, steps += stride * size) {
+    const double* G = view.G + i * view.limits * stride;
+    double* const end = values + static_cast<long>(view.row) * size;
+    double* const used_end = values + static_cast<long>(view.counts[i]) * size;
+    for (int first = 0; first < size; first += lane_count) {
+      Lanes of_column[known_columns];
+      for (int k = 0; k < known_columns; ++k) of_column[k] = load(steps + at[k] * size + first);
+      const double* row = G;
+      for (double* to = values; to < used_end; to += size, row += stride) {
+        Lanes sum{};
+        for (int k = 0; k < known_columns; ++k) sum += of_column[k] * row[at[k]];
+        store(sum, to + first);
+      }
+    }
+    for (values = used_end; values < end; values += lane_count) store(Lanes{}, values);
+  }
+}
+
 void limit_sensitivities(const LimitView& view, const int* control_counts, int states, const std::int8_t* held,
                          const double* steps, double* values) {
   constexpr int size = 8, max_columns = 128;  // twice the most states or controls of a stage
@@ -302,6 +327,11 @@ void limit_sensitivities(const LimitView& view, const int* control_counts, int s
   const int column_count = find_columns(view, most, columns);
   int state_columns = 0;
   while (state_columns < column_count && columns[state_columns] < states) ++state_columns;
+  // Most limits are those of a place: of two states, or of three with a heading.
+  if (state_columns == column_count && column_count == 2)
+    return limit_sensitivities_of<2>(view, columns, steps, values);
+  if (state_columns == column_count && column_count == 3)
+    return limit_sensitivities_of<3>(view, columns, steps, values);
   for (int i = 0; i <= view.intervals; ++i, held += stride, steps += stride * size) {
     const double* G = view.G + i * view.limits * stride;
     const int used = states + (i < view.intervals ? control_counts[i] : 0);

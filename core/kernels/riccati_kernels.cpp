@@ -572,97 +572,91 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
 /// One entry of the rows of a batch of sensitivities.
 using Batch = Row<response_batch / lane_count>;
 
+/// A register of every entry of a batch: with the entries of all registers at once, those of a stage would not fit into
+/// the processor's. `gradients` begins at this register.
 template <class Stage>
-inline void sensitivities_stage_backward(const RiccatiView& view, int i, bool has_gradient, bool has_next,
-                                         double* gradients) {
-  const Stage stage(view, i);
-  const long stride = view.stride;
-  const double* AB = view.AB + i * view.states * stride;
-  const double* U = view.U + i * view.controls * stride;
-  const double* inverse = view.inverse + i * view.controls;
-  const std::int8_t* sides = view.sides + i * stride;
-  double* own = gradients + i * stride * response_batch;
-  const double* next = own + stride * response_batch;
-  Batch costates[Stage::most_states], gradient[Stage::most_columns];
-  for (int l = 0; l < stage.next_states; ++l) costates[l] = has_next ? Batch::from(next + l * response_batch) : Batch{};
-  const auto form = [&](int k) {
-    gradient[k] = has_gradient ? Batch::from(own + k * response_batch) : Batch{};
-    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { gradient[k].add(costates[l], AB[l * stride + k]); });
-    if (k >= stage.moved && k < stage.next_states) gradient[k].add(costates[k]);
+RHEC_ALWAYS_INLINE inline void sensitivities_stage_backward(const Stage& stage, const Memory<Stage>& at,
+                                                            bool has_gradient, bool has_next, double* own) {
+  const double* next = own + at.stride * response_batch;
+  Lanes costates[Stage::most_states], gradient[Stage::most_columns];
+  stage.each_next_state([&](auto l)
+                            RHEC_ALWAYS_INLINE { costates[l] = has_next ? load(next + l * response_batch) : Lanes{}; });
+  const auto form = [&](auto k) RHEC_ALWAYS_INLINE {
+    Lanes sum = has_gradient ? load(own + k * response_batch) : Lanes{};
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { sum += costates[l] * at.AB[l * at.stride + k]; });
+    if (k >= stage.moved && k < stage.next_states) sum += costates[k];
+    gradient[k] = sum;
   };
-  for (int k = stage.offset; k < stage.columns; ++k) {
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
     form(k);
-    gradient[k].to(own + k * response_batch);
-  }
-  for (int k = 0; k < stage.states; ++k) form(k);
-  for (int k = stage.columns - 1; k >= stage.offset; --k) {
-    if (sides[k] != 0) continue;
-    const double* column = U + (k - stage.offset) * stride;
-    Batch of_control{};
-    of_control.add(gradient[k], -inverse[k - stage.offset]);
-    for (int j = stage.offset; j < k; ++j) gradient[j].add(of_control, column[j]);
-    for (int j = 0; j < stage.states; ++j) gradient[j].add(of_control, column[j]);
-    gradient[k].to(own + k * response_batch);
-  }
-  for (int k = 0; k < stage.states; ++k) gradient[k].to(own + k * response_batch);
+    store(gradient[k], own + k * response_batch);
+  });
+  stage.each_state(form);
+  stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
+    if (at.sides[k] != 0) return;
+    const double* column = at.U + (k - stage.offset) * at.stride;
+    const Lanes of_control = gradient[k] * -at.inverse[k - stage.offset];
+    const auto add = [&](auto j) RHEC_ALWAYS_INLINE { gradient[j] += of_control * column[j]; };
+    stage.each_control_before(k, add);
+    stage.each_state(add);
+    store(gradient[k], own + k * response_batch);
+  });
+  stage.each_state([&](auto k) RHEC_ALWAYS_INLINE { store(gradient[k], own + k * response_batch); });
 }
 
+/// The same forwards. Behind the last stage with a gradient, the gradients of value functions and controls are zero.
+/// `costates` (null: none) are those of the next node.
 template <class Stage>
-inline void sensitivities_stage_forward(const RiccatiView& view, int i, int last, double* sensitivities,
-                                        double* costates) {
-  const Stage stage(view, i);
-  const long stride = view.stride;
-  const double* AB = view.AB + i * view.states * stride;
-  const double* U = view.U + i * view.controls * stride;
-  const double* inverse = view.inverse + i * view.controls;
-  const std::int8_t* sides = view.sides + i * stride;
-  double* own = sensitivities + i * stride * response_batch;
-  double* next = own + stride * response_batch;
-  // Behind the last stage with a gradient, the gradients of value functions and controls are zero.
-  const auto gradient_at = [](const double* row, int entry, bool is_there) RHEC_ALWAYS_INLINE {
-    return is_there ? Batch::from(row + entry * response_batch) : Batch{};
+RHEC_ALWAYS_INLINE inline void sensitivities_stage_forward(const Stage& stage, const Memory<Stage>& at,
+                                                           bool has_gradient, bool has_next, double* own,
+                                                           double* costates) {
+  double* next = own + at.stride * response_batch;
+  Lanes z[Stage::most_columns];
+  stage.each_state([&](auto j) RHEC_ALWAYS_INLINE { z[j] = load(own + j * response_batch); });
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    z[k] = Lanes{};
+    if (at.sides[k] != 0) return;
+    const double* column = at.U + (k - stage.offset) * at.stride;
+    Lanes sum = has_gradient ? load(own + k * response_batch) : Lanes{};
+    const auto add = [&](auto j) RHEC_ALWAYS_INLINE { sum += z[j] * column[j]; };
+    stage.each_state(add);
+    stage.each_control_before(k, add);
+    z[k] = sum * -at.inverse[k - stage.offset];
+  });
+  const auto next_state = [&](auto l) RHEC_ALWAYS_INLINE {
+    Lanes sum{};
+    const auto add = [&](auto j) RHEC_ALWAYS_INLINE { sum += z[j] * at.AB[l * at.stride + j]; };
+    stage.each_state(add);
+    stage.each_control(add);
+    return sum;
   };
-  Batch z[Stage::most_columns];
-  for (int j = 0; j < stage.states; ++j) z[j] = Batch::from(own + j * response_batch);
-  for (int k = stage.offset; k < stage.columns; ++k) {
-    z[k] = {};
-    if (sides[k] != 0) continue;
-    const double* column = U + (k - stage.offset) * stride;
-    Batch sum = gradient_at(own, k, i <= last);
-    for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
-    for (int j = stage.offset; j < k; ++j) sum.add(z[j], column[j]);
-    z[k].add(sum, -inverse[k - stage.offset]);
+  if (costates) {
+    Lanes reached[Stage::most_states];
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { reached[l] = next_state(l); });
+    stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { reached[l] = z[l]; });
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE {
+      Lanes sum = has_next ? load(next + l * response_batch) : Lanes{};
+      stage.each_next_state([&](auto j) RHEC_ALWAYS_INLINE { sum += reached[j] * at.P_next[l * at.stride + j]; });
+      store(sum, costates + l * response_batch);
+    });
+    stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { store(reached[l], next + l * response_batch); });
+  } else {
+    stage.each_moved([&](auto l) RHEC_ALWAYS_INLINE { store(next_state(l), next + l * response_batch); });
+    stage.each_carried([&](auto l) RHEC_ALWAYS_INLINE { store(z[l], next + l * response_batch); });
   }
-  Batch next_state[Stage::most_states];
-  for (int l = 0; l < stage.next_states; ++l) {
-    next_state[l] = {};
-    if (l >= stage.moved) {
-      next_state[l] = z[l];
-      continue;
-    }
-    for (int j = 0; j < stage.states; ++j) next_state[l].add(z[j], AB[l * stride + j]);
-    for (int k = stage.offset; k < stage.columns; ++k) next_state[l].add(z[k], AB[l * stride + k]);
-  }
-  const double* P_next = view.P + (i + 1) * view.states * stride;
-  for (int l = 0; costates && l < stage.next_states; ++l) {
-    Batch sum = gradient_at(next, l, i < last);
-    for (int j = 0; j < stage.next_states; ++j) sum.add(next_state[j], P_next[l * stride + j]);
-    sum.to(costates + ((i + 1) * stride + l) * response_batch);
-  }
-  for (int l = 0; l < stage.next_states; ++l) next_state[l].to(next + l * response_batch);
-  for (int k = stage.offset; k < stage.columns; ++k) {
-    Batch answer = z[k];
-    if (sides[k] != 0) {
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    Lanes answer = z[k];
+    if (at.sides[k] != 0) {
       // The sensitivity of a fixed control is that of its multiplier.
-      const double* column = U + (k - stage.offset) * stride;
-      Batch sum = gradient_at(own, k, i <= last);
-      for (int j = 0; j < stage.states; ++j) sum.add(z[j], column[j]);
-      for (int j = stage.offset; j < stage.columns; ++j) sum.add(z[j], column[j]);
-      answer = {};
-      answer.add(sum, -1.0);
+      const double* column = at.U + (k - stage.offset) * at.stride;
+      Lanes sum = has_gradient ? load(own + k * response_batch) : Lanes{};
+      const auto add = [&](auto j) RHEC_ALWAYS_INLINE { sum += z[j] * column[j]; };
+      stage.each_state(add);
+      stage.each_control(add);
+      answer = -sum;
     }
-    answer.to(own + k * response_batch);
-  }
+    store(answer, own + k * response_batch);
+  });
 }
 
 /// Calls `function` with the type of a stage's shape: one of the sizes for which kernels are compiled, or a general
@@ -768,17 +762,43 @@ int solve_forward(const RiccatiView& view, int first) {
   return view.intervals;
 }
 
+/// Calls function(first) for each register of a batch's entries.
+template <class Function>
+RHEC_ALWAYS_INLINE inline void each_register(const Function& function) {
+  for (int first = 0; first < response_batch; first += lane_count) function(first);
+}
+
 void sensitivities_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
-  for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0; --i)
+  for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0;)
     with_shape<true>(view, i, [&]<class Stage>() {
-      sensitivities_stage_backward<Stage>(view, i, has_gradient[i] != 0, i < last, gradients);
+      const int alike = i;
+      do {
+        const Stage stage(view, i);
+        const Memory<Stage> at(view, i);
+        double* own = gradients + i * at.stride * response_batch;
+        each_register([&](int first) RHEC_ALWAYS_INLINE {
+          sensitivities_stage_backward<Stage>(stage, at, has_gradient[i] != 0, i < last, own + first);
+        });
+      } while (--i >= 0 && is_alike(view, alike, i));
     });
 }
 
 void sensitivities_forward(const RiccatiView& view, int last, double* sensitivities, double* costates) {
-  for (int i = 0; i < view.intervals; ++i)
-    with_shape<true>(
-        view, i, [&]<class Stage>() { sensitivities_stage_forward<Stage>(view, i, last, sensitivities, costates); });
+  for (int i = 0; i < view.intervals;)
+    with_shape<true>(view, i, [&]<class Stage>() {
+      const int alike = i;
+      do {
+        const Stage stage(view, i);
+        const Memory<Stage> at(view, i);
+        const long row = at.stride * response_batch;
+        double* own = sensitivities + i * row;
+        double* of_next = costates ? costates + (i + 1) * row : nullptr;
+        each_register([&](int first) RHEC_ALWAYS_INLINE {
+          sensitivities_stage_forward<Stage>(stage, at, i <= last, i < last, own + first,
+                                             of_next ? of_next + first : nullptr);
+        });
+      } while (++i < view.intervals && is_alike(view, alike, i));
+    });
 }
 
 void combine(const double* batch, const double* weights, double* sums, long count) {

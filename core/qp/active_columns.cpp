@@ -87,14 +87,23 @@ bool DualActiveSet::find_sensitivities_of_next(const StageQp& qp, Riccati& ricca
   std::copy_n(first, count, places.begin());
   const int given = count;
   // `least` is the smallest violation among the chosen ones, once the batch is full.
-  for (int place = 0; place < all_places_; ++place) {
-    if (!(violation_[place] > least) || number_[place] != none) continue;
-    if (std::find(first, first + given, place) != first + given) continue;
+  const auto take = [&](int place) {
+    if (!(violation_[place] > least) || number_[place] != none) return;
+    if (std::find(first, first + given, place) != first + given) return;
     if (count < batch_size) ++count;
     int at = count - 1;
     for (; at > given && violation_[places[at - 1]] < violation_[place]; --at) places[at] = places[at - 1];
     places[at] = place;
     if (count == batch_size) least = violation_[places[batch_size - 1]];
+  };
+  // Rows are padded to multiples of eight, and few of them have one that is chosen.
+  constexpr int eight = 8;
+  for (int begin = 0; begin < all_places_; begin += eight) {
+    const double* violations = violation_.data() + begin;
+    double largest[2] = {violations[0], violations[1]};
+    for (int j = 2; j < eight; ++j) largest[j % 2] = std::max(largest[j % 2], violations[j]);
+    if (!(std::max(largest[0], largest[1]) > least)) continue;
+    for (int j = 0; j < eight; ++j) take(begin + j);
   }
   return find_sensitivities(qp, riccati, places.data(), count);
 }

@@ -22,6 +22,9 @@ constexpr int most_foreseen = 6;
 // Number of solutions with an unchanged active set before rounding errors are assumed, and how many of them are
 // combined from sensitivities.
 constexpr int max_refinements = 4, max_combined = 2;
+// With limits the interior-point method, which comes next, takes as long as some hundred of them. Before, columns of
+// controls are held.
+constexpr int max_refinements_with_limits = 8, refinements_before_holding = 1;
 
 }  // namespace
 
@@ -141,7 +144,35 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   places_ = (qp.intervals() + 1) * stride_;
   all_places_ = places_ + (qp.intervals() + 1) * limit_row_;
   if (claimed) take_claims(qp, *claimed);
+  // Where sensitivities are needed anyway, the ends of a sequence of active bounds are columns: these are dropped more
+  // often than those between, and a column is dropped without another factorisation.
+  const int first_end = column_count();
+  if (has_limits_ && first_end > 0 && first_end < batch_size) {
+    std::erase_if(held_places_, [&](int place) {
+      const int stage = place / stride_, j = place % stride_;
+      const auto goes_on = [&](int other) {
+        return other < 0 || other >= qp.intervals() || claimed->row(other)[j] == side_[place];
+      };
+      if (column_count() == most_foreseen || (goes_on(stage - 1) && goes_on(stage + 1))) return false;
+      held_.row(stage)[j] = 0;
+      hold_[place] = Hold::column;
+      multipliers_[column_count()] = 0.0;
+      columns_.push_back(place);
+      return true;
+    });
+  }
   factor(qp, riccati);
+  if (!is_convex_ && column_count() > first_end) {
+    // Held bounds may make the QP convex.
+    for (int k = first_end; k < column_count(); ++k) {
+      const int place = columns_[k];
+      hold_[place] = Hold::held;
+      held_places_.push_back(place);
+      held_.row(place / stride_)[place % stride_] = side_[place];
+    }
+    columns_.resize(first_end);
+    factor(qp, riccati);
+  }
   if (has_limits_) keep_rows(qp);
   if (!claimed || !is_convex_) return;
   // Where rows change with the newest data, their sensitivities are not worth finding before.
@@ -160,8 +191,9 @@ void DualActiveSet::prepare(const StageQp& qp, Riccati& riccati, const ActiveSet
   has_bounds_ = false;
 }
 
-/// Factorises anew without the released bounds. Columns of controls are held from now on; the remaining columns have no
-/// sensitivities yet.
+/// Factorises anew without the released bounds. Columns of controls are held from now on, but for those that are likely
+/// to be released next (for which `violation_` is smallest), as far as they get their sensitivities together with the
+/// columns that remain. These have no sensitivities yet.
 bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
   held_.clear();
   int kept = 0;
@@ -177,7 +209,36 @@ bool DualActiveSet::refactor(const StageQp& qp, Riccati& riccati) noexcept {
     }
   }
   columns_.resize(kept);
+  // One is left for a bound that enters.
+  const int used = (kept + 1) % batch_size, room = used > 0 ? batch_size - used : 0;
+  const auto is_sooner = [this](int a, int b) { return violation_[a] < violation_[b]; };
+  if (has_limits_ && room > 0 && kept + room <= most_columns_)
+    std::sort(held_places_.begin(), held_places_.end(), is_sooner);
+  int loose = 0;
+  for (const int place : held_places_) {
+    if (!has_limits_ || loose == room || kept + room > most_columns_ || !(violation_[place] < infinity) ||
+        is_equality_bound(place))
+      break;
+    hold_[place] = Hold::column;
+    multipliers_[column_count()] = value_[place];
+    columns_.push_back(place);
+    value_[place] = bound(place);
+    ++loose;
+  }
+  held_places_.erase(held_places_.begin(), held_places_.begin() + loose);
+  for (const auto* places : {&held_places_, &columns_})
+    for (const int place : *places) violation_[place] = -infinity;
   for (const int place : held_places_) held_.row(place / stride_)[place % stride_] = side_[place];
+  factor(qp, riccati);
+  if (is_convex_ || loose == 0) return is_convex_;
+  for (int k = kept; k < column_count(); ++k) {
+    const int place = columns_[k];
+    hold_[place] = Hold::held;
+    held_places_.push_back(place);
+    value_[place] = multipliers_[k];
+    held_.row(place / stride_)[place % stride_] = side_[place];
+  }
+  columns_.resize(kept);
   factor(qp, riccati);
   return is_convex_;
 }
@@ -229,25 +290,64 @@ double DualActiveSet::largest_miss() const noexcept {
   return largest;
 }
 
+/// Corrects the column that is most wrong, and the multipliers of the others, until none is: where one was the reason
+/// for others, these stay. Values of all places follow at the end.
 bool DualActiveSet::drop_wrong_columns(const Riccati& riccati) noexcept {
-  bool any = false;
-  Weights weights{};
-  for (int k = column_count() - 1; k >= 0; --k) {
-    const int place = columns_[k];
-    if (has_limits_ && is_soft(place)) {
-      const bool is_changed = correct_soft_column(k, weights);
-      changes_ += is_changed;
-      any |= is_changed;
-      continue;
-    }
-    if (side_[place] * multipliers_[k] >= -pull_tolerance_ || is_equality_bound(place)) continue;
-    weight_of(place, weights) = -multipliers_[k];
-    drop_column(k);
-    any = true;
-    ++changes_;
+  const int first_count = column_count(), changes_before = changes_;
+  int first_columns[max_columns_with_limits];
+  double first_values[max_columns_with_limits];
+  for (int k = 0; k < first_count; ++k) {
+    first_columns[k] = columns_[k];
+    first_values[k] = value_[columns_[k]];
   }
-  if (any) add_sensitivities(riccati, weights, value_);
-  return any;
+  Weights weights{};
+  // By how much the objective would change, about.
+  const auto find_worst = [&] {
+    int worst = none;
+    double largest = 0.0;
+    for (int k = 0; k < column_count(); ++k) {
+      const int place = columns_[k];
+      if (is_equality_bound(place)) continue;
+      const double size = side_[place] * multipliers_[k];
+      double excess = -size;
+      if (has_limits_ && is_soft(place))
+        excess = relaxed_[place] != 0 ? linear(place) - size : std::max(excess, size - linear(place));
+      if (excess <= pull_tolerance_) continue;
+      const double gain = excess * excess * -sensitivity(place, place);
+      if (worst == none || gain > largest) worst = k, largest = gain;
+    }
+    return worst;
+  };
+  for (int worst = find_worst(); worst != none; worst = find_worst()) {
+    const int place = columns_[worst];
+    Weights weight{};
+    if (has_limits_ && is_soft(place)) {
+      if (!correct_soft_column(worst, weight)) break;
+    } else {
+      weight_of(place, weight) = -multipliers_[worst];
+      drop_column(worst);
+    }
+    ++changes_;
+    const double change = weight_of(place, weight);
+    weight_of(place, weights) += change;
+    for (const int column : columns_) value_[column] += change * sensitivity(place, column);
+    double changes[max_columns_with_limits];
+    const int count = column_count();
+    for (int k = 0; k < count; ++k) {
+      const double* row = factor_row(k);
+      changes[k] = (value_[columns_[k]] - target(columns_[k], multipliers_[k]) - dot(row, changes, k)) * row[k];
+    }
+    back_substitute(changes);
+    for (int k = 0; k < count; ++k) {
+      multipliers_[k] += changes[k];
+      weight_of(columns_[k], weights) += changes[k];
+      value_[columns_[k]] = target(columns_[k], multipliers_[k]);
+    }
+  }
+  if (changes_ == changes_before) return false;
+  for (int k = 0; k < first_count; ++k) value_[first_columns[k]] = first_values[k];
+  add_sensitivities(riccati, weights, value_);
+  return true;
 }
 
 bool DualActiveSet::release_wrong_held() noexcept {
@@ -261,7 +361,7 @@ bool DualActiveSet::release_wrong_held() noexcept {
 
 /// Makes the active set dual feasible; true if this needs another factorisation.
 bool DualActiveSet::drop_wrong(const Riccati& riccati) noexcept {
-  while (drop_wrong_columns(riccati)) return_to_bounds(riccati);
+  drop_wrong_columns(riccati);
   return release_wrong_held();
 }
 
@@ -322,12 +422,13 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
   // Values change with the multipliers, but only few of them are needed before the entering bound is met.
   Weights changes{};
   bool has_changes = false;
-  const auto value_of = [&](int place) {
-    double value = value_[place];
-    for (int k = 0; has_changes && k < batch_count_; ++k)
-      if (batches_[k].count > 0) value += dot(changes[k].data(), sensitivities_at(k, place), batch_size);
-    return value;
+  const auto sum_at = [&](const Weights& weights, int place) {
+    double sum = 0.0;
+    for (int k = 0; k < batch_count_; ++k)
+      if (batches_[k].count > 0) sum += dot(weights[k].data(), sensitivities_at(k, place), batch_size);
+    return sum;
   };
+  const auto value_of = [&](int place) { return has_changes ? value_[place] + sum_at(changes, place) : value_[place]; };
   const auto write_values = [&] {
     if (has_changes) add_sensitivities(riccati, changes, value_);
     has_changes = false;
@@ -364,24 +465,29 @@ DualActiveSet::Outcome DualActiveSet::add(const StageQp& qp, Riccati& riccati, i
         if (until < length) length = until, blocking_column = k, grows = loss < 0.0;
         continue;
       }
+      violation_[other] = infinity;
       if (!(loss > 0.0) || is_equality_bound(other)) continue;
       const double until = std::max(side_[other] * multipliers_[k], 0.0) / loss;
+      violation_[other] = until;
       if (until < length) length = until, blocking_column = k, grows = false;
     }
+    Weights direction{};
+    weight_of(entering, direction) = side;
+    for (int k = 0; k < count; ++k) weight_of(columns_[k], direction) -= pull[k];
     for (const int other : held_places_) {
-      double direction = side * sensitivity(entering, other);
-      for (int k = 0; k < count; ++k) direction -= pull[k] * sensitivity(columns_[k], other);
-      const double loss = -side_[other] * direction;
+      const double loss = -side_[other] * sum_at(direction, other);
+      violation_[other] = infinity;
       if (!(loss > 0.0) || is_equality_bound(other)) continue;
       const double until = std::max(side_[other] * value_of(other), 0.0) / loss;
+      violation_[other] = until;
       if (until < length) length = until, blocking_held = other;
     }
     if (length == infinity) return Outcome::no_solution;
     multiplier += side * length;
     for (int k = 0; k < count; ++k) multipliers_[k] -= length * pull[k];
     has_changes = true;
-    weight_of(entering, changes) += side * length;
-    for (int k = 0; k < count; ++k) weight_of(columns_[k], changes) -= length * pull[k];
+    for (int k = 0; k < batch_count_; ++k)
+      for (int c = 0; batches_[k].count > 0 && c < batch_size; ++c) changes[k][c] += length * direction[k][c];
     if (blocking_held != none) {
       write_values();
       std::erase(held_places_, blocking_held);
@@ -484,8 +590,36 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
   changes_ = 0;
   pull_tolerance_ = multiplier_tolerance;
   bool may_add_together = true;
-  for (int refinements = 0; refinements < max_refinements; ++refinements) {
-    if (!is_convex_) return Outcome::not_convex;
+  // Whether there are columns of controls, which the next factorisation then holds.
+  const auto holds_no_column = [this] {
+    for (const auto* places : {&held_places_, &columns_})
+      for (const int place : *places) violation_[place] = infinity;
+    return std::any_of(columns_.begin(), columns_.end(), [this](int place) { return is_control(place); });
+  };
+  // What was found of the active set is a guess for the QP in the place of one that is not convex.
+  const auto give_up_not_convex = [&] {
+    if (has_limits_ && changes_ > 0) write(qp, active, step);
+    return Outcome::not_convex;
+  };
+  // Of the violated bounds that have sensitivities the one whose addition raises the dual objective most, about; if
+  // none has, the one that is violated most.
+  const auto choose = [this](int most_violated) {
+    int chosen = most_violated;
+    double largest = 0.0;
+    for (int k = 0; has_limits_ && k < batch_count_; ++k) {
+      for (int c = 0; c < batches_[k].count; ++c) {
+        const int place = batches_[k].of[c];
+        const double violation = violation_[place];
+        if (!(violation > 0.0) || number_[place] != k * batch_size + c) continue;
+        const double gain = violation * violation / -sensitivity(place, place);
+        if (gain > largest) largest = gain, chosen = place;
+      }
+    }
+    return chosen;
+  };
+  const int most_refinements = has_limits_ ? max_refinements_with_limits : max_refinements;
+  for (int refinements = 0; refinements < most_refinements; ++refinements) {
+    if (!is_convex_) return give_up_not_convex();
     const int changes_before = changes_;
     const Found found = find_values(qp, riccati, refinements < max_combined, step);
     if (found == Found::nothing) return Outcome::too_much;
@@ -505,16 +639,25 @@ DualActiveSet::Outcome DualActiveSet::solve(const StageQp& qp, Riccati& riccati,
     if (needs_factor) {
       if (changes_ > most_changes_) return Outcome::too_much;
       if (is_past(deadline)) return Outcome::out_of_time;
-      if (!refactor(qp, riccati)) return Outcome::not_convex;
+      const bool have_sensitivities = has_limits_ && !columns_.empty();
+      for (const int place : held_places_)
+        violation_[place] = have_sensitivities ? side_[place] * value_[place] : infinity;
+      for (int k = 0; k < column_count(); ++k)
+        violation_[columns_[k]] = have_sensitivities ? side_[columns_[k]] * multipliers_[k] : infinity;
+      if (!refactor(qp, riccati)) return give_up_not_convex();
     }
     for (; !needs_factor && violations.worst != none; violations = find_violations())
-      if (const Outcome outcome = add(qp, riccati, violations.worst, deadline); outcome != Outcome::solved)
-        return outcome;
+      if (const Outcome outcome = add(qp, riccati, choose(violations.worst), deadline); outcome != Outcome::solved)
+        return outcome == Outcome::not_convex ? give_up_not_convex() : outcome;
     if (needs_factor || changes_ > changes_before) {
       refinements = 0;
     } else if (found == Found::step) {
       write(qp, active, step);
       return Outcome::solved;
+    } else if (has_limits_ && refinements == refinements_before_holding && holds_no_column()) {
+      // Rounding: the columns of controls are nearly dependent. Held, they are exact.
+      if (is_past(deadline)) return Outcome::out_of_time;
+      if (!refactor(qp, riccati)) return give_up_not_convex();
     }
   }
   return Outcome::too_much;

@@ -82,10 +82,10 @@ LimitCosts GnRti::costs_of_limits(const Iterate& iterate) noexcept {
   return all;
 }
 
-/// Raises a penalty to what a step's multipliers ask for. With limits, these can be huge far from the solution, and a
-/// penalty that stayed that large would shorten every later step: there it falls, too, some times.
+/// Raises a penalty to what a step's multipliers ask for. These can be huge far from the solution, and a penalty that
+/// stayed that large would shorten every later step: it falls, too, some times.
 void GnRti::raise(double& penalty, double least) noexcept {
-  if (!limits_.empty() && penalty > 4.0 * least && penalty_cuts_left_ > 0 && !is_elastic_) {
+  if (penalty > 4.0 * least && penalty_cuts_left_ > 0 && (limits_.empty() || !is_elastic_)) {
     penalty = 2.0 * least;
     --penalty_cuts_left_;
   }
@@ -246,7 +246,7 @@ StageQpSolver::Outcome GnRti::solve_elastic(Report& report, Clock::time_point de
 /// Looks at an accepted step from `best_`: whether so many priced ones have removed so little that the limits cannot be
 /// met.
 bool GnRti::is_futile() noexcept {
-  if (!was_elastic_) {
+  if (!was_elastic_ || limits_.empty()) {
     futile_ = 0;
     return false;
   }
@@ -305,7 +305,8 @@ Report GnRti::converge(Iterate& iterate, Clock::time_point deadline) noexcept {
     // Damped steps do better than short ones, and than those of a Hessian that is not convex.
     stagnant = residual > halved * halved_residual ? stagnant + 1 : 0;
     if (stagnant == 0) halved_residual = residual;
-    if (std::max(short_steps, stagnant) > most_short_steps && !limits_.empty() && !is_priced_ && is_nearly_feasible())
+    const bool may_damp = !limits_.empty() || hessian() == Hessian::exact;
+    if (std::max(short_steps, stagnant) > most_short_steps && may_damp && !is_priced_ && is_nearly_feasible())
       begin_priced(2.0 * largest_bound_multiplier(*ocp_, best_));
     double merit_after = 0.0;
     bool feasible = false, accepted = false, late = false;

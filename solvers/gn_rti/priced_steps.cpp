@@ -133,7 +133,8 @@ bool GnRti::raise_price(double merit_after) noexcept {
 /// A step from `best_` to `trial_`, damped until the merit function accepts it; false if none is acceptable.
 bool GnRti::take_priced_step(Report& report, double residual, double& merit_after, Clock::time_point deadline,
                              bool& feasible, bool& late) noexcept {
-  shortest_length_ = shortest_undamped;
+  // Without limits a line search may go on: damping does not shorten what removes defects.
+  shortest_length_ = limits_.empty() ? 0.0 : shortest_undamped;
   bool accepted = false;
   while (!accepted && !late) {
     const auto outcome = relax_until_feasible(solve_priced(report, deadline), report, deadline);
@@ -153,6 +154,7 @@ bool GnRti::take_priced_step(Report& report, double residual, double& merit_afte
     late = late || is_past(deadline);
   }
   if (accepted && step_length_ == 1.0) damping_ = damping_ > first_damping ? weaker * damping_ : 0.0;
+  if (accepted && step_length_ < shortest_undamped) damping_ = std::max(stronger * damping_, first_damping);
   shortest_length_ = 0.0;
   return accepted;
 }

@@ -24,7 +24,7 @@ constexpr int most_spare_iterations = 6;
 constexpr double near_solution = 1e-4;
 constexpr int most_polishes = 2;
 /// Iterations after which another kind of start is more promising. Runs that take longer are mostly those that wander
-/// in directions of negative curvature.
+/// in directions of negative curvature, or try to refute an infeasibility that is there.
 constexpr int patience = 150;
 /// A violation of the dynamics, or of limits, too large for rounding.
 constexpr double clear_violation = 1e-6;
@@ -174,7 +174,7 @@ IpoptSolver::Start IpoptSolver::start_after(Start start, Ending ending) const no
 
 int IpoptSolver::iterations_of(Start start) const noexcept {
   const int left = std::max(options_.max_iterations - iterations_, 0);
-  return start == Start::adaptive ? left : std::min(left, patience);
+  return start == Start::adaptive && !claimed_infeasible_ ? left : std::min(left, patience);
 }
 
 void IpoptSolver::set_run_options(Start start, double barrier) {
@@ -280,11 +280,10 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
     ending = best_kkt_.largest() <= options_.tolerance ? Ending::converged : Ending::lost;
   } else {
     int polishes = 0;
-    bool claimed_infeasible = false;
     Start begun = warm ? Start::warm : Start::cold;
     for (Start start = begun;;) {
       ending = run(start, start == Start::polish ? best_ : guess_);
-      claimed_infeasible |= ending == Ending::infeasible && start != Start::warm;
+      claimed_infeasible_ |= ending == Ending::infeasible && start != Start::warm;
       if (ending == Ending::near && polishes++ < most_polishes) {
         start = Start::polish;
         continue;
@@ -296,7 +295,7 @@ bool IpoptSolver::improve(const Ocp& ocp, Iterate& iterate, Report& report) {
     }
     // A claim stands if no later run has come near to refuting it, also where that run was cut off.
     const bool is_open = ending != Ending::converged && ending != Ending::out_of_time;
-    if (is_open && claimed_infeasible && violation_of(best_kkt_) > clear_violation) ending = Ending::infeasible;
+    if (is_open && claimed_infeasible_ && violation_of(best_kkt_) > clear_violation) ending = Ending::infeasible;
   }
   switch (ending) {
     case Ending::converged:
@@ -328,6 +327,7 @@ Report IpoptSolver::solve(Iterate& iterate, Clock::time_point deadline) noexcept
   if (!ocp_ || !has_sound_numbers(*ocp_, iterate)) return report;
   deadline_ = deadline;
   iterations_ = 0;
+  claimed_infeasible_ = false;
   backend_us_ = 0.0;
   stopped_late_ = false;
   bool is_assessed = false;

@@ -97,6 +97,7 @@ class IpoptSolver final : public Solver, private Spectator {
   KktResidual best_kkt_, seen_kkt_;
   double best_objective_ = 0.0, backend_us_ = 0.0;
   bool stopped_late_ = false;
+  bool claimed_infeasible_ = false;  ///< by a run that did not begin at the guess' multipliers
   int iterations_ = 0;
   int spare_iterations_ = 0;  ///< left for the barrier to become negligible once the residual is within the tolerance
 };

@@ -57,6 +57,14 @@ TEST(PricedSteps, SolveWhereTheHessianIsNotConvexAtTheSolution) {
   }
 }
 
+TEST(PricedSteps, SolveLongEstimationsFarFromTheirSolution) {
+  for (const Case& of : {Case{"rhe_200_intervals_unblocked", "unicycle_traction", 6},
+                         Case{"rhe_200_intervals_unblocked", "tractor_trailer", 7}}) {
+    Iterate point;
+    EXPECT_EQ(solve(of, point).status, Status::solved) << of.family << " of " << of.model << ", seed " << of.seed;
+  }
+}
+
 TEST(PricedSteps, SaySoWhereLimitsContradictEachOther) {
   for (const Case& of :
        {Case{"rhc_limits_infeasible", "tractor_trailer", 28}, Case{"rhc_limits_infeasible", "skid_steer", 122}}) {
