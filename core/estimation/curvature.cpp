@@ -8,6 +8,7 @@ namespace {
 /// Different fractions of what is typical: no product is 0 by chance.
 std::vector<double> any_values(const std::vector<Variable>& variables, int& number) {
   std::vector<double> z;
+  z.reserve(variables.size());
   for (const Variable& variable : variables) z.push_back(variable.scale * (0.31 + 0.017 * number++));
   return z;
 }
