@@ -113,15 +113,10 @@ void KalmanFilter::write_hessians(const MeasuredInterval& interval) noexcept {
     copy_point(row, seconds(row), seconds(row) / interval.duration);
     multipliers_[row * nx_ + curved_[row % curved]] = 1.0;
   }
-  model_->integrate({.count = count,
-                     .states = states_.data(),
-                     .inputs = inputs_.data(),
-                     .parameters = parameters_.data(),
-                     .parameters_end = ends_.data(),
-                     .durations = durations_.data(),
-                     .substeps = substeps_,
-                     .multipliers = multipliers_.data(),
-                     .hessians = hessians_.data()});
+  Model::Intervals request = copied_points(count);
+  request.multipliers = multipliers_.data();
+  request.hessians = hessians_.data();
+  model_->integrate(request);
   // Places of z = [x; u; p; p at the time] among what is unknown.
   const auto place = [&](int z) {
     if (z < nx_) return z;
@@ -177,6 +172,16 @@ void KalmanFilter::copy_point(int row, double seconds, double share) noexcept {
   durations_[row] = seconds;
 }
 
+Model::Intervals KalmanFilter::copied_points(int count) const noexcept {
+  return {.count = count,
+          .states = states_.data(),
+          .inputs = inputs_.data(),
+          .parameters = parameters_.data(),
+          .parameters_end = ends_.data(),
+          .durations = durations_.data(),
+          .substeps = substeps_};
+}
+
 /// How far a time is from that of the first measurement (0) towards the end (1).
 double KalmanFilter::from_first(const MeasuredInterval& interval, double seconds) noexcept {
   return interval.between > 0 ? (seconds - interval.times[0]) / (interval.duration - interval.times[0]) : 1.0;
@@ -185,15 +190,10 @@ double KalmanFilter::from_first(const MeasuredInterval& interval, double seconds
 /// Next states, outputs and their Jacobians at several times about `point_`, all in one call of the model.
 void KalmanFilter::linearise_times(const MeasuredInterval& interval, int count, const double* seconds) noexcept {
   for (int k = 0; k < count; ++k) copy_point(k, seconds[k], seconds[k] / interval.duration);
-  model_->integrate({.count = count,
-                     .states = states_.data(),
-                     .inputs = inputs_.data(),
-                     .parameters = parameters_.data(),
-                     .parameters_end = ends_.data(),
-                     .durations = durations_.data(),
-                     .substeps = substeps_,
-                     .next_states = next_states_.data(),
-                     .jacobians = jacobians_.data()});
+  Model::Intervals request = copied_points(count);
+  request.next_states = next_states_.data();
+  request.jacobians = jacobians_.data();
+  model_->integrate(request);
   const int curved = is_curved_ ? static_cast<int>(curved_.size()) : 0;
   for (int k = 0; k < count; ++k) {
     const double share = from_first(interval, seconds[k]);

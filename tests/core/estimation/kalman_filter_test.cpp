@@ -130,17 +130,24 @@ TEST(KalmanFilter, KeepsItsParametersWithinTheirBounds) {
   EXPECT_EQ(filter.mean[2], 0.0);
 }
 
-KalmanFilter turntable_filter(const TurntableNoise& noise, bool looks_ahead) {
+/// With a scale error of the gyro its state stands before the gyro's value.
+KalmanFilter turntable_filter(const TurntableNoise& noise, bool looks_ahead, double scale_sigma = 0.0) {
   const double infinity = std::numeric_limits<double>::infinity();
-  KalmanFilter filter(turntable(),
+  const bool has_scale_error = scale_sigma > 0.0;
+  KalmanFilter filter(turntable(has_scale_error),
                       {.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro},
                        .input_variances = {noise.omega * noise.omega},
                        .parameter_lower = {-infinity},
                        .parameter_upper = {infinity},
                        .motion_outputs = looks_ahead ? std::vector{1} : std::vector<int>{}},
                       1, 20);
-  filter.mean << 0.0, 0.0, 0.75;
-  filter.covariance = Eigen::Vector3d(1e-4, 1.0, noise.kappa * noise.kappa).asDiagonal();
+  const Eigen::Index last = filter.mean.size() - 1;
+  filter.mean.setZero();
+  filter.mean[last] = 0.75;
+  filter.covariance.setIdentity();
+  filter.covariance(0, 0) = 1e-4;
+  if (has_scale_error) filter.covariance(1, 1) = scale_sigma * scale_sigma;
+  filter.covariance(last, last) = noise.kappa * noise.kappa;
   return filter;
 }
 
@@ -251,16 +258,8 @@ TEST(KalmanFilter, DoesNotTakeNoiseForKnowledgeOfAScaleError) {
   std::normal_distribution<double> normal;
   int within = 0, count = 0;
   for (int drive = 0; drive < 40; ++drive) {
-    const double kappa = 0.75 + noise.kappa * normal(random), scale = 0.1 * normal(random), infinity = HUGE_VAL;
-    KalmanFilter filter(turntable(true),
-                        {.output_variances = {noise.angle * noise.angle, noise.gyro * noise.gyro},
-                         .input_variances = {noise.omega * noise.omega},
-                         .parameter_lower = {-infinity},
-                         .parameter_upper = {infinity},
-                         .motion_outputs = {1}},
-                        1);
-    filter.mean << 0.0, 0.0, 0.0, 0.75;
-    filter.covariance = Eigen::Vector4d(1e-4, 0.01, 1.0, noise.kappa * noise.kappa).asDiagonal();
+    const double kappa = 0.75 + noise.kappa * normal(random), scale = 0.1 * normal(random);
+    KalmanFilter filter = turntable_filter(noise, true, 0.1);
     for (int k = 0; k < 100; ++k) {
       const double truth = k % 10 == 0 ? 0.3 : 0.0, omega = truth + noise.omega * normal(random);
       const double outputs[] = {noise.angle * normal(random),

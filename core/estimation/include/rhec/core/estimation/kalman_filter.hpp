@@ -88,6 +88,7 @@ class RHEC_EXPORT KalmanFilter {
   void find_curvature(const MeasuredInterval& interval, int step) noexcept;
   void write_hessians(const MeasuredInterval& interval) noexcept;
   void copy_point(int row, double seconds, double share) noexcept;
+  Model::Intervals copied_points(int count) const noexcept;
   static double from_first(const MeasuredInterval& interval, double seconds) noexcept;
   void linearise_times(const MeasuredInterval& interval, int count, const double* seconds) noexcept;
   void use_time(const MeasuredInterval& interval, int which) noexcept;
