@@ -1,6 +1,6 @@
 #include "rhec/core/estimation/curvature.hpp"
 
-#include <cmath>
+#include <algorithm>
 
 namespace rhec {
 namespace {
@@ -64,6 +64,10 @@ void Curvature::factorise() noexcept {
         for (const std::ptrdiff_t r : active_) sum += product(k, r, c) * product(l, c, r);
       V(k, l) = V(l, k) = 0.5 * sum;
     }
+  }
+  for (std::ptrdiff_t k = 0; k < rows; ++k) {
+    if (!std::isfinite(V(k, k)))
+      for (std::ptrdiff_t l = 0; l < rows; ++l) V(k, l) = V(l, k) = 0.0;
     variances_[k] = V(k, k);
   }
   for (int column = 0; column < factors; ++column) {

@@ -14,9 +14,12 @@
 namespace rhec {
 namespace {
 
-/// Those of some outputs that are not angles, whose polynomials in time would jump.
-std::vector<int> steady_outputs(const ModelDescription& about, std::vector<int> outputs) {
-  std::erase_if(outputs, [&](int j) { return about.outputs[j].is_angle; });
+/// Those of motion whose measurements are summarised. Polynomials in time would jump with an angle.
+std::vector<int> summarised_outputs(const ModelDescription& about, const KalmanFilter::Noise& noise) {
+  std::vector<int> outputs = noise.motion_outputs;
+  std::erase_if(outputs, [&](int j) {
+    return about.outputs[j].is_angle || std::ranges::find(noise.single_outputs, j) != noise.single_outputs.end();
+  });
   return outputs;
 }
 
@@ -54,7 +57,7 @@ KalmanFilter::KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int 
   output_curvature_ = Curvature(static_cast<int>(curved_outputs_.size()), nx_, ny_);
   before_ = covariance;
   curvature_ = Curvature(2 * static_cast<int>(curved_.size()), plain);
-  summary_ = ReadingSummary(steady_outputs(model_->description(), noise_.motion_outputs), ny_, most_between, substeps_);
+  summary_ = ReadingSummary(summarised_outputs(model_->description(), noise_), ny_, most_between, substeps_);
   const std::size_t rows = std::max(static_cast<std::size_t>(summary_.most()) + 1, 2 * curved_.size()),
                     times = static_cast<std::size_t>(summary_.most()) + 1, second = 2 * curved_.size(),
                     nx = static_cast<std::size_t>(nx_), ny = static_cast<std::size_t>(ny_);

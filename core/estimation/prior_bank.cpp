@@ -139,16 +139,17 @@ PriorBank::PriorBank(std::shared_ptr<const Model> model, Setup setup)
   if (looks_ahead()) {
     constexpr double unbounded = std::numeric_limits<double>::infinity();
     const std::vector<double> lower(np_, -unbounded), upper(np_, unbounded);
-    ahead_ = std::make_unique<LookAhead>(
-        LookAhead{.mixture = {model_,
-                              {setup_.output_variances, setup_.input_variances, lower, upper, setup_.motion_outputs},
-                              setup_.substeps,
-                              setup_.most_between},
-                  .curved_outputs = curved_outputs(*model_, setup_.motion_outputs)});
+    std::vector<int> single;  // a robust loss is one of each measurement
+    for (const RobustLoss& loss : setup_.robust) single.insert(single.end(), loss.outputs.begin(), loss.outputs.end());
+    ahead_ = std::make_unique<LookAhead>(LookAhead{
+        .mixture = {model_,
+                    {setup_.output_variances, setup_.input_variances, lower, upper, setup_.motion_outputs, single},
+                    setup_.substeps,
+                    setup_.most_between},
+        .curved_outputs = curved_outputs(*model_, setup_.motion_outputs)});
     ahead_->output_curvature = Curvature(static_cast<int>(ahead_->curved_outputs.size()), nx_, ny_);
     ahead_->ramp_variances.assign(np_, 0.0);
     ahead_->no_input.assign(nu_, 0.0);
-    if (!setup_.robust.empty()) ahead_->ones.assign(static_cast<std::size_t>(setup_.most_between) * ny_, 1.0);
     const auto a = static_cast<std::size_t>(wide_count());
     for (auto* v : {&ahead_->next_point, &ahead_->trial_mean}) v->assign(a * M, 0.0);
     ahead_->trial_covariance.assign(a * a * M, 0.0);
@@ -296,6 +297,7 @@ void PriorBank::update(const double* y, const double* robust_weights) noexcept {
               .before_lane = nx_,
               .is_between = false};
   std::ranges::fill(added_, 0.0);
+  if (ahead_) spread_variances();
   if (ahead_ && std::ranges::any_of(ahead_->curved_outputs, [y](int j) { return !std::isnan(y[j]); })) {
     linearise_given(y);
     wide_before_ = wide_mean_;
@@ -304,7 +306,6 @@ void PriorBank::update(const double* y, const double* robust_weights) noexcept {
     frame.before_lane = 1;
   }
   log_likelihood_ = take_outputs(frame, y, robust_weights);
-  if (frame.before_lane == 1) spread_variances();
 }
 
 /// Outputs and gradients at `states_`.
@@ -315,21 +316,23 @@ void PriorBank::linearise_nodes() noexcept {
       for (int c = 0; c < nx_; ++c) gradient_[(j * nx_ + c) * lanes_ + m] = gradient_rows_[(m * nx_ + c) * ny_ + j];
 }
 
+/// The outputs that y has, as `predicted_`, for the kernels: how many.
+int PriorBank::view_outputs(const double* gradients, std::ptrdiff_t entries, const double* y) noexcept {
+  views_->taken = 0;
+  for (std::ptrdiff_t j = 0; j < ny_; ++j)
+    if (!std::isnan(y[j]))
+      views_->add(model_->description().outputs[j], predicted_.data() + j * lanes_, gradients + j * entries,
+                  output_variances_.data() + j * lanes_, y[j]);
+  return views_->taken;
+}
+
 /// Takes in outputs whose predictions and gradients are known, and weighs the members by them. Returns the logarithm of
 /// their likelihood.
 double PriorBank::take_outputs(const Frame& frame, const double* y, const double* robust_weights) noexcept {
   const BankView& view = frame.view;
   const std::ptrdiff_t entries = static_cast<std::ptrdiff_t>(view.vehicle_states) * lanes_;
   std::fill(squares_.begin(), squares_.end(), 0.0);
-  int taken = 0;
-  for (int j = 0; j < ny_; ++j) {
-    if (std::isnan(y[j])) continue;
-    views_->outputs[taken++] = {.predicted = predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
-                                .gradient = frame.gradient + j * entries,
-                                .variance = output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
-                                .measured = y[j],
-                                .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
-  }
+  const int taken = view_outputs(frame.gradient, entries, y);
   if (taken == 0) return 0.0;
   if (!setup_.robust.empty()) weigh_outputs(frame, y, taken, robust_weights);
   bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),

@@ -17,6 +17,7 @@ namespace rhec {
 /// other, and only then moves to the interval's end.
 void PriorBank::predict(const MeasuredInterval& measured, const double* end_outputs) noexcept {
   is_curved_ = false;
+  std::ranges::fill(added_, 0.0);
   const bool has_motion = measures_motion(setup_.motion_outputs, measured, static_cast<std::size_t>(ny_), end_outputs);
   if (measured.between == 0 && !has_motion) return predict(measured.inputs, measured.duration);
   RHEC_ASSERT(!wide_mean_.empty(), "a bank that was set up for measurements between nodes");
@@ -24,7 +25,9 @@ void PriorBank::predict(const MeasuredInterval& measured, const double* end_outp
   widen();
   const MeasuredInterval interval = has_motion ? look_ahead(measured, end_outputs) : measured;
   for (int k = 0; k < interval.between; ++k) take_between(interval, k, has_motion);
-  if (!has_motion) {
+  if (has_motion) {
+    spread_variances();
+  } else {
     point_ = wide_mean_;
     integrate_members(point_.data(), true, interval.duration, 1.0);
   }
@@ -50,10 +53,8 @@ MeasuredInterval PriorBank::look_ahead(const MeasuredInterval& measured, const d
     for (int m = 0; m < members_; ++m) ahead_->ramp_variances[j] += weights_[m] * process.ramp[m] * process.Q[m];
   }
   moments(ahead_->mixture.mean, ahead_->mixture.covariance);
-  // A robust loss is one of each measurement.
-  const MeasuredInterval interval =
-      ahead_->mixture.look_ahead(measured, ahead_->no_input.data(), ahead_->ramp_variances.data(),
-                                 ahead_->ones.empty() ? nullptr : ahead_->ones.data(), end_outputs);
+  const MeasuredInterval interval = ahead_->mixture.look_ahead(measured, ahead_->no_input.data(),
+                                                               ahead_->ramp_variances.data(), nullptr, end_outputs);
   is_curved_ = !ahead_->mixture.curved().empty();
   const Eigen::VectorXd& found = ahead_->mixture.point();
   point_ = wide_mean_;
@@ -86,14 +87,7 @@ void PriorBank::linearise_given(const double* y) noexcept {
   std::copy(covariance_.begin(), covariance_.end(), ahead_->trial_covariance.begin());
   moments(ahead_->mixture.mean, ahead_->mixture.covariance);
   const BankView trial{lanes_, nx_, n_, ahead_->trial_mean.data(), ahead_->trial_covariance.data(), wide_work_.data()};
-  int taken = 0;
-  for (std::ptrdiff_t j = 0; j < ny_; ++j)
-    if (!std::isnan(y[j]))
-      views_->outputs[taken++] = {.predicted = predicted_.data() + j * M,
-                                  .gradient = gradient_.data() + j * nx_ * M,
-                                  .variance = output_variances_.data() + j * M,
-                                  .measured = y[j],
-                                  .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
+  const int taken = view_outputs(gradient_.data(), nx_ * M, y);
   bank_kernels().update(trial, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                         innovation_variances_.data());
   for (std::ptrdiff_t m = 0; m < M; ++m)
@@ -247,14 +241,7 @@ void PriorBank::expect_outputs(int which, const double* y, const double* mean) n
 bool PriorBank::move_point(const MeasuredInterval& interval, const double* end_outputs) noexcept {
   constexpr double little = least_look_ahead_step * least_look_ahead_step;
   const int a = wide_count();
-  const auto output_of = [&](int which, int j, const double* predicted, double measured) -> BankOutput {
-    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(which) * ny_ + j;
-    return {.predicted = predicted,
-            .gradient = wide_gradient_.data() + row * a * lanes_,
-            .variance = output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_,
-            .measured = measured,
-            .period = model_->description().outputs[j].is_angle ? 2.0 * std::numbers::pi : 0.0};
-  };
+  const std::ptrdiff_t M = lanes_, entries = a * M;
   BankView view{lanes_, a, a, wide_mean_.data(), wide_covariance_.data(), wide_work_.data()};
   if (interval.between > 0) {
     ahead_->trial_mean = wide_mean_;
@@ -266,39 +253,36 @@ bool PriorBank::move_point(const MeasuredInterval& interval, const double* end_o
     const double* const y = interval.outputs + static_cast<std::ptrdiff_t>(k) * ny_;
     expect_outputs(k, y, ahead_->trial_mean.data());
     weigh_readings(k);
-    int taken = 0;
-    for (int j = 0; j < ny_; ++j)
-      if (!std::isnan(y[j]))
-        views_->outputs[taken++] = output_of(k, j, predicted_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, y[j]);
+    const int taken = view_outputs(wide_gradient_.data() + static_cast<std::ptrdiff_t>(k) * ny_ * entries, entries, y);
     bank_kernels().update(view, views_->outputs.data(), taken, setup_.gate, squares_.data(),
                           innovation_variances_.data());
   }
   spread_variances();
-  int taken = 0;
-  for (const int j : setup_.motion_outputs)
-    if (end_outputs && !std::isnan(end_outputs[j]))
-      views_->outputs[taken++] = output_of(
-          interval.between, j,
-          wide_predicted_.data() + (static_cast<std::ptrdiff_t>(interval.between) * ny_ + j) * lanes_, end_outputs[j]);
+  views_->taken = 0;
+  for (const std::ptrdiff_t j : setup_.motion_outputs) {
+    if (!end_outputs || std::isnan(end_outputs[j])) continue;
+    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(interval.between) * ny_ + j;
+    views_->add(model_->description().outputs[j], wide_predicted_.data() + row * M,
+                wide_gradient_.data() + row * entries, output_variances_.data() + j * M, end_outputs[j]);
+  }
   ahead_->next_point = point_;
-  bank_kernels().move_point(view, views_->outputs.data(), taken, plain_count(), setup_.gate, ahead_->next_point.data(),
-                            ahead_->moved.data());
+  bank_kernels().move_point(view, views_->outputs.data(), views_->taken, plain_count(), setup_.gate,
+                            ahead_->next_point.data(), ahead_->moved.data());
   std::copy(point_.begin() + static_cast<std::ptrdiff_t>(plain_count()) * lanes_, point_.end(),
             ahead_->next_point.begin() + static_cast<std::ptrdiff_t>(plain_count()) * lanes_);
   return *std::max_element(ahead_->moved.begin(), ahead_->moved.begin() + members_) > little;
 }
 
-/// How many measurements those of number `which` stand for; null: one.
+/// How many measurements those of number `which` stand for.
 const double* PriorBank::reading_weights(int which) const noexcept {
-  return ahead_->ones.empty() ? ahead_->mixture.summary().weights() + static_cast<std::ptrdiff_t>(which) * ny_
-                              : nullptr;
+  return ahead_->mixture.summary().weights() + static_cast<std::ptrdiff_t>(which) * ny_;
 }
 
 /// Noise variances of the outputs of measurement number `which`.
 void PriorBank::weigh_readings(int which) noexcept {
   const double* const weights = reading_weights(which);
   for (std::ptrdiff_t j = 0; j < ny_; ++j)
-    std::fill_n(output_variances_.data() + j * lanes_, lanes_, learnt_[j] / (weights ? weights[j] : 1.0));
+    std::fill_n(output_variances_.data() + j * lanes_, lanes_, learnt_[j] / weights[j]);
 }
 
 /// Takes in the measurements at a time within the interval, linearised about the mean as it is by then or, as they have
@@ -325,7 +309,6 @@ void PriorBank::take_between(const MeasuredInterval& interval, int which, bool a
                     .before_lane = 1,
                     .weights = about_point ? reading_weights(which) : nullptr},
                    y, nullptr);
-  if (about_point) spread_variances();
 }
 
 /// Of an interval without measurements between its nodes, linearised about `point_`: as `take_step` from the mean.

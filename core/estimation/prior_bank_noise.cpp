@@ -99,7 +99,8 @@ void PriorBank::adapt_noise(const Frame& frame, const double* y) noexcept {
 /// 2 delta^2 (sqrt(1 + s / delta^2) - 1) has the slope 1 / sqrt(1 + s / delta^2).
 void PriorBank::weigh_outputs(const Frame& frame, const double* y, int taken, const double* given) noexcept {
   for (int j = 0; j < ny_; ++j)
-    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_, learnt_[j] + added_[j]);
+    std::fill_n(output_variances_.data() + static_cast<std::ptrdiff_t>(j) * lanes_, lanes_,
+                (learnt_[j] + added_[j]) / (frame.weights ? frame.weights[j] : 1.0));
   bank_kernels().surprise(frame.view, views_->outputs.data(), taken, surprises_.data());
   const auto place = [&](int output) {
     return std::count_if(y, y + output, [](double each) { return !std::isnan(each); });

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <numbers>
 #include <vector>
 
 #include "rhec/core/base/aligned.hpp"
@@ -31,13 +32,17 @@ struct PriorBank::LookAhead {
   Curvature output_curvature = {};                                                     ///< of these, by the state
   AlignedDoubles next_point = {}, moved = {}, trial_mean = {}, trial_covariance = {};  ///< of the wide vector
   std::vector<double> ramp_variances = {}, no_input = {};
-  std::vector<double> ones = {};  ///< weights of measurements where there are robust losses, else empty
 };
 
 /// What the kernels are given.
 struct PriorBank::Views {
   std::vector<BankProcess> processes;
-  std::vector<BankOutput> outputs;
+  std::vector<BankOutput> outputs;  ///< room for n_y
+  int taken = 0;                    ///< of them
+  void add(const Variable& output, const double* predicted, const double* gradient, const double* variance,
+           double measured) noexcept {
+    outputs[taken++] = {predicted, gradient, variance, measured, output.is_angle ? 2.0 * std::numbers::pi : 0.0};
+  }
 };
 
 /// The bank, or the wider vector that it is within an interval, with the outputs' gradients.

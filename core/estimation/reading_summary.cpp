@@ -33,11 +33,8 @@ MeasuredInterval ReadingSummary::operator()(const MeasuredInterval& interval) no
       int last = first, taken = 0;
       for (; last < interval.between && interval.times[last] < end; ++last)
         if (!std::isnan(value(last, j))) present_[taken++] = last;
-      if (is_chosen && taken >= least) {
-        summarise(interval, j, taken);
-      } else {
+      if (!is_chosen || taken < least || !summarise(interval, j, taken))
         for (int i = 0; i < taken; ++i) add(interval.times[present_[i]], j, value(present_[i], j), 1.0);
-      }
       first = last;
     }
   }
@@ -45,10 +42,13 @@ MeasuredInterval ReadingSummary::operator()(const MeasuredInterval& interval) no
 }
 
 /// The polynomials that are orthonormal over the times, by Stieltjes' procedure: their recurrence is the Jacobi matrix,
-/// whose eigenvalues are the nodes, and whose eigenvectors hold the polynomials at the nodes.
-void ReadingSummary::summarise(const MeasuredInterval& interval, int output, int taken) noexcept {
+/// whose eigenvalues are the nodes, and whose eigenvectors hold the polynomials at the nodes. False, and nothing done,
+/// if the times are too few different ones.
+bool ReadingSummary::summarise(const MeasuredInterval& interval, int output, int taken) noexcept {
   const auto time = [&](int i) { return interval.times[present_[i]]; };
+  constexpr double least_spread = 1e-3;
   const double middle = 0.5 * (time(0) + time(taken - 1)), half = 0.5 * (time(taken - 1) - time(0));
+  if (!(half > 0.0)) return false;
   const auto q = [&](int degree) { return polynomials_.data() + static_cast<std::ptrdiff_t>(degree) * taken; };
   Eigen::Matrix<double, nodes, 1> diagonal, coefficients;
   Eigen::Matrix<double, nodes - 1, 1> beside;
@@ -66,6 +66,7 @@ void ReadingSummary::summarise(const MeasuredInterval& interval, int output, int
       squares += q(d + 1)[i] * q(d + 1)[i];
     }
     beside[d] = std::sqrt(squares);
+    if (!(beside[d] > least_spread)) return false;
     for (int i = 0; i < taken; ++i) q(d + 1)[i] /= beside[d];
   }
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, nodes, nodes>> solver;
@@ -78,12 +79,14 @@ void ReadingSummary::summarise(const MeasuredInterval& interval, int output, int
     add(middle + half * solver.eigenvalues()[n], output, value / (first * std::sqrt(static_cast<double>(taken))),
         taken * first * first);
   }
+  return true;
 }
 
-/// In the order of times; outputs of one time stand in one row.
+/// In the order of times; outputs of one time stand in one row, unless one is measured twice.
 void ReadingSummary::add(double time, int output, double value, double weight) noexcept {
   const std::ptrdiff_t n = width_;
   std::ptrdiff_t row = std::lower_bound(times_.begin(), times_.begin() + count_, time) - times_.begin();
+  while (row < count_ && times_[row] == time && !std::isnan(values_[row * n + output])) ++row;
   if (row == count_ || times_[row] != time) {
     std::copy_backward(times_.begin() + row, times_.begin() + count_, times_.begin() + count_ + 1);
     for (auto* each : {&values_, &weights_})

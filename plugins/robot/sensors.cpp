@@ -79,7 +79,10 @@ std::vector<double> initial_sensor_sigmas(const RobotContext& vehicle, const Rob
   return sigmas;
 }
 
-bool senses_motion(const Model& model) noexcept { return !sensed_motion(model).empty(); }
+bool senses_motion(const Model& model) noexcept {
+  const SensorModel* const sensors = sensors_in(model);
+  return sensors && sensors->motion().count() > 0;
+}
 
 std::vector<int> sensed_motion(const Model& model) {
   const SensorModel* const sensors = sensors_in(model);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -68,6 +69,21 @@ TEST(Curvature, OfManyRowsOfOneProductHasOneFactor) {
     EXPECT_NEAR(std::abs(terms.factor(k, 0)), 1.0 + k, 1e-12);
     for (int f = 1; f < Curvature::factors; ++f) EXPECT_EQ(terms.factor(k, f), 0.0);
   }
+}
+
+TEST(Curvature, HasNoTermsWhereItIsNotFinite) {
+  Curvature terms(2, 2);
+  for (int k = 0; k < 2; ++k)
+    Eigen::Map<Eigen::Matrix2d>(terms.hessian(k), 2, 2) << 0.0, k == 0 ? NAN : 2.0, k == 0 ? HUGE_VAL : 2.0, 0.0;
+  terms.look();
+  const auto W = [](std::ptrdiff_t r, std::ptrdiff_t c) { return r == c ? 1.0 : 0.25; };
+  terms.find_factor(W);
+  terms.find_means(W);
+  EXPECT_EQ(terms.mean(0), 0.0);
+  EXPECT_EQ(terms.variance(0), 0.0);
+  EXPECT_NEAR(terms.mean(1), 0.5, 1e-12);
+  EXPECT_NEAR(std::abs(terms.factor(1, 0)), std::sqrt(terms.variance(1)), 1e-12);
+  for (int f = 0; f < Curvature::factors; ++f) EXPECT_EQ(terms.factor(0, f), 0.0);
 }
 
 TEST(Curvature, FindsTheStatesThatHaveIt) {

@@ -369,7 +369,7 @@ TEST(PriorBank, IsTheKalmanFilterWithOutputsOfMotion) {
   constexpr double sigma = 0.05, nan = std::numeric_limits<double>::quiet_NaN();
   constexpr int most = 12;
   const TurntableNoise noise{.gyro = 0.01};
-  for (const bool has_scale_error : {false, true}) {
+  for (const auto& [has_scale_error, has_loss] : {std::pair{false, false}, {true, false}, {true, true}}) {
     const auto model = turntable(has_scale_error);
     const int nx = model->state_count();
     PriorBank::Setup setup;
@@ -378,6 +378,8 @@ TEST(PriorBank, IsTheKalmanFilterWithOutputsOfMotion) {
     setup.input_variances = {noise.omega * noise.omega};
     setup.most_between = most;
     setup.motion_outputs = {1};
+    // A loss that nothing is large enough for keeps no other output from being summarised.
+    if (has_loss) setup.robust = {{.outputs = {0}, .delta = 1e8}};
     PriorBank bank(model, setup);
     const double infinity = std::numeric_limits<double>::infinity();
     KalmanFilter filter(model, {setup.output_variances, setup.input_variances, {-infinity}, {infinity}, {1}}, 1, most);

@@ -94,6 +94,22 @@ TEST(ReadingSummary, LeavesFewReadingsAndOtherOutputsAsTheyAre) {
   }
 }
 
+/// Six readings at three times hold no polynomial of degree 3.
+TEST(ReadingSummary, LeavesReadingsOfTooFewTimesAsTheyAre) {
+  Readings readings{.times = {0.05, 0.05, 0.1, 0.1, 0.15, 0.15}, .outputs = {1.0, 1.1, 2.0, 2.1, 3.0, 3.1}};
+  ReadingSummary summary({0}, 1, 6, 1);
+  for (int round = 0; round < 2; ++round) {
+    const MeasuredInterval same = summary(readings.interval());
+    ASSERT_EQ(same.between, 6);
+    for (int k = 0; k < 6; ++k) {
+      EXPECT_EQ(same.times[k], readings.times[k]) << k;
+      EXPECT_EQ(same.outputs[k], readings.outputs[k]) << k;
+      EXPECT_EQ(summary.weights()[k], 1.0) << k;
+    }
+    readings.times.assign(6, 0.1);
+  }
+}
+
 TEST(ReadingSummary, CutsTheIntervalIntoPieces) {
   std::mt19937_64 random(7);
   const Readings readings = random_readings(60, 1, random);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -28,14 +28,15 @@ class RHEC_EXPORT Curvature {
   void look() noexcept;
   /// The same of outputs at a state x, by x.
   void observe(const Model& model, const std::vector<int>& outputs, const double* x) noexcept;
-  /// Means and L of the terms with a W(r, c) by a function of two variables' numbers.
+  /// Means and L of the terms with a W(r, c) by a function of two variables' numbers. A function whose second
+  /// derivatives are not finite has none.
   template <class Covariance>
   void find_means(const Covariance& W) noexcept {
     for (std::ptrdiff_t k = 0; k < std::ssize(means_); ++k) {
       double trace = 0.0;
       for (const std::ptrdiff_t c : active_)
         for (const std::ptrdiff_t r : active_) trace += hessian(k, r, c) * W(r, c);
-      means_[k] = 0.5 * trace;
+      means_[k] = std::isfinite(trace) ? 0.5 * trace : 0.0;
     }
   }
   template <class Covariance>

@@ -26,6 +26,8 @@ class RHEC_EXPORT KalmanFilter {
     std::vector<double> parameter_lower, parameter_upper;  ///< bounds of the mean
     /// Those outputs of motion, ascending, by which an interval is linearised, see `predict`.
     std::vector<int> motion_outputs = {};
+    /// Outputs of which each measurement counts by itself, also if there are many (ReadingSummary).
+    std::vector<int> single_outputs = {};
   };
   /// `most_between`: measurements that there can be between two nodes.
   KalmanFilter(std::shared_ptr<const Model> model, Noise noise, int substeps, int most_between = 0);

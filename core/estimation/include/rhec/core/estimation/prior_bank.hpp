@@ -119,6 +119,7 @@ class RHEC_EXPORT PriorBank {
   void write_start(int parameter, const Prior& prior, int lane) noexcept;
   struct Views;  ///< what the kernels are given
   struct Frame;  ///< what outputs are taken in by
+  int view_outputs(const double* gradients, std::ptrdiff_t entries, const double* y) noexcept;
   double take_outputs(const Frame& frame, const double* y, const double* robust_weights) noexcept;
   void begin_step(const double* measured_input, double duration) noexcept;
   void take_step(double duration) noexcept;
@@ -142,8 +143,7 @@ class RHEC_EXPORT PriorBank {
   void linearise_given(const double* y) noexcept;
   void take_between(const MeasuredInterval& interval, int which, bool about_point) noexcept;
   void narrow() noexcept;
-  /// Entries of the wide vector without the factors of second-order terms, and with them.
-  int plain_count() const noexcept { return 2 * n_ - nx_ + nu_; }
+  int plain_count() const noexcept { return 2 * n_ - nx_ + nu_; }  ///< of the wide vector, without the factors f
   int wide_count() const noexcept;
   void find_distance(const double* input, double duration) noexcept;
   void advance_processes(double duration) noexcept;

@@ -31,7 +31,7 @@ class RHEC_EXPORT ReadingSummary {
   const double* weights() const noexcept { return weights_.data(); }
 
  private:
-  void summarise(const MeasuredInterval& interval, int output, int taken) noexcept;
+  bool summarise(const MeasuredInterval& interval, int output, int taken) noexcept;
   void add(double time, int output, double value, double weight) noexcept;
 
   std::vector<int> outputs_;
