@@ -99,8 +99,7 @@ struct NoiseOptions {
             .flag("adapt", &NoiseOptions::adapt,
                   "bank, and rhe with priors: learn the noise of outputs while driving, from a fifth to five "
                   "times what is stated; of outputs of motion only what comes between nodes, and not beside noise of "
-                  "states "
-                  "or drifting sensors, from which it cannot be told");
+                  "states or drifting sensors, from which it cannot be told");
     return rows;
   }
 };

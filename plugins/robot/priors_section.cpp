@@ -45,8 +45,7 @@ std::vector<OptionRow> PriorsSection::rows() {
   OptionRow row = of_parameter.row(
       "of bank and of rhe: how the parameter varies along the way, and its start. A prior with its options beside the "
       "name, a "
-      "list of priors that are "
-      "weighed against each other, or auto: a set that serves for slip of any kind");
+      "list of priors that are weighed against each other, or auto: a set that serves for slip of any kind");
   row.name = "PARAMETER";
   row.type = "prior, or list of priors";
   return {row};
@@ -76,8 +75,9 @@ std::vector<PriorCombination> PriorsSection::given() const {
 }
 
 std::vector<PriorCombination> PriorsSection::combinations() const {
+  const std::vector<PriorCombination> priors = given();  // whose mistakes have their own places
   try {
-    return standard_bank(context_->about, given());
+    return standard_bank(context_->about, priors);
   } catch (const Error& mistake) {
     throw section_.error(mistake.what());
   }

@@ -4,7 +4,7 @@
 The test of <floor>/<room>/<name>.cpp is tests/<floor>/<room>/<name>_test.cpp; a plugin's folder is a room. What outgrows one
 file goes on in <name>_<subject>_test.cpp beside it. Headers without a source may have tests too. What is in apps/ may be
 tested from outside, by tests/cli/<name>.py or tests/report/<name>.py. A folder whose CMakeLists.txt has a project() is a
-project of its own and is left out. What is tested in another place is listed here with the test that does it, and nothing
+project of its own and is left out. A test that no CMakeLists.txt names is never built, and a violation. What is tested in another place is listed here with the test that does it, and nothing
 else is: an entry that is no longer needed, or names a test that is not there, is a violation, too.
 """
 import argparse
@@ -130,6 +130,14 @@ def mirrored(test, root):
     return False
 
 
+def is_built(test, root):
+    """Whether a list of its folder, or of one above it in tests/, names a test: as a file, or without its ending."""
+    name = test.name.removesuffix("_test.cpp")
+    word = re.compile(rf"(?<![\w/]){re.escape(name)}(_test(\.cpp)?)?(?![\w.])|\b{re.escape(name)}_test\.cpp\b")
+    lists = [folder / "CMakeLists.txt" for folder in test.parents if folder.is_relative_to(root / "tests")]
+    return any(word.search(re.sub(r"#.*", "", file.read_text())) for file in lists if file.is_file())
+
+
 def violations_of(root, floors=FLOORS, untested=None, alone=None):
     untested, alone = UNTESTED if untested is None else untested, ALONE if alone is None else alone
     found, looked_at = [], 0
@@ -149,6 +157,8 @@ def violations_of(root, floors=FLOORS, untested=None, alone=None):
             continue
         looked_at += 1
         name = test.relative_to(root).as_posix()
+        if not is_built(test, root):
+            found.append(f"{name}: no CMakeLists.txt of its folder or above names it; add it, or it never runs")
         if mirrored(test, root):
             if name in alone:
                 found.append(f"{name}: mirrors a source; take it off the list in mirror.py")
@@ -172,13 +182,14 @@ def self_test():
         "core/low/include/rhec/core/low/dual.hpp", "tests/core/low/dual_test.cpp",
         "tests/core/low/angle_large_numbers_test.cpp",
         "core/low/long_name.cpp", "tests/core/low/long_name_test.cpp",
-        "core/low/special.cpp",
+        "core/low/special.cpp", "core/low/unbuilt.cpp",
         "models/cart/cart.cpp", "tests/models/cart/cart_test.cpp",
         "tests/models/every_test.cpp", "tests/models/helper.cpp",
         "apps/check.cpp", "tests/cli/check.py",
         "apps/report/page.cpp", "tests/report/page.py",
         "apps/run.cpp", "tests/cli/runs.py",
         "plugins/host/host.cpp", "tests/plugins/host/host_test.cpp",
+        "tests/CMakeLists.txt", "tests/models/CMakeLists.txt", "tests/plugins/CMakeLists.txt", "tests/solvers/CMakeLists.txt",
         "plugins/template/CMakeLists.txt", "plugins/template/own.cpp", "plugins/template/deep/own.cpp",
         "sim/CMakeLists.txt", "sim/loop/loop.cpp", "tests/sim/loop/loop_test.cpp",
         "solvers/fast/fast.cpp", "tests/solvers/fast/fast_test.cpp", "tests/solvers/conformance/all_test.cpp",
@@ -193,8 +204,13 @@ def self_test():
         "plugins/untested.cpp",
         "core/low/tested_after_all.cpp",
         "tests/solvers/listed_test.cpp",
+        "tests/core/low/unbuilt_test.cpp",
     ]
     texts = {"plugins/template/CMakeLists.txt": "cmake_minimum_required(VERSION 3.22)\nproject(mine)\n",
+             "tests/CMakeLists.txt": "angle dual long_name_test angle_large_numbers tested_after_all\nloop_test.cpp\n"
+                                     "low/moved_test.cpp gone listed # unbuilt\n",
+             "tests/models/CMakeLists.txt": "cart every\n", "tests/plugins/CMakeLists.txt": "host\n",
+             "tests/solvers/CMakeLists.txt": "fast\n",
              "sim/CMakeLists.txt": "# No project(): a part of ours.\nadd_subdirectory(loop)\n"}
     more = ["tests/core/low/tested_after_all_test.cpp", "sim/loop/by_nobody.cpp", "sim/loop/by_words.cpp"]
     by_another = "tests/models/every_test.cpp: planted"
