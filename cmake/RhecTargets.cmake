@@ -51,17 +51,29 @@ function(rhec_add_precompiled_headers NAME)
   target_compile_options(${NAME} PRIVATE ${RHEC_PRECOMPILED_OPTIONS})
   target_link_libraries(${NAME} PRIVATE rhec_flags Eigen3::Eigen fmt::fmt)
   target_precompile_headers(${NAME} PRIVATE ${RHEC_PRECOMPILED_HEADERS})
-  set(RHEC_PRECOMPILED ${NAME} PARENT_SCOPE)
+  if(RHEC_COLD)
+    target_compile_options(${NAME} PRIVATE ${RHEC_COLD_OPTIONS})
+    set(RHEC_COLD_PRECOMPILED ${NAME} PARENT_SCOPE)
+  else()
+    set(RHEC_PRECOMPILED ${NAME} PARENT_SCOPE)
+  endif()
 endfunction()
+# A folder that sets RHEC_COLD has sources which take the compiler longer than they ever run: they wait for files, or for what
+# they call. They are optimised less.
+set(RHEC_COLD_OPTIONS "$<$<CONFIG:Release,RelWithDebInfo>:-O1>")
 set(RHEC_PRECOMPILED_HEADERS
   <algorithm> <array> <charconv> <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory> <numbers> <optional>
   <set> <span> <string> <string_view> <utility> <vector> <fmt/format.h> <Eigen/Cholesky> <Eigen/Core>)
 # ccache is to know what a precompiled header holds. gcc 12 warns of sums of texts, once std::string is precompiled, that they
-# are written beyond the short texts' place in the object.
-set(RHEC_PRECOMPILED_OPTIONS "$<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess;-Wno-array-bounds;-Wno-stringop-overflow>")
+# are written beyond the short texts' place in the object, or onto themselves.
+set(RHEC_PRECOMPILED_OPTIONS "$<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-restrict>")
 
-# rhec_precompile(TARGET): the target's sources have the precompiled headers.
+# rhec_precompile(TARGET): the target's sources have the precompiled headers, those of cold sources in a folder of such.
 function(rhec_precompile TARGET)
+  if(RHEC_COLD)
+    target_compile_options(${TARGET} PRIVATE ${RHEC_COLD_OPTIONS})
+    set(RHEC_PRECOMPILED ${RHEC_COLD_PRECOMPILED})
+  endif()
   if(NOT RHEC_PRECOMPILE)
     return()
   endif()
@@ -98,7 +110,7 @@ function(rhec_unite TARGET)
       set_source_files_properties("${SOURCE}" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     endif()
   endforeach()
-  set_target_properties(${TARGET} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+  set_target_properties(${TARGET} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
 endfunction()
 
 # rhec_add_room(FLOOR ROOM [INTERNAL] [SHARED] [APART] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])

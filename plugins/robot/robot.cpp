@@ -12,9 +12,9 @@ namespace rhec {
 namespace {
 
 std::shared_ptr<const RobotContext> context_of(const Host& host, const RobotOptions& options,
-                                               const ModelSection& vehicle) {
-  const std::shared_ptr<const Model>& model = vehicle.model();
-  const NoiseSection noise(options.noise, model->description(), vehicle.left_out());
+                                               const ModelSection& section) {
+  const std::shared_ptr<const Model>& model = section.model();
+  const NoiseSection noise(options.noise, model->description(), section.left_out());
   const BoundsSection bounds(options.bounds, model->description());
   return std::make_shared<const RobotContext>(RobotContext{host, options.step, model, bounds.bounded(), noise});
 }

@@ -185,14 +185,14 @@ class Tracer {
   std::vector<int> seen_;  ///< nodes of parts before, ascending
 };
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json json_of(const TracedNode& node) {
   Json json;
   json["node"] = node.node;
   json["name"] = node.name;
   json["term"] = node.term;
-  json["value"] = number(node.value);
+  json["value"] = finite_or_null(node.value);
   json["finite"] = std::isfinite(node.value);
   return json;
 }
@@ -227,7 +227,7 @@ std::string trace_json(const FormulaTrace& trace, const ModelDescription& about,
   json["model"] = trace.model;
   json["at"] = Json::object();
   const auto add = [&](const std::vector<Variable>& variables, const std::vector<double>& values) {
-    for (std::size_t k = 0; k < variables.size(); ++k) json["at"][variables[k].name] = number(values[k]);
+    for (std::size_t k = 0; k < variables.size(); ++k) json["at"][variables[k].name] = finite_or_null(values[k]);
   };
   add(about.states, at.states);
   add(about.inputs, at.inputs);
