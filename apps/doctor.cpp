@@ -122,7 +122,7 @@ void print(const Finding& finding) {
   }
 }
 
-void print(const std::vector<PlaceFindings>& places, const std::string& name) {
+void print_places(const std::vector<PlaceFindings>& places, const std::string& name) {
   for (const PlaceFindings& each : places) {
     fmt::print("{} ({}){}\n", each.place.directory.empty() ? "''" : each.place.directory.string(),
                origin_of(each.place), each.place.skipped.empty() ? "" : ": not searched: " + each.place.skipped);
@@ -160,7 +160,7 @@ sim::Json as_json(const Finding& finding) {
   return json;
 }
 
-void print_json(const std::vector<PlaceFindings>& places) {
+void print_places_json(const std::vector<PlaceFindings>& places) {
   sim::Json json{{"places", sim::Json::array()}};
   for (const PlaceFindings& each : places) {
     auto candidates = sim::Json::array();
@@ -196,9 +196,9 @@ int examine_plugins(const Host& host, const std::string& name, bool json) {
   const bool found = std::any_of(places.begin(), places.end(), [](const auto& each) { return !each.findings.empty(); });
   if (!name.empty() && !found) nothing_called(name, host);
   if (json) {
-    print_json(places);
+    print_places_json(places);
   } else {
-    print(places, name);
+    print_places(places, name);
   }
   const Counts counts = count(places);
   return counts.not_used + counts.refused + counts.failed > 0 ? exit_not_solved : exit_fine;

@@ -97,19 +97,21 @@ function(rhec_set_up_shared_library NAME)
     LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT rhec NAMELINK_COMPONENT dev)
 endfunction()
 
-# rhec_unite(TARGET): with RHEC_UNITY, several of the target's sources are compiled as one. Those with a private header
-# beside them are not: tests link their objects (rhec_objects_of).
+# rhec_unite(TARGET): with RHEC_UNITY, several of the target's sources are compiled as one. Where tests are built with all else,
+# those with a private header beside them are not: tests link their objects (rhec_objects_of).
 function(rhec_unite TARGET)
   if(NOT RHEC_UNITY)
     return()
   endif()
-  get_target_property(SOURCES ${TARGET} SOURCES)
-  foreach(SOURCE IN LISTS SOURCES)
-    cmake_path(REPLACE_EXTENSION SOURCE hpp OUTPUT_VARIABLE HEADER)
-    if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${HEADER}")
-      set_source_files_properties("${SOURCE}" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-    endif()
-  endforeach()
+  if(RHEC_TESTS_LINK_OBJECTS)
+    get_target_property(SOURCES ${TARGET} SOURCES)
+    foreach(SOURCE IN LISTS SOURCES)
+      cmake_path(REPLACE_EXTENSION SOURCE hpp OUTPUT_VARIABLE HEADER)
+      if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${HEADER}")
+        set_source_files_properties("${SOURCE}" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+      endif()
+    endforeach()
+  endif()
   set_target_properties(${TARGET} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
 endfunction()
 
@@ -199,6 +201,7 @@ function(rhec_add_plugin NAME)
   rhec_plugin_module(${NAME} ${ARGN})
   target_link_libraries(${NAME} PRIVATE rhec_flags)
   rhec_precompile(${NAME})
+  rhec_unite(${NAME})
   file(RELATIVE_PATH LIB_FROM_PLUGINS "${CMAKE_INSTALL_FULL_LIBDIR}/rhec/plugins" "${CMAKE_INSTALL_FULL_LIBDIR}")
   set_target_properties(${NAME} PROPERTIES
     LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/${RHEC_PLUGIN_DIRECTORY}"

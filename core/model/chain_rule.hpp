@@ -10,6 +10,11 @@
 
 namespace rhec {
 
+/// The classical method of Runge and Kutta, of order 4: where its stages lie, and their weights.
+struct ClassicalMethod {
+  static constexpr std::array<double, 4> reach{0.0, 0.5, 0.5, 1.0}, share{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+};
+
 /// Where derivatives of dx/dt = f(a) are not always zero, with a = [x; p; u].
 struct RatesStructure {
   struct Entry {

@@ -12,7 +12,7 @@
 namespace rhec {
 namespace {
 
-constexpr int lanes = RadauSteps::lanes, stages = RadauMethod::stages;
+constexpr int radau_lanes = RadauSteps::lanes;
 
 IntervalLanes interval_lanes(const RadauPlan& plan) {
   const RadauPlaces& at = plan.places();
@@ -47,7 +47,7 @@ RadauSteps::RadauSteps(std::shared_ptr<const RatesTapes> tapes, int nx, int np, 
     scales_.push_back(scales[static_cast<std::size_t>(single_.plan.state_of(q))]);
   const int registers =
       std::max({tapes_->rates.register_count(), tapes_->slopes.register_count(), tapes_->bends.register_count()});
-  memory_ = (static_cast<std::size_t>(single_.plan.places().count) + static_cast<std::size_t>(registers)) * lanes;
+  memory_ = (static_cast<std::size_t>(single_.plan.places().count) + static_cast<std::size_t>(registers)) * radau_lanes;
 }
 
 /// Eight intervals at most.
@@ -77,7 +77,7 @@ class RadauSteps::Run {
     }
   }
 
-  double* at(std::uint32_t place) const { return memory_ + static_cast<std::size_t>(place) * lanes; }
+  double* at(std::uint32_t place) const { return memory_ + static_cast<std::size_t>(place) * radau_lanes; }
   const double* memory() const { return memory_; }
   const RadauPlan& plan() const { return plan_; }
 
@@ -86,7 +86,7 @@ class RadauSteps::Run {
   template <class Store>
   void integrate(const double* durations, int count, Store store) {
     count_ = count;
-    for (int i = 0; i < lanes; ++i) {
+    for (int i = 0; i < radau_lanes; ++i) {
       const double h = durations[std::min(i, count - 1)] * (1.0 / substeps_);
       at(at_.h)[i] = h;
       at(at_.minus_h)[i] = -h;
@@ -105,10 +105,10 @@ class RadauSteps::Run {
 
  private:
   void multiply(RadauPlan::Products products) const { kernels_.add_products(products, memory_); }
-  void fill(std::uint32_t place, double value) const { std::fill_n(at(place), lanes, value); }
-  void clear(std::uint32_t first, int count) const { std::fill_n(at(first), std::ptrdiff_t{count} * lanes, 0.0); }
+  void fill(std::uint32_t place, double value) const { std::fill_n(at(place), radau_lanes, value); }
+  void clear(std::uint32_t first, int count) const { std::fill_n(at(first), std::ptrdiff_t{count} * radau_lanes, 0.0); }
   void copy(std::uint32_t from, std::uint32_t to, int count) const {
-    std::copy_n(at(from), std::ptrdiff_t{count} * lanes, at(to));
+    std::copy_n(at(from), std::ptrdiff_t{count} * radau_lanes, at(to));
   }
 
   /// The first `steps` steps; stages and derivatives of the last one stay.
@@ -123,7 +123,7 @@ class RadauSteps::Run {
       if (step > 0) begin_at_end(with_jacobian);
       for (std::uint32_t s = 0; s < 3; ++s) {
         const double run = (step + plan_.method().nodes[s]) / substeps_;
-        for (int i = 0; i < lanes; ++i) {
+        for (int i = 0; i < radau_lanes; ++i) {
           at(at_.run + s)[i] = run;
           at(at_.rest + s)[i] = 1.0 - run;
           at(at_.h_run + s)[i] = at(at_.h)[i] * run;
@@ -153,7 +153,7 @@ class RadauSteps::Run {
       multiply(plan_.arguments(static_cast<int>(s)));
       copy_to_registers(at_.arguments[s], plan_.na(), 0);
       const Tape& tape = of_.tapes_->slopes;
-      tape.run(kernels_, registers_, lanes, count_);
+      tape.run(kernels_, registers_, radau_lanes, count_);
       for (int r = 0; r < plan_.nx(); ++r) take_result(tape, r, at_.rates[s] + static_cast<std::uint32_t>(r));
       std::uint32_t to = at_.slopes[s];
       for (const int result : of_.slopes_) take_result(tape, result, to++);
@@ -165,17 +165,17 @@ class RadauSteps::Run {
   void factor() {
     multiply(plan_.matrix());
     for (int q = 0; q < plan_.unknowns(); ++q) {
-      const auto s = static_cast<std::size_t>(q % stages);
+      const auto s = static_cast<std::size_t>(q % RadauMethod::stages);
       const double own = plan_.method().inverse[s][s];
       const double* const diagonal = at(plan_.diagonal(q));
       double* const scale = at(at_.pivots + static_cast<std::uint32_t>(q));
-      for (int i = 0; i < lanes; ++i) scale[i] = own + std::abs(diagonal[i] - own);
+      for (int i = 0; i < radau_lanes; ++i) scale[i] = own + std::abs(diagonal[i] - own);
     }
     for (int q = 0; q < plan_.unknowns(); ++q) {
       const double* const diagonal = at(plan_.diagonal(q));
       double* const pivots = at(at_.pivots + static_cast<std::uint32_t>(q));
       double* const minus = at(at_.minus_pivots + static_cast<std::uint32_t>(q));
-      for (int i = 0; i < lanes; ++i) {
+      for (int i = 0; i < radau_lanes; ++i) {
         const bool is_lost = std::abs(diagonal[i]) < least_pivot * pivots[i];
         pivots[i] = is_lost ? std::numeric_limits<double>::quiet_NaN() : 1.0 / diagonal[i];
         minus[i] = -pivots[i];
@@ -187,8 +187,8 @@ class RadauSteps::Run {
   /// Newton's method for the stages, with half the step, and again half, where the residual grows.
   void solve() {
     const int unknowns = plan_.unknowns();
-    std::array<bool, lanes> is_done{};
-    std::array<double, lanes> share{}, last{};
+    std::array<bool, radau_lanes> is_done{};
+    std::array<double, radau_lanes> share{}, last{};
     last.fill(std::numeric_limits<double>::infinity());
     clear(at_.moves, unknowns);
     clear(at_.base, unknowns);
@@ -197,9 +197,9 @@ class RadauSteps::Run {
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
       evaluate();
       multiply(plan_.residual());
-      const std::array<double, lanes> size = largest(at_.residual);
-      std::array<bool, lanes> is_worse{};
-      for (std::size_t i = 0; i < lanes; ++i) {
+      const std::array<double, radau_lanes> size = largest(at_.residual);
+      std::array<bool, radau_lanes> is_worse{};
+      for (std::size_t i = 0; i < radau_lanes; ++i) {
         is_worse[i] = !is_done[i] && iteration > 0 && !(size[i] <= last[i]) && share[i] > least_share;
         if (is_worse[i]) {
           share[i] *= 0.5;
@@ -211,8 +211,8 @@ class RadauSteps::Run {
       factor();
       multiply(plan_.solve());
       bool are_all_done = true;
-      const std::array<double, lanes> length = largest(at_.newton);
-      for (std::size_t i = 0; i < lanes; ++i) {
+      const std::array<double, radau_lanes> length = largest(at_.newton);
+      for (std::size_t i = 0; i < radau_lanes; ++i) {
         if (is_done[i]) continue;
         if (is_worse[i]) {
           move(i, at_.tried, share[i]);
@@ -229,7 +229,7 @@ class RadauSteps::Run {
       if (are_all_done) return;
     }
     constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
-    for (std::size_t i = 0; i < lanes; ++i) {
+    for (std::size_t i = 0; i < radau_lanes; ++i) {
       if (is_done[i]) continue;
       for (const std::uint32_t place : {at_.h, at_.minus_h}) at(place)[i] = nothing;
       for (std::uint32_t q = 0; q < static_cast<std::uint32_t>(unknowns); ++q) at(at_.moves + q)[i] = nothing;
@@ -243,13 +243,13 @@ class RadauSteps::Run {
   }
 
   /// In typical magnitudes of the states, or in what they have.
-  std::array<double, lanes> largest(std::uint32_t place) const {
-    std::array<double, lanes> most{};
+  std::array<double, radau_lanes> largest(std::uint32_t place) const {
+    std::array<double, radau_lanes> most{};
     for (int q = 0; q < plan_.unknowns(); ++q) {
       const double* const x = at(at_.x + static_cast<std::uint32_t>(plan_.state_of(q)));
       const double* const values = at(place + static_cast<std::uint32_t>(q));
       const double scale = of_.scales_[static_cast<std::size_t>(q)];
-      for (std::size_t i = 0; i < lanes; ++i) {
+      for (std::size_t i = 0; i < radau_lanes; ++i) {
         const double size = std::abs(values[i]) / (scale + std::abs(x[i]));
         most[i] = size <= most[i] ? most[i] : size;  // a NaN stays
       }
@@ -264,7 +264,7 @@ class RadauSteps::Run {
       copy_to_registers(at_.arguments[s], plan_.na(), 0);
       copy_to_registers(at_.stage_weights[s], plan_.nx(), plan_.na());
       const Tape& tape = of_.tapes_->bends;
-      tape.run(kernels_, registers_, lanes, count_);
+      tape.run(kernels_, registers_, radau_lanes, count_);
       std::uint32_t to = at_.bends;
       for (const int result : of_.bends_) take_result(tape, result, to++);
       multiply(plan_.curvature(static_cast<int>(s)));
@@ -273,7 +273,7 @@ class RadauSteps::Run {
   }
 
   void copy_to_registers(std::uint32_t from, int count, int first) const {
-    std::copy_n(at(from), std::ptrdiff_t{count} * lanes, registers_ + std::ptrdiff_t{first} * lanes);
+    std::copy_n(at(from), std::ptrdiff_t{count} * radau_lanes, registers_ + std::ptrdiff_t{first} * radau_lanes);
   }
 
   void take_result(const Tape& tape, int which, std::uint32_t place) const {
@@ -303,11 +303,12 @@ void RadauSteps::integrate(const Model::Intervals& q, const TapeKernels& kernels
 
 long RadauSteps::operations(bool with_jacobian, bool with_hessian) const {
   constexpr long iterations = 4;
-  const long evaluation = long{stages} * tapes_->slopes.instruction_count();
+  const long evaluation = long{RadauMethod::stages} * tapes_->slopes.instruction_count();
   long sum = iterations * (evaluation + single_.plan.iteration_operations());
   if (with_jacobian || with_hessian)
     sum += evaluation + single_.plan.iteration_operations() + single_.plan.sensitivity_operations();
-  if (with_hessian) sum += long{stages} * tapes_->bends.instruction_count() + single_.plan.hessian_operations();
+  if (with_hessian)
+    sum += long{RadauMethod::stages} * tapes_->bends.instruction_count() + single_.plan.hessian_operations();
   return sum;
 }
 

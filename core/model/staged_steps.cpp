@@ -11,7 +11,6 @@ namespace rhec {
 namespace {
 
 constexpr int lanes = StagedSteps::lanes;
-constexpr std::array<double, 4> reach{0.0, 0.5, 0.5, 1.0}, share{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
 
 IntervalLanes interval_lanes(const ChainRulePlaces& at) {
   return {.nx = at.nx,
@@ -113,8 +112,8 @@ class StagedSteps::Run {
     for (int i = 0; i < lanes; ++i) {
       const double h = durations[std::min(i, count - 1)] * (1.0 / substeps_);
       for (std::uint32_t k = 0; k < 4; ++k) {
-        at(at_.reach + k)[i] = h * reach[k];
-        at(at_.share + k)[i] = h * share[k];
+        at(at_.reach + k)[i] = h * ClassicalMethod::reach[k];
+        at(at_.share + k)[i] = h * ClassicalMethod::share[k];
       }
     }
     if (!wanted_.hessian) {
@@ -152,7 +151,7 @@ class StagedSteps::Run {
         if (with_jacobian) std::copy_n(at(at_.moved_next), matrix(), at(at_.moved[0]));
       }
       for (std::uint32_t k = 0; k < 4 && at_.ramp; ++k) {
-        const double moved = (step + reach[k]) / substeps_;
+        const double moved = (step + ClassicalMethod::reach[k]) / substeps_;
         std::fill_n(at(at_.run + k), lanes, moved);
         std::fill_n(at(at_.rest + k), lanes, 1.0 - moved);
       }

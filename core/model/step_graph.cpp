@@ -4,10 +4,10 @@
 #include <array>
 #include <cstddef>
 
+#include "chain_rule.hpp"
+
 namespace rhec {
 namespace {
-
-constexpr std::array<double, 4> reach{0.0, 0.5, 0.5, 1.0}, share{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
 
 template <class... Lists>
 std::vector<int> joined(const Lists&... lists) {
@@ -64,9 +64,9 @@ class StepBuilder {
     for (int k = 0; k < 4; ++k) {
       std::vector<int> at = arguments_;
       for (int j = 0; j < nx() && k > 0; ++j)
-        at[j] = graph_.add(at[j], graph_.multiply(scaled(reach[k], step_.h), rates[j]));
+        at[j] = graph_.add(at[j], graph_.multiply(scaled(ClassicalMethod::reach[k], step_.h), rates[j]));
       for (int j = 0; j < np() && ramp_; ++j) {
-        const int moved = graph_.add(step_.fraction, scaled(reach[k], step_.share));
+        const int moved = graph_.add(step_.fraction, scaled(ClassicalMethod::reach[k], step_.share));
         const int range = graph_.subtract(step_.z[arguments_.size() + j], at[nx() + j]);
         at[nx() + j] = graph_.add(at[nx() + j], graph_.multiply(range, moved));
       }
@@ -76,7 +76,7 @@ class StepBuilder {
     for (int j = 0; j < nx(); ++j) {
       const int outer = graph_.add(stages_[0].rates[j], stages_[3].rates[j]),
                 inner = graph_.add(stages_[1].rates[j], stages_[2].rates[j]);
-      const int mean = graph_.add(scaled(share[0], outer), scaled(share[1], inner));
+      const int mean = graph_.add(scaled(ClassicalMethod::share[0], outer), scaled(ClassicalMethod::share[1], inner));
       step_.next.push_back(graph_.add(step_.z[j], graph_.multiply(step_.h, mean)));
     }
   }
@@ -117,8 +117,8 @@ class StepBuilder {
             pulled[c] = graph_.add(pulled[c], graph_.multiply(slopes[r * na + c], adjoint[r]));
       }
       for (int c = 0; c < nx(); ++c) {
-        int node = graph_.multiply(scaled(share[k], step_.h), step_.weights[c]);
-        if (k < 3) node = graph_.add(node, graph_.multiply(scaled(reach[k + 1], step_.h), pulled[c]));
+        int node = graph_.multiply(scaled(ClassicalMethod::share[k], step_.h), step_.weights[c]);
+        if (k < 3) node = graph_.add(node, graph_.multiply(scaled(ClassicalMethod::reach[k + 1], step_.h), pulled[c]));
         now.push_back(node);
       }
       adjoint = now;

@@ -67,12 +67,17 @@ bool is_more(int a, int b) { return b != 0 && (a == 0 || a > b); }
 
 /// The state whose participation factor |left eigenvector x right eigenvector| in a mode is the largest (Perez-Arriaga,
 /// Verghese and Schweppe 1982); without left eigenvectors the largest entry of the right one in typical magnitudes.
-int leading_state(const Eigen::MatrixXcd& modes, Eigen::Index mode, const ModelDescription& about) {
-  const Eigen::PartialPivLU<Eigen::MatrixXcd> lu(modes);
-  const Eigen::MatrixXcd left = lu.inverse();
-  Eigen::VectorXd part = modes.col(mode).cwiseAbs().cwiseProduct(left.row(mode).transpose().cwiseAbs());
+int leading_state(const Eigen::EigenSolver<Eigen::MatrixXd>& solver, Eigen::Index mode, const ModelDescription& about) {
+  // Right eigenvectors of a pair are columns a + i b and a - i b, left ones half the rows of their inverse, a - i b and
+  // a + i b.
+  const Eigen::MatrixXd right = solver.pseudoEigenvectors();
+  const Eigen::MatrixXd left = Eigen::PartialPivLU<Eigen::MatrixXd>(right).inverse();
+  const double turning = solver.eigenvalues()[mode].imag();
+  const Eigen::Index first = turning < 0.0 ? mode - 1 : mode, count = turning == 0.0 ? 1 : 2;
+  const Eigen::VectorXd size = right.middleCols(first, count).rowwise().norm();
+  Eigen::VectorXd part = left.middleRows(first, count).colwise().norm().transpose().cwiseProduct(size);
   if (!part.allFinite())
-    for (Eigen::Index j = 0; j < part.size(); ++j) part[j] = std::abs(modes(j, mode)) / about.states[j].scale;
+    for (Eigen::Index j = 0; j < part.size(); ++j) part[j] = size[j] / about.states[j].scale;
   Eigen::Index leading = 0;
   part.maxCoeff(&leading);
   return static_cast<int>(leading);
@@ -101,7 +106,7 @@ StepRequirement mode_requirement(const Model& model, const OperatingPoint& point
     if (needed.state >= 0 && !is_more(exact, needed.mode_substeps)) continue;
     needed.mode_substeps = needed.substeps = exact;
     needed.time_constant = 1.0 / std::abs(lambda);
-    needed.state = leading_state(solver.eigenvectors(), mode, model.description());
+    needed.state = leading_state(solver, mode, model.description());
   }
   return needed;
 }

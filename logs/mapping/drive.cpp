@@ -12,7 +12,7 @@
 namespace rhec::logs {
 namespace {
 
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 // Messages that take longer than this from stamp to arrival were stamped by another clock [s]; and so were those that
 // arrive before they were measured.
 constexpr double longest_way = 10.0, smallest_lead = 1e-3;
@@ -125,7 +125,7 @@ class DriveReader {
   }
 
   double usual_interval(std::size_t input) const {
-    double first = missing, last = missing;
+    double first = nothing, last = nothing;
     std::int64_t count = 0;
     for (const DriveEvent& event : drive_.events) {
       if (event.is_output || std::isnan(drive_.values[event.values + input])) continue;

@@ -8,7 +8,6 @@
 #include <memory>
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 
 #include "rhec/core/base/angle.hpp"
 #include "rhec/core/base/error.hpp"
@@ -28,6 +27,17 @@ struct Displacement {
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  ///< [m]
   bool is_common = false;  ///< all outputs that depend on the position are off by it, and no other output is off
 };
+
+/// The shortest x that makes |A x - b| the least, of two columns A that are not zero.
+Eigen::Vector2d least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b) {
+  const double xx = A.col(0).squaredNorm(), xy = A.col(0).dot(A.col(1)), yy = A.col(1).squaredNorm();
+  const Eigen::Vector2d right(A.col(0).dot(b), A.col(1).dot(b));
+  const double determinant = xx * yy - xy * xy, trace = xx + yy;
+  // With columns of one direction, A'A has one eigenvalue besides zero: its trace.
+  if (determinant <= rounding * trace * trace)
+    return Eigen::Vector2d(xx * right[0] + xy * right[1], xy * right[0] + yy * right[1]) / (trace * trace);
+  return Eigen::Vector2d(yy * right[0] - xy * right[1], xx * right[1] - xy * right[0]) / determinant;
+}
 
 /// Finds the shift of the vehicle's position that explains best what was added to its outputs.
 class DisplacementOfOutputs {
@@ -52,7 +62,7 @@ class DisplacementOfOutputs {
     }
     Displacement found;
     if (rows.isZero(0.0) || values.isZero(0.0) || !values.allFinite()) return found;
-    found.shift = rows.completeOrthogonalDecomposition().solve(values);
+    found.shift = least_squares(rows, values);
     found.is_common = is_complete && (rows * found.shift - values).norm() <= rounding * values.norm();
     return found;
   }

@@ -17,7 +17,7 @@ namespace {
 constexpr std::int64_t application = 0x72686d70;  // 'rhmp': how a map is told from other databases
 constexpr std::int64_t version = 1;
 
-constexpr const char* schema = R"(
+constexpr const char* slip_map_schema = R"(
   CREATE TABLE about (vehicle TEXT NOT NULL, model TEXT NOT NULL, frame TEXT NOT NULL, origin_x REAL NOT NULL,
                       origin_y REAL NOT NULL, cell REAL NOT NULL);
   CREATE TABLE parameters (parameter INTEGER PRIMARY KEY, name TEXT NOT NULL, unit TEXT NOT NULL);
@@ -114,7 +114,7 @@ void write_slip_map(const fs::path& file, const SlipMapContent& content) {
         "PRAGMA journal_mode = OFF; PRAGMA synchronous = FULL");  // it is moved into place once it is whole
     database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", application, version));
     SqliteTransaction all(database);
-    database.execute(schema);
+    database.execute(slip_map_schema);
     SqliteStatement about = database.prepare("INSERT INTO about VALUES (?1, ?2, ?3, ?4, ?5, ?6)");
     const MapIdentity& identity = content.identity;
     about.bind(1, identity.vehicle);

@@ -21,7 +21,6 @@ namespace {
 constexpr double trade_offs[] = {0.1, 0.3, 1.0, 3.0};
 // A run that does not reach the end of its path counts as tracking so many times worse than the scenario.
 constexpr double lost = 100.0;
-constexpr int written_digits = 4;
 
 struct Drive {
   double tracking = 0.0, effort = 0.0;

@@ -21,7 +21,7 @@ namespace {
 using Seconds = std::chrono::duration<double>;
 
 /// From here on a number is little more certain than before.
-constexpr double told_below = 0.5;
+constexpr double certain_below = 0.5;
 
 Settings with_filter(Settings settings) {
   settings.set("estimator.name", Settings::scalar("ekf"));
@@ -136,7 +136,7 @@ class Tuner {
       number.is_at_bound = !precision.is_free[i];
       number.error = tunables_[i].error_of(precision.error(static_cast<int>(i)), number.value);
       number.hessian_error = tunables_[i].error_of(precision.hessian_errors[j], number.value);
-      number.is_told = number.is_at_bound || precision.error(static_cast<int>(i)) < told_below;
+      number.is_told = number.is_at_bound || precision.error(static_cast<int>(i)) < certain_below;
       result_.numbers.push_back(std::move(number));
     }
   }

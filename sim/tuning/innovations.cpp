@@ -16,7 +16,7 @@ namespace {
 // Tails heavier than Cauchy's are no measurement's.
 constexpr double least_degrees = 1.0;
 // Squared innovation where a filter has no numbers any more.
-constexpr double lost = 1e12;
+constexpr double squared_of_lost = 1e12;
 
 /// std::lgamma writes the sign to a variable that all threads share.
 double log_gamma(double x) noexcept {
@@ -89,7 +89,7 @@ class InnovationMethod final : public EstimationMethod {
     innovation.log_determinant = std::log(determinant);
     // A filter that has lost its way expected nothing of the kind.
     if (!std::isfinite(innovation.squared) || !std::isfinite(innovation.log_determinant) || !(determinant > 0.0))
-      innovation = {.size = size, .squared = lost, .log_determinant = 0.0};
+      innovation = {.size = size, .squared = squared_of_lost, .log_determinant = 0.0};
   }
 
   std::unique_ptr<EstimationMethod> method_;

@@ -15,6 +15,11 @@
 
 namespace rhec::sim {
 
+/// A log likelihood that is higher by no more than this is no better.
+inline constexpr double as_good = 2.0;
+/// What a search may take.
+inline constexpr int evaluations_per_number = 30;
+
 /// `tune_on_log`, step by step.
 class LogTuner {
  public:

@@ -15,14 +15,11 @@ namespace {
 
 // Ground that is driven before fixes count: until then the filter finds its heading. At most this share of the log.
 constexpr double found_after = 25.0, most_found = 0.1;
-// A log likelihood that is higher by no more than this is no better.
-constexpr double as_good = 2.0;
 // Another law must gain more than `as_good`, and than so many standard errors of its gain.
 constexpr double gain_errors = 1.64;
-constexpr int evaluations_per_number = 30, evaluations_of_a_law = 60, most_rounds = 12;
+constexpr int evaluations_of_a_law = 60, most_rounds = 12;
 // What an objective is where there is none, below its start.
 constexpr double hopeless = 1e4;
-constexpr int written_digits = 4;
 
 double width_of(const Variable& parameter) {
   const double width = parameter.upper - parameter.lower;

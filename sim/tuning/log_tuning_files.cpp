@@ -18,9 +18,9 @@ Json interval_json(const std::pair<double, double>& interval) {
 }
 
 // Sizes of the drawing [pixels].
-constexpr double width = 1080.0, margin = 20.0, panel_height = 170.0, gap = 46.0, head = 64.0;
+constexpr double page_width = 1080.0, margin = 20.0, panel_height = 170.0, gap = 46.0, head = 64.0;
 constexpr int columns = 4;
-constexpr const char* small_text = R"(font-size="11" fill="#5f6368")";
+constexpr const char* panel_text = R"(font-size="11" fill="#5f6368")";
 constexpr const char* head_text = R"(font-size="12" font-weight="bold" fill="#222")";
 
 // A log likelihood this far below its maximum is the lower end of a panel, or farther where the likelihood is rough.
@@ -62,7 +62,7 @@ void draw_slice(Svg& svg, const TunedNumber& number, Point corner, double panel_
   if (deepest > least_depth) line += fmt::format("; height {:.0f}", deepest);
   if (!number.is_told) line += "; not told";
   if (number.is_at_bound) line += "; at its bound";
-  svg.text({left, top - 6.0}, line, small_text);
+  svg.text({left, top - 6.0}, line, panel_text);
   svg.begin_clip({left, top}, panel_width, panel_height);
   if (shows_error)
     svg.rectangle({x(number.value - number.error), top},
@@ -170,8 +170,8 @@ std::string summary_json(const LogTuning& tuning) {
 std::string tuning_svg(const LogTuning& tuning) {
   const auto count = static_cast<int>(tuning.numbers.size());
   const int rows = (count + columns - 1) / columns;
-  const double panel_width = (width - 2.0 * margin - (columns - 1) * gap * 0.5) / columns;
-  Svg svg(width, head + rows * (panel_height + gap + 22.0) + margin);
+  const double panel_width = (page_width - 2.0 * margin - (columns - 1) * gap * 0.5) / columns;
+  Svg svg(page_width, head + rows * (panel_height + gap + 22.0) + margin);
   svg.text({margin, 24.0}, "Log likelihood of the fixes about what was found",
            R"(font-size="15" font-weight="bold" fill="#222")");
   svg.text(
@@ -179,7 +179,7 @@ std::string tuning_svg(const LogTuning& tuning) {
       fmt::format("one number at a time, the others held; red: found, grey: its standard error with the others free, "
                   "dashed: before; a panel is {:g} high where it says nothing else",
                   least_depth),
-      small_text);
+      panel_text);
   for (int i = 0; i < count; ++i) {
     const int row = i / columns, column = i % columns;
     draw_slice(svg, tuning.numbers[static_cast<std::size_t>(i)],

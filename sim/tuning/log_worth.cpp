@@ -17,11 +17,7 @@ namespace {
 
 // A coordinate whose standard error is not below this share of its doubt is not told by the log.
 constexpr double told_below = 0.5;
-// A log likelihood that is lower by no more than this is as good.
-constexpr double as_good = 2.0;
-constexpr int evaluations_per_number = 30;
 constexpr std::size_t most_named = 6;  // confounded pairs
-constexpr int written_digits = 4;
 constexpr int fewest_blocks = 10, most_blocks = 60, fixes_of_a_block = 10;
 constexpr double block_seconds = 30.0;
 // Estimators are chosen by these many rests of so many, at least.

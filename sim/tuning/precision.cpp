@@ -14,7 +14,7 @@ namespace {
 
 // First width of a slice, the longest and the shortest, in the coordinate's unit.
 constexpr double first_step = 0.1, longest_step = 1.0, shortest_step = 0.002;
-constexpr int most_rounds = 4;
+constexpr int most_slice_rounds = 4;
 // A slice falls by so many times the roughness.
 constexpr double rough_drops = 4.0;
 // Closer to a bound than this a coordinate counts as at it.
@@ -98,7 +98,7 @@ Precision precision_at(const LikelihoodTerms& terms, const Eigen::VectorXd& at, 
     if (!result.is_free[i]) return;
     Slice& slice = slices[i];
     double width = std::min(first_step, room(i));
-    for (int round = 0; round < most_rounds && !stopped(); ++round) {
+    for (int round = 0; round < most_slice_rounds && !stopped(); ++round) {
       slice = measure([&](double step) { return terms(moved(i, step)); }, width);
       const double wanted = std::max(1.0, rough_drops * slice.roughness), drop = slice.drop();
       if (drop > 0.5 * wanted && drop < 3.0 * wanted) break;

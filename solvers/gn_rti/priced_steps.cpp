@@ -12,7 +12,7 @@ namespace rhec::gn_rti {
 namespace {
 
 // Prices relative to the gradient.
-constexpr double low_price = 1e-1, high_price = 1e2, dearer = 1e1, highest_price = 1e7;
+constexpr double low_price = 1e-1, high_price = 1e2, dearer = 1e1, dearest_price = 1e7;
 // The price rises where a step leaves more than the first share of the violation and a higher price removes more of
 // what is left than the second one does not.
 constexpr double enough_left = 0.5, less = 0.9;
@@ -108,7 +108,7 @@ StageQpSolver::Outcome GnRti::solve_priced(Report& report, Clock::time_point dea
   price_ = std::max(price_, first_price_ * unit);
   const double now = price_;
   const auto outcome = solve_at(now);
-  if (damping_ > 0.0 || before <= options_.tolerance || now > highest_price * unit || !is_step(outcome)) return outcome;
+  if (damping_ > 0.0 || before <= options_.tolerance || now > dearest_price * unit || !is_step(outcome)) return outcome;
   const double after = violation_after(given, step_);
   if (after <= enough_left * before) return outcome;
   const auto dear = solve_at(dearer * now);

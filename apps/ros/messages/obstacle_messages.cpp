@@ -21,7 +21,7 @@ using logs::CdrCursor;
 using logs::Kind;
 
 // What moves faster, or is larger, is no obstacle on the ground but a mistake [m/s], [m].
-constexpr double fastest = 1000.0, largest = 1e6;
+constexpr double fastest_obstacle = 1000.0, largest = 1e6;
 // What is thinner states no width [m].
 constexpr double thinnest = 1e-3;
 
@@ -156,8 +156,8 @@ SeenObstacles read_obstacle_array(std::span<const std::byte> message, double rad
     Obstacle obstacle = ellipse_around(outline, own_radius);
     if (std::min(obstacle.semi_axis_along, obstacle.semi_axis_across) < thinnest)
       obstacle = ellipse_around(outline, radius);
-    obstacle.velocity_x = read_bounded(cursor, -fastest, fastest, "velocity");
-    obstacle.velocity_y = read_bounded(cursor, -fastest, fastest, "velocity");
+    obstacle.velocity_x = read_bounded(cursor, -fastest_obstacle, fastest_obstacle, "velocity");
+    obstacle.velocity_y = read_bounded(cursor, -fastest_obstacle, fastest_obstacle, "velocity");
     cursor.skip_numbers(Kind::f64, 4 + numbers_of_covariance);  // upwards, and turning
     seen.obstacles.push_back(obstacle);
   }

@@ -36,6 +36,9 @@ struct RHEC_EXPORT Tunable {
   double error_of(double coordinate_error, double value) const noexcept;
 };
 
+/// The significant digits that numbers are written with once they are found.
+inline constexpr int written_digits = 4;
+
 /// A coordinate for each of `tunables`, put into the settings of a scenario, with `digits` significant ones.
 RHEC_EXPORT Settings with_values(Settings settings, const std::vector<Tunable>& tunables, const Eigen::VectorXd& at,
                                  int digits = 17);
