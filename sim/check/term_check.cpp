@@ -209,6 +209,7 @@ std::vector<Finding> check_numbers(const std::vector<TermFormula>& on, const Ter
   for (const TermFormula& formula : on) {
     TermSamples samples(formula, places, options.seed);
     std::vector<Samples::Point> bad;
+    std::size_t example = 0;
     int values = 0, first = 0, second = 0;
     for (int begin = 0; begin < options.samples; begin += batch) {
       std::vector<Samples::Point> points;
@@ -216,7 +217,8 @@ std::vector<Finding> check_numbers(const std::vector<TermFormula>& on, const Ter
       const std::vector<TermSamples::Look> looks = samples.look(points);
       for (std::size_t i = 0; i < points.size(); ++i) {
         if (!looks[i].bad()) continue;
-        values += looks[i].values;
+        // One whose value is not finite tells more than one of whose derivatives alone that is so.
+        if (looks[i].values && values++ == 0) example = bad.size();
         first += looks[i].first;
         second += looks[i].second;
         bad.push_back(std::move(points[i]));
@@ -225,7 +227,7 @@ std::vector<Finding> check_numbers(const std::vector<TermFormula>& on, const Ter
     if (bad.empty()) continue;
     bad_vehicles.push_back(formula.about().name);
     if (bad_vehicles.size() > 1) continue;
-    const Blame because = blame(formula, places, samples, bad.front());
+    const Blame because = blame(formula, places, samples, bad[example]);
     region = region_of(samples, bad, [&](std::span<const Samples::Point> points) {
       std::vector<bool> judged;
       for (const TermSamples::Look& look : samples.look(points)) judged.push_back(look.bad());
@@ -235,7 +237,7 @@ std::vector<Finding> check_numbers(const std::vector<TermFormula>& on, const Ter
         "{} of {} samples give limits, costs or derivatives that are not finite (values {}, first derivatives {}, "
         "second "
         "{}), e.g. at {}{}",
-        bad.size(), options.samples, values, first, second, samples.text_of(bad.front()), because.found);
+        bad.size(), options.samples, values, first, second, samples.text_of(bad[example]), because.found);
     advice = because.advice;
     numbers = {{"samples", options.samples},
                {"bad", static_cast<double>(bad.size())},
