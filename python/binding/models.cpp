@@ -177,7 +177,7 @@ py::dict sources_of(const std::string& file) {
   return made;
 }
 
-py::dict roles_of(const Vehicle& self) {
+py::object roles_of(const Vehicle& self) {
   const Roles& roles = self.about.roles;
   py::dict made;
   const auto add = [&made](const char* role, int index, const std::vector<Variable>& variables) {
@@ -189,7 +189,7 @@ py::dict roles_of(const Vehicle& self) {
   add("speed", roles.speed, self.about.inputs);
   add("speed_state", roles.speed_state, self.about.states);
   add("speed_factor", roles.speed_factor, self.about.parameters);
-  return made;
+  return named(made);
 }
 
 }  // namespace

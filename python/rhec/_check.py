@@ -7,7 +7,7 @@ from typing import Any
 
 from . import _configuration, _rhec
 from ._arguments import checked, found_in_words
-from ._errors import ArgumentError
+from ._errors import ArgumentError, Names
 from ._table import Table
 from ._types import PluginPath
 
@@ -23,7 +23,7 @@ class Check:
     def __init__(self, text: str) -> None:
         import numpy
 
-        self.details: dict[str, Any] = json.loads(text)
+        self.details: dict[str, Any] = json.loads(text, object_hook=Names)
         columns = ("check", "verdict", "where", "found", "advice")
         self.findings = Table({column: numpy.array([each.get(column, "") for each in self.details["findings"]], dtype=object)
                                for column in columns})

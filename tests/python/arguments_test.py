@@ -45,7 +45,8 @@ def calls(things):
         yield f"_rhec.{kind.name}", getattr(_rhec, kind.name)
         of = things.get(f"_rhec.{kind.name}", things.get(kind.name))
         for name, member in functions(kind.body).items():
-            if name != "__init__" and not any(getattr(mark, "id", "") == "property" for mark in member.decorator_list):
+            # Anything may be looked for by `in`.
+            if name not in ("__init__", "__contains__") and not any(getattr(mark, "id", "") == "property" for mark in member.decorator_list):
                 yield f"_rhec.{kind.name}.{name}", getattr(of if isinstance(of, getattr(_rhec, kind.name)) else getattr(_rhec, kind.name), name)
     for name in rhec.__all__:
         value = getattr(rhec, name)

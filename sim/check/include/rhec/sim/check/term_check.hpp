@@ -60,8 +60,8 @@ RHEC_EXPORT TermCheck check_term(const Host& host, const Settings& section,
                                  const std::vector<std::shared_ptr<const Model>>& vehicles = {},
                                  const TermCheckOptions& options = {});
 
-/// Whether a name is that of a term plugin, and of no model, or that of a file (*.yaml) with a term's equations, which are
-/// a map, where a vehicle's are a text. Throws Error where it is nearly a term's and nearly no model's, with both.
+/// Whether a name is that of a term plugin, and of no model, or that of a file (*.yaml) with a term's equations, which
+/// are a map, where a vehicle's are a text. Throws Error where it is nearly a term's and nearly no model's, with both.
 RHEC_EXPORT bool is_name_of_term(const Host& host, const std::string& name);
 /// The section of a term of such a name: with that name, or what the file has.
 RHEC_EXPORT Settings section_of_term(const std::string& name);
