@@ -119,7 +119,7 @@ def sweep(description: Configuration, file: File, *, threads: int = 0, plugin_pa
         plain = _configuration.plain(description, folders)
         settings = _rhec.Settings.of(plain, os.path.join(os.getcwd(), "configuration"))
     else:
-        settings, folders = _configuration.read(description, None, plugin_path)
+        settings = _rhec.Settings.read(os.fspath(description))
     program = f"rhec {_rhec.version} (Python)"
     with Bar(progress, "sweep") as bar:
         return Sweep(_rhec.sweep(folders, settings, os.fspath(file), program, threads, bar), file)
