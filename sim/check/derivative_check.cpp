@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include <fmt/format.h>
+
 #include "differences.hpp"
 #include "rhec/sim/numbers/random.hpp"
 

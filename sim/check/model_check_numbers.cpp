@@ -139,6 +139,7 @@ struct Tally {
 template <class IsBad>
 std::vector<bool> judged(const std::vector<Look>& looks, const IsBad& is_bad) {
   std::vector<bool> bad;
+  bad.reserve(looks.size());
   for (const Look& look : looks) bad.push_back(is_bad(look));
   return bad;
 }

@@ -41,6 +41,7 @@ std::vector<double> data_of(const TermFormula& formula, const TermPlaces& places
 /// Places in turn, for so many stages.
 std::vector<int> in_turn(int count, const TermPlaces& places) {
   std::vector<int> which;
+  which.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) which.push_back(i % static_cast<int>(places.all().size()));
   return which;
 }
@@ -299,6 +300,7 @@ std::vector<Finding> judge_vehicles(const std::vector<TermFormula>& on, const st
                                     bool all_have_to_suit) {
   FindingList findings("vehicle");
   std::vector<std::string> suited;
+  suited.reserve(on.size());
   for (const TermFormula& formula : on) suited.push_back(formula.about().name);
   if (all_have_to_suit) {
     for (const Refusal& refusal : refusals)
@@ -310,6 +312,7 @@ std::vector<Finding> judge_vehicles(const std::vector<TermFormula>& on, const st
     if (on.empty())
       findings.warn(refusal.vehicle, refusal.why, "give the vehicle that it is for (--vehicle; in Python `vehicle`)");
   std::vector<std::string> others;
+  others.reserve(refusals.size());
   for (const Refusal& refusal : refusals) others.push_back(fmt::format("{} ({})", refusal.vehicle, refusal.why));
   if (!on.empty())
     findings.pass(fmt::format("it suits {}{}", fmt::join(suited, ", "),

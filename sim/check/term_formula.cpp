@@ -32,6 +32,7 @@ bool is_written_behind(std::vector<double>& numbers) {
 
 std::vector<int> nodes_of(Graph& graph, const std::vector<Expression>& expressions) {
   std::vector<int> nodes;
+  nodes.reserve(expressions.size());
   for (const Expression& each : expressions) nodes.push_back(each.node_in(graph));
   return nodes;
 }

@@ -45,6 +45,7 @@ def main():
     parser.add_argument("names", nargs="*")
     parser.add_argument("--environment", type=pathlib.Path)
     parser.add_argument("--casadi", type=pathlib.Path)
+    parser.add_argument("--preload", help="libraries that the Python of the tests loads first, with colons between them")
     arguments = parser.parse_args()
     paths = [os.environ["RHEC_PYTHON_PACKAGE"]]
     if arguments.environment:
@@ -62,6 +63,8 @@ def main():
             paths += map(str, arguments.casadi.resolve().glob("lib/python*/site-packages"))
     environment = {name: value for name, value in os.environ.items() if name not in ("RHEC_PLUGIN_PATH", "PYTHONPATH")}
     environment["PYTHONPATH"] = os.pathsep.join(paths)
+    if arguments.preload:
+        environment["LD_PRELOAD"] = arguments.preload
     # -rs: why tests were skipped.
     code = subprocess.run([python, "-B", "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", *files], env=environment,
                           cwd=HERE, check=False).returncode
