@@ -72,10 +72,16 @@ class UnknownName(Error, KeyError):
         return str(self.args[0]) if self.args else ""  # a KeyError puts it into quotes
 
 
+def nearest(name: Any, known: Sequence[str]) -> str:
+    """The one of those that are known that was most likely meant, or nothing."""
+    near = difflib.get_close_matches(name, known, 1, 0.6) if isinstance(name, str) else []
+    return near[0] if near else ""
+
+
 def unknown_name(name: Any, known: Sequence[str]) -> UnknownName:
     """The error for a name that is none of those that are known."""
-    near = difflib.get_close_matches(name, known, 1, 0.6) if isinstance(name, str) else []
-    return UnknownName(f"there is no {name!r}; " + (f"did you mean '{near[0]}'?" if near else f"expected one of {', '.join(known)}" if known
+    near = nearest(name, known)
+    return UnknownName(f"there is no {name!r}; " + (f"did you mean '{near}'?" if near else f"expected one of {', '.join(known)}" if known
                                                     else "nothing is there"), name)
 
 
