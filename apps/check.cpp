@@ -17,6 +17,7 @@
 #include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/plugins/yaml/yaml.hpp"
 #include "rhec/sim/check/model_check.hpp"
+#include "rhec/sim/check/term_check.hpp"
 #include "rhec/sim/loop/scenario.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
 
@@ -29,6 +30,7 @@ struct CheckArguments {
   std::string model;
   std::vector<std::string> assignments;
   std::vector<std::filesystem::path> plugin_path;
+  std::vector<std::string> vehicles;  ///< of a term
   int seed = 1;
   std::optional<double> speed;
   bool json = false, trace = false;
@@ -44,7 +46,6 @@ bool is_file(const std::string& name) {
 bool is_vehicle(const std::string& name) {
   return is_equations_file(name) && load_yaml(name).find("equations") != nullptr;
 }
-
 /// A robot with nothing but its model configured.
 RobotOptions robot_of_model(const CheckArguments& arguments) {
   Settings model;
@@ -70,11 +71,11 @@ RobotOptions robot_of_scenario(const CheckArguments& arguments, std::optional<do
   return options;
 }
 
-void print_findings(const sim::ModelCheck& check) {
+void print_findings(const std::vector<sim::Finding>& findings) {
   std::size_t name = 5;
-  for (const sim::Finding& finding : check.findings) name = std::max(name, finding.check.size());
+  for (const sim::Finding& finding : findings) name = std::max(name, finding.check.size());
   fmt::print("{:<{}}  VERDICT  FOUND\n", "CHECK", name);
-  for (const sim::Finding& finding : check.findings) {
+  for (const sim::Finding& finding : findings) {
     fmt::print("{:<{}}  {:<7}  {}{}\n", finding.check, name, word_of(finding.verdict),
                finding.where.empty() ? "" : finding.where + ": ", finding.found);
     if (!finding.advice.empty()) fmt::print("{:<{}}           -> {}\n", "", name, finding.advice);
@@ -115,16 +116,28 @@ void print_drives(const sim::ModelCheck& check) {
   }
 }
 
+std::string time_text(const sim::Spread& spread) {
+  return std::isfinite(spread.median) ? fmt::format("{:.0f}/{:.0f}", spread.median, spread.p99) : "-";
+}
+
 void print_times(const sim::ModelCheck& check) {
   if (check.times.empty()) return;
   fmt::print("\n{:<10} {:>14} {:>14} {:>14} {:>14}   median/p99 of one stage [ns]\n", "TIME", "VALUES", "JACOBIANS",
              "HESSIANS", "OUTPUTS");
-  const auto text = [](const sim::Spread& spread) {
-    return std::isfinite(spread.median) ? fmt::format("{:.0f}/{:.0f}", spread.median, spread.p99) : "-";
-  };
   for (const sim::EvaluationTimes& times : check.times)
-    fmt::print("{:<10} {:>14} {:>14} {:>14} {:>14}\n", times.instruction_set, text(times.values), text(times.jacobians),
-               text(times.hessians), text(times.outputs));
+    fmt::print("{:<10} {:>14} {:>14} {:>14} {:>14}\n", times.instruction_set, time_text(times.values),
+               time_text(times.jacobians), time_text(times.hessians), time_text(times.outputs));
+}
+
+void print_vehicles(const sim::TermCheck& check) {
+  if (check.vehicles.empty()) return;
+  std::size_t name = 7;
+  for (const sim::TermOnVehicle& each : check.vehicles) name = std::max(name, each.vehicle.size());
+  fmt::print("\n{:<{}} {:>7} {:>6} {:>5} {:>14} {:>14} {:>14}   median/p99 of one stage [ns]\n", "VEHICLE", name,
+             "LIMITS", "COSTS", "DATA", "VALUES", "JACOBIANS", "HESSIANS");
+  for (const sim::TermOnVehicle& each : check.vehicles)
+    fmt::print("{:<{}} {:>7} {:>6} {:>5} {:>14} {:>14} {:>14}\n", each.vehicle, name, each.limits, each.costs,
+               each.data, time_text(each.values), time_text(each.jacobians), time_text(each.hessians));
 }
 
 /// Where a formula is looked at: where a simulated drive starts, or at the origin; straight ahead at the speed.
@@ -145,8 +158,50 @@ sim::FormulaPoint start_of(const Host& host, const CheckArguments& arguments, bo
   return point;
 }
 
+/// A term of the section that a configuration would have for it.
+Settings section_of_term(const CheckArguments& arguments) {
+  Settings options;
+  apply_assignments(options, arguments.assignments);
+  if (const Settings* name = options.find("name"))
+    throw name->error("the term is named as the command's argument; expected its options");
+  Settings section = sim::section_of_term(arguments.model);
+  apply_assignments(section, arguments.assignments);
+  return section;
+}
+
+int check_term(const Host& host, const CheckArguments& arguments) {
+  if (arguments.graph)
+    throw Error("--graph: it draws the formula of a model; of a term --trace prints it node by node");
+  if (arguments.speed) throw Error("--speed: it is for a model, which is driven; a term is not");
+  const Settings section = section_of_term(arguments);
+  std::vector<std::shared_ptr<const Model>> vehicles;
+  for (const std::string& name : arguments.vehicles) vehicles.push_back(host.make_model(name));
+  if (arguments.trace) {
+    if (vehicles.size() != 1)
+      throw Error("--trace: a term is traced on one vehicle; name it, as in --vehicle bicycle_slip");
+    const auto vehicle = host.make_model(arguments.vehicles.front());
+    const sim::TermGraph graph = sim::graph_of_term(host, section, *vehicle);
+    sim::FormulaPoint point = sim::straight_point(*vehicle, vehicle->description(), {});
+    apply_values(arguments.values, graph.about, point);
+    return show_trace(graph.formula, graph.about, point, "limits and costs", arguments.json);
+  }
+  const sim::TermCheck found =
+      sim::check_term(host, section, vehicles, {.seed = static_cast<std::uint64_t>(arguments.seed)});
+  if (arguments.json) {
+    fmt::print("{}\n", sim::check_json(found));
+  } else {
+    print_findings(found.findings);
+    print_vehicles(found);
+    fmt::print("\n{}: {} failed, {} warnings\n", found.term, found.count(Verdict::fail), found.count(Verdict::warn));
+  }
+  return found.verdict() == Verdict::fail ? exit_not_solved : exit_fine;
+}
+
 int check(const CheckArguments& arguments) {
   const Host host = examined_host(arguments.plugin_path);
+  if (sim::is_name_of_term(host, arguments.model)) return check_term(host, arguments);
+  if (!arguments.vehicles.empty())
+    throw Error(fmt::format("--vehicle: it is for a term, which is looked at on it; '{}' is none", arguments.model));
   sim::ModelCheckOptions options;
   options.seed = static_cast<std::uint64_t>(arguments.seed);
   options.speed = arguments.speed;
@@ -164,7 +219,7 @@ int check(const CheckArguments& arguments) {
   if (arguments.json) {
     fmt::print("{}\n", sim::check_json(found));
   } else {
-    print_findings(found);
+    print_findings(found.findings);
     print_drives(found);
     print_times(found);
     fmt::print("\n{}: {} failed, {} warnings\n", found.model, found.count(Verdict::fail), found.count(Verdict::warn));
@@ -177,7 +232,8 @@ int check(const CheckArguments& arguments) {
 void add_check(Program& program) {
   auto arguments = std::make_shared<CheckArguments>();
   Command command = program.add(
-      "check", "Looks at a model before its first run: derivatives, scales, NaN, what can be estimated, time.",
+      "check",
+      "Looks at a model, or a term, before its first run: derivatives, scales, NaN, what can be estimated, time.",
       "The exit code is 3 where a check fails, or a traced number is not finite; warnings are no failure. "
       "docs/check.md\n"
       "explains each check.\n\n"
@@ -187,26 +243,34 @@ void add_check(Program& program) {
       "  rhec check my_vehicle.yaml\n"
       "  rhec check scenarios/figure8.yaml --set bounds.delta='[-1.5, 1.5]'\n"
       "  rhec check my_model --plugin-path build/my_model --json\n"
+      "  rhec check corridor --set left=3\n"
+      "  rhec check my_term.yaml --vehicle my_vehicle.yaml\n"
       "  rhec check my_vehicle.yaml --trace --at v=0 --at delta=0.3\n"
       "  rhec check scenarios/figure8.yaml --graph",
       [arguments] { return check(*arguments); });
   command
       .add("model", arguments->model,
            "a model plugin, a vehicle's equations (*.yaml), or a scenario (*.yaml), whose model is looked at with its "
-           "noise, bounds, step, horizon and blocking")
+           "noise, bounds, step, horizon and blocking; or a term plugin, or a term's equations (*.yaml)")
       .value("MODEL")
       .required();
-  add_assignments(command, arguments->assignments, "an option of the model, or a key of the scenario");
+  add_assignments(command, arguments->assignments, "an option of the model or the term, or a key of the scenario");
   command.add("--seed", arguments->seed, "of random points").not_negative().shows_default();
   command
       .add("--speed", arguments->speed,
            "ground speed of the drives [m/s]; else the scenario's, or what the inputs' scales make")
       .positive();
+  command
+      .add_list(
+          "--vehicle", arguments->vehicles,
+          "of a term: a model plugin or a vehicle's equations to look at it on; may be given several times; without "
+          "it all model plugins that are found")
+      .value("MODEL");
   command.add_flag("--json", arguments->json, "print JSON");
-  const Argument trace = command.add_flag(
-      "--trace", arguments->trace,
-      "instead of the checks, print every node of the model's formula at the start of the drive, and the first that is "
-      "not finite");
+  const Argument trace = command.add_flag("--trace", arguments->trace,
+                                          "instead of the checks, print every node of the formula of the model, or of "
+                                          "the term on one --vehicle, at the start "
+                                          "of the drive, and the first that is not finite");
   command
       .add_list("--at", arguments->values,
                 "with --trace: the value of a state, an input or a parameter; may be given several times")

@@ -123,6 +123,22 @@ std::string Program::wrong_command(const std::string& word) const {
                      near.empty() ? expected : fmt::format("did you mean '{}'?", near));
 }
 
+namespace {
+
+/// An option of a command that does not have it, or a word too many.
+std::string unexpected(const CLI::App& command) {
+  const std::vector<std::string> words = command.remaining();
+  const auto option = std::ranges::find_if(words, [](const std::string& word) { return word.starts_with('-'); });
+  if (option == words.end()) return fmt::format("found '{}', which nothing takes", fmt::join(words, " "));
+  std::vector<std::string> known;
+  for (const CLI::Option* each : command.get_options())
+    for (const std::string& name : each->get_lnames()) known.push_back("--" + name);
+  const std::string name = option->substr(0, option->find('=')), near = nearest(name, known);
+  return fmt::format("there is no option '{}'{}", name, near.empty() ? "" : fmt::format("; did you mean '{}'?", near));
+}
+
+}  // namespace
+
 int Program::run(int count, char** words) {
   const auto usage_error = [](std::string_view what) {
     fmt::print(stderr, "rhec: error: {}\n", what);
@@ -135,6 +151,11 @@ int Program::run(int count, char** words) {
   if (const std::string problem = wrong_command(words[1]); !problem.empty()) return usage_error(problem);
   try {
     app_->parse(count, words);
+  } catch (const CLI::ExtrasError& end) {
+    const auto called = app_->get_subcommands();
+    if (called.empty()) return usage_error(fmt::format("{}; see 'rhec --help'", end.what()));
+    return usage_error(
+        fmt::format("{}; see 'rhec {} --help'", unexpected(*called.front()), called.front()->get_name()));
   } catch (const CLI::ParseError& end) {
     if (end.get_exit_code() == 0) return app_->exit(end);  // --help, --version
     const auto called = app_->get_subcommands();

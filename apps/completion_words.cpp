@@ -122,7 +122,8 @@ using Keys = std::vector<std::pair<std::string, OptionRow>>;
 class Subject {
  public:
   explicit Subject(const Line& line) : host_(examined_host(folders(line))) {
-    const Words files = line.values_of("--vehicle");
+    // Of `check` it is a further model, on which a term is looked at.
+    const Words files = line.command->name == "check" ? Words() : line.values_of("--vehicle");
     const std::string name = !files.empty() ? files.front() : line.placed.empty() ? "" : line.placed.front();
     const Words solvers = line.values_of("--solver");
     plugin_ = !solvers.empty() ? solvers.front() : name;
@@ -254,6 +255,12 @@ Completion completion_of(const Line& line, const CommandDescription::Option& arg
   };
   if (is({"--set", "--case"})) return {Files::none, assignments(Subject(line), line.word, true)};
   if (is({"--tune", "--keep"})) return {Files::none, assignments(Subject(line), line.word, false)};
+  if (!is_option && line.command->name == "check") {
+    const Subject subject(line);
+    Words names = subject.plugins(PluginKind::model);
+    for (std::string& term : subject.plugins(PluginKind::term)) names.push_back(std::move(term));
+    return {Files::yaml, std::move(names)};
+  }
   if (is({"--vehicle", "model"})) return {Files::yaml, Subject(line).plugins(PluginKind::model)};
   if (is({"--solver", "--drive"})) return {Files::none, Subject(line).plugins(PluginKind::solver)};
   if (is({"--solvers"})) return {Files::none, listed(line.word, Subject(line).plugins(PluginKind::solver))};

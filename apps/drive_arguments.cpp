@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "commands.hpp"
 #include "crash_report.hpp"
 #include "rhec/core/base/error.hpp"
@@ -73,7 +75,15 @@ bool names_log(const LogArguments& arguments, const char* command) {
   if (!arguments.log.empty() && (!arguments.dead_reckoning.empty() || !arguments.gps.empty()))
     throw Error("found a log, and --dead-reckoning or --gps; give the one or the other");
   if (!arguments.log.empty() || has_files) return true;
-  fmt::print(stderr, "rhec: error: no log; give one, or --dead-reckoning and --gps; see 'rhec {} --help'\n", command);
+  std::string told;
+  if (std::filesystem::exists(arguments.scenario)) {
+    const Settings scenario = load_scenario(arguments.scenario);
+    for (const char* key : {"path", "terrain", "speed"})
+      if (told.empty() && scenario.find(key))
+        told = fmt::format("; {} is a scenario of a simulated drive, which is for 'rhec run'", arguments.scenario);
+  }
+  fmt::print(stderr, "rhec: error: no log{}; give one, or --dead-reckoning and --gps; see 'rhec {} --help'\n", told,
+             command);
   return false;
 }
 

@@ -111,8 +111,12 @@ void apply_values(const std::vector<std::string>& assignments, const ModelDescri
 }
 
 int show_trace(const Model& model, const sim::FormulaPoint& point, bool json) {
-  const ModelDescription& about = model.description();
-  const sim::FormulaTrace trace = sim::trace_formula(graph_of(model, "--trace"), about, point);
+  return show_trace(graph_of(model, "--trace"), model.description(), point, "f and h", json);
+}
+
+int show_trace(const VehicleGraph& formula, const ModelDescription& about, const sim::FormulaPoint& point,
+               std::string_view what, bool json) {
+  const sim::FormulaTrace trace = sim::trace_formula(formula, about, point);
   const int code = trace.is_finite() ? exit_fine : exit_not_solved;
   if (json) {
     fmt::print("{}\n", sim::trace_json(trace, about, point));
@@ -121,9 +125,10 @@ int show_trace(const Model& model, const sim::FormulaPoint& point, bool json) {
   fmt::print("{}, node by node\n", trace.model);
   for (const sim::TracedPart& part : trace.parts) {
     const bool is_hessian = part.name == "hessian";
-    fmt::print("\n{}\n", part.name == "values"     ? "f and h"
-                         : part.name == "jacobian" ? "Jacobians of f and h: what they need besides"
-                                                   : "Hessian of the sum of f and h: what it needs besides");
+    fmt::print("\n{}\n", part.name == "values" ? std::string(what)
+                         : part.name == "jacobian"
+                             ? fmt::format("Jacobians of {}: what they need besides", what)
+                             : fmt::format("Hessian of the sum of {}: what it needs besides", what));
     if (!is_hessian) print_nodes(part);
     if (part.first)
       print_first(*part.first);

@@ -59,13 +59,10 @@ ModelDescription description_of(const InspectArguments& arguments) {
   const Host host = examined_host(arguments.plugin_path);
   Settings settings;
   if (std::filesystem::is_regular_file(arguments.vehicle)) {
-    settings = load_scenario(arguments.vehicle);
-    if (!settings.find("model")) {  // equations
-      Settings model;
-      model.set("equations", Settings::scalar(arguments.vehicle));
-      settings = Settings();
-      settings.set("model", model);
-    }
+    if (load_yaml(arguments.vehicle).find("equations"))
+      settings.set("model.equations", Settings::scalar(arguments.vehicle));
+    else
+      settings = load_scenario(arguments.vehicle);
   } else {
     settings.set("model.name", Settings::scalar(arguments.vehicle));
   }

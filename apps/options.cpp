@@ -89,9 +89,19 @@ std::string full_name(const OptionSection& section, const std::string& key) {
   return section.name.empty() ? key : section.name + "." + key;
 }
 
+/// Plugins of a name.
+std::vector<PluginRecord> plugins_named(const Host& host, const std::string& name) {
+  std::vector<PluginRecord> found = host.discover();
+  std::erase_if(found, [&](const PluginRecord& plugin) {
+    return !plugin.accepted() || plugin.name != name || !plugin.used_instead.empty();
+  });
+  return found;
+}
+
 /// The sections that a word names: one of that name, or those with a key of that name, by its full name or its own,
-/// with its row alone. Throws Error, with the nearest name, if there is none.
-std::vector<OptionSection> named(const std::vector<OptionSection>& sections, const std::string& word) {
+/// with its row alone. Throws Error, with the nearest name, which may be that of a plugin, if there is none.
+std::vector<OptionSection> named(const std::vector<OptionSection>& sections, const std::string& word,
+                                 const Host& host) {
   std::vector<OptionSection> found;
   std::vector<std::string> names, keys;
   for (const OptionSection& section : sections) {
@@ -107,8 +117,10 @@ std::vector<OptionSection> named(const std::vector<OptionSection>& sections, con
   if (!found.empty()) return found;
   std::vector<std::string> known = names;
   known.insert(known.end(), keys.begin(), keys.end());
+  for (const PluginRecord& plugin : host.discover())
+    if (plugin.accepted()) known.push_back(plugin.name);
   const std::string near = nearest(word, known);
-  throw Error(fmt::format("there is no section and no key '{}'; {}", word,
+  throw Error(fmt::format("there is no section, key or plugin '{}'; {}", word,
                           near.empty() ? fmt::format("expected a key or one of the sections {}", fmt::join(names, ", "))
                                        : fmt::format("did you mean '{}'?", near)));
 }
@@ -140,6 +152,15 @@ sim::Json json_of(const std::vector<OptionSection>& sections) {
   return list;
 }
 
+sim::Json json_of(const Host& host, const std::vector<PluginRecord>& plugins) {
+  sim::Json list = sim::Json::array();
+  for (const PluginRecord& plugin : plugins)
+    list.push_back({{"kind", std::string(word_of(plugin.kind))},
+                    {"name", plugin.name},
+                    {"options", json_of(host.options(plugin.kind, plugin.name))}});
+  return list;
+}
+
 /// Plugins whose options every installation has.
 std::vector<PluginRecord> listed_plugins(const Host& host) {
   std::vector<PluginRecord> plugins = host.discover();
@@ -154,19 +175,23 @@ std::vector<PluginRecord> listed_plugins(const Host& host) {
 
 int show(const OptionsArguments& arguments) {
   const std::vector<OptionSection> sections = option_sections();
+  const Host host = examined_host(arguments.plugin_path);
+  if (const auto plugins = plugins_named(host, arguments.section); !plugins.empty()) {
+    if (arguments.json) {
+      fmt::print("{}\n", json_of(host, plugins).dump(2));
+    } else {
+      for (const PluginRecord& plugin : plugins) fmt::print("{}", plugin_text(host, plugin));
+    }
+    return exit_fine;
+  }
   if (!arguments.section.empty()) {
-    const std::vector<OptionSection> found = named(sections, arguments.section);
+    const std::vector<OptionSection> found = named(sections, arguments.section, host);
     fmt::print("{}", arguments.json ? json_of(found).dump(2) + "\n" : text_of(found, arguments.section));
     return exit_fine;
   }
-  const Host host = examined_host(arguments.plugin_path);
   if (arguments.json) {
-    sim::Json plugins = sim::Json::array();
-    for (const PluginRecord& plugin : listed_plugins(host))
-      plugins.push_back({{"kind", std::string(word_of(plugin.kind))},
-                         {"name", plugin.name},
-                         {"options", json_of(host.options(plugin.kind, plugin.name))}});
-    fmt::print("{}\n", sim::Json({{"sections", json_of(sections)}, {"plugins", plugins}}).dump(2));
+    fmt::print("{}\n",
+               sim::Json({{"sections", json_of(sections)}, {"plugins", json_of(host, listed_plugins(host))}}).dump(2));
     return exit_fine;
   }
   std::string text = introduction;
@@ -192,9 +217,10 @@ void add_options(Program& program) {
                                 "Examples:\n"
                                 "  rhec options\n"
                                 "  rhec options estimator\n"
-                                "  rhec options estimator.horizon",
+                                "  rhec options estimator.horizon\n"
+                                "  rhec options structured",
                                 [arguments] { return show(*arguments); });
-  command.add("section", arguments->section, "show this section or key alone").value("SECTION");
+  command.add("section", arguments->section, "show this section, key or plugin alone").value("SECTION");
   add_json(command, arguments->json);
   add_plugin_path(command, arguments->plugin_path);
 }

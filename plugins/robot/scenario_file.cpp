@@ -41,8 +41,20 @@ Settings load_robot(const Settings& named, const std::filesystem::path& scenario
 
 void put_over(Settings& base, const Settings& keys) { put_over(base, keys, ""); }
 
+void refuse_what_is_no_scenario(const Settings& settings) {
+  struct {
+    const char* key;
+    const char* what;
+  } constexpr others[] = {{"grid", "is that of a sweep: this file is for 'rhec sweep'"},
+                          {"equations", "is that of a vehicle; a scenario names the file: 'model: {equations: FILE}'"}};
+  if (settings.kind() != Settings::Kind::map) return;
+  for (const auto& [key, what] : others)
+    if (const Settings* found = settings.find(key)) throw found->error(what);
+}
+
 Settings load_scenario(const std::filesystem::path& file) {
   Settings scenario = load_yaml(file);
+  refuse_what_is_no_scenario(scenario);
   const Settings* named = scenario.find(robot_key);
   if (!named) return scenario;
   Settings merged = load_robot(*named, file);

@@ -14,6 +14,11 @@ class ArgumentError : public Error {
   using Error::Error;
 };
 
+/// A dict that says what it has where a name is unknown.
+inline pybind11::object named(const pybind11::dict& values) {
+  return pybind11::module_::import("rhec._errors").attr("Names")(values);
+}
+
 /// The method by which copy and pickle would take an object apart, of a class whose objects stay where they are;
 /// `instead` says what to do.
 inline auto not_copied(const char* instead) {

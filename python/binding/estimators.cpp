@@ -159,6 +159,14 @@ std::string window_line(NamedEstimator& self, const std::string& id) {
   return sim::problem_line(sim::record_of(method->problem(), &method->solution(), id, model.name, model.options));
 }
 
+/// The names of an estimate's values: of the vehicle's states, then of the parameters.
+std::vector<std::string> names_of_values(const EstimateObject& self) {
+  std::vector<std::string> names;
+  for (const auto* variables : {&self.about->states, &self.about->parameters})
+    for (const Variable& variable : *variables) names.push_back(variable.name);
+  return names;
+}
+
 double value_of(const EstimateObject& self, const std::string& name) {
   const auto find = [&](const std::vector<Variable>& variables) {
     const auto at = std::find_if(variables.begin(), variables.end(), [&](const Variable& v) { return v.name == name; });
@@ -167,7 +175,9 @@ double value_of(const EstimateObject& self, const std::string& name) {
   if (const Eigen::Index j = find(self.about->states); j >= 0 && j < self.value.state.size())
     return self.value.state[j];
   if (const Eigen::Index j = find(self.about->parameters); j >= 0) return self.value.parameters[j];
-  throw py::key_error(fmt::format("'{}' is neither a state nor a parameter", name));
+  const py::object error = py::module_::import("rhec._errors").attr("unknown_name")(name, names_of_values(self));
+  PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(error.ptr())), error.ptr());
+  throw py::error_already_set();
 }
 
 py::array sigmas_of(const EstimateObject& self) {
@@ -188,7 +198,7 @@ py::list innovations_of(const EstimateObject& self) {
     each["value"] = copy(innovation.value.data(), {innovation.value.size()});
     each["covariance"] =
         copy(innovation.covariance.data(), {innovation.covariance.rows(), innovation.covariance.cols()});
-    made.append(each);
+    made.append(named(each));
   }
   return made;
 }
@@ -260,6 +270,14 @@ void bind_estimates(py::module_& module) {
                     "that the estimator took for it, without Python [us]")
       .def_property_readonly("report", [](const EstimateObject& self) { return self.value.report; })
       .def("__getitem__", &value_of, py::arg("name"), "The value of a state or a parameter.")
+      .def("keys", &names_of_values, "The names of states and parameters, for which it has values: dict(estimate).")
+      .def("__iter__", [](const EstimateObject& self) { return py::cast(names_of_values(self)).attr("__iter__")(); })
+      .def(
+          "__contains__",
+          [](const EstimateObject& self, const py::object& name) {
+            return py::cast(names_of_values(self)).attr("__contains__")(name).cast<bool>();
+          },
+          py::arg("name"))
       .def("__repr__", &described_estimate);
 }
 

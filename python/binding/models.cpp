@@ -17,6 +17,7 @@
 #include "rhec/plugins/equations/vehicle_cpp.hpp"
 #include "rhec/plugins/robot/model_section.hpp"
 #include "rhec/sim/check/model_check.hpp"
+#include "rhec/sim/check/term_check.hpp"
 
 namespace rhec::python {
 namespace {
@@ -129,10 +130,32 @@ py::object graph(const Vehicle& self) {
   return all;
 }
 
-std::string check_of(const std::vector<std::string>& plugin_path, const Settings& section) {
+std::vector<std::shared_ptr<const Model>> looked_at_on(const Vehicle* vehicle) {
+  if (vehicle == nullptr) return {};
+  return {vehicle->model};
+}
+
+/// Of a term's section.
+std::string check_of_term(const std::vector<std::string>& plugin_path, const Settings& section,
+                          const Vehicle* vehicle) {
+  const Host host = examined_host(plugin_path);
+  const py::gil_scoped_release others_go_on;
+  return sim::check_json(sim::check_term(host, section, looked_at_on(vehicle)));
+}
+
+/// Of a model's section, or of one that has the name of a term.
+std::string check_of(const std::vector<std::string>& plugin_path, const Settings& section, const Vehicle* vehicle) {
+  const Host host = examined_host(plugin_path);
+  const Settings* const name = section.find("name");
+  if (name != nullptr && section.find("equations") == nullptr && sim::is_name_of_term(host, name->as_text())) {
+    Settings term = sim::section_of_term(name->as_text());
+    for (const auto& [key, value] : section.members())
+      if (key != "name") term.set(key, value);
+    return check_of_term(plugin_path, term, vehicle);
+  }
+  if (vehicle != nullptr) throw Error("check: vehicle: it is for a term, which is looked at on it; this is a model");
   RobotOptions options;
   options.model = section;
-  const Host host = examined_host(plugin_path);
   const py::gil_scoped_release others_go_on;
   return sim::check_json(sim::check_model(host, Robot(host, options)));
 }
@@ -154,7 +177,7 @@ py::dict sources_of(const std::string& file) {
   return made;
 }
 
-py::dict roles_of(const Vehicle& self) {
+py::object roles_of(const Vehicle& self) {
   const Roles& roles = self.about.roles;
   py::dict made;
   const auto add = [&made](const char* role, int index, const std::vector<Variable>& variables) {
@@ -166,7 +189,7 @@ py::dict roles_of(const Vehicle& self) {
   add("speed", roles.speed, self.about.inputs);
   add("speed_state", roles.speed_state, self.about.states);
   add("speed_factor", roles.speed_factor, self.about.parameters);
-  return made;
+  return named(made);
 }
 
 }  // namespace
@@ -224,7 +247,8 @@ void bind_models(py::module_& module) {
         return Vehicle{made.model(), made.model()->description()};
       },
       py::arg("plugin_path"), py::arg("section"));
-  module.def("check", &check_of, py::arg("plugin_path"), py::arg("section"));
+  module.def("check", &check_of, py::arg("plugin_path"), py::arg("section"), py::arg("vehicle"));
+  module.def("check_of_term", &check_of_term, py::arg("plugin_path"), py::arg("section"), py::arg("vehicle"));
   module.def("check_term", &check_term, py::arg("section"), py::arg("vehicle"));
   module.def("vehicle_as_cpp", &sources_of, py::arg("file"));
 }

@@ -170,7 +170,7 @@ void bind_solutions(py::module_& module) {
           "whether it may be used: all but infeasible and bad_input")
       .def_property_readonly("objective", [](const Solution& self) { return self.report.objective; })
       .def_property_readonly(
-          "kkt", [](const Solution& self) { return dict_of(self.report.kkt); },
+          "kkt", [](const Solution& self) { return named(dict_of(self.report.kkt)); },
           "KKT residual, measured alike for all solvers (docs/method.md, section 7)")
       .def_property_readonly(
           "seconds", [](const Solution& self) { return 1e-6 * self.outcome.solve_time_us; }, "of the solve")

@@ -112,6 +112,9 @@ void bind_settings(py::module_& module) {
       .def_static(
           "load", [](const std::string& file) { return load_scenario(file); }, py::arg("file"),
           "Reads a scenario, and the robot that it names.")
+      .def_static(
+          "read", [](const std::string& file) { return load_yaml(file); }, py::arg("file"),
+          "Reads a file of another kind than a scenario, such as a sweep.")
       .def_static("of", &settings_of, py::arg("object"), py::arg("origin"), "Of dicts, lists, numbers and texts.")
       .def(
           "set",

@@ -66,7 +66,7 @@ py::dict sweep(const std::vector<std::string>& plugin_path, const Settings& sett
   sim::SweepProgress done;
   do_watched(progress, [&](Job& job) {
     const Host host = examined_host(plugin_path);
-    grid.check_values(host);
+    grid.check_values(host, [&] { job.show(0.0, "looking at values"); });
     runs = grid.identities();
     sim::SweepStore store(file, program);
     sim::ThreadWorkers workers(host, grid, threads_of(threads));

@@ -4,7 +4,7 @@ Arrays are numpy's, units SI, angles in rad. docs/python.md has examples of ever
 """
 from ._casadi import CasadiModel, CasadiProblem, to_casadi
 from ._check import Check, check
-from ._errors import ArgumentError, Error, Note
+from ._errors import ArgumentError, Error, Note, UnknownName
 from ._graphs import to_sympy
 from ._model import BuiltModel, Model
 from ._notation import smooth_abs, smooth_max, smooth_min
@@ -21,6 +21,6 @@ from ._term import BuiltTerm, Term
 
 __all__ = ["ArgumentError", "BuiltModel", "BuiltTerm", "CasadiModel", "CasadiProblem", "Check", "Command", "Controller", "Error", "Estimate",
            "Estimates", "Estimator", "Model", "Note", "Page", "Path", "Problem", "Report", "Robot", "Run", "SmoothedRun", "Solution",
-           "Sweep", "Table", "Term", "Tuning", "Variable", "Vehicle", "__version__", "check", "estimate", "options", "plugins",
+           "Sweep", "Table", "Term", "Tuning", "UnknownName", "Variable", "Vehicle", "__version__", "check", "estimate", "options", "plugins",
            "read_problems", "report", "run", "smooth", "smooth_abs", "smooth_max", "smooth_min", "sweep", "to_casadi",
            "to_sympy", "tune", "tune_controller", "write_problems"]

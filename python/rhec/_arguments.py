@@ -222,7 +222,8 @@ class _Call:
         for word in named:
             if word not in known and inspect.Parameter.VAR_KEYWORD not in kinds:
                 near = difflib.get_close_matches(word, known, 1)
-                return ArgumentError(f"{title}: there is no argument '{word}'; {f'did you mean {near[0]!r}? ' if near else ''}it is {takes}")
+                hint = f"did you mean {near[0]!r}? " if near else f"keys of a configuration go into set={{'{word}': ...}}; " if "set" in known else ""
+                return ArgumentError(f"{title}: there is no argument '{word}'; {hint}it is {takes}")
         for each, _ in zip(places, given):
             if each.name in named and each.name in known:
                 return ArgumentError(f"{title}: {each.name} is there twice, once without its name; it is {takes}", each.name)

@@ -7,7 +7,7 @@ from typing import Any
 
 from . import _graphs
 from ._arguments import checked
-from ._errors import Error, module_of
+from ._errors import Error, Names, module_of
 from ._problems import Problem
 from ._types import Array
 
@@ -42,13 +42,13 @@ class CasadiProblem:
 
         made = casadi.nlpsol("rhec", solver, self.nlp, options)
         result = made(x0=self.start, **self.bounds)
-        return {**self.unpack(result["x"]), "objective": float(result["f"]), "stats": made.stats()}
+        return Names({**self.unpack(result["x"]), "objective": float(result["f"]), "stats": made.stats()})
 
     def unpack(self, x: Any) -> dict[str, Array]:
         """states (N + 1, n_x), inputs (N, n_u) and parameters (N, n_p) of a point."""
         import numpy
 
-        return {name: numpy.array(value) for name, value in zip(("states", "inputs", "parameters"), self._values(x))}
+        return Names({name: numpy.array(value) for name, value in zip(("states", "inputs", "parameters"), self._values(x))})
 
     def objective(self, x: Any) -> float:
         """The objective of a point."""

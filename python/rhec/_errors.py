@@ -1,6 +1,7 @@
 """The exceptions that rhec raises for what a user can correct, and the warning for what one should know."""
 from __future__ import annotations
 
+import difflib
 import importlib
 import os
 import re
@@ -54,6 +55,41 @@ class ArgumentError(Error, TypeError):
     def __init__(self, text: str = "", argument: str | None = None) -> None:
         super().__init__(text)
         self.argument = argument
+
+
+class UnknownName(Error, KeyError):
+    """A name that a result does not have: the text says which is close, or which there are. It is a KeyError, too, as dicts
+    raise.
+
+    name: what was asked for
+    """
+
+    def __init__(self, text: str = "", name: Any = None) -> None:
+        super().__init__(text)
+        self.name = name
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""  # a KeyError puts it into quotes
+
+
+def nearest(name: Any, known: Sequence[str]) -> str:
+    """The one of those that are known that was most likely meant, or nothing."""
+    near = difflib.get_close_matches(name, known, 1, 0.6) if isinstance(name, str) else []
+    return near[0] if near else ""
+
+
+def unknown_name(name: Any, known: Sequence[str]) -> UnknownName:
+    """The error for a name that is none of those that are known."""
+    near = nearest(name, known)
+    return UnknownName(f"there is no {name!r}; " + (f"did you mean '{near}'?" if near else f"expected one of {', '.join(known)}" if known
+                                                    else "nothing is there"), name)
+
+
+class Names(dict[str, Any]):
+    """A dict of results that tells what it has where a name is unknown."""
+
+    def __missing__(self, name: Any) -> Any:
+        raise unknown_name(name, [*self])
 
 
 class Note(_Placed, UserWarning):

@@ -6,7 +6,7 @@ from typing import Any
 
 from . import _rhec
 from ._arguments import checked, found_in_words
-from ._errors import ArgumentError, Error, module_of
+from ._errors import ArgumentError, Error, Names, module_of
 
 
 def evaluate(vehicle: _rhec.Vehicle, library: dict[str, Any], states: Sequence[Any], inputs: Sequence[Any],
@@ -69,5 +69,5 @@ def to_sympy(model: Any) -> tuple[dict[str, Any], dict[str, Any]]:
                for variables in (vehicle.states, vehicle.inputs, vehicle.parameters)]
     names = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "tanh", "atan2")
     rates, outputs = evaluate(vehicle, {name: getattr(sympy, name) for name in names}, *symbols)
-    return ({each.name: term for each, term in zip(vehicle.states, rates)},
-            {each.name: term for each, term in zip(vehicle.outputs, outputs)})
+    return (Names({each.name: term for each, term in zip(vehicle.states, rates)}),
+            Names({each.name: term for each, term in zip(vehicle.outputs, outputs)}))

@@ -77,7 +77,9 @@ class Model:
         notes = _notation.Notes([*names, *definitions], smooth)
         equations = dict(definitions)
         equations |= {f"{state}'": term for state, term in self._matched(rates, "states", "rates").items()}
-        equations |= self._matched(measured, "outputs", "measured")
+        # What measures the state of its name has no equation.
+        equations |= {output: term for output, term in self._matched(measured, "outputs", "measured").items()
+                      if output not in self._variables["states"] or str(term) != output}
         straight = by_name(straight_motion, "straight_motion")
         owner, of_equations = f"the model '{name}'", _where(equations, definitions)
         of_straight = [f"straight_motion: {each}" for each in straight]

@@ -8,7 +8,7 @@ from typing import Any
 
 from . import _configuration, _files, _rhec
 from ._arguments import checked, found_in_words
-from ._errors import ArgumentError
+from ._errors import ArgumentError, Names
 from ._types import ArrayLike, File, PluginPath
 
 
@@ -35,7 +35,7 @@ class Problem:
 
     def to_dict(self) -> dict[str, Any]:
         """As such a dict."""
-        return json.loads(self.line())
+        return json.loads(self.line(), object_hook=Names)
 
     def line(self) -> str:
         """As a line of a problem file."""

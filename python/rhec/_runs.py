@@ -13,7 +13,7 @@ from typing import Any
 
 from . import _configuration, _rhec
 from ._arguments import check_range, checked
-from ._errors import Error
+from ._errors import Error, Names
 from ._problems import Problem, problems_of
 from ._progress import Bar
 from ._table import Table
@@ -26,7 +26,7 @@ class _Result:
 
     def __init__(self, made: Any) -> None:
         self._made = made
-        self.summary: dict[str, Any] = json.loads(made.summary_json)
+        self.summary: dict[str, Any] = json.loads(made.summary_json, object_hook=Names)
 
     @property
     def svg(self) -> str:

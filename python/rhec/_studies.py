@@ -10,7 +10,7 @@ from typing import Any
 
 from . import _configuration, _files, _rhec
 from ._arguments import check_range, checked
-from ._errors import Error
+from ._errors import Error, Names
 from ._progress import Bar
 from ._runs import log_files
 from ._table import Table
@@ -119,7 +119,7 @@ def sweep(description: Configuration, file: File, *, threads: int = 0, plugin_pa
         plain = _configuration.plain(description, folders)
         settings = _rhec.Settings.of(plain, os.path.join(os.getcwd(), "configuration"))
     else:
-        settings, folders = _configuration.read(description, None, plugin_path)
+        settings = _rhec.Settings.read(os.fspath(description))
     program = f"rhec {_rhec.version} (Python)"
     with Bar(progress, "sweep") as bar:
         return Sweep(_rhec.sweep(folders, settings, os.fspath(file), program, threads, bar), file)
@@ -138,7 +138,7 @@ class Tuning:
     def __init__(self, made: dict[str, Any]) -> None:
         self.numbers, self.judged = Table(made["numbers"]), Table(made["judged"])
         self.yaml, self.svg, self.remarks = made["yaml"], made["svg"], made["remarks"]
-        self.summary = json.loads(made["summary"])
+        self.summary = json.loads(made["summary"], object_hook=Names)
 
     def save(self, file: File) -> None:
         """Writes the scenario."""

@@ -5,13 +5,13 @@ import html
 from typing import Any
 
 from ._arguments import checked, found_in_words
-from ._errors import ArgumentError, module_of
+from ._errors import ArgumentError, Names, module_of
 
 _MOST_ROWS = 10
 
 
 @checked
-class Table(dict[str, Any]):
+class Table(Names):
     """Columns by name, each a numpy array of one entry a row."""
 
     def __init__(self, columns: Any = (), /, **more: Any) -> None:

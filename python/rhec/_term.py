@@ -1,6 +1,7 @@
 """A term of a controller's problem, limits and costs, that is written in Python."""
 from __future__ import annotations
 
+import functools
 import json
 import math
 import numbers
@@ -10,6 +11,7 @@ from typing import Any
 
 from . import _compile, _configuration, _notation, _rhec
 from ._arguments import checked, found_in_words
+from ._check import Check
 from ._errors import Error
 from ._model import by_name, check_known, labelled_texts, parts_of
 from ._types import File, Terms
@@ -120,6 +122,7 @@ class Term:
     """
 
     _plugin_path: list[str] = []
+    _is_term = True
 
     def __init__(self, name: str, *, limits: Terms | None = None, costs: Terms | None = None,
                  states: Terms | None = None, inputs: Terms | None = None,
@@ -244,6 +247,8 @@ class Term:
                 made[key] = names
         if self._options:
             made["options"] = {name: dict(about) for name, about in self._options.items()}
+        if self._meaning:
+            made["meaning"] = self._meaning
         if notes.definitions:
             made["definitions"] = dict(notes.definitions)
         if self._limits:
@@ -351,14 +356,23 @@ class Term:
         _rhec.check_term(_rhec.Settings.of(_configuration.plain(self._section(), []), f"the term '{self.name}'"), vehicle)
         return self
 
-    def build(self, folder: File | None = None) -> BuiltTerm:
-        """Compiles it as a plugin against the rhec that this package belongs to, and loads that. Returns a BuiltTerm, for
-        configurations: {"controller": {"terms": [built]}}.
+    def check(self, vehicle: Any = None) -> Check:
+        """What `rhec check` says of it (docs/check.md), on a Vehicle or a Model; without one on all model plugins that are
+        found."""
+        return Check.of(self, vehicle)
+
+    def build(self, folder: File | None = None, *, vehicle: Any = None) -> BuiltTerm:
+        """Checks it, compiles it as a plugin against the rhec that this package belongs to, and loads that. Returns a
+        BuiltTerm, for configurations: {"controller": {"terms": [built]}}.
 
         folder: of the sources; without one a folder of the user's cache, where it is found again the next time
+        vehicle: on which it is checked, as of `check`
         """
         self.load()
         _compile.check_name(self.name)
+        check = self.check(vehicle)  # before it is compiled, which takes longer
+        if check.failed:
+            raise Error(f"the term '{self.name}': its check failed: {check.failures()}")
         place = _compile.folder_of(folder, self.name, self.source)
         _compile.write(place / f"{self.name}.cpp", self.source)
         _compile.write(place / "CMakeLists.txt", _CMAKE.replace("@NAME@", self.name))
@@ -376,11 +390,20 @@ class Term:
 
 @checked
 class BuiltTerm:
-    """A term that was compiled, for configurations: {"controller": {"terms": [built]}}; folder: its sources."""
+    """A term that was compiled, for configurations: {"controller": {"terms": [built]}}.
+
+    folder: its sources; check: what `rhec check` says of what was compiled, when it is first asked for
+    """
+
+    _is_term = True
 
     def __init__(self, plugin: str, folder: pathlib.Path, options: dict[str, Any]) -> None:
         self.plugin, self.folder, self._options = plugin, folder, options
         self._plugin_path = [str(folder.absolute() / "build")]
+
+    @functools.cached_property
+    def check(self) -> Check:
+        return Check.of(self)
 
     def _section(self) -> dict[str, Any]:
         return {"name": self.plugin, **self._options}

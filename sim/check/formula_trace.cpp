@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
+#include "findings_json.hpp"
 #include "model_checks.hpp"
 #include "node_labels.hpp"
 #include "rhec/core/formula/derivatives.hpp"
 #include "rhec/core/model/formula_copy.hpp"
-#include "rhec/sim/files/json.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -79,7 +79,8 @@ class Tracer {
   TracedPart jacobian() {
     std::vector<Result> results;
     add_slopes(results, vehicle_.rates, about_.states, "'", z_);
-    add_slopes(results, vehicle_.outputs, about_.outputs, "", vehicle_.states);
+    // A vehicle's outputs depend on its state alone; the rows of a term, which has no rates, on all variables.
+    add_slopes(results, vehicle_.outputs, about_.outputs, "", vehicle_.rates.empty() ? z_ : vehicle_.states);
     return part("jacobian", results, {});
   }
   TracedPart hessian() {
@@ -185,14 +186,12 @@ class Tracer {
   std::vector<int> seen_;  ///< nodes of parts before, ascending
 };
 
-Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json json_of(const TracedNode& node) {
   Json json;
   json["node"] = node.node;
   json["name"] = node.name;
   json["term"] = node.term;
-  json["value"] = finite_or_null(node.value);
+  json["value"] = number_or_null(node.value);
   json["finite"] = std::isfinite(node.value);
   return json;
 }
@@ -227,7 +226,7 @@ std::string trace_json(const FormulaTrace& trace, const ModelDescription& about,
   json["model"] = trace.model;
   json["at"] = Json::object();
   const auto add = [&](const std::vector<Variable>& variables, const std::vector<double>& values) {
-    for (std::size_t k = 0; k < variables.size(); ++k) json["at"][variables[k].name] = finite_or_null(values[k]);
+    for (std::size_t k = 0; k < variables.size(); ++k) json["at"][variables[k].name] = number_or_null(values[k]);
   };
   add(about.states, at.states);
   add(about.inputs, at.inputs);

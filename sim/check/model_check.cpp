@@ -1,7 +1,6 @@
 #include "rhec/sim/check/model_check.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -13,29 +12,9 @@
 
 namespace rhec::sim {
 
-std::string_view word_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::pass:
-      return "pass";
-    case Verdict::skip:
-      return "skip";
-    case Verdict::warn:
-      return "warn";
-    case Verdict::fail:
-      return "fail";
-  }
-  return "";
-}
+int ModelCheck::count(Verdict verdict) const { return count_of(findings, verdict); }
 
-int ModelCheck::count(Verdict verdict) const {
-  return static_cast<int>(std::count_if(findings.begin(), findings.end(),
-                                        [&](const Finding& finding) { return finding.verdict == verdict; }));
-}
-
-Verdict ModelCheck::verdict() const {
-  if (count(Verdict::fail) > 0) return Verdict::fail;
-  return count(Verdict::warn) > 0 ? Verdict::warn : Verdict::pass;
-}
+Verdict ModelCheck::verdict() const { return verdict_of(findings); }
 
 namespace {
 
@@ -98,8 +77,7 @@ struct WorstOfAll {
   }
 };
 
-constexpr int stages_of_a_range = 15;  // fills SIMD packs and leaves one partly filled
-constexpr double derivative_tolerance = 1e-6, integration_tolerance = 1e-10;
+constexpr double integration_tolerance = 1e-10;
 
 }  // namespace
 
@@ -178,9 +156,7 @@ std::vector<Finding> check_derivatives(const CheckedModel& checked) {
 }
 
 std::vector<Finding> measure_times(const CheckedModel& checked, std::vector<EvaluationTimes>& times) {
-  using Clock = std::chrono::steady_clock;
-  constexpr int range = 16, calls = 300;
-  constexpr double longest = 0.05;  // of one measurement [s]
+  constexpr int range = 16;
   FindingList findings("time");
   const FastestAtTheEnd restore(checked.model);
   Model& model = checked.model;
@@ -190,19 +166,7 @@ std::vector<Finding> measure_times(const CheckedModel& checked, std::vector<Eval
   std::vector<double> next(range * nx), jacobians(range * nx * nz), hessians(range * nz * nz), outputs(range * ny),
       output_jacobians(range * ny * nx);
   const std::vector<double> multipliers(range * nx, 1.0);
-  const auto spread = [&](const auto& call) {
-    std::vector<double> nanoseconds;
-    call();
-    double seconds = 0.0;
-    for (int i = 0; i < calls && seconds < longest; ++i) {
-      const auto start = Clock::now();
-      call();
-      const std::chrono::duration<double> taken = Clock::now() - start;
-      seconds += taken.count();
-      nanoseconds.push_back(1e9 * taken.count() / range);
-    }
-    return spread_of(nanoseconds);
-  };
+  const auto spread = [](const auto& call) { return time_of_calls(range, call); };
   for (const std::string& set : model.instruction_sets()) {
     if (!model.use_instruction_set(set)) continue;
     Model::Intervals request{.count = range,

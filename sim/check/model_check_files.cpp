@@ -1,24 +1,9 @@
-#include <cmath>
-
 #include "rhec/sim/check/model_check.hpp"
-#include "rhec/sim/files/json.hpp"
+
+#include "findings_json.hpp"
 
 namespace rhec::sim {
 namespace {
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-Json json_of(const Finding& finding) {
-  Json json;
-  json["check"] = finding.check;
-  json["verdict"] = word_of(finding.verdict);
-  json["where"] = finding.where;
-  json["found"] = finding.found;
-  json["advice"] = finding.advice;
-  json["numbers"] = Json::object();
-  for (const auto& [name, value] : finding.numbers) json["numbers"][name] = number(value);
-  return json;
-}
 
 Json json_of(const DriveInformation& drive, const ModelCheck& check) {
   Json json;
@@ -27,20 +12,16 @@ Json json_of(const DriveInformation& drive, const ModelCheck& check) {
   json["unusable"] = drive.unusable;
   json["unknowns"] = drive.unknowns;
   json["rank"] = drive.rank;
-  json["condition"] = number(drive.condition);
+  json["condition"] = number_or_null(drive.condition);
   json["parameter_sigma"] = Json::object();
   for (std::size_t j = 0; j < check.parameters.size(); ++j)
-    json["parameter_sigma"][check.parameters[j]] = number(drive.parameter_sigma[j]);
+    json["parameter_sigma"][check.parameters[j]] = number_or_null(drive.parameter_sigma[j]);
   json["state_determined"] = Json::object();
   for (std::size_t j = 0; j < check.states.size(); ++j)
     json["state_determined"][check.states[j]] = static_cast<bool>(drive.state_determined[j]);
   json["undetermined"] = drive.undetermined;
   json["weakest"] = drive.weakest;
   return json;
-}
-
-Json json_of(const Spread& spread) {
-  return {{"median", number(spread.median)}, {"p99", number(spread.p99)}, {"max", number(spread.max)}};
 }
 
 }  // namespace

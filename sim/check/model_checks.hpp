@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,10 @@ namespace rhec::sim {
 
 /// More Runge-Kutta steps in an interval than this are worth a word.
 inline constexpr int costly_substeps = 8;
+
+/// Derivatives are compared at so many stages: they fill SIMD packs and leave one partly filled.
+inline constexpr int stages_of_a_range = 15;
+inline constexpr double derivative_tolerance = 1e-6;
 
 /// Input of every check.
 struct CheckedModel {
@@ -49,6 +54,25 @@ class FindingList {
   std::string check_;
   std::vector<Finding> all_;
 };
+
+/// How long a call that does `range` stages takes for one of them [ns].
+template <class Call>
+Spread time_of_calls(int range, const Call& call) {
+  using Clock = std::chrono::steady_clock;
+  constexpr int calls = 300;
+  constexpr double longest = 0.05;  // of one measurement [s]
+  std::vector<double> nanoseconds;
+  call();
+  double seconds = 0.0;
+  for (int i = 0; i < calls && seconds < longest; ++i) {
+    const auto start = Clock::now();
+    call();
+    const std::chrono::duration<double> taken = Clock::now() - start;
+    seconds += taken.count();
+    nanoseconds.push_back(1e9 * taken.count() / range);
+  }
+  return spread_of(nanoseconds);
+}
 
 /// `can_go_on`: whether the description suffices to evaluate the model.
 std::vector<Finding> check_description(const ModelDescription& about, bool& can_go_on);

@@ -12,6 +12,7 @@
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/plugins/robot/by_name.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/sim/world/paths.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
 
@@ -299,11 +300,10 @@ void refuse_other_files(const Settings& settings) {
     const char* what;
   } constexpr others[] = {
       {"log", "is that of a recorded drive: this scenario is for 'rhec estimate', 'rhec smooth' and 'rhec tune'"},
-      {"variants", "is that of a recorded drive: this scenario is for 'rhec estimate' and 'rhec smooth'"},
-      {"grid", "is that of a sweep: this file is for 'rhec sweep'"},
-      {"equations", "is that of a vehicle; a scenario names the file: 'model: {equations: FILE}'"}};
+      {"variants", "is that of a recorded drive: this scenario is for 'rhec estimate' and 'rhec smooth'"}};
   for (const auto& [key, what] : others)
     if (const Settings* found = settings.find(key)) throw found->error(what);
+  refuse_what_is_no_scenario(settings);
 }
 
 ScenarioOptions parse_scenario(const Settings& settings) {

@@ -72,7 +72,23 @@ std::string text_of(const Settings& value) {
 
 Sweep Sweep::from_file(const std::filesystem::path& file) { return Sweep(load_yaml(file)); }
 
+namespace {
+
+/// A scenario says what it is, too.
+void refuse_scenario(const Settings& description) {
+  if (description.kind() != Settings::Kind::map) return;
+  for (const char* key : {"robot", "model", "path", "speed", "terrain", "log", "signals"})
+    if (const Settings* found = description.find(key))
+      throw found->error(
+          "is that of a scenario: this file is for 'rhec run' or 'rhec estimate'; a sweep names it, 'scenario: FILE', "
+          "and "
+          "changes keys in its 'set' and 'grid'");
+}
+
+}  // namespace
+
 Sweep::Sweep(const Settings& description) {
+  refuse_scenario(description);
   const Description read = Description::table().parse(description, "sweep");
   name_ = read.name;
   folder_ = std::filesystem::path(description.origin().file).parent_path();

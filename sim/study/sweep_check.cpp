@@ -48,11 +48,11 @@ std::vector<RunIdentity> Sweep::identities() const {
                          first + 1, assignments(first), second + 1, assignments(second)));
 }
 
-void Sweep::check_values(const Host& host) const {
-  for (const Block& block : blocks_) check_values(host, block);
+void Sweep::check_values(const Host& host, const std::function<void()>& between) const {
+  for (const Block& block : blocks_) check_values(host, block, between);
 }
 
-void Sweep::check_values(const Host& host, const Block& block) const {
+void Sweep::check_values(const Host& host, const Block& block, const std::function<void()>& between) const {
   // The ends of a range suffice: valid values lie between two bounds or are integers.
   constexpr std::int64_t ends = 8, most_mates = 12;
   const std::size_t axes = block.axes.size();
@@ -73,6 +73,7 @@ void Sweep::check_values(const Host& host, const Block& block) const {
 
   // Tries the combination at these indices of `tried`; returns its error.
   const auto why_not = [&](const Indices& places) -> std::string {
+    if (between) between();
     Indices indices(axes);
     for (std::size_t a = 0; a < axes; ++a) indices[a] = tried[a][static_cast<std::size_t>(places[a])];
     try {

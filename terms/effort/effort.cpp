@@ -22,7 +22,8 @@ struct EffortOptions {
     static const auto options =
         OptionTable<E>()
             .map("weights", &E::weights,
-                 {{"INPUT", "number", "0", "at least 0", "of the squared input on an interval"}})
+                 {{"INPUT", "number", "0", "at least 0",
+                   "of the squared input on an interval [1 / unit of the input squared]"}})
             .number("delta", &E::delta,
                     "beyond this an input costs in proportion to its size, not to its square (pseudo-Huber loss) [unit "
                     "of the input]; 0: the square everywhere",

@@ -406,6 +406,14 @@ class Test(cli.Findings):
             self.refused(f"{command} of a simulation", self.rhec(command, FIGURE8, *drive), ERROR, str(FIGURE8), "this scenario is for 'rhec run'")
         self.refused("run of a log", self.rhec("run", park), ERROR, str(park), "'rhec estimate'")
         self.refused("smooth of a log without files", self.rhec("smooth", park), ERROR, str(park), "--dead-reckoning")
+        sweep, scenario = cli.ROOT / "scenarios" / "sweep_blocks.yaml", cli.ROOT / "scenarios" / "figure8.yaml"
+        for words in (["estimate", sweep, sweep], ["smooth", sweep], ["check", sweep], ["compare", sweep, "--solvers", "gn_rti"],
+                      ["tune", sweep, sweep]):
+            self.refused(f"{words[0]} of a sweep", self.rhec(*words), ERROR, "'rhec sweep'")
+        self.refused("sweep of a scenario", self.rhec("sweep", scenario), ERROR, "'rhec run' or 'rhec estimate'; a sweep names it")
+        self.refused("estimate of a simulated drive", self.rhec("estimate", scenario), USAGE, "simulated drive, which is for 'rhec run'")
+        self.refused("a word of an option", self.rhec("run", scenario, "--st", "seed=1"), USAGE, "there is no option '--st'; did you mean '--set'?")
+        self.refused("a word too many", self.rhec("run", scenario, "seed=1"), USAGE, "found 'seed=1', which nothing takes")
         self.refused("run of a sweep", self.rhec("run", cli.ROOT / "scenarios" / "sweep_blocks.yaml"), ERROR, "'rhec sweep'")
         self.refused("run of a vehicle", self.rhec("run", cli.ROOT / "examples" / "vehicles" / "bicycle.yaml"), ERROR, "model: {equations: FILE}")
         for word, near in (("bicycle", "bicycle_slip"), ("skid", "skid_steer"), ("bicycle_slpi", "bicycle_slip")):

@@ -4,13 +4,16 @@
     check.py <rhec>
 """
 import json
+import pathlib
 import re
 import sys
+import tempfile
 
 import cli
 from cli import ERROR, FIGURE8, FINE, NOT_SOLVED, PAPER, USAGE, Program, assignments
 
 CHECKS = ["description", "symmetry", "straight_motion", "integration", "derivatives", "numbers", "scaling", "observability", "time"]
+CHECKS_OF_TERM = ["description", "vehicle", "rows", "derivatives", "numbers", "time"]
 DRIVES = ["straight", "turn", "slalom", "standing"]
 # Words, exit code, and what the one line of the error must say.
 BAD = [
@@ -28,6 +31,15 @@ BAD = [
     (["check", FIGURE8, *assignments("bounds.kapa=[0, 1]")], ERROR, "did you mean 'kappa'"),
     (["check", FIGURE8, *assignments("spede=4")], ERROR, "did you mean 'speed'"),
     (["check", "bicycle_slip", "--plugin-path", "nowhere"], ERROR, "nowhere"),
+    (["check", "corridr"], ERROR, "did you mean the term 'corridor'?"),
+    (["check", "corridor", *assignments("lefft=3")], ERROR, "did you mean 'left'"),
+    (["check", "corridor", *assignments("left=-5")], ERROR, "no room is left"),
+    (["check", "corridor", *assignments("name=effort")], ERROR, "--set name=effort"),
+    (["check", "corridor", "--vehicle", "bicycle_slpi"], ERROR, "did you mean 'bicycle_slip'"),
+    (["check", "corridor", "--speed", "3"], ERROR, "--speed: it is for a model"),
+    (["check", "corridor", "--graph"], ERROR, "--graph: it draws the formula of a model"),
+    (["check", "corridor", "--trace"], ERROR, "--trace: a term is traced on one vehicle"),
+    (["check", "bicycle_slip", "--vehicle", "bicycle_slip"], ERROR, "--vehicle: it is for a term"),
 ]
 
 
@@ -36,7 +48,7 @@ class Test(cli.Findings):
         super().__init__("check")
         self.rhec = rhec
 
-    def check(self, name, *words, code=FINE):
+    def check(self, name, *words, code=FINE, checks=CHECKS):
         """What --json says, once the table has been seen to say the same."""
         result, table = self.rhec("check", *words, "--json"), self.rhec("check", *words)
         for each in (result, table):
@@ -52,10 +64,11 @@ class Test(cli.Findings):
                              rf"{re.escape(finding['found'])}$", re.MULTILINE)
             self.expect(row.search(table.stdout), name, f"the table does not say: {finding}\n{table.stdout}")
         counts = [sum(finding["verdict"] == verdict for finding in found["findings"]) for verdict in ("fail", "warn")]
-        self.expect(f"{found['model']}: {counts[0]} failed, {counts[1]} warnings" in table.stdout, name, table.stdout[-80:])
+        of_what = found.get("model") or found.get("term")
+        self.expect(f"{of_what}: {counts[0]} failed, {counts[1]} warnings" in table.stdout, name, table.stdout[-80:])
         worst = "fail" if counts[0] else "warn" if counts[1] else "pass"
         self.expect(found["verdict"] == worst, name, f"verdict {found['verdict']} of {counts}")
-        self.expect(list(dict.fromkeys(finding["check"] for finding in found["findings"])) == CHECKS, name, "checks")
+        self.expect(list(dict.fromkeys(finding["check"] for finding in found["findings"])) == checks, name, "checks")
         return found
 
     def every_model(self):
@@ -67,6 +80,42 @@ class Test(cli.Findings):
             self.expect(found["model"] == model, model, f"checks {found['model']}")
             self.expect([drive["name"] for drive in found["drives"]] == DRIVES, model, f"{found['drives']}")
             self.expect(all(times["values"]["median"] > 0 for times in found["time_ns"]), model, f"{found['time_ns']}")
+
+    def every_term(self):
+        """As they come; a term that needs options to have rows warns that it has none."""
+        plugins = json.loads(self.rhec("plugins", "--json").stdout)
+        terms = [plugin["name"] for plugin in plugins if plugin.get("kind") == "term"]
+        models = [plugin["name"] for plugin in plugins if plugin.get("kind") == "model"]
+        self.expect("corridor" in terms, "terms", f"{terms}")
+        options = {"obstacles": ["most=2"], "keep_out": ["lines=[{x: 3, y: -1, direction: 0.4}]"], "effort": ["weights.u2=2", "delta=0.5"]}
+        for term in terms:
+            found = self.check(term, term, *assignments(*options.get(term, [])), checks=CHECKS_OF_TERM)
+            self.expect(found["verdict"] == "pass" and found["term"] == term, term, f"{found}")
+            suited = [each["vehicle"] for each in found["vehicles"]]
+            self.expect(suited == (["bicycle_slip"] if term == "effort" else models), term, f"{suited}")
+            self.expect(all(each["limits"] + each["costs"] > 0 and each["time_ns"]["jacobians"]["median"] > 0 for each in found["vehicles"]),
+                        term, f"{found['vehicles']}")
+        found = self.check("no rows", "obstacles", checks=CHECKS_OF_TERM)
+        self.expect(found["verdict"] == "warn" and not found["vehicles"], "no rows", f"{found}")
+
+    def term_of_equations(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "term.yaml"
+            file.write_text("equations:\n  name: aside\n  meaning: stays away\n  options: {near: {default: 1, unit: m, meaning: from the line}}\n"
+                            "  limits: {line: {lower: near, term: sqrt(position_y)}}\nsoft: {linear: 50}\n")
+            found = self.check("term", file, "--vehicle", "bicycle_slip", code=NOT_SOLVED, checks=CHECKS_OF_TERM)
+            failed = [finding for finding in found["findings"] if finding["verdict"] == "fail"]
+            self.expect([finding["check"] for finding in failed] == ["numbers"], "term", f"{failed}")
+            self.expect("y_pos in [" in failed[0]["where"] and "(line) = sqrt(y_pos)" in failed[0]["found"] and
+                        "the square root of a negative number" in failed[0]["found"], "term", f"{failed}")
+            self.expect([each["vehicle"] for each in found["vehicles"]] == ["bicycle_slip"], "term", f"{found['vehicles']}")
+            trace = self.rhec("check", file, "--vehicle", "bicycle_slip", "--trace", "--at", "y_pos=-1")
+            self.expect(trace.returncode == NOT_SOLVED and "first not finite: n" in trace.stdout and "sqrt(y_pos)" in trace.stdout and
+                        trace.stdout.startswith("aside on bicycle_slip"), "trace", trace.stdout + trace.stderr)
+            fine = self.rhec("check", file, "--vehicle", "bicycle_slip", "--trace", "--at", "y_pos=4")
+            self.expect(fine.returncode == FINE and "sqrt(y_pos)  2" in fine.stdout, "trace", fine.stdout + fine.stderr)
+            mended = assignments("equations.limits.line.term=sqrt(position_y^2 + 0.01)", "near=2")
+            self.expect(self.check("mended", file, *mended, checks=CHECKS_OF_TERM)["verdict"] == "pass", "mended", "")
 
     def scenario(self):
         found = self.check("figure8", PAPER)
@@ -147,7 +196,8 @@ class Test(cli.Findings):
 
 def main():
     test = Test(Program(sys.argv[1]))
-    for part in (test.every_model, test.scenario, test.errors_of_sensors, test.faults, test.bad_input, test.others):
+    for part in (test.every_model, test.every_term, test.term_of_equations, test.scenario, test.errors_of_sensors, test.faults,
+                 test.bad_input, test.others):
         part()
     test.tell()
 

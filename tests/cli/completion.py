@@ -18,6 +18,9 @@ from cli import CLEAN, ERROR, FIGURE8, FINE, ROOT, Findings, Program
 CASES = (
     ("plugins gn_", ["plugins", "gn_rti"]),
     ("check bicycle_sl", ["check", "bicycle_slip"]),
+    ("check corri", ["check", "corridor"]),
+    ("check corridor --vehicle bicycle_sl", ["check", "corridor", "--vehicle", "bicycle_slip"]),
+    ("check corridor --vehicle bicycle_slip --set marg", ["check", "corridor", "--vehicle", "bicycle_slip", "--set", "margin="]),
     ("check scen", ["check", "scenarios"]),
     ("run scenarios/fig", ["run", "scenarios/figure8.yaml"]),
     ("run scenarios/figure8.yaml --set spe", ["run", "scenarios/figure8.yaml", "--set", "speed="]),

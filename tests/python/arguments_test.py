@@ -45,7 +45,8 @@ def calls(things):
         yield f"_rhec.{kind.name}", getattr(_rhec, kind.name)
         of = things.get(f"_rhec.{kind.name}", things.get(kind.name))
         for name, member in functions(kind.body).items():
-            if name != "__init__" and not any(getattr(mark, "id", "") == "property" for mark in member.decorator_list):
+            # Anything may be looked for by `in`.
+            if name not in ("__init__", "__contains__") and not any(getattr(mark, "id", "") == "property" for mark in member.decorator_list):
                 yield f"_rhec.{kind.name}.{name}", getattr(of if isinstance(of, getattr(_rhec, kind.name)) else getattr(_rhec, kind.name), name)
     for name in rhec.__all__:
         value = getattr(rhec, name)
@@ -86,6 +87,7 @@ ZEROS, ONES = numpy.zeros(4), [1.0, 1.0]
     (lambda d: rhec.Robot("a\0b.yaml"), "Robot: configuration: found 'a"),
     (lambda d: rhec.run(FIGURE8, problems_every=-1), "problems_every: found -1, expected a number, at least 0"),
     (lambda d: rhec.run(FIGURE8, problems_every=2**40), "problems_every: found 1099511627776, expected an integer of 32 bits"),
+    (lambda d: rhec.run(FIGURE8, speed=3), r"run: there is no argument 'speed'; keys of a configuration go into set=\{'speed': ...\}; it is run\("),
     (lambda d: rhec.run(FIGURE8, sett={}), r"run: there is no argument 'sett'; did you mean 'set'\? it is run\(scenario, \*, set=None"),
     (lambda d: rhec.run(), "run: scenario is missing; expected the name of a YAML file or a dict: run"),
     (lambda d: rhec.run(FIGURE8, {}), "run: found 2 arguments without a name, expected at most 1"),

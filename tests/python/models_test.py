@@ -302,3 +302,15 @@ def test_examples_are_the_same():
     theirs = rhec.Robot({"model": {"equations": str(ROOT / "examples" / "vehicles" / "bicycle.yaml")}}).vehicle
     point = ([1, 2, 0.3, 0.1], [2.0, 0.1], [0.8, 0.9])
     numpy.testing.assert_allclose(ours.rates(*point), theirs.rates(*point), rtol=1e-14)
+
+
+def test_a_formula_that_comes_back_is_a_model_again():
+    """Outputs, too, that measure the state of their name: `delta = delta` is no equation."""
+    ours = bicycle().load()
+    rates, outputs = rhec.to_sympy(ours)
+    again = rhec.Model("again", states={each.name: {"unit": each.unit} for each in ours.states}, inputs=[each.name for each in ours.inputs],
+                       parameters=[each.name for each in ours.parameters], outputs={each.name: {"unit": each.unit} for each in ours.outputs},
+                       rates=rates, measured=outputs).load()
+    point = ([1, 2, 0.3, 0.1], [2.0, 0.1], [0.8, 0.9])
+    numpy.testing.assert_allclose(again.rates(*point), ours.rates(*point), rtol=1e-13)
+    numpy.testing.assert_allclose(again.observe(point[0]), ours.observe(point[0]), rtol=1e-13)

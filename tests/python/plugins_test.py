@@ -22,6 +22,13 @@ def test_options_of_plugins_and_sections():
     assert list(table["name"]) == [each["name"] for each in told[0]["options"]]
     assert "horizon" in list(rhec.options("estimator")["name"])
     assert "speed" in list(rhec.options()["name"])
+    assert list(rhec.options("estimator.horizon")["name"]) == ["estimator.horizon"]
+    assert {"estimator.horizon", "controller.horizon"} <= {*rhec.options("horizon")["name"]}
+    for wrong, right in (("gnrti", "gn_rti"), ("estimater", "estimator"), ("estimator.horizn", "estimator.horizon"), ("corridr", "corridor")):
+        with pytest.raises(rhec.Error, match=f"there is no section, key or plugin '{wrong}'; did you mean '{right}'"):
+            rhec.options(wrong)
+    with pytest.raises(rhec.Error, match="there is no .* plugin 'xyzzy'"):
+        rhec.options("xyzzy")
     assert "wheelbase" in list(rhec.options(str(ROOT / "examples" / "vehicles" / "bicycle.yaml"))["name"])
     with pytest.raises(rhec.Error, match="gn_rti"):
         rhec.options("gn_rtti", kind="solver")

@@ -1,5 +1,6 @@
 """Problems: of runs and files, changed, written, solved by every backend."""
 import json
+import pickle
 import subprocess
 
 import numpy
@@ -146,3 +147,25 @@ def test_problems_of_a_vehicle_of_equations():
         estimator.estimate(0.2 * k)
     window = rhec.Problem.of(estimator)
     assert window.vehicle.name == "cart" and window.solve("sparse_sqp").usable
+
+
+def test_names_that_results_do_not_have(tmp_path):
+    """Every result that is looked up by name says what it has, and stays a dict for all else."""
+    run = rhec.run(FIGURE8, set=SHORT, problems_every=50)
+    problem = next(each for each in run.problems if each.kind == "rhc")
+    solution, vehicle, check = problem.solve("gn_rti", mode="converge"), rhec.Robot({"model": "bicycle_slip"}).vehicle, rhec.check("corridor")
+    results = {"kapa": (run.steps, "kappa"), "mea": (run.summary, "mae"), "trakcing": (run.summary["mae"], "tracking"), "larges": (solution.kkt, "largest"),
+               "bound": (problem.to_dict(), "bounds"), "nam": (rhec.plugins(), "name"), "postion_x": (vehicle.roles, "position_x"),
+               "finding": (check.details, "findings"), "verdic": (check.findings, "verdict"), "meanin": (rhec.options("gn_rti"), "meaning")}
+    for wrong, (result, right) in results.items():
+        with pytest.raises(rhec.UnknownName, match=f"there is no '{wrong}'; did you mean '{right}'"):
+            result[wrong]
+        assert wrong not in result and result.get(wrong) is None and isinstance(result, dict)
+        result[right]
+        with pytest.raises(KeyError, match="expected one of"):
+            result["zzz"]
+    assert json.loads(json.dumps(run.summary)) == run.summary and pickle.loads(pickle.dumps(run.summary)) == run.summary
+    with pytest.raises(rhec.UnknownName, match="nothing is there"):
+        rhec.Table()["x"]
+    again = pickle.loads(pickle.dumps(rhec.UnknownName("there is no 'a'", "a")))
+    assert str(again) == "there is no 'a'"

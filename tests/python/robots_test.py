@@ -87,8 +87,13 @@ def test_estimates_stay_as_they_are():
     assert last.health == "ok" and last.findings == ""
     assert [each["sensor"] for each in last.innovations] == ["x_gps and y_gps", "delta"]
     assert last.report.usable and not last.fallback
-    with pytest.raises(KeyError, match="'gamma' is neither"):
-        last["gamma"]
+    assert [*last] == last.keys() == ["x_pos", "y_pos", "beta", "delta", "kappa", "mu"] and dict(last)["kappa"] == last["kappa"]
+    assert "kappa" in last and "gamma" not in last and 3 not in last
+    for name, told in (("kapa", "there is no 'kapa'; did you mean 'kappa'?"), ("gamma", "there is no 'gamma'; expected one of x_pos, y_pos, beta")):
+        for of in (rhec.Error, KeyError):
+            with pytest.raises(of) as caught:
+                last[name]
+            assert type(caught.value) is rhec.UnknownName and str(caught.value).startswith(told) and caught.value.name == name
 
 
 def test_results_that_are_reused():

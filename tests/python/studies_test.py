@@ -61,6 +61,21 @@ def test_columns_where_keys_are_missing(tmp_path):
         assert runs[name].dtype == float and (numpy.isnan(runs[name]) == refused).all(), name
 
 
+def test_ctrl_c_while_values_are_looked_at(tmp_path):
+    """Of a grid with so many values that looking at them takes longer than anybody waits: no run was made yet."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    told = []
+
+    def interrupt(share, text):
+        if not told:
+            os.kill(os.getpid(), signal.SIGINT)
+        told.append(text)
+
+    with pytest.raises(KeyboardInterrupt):
+        rhec.sweep({"scenario": str(FIGURE8), "grid": {"seed": list(range(20000))}}, tmp_path / "many.sqlite", progress=interrupt)
+    assert set(told) <= {"", "looking at values"} and not (tmp_path / "many.sqlite").exists()
+
+
 def test_ctrl_c_keeps_what_was_made(tmp_path):
     many = {**GRID, "grid": {"speed": [10], "seed": {"from": 1, "to": 500, "step": 1}}}
     file = tmp_path / "many.sqlite"

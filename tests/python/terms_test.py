@@ -124,13 +124,13 @@ def test_mistakes_in_terms(keys, word):
         rhec.Term("Wrong Name", costs={"c": SPEED})
 
 
-TERMS = [SPEED**2, SPEED**-2, sympy.sqrt(SPEED**2 + 1), (SPEED**2 + 1)**sympy.Rational(3, 2), sympy.Rational(1, 2) * SPEED, sympy.pi * SPEED,
+TERMS = [SPEED**2, (SPEED**2 + 1)**-2, sympy.sqrt(SPEED**2 + 1), (SPEED**2 + 1)**sympy.Rational(3, 2), sympy.Rational(1, 2) * SPEED, sympy.pi * SPEED,
          sympy.atan2(SPEED, RATE + 2), rhec.smooth_max(SPEED, RATE, 0.1), sympy.exp(-SPEED) + sympy.log(SPEED**2 + 1)]
 
 
 def test_all_functions_compile(tmp_path):
     """Compiled they are what they are without a compiler: sympy's terms, and texts."""
-    texts = ["-ground_speed^2 / (2 + heading_rate^2)", "ground_speed^0.5 * pi", "hypot(ground_speed, 1)^-1 - -2e-1", "smooth_min(3, ground_speed, .1) + atan2(1, ground_speed) + atan2(scale, 2)"]
+    texts = ["-ground_speed^2 / (2 + heading_rate^2)", "(ground_speed^2 + 1)^0.5 * pi", "hypot(ground_speed, 1)^-1 - -2e-1", "smooth_min(3, ground_speed, .1) + atan2(1, ground_speed) + atan2(scale, 2)"]
     term = rhec.Term("functions", costs={f"c{i}": {"term": term, "weight": 1e-6} for i, term in enumerate([*TERMS, *texts])}, options={"scale": 2.0},
                      limits={'with "quotes"': (sympy.Min(-5, -LENGTH), RATE, "where(arc_length - 20, abs(-6), max(5, 4)) + infinity"),
                              "smoothed": (None, sympy.Max(SPEED, 0) * sympy.Abs(RATE), 100)}, smooth=1e-2)
@@ -188,3 +188,38 @@ def test_bounds_with_corners_are_the_same_compiled_and_loaded():
     term = rhec.Term("bounds", limits={f"g{i}": (None, SPEED, bound) for i, bound in enumerate(bounds)})
     assert "(arc_length >= 3.0 ? 1.0 : (arc_length <= 1.0 ? 2.0 : 3.0))" in term.source
     assert term._section()["equations"]["limits"]["g3"]["upper"] == "where(3 - arc_length, where(arc_length - 1, 3, 2), 1)"
+
+
+def test_a_term_is_checked(side):
+    check = lateral().check()
+    assert not check.failed and list(check.findings["check"]) == ["description", "vehicle", "rows", "derivatives", "numbers", "time"]
+    vehicles = [each["vehicle"] for each in check.details["vehicles"]]
+    assert "bicycle_slip" in vehicles and len(vehicles) > 1
+    built = side.check
+    assert built is side.check and [each["vehicle"] for each in built.details["vehicles"]] == vehicles
+    vehicle = rhec.Robot({"model": "bicycle_slip"}).vehicle
+    for one in (lateral().check(vehicle), rhec.check(lateral(), vehicle=vehicle), rhec.check("lateral_acceleration", vehicle=vehicle, most=3.0)):
+        assert [each["vehicle"] for each in one.details["vehicles"]] == ["bicycle_slip"] and not one.failed
+    assert "table of" in repr(check.findings) and "0 failed" in repr(check)
+
+
+def test_checks_of_terms_that_are_wrong(tmp_path):
+    root = rhec.Term("root", costs={"c": sympy.sqrt(RATE)}, meaning="bends to the left")
+    with pytest.raises(rhec.Error, match="the term 'root': its check failed: numbers .*not finite.*square root"):
+        root.build(tmp_path)
+    assert not [each for each in tmp_path.iterdir() if each.name != "CMakeCache.txt"]
+    assert "lower is 1, above upper, which is 0" in rhec.Term("crossed", limits={"g": (1, SPEED, 0)}).check().failures()
+    mine = rhec.Term("mine", inputs=["u7"], costs={"c": "u7"})
+    assert not mine.check().failed and "no vehicle" in " ".join(mine.check().findings["found"])
+    with pytest.raises(rhec.Error, match="its check failed: vehicle bicycle_slip has no input 'u7'"):
+        mine.build(tmp_path, vehicle=rhec.Robot({"model": "bicycle_slip"}).vehicle)
+    with pytest.raises(rhec.ArgumentError, match="vehicle: found 3, expected a Vehicle"):
+        root.check(3)
+    with pytest.raises(rhec.Error, match="did you mean the term 'corridor'"):
+        rhec.check("corridr")
+    with pytest.raises(rhec.Error, match="lef: .*did you mean 'left'"):
+        rhec.check("corridor", lef=3)
+    with pytest.raises(rhec.Error, match="it is for a term"):
+        rhec.check("bicycle_slip", vehicle=rhec.Robot({"model": "bicycle_slip"}).vehicle)
+    with pytest.raises(rhec.ArgumentError, match="with_options"):
+        rhec.check(root, most=3)

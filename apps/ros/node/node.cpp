@@ -14,6 +14,7 @@
 #include "lever_arms.hpp"
 #include "loop.hpp"
 #include "rhec/core/base/error.hpp"
+#include "rhec/plugins/robot/scenario_file.hpp"
 #include "rhec/sim/files/json.hpp"
 #include "rhec/sim/loop/scenario.hpp"
 #include "rhec/sim/maps/map_keeper.hpp"
@@ -182,6 +183,7 @@ class Pursuit {
 }  // namespace
 
 int run_node(const Host& host, Settings settings, const LiveArguments& arguments) {
+  refuse_what_is_no_scenario(settings);
   const RosOptions options =
       read_ros_options(settings.find("ros") ? *settings.find("ros") : Settings::map(settings.origin()));
   const WireOptions wire_setup = wire_options(options, arguments);

@@ -66,6 +66,18 @@ TEST_F(ScenarioFile, RefusesRobotsThatAreNone) {
   EXPECT_THAT(error("robot: another.yaml"), HasSubstr("another.yaml:1: robot"));
 }
 
+TEST_F(ScenarioFile, SaysWhatFilesOfOtherKindsAre) {
+  const auto error = [&](const std::string& text) {
+    const auto file = write("field.yaml", text);
+    return error_of([&] { load_scenario(file); });
+  };
+  EXPECT_THAT(error("scenario: x.yaml\ngrid: {speed: [1, 2]}"),
+              AllOf(HasSubstr("field.yaml:2: grid"), HasSubstr("this file is for 'rhec sweep'")));
+  EXPECT_THAT(error("name: car\nequations: |\n  x' = v"), HasSubstr("'model: {equations: FILE}'"));
+  refuse_what_is_no_scenario(settings("speed: 3"));
+  refuse_what_is_no_scenario(Settings());
+}
+
 TEST(PutOver, MergesMapsAndReplacesAllElse) {
   Settings base = settings("a: {b: 1, c: [1, 2]}\nd: {e: 4}");
   put_over(base, settings("a: {c: [3]}\nd: 5\nf: 6"));

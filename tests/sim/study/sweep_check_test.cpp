@@ -20,6 +20,18 @@ TEST(SweepIdentity, DiffersBetweenRunsAndStaysFromSweepToSweep) {
   EXPECT_EQ(all[56], other[0]);
 }
 
+TEST(SweepValues, AreGivenUpBetweenAttempts) {
+  struct GivenUp {};
+  int attempts = 0;
+  const Sweep sweep = grid_of("  speed: [4, 5, 6]\n");
+  EXPECT_THROW(sweep.check_values(host(),
+                                  [&] {
+                                    if (++attempts == 2) throw GivenUp();
+                                  }),
+               GivenUp);
+  EXPECT_EQ(attempts, 2);
+}
+
 TEST(SweepMistakes, InKeysAndValues) {
   EXPECT_THAT(mistake_in_grid("  seed: [1, 2]\n  spede: [1]\n"),
               AllOf(StartsWith("sweep.yaml:4: "), HasSubstr("did you mean 'speed'")));

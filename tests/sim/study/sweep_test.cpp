@@ -113,6 +113,11 @@ TEST(SweepGrid, AScenarioIsAKeyToo) {
 
 // ---- mistakes
 
+TEST(SweepMistakes, AScenarioSaysWhatItIs) {
+  for (const char* text : {"robot: r.yaml", "speed: 3", "model: {name: bicycle_slip}", "signals: {clock: t}"})
+    EXPECT_THAT(mistake_in(text), HasSubstr("a sweep names it, 'scenario: FILE'"));
+}
+
 TEST(SweepMistakes, InTheFormOfTheFile) {
   EXPECT_THAT(mistake_in(""), HasSubstr("the grid is empty"));
   EXPECT_THAT(mistake_in("scenario: figure8.yaml\ngird: {}\n"), AllOf(StartsWith("sweep.yaml:2"), HasSubstr("'grid'")));

@@ -51,7 +51,7 @@ struct RHEC_EXPORT FormulaTrace {
 };
 
 /// All nodes of f and h, of their Jacobian by [x; p; u], and of the Hessian of their sum, at a point. `about` describes
-/// the same variables.
+/// the same variables. Without rates, as of a term, the outputs may depend on all of [x; p; u].
 RHEC_EXPORT FormulaTrace trace_formula(const VehicleGraph& vehicle, const ModelDescription& about,
                                        const FormulaPoint& at);
 

@@ -12,24 +12,11 @@
 #include "rhec/core/horizon/blocking.hpp"
 #include "rhec/core/model/model.hpp"
 #include "rhec/plugins/robot/robot.hpp"
+#include "rhec/sim/check/finding.hpp"
 #include "rhec/sim/numbers/spread.hpp"
 
 /// Checks of a new model before its first run; docs/check.md explains each.
 namespace rhec::sim {
-
-/// `skip`: nothing to check, or no way to check it.
-enum class Verdict { pass, skip, warn, fail };
-RHEC_EXPORT std::string_view word_of(Verdict verdict);
-
-struct Finding {
-  std::string check;  ///< "description", "symmetry", "straight_motion", "integration", "derivatives", "numbers",
-                      ///< "scaling", "observability" or "time"
-  Verdict verdict = Verdict::pass;
-  std::string where;                                    ///< the variable or entry; empty: the whole model
-  std::string found;                                    ///< a phrase with numbers
-  std::string advice;                                   ///< what to do; may be empty
-  std::vector<std::pair<std::string, double>> numbers;  ///< the numbers in `found`, by name
-};
 
 /// Information that one estimation horizon of a drive contains, without a prior, about its initial state and the
 /// parameters. Measured inputs are unknowns too, measured with their noise.

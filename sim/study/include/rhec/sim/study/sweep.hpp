@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -38,8 +39,9 @@ class RHEC_EXPORT Sweep {
 
   /// Throws Error, naming file, line and key, for a value that is invalid in every run. Tries each listed value, and
   /// the first and last of each range, with several of the others; simulates nothing. Does not find combinations that
-  /// are invalid although each value is valid in others; such a run reports it when it is made.
-  void check_values(const Host& host) const;
+  /// are invalid although each value is valid in others; such a run reports it when it is made. `between`, called
+  /// before each attempt, may throw to give up.
+  void check_values(const Host& host, const std::function<void()>& between = {}) const;
   /// Identities of all runs, in order. Throws Error, naming both, if two runs are identical.
   std::vector<RunIdentity> identities() const;
 
@@ -74,7 +76,7 @@ class RHEC_EXPORT Sweep {
   const Settings& base_of(const std::string& scenario) const;
   std::pair<const Block*, Indices> place_of(std::int64_t run) const;
   Settings settings_of(const Block& block, const Indices& indices) const;
-  void check_values(const Host& host, const Block& block) const;
+  void check_values(const Host& host, const Block& block, const std::function<void()>& between) const;
 
   std::string name_;
   std::string scenario_;                   // default of blocks that name none; may be empty
