@@ -201,7 +201,9 @@ function(rhec_add_plugin NAME)
   rhec_plugin_module(${NAME} ${ARGN})
   target_link_libraries(${NAME} PRIVATE rhec_flags)
   rhec_precompile(${NAME})
-  rhec_unite(${NAME})
+  if(NOT RHEC_TESTS_LINK_OBJECTS)
+    rhec_unite(${NAME})
+  endif()
   file(RELATIVE_PATH LIB_FROM_PLUGINS "${CMAKE_INSTALL_FULL_LIBDIR}/rhec/plugins" "${CMAKE_INSTALL_FULL_LIBDIR}")
   set_target_properties(${NAME} PROPERTIES
     LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/${RHEC_PLUGIN_DIRECTORY}"

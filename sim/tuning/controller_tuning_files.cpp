@@ -13,7 +13,8 @@ namespace rhec::sim {
 namespace {
 
 // Sizes of the drawing [pixels].
-constexpr double width = 720.0, height = 520.0, left = 70.0, right = 24.0, top = 64.0, bottom = 56.0;
+constexpr double figure_width = 720.0, figure_height = 520.0, left_margin = 70.0, right_margin = 24.0,
+                 top_margin = 64.0, bottom_margin = 56.0;
 constexpr const char* small_text = R"(font-size="11" fill="#5f6368")";
 // What tracks or steers so many times worse than the scenario is not drawn.
 constexpr double worst_shown = 4.0;
@@ -90,27 +91,28 @@ std::string pareto_svg(const ControllerTuning& tuning) {
   }
   const double pad_x = 0.06 * (most_x - least_x) + 0.01, pad_y = 0.06 * (most_y - least_y) + 0.01;
   least_x -= pad_x, most_x += pad_x, least_y -= pad_y, most_y += pad_y;
-  const double inner_width = width - left - right, inner_height = height - top - bottom;
+  const double inner_width = figure_width - left_margin - right_margin,
+               inner_height = figure_height - top_margin - bottom_margin;
   const auto at = [&](const TriedController& tried) {
-    return Point{left + (tried.effort - least_x) / (most_x - least_x) * inner_width,
-                 top + (most_y - tried.tracking) / (most_y - least_y) * inner_height};
+    return Point{left_margin + (tried.effort - least_x) / (most_x - least_x) * inner_width,
+                 top_margin + (most_y - tried.tracking) / (most_y - least_y) * inner_height};
   };
-  Svg svg(width, height);
-  svg.text({left, 24.0}, "Tracking against effort", R"(font-size="15" font-weight="bold" fill="#222")");
-  svg.text({left, 44.0},
+  Svg svg(figure_width, figure_height);
+  svg.text({left_margin, 24.0}, "Tracking against effort", R"(font-size="15" font-weight="bold" fill="#222")");
+  svg.text({left_margin, 44.0},
            "relative to the scenario's controller, on the seeds that were tuned on; black: the scenario, red: chosen",
            small_text);
   const Ticks x_ticks = nice_ticks(least_x, most_x, 7), y_ticks = nice_ticks(least_y, most_y, 6);
   for (std::size_t i = 0; i < x_ticks.values.size(); ++i) {
-    const double x = left + (x_ticks.values[i] - least_x) / (most_x - least_x) * inner_width;
-    svg.line({x, top}, {x, top + inner_height}, R"(stroke="#e3e5e8")");
-    svg.text({x, top + inner_height + 16.0}, x_ticks.labels[i],
+    const double x = left_margin + (x_ticks.values[i] - least_x) / (most_x - least_x) * inner_width;
+    svg.line({x, top_margin}, {x, top_margin + inner_height}, R"(stroke="#e3e5e8")");
+    svg.text({x, top_margin + inner_height + 16.0}, x_ticks.labels[i],
              R"(font-size="11" fill="#5f6368" text-anchor="middle")");
   }
   for (std::size_t i = 0; i < y_ticks.values.size(); ++i) {
-    const double y = top + (most_y - y_ticks.values[i]) / (most_y - least_y) * inner_height;
-    svg.line({left, y}, {left + inner_width, y}, R"(stroke="#e3e5e8")");
-    svg.text({left - 6.0, y + 4.0}, y_ticks.labels[i], R"(font-size="11" fill="#5f6368" text-anchor="end")");
+    const double y = top_margin + (most_y - y_ticks.values[i]) / (most_y - least_y) * inner_height;
+    svg.line({left_margin, y}, {left_margin + inner_width, y}, R"(stroke="#e3e5e8")");
+    svg.text({left_margin - 6.0, y + 4.0}, y_ticks.labels[i], R"(font-size="11" fill="#5f6368" text-anchor="end")");
   }
   std::vector<TriedController> front;
   std::vector<Point> others;
@@ -132,12 +134,13 @@ std::string pareto_svg(const ControllerTuning& tuning) {
   const Point own = at(tuning.tried.front()), chosen = at(tuning.tried[static_cast<std::size_t>(tuning.chosen)]);
   svg.dots({&own, 1}, R"(stroke="#222222" stroke-width="9")");
   if (tuning.chosen > 0) svg.dots({&chosen, 1}, R"(stroke="#d1341f" stroke-width="9")");
-  svg.rectangle({left, top}, inner_width, inner_height, R"(fill="none" stroke="#9aa0a6" stroke-width="1")");
-  svg.text({left + 0.5 * inner_width, height - 14.0}, "root mean square change of the inputs, ratio",
+  svg.rectangle({left_margin, top_margin}, inner_width, inner_height,
+                R"(fill="none" stroke="#9aa0a6" stroke-width="1")");
+  svg.text({left_margin + 0.5 * inner_width, figure_height - 14.0}, "root mean square change of the inputs, ratio",
            R"(font-size="12" fill="#222" text-anchor="middle")");
-  svg.text({18.0, top + 0.5 * inner_height}, "mean distance from the path, ratio",
+  svg.text({18.0, top_margin + 0.5 * inner_height}, "mean distance from the path, ratio",
            fmt::format("font-size=\"12\" fill=\"#222\" text-anchor=\"middle\" transform=\"rotate(-90 18 {:.0f})\"",
-                       top + 0.5 * inner_height));
+                       top_margin + 0.5 * inner_height));
   return svg.document();
 }
 
