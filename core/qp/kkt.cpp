@@ -28,9 +28,9 @@ double pull_of(const StageQp& qp, int i, int c, const double* costate) noexcept 
 
 /// The same for column `c` of its G, times the multipliers of its limits.
 double pull_of_limits(const StageQp& qp, int i, int c, const double* multipliers) noexcept {
-  const double* G = qp.G(i) + c;
+  const double* G = qp.G(i);  // null where there are no limits, so that it has no column
   double sum = 0.0;
-  for (int r = 0; r < qp.limits(i); ++r) sum += G[r * qp.stride()] * multipliers[r];
+  for (int r = 0; r < qp.limits(i); ++r) sum += G[r * qp.stride() + c] * multipliers[r];
   return sum;
 }
 
