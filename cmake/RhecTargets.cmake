@@ -115,6 +115,28 @@ function(rhec_unite TARGET)
   set_target_properties(${TARGET} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
 endfunction()
 
+# rhec_objects_of(VARIABLE TARGET name ...): objects of a library's or a plugin's sources <name>.cpp, for tests that call
+# what it does not export. They are those that it was linked from, so that nothing is compiled twice, unless it was compiled as one.
+function(rhec_objects_of VARIABLE TARGET)
+  list(JOIN ARGN "|" NAMES)
+  if(NOT RHEC_TESTS_LINK_OBJECTS)
+    string(MD5 HASH "${NAMES}")
+    string(SUBSTRING "${HASH}" 0 8 HASH)
+    set(APART ${TARGET}_apart_${HASH})
+    get_target_property(SOURCES ${TARGET} SOURCES)
+    get_target_property(FOLDER ${TARGET} SOURCE_DIR)
+    list(FILTER SOURCES INCLUDE REGEX "^(.*/)?(${NAMES})[.]cpp$")
+    list(TRANSFORM SOURCES PREPEND "${FOLDER}/")
+    add_library(${APART} OBJECT EXCLUDE_FROM_ALL ${SOURCES})
+    target_include_directories(${APART} PRIVATE "$<TARGET_PROPERTY:${TARGET},INCLUDE_DIRECTORIES>")
+    target_compile_definitions(${APART} PRIVATE "$<TARGET_PROPERTY:${TARGET},COMPILE_DEFINITIONS>")
+    target_compile_options(${APART} PRIVATE "$<TARGET_PROPERTY:${TARGET},COMPILE_OPTIONS>")
+    target_compile_features(${APART} PRIVATE cxx_std_20)
+    set(TARGET ${APART})
+  endif()
+  set(${VARIABLE} "$<FILTER:$<TARGET_OBJECTS:${TARGET}>,INCLUDE,/(${NAMES})[.]cpp>" PARENT_SCOPE)
+endfunction()
+
 # rhec_add_room(FLOOR ROOM [INTERNAL] [SHARED] [APART] [AFTER room ...] [SOURCES ...] [PUBLIC ...] [PRIVATE ...])
 #   A room of a floor, in its own folder: the target `rhec_<FLOOR>_<ROOM>`. It sees the public headers of the rooms of the same
 #   floor that it comes AFTER, and of those that they come after, and no others. The headers in <folder>/include are

@@ -70,7 +70,7 @@ bool is_more(int a, int b) { return b != 0 && (a == 0 || a > b); }
 int leading_state(const Eigen::EigenSolver<Eigen::MatrixXd>& solver, Eigen::Index mode, const ModelDescription& about) {
   // Right eigenvectors of a pair are columns a + i b and a - i b, left ones half the rows of their inverse, a - i b and
   // a + i b.
-  const Eigen::MatrixXd right = solver.pseudoEigenvectors();
+  const Eigen::MatrixXd& right = solver.pseudoEigenvectors();
   const Eigen::MatrixXd left = Eigen::PartialPivLU<Eigen::MatrixXd>(right).inverse();
   const double turning = solver.eigenvalues()[mode].imag();
   const Eigen::Index first = turning < 0.0 ? mode - 1 : mode, count = turning == 0.0 ? 1 : 2;
