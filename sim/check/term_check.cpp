@@ -236,8 +236,8 @@ std::vector<Finding> check_numbers(const std::vector<TermFormula>& on, const Ter
     });
     found = fmt::format(
         "{} of {} samples give limits, costs or derivatives that are not finite (values {}, first derivatives {}, "
-        "second "
-        "{}), e.g. at {}{}",
+        "second {}), "
+        "e.g. at {}{}",
         bad.size(), options.samples, values, first, second, samples.text_of(bad[example]), because.found);
     advice = because.advice;
     numbers = {{"samples", options.samples},

@@ -81,8 +81,7 @@ void refuse_scenario(const Settings& description) {
     if (const Settings* found = description.find(key))
       throw found->error(
           "is that of a scenario: this file is for 'rhec run' or 'rhec estimate'; a sweep names it, 'scenario: FILE', "
-          "and "
-          "changes keys in its 'set' and 'grid'");
+          "and changes keys in its 'set' and 'grid'");
 }
 
 }  // namespace
