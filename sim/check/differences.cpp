@@ -9,7 +9,7 @@
 namespace rhec::sim {
 namespace {
 
-constexpr double none = std::numeric_limits<double>::quiet_NaN();
+constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 constexpr double most_scales = 10.0;                            // wider bounds do not count as typical values
 constexpr double distances[] = {2e-2, 2e-3, 2e-4, 2e-5, 2e-6};  // spacing of difference points, in scales
 
@@ -32,7 +32,7 @@ struct Differences {
 Differences differences(const StagePoints& stages, const ModelDescription& about, int entry, double step, int size,
                         const std::vector<double>& given, const ValuesOfStages& evaluate) {
   const std::size_t count = static_cast<std::size_t>(stages.count) * size;
-  Differences best{std::vector<double>(count, none),
+  Differences best{std::vector<double>(count, not_known),
                    std::vector<double>(count, std::numeric_limits<double>::infinity())};
   StagePoints moved = stages;
   std::vector<double> start(stages.count);
