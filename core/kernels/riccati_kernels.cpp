@@ -294,125 +294,200 @@ RHEC_ALWAYS_INLINE inline bool factor_stage(const RiccatiView& view, int i, doub
   return true;
 }
 
-/// The same for any sizes, with rows in memory: those of controls have `width` columns. Those of states are only needed
-/// up to the states, which fill `state_width`: their columns of controls are the rows of these.
-template <int width, int state_width>
-inline bool factor_general_stage(const RiccatiView& view, int i, double tolerance) {
-  using Stage = Shape<width / 8, 0, 0>;
-  using R = typename Stage::R;
-  using S = Row<state_width / lane_count>;
-  const Stage stage(view, i);
-  const Memory<Stage> at(view, i);
-  const long stride = at.stride;
-  const int states = stage.states, controls = stage.columns - stage.offset, moved = stage.moved, offset = stage.offset;
-  // Rows are summed up two at a time, for the processor's pipelines; an odd last one is summed up twice.
-  R W[state_width];  // rows of P [A B]
-  for (int j = 0; j < stage.next_states; j += 2) {
-    const int other = j + 1 < stage.next_states ? j + 1 : j;
-    R sum = at.row(at.P_next, j).between(moved, stage.next_states),
-      sum_of_other = at.row(at.P_next, other).between(moved, stage.next_states);
-    // P is read from its upper triangle only, so that it stays symmetric.
-    const auto entry = [&](int l, int column) {
-      return l < column ? at.P_next[l * stride + column] : at.P_next[column * stride + l];
-    };
-    for (int l = 0; l < moved; ++l) {
-      const R row = at.row(at.AB, l);
-      sum.add(row, entry(l, j));
-      sum_of_other.add(row, entry(l, other));
+/// What factorisations of any size do with rows in memory, for rows of `width` numbers. One function each: rows of
+/// controls and of states have widths of their own, and whole stages compiled for every pair of them would be many.
+/// Rows are summed up two at a time, for the processor's pipelines; an odd last one is summed up twice.
+template <int width>
+struct GeneralRows {
+  using R = Row<width / lane_count>;
+
+  /// Row r of `sums`: that of `starts`, plus the sum over l of factors[l * step + r] times row l of `rows`.
+  [[gnu::noinline]] static void add_products(int count, int terms, const double* rows, long row_stride,
+                                             const double* factors, long step, const double* starts, double* sums,
+                                             long sum_stride) {
+    for (int r = 0; r < count; r += 2) {
+      const int other = r + 1 < count ? r + 1 : r;
+      R first = R::from(starts + r * step), second = R::from(starts + other * step);
+      for (int l = 0; l < terms; ++l) {
+        const R row = R::from(rows + l * row_stride);
+        first.add(row, factors[l * step + r]);
+        second.add(row, factors[l * step + other]);
+      }
+      first.to(sums + r * sum_stride);
+      second.to(sums + other * sum_stride);
     }
-    W[j] = sum;
-    W[other] = sum_of_other;
   }
+
+  /// Rows of P [A B]: of the first `moved` rows of AB, and of the identity for the other states. P is read from its
+  /// upper triangle only, so that it stays symmetric.
+  [[gnu::noinline]] static void multiply(int states, int moved, const double* P, const double* AB, long stride,
+                                         double* products) {
+    for (int j = 0; j < states; j += 2) {
+      const int other = j + 1 < states ? j + 1 : j;
+      R first = R::from(P + j * stride).between(moved, states),
+        second = R::from(P + other * stride).between(moved, states);
+      const auto entry = [&](int l, int column) RHEC_ALWAYS_INLINE {
+        return l < column ? P[l * stride + column] : P[column * stride + l];
+      };
+      for (int l = 0; l < moved; ++l) {
+        const R row = R::from(AB + l * stride);
+        first.add(row, entry(l, j));
+        second.add(row, entry(l, other));
+      }
+      first.to(products + j * width);
+      second.to(products + other * width);
+    }
+  }
+
+  /// Subtracts factors[j] times `row` from row j of `rows`.
+  [[gnu::noinline]] static void eliminate(int count, const double* row, const double* factors, double* rows,
+                                          long stride) {
+    const R eliminated = R::from(row);
+    for (int j = 0; j < count; ++j) {
+      R left = R::from(rows + j * stride);
+      left.add(eliminated, -factors[j]);
+      left.to(rows + j * stride);
+    }
+  }
+
+  /// Adds to `sum` what factors[j] times row j of `rows` sum up to.
+  [[gnu::noinline]] static void accumulate(int count, const double* rows, long stride, const double* factors,
+                                           double* sum) {
+    R total = R::from(sum);
+    for (int j = 0; j < count; ++j) total.add(R::from(rows + j * stride), factors[j]);
+    total.to(sum);
+  }
+
+  /// Subtracts from `sum` what factors[j] times row j of `rows` sum up to.
+  [[gnu::noinline]] static void subtract_products(int count, const double* rows, long stride, const double* factors,
+                                                  double* sum) {
+    R left = R::from(sum);
+    for (int j = 0; j < count; ++j) left.add(R::from(rows + j * stride), -factors[j]);
+    left.to(sum);
+  }
+};
+
+/// Of a QP's stages: states or controls, and both.
+constexpr int most_rows = 64, most_columns = 2 * most_rows;
+
+/// The functions of one width, to be chosen at run time.
+struct RowFunctions {
+  int width;
+  decltype(&GeneralRows<8>::add_products) add_products;
+  decltype(&GeneralRows<8>::multiply) multiply;
+  decltype(&GeneralRows<8>::eliminate) eliminate;
+  decltype(&GeneralRows<8>::accumulate) accumulate;
+  decltype(&GeneralRows<8>::subtract_products) subtract_products;
+};
+
+template <int width>
+constexpr RowFunctions row_functions = {width,
+                                        &GeneralRows<width>::add_products,
+                                        &GeneralRows<width>::multiply,
+                                        &GeneralRows<width>::eliminate,
+                                        &GeneralRows<width>::accumulate,
+                                        &GeneralRows<width>::subtract_products};
+
+/// The least compiled width for so many columns.
+inline const RowFunctions& row_functions_for(int columns) {
+  if (columns <= 8) return row_functions<8>;
+  if (columns <= 16) return row_functions<16>;
+  if (columns <= 24) return row_functions<24>;
+  if (columns <= 32) return row_functions<32>;
+  if (columns <= 64) return row_functions<64>;
+  return row_functions<128>;
+}
+
+inline void add_to_diagonal(const RiccatiView& view, int i, int k, double* row) {
+  if (view.diagonal) row[k] += view.diagonal[static_cast<long>(i) * view.stride + k];
+}
+
+/// Writes the first `count` numbers of a row of `width`, the others as zero. Both rows may be the same.
+inline void copy_first(int count, int width, const double* row, double* to) {
+  for (int v = 0; v < width / lane_count; ++v)
+    store(first_of(load(row + v * lane_count), v, count), to + v * lane_count);
+}
+
+inline int most_states(const RiccatiView& view, int i) {
+  return view.state_counts[i] > view.state_counts[i + 1] ? view.state_counts[i] : view.state_counts[i + 1];
+}
+
+/// The same for any sizes, with rows in memory: those of controls have all columns. Those of states are only needed up
+/// to the states: their columns of controls are the rows of these.
+bool factor_general(const RiccatiView& view, int i, double tolerance) {
+  const long stride = view.stride;
+  const int offset = view.states, controls = view.control_counts[i], columns = offset + controls;
+  const int states = view.state_counts[i], next_states = view.state_counts[i + 1];
+  const int moved = next_states - view.identity_counts[i];
+  const RowFunctions& all_columns = row_functions_for(columns);
+  const RowFunctions& of_state = row_functions_for(most_states(view, i));
+  const int width = all_columns.width, state_width = of_state.width;
+  const Memory<Shape<1, 0, 0>> at(view, i);
+
+  alignas(64) double W[most_rows * most_columns];  // rows of P [A B]
+  all_columns.multiply(next_states, moved, at.P_next, at.AB, stride, W);
   // Rows of H + [A B]'P[A B].
-  R of_controls[64];
-  S of_states[state_width];
-  double diagonal[64];
+  alignas(64) double of_controls[most_rows * most_columns], of_states[most_rows * most_rows], diagonal[most_rows];
   bool any_fixed = false;
-  for (int c = 0; c < controls; c += 2) {
-    const int other = c + 1 < controls ? c + 1 : c;
-    R sums[2] = {at.row(at.H, offset + c), at.row(at.H, offset + other)};
-    for (int l = 0; l < moved; ++l) {
-      sums[0].add(W[l], at.AB[l * stride + offset + c]);
-      sums[1].add(W[l], at.AB[l * stride + offset + other]);
-    }
-    of_controls[c] = sums[0];
-    of_controls[other] = sums[1];
-  }
+  all_columns.add_products(controls, moved, W, width, at.AB + offset, stride, at.H + offset * stride, of_controls,
+                           width);
   for (int c = 0; c < controls; ++c) {
-    const int k = offset + c;
-    R& row = of_controls[c];
-    if (view.diagonal) row = row.with(k, row.entry(k) + view.diagonal[i * stride + k]);
-    diagonal[c] = row.entry(k);
-    if (at.sides[k] == 0) continue;
+    double* const row = of_controls + c * width;
+    add_to_diagonal(view, i, offset + c, row);
+    diagonal[c] = row[offset + c];
+    if (at.sides[offset + c] == 0) continue;
     any_fixed = true;
-    row.to(at.U + c * stride);
+    copy_first(width, width, row, at.U + c * stride);
   }
   view.fixes[i] = any_fixed;
-  const auto states_of = [](const R& row) {
-    S part;
-    for (int v = 0; v < state_width / lane_count; ++v) part.part[v] = row.part[v];
-    return part;
-  };
-  for (int k = 0; k < states; k += 2) {
-    const int other = k + 1 < states ? k + 1 : k;
-    S sums[2] = {S::from(at.H + k * stride), S::from(at.H + other * stride)};
-    for (int l = 0; l < moved; ++l) {
-      const S row = states_of(W[l]);
-      sums[0].add(row, at.AB[l * stride + k]);
-      sums[1].add(row, at.AB[l * stride + other]);
-    }
-    of_states[k] = sums[0];
-    of_states[other] = sums[1];
-  }
+  of_state.add_products(states, moved, W, width, at.AB, stride, at.H, of_states, state_width);
   for (int k = 0; k < states; ++k) {
-    S& row = of_states[k];
-    if (k >= moved && k < stage.next_states) row.add(states_of(W[k]));
-    if (view.diagonal) row = row.with(k, row.entry(k) + view.diagonal[i * stride + k]);
+    double* const row = of_states + k * state_width;
+    if (k >= moved && k < next_states)
+      for (int j = 0; j < state_width; ++j) row[j] += W[k * width + j];
+    add_to_diagonal(view, i, k, row);
   }
   // Controls are eliminated one by one: see eliminate_controls.
-  S policies[64];
-  alignas(64) double scaled_row[width];
+  alignas(64) double policies[most_rows * most_rows], scaled[most_columns];
   bool is_definite = true;
   for (int c = controls - 1; c >= 0; --c) {
     const int k = offset + c;
+    double *const row = of_controls + c * width, *const policy = policies + c * state_width;
     if (at.sides[k] != 0) {
       at.inverse[c] = 0.0;
-      policies[c] = S{};
+      for (int j = 0; j < state_width; ++j) policy[j] = 0.0;
       continue;
     }
-    const double pivot = of_controls[c].entry(k);
+    const double pivot = row[k];
     is_definite = is_definite && pivot > tolerance * diagonal[c] && pivot > 0.0;
     const double reciprocal = 1.0 / pivot;
-    R row = of_controls[c].first(k);
+    copy_first(k, width, row, row);
     for (int f = offset; any_fixed && f < k; ++f)
-      if (at.sides[f] != 0) row.part[f / lane_count][f % lane_count] = 0.0;
-    row.to(at.U + c * stride);
+      if (at.sides[f] != 0) row[f] = 0.0;
+    copy_first(width, width, row, at.U + c * stride);
     at.inverse[c] = reciprocal;
-    R scaled{};
-    scaled.add(row, reciprocal);
-    scaled.to(scaled_row);
-    for (int j = 0; j < c; ++j) of_controls[j].add(row, -scaled_row[offset + j]);
-    const S of_row = states_of(row);
-    for (int j = 0; j < states; ++j) of_states[j].add(of_row, -scaled_row[j]);
-    of_controls[c] = scaled;
-    policies[c] = states_of(scaled).first(states);
+    for (int j = 0; j < width; ++j) scaled[j] = row[j] * reciprocal;
+    all_columns.eliminate(c, row, scaled + offset, of_controls, width);
+    of_state.eliminate(states, row, scaled, of_states, state_width);
+    copy_first(width, width, scaled, row);
+    copy_first(states, state_width, scaled, policy);
   }
   if (!is_definite) return false;
-  const auto store = [](const S& row, double* to) {
-    row.to(to);
+  const auto store_states = [&](const double* row, double* to) {
+    copy_first(states, state_width, row, to);
     for (int v = state_width; v < width; v += lane_count) kernels::store(Lanes{}, to + v);
   };
   // From a policy in terms of the state and the controls before, to a policy in terms of the state alone.
   for (int c = 0; c < controls; ++c) {
-    of_controls[c].to(scaled_row);
-    for (int j = 0; at.sides[offset + c] == 0 && j < c; ++j) policies[c].add(policies[j], -scaled_row[offset + j]);
-    store(policies[c], at.V + c * stride);
+    double* const policy = policies + c * state_width;
+    if (at.sides[offset + c] == 0)
+      of_state.subtract_products(c, policies, state_width, of_controls + c * width + offset, policy);
+    store_states(policy, at.V + c * stride);
   }
-  for (int j = 0; j < states; ++j) store(of_states[j].first(states), at.P + j * stride);
+  for (int j = 0; j < states; ++j) store_states(of_states + j * state_width, at.P + j * stride);
   if (view.for_steps) {
-    R drift{};
-    for (int l = 0; l < stage.next_states; ++l) drift.add(at.row(at.P_next, l), at.b[l]);
-    drift.to(at.drift);
+    for (int v = 0; v < width; v += lane_count) kernels::store(Lanes{}, at.drift + v);
+    all_columns.accumulate(next_states, at.P_next, stride, at.b, at.drift);
   }
   return true;
 }
@@ -427,18 +502,29 @@ inline auto with_width_of_states(int states, const Function& function) {
   return function.template operator()<64>();
 }
 
-inline int most_states(const RiccatiView& view, int i) {
-  return view.state_counts[i] > view.state_counts[i + 1] ? view.state_counts[i] : view.state_counts[i + 1];
-}
-
-constexpr int smaller_of(int a, int b) { return a < b ? a : b; }
-
-template <int width>
-inline bool factor_general(const RiccatiView& view, int i, double tolerance) {
-  return with_width_of_states(most_states(view, i), [&]<int state_width>() {
-    constexpr int fitting = smaller_of(state_width, width);  // states are columns, too
-    return factor_general_stage<width, fitting>(view, i, tolerance);
+/// The controls at state step zero, given the gradient's entries: eliminated from last to first, then computed from
+/// first to last.
+template <class Stage, class Gradient>
+RHEC_ALWAYS_INLINE inline void solve_controls(const RiccatiView& view, int i, const Stage& stage,
+                                              const Memory<Stage>& at, const Gradient& gradient) {
+  double own[Stage::most_columns];
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { own[k] = gradient(k); });
+  stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
+    const double* U = at.U + (k - stage.offset) * at.stride;
+    own[k] *= at.inverse[k - stage.offset];
+    stage.each_control_before(k, [&](auto j) RHEC_ALWAYS_INLINE { own[j] -= U[j] * own[k]; });
   });
+  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
+    const double* U = at.U + (k - stage.offset) * at.stride;
+    double sum = own[k];
+    stage.each_control_before(k,
+                              [&](auto j) RHEC_ALWAYS_INLINE { sum -= U[j] * at.inverse[k - stage.offset] * own[j]; });
+    own[k] = sum;
+    at.p[k] = -sum;
+  });
+  if (view.fixes[i])
+    for (int k = stage.offset; k < stage.columns; ++k)
+      if (at.sides[k] != 0) at.p[k] = bound_of(view, i, k);
 }
 
 /// Replaces p of the next node by p of this one. It stays in registers, since a value just written to memory takes a
@@ -477,25 +563,33 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
     subtract_policy(p, gradient);
   }
   p.to(at.p);
-  // The controls at state step zero: eliminated from last to first, then computed from first to last.
-  double own[Stage::most_columns];
-  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { own[k] = gradient.entry(k); });
-  stage.each_control_back([&](auto k) RHEC_ALWAYS_INLINE {
-    const double* U = at.U + (k - stage.offset) * at.stride;
-    own[k] *= at.inverse[k - stage.offset];
-    stage.each_control_before(k, [&](auto j) RHEC_ALWAYS_INLINE { own[j] -= U[j] * own[k]; });
-  });
-  stage.each_control([&](auto k) RHEC_ALWAYS_INLINE {
-    const double* U = at.U + (k - stage.offset) * at.stride;
-    double sum = own[k];
-    stage.each_control_before(k,
-                              [&](auto j) RHEC_ALWAYS_INLINE { sum -= U[j] * at.inverse[k - stage.offset] * own[j]; });
-    own[k] = sum;
-    at.p[k] = -sum;
-  });
-  if (view.fixes[i])
-    for (int k = stage.offset; k < stage.columns; ++k)
-      if (at.sides[k] != 0) at.p[k] = bound_of(view, i, k);
+  solve_controls(view, i, stage, at, [&](auto k) RHEC_ALWAYS_INLINE { return gradient.entry(k); });
+}
+
+/// What solve_stage_backward does, for any sizes, with p in memory.
+void solve_backward_general(const RiccatiView& view, int i) {
+  using Stage = Shape<2 * most_rows / 8, 0, 0>;
+  const Stage stage(view, i);
+  const Memory<Stage> at(view, i);
+  const int controls = stage.columns - stage.offset;
+  const RowFunctions& rows = row_functions_for(stage.columns);
+  alignas(64) double costate[most_columns], gradient[most_columns];
+  for (int j = 0; j < rows.width; ++j) {
+    costate[j] = at.p_next[j] + at.drift[j];
+    gradient[j] = at.h[j];
+  }
+  rows.accumulate(stage.moved, at.AB, at.stride, costate, gradient);
+  for (int j = stage.moved; j < stage.next_states; ++j) gradient[j] += costate[j];
+  if (view.fixes[i]) {
+    copy_first(rows.width, rows.width, gradient, at.g);
+    for (int k = stage.offset; k < stage.columns; ++k) {
+      const double bound = at.sides[k] != 0 ? bound_of(view, i, k) : 0.0;
+      if (at.sides[k] != 0) rows.accumulate(1, at.U + (k - stage.offset) * at.stride, at.stride, &bound, gradient);
+    }
+  }
+  copy_first(rows.width, rows.width, gradient, at.p);
+  rows.subtract_products(controls, at.V, at.stride, gradient + stage.offset, at.p);
+  solve_controls(view, i, stage, at, [&](int k) RHEC_ALWAYS_INLINE { return gradient[k]; });
 }
 
 /// Multipliers of the active bounds of a stage's controls.
@@ -537,10 +631,18 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
     stage.each_control([&](auto k) RHEC_ALWAYS_INLINE { sum += AB[k] * w[k]; });
     reached[l] = next[l] = sum;
   });
-  R sums[2] = {R::from(at.p_next).first(stage.next_states), R{}};
-  stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.P_next, l), reached[l]); });
-  if (R::chains > 1) sums[0].add(sums[1]);
-  sums[0].to(view.costates + (i + 1) * at.stride);
+  double* const costates = view.costates + (i + 1) * at.stride;
+  if constexpr (Stage::is_known) {
+    R sums[2] = {R::from(at.p_next).first(stage.next_states), R{}};
+    stage.each_next_state([&](auto l)
+                              RHEC_ALWAYS_INLINE { sums[l % R::chains].add(at.row(at.P_next, l), reached[l]); });
+    if (R::chains > 1) sums[0].add(sums[1]);
+    sums[0].to(costates);
+  } else {
+    const RowFunctions& rows = row_functions_for(stage.columns);
+    copy_first(stage.next_states, rows.width, at.p_next, costates);
+    rows.accumulate(stage.next_states, at.P_next, at.stride, reached, costates);
+  }
   stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { s[l] = reached[l]; });
   if (view.fixes[i]) write_multipliers(view, i, stage, at);
 }
@@ -663,8 +765,8 @@ RHEC_ALWAYS_INLINE inline void sensitivities_stage_forward(const Stage& stage, c
 /// one. The compiled sizes are those of estimators and controllers with two inputs: vehicles with three to five states
 /// plus parameters, between the starts of blocks, where the parameters are carried; that of a controller with the rate
 /// of one input; and the most common ones where blocks start. The row length has no other effect: a QP gives the same
-/// bits with another capacity.
-template <bool is_written_out, class Function>
+/// bits with another capacity. General shapes differ by the rows' length only if it `counts`.
+template <bool is_written_out, bool length_counts = true, class Function>
 inline auto with_shape(const RiccatiView& view, int i, const Function& function) {
   const int states = view.states, controls = view.control_counts[i], carried = view.identity_counts[i];
   const bool is_full = view.state_counts[i] == states && view.state_counts[i + 1] == states;
@@ -692,6 +794,7 @@ inline auto with_shape(const RiccatiView& view, int i, const Function& function)
     if (states == 6 && controls == 3) return function.template operator()<Shape<2, 6, 3, is_written_out, 0, 16>>();
     if (states == 6 && controls == 4) return function.template operator()<Shape<2, 6, 4, is_written_out, 0, 16>>();
   }
+  if constexpr (!length_counts) return function.template operator()<Shape<16, 0, 0>>();
   const int columns = states + controls;
   if (columns <= 8) return function.template operator()<Shape<1, 0, 0>>();
   if (columns <= 16) return function.template operator()<Shape<2, 0, 0>>();
@@ -716,7 +819,7 @@ int factor(const RiccatiView& view, int first, double tolerance) {
     if (view.special[i]) return i;
     const bool done = with_shape<matrices_fit>(view, i, [&]<class Stage>() {
       if constexpr (!Stage::is_known && Stage::most_columns > 8)
-        return factor_general<Stage::most_columns>(view, i, tolerance) && (--i, true);
+        return factor_general(view, i, tolerance) && (--i, true);
       const int alike = i;
       do
         if (!factor_stage<Stage>(view, i, tolerance)) return false;
@@ -732,6 +835,10 @@ int solve_backward(const RiccatiView& view, int first) {
   for (int i = first; i >= 0;) {
     if (view.special[i]) return i;
     with_shape<true>(view, i, [&]<class Stage>() {
+      if constexpr (!Stage::is_known && Stage::most_columns > 8) {
+        solve_backward_general(view, i--);
+        return;
+      }
       const int alike = i;
       auto p = Stage::R::from(view.p + static_cast<long>(i + 1) * view.stride);
       do solve_stage_backward<Stage>(view, i, p);
@@ -744,7 +851,7 @@ int solve_backward(const RiccatiView& view, int first) {
 int solve_forward(const RiccatiView& view, int first) {
   for (int i = first; i < view.intervals;) {
     if (view.special[i]) return i;
-    with_shape<true>(view, i, [&]<class Stage>() {
+    with_shape<true, false>(view, i, [&]<class Stage>() {
       const int alike = i;
       const double* first_state = view.values + static_cast<long>(i) * view.stride;
       if constexpr (Stage::is_compact) {
@@ -770,7 +877,7 @@ RHEC_ALWAYS_INLINE inline void each_register(const Function& function) {
 
 void sensitivities_backward(const RiccatiView& view, int last, const unsigned char* has_gradient, double* gradients) {
   for (int i = last < view.intervals ? last : view.intervals - 1; i >= 0;)
-    with_shape<true>(view, i, [&]<class Stage>() {
+    with_shape<true, false>(view, i, [&]<class Stage>() {
       const int alike = i;
       do {
         const Stage stage(view, i);
@@ -785,7 +892,7 @@ void sensitivities_backward(const RiccatiView& view, int last, const unsigned ch
 
 void sensitivities_forward(const RiccatiView& view, int last, double* sensitivities, double* costates) {
   for (int i = 0; i < view.intervals;)
-    with_shape<true>(view, i, [&]<class Stage>() {
+    with_shape<true, false>(view, i, [&]<class Stage>() {
       const int alike = i;
       do {
         const Stage stage(view, i);
@@ -1077,12 +1184,37 @@ bool filter_covariance(const RiccatiView& view, double* sigma) {
   return with_width_of_states(view.states, [&]<int width>() { return filter_covariance_of<width>(view, sigma); });
 }
 
+/// What form_rows does, for any sizes.
+void form_general(const RiccatiView& view, int i, double* out) {
+  const long stride = view.stride;
+  const int offset = view.states, controls = view.control_counts[i], states = view.state_counts[i];
+  const int next_states = view.state_counts[i + 1], moved = next_states - view.identity_counts[i];
+  const RowFunctions& rows = row_functions_for(offset + controls);
+  const Memory<Shape<1, 0, 0>> at(view, i);
+  alignas(64) double W[most_rows * most_columns];
+  rows.multiply(next_states, moved, at.P_next, at.AB, stride, W);
+  rows.add_products(states, moved, W, rows.width, at.AB, stride, at.H, out, stride);
+  rows.add_products(controls, moved, W, rows.width, at.AB + offset, stride, at.H + offset * stride,
+                    out + offset * stride, stride);
+  for (int k = 0; k < offset + controls; ++k) {
+    double* const row = out + k * stride;
+    if (k >= states && k < offset) continue;
+    if (k >= moved && k < next_states)
+      for (int j = 0; j < rows.width; ++j) row[j] += W[k * rows.width + j];
+    add_to_diagonal(view, i, k, row);
+  }
+}
+
 void form(const RiccatiView& view, int i, double* out) {
   with_shape<matrices_fit>(view, i, [&]<class Stage>() {
-    typename Stage::R X[Stage::most_columns]{};
-    const Stage stage(view, i);
-    form_rows(view, i, stage, Memory<Stage>(view, i), X);
-    for (int k = 0; k < stage.columns; ++k) X[k].to(out + static_cast<long>(k) * view.stride);
+    if constexpr (Stage::is_known) {
+      typename Stage::R X[Stage::most_columns]{};
+      const Stage stage(view, i);
+      form_rows(view, i, stage, Memory<Stage>(view, i), X);
+      for (int k = 0; k < stage.columns; ++k) X[k].to(out + static_cast<long>(k) * view.stride);
+    } else {
+      form_general(view, i, out);
+    }
   });
 }
 

@@ -135,10 +135,10 @@ class Rider {
     const int x = about_.roles.position_x, y = about_.roles.position_y;
     const Eigen::Vector2d off(estimate.state[x] - truth.state()[x], estimate.state[y] - truth.state()[y]);
     const Eigen::Vector2d error = off - frame;
-    Eigen::Matrix2d P;
-    P << estimate.covariance(x, x), estimate.covariance(x, y), estimate.covariance(y, x), estimate.covariance(y, y);
+    const double xx = estimate.covariance(x, x), xy = estimate.covariance(x, y), yy = estimate.covariance(y, y);
     sample.error = error.norm();
-    sample.is_inside = error.dot(P.ldlt().solve(error)) < counted_in_plane;
+    const double squared = yy * error[0] * error[0] - 2.0 * xy * error[0] * error[1] + xx * error[1] * error[1];
+    sample.is_inside = squared <= counted_in_plane * (xx * yy - xy * xy);
     sample.displaced = displacement.shift.norm();
     if (sample.displaced > 0.0) sample.followed = off.dot(displacement.shift) / displacement.shift.squaredNorm();
   }

@@ -1,5 +1,4 @@
 // Estimation: writes, reads, builds and copies an RheProblem.
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +10,7 @@
 #include "rhec/core/model/state_noise_model.hpp"
 #include "rhec/core/prior/prior.hpp"
 #include "rhec/core/prior/process_model.hpp"
+#include "rhec/core/qp/symmetric_eigen.hpp"
 
 namespace rhec::sim {
 namespace {
@@ -106,8 +106,7 @@ void check_information(const LineValue& information, const ProblemRecord::Rows& 
     }
   }
   if (n == 0) return;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled, Eigen::EigenvaluesOnly);
-  if (const double least = eigen.eigenvalues()[0]; !(least >= -rounding_of_information * static_cast<double>(n)))
+  if (const double least = symmetric_eigen(scaled).values[0]; !(least >= -rounding_of_information * static_cast<double>(n)))
     throw information.error(
         fmt::format("has a negative eigenvalue ({:.3g} with the diagonal scaled to 1); expected a "
                     "positive semidefinite matrix, the inverse of a covariance",

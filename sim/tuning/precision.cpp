@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "rhec/core/qp/symmetric_eigen.hpp"
 #include "rhec/sim/tuning/search.hpp"
 
 namespace rhec::sim {
@@ -62,9 +62,9 @@ Slice measure(const std::function<Eigen::VectorXd(double step)>& terms, double w
 /// that cannot be: the least eigenvalue, of the matrix scaled to a diagonal of ones, is what roughness leaves of it.
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix, double least) {
   const Eigen::VectorXd scale = matrix.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * matrix * scale.asDiagonal());
-  return scale.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
-         eigen.eigenvectors().transpose() * scale.asDiagonal();
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * matrix * scale.asDiagonal());
+  const Eigen::MatrixXd rows = scale.asDiagonal() * eigen.vectors;
+  return rows * eigen.values.cwiseMax(least).cwiseInverse().asDiagonal() * rows.transpose();
 }
 
 }  // namespace

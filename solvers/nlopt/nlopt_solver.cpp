@@ -5,10 +5,10 @@
 #include <optional>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include "active_set.hpp"
 #include "rhec/core/ocp/iterate_checks.hpp"
+#include "rhec/core/qp/symmetric_eigen.hpp"
 #include "rhec/plugins/kit/sdk.hpp"
 
 namespace rhec::nlopt {
@@ -41,10 +41,11 @@ constexpr double least_curvature = 1e-10;
 
 /// Makes a symmetric matrix positive definite by reflecting its negative eigenvalues.
 Matrix reflected(const Matrix& symmetric) {
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(symmetric);
-  Vector values = eigen.eigenvalues().cwiseAbs();
+  const SymmetricEigen eigen = symmetric_eigen(symmetric);
+  Vector values = eigen.values.cwiseAbs();
   values = values.cwiseMax(std::max(least_curvature * values.maxCoeff(), 1e-300));
-  return eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
+  const Matrix scaled = eigen.vectors * values.asDiagonal();
+  return scaled * eigen.vectors.transpose();
 }
 
 }  // namespace
