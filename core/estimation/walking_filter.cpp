@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <Eigen/Cholesky>
 
@@ -41,14 +42,30 @@ void WalkingFilter::predict(const double* inputs, double duration, const double*
   for (int i = 0; i < parts; ++i) {
     if (setup_.has_ramps) {
       filter_.predict(inputs, guess_.data(), part, ramp_variances_.data());
-      continue;
+    } else {
+      filter_.predict(inputs, guess_.data(), part);
+      for (std::size_t j = 0; j < setup_.walk.size(); ++j)
+        filter_.add_parameter_variance(static_cast<int>(j), ramp_variances_[j]);
     }
-    filter_.predict(inputs, guess_.data(), part);
-    for (std::size_t j = 0; j < setup_.walk.size(); ++j)
-      filter_.add_parameter_variance(static_cast<int>(j), ramp_variances_[j]);
+    if (more_sigmas) limit_states();
   }
   for (std::size_t j = 0; more_sigmas && j < guess_.size(); ++j)
     filter_.set_input_variance(static_cast<int>(j), setup_.noise.input_variances[j]);
+}
+
+/// A motion that nobody knows ends at a state's bounds, as that of a steering angle at its stop, and no angle is less
+/// known than that it is on the circle. What is capped keeps its correlations.
+void WalkingFilter::limit_states() noexcept {
+  const std::vector<Variable>& states = model().description().states;
+  for (Eigen::Index j = 0; j < std::ssize(states); ++j) {
+    const Variable& state = states[j];
+    mean()[j] = std::min(std::max(mean()[j], state.lower), state.upper);
+    const double most = 0.5 * (state.is_angle ? 2.0 * std::numbers::pi : state.upper - state.lower);
+    const double sigma = std::sqrt(covariance()(j, j));
+    if (!(sigma > most)) continue;
+    covariance().row(j) *= most / sigma;
+    covariance().col(j) *= most / sigma;
+  }
 }
 
 void WalkingFilter::expect() noexcept {

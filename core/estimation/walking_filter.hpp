@@ -45,6 +45,8 @@ class WalkingFilter {
   double expected(int output) const noexcept { return expected_[output]; }
 
  private:
+  void limit_states() noexcept;
+
   Setup setup_;
   KalmanFilter filter_;
   std::vector<double> ramp_variances_, guess_, expected_, jacobian_;

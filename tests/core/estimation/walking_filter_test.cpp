@@ -2,7 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+
 #include "support/linear_case.hpp"
+#include "support/sensor_faults.hpp"
 
 namespace rhec {
 namespace walking_filter_test {
@@ -51,6 +58,32 @@ TEST(WalkingFilter, WhatIsNotKnownOfInputsCountsOnce) {
   filter.predict(&input, 0.1);
   after.predict(&input, 0.1);
   EXPECT_LT((filter.covariance() - after.covariance()).norm(), 1e-14);
+}
+
+/// Of a motion that nobody knows it is still known that a steering angle ends at its stop, and a heading on a circle.
+TEST(WalkingFilter, AnUnknownMotionStaysWithinBounds) {
+  const Robot robot = watched_robot("ekf");
+  const auto model = robot.model();
+  const int nx = model->state_count(), heading = model->description().roles.heading, steering = 3;
+  const Variable& angle = model->description().states[steering];
+  WalkingFilter filter(model, {.noise = {.output_variances = {1e-3, 1e-3, 3e-4},
+                                         .input_variances = {0.01, 0.01},
+                                         .parameter_lower = {0.0, 0.0},
+                                         .parameter_upper = {1.0, 1.0}},
+                               .walk = {0.03, 0.03}});
+  filter.mean() = Eigen::VectorXd::Zero(nx + 2);
+  filter.mean().tail(2).setConstant(0.75);
+  filter.covariance() = 1e-3 * Eigen::MatrixXd::Identity(nx + 2, nx + 2);
+  const std::vector<double> inputs = {4.0, -0.3}, more = {1.0, 0.5};
+  for (int second = 1; second <= 60; ++second) {
+    filter.predict(inputs.data(), 1.0, more.data());
+    const Eigen::MatrixXd& P = filter.covariance();
+    EXPECT_LE(std::sqrt(P(heading, heading)), std::numbers::pi + 1e-9);
+    EXPECT_LE(std::sqrt(P(steering, steering)), 0.5 * (angle.upper - angle.lower) + 1e-9);
+    EXPECT_TRUE(P.allFinite());
+    EXPECT_GE(P.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-9 * P.diagonal().maxCoeff());
+  }
+  EXPECT_DOUBLE_EQ(filter.mean()[steering], angle.lower);
 }
 
 TEST(WalkingFilter, InnovationsAreThoseOfTheTextbook) {
