@@ -15,6 +15,29 @@ std::vector<int> process_counts(const Model& model, const PriorBank& bank) {
   return counts;
 }
 
+/// Ground after which another law may hold, as in a bank that is not told otherwise [m].
+const double law_memory = PriorBank::Setup{}.memory;
+
+int most_probable(const std::vector<double>& weights, int members) {
+  return static_cast<int>(std::max_element(weights.begin(), weights.begin() + members) - weights.begin());
+}
+
+/// The members' probabilities at a node, given all that came later (Kim 1994): from `smoothed`, those at the next node,
+/// and `filtered`. With the probability `change` another law has come to hold on the interval between the two.
+void look_back(double* smoothed, const double* filtered, int members, double change) {
+  const double each = change / members;
+  double ratios = 0.0, sum = 0.0;
+  for (int m = 0; m < members; ++m) {
+    smoothed[m] /= (1.0 - change) * filtered[m] + each;
+    ratios += smoothed[m];
+  }
+  for (int m = 0; m < members; ++m) {
+    smoothed[m] = filtered[m] * ((1.0 - change) * smoothed[m] + each * ratios);
+    sum += smoothed[m];
+  }
+  for (int m = 0; m < members; ++m) smoothed[m] = sum > 0.0 ? smoothed[m] / sum : filtered[m];
+}
+
 }  // namespace
 
 PlaceSmoother::PlaceSmoother(const std::shared_ptr<const Model>& model, const PriorBank& bank, Setup setup)
@@ -28,7 +51,7 @@ PlaceSmoother::PlaceSmoother(const std::shared_ptr<const Model>& model, const Pr
       inputs_(model_->input_count()) {
   if (setup_.lag < 2) throw Error("place: expected a lag of 2 nodes or more");
   setup_.nodes_at_once = std::max(setup_.nodes_at_once, 3);
-  weights_.assign(bank.member_count(), 0.0);
+  weights_.assign(2 * static_cast<std::size_t>(bank.member_count()), 0.0);  // with hindsight, and without
   data_.assign(model_->data_count(), 0.0);
   input_.assign(inputs_, 0.0);
   scratch_means_.assign(np_, 0.0);
@@ -49,12 +72,10 @@ void PlaceSmoother::reset() noexcept {
 void PlaceSmoother::begin(BankHistory& history, std::int64_t write_until) noexcept {
   const std::int64_t oldest = history.newest() - history.count() + 1;
   written_ = std::max(written_, oldest);
-  // Of the member that was the most probable in the mean.
-  std::fill(weights_.begin(), weights_.end(), 0.0);
-  for (std::int64_t number = written_; number <= history.newest(); ++number)
-    history.bank().add_saved_weights(history.node(number).filtered, weights_.data());
-  law_ = static_cast<int>(std::max_element(weights_.begin(), weights_.end()) - weights_.begin());
   at_ = history.newest();
+  std::fill(weights_.begin(), weights_.end(), 0.0);
+  history.bank().add_saved_weights(history.node(at_).filtered, weights_.data());
+  law_ = most_probable(weights_, history.bank().member_count());
   write_until_ = write_until;
   history.bank().saved_moments(history.node(at_).filtered, law_, mean_, covariance_);
   is_busy_ = at_ > written_;
@@ -70,6 +91,14 @@ void PlaceSmoother::step_back(BankHistory& history, SlipMap& map) noexcept {
   }
   PriorBank& bank = history.bank();
   const BankHistory::Node node = history.node(number), after = history.node(at_);
+  // The law of an interval is the most probable one at its end. One law for the whole way would blur the edge of a
+  // patch over metres, and be certain of it.
+  const int members = bank.member_count(), law = most_probable(weights_, members);
+  const bool is_other_law = law != law_;
+  law_ = law;
+  std::fill(weights_.begin() + members, weights_.end(), 0.0);
+  bank.add_saved_weights(node.filtered, weights_.data() + members);
+  look_back(weights_.data(), weights_.data() + members, members, -std::expm1(-after.distance / law_memory));
   bank.saved_moments(node.filtered, law_, filtered_, filtered_covariance_);
   for (int j = 0; j < np_; ++j)
     bank.write_process(law_, j, after.duration, after.distance, model_->process_data(j, data_.data()));
@@ -95,6 +124,13 @@ void PlaceSmoother::step_back(BankHistory& history, SlipMap& map) noexcept {
     }
     for (int c = 0; c < n_; ++c)
       for (int r = 0; r < n_; ++r) predicted_(r, c) += variance * jacobian_(r, n_ + j) * jacobian_(c, n_ + j);
+  }
+  // Nothing is known of a state that the law of the next interval does not have: PriorBank::saved_moments.
+  for (int j = nx_; is_other_law && j < n_; ++j) {
+    if (covariance_(j, j) != 1.0 || mean_[j] != 0.0) continue;
+    across_.row(j).setZero();
+    predicted_.row(j).setZero();
+    predicted_.col(j).setZero();
   }
   for (int j = 0; j < n_; ++j) {
     // States that the law does not have are 0, and nothing depends on them.
