@@ -106,7 +106,8 @@ void check_information(const LineValue& information, const ProblemRecord::Rows& 
     }
   }
   if (n == 0) return;
-  if (const double least = symmetric_eigen(scaled).values[0]; !(least >= -rounding_of_information * static_cast<double>(n)))
+  if (const double least = symmetric_eigen(scaled).values[0];
+      !(least >= -rounding_of_information * static_cast<double>(n)))
     throw information.error(
         fmt::format("has a negative eigenvalue ({:.3g} with the diagonal scaled to 1); expected a "
                     "positive semidefinite matrix, the inverse of a covariance",

@@ -30,9 +30,7 @@ TEST(SymmetricEigen, OnlyTheLowerTriangleIsRead) {
   EXPECT_NEAR(eigen.values[1], 3.0, 1e-15);
 }
 
-TEST(SymmetricEigen, AnEmptyMatrixHasNone) {
-  EXPECT_EQ(symmetric_eigen(Eigen::MatrixXd(0, 0)).values.size(), 0);
-}
+TEST(SymmetricEigen, AnEmptyMatrixHasNone) { EXPECT_EQ(symmetric_eigen(Eigen::MatrixXd(0, 0)).values.size(), 0); }
 
 TEST(SymmetricEigen, AreNotFiniteWhereTheMatrixIsNot) {
   Eigen::MatrixXd broken = Eigen::MatrixXd::Identity(3, 3);

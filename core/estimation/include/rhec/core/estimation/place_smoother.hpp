@@ -16,10 +16,10 @@ namespace rhec {
 /// Writes a map from smoothed estimates while the drive goes on: parameters with some seconds of hindsight have about
 /// half the error of filtered ones.
 ///
-/// The smoother is that of Rauch, Tung and Striebel, by the law that is the most probable on each interval with hindsight
-/// (docs/method.md, section 9). It goes back from a newest node over `lag` nodes, writes the older half of them, and
-/// begins anew half as many nodes later; so a value has a hindsight of half the lag at least. A few nodes are done at
-/// each sample: the time of a sample is bounded. Allocates in its constructor only.
+/// The smoother is that of Rauch, Tung and Striebel, by the law that is the most probable on each interval with
+/// hindsight (docs/method.md, section 9). It goes back from a newest node over `lag` nodes, writes the older half of
+/// them, and begins anew half as many nodes later; so a value has a hindsight of half the lag at least. A few nodes are
+/// done at each sample: the time of a sample is bounded. Allocates in its constructor only.
 class RHEC_EXPORT PlaceSmoother {
  public:
   struct Setup {

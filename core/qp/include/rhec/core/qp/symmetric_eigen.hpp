@@ -13,8 +13,8 @@ struct SymmetricEigen {
   Eigen::MatrixXd vectors;
 };
 
-/// Reads the lower triangle of a matrix of any size. Where an entry is not finite, neither are values and vectors. Allocates:
-/// the real-time path has decompositions of its own, for sizes known when it is compiled.
+/// Reads the lower triangle of a matrix of any size. Where an entry is not finite, neither are values and vectors.
+/// Allocates: the real-time path has decompositions of its own, for sizes known when it is compiled.
 RHEC_EXPORT SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& symmetric);
 
 }  // namespace rhec
