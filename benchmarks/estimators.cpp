@@ -277,7 +277,8 @@ void write_series(const std::string& file, const ModelDescription& about, const 
 /// One drive; `maps` are those of the estimators, in their order.
 void drive(const Host& host, const Arguments& arguments, const std::string& more,
            std::vector<std::shared_ptr<SlipMap>>& maps, bool is_printed) {
-  sim::Scenario driver = scenario_with(host, arguments, more);
+  // The others hear what the driver's method is given: a measurement that its judge withholds would be lost for them.
+  sim::Scenario driver = scenario_with(host, arguments, more + "; estimator.health.watch=false");
   std::vector<sim::Scenario> variants;
   std::vector<Beside> others;
   variants.reserve(arguments.beside.size() + arguments.smoothed.size());

@@ -363,8 +363,8 @@ void Estimator::clip(Estimate& estimate) const noexcept {
     estimate.state[j] = std::min(std::max(estimate.state[j], states[j].lower), states[j].upper);
 }
 
+/// Goes on with what is given out, from the newest node.
 void Estimator::predict_to(double time, Clock::time_point deadline) noexcept {
-  predicted_ = estimate_;
   predicted_.predicted = true;
   const double last = grid_.time();
   if (watch_ && watch_->is_active())
@@ -461,9 +461,18 @@ const Estimate& Estimator::estimate(double time, Clock::time_point deadline) noe
   const double newest = grid_.time();
   estimate_.time = newest + clock_offset;
   if (watch_) estimate_.innovations = watch_->innovations();
-  if (!std::isfinite(time) || time <= newest + timeline_.tolerance) {
+  const bool is_ahead = std::isfinite(time) && time > newest + timeline_.tolerance;
+  const bool is_in_doubt = watch_ && is_all_taken_in && watch_->is_in_doubt();
+  if (!is_ahead && !is_in_doubt) {
     assess(estimate_, std::isfinite(time) ? time : newest);
     return estimate_;
+  }
+  predicted_ = estimate_;
+  // What is given out alone: everything goes on from what the method says.
+  if (is_in_doubt) watch_->widen(predicted_);
+  if (!is_ahead) {
+    assess(predicted_, std::isfinite(time) ? time : newest);
+    return predicted_;
   }
   predict_to(time, extended(1.0, deadline));
   predicted_.time = time + clock_offset;

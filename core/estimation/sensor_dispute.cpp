@@ -86,6 +86,7 @@ void SensorWatch::refute(Hypothesis& hypothesis) noexcept {
   hypothesis.is_active = false;
   hypothesis.explained = 0;
   ++hypothesis.refuted;
+  if (&hypothesis == slip_.get()) slip_probability_ = 0.0;
 }
 
 /// nu' S^-1 nu of the sensors that were rejected, together.
@@ -97,12 +98,12 @@ double SensorWatch::disputed_nis(WalkingFilter& filter) noexcept {
   return sum;
 }
 
-/// Log likelihood of what was not rejected, but for a constant.
-double SensorWatch::undisputed_likelihood(WalkingFilter& filter) noexcept {
+/// Log likelihood of what was measured, or of what of it was not rejected, but for a constant.
+double SensorWatch::likelihood(WalkingFilter& filter, bool with_rejected) noexcept {
   filter.expect();
   double sum = 0.0;
   for (std::size_t s = 0; s < sensors_.size(); ++s)
-    if (!(findings_[s] & reason::rejected) && filter.innovation(sensors_[s], raw_.data(), scratch_))
+    if ((with_rejected || !(findings_[s] & reason::rejected)) && filter.innovation(sensors_[s], raw_.data(), scratch_))
       sum -= 0.5 * (scratch_.nis + std::log(scratch_.covariance.determinant()));
   return sum;
 }
@@ -150,6 +151,7 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   if (!is_disputed_) memory_->was_calm = calm_samples_ >= setup_.calm;
   is_disputed_ = true;
   ++disputed_samples_;
+  double new_likelihood = Memory::unknown;  // of slip that has jumped just now
   const auto consider = [&](Hypothesis& hypothesis) {
     const bool is_new = !hypothesis.is_active;
     if (is_new && &hypothesis == moved_.get()) start_moved();
@@ -160,10 +162,14 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
         refute(hypothesis);
         return;
       }
+      if (disputed_samples_ <= fresh) new_likelihood = likelihood(hypothesis.filter, true);
     }
+    // As probable before the sample as that the sensor has moved.
+    if (&hypothesis == moved_.get() && slip_->is_active && !std::isnan(new_likelihood))
+      slip_probability_ = 1.0 / (1.0 + std::exp(likelihood(hypothesis.filter, true) - new_likelihood));
     // Whether the other sensors agree better with a vehicle whose state is what the disputed one says.
     if (&hypothesis == moved_.get() && !is_new && !is_position_disputed())
-      hypothesis.evidence += undisputed_likelihood(hypothesis.filter) - undisputed_likelihood(own_->filter);
+      hypothesis.evidence += likelihood(hypothesis.filter, false) - likelihood(own_->filter, false);
     confront(hypothesis, raw_.data(), true);
   };
   consider(*slip_);
@@ -285,6 +291,7 @@ void SensorWatch::hold_back(double time, const double* outputs) noexcept {
 
 void SensorWatch::end_dispute() noexcept {
   is_disputed_ = false;
+  slip_probability_ = 0.0;
   disputed_samples_ = 0;
   if (memory_->second_thought) memory_->second_thought->cancel();
   for (Hypothesis* each : {slip_.get(), moved_.get(), blind_.get()}) {

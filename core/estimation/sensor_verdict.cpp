@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rhec/core/base/angle.hpp"
 #include "sensor_watch_parts.hpp"
 
 // What is said of an estimate, and of late measurements.
@@ -59,6 +60,24 @@ void SensorWatch::follow(const Estimate& estimate) noexcept {
   own_->filter.mean().head(nx) = estimate.state;
   own_->filter.mean().tail(np) = estimate.parameters;
   own_->filter.covariance() = estimate.covariance;
+}
+
+void SensorWatch::widen(Estimate& estimate) noexcept {
+  const Model& model = own_->filter.model();
+  const Eigen::Index nx = model.state_count(), n = nx + model.parameter_count();
+  const Eigen::VectorXd& mean = slip_->filter.mean();
+  const Eigen::MatrixXd& covariance = slip_->filter.covariance();
+  if (!is_in_doubt() || estimate.covariance.rows() != n || !mean.allFinite() || !covariance.allFinite()) return;
+  Eigen::VectorXd& away = memory_->away;
+  away.head(nx) = mean.head(nx) - estimate.state;
+  away.tail(n - nx) = mean.tail(n - nx) - estimate.parameters;
+  for (Eigen::Index j = 0; j < nx; ++j)
+    if (model.description().states[static_cast<std::size_t>(j)].is_angle)
+      away[j] = angle_difference(mean[j], estimate.state[j]);
+  for (Eigen::Index c = 0; c < n; ++c)
+    for (Eigen::Index r = 0; r < n; ++r)
+      estimate.covariance(r, c) +=
+          slip_probability_ * (covariance(r, c) + away[r] * away[c] - estimate.covariance(r, c));
 }
 
 /// What volume is usual is learnt where nothing is missing.

@@ -79,6 +79,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   const Eigen::Index n = own_->filter.mean().size();
   memory_->before_mean = Eigen::VectorXd::Zero(n);
   memory_->before_covariance = Eigen::MatrixXd::Zero(n, n);
+  memory_->away = Eigen::VectorXd::Zero(n);
   memory_->factor.compute(Eigen::MatrixXd::Identity(n, n));  // of its final size
   for (Memory::Entry& entry : memory_->entries) {
     entry.mean = memory_->before_mean;

@@ -57,6 +57,7 @@ struct SensorWatch::Memory {
   std::unique_ptr<HeadingSearch> second_thought;
   int in_vain = 0;                     ///< samples in a row that it has not explained
   Eigen::LLT<Eigen::MatrixXd> factor;  ///< of a covariance
+  Eigen::VectorXd away;                ///< of slip that has jumped from an estimate
 
   /// log sqrt(det P); NaN where P is not positive definite, as of a parameter that is known.
   double log_volume(const Eigen::MatrixXd& covariance) noexcept {

@@ -29,6 +29,8 @@ class WalkingFilter;
 ///     and this does, the estimate goes on without inputs until they fit again.
 /// A measurement that passes its gate again ends all of this.
 ///
+/// As long as it is open whether slip has jumped, what is given out is the second moment of both answers (`widen`).
+///
 /// Allocates in its constructor only.
 class RHEC_EXPORT SensorWatch {
  public:
@@ -96,6 +98,14 @@ class RHEC_EXPORT SensorWatch {
   /// with an input (n_u), each of which may be off by `input_sigmas` besides its noise (n_u, or null).
   void predict(double duration, const double* inputs, const double* input_sigmas, Estimate& estimate) noexcept;
 
+  /// Whether measurements are held back that slip which has jumped would explain, so that estimates are to be widened.
+  bool is_in_doubt() const noexcept { return slip_probability_ > 0.0; }
+  /// Gives an estimate at the last sample the covariance that it has if slip may have jumped, with the probability w
+  /// that the likelihoods of the measurements say: (1 - w) P + w (P1 + d d'), where P1 and d are the covariance with
+  /// such slip and how far its mean is from that of the estimate (moments of a mixture; Bar-Shalom, Li and Kirubarajan
+  /// 2001). The mean stays, so that no wrong measurement moves it.
+  void widen(Estimate& estimate) noexcept;
+
   void begin_innovations() noexcept { innovation_count_ = 0; }
   /// Those judged since then, the first ones if there are very many.
   std::span<const Innovation> innovations() const noexcept {
@@ -134,7 +144,7 @@ class RHEC_EXPORT SensorWatch {
   bool fits(WalkingFilter& filter, const double* outputs) noexcept;
   void refute(Hypothesis& hypothesis) noexcept;
   double disputed_nis(WalkingFilter& filter) noexcept;
-  double undisputed_likelihood(WalkingFilter& filter) noexcept;
+  double likelihood(WalkingFilter& filter, bool with_rejected) noexcept;
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis& hypothesis) noexcept;
@@ -162,6 +172,7 @@ class RHEC_EXPORT SensorWatch {
   std::unique_ptr<Hypothesis> own_, slip_, moved_, blind_;
   std::unique_ptr<Memory> memory_;
   bool is_active_ = false, is_disputed_ = false, is_blind_ = false;
+  double slip_probability_ = 0.0;  ///< that slip has jumped, while that is open
   int disputed_samples_ = 0, trusted_samples_ = 0, calm_samples_ = 0;
   std::vector<SensorHealth> states_;  ///< by sensor
   SensorHealth inputs_;
