@@ -18,18 +18,6 @@ constexpr int most_rounds = 60;
 constexpr int hasty_rounds = 12;
 constexpr double rank_tolerance = 1e-10;
 
-/// minimise |A z - b|, of the columns of A that are not linearly dependent.
-Vector least_squares(const Matrix& A, const Vector& b) {
-  const Eigen::ColPivHouseholderQR<Matrix> decomposition(A);
-  const Index rank = decomposition.nonzeroPivots();
-  const Matrix basis = decomposition.householderQ();
-  const Vector projected = basis.leftCols(rank).transpose() * b;
-  Vector permuted = Vector::Zero(A.cols());
-  permuted.head(rank) =
-      decomposition.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solve(projected);
-  return decomposition.colsPermutation() * permuted;
-}
-
 /// minimise |A z - b| subject to z >= 0.
 Vector nonnegative_least_squares(const Matrix& A, const Vector& b) {
   const Index count = A.cols();
@@ -51,7 +39,7 @@ Vector nonnegative_least_squares(const Matrix& A, const Vector& b) {
     while (!passive.empty()) {
       chosen.resize(A.rows(), static_cast<Index>(passive.size()));
       for (std::size_t k = 0; k < passive.size(); ++k) chosen.col(static_cast<Index>(k)) = A.col(passive[k]);
-      const Vector wanted = least_squares(chosen, b);
+      const Vector wanted = chosen.colPivHouseholderQr().solve(b);
       double length = 1.0;
       for (std::size_t k = 0; k < passive.size(); ++k) {
         const double now = z[passive[k]], then = wanted[static_cast<Index>(k)];
