@@ -350,20 +350,12 @@ struct GeneralRows {
     }
   }
 
-  /// Adds to `sum` what factors[j] times row j of `rows` sum up to.
-  [[gnu::noinline]] static void accumulate(int count, const double* rows, long stride, const double* factors,
-                                           double* sum) {
+  /// Adds to `sum`, or subtracts from it (a sign of -1), what factors[j] times row j of `rows` sum up to.
+  [[gnu::noinline]] static void accumulate(double sign, int count, const double* rows, long stride,
+                                           const double* factors, double* sum) {
     R total = R::from(sum);
-    for (int j = 0; j < count; ++j) total.add(R::from(rows + j * stride), factors[j]);
+    for (int j = 0; j < count; ++j) total.add(R::from(rows + j * stride), sign * factors[j]);
     total.to(sum);
-  }
-
-  /// Subtracts from `sum` what factors[j] times row j of `rows` sum up to.
-  [[gnu::noinline]] static void subtract_products(int count, const double* rows, long stride, const double* factors,
-                                                  double* sum) {
-    R left = R::from(sum);
-    for (int j = 0; j < count; ++j) left.add(R::from(rows + j * stride), -factors[j]);
-    left.to(sum);
   }
 };
 
@@ -377,16 +369,11 @@ struct RowFunctions {
   decltype(&GeneralRows<8>::multiply) multiply;
   decltype(&GeneralRows<8>::eliminate) eliminate;
   decltype(&GeneralRows<8>::accumulate) accumulate;
-  decltype(&GeneralRows<8>::subtract_products) subtract_products;
 };
 
 template <int width>
-constexpr RowFunctions row_functions = {width,
-                                        &GeneralRows<width>::add_products,
-                                        &GeneralRows<width>::multiply,
-                                        &GeneralRows<width>::eliminate,
-                                        &GeneralRows<width>::accumulate,
-                                        &GeneralRows<width>::subtract_products};
+constexpr RowFunctions row_functions = {width, &GeneralRows<width>::add_products, &GeneralRows<width>::multiply,
+                                        &GeneralRows<width>::eliminate, &GeneralRows<width>::accumulate};
 
 /// The least compiled width for so many columns.
 inline const RowFunctions& row_functions_for(int columns) {
@@ -481,13 +468,13 @@ bool factor_general(const RiccatiView& view, int i, double tolerance) {
   for (int c = 0; c < controls; ++c) {
     double* const policy = policies + c * state_width;
     if (at.sides[offset + c] == 0)
-      of_state.subtract_products(c, policies, state_width, of_controls + c * width + offset, policy);
+      of_state.accumulate(-1.0, c, policies, state_width, of_controls + c * width + offset, policy);
     store_states(policy, at.V + c * stride);
   }
   for (int j = 0; j < states; ++j) store_states(of_states + j * state_width, at.P + j * stride);
   if (view.for_steps) {
     for (int v = 0; v < width; v += lane_count) kernels::store(Lanes{}, at.drift + v);
-    all_columns.accumulate(next_states, at.P_next, stride, at.b, at.drift);
+    all_columns.accumulate(1.0, next_states, at.P_next, stride, at.b, at.drift);
   }
   return true;
 }
@@ -568,7 +555,7 @@ RHEC_ALWAYS_INLINE inline void solve_stage_backward(const RiccatiView& view, int
 
 /// What solve_stage_backward does, for any sizes, with p in memory.
 void solve_backward_general(const RiccatiView& view, int i) {
-  using Stage = Shape<2 * most_rows / 8, 0, 0>;
+  using Stage = Shape<most_columns / 8, 0, 0>;
   const Stage stage(view, i);
   const Memory<Stage> at(view, i);
   const int controls = stage.columns - stage.offset;
@@ -578,17 +565,18 @@ void solve_backward_general(const RiccatiView& view, int i) {
     costate[j] = at.p_next[j] + at.drift[j];
     gradient[j] = at.h[j];
   }
-  rows.accumulate(stage.moved, at.AB, at.stride, costate, gradient);
+  rows.accumulate(1.0, stage.moved, at.AB, at.stride, costate, gradient);
   for (int j = stage.moved; j < stage.next_states; ++j) gradient[j] += costate[j];
   if (view.fixes[i]) {
     copy_first(rows.width, rows.width, gradient, at.g);
     for (int k = stage.offset; k < stage.columns; ++k) {
-      const double bound = at.sides[k] != 0 ? bound_of(view, i, k) : 0.0;
-      if (at.sides[k] != 0) rows.accumulate(1, at.U + (k - stage.offset) * at.stride, at.stride, &bound, gradient);
+      if (at.sides[k] == 0) continue;
+      const double bound = bound_of(view, i, k);
+      rows.accumulate(1.0, 1, at.U + (k - stage.offset) * at.stride, at.stride, &bound, gradient);
     }
   }
   copy_first(rows.width, rows.width, gradient, at.p);
-  rows.subtract_products(controls, at.V, at.stride, gradient + stage.offset, at.p);
+  rows.accumulate(-1.0, controls, at.V, at.stride, gradient + stage.offset, at.p);
   solve_controls(view, i, stage, at, [&](int k) RHEC_ALWAYS_INLINE { return gradient[k]; });
 }
 
@@ -641,7 +629,7 @@ RHEC_ALWAYS_INLINE inline void solve_stage_forward(const RiccatiView& view, int 
   } else {
     const RowFunctions& rows = row_functions_for(stage.columns);
     copy_first(stage.next_states, rows.width, at.p_next, costates);
-    rows.accumulate(stage.next_states, at.P_next, at.stride, reached, costates);
+    rows.accumulate(1.0, stage.next_states, at.P_next, at.stride, reached, costates);
   }
   stage.each_next_state([&](auto l) RHEC_ALWAYS_INLINE { s[l] = reached[l]; });
   if (view.fixes[i]) write_multipliers(view, i, stage, at);
