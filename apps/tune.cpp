@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -58,23 +59,30 @@ void print_numbers(const sim::LogTuning& tuning) {
                law.is_taken ? "  taken" : "");
   }
   if (!tuning.estimators.empty())
-    fmt::print("\n{:<36} {:>11} {:>11}\n", "ESTIMATOR, ON FIXES TUNED ON", "MEDIAN", "RMSE(5 m)");
+    fmt::print("\n{:<36} {:>11} {:>11}\n", "ESTIMATOR, ON WHAT WAS TUNED ON", "MEDIAN",
+               fmt::format("RMSE({:g} {})", sim::error_cap, tuning.unit));
   for (const sim::TriedEstimator& tried : tuning.estimators)
-    fmt::print("{:<36} {:>9.4f} m {:>9.4f} m{}\n", tried.name, tried.median, tried.rmse,
+    fmt::print("{:<36} {:>9.4f} {} {:>9.4f} {}{}\n", tried.name, tried.median, tuning.unit, tried.rmse, tuning.unit,
                tried.is_taken ? "  taken" : "");
 }
 
 void print_judgement(const sim::LogTuning& tuning) {
-  fmt::print("\nlog likelihood of {} fixes: {:.1f} before, {:.1f} after; tails: {} before, {} after\n", tuning.fixes,
-             tuning.log_likelihood_before, tuning.log_likelihood_after, tails_text(tuning.degrees_before),
-             tails_text(tuning.degrees_after));
+  fmt::print("\nlog likelihood of {} {}: {:.1f} before, {:.1f} after; tails: {} before, {} after\n", tuning.fixes,
+             tuning.entries_name, tuning.log_likelihood_before, tuning.log_likelihood_after,
+             tails_text(tuning.degrees_before), tails_text(tuning.degrees_after));
   if (tuning.judged.empty()) {
-    fmt::print("nothing judges the result, since no fix was withheld; --hold-out 5 withholds every fifth\n");
+    fmt::print("nothing judges the result, since no {} was withheld; --hold-out 5 withholds every fifth\n",
+               tuning.entry_name);
   } else {
-    fmt::print("\n{:<28} {:>10} {:>10}  {:<22} {}\n", "FIXES NOT TUNED ON", "BEFORE", "AFTER", "AFTER, 95 %",
-               "CHANGE, 95 %");
+    for (const sim::TunedSensor& sensor : tuning.sensors) {
+      if (&sensor == tuning.sensors.data())
+        fmt::print("\n{:<36} {:>11} {:>11}\n", "INNOVATIONS: NIS / EXPECTED", "BEFORE", "AFTER");
+      fmt::print("{:<36} {:>11.2f} {:>11.2f}\n", sensor.name, sensor.before / sensor.expected,
+                 sensor.after / sensor.expected);
+    }
+    fmt::print("\n{:<36} {:>11} {:>11}  {:<22} {}\n", "NOT TUNED ON", "BEFORE", "AFTER", "AFTER, 95 %", "CHANGE, 95 %");
     for (const sim::Compared& figure : tuning.judged)
-      fmt::print("{:<28} {:>10.4f} {:>10.4f}  {:<22} {} to {}\n", figure.name, figure.before, figure.after,
+      fmt::print("{:<36} {:>11.4f} {:>11.4f}  {:<22} {} to {}\n", figure.name, figure.before, figure.after,
                  fmt::format("{:.4f} to {:.4f}", figure.after_interval.first, figure.after_interval.second),
                  fmt::format("{:+.4f}", figure.change_interval.first),
                  fmt::format("{:+.4f}", figure.change_interval.second));
@@ -83,43 +91,37 @@ void print_judgement(const sim::LogTuning& tuning) {
   for (const std::string& remark : tuning.remarks) fmt::print("  - {}\n", remark);
 }
 
-/// Of a tuning on a recorded drive, of either kind.
-template <class Tuning>
-void print_end(const Tuning& tuning, const std::filesystem::path& folder) {
-  if (tuning.stopped) fmt::print("\nstopped: this is the best that was found until then\n");
-  fmt::print("\n{} evaluations, {:.0f} s; the scenario to use: {}\n", tuning.evaluations, tuning.seconds,
-             (folder / "tuned.yaml").string());
-}
-
 int threads_of(const TuneArguments& arguments) {
   return arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-int tune_on_log(const TuneArguments& arguments) {
-  const sim::LogScenario scenario = read_log_scenario(arguments);
-  const sim::LogVariant& variant = scenario.variants().front();
-  const sim::LogTables tables = sim::read_log_tables(arguments.dead_reckoning, arguments.gps);
-  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_tune"));
-  const Host host = examined_host(arguments.plugin_path);
-  sim::LogTuningOptions options;
-  options.hold_out = read_hold_out(arguments);
-  options.wishes = {arguments.tune, arguments.keep};
+sim::LogTuningOptions log_options_of(const TuneArguments& arguments) {
+  sim::LogTuningOptions options{.hold_out = read_hold_out(arguments), .wishes = {arguments.tune, arguments.keep}};
   options.threads = threads_of(arguments);
   options.smooths = !arguments.no_smoother;
   if (arguments.most_seconds > 0) options.most_seconds = arguments.most_seconds;
+  return options;
+}
+
+using TunesLog = std::function<sim::LogTuning(const sim::LogTuningOptions&, const sim::TuningHooks&)>;
+
+/// Tunes on a recorded drive of either kind; `origin` says on which, of which scenario.
+int tune_on_log(const TuneArguments& arguments, const std::string& variant, const std::string& origin,
+                const TunesLog& tunes) {
+  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_tune"));
   sim::LogTuning tuning;
   {
     const StopRequest stop;
-    StageLine line(variant.name);
-    tuning = sim::tune_on_log(host, variant.settings, tables, options,
-                              {.progress =
-                                   [&](const sim::TuningProgress& now) {
-                                     line.show(fmt::format("{}, {} evaluations, log likelihood {:+.1f}, {:.0f} s",
-                                                           now.stage, now.evaluations, now.gain, now.seconds));
-                                   },
-                               .stop = [] { return StopRequest::asked(); }});
+    StageLine line(variant);
+    tuning = tunes(log_options_of(arguments),
+                   {.progress =
+                        [&](const sim::TuningProgress& now) {
+                          line.show(fmt::format("{}, {} evaluations, log likelihood {:+.1f}, {:.0f} s", now.stage,
+                                                now.evaluations, now.gain, now.seconds));
+                        },
+                    .stop = [] { return StopRequest::asked(); }});
   }
-  folder.write("tuned.yaml", sim::tuned_yaml(tuning, fmt::format("from {} ({})", arguments.scenario, variant.name)));
+  folder.write("tuned.yaml", sim::tuned_yaml(tuning, origin));
   const std::string summary = sim::summary_json(tuning);
   folder.write("summary.json", summary);
   folder.write("tuning.svg", sim::tuning_svg(tuning));
@@ -129,11 +131,24 @@ int tune_on_log(const TuneArguments& arguments) {
   } else {
     print_numbers(tuning);
     print_judgement(tuning);
-    print_end(tuning, folder.path());
+    if (tuning.stopped) fmt::print("\nstopped: this is the best that was found until then\n");
+    fmt::print("\n{} evaluations, {:.0f} s; the scenario to use: {}\n", tuning.evaluations, tuning.seconds,
+               (folder.path() / "tuned.yaml").string());
   }
   const bool says_anything =
       std::any_of(tuning.numbers.begin(), tuning.numbers.end(), [](const auto& number) { return number.is_told; });
   return tuning.stopped || !says_anything ? exit_not_solved : exit_fine;
+}
+
+int tune_on_tables(const TuneArguments& arguments) {
+  const sim::LogScenario scenario = read_log_scenario(arguments);
+  const sim::LogVariant& variant = scenario.variants().front();
+  const sim::LogTables tables = sim::read_log_tables(arguments.dead_reckoning, arguments.gps);
+  const Host host = examined_host(arguments.plugin_path);
+  return tune_on_log(arguments, variant.name, fmt::format("from {} ({})", arguments.scenario, variant.name),
+                     [&](const sim::LogTuningOptions& options, const sim::TuningHooks& hooks) {
+                       return sim::tune_on_log(host, variant.settings, tables, options, hooks);
+                     });
 }
 
 /// "speed=2; path.laps=1" over the scenario.
@@ -210,27 +225,6 @@ int tune_controller(const TuneArguments& arguments) {
   return tuning.stopped ? exit_not_solved : exit_fine;
 }
 
-void print_drive(const sim::DriveTuning& tuning) {
-  sim::LogTuning numbers;
-  numbers.numbers = tuning.numbers;
-  print_numbers(numbers);
-  fmt::print("\nlog likelihood of {} measurements: {:.1f} before, {:.1f} after\n", tuning.measurements,
-             tuning.log_likelihood_before, tuning.log_likelihood_after);
-  fmt::print("\n{:<28} {:>10} {:>10}\n", "INNOVATIONS: NIS / EXPECTED", "BEFORE", "AFTER");
-  for (std::size_t i = 0; i < tuning.innovations_before.size(); ++i) {
-    const sim::SensorSummary &one = tuning.innovations_before[i], &other = tuning.innovations_after[i];
-    fmt::print("{:<28} {:>10.2f} {:>10.2f}\n", one.name, one.nis / one.expected, other.nis / other.expected);
-  }
-  if (tuning.before.count == 0) {
-    fmt::print("nothing judges the result, since nothing was withheld; --hold-out 5 withholds every fifth\n");
-    return;
-  }
-  fmt::print("\n{:<28} {:>10} {:>10}\n", "WITHHELD, NOT TUNED ON", "BEFORE", "AFTER");
-  fmt::print("{:<28} {:>10.4f} {:>10.4f}\n", "distance, median", tuning.before.median, tuning.after.median);
-  fmt::print("{:<28} {:>10.4f} {:>10.4f}\n", "distance, RMS", tuning.before.rms, tuning.after.rms);
-  if (!tuning.is_taken) fmt::print("what was found predicts worse: the scenario is left as it was\n");
-}
-
 int tune_on_drive(const TuneArguments& arguments) {
   Settings settings = load_scenario(arguments.scenario);
   apply_assignments(settings, arguments.assignments);
@@ -239,34 +233,11 @@ int tune_on_drive(const TuneArguments& arguments) {
   const sim::ReplayVariant& variant = scenario.variants().front();
   const logs::Drive drive = logs::read_drive(*open_log(arguments.log, arguments.msg_paths), variant.signals);
   tell_damage(drive.damage);
-  sim::OutputFolder folder(out_of(arguments.out, arguments.scenario, "_tune"));
-  sim::DriveTuningOptions options{.hold_out = read_hold_out(arguments), .wishes = {arguments.tune, arguments.keep}};
-  options.threads = threads_of(arguments);
-  if (arguments.most_seconds > 0) options.most_seconds = arguments.most_seconds;
-  sim::DriveTuning tuning;
-  {
-    const StopRequest stop;
-    StageLine line(variant.name);
-    tuning = sim::tune_on_drive(host, variant.settings, drive, options,
-                                {.progress =
-                                     [&](const sim::TuningProgress& now) {
-                                       line.show(fmt::format("{}, {} evaluations, log likelihood {:+.1f}, {:.0f} s",
-                                                             now.stage, now.evaluations, now.gain, now.seconds));
-                                     },
-                                 .stop = [] { return StopRequest::asked(); }});
-  }
-  folder.write("tuned.yaml", sim::tuned_yaml(tuning, fmt::format("on {}, from {} ({})", arguments.log,
-                                                                 arguments.scenario, variant.name)));
-  const std::string summary = sim::summary_json(tuning);
-  folder.write("summary.json", summary);
-  folder.commit();
-  if (arguments.json) {
-    print_json(summary, folder.path());
-  } else {
-    print_drive(tuning);
-    print_end(tuning, folder.path());
-  }
-  return tuning.stopped ? exit_not_solved : exit_fine;
+  return tune_on_log(arguments, variant.name,
+                     fmt::format("on {}, from {} ({})", arguments.log, arguments.scenario, variant.name),
+                     [&](const sim::LogTuningOptions& options, const sim::TuningHooks& hooks) {
+                       return sim::tune_on_drive(host, variant.settings, drive, options, hooks);
+                     });
 }
 
 int tune(const TuneArguments& arguments) {
@@ -281,7 +252,7 @@ int tune(const TuneArguments& arguments) {
   }
   if (arguments.dead_reckoning.empty() || arguments.gps.empty())
     throw Error("expected a LOG, or --dead-reckoning FILE and --gps FILE, a recorded drive; or --controller");
-  return tune_on_log(arguments);
+  return tune_on_tables(arguments);
 }
 
 }  // namespace
@@ -296,10 +267,8 @@ void add_tune(Program& program) {
       "given all before it. Fixes that --hold-out withholds are not tuned on, and judge the result. Writes tuned.yaml, "
       "a\n"
       "scenario for 'rhec estimate', summary.json and tuning.svg to the output folder.\n\n"
-      "From a LOG with the vehicle's own sensors (see 'rhec estimate'): noise of sensors and inputs, their delays, "
-      "lever arms\n"
-      "and how fast slip changes, by the innovations of a Kalman filter; taken unless withheld measurements are\n"
-      "then predicted worse.\n\n"
+      "A LOG with the vehicle's own sensors is one as 'rhec estimate' reads it; measurements of all sensors count "
+      "then.\n\n"
       "With --controller: weights and horizon by which the vehicle of the scenario tracks its path best without more\n"
       "effort, over several seeds; others judge the result. Writes tuned.yaml, a scenario for 'rhec run', "
       "summary.json,\n"

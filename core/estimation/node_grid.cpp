@@ -107,6 +107,7 @@ void NodeGrid::take_back(int nodes, double until) noexcept {
 void NodeGrid::skip_to(double time) noexcept {
   if (count_ == 0 || !(time > this->time())) return;
   nodes_[static_cast<std::size_t>(count_ - 1) % nodes_.size()] = {time, time, Kind::grid, 0};
+  if (count_ == 1) start_ = time;
 }
 
 /// The row behind those that have the stamp of a row.
@@ -134,6 +135,7 @@ void NodeGrid::make_next(double until) noexcept {
     mean_input(last.time, next.time);
   }
   collect(next, from, end);
+  if (count_ == 0) start_ = next.time;
   nodes_[static_cast<std::size_t>(count_++) % nodes_.size()] = next;
 }
 

@@ -119,7 +119,7 @@ const OptionTable<SignalOptions>& SignalOptions::table() {
           .subtree(
               "from", &SignalOptions::from,
               "`topic:field`, or the name of a column; several in a list. An item of a list by its index or by name: "
-              "`/joint_states:position[rear_left]`")
+              "`/joint_states:position[rear_left]`. None: the signal of the variable's name")
           .choice("as", &SignalOptions::form,
                   {{"value", SignalForm::value},
                    {"east", SignalForm::east},
@@ -209,8 +209,11 @@ void SignalMap::add(const Settings& map, const std::vector<Variable>& variables,
       if (signal.options.sign == 0) throw entry->error("sign: found 0, expected 1 or -1");
       if (signal.options.derivative && is_output)
         throw entry->error("derivative: is for inputs; expected an output that is measured");
-      signal.from = names_in(keys.find("from") ? *keys.find("from") : keys);
-      check_count(signal, *entry);
+      // Without `from` it is the signal of the variable's own name, in another unit or with an offset.
+      if (keys.find("from") || signal.options.form != SignalForm::value) {
+        signal.from = names_in(keys.find("from") ? *keys.find("from") : keys);
+        check_count(signal, *entry);
+      }
       set_factor(signal, *entry);
     }
     signals_.push_back(std::move(signal));

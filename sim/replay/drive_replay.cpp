@@ -133,6 +133,7 @@ class Driver {
     predict_until(infinity);
     estimator_->end_drive();
     result_.counts = estimator_->counts();
+    result_.start = estimator_->start_time();
     result_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     return std::move(result_);
   }
@@ -169,6 +170,11 @@ class Driver {
     by_time_ = withheld_;
     std::stable_sort(by_time_.begin(), by_time_.end(),
                      [&](std::size_t a, std::size_t b) { return drive_.events[a].time < drive_.events[b].time; });
+    // What is stamped late was measured before.
+    const Settings& delays = robot_.estimator_options().delays;
+    const Settings* const given =
+        delays.find(robot_.model()->description().outputs[static_cast<std::size_t>(outputs.front())].name);
+    if (given) delay_ = given->as_number();
   }
 
   const Sensor& sensor() const { return result_.sensors[static_cast<std::size_t>(result_.withheld_sensor)]; }
@@ -195,8 +201,7 @@ class Driver {
   /// Predicts what is due before a time.
   void predict_until(double time) {
     for (; predicted_ < by_time_.size(); ++predicted_) {
-      const logs::DriveEvent& event = drive_.events[by_time_[predicted_]];
-      if (!(event.time < time - same_time)) return;
+      if (!(measured_at(by_time_[predicted_]) < time - same_time)) return;
       if (!estimator_->has_started()) {
         ++result_.unpredicted;
         continue;
@@ -205,16 +210,19 @@ class Driver {
     }
   }
 
+  /// When what is withheld was measured [s].
+  double measured_at(std::size_t index) const { return drive_.events[index].time - delay_; }
+
   void predict(std::size_t index) {
     const logs::DriveEvent& event = drive_.events[index];
-    const Estimate& estimate = estimator_->estimate(event.time);
+    const Estimate& estimate = estimator_->estimate(measured_at(index));
     const Model& model = estimator_->model();
     Model::Nodes request;
     request.count = 1;
     request.states = estimate.state.data();
     request.outputs = outputs_.data();
     model.observe(request);
-    DrivePrediction prediction{.event = index, .time = event.time, .residuals = {}, .distance = 0.0};
+    DrivePrediction prediction{.event = index, .time = measured_at(index), .residuals = {}, .distance = 0.0};
     double squares = 0.0;
     for (const int j : sensor().outputs) {
       const auto i = static_cast<std::size_t>(j);
@@ -276,6 +284,7 @@ class Driver {
   std::vector<double> outputs_;
   std::vector<std::size_t> withheld_, by_time_;  ///< events, in the order of arrival and of time
   std::size_t next_ = 0, predicted_ = 0;
+  double delay_ = 0.0;  ///< of the sensor that is withheld [s]
   DriveReplay result_;
 };
 

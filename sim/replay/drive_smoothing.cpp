@@ -40,7 +40,7 @@ SmoothedDriveReplay smooth_drive(const std::string& name, const Robot& robot, co
   const int nx = model.state_count(), np = model.parameter_count();
   const Eigen::Index results = std::ssize(robot.estimated_description().states);
   const std::ptrdiff_t n = std::ptrdiff_t{nx} + np;
-  const double first_time = result.causal.estimates.front().time;
+  const double first_time = result.causal.start;
   result.smoothed = result.causal;
   result.smoothed.name = name;
   result.smoothed.seconds = Seconds(Clock::now() - begin).count();

@@ -3,209 +3,269 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <mutex>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
 
+#include "drive_innovations.hpp"
+#include "log_tuner.hpp"
 #include "rhec/core/base/error.hpp"
 #include "rhec/sim/loop/scenario.hpp"
-#include "rhec/sim/tuning/innovations.hpp"
-#include "rhec/sim/tuning/precision.hpp"
-#include "rhec/sim/tuning/search.hpp"
+#include "rhec/sim/replay/drive_smoothing.hpp"
+#include "rhec/sim/replay/replay_scenario.hpp"
 #include "rhec/sim/world/truth_estimator.hpp"
-#include "scenario_text.hpp"
+#include "tuned_log.hpp"
 
 namespace rhec::sim {
 namespace {
 
-using Seconds = std::chrono::duration<double>;
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+// Ground that is driven before measurements count where a heading is searched; at most this share of the log.
+constexpr double found_after = 25.0, most_found = 0.1;
+// Innovations are those of a measurement whose time is this close [s].
+constexpr double same_time = 2e-6;
+// Sensors that measure at one time are asked one after the other, this far apart [s]: each is then expected from what
+// the others have said, so that densities multiply.
+constexpr double stagger = 1e-5;
 
-/// From here on a number is little more certain than before.
-constexpr double certain_below = 0.5;
-
-Settings with_filter(Settings settings) {
-  settings.set("estimator.name", Settings::scalar("ekf"));
-  // A window's sections are none of a filter's.
-  settings.set("blocking", Settings::null());
-  settings.set("smoother", Settings::null());
+/// Without a map, which is for drives and not for rehearsals of them.
+Settings without_memory(Settings settings) {
+  if (settings.find_path("estimator.memory")) settings.set("estimator.memory", Settings::null());
   return settings;
 }
 
-Robot robot_of(const Host& host, const Settings& settings) {
-  return {host, ReplayOptions::table().parse(settings, "scenario"), scenario_estimators()};
+/// What is added to each output or input of a drive by the section `signals`, by its path; 0 where that says nothing.
+double offset_at(const Settings& settings, const std::string& key) {
+  const Settings* given = settings.find_path(key);
+  return given ? given->as_number() : 0.0;
 }
 
-std::vector<Innovation> innovations_of(const DriveReplay& replay) {
-  std::vector<Innovation> innovations;
-  innovations.reserve(replay.innovations.size());
-  for (const DriveInnovation& each : replay.innovations)
-    innovations.push_back(
-        {.size = static_cast<int>(each.values.size()), .squared = each.nis, .log_determinant = each.log_determinant});
-  return innovations;
-}
-
-/// Replays a drive with numbers that are looked for.
-class Tuner {
+/// A drive with the vehicle's own sensors. An entry is what one sensor says in one event.
+class TunedDrive final : public TunedLog {
  public:
-  Tuner(const Host& host, const Settings& settings, const logs::Drive& drive, const DriveTuningOptions& options,
-        const TuningHooks& hooks)
-      : host_(host), settings_(settings), drive_(drive), options_(options), hooks_(hooks) {
+  TunedDrive(const Host& host, const logs::Drive& drive, const Settings& settings, const HoldOut& hold_out)
+      : host_(host), drive_(drive), base_(settings), judges_(hold_out) {
     if (settings.find("path")) start_ = Scenario(host, settings).initial_state();
-    const Robot robot = robot_of(host, settings);
-    const DriveReplay first = replay(with_filter(settings));
-    result_.measurements = static_cast<int>(first.innovations.size());
-    if (result_.measurements < least_fixes)
-      throw Error(fmt::format("the log has {} measurements that can be judged; expected at least {} to tune on{}",
-                              result_.measurements, least_fixes,
-                              !robot.estimator_options().health.watch ? "; estimator.health.watch is false" : ""));
-    tunables_ = drive_tunables(host, robot, settings, first.sensors, options.wishes);
-    if (tunables_.empty()) throw Error("--keep leaves nothing to tune");
+    const Robot first = robot(settings);
+    const ModelDescription& about = first.model()->description();
+    for (const Variable& output : about.outputs) offsets_.push_back("signals.outputs." + output.name + ".offset");
+    inputs_ = static_cast<std::size_t>(drive.inputs);
+    for (std::size_t j = 0; j < inputs_; ++j) offsets_.push_back("signals.inputs." + about.inputs[j].name + ".offset");
+    const DriveReplay replay = replay_drive(first, drive, {}, start_);
+    sensors_ = replay.sensors;
+    withheld_ = sensor_to_withhold(first, sensors_);
+    unit_ = about.outputs[static_cast<std::size_t>(sensors_[static_cast<std::size_t>(withheld_)].outputs.front())].unit;
+    const bool is_searched = first.estimator_options().heading_starts > 1;
+    list_entries(is_searched ? known_from(replay, about.roles) : -std::numeric_limits<double>::infinity());
   }
 
-  DriveTuning run() {
-    const Eigen::Index n = std::ssize(tunables_);
-    SearchOptions search{
-        .lower = Eigen::VectorXd(n), .upper = Eigen::VectorXd(n), .step = Eigen::VectorXd::Constant(n, 0.3)};
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Tunable& tunable = tunables_[static_cast<std::size_t>(i)];
-      search.lower[i] = tunable.coordinate_of(tunable.lower);
-      search.upper[i] = tunable.coordinate_of(tunable.upper);
+  const std::vector<TunedEntry>& entries() const override { return entries_; }
+  std::string name() const override { return "the log"; }
+  std::string entry_name(bool is_plural) const override { return is_plural ? "measurements" : "measurement"; }
+  std::string withheld_unit() const override { return unit_; }
+
+  Robot robot(const Settings& settings) const override {
+    return {host_, ReplayOptions::table().parse(without_memory(settings), "scenario"), scenario_estimators()};
+  }
+
+  std::vector<Tunable> tunables(const Settings& settings, const TuningWishes& wishes) const override {
+    std::vector<Sensor> measured;
+    for (std::size_t s = 0; s < sensors_.size(); ++s)
+      if (!by_sensor_[s].empty()) measured.push_back(sensors_[s]);
+    std::vector<Tunable> all = drive_tunables(host_, robot(settings), settings, measured, wishes);
+    for (const Tunable& tunable : all)
+      for (const std::string& key : tunable.keys)
+        if (key.starts_with("signals.") && std::find(offsets_.begin(), offsets_.end(), key) == offsets_.end())
+          throw Error(fmt::format(
+              "--tune {}: of the section `signals` only offsets can be tuned, as the log is read once; expected the "
+              "offset of an output or input, or e.g. estimator.delays.OUTPUT",
+              key));
+    return all;
+  }
+
+  /// Everything is known when it was measured: what a filter knows at a measurement would else leap with delays.
+  std::vector<Innovation> innovations(const Settings& settings, const HoldOut& withheld) const override {
+    Settings punctual = settings;
+    punctual.set("estimator.delays", Settings::null());
+    punctual.set("estimator.health.watch", Settings::scalar("false"));
+    const Robot chosen = robot(punctual);
+    const ModelDescription& about = chosen.model()->description();
+    std::vector<double> delays;
+    for (const Sensor& sensor : sensors_)
+      delays.push_back(offset_at(
+          settings, "estimator.delays." + about.outputs[static_cast<std::size_t>(sensor.outputs.front())].name));
+    std::vector<Innovation> found(entries_.size());
+    for (const AskedInnovation& each :
+         asked_innovations(chosen, in_time(shifted(settings), delays), withheld, start_)) {
+      const auto s = static_cast<std::size_t>(each.sensor);
+      const double stamp = each.time + delays[s] - stagger * static_cast<double>(s);
+      const std::vector<std::size_t>& candidates = by_sensor_[s];
+      auto at = std::lower_bound(candidates.begin(), candidates.end(), stamp - same_time,
+                                 [&](std::size_t entry, double time) { return entries_[entry].time < time; });
+      // Of measurements at one time they come one after the other.
+      while (at != candidates.end() && found[*at].size > 0) ++at;
+      if (at != candidates.end() && entries_[*at].time <= stamp + same_time) found[*at] = each.innovation;
     }
-    search.most_evaluations = 40 * static_cast<int>(n);
-    search.threads = options_.threads;
-    search.stop = [this] { return is_over(); };
-    const Objective objective = [this](const Eigen::VectorXd& at) { return log_posterior(at); };
-    start_value_ = log_posterior(Eigen::VectorXd::Zero(n));
-    const Maximum found = maximise(
-        objective, {Eigen::VectorXd::Zero(n), Eigen::VectorXd::Constant(n, 0.2).cwiseMax(search.lower)}, search);
-    result_.log_likelihood_before = likelihood(Eigen::VectorXd::Zero(n)).total;
-    result_.log_likelihood_after = likelihood(found.at).total;
-    write_numbers(found.at, search);
-    judge(found.at);
-    result_.evaluations = evaluations_;
-    result_.stopped = found.stopped;
-    result_.seconds = seconds();
-    return std::move(result_);
+    return found;
+  }
+
+  std::vector<double> predictions(const Settings& settings, const HoldOut& withheld,
+                                  bool without_judges) const override {
+    logs::Drive drive = shifted(settings);
+    if (without_judges)
+      for (std::size_t i = 0; i < entries_.size(); ++i)
+        if (is_withheld_[i])
+          for (const int j : sensors_[static_cast<std::size_t>(withheld_)].outputs)
+            drive.values[drive.events[events_[i]].values + static_cast<std::size_t>(j)] = nothing;
+    return distances_of(replay_drive(robot(settings), drive, withheld, start_));
+  }
+
+  std::vector<double> interpolations(const Settings& settings, const HoldOut& withheld) const override {
+    return distances_of(smooth_drive("tuned", robot(settings), shifted(settings), withheld, start_).smoothed);
+  }
+
+  std::vector<SensorSummary> sensors(const Settings& settings, const HoldOut& withheld) const override {
+    const Robot chosen = robot(settings);
+    return summarise_innovations(replay_drive(chosen, shifted(settings), withheld, start_), chosen);
   }
 
  private:
-  double seconds() const { return Seconds(Clock::now() - begin_).count(); }
-  bool is_over() const { return (hooks_.stop && hooks_.stop()) || seconds() > options_.most_seconds; }
-
-  DriveReplay replay(const Settings& settings) const {
-    return replay_drive(robot_of(host_, settings), drive_, options_.hold_out, start_);
-  }
-
-  std::vector<Innovation> innovations_at(const Eigen::VectorXd& at) const {
-    return innovations_of(replay(with_filter(with_values(settings_, tunables_, at))));
-  }
-
-  LogLikelihood likelihood(const Eigen::VectorXd& at) {
-    const std::vector<Innovation> innovations = innovations_at(at);
-    return log_likelihood(innovations, std::vector<bool>(innovations.size(), true));
-  }
-
-  double log_posterior(const Eigen::VectorXd& at) {
-    const double value = likelihood(at).total - 0.5 * at.squaredNorm();
-    const std::lock_guard lock(mutex_);
-    ++evaluations_;
-    best_ = std::max(best_, value);
-    if (hooks_.progress)
-      hooks_.progress(
-          {.stage = "search", .evaluations = evaluations_, .gain = best_ - start_value_, .seconds = seconds()});
-    return value;
-  }
-
-  void write_numbers(const Eigen::VectorXd& at, const SearchOptions& search) {
-    const double degrees = likelihood(at).degrees;
-    const auto size = static_cast<Eigen::Index>(innovations_at(at).size());
-    const LikelihoodTerms terms = [&](const Eigen::VectorXd& where) {
-      const std::vector<Innovation> innovations = innovations_at(where);
-      Eigen::VectorXd values = Eigen::VectorXd::Zero(size);
-      for (Eigen::Index i = 0; i < std::min<Eigen::Index>(size, std::ssize(innovations)); ++i)
-        values[i] = log_density(innovations[static_cast<std::size_t>(i)], degrees);
-      return values;
-    };
-    const Precision precision = precision_at(
-        terms, at, {.lower = search.lower, .upper = search.upper, .threads = options_.threads, .stop = [this] {
-                      return is_over();
-                    }});
-    for (std::size_t i = 0; i < tunables_.size(); ++i) {
-      const auto j = static_cast<Eigen::Index>(i);
-      TunedNumber number{.tunable = tunables_[i], .value = tunables_[i].value_at(at[j]), .slice = {}};
-      number.is_at_bound = !precision.is_free[i];
-      number.error = tunables_[i].error_of(precision.error(static_cast<int>(i)), number.value);
-      number.hessian_error = tunables_[i].error_of(precision.hessian_errors[j], number.value);
-      number.is_told = number.is_at_bound || precision.error(static_cast<int>(i)) < certain_below;
-      result_.numbers.push_back(std::move(number));
+  /// From when on a heading that is searched should be known [s].
+  double known_from(const DriveReplay& replay, const Roles& roles) const {
+    const double begin = drive_.events.front().time, end = drive_.events.back().time;
+    const double most = begin + most_found * (end - begin);
+    if (roles.position_x < 0 || roles.position_y < 0) return begin;
+    double covered = 0.0, from = begin;
+    for (std::size_t i = 1; i < replay.estimates.size() && covered < found_after && from < most; ++i) {
+      const Eigen::VectorXd &one = replay.estimates[i - 1].values, &other = replay.estimates[i].values;
+      covered +=
+          std::hypot(other[roles.position_x] - one[roles.position_x], other[roles.position_y] - one[roles.position_y]);
+      from = replay.estimates[i].time;
     }
+    return std::min(from, most);
   }
 
-  /// What was found is taken unless it predicts worse what nothing was tuned on: covariances, which the likelihood has
-  /// made right, count, too.
-  void judge(const Eigen::VectorXd& at) {
-    constexpr int digits = 4;
-    const Settings tuned = with_values(settings_, tunables_, at, digits);
-    const Robot before = robot_of(host_, settings_), after = robot_of(host_, tuned);
-    const DriveReplay one = replay_drive(before, drive_, options_.hold_out, start_),
-                      other = replay_drive(after, drive_, options_.hold_out, start_);
-    result_.before = summarise_predictions(one, before);
-    result_.after = summarise_predictions(other, after);
-    result_.innovations_before = summarise_innovations(one, before);
-    result_.innovations_after = summarise_innovations(other, after);
-    const auto score = [](const AccuracySummary& accuracy) { return accuracy.median * accuracy.rms; };
-    constexpr double by_chance = 1.05;
-    // Without anything withheld nothing judges, and the likelihood decides.
-    result_.is_taken = result_.after.count == 0 || score(result_.after) < by_chance * score(result_.before);
-    result_.settings = result_.is_taken ? tuned : settings_;
+  void list_entries(double known_from) {
+    by_sensor_.resize(sensors_.size());
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < drive_.events.size(); ++i) {
+      const logs::DriveEvent& event = drive_.events[i];
+      if (!event.is_output) continue;
+      for (std::size_t s = 0; s < sensors_.size(); ++s) {
+        if (std::ranges::all_of(sensors_[s].outputs, [&](int j) { return std::isnan(drive_.values_of(event)[j]); }))
+          continue;
+        const bool is_withheld = static_cast<int>(s) == withheld_ && judges_.holds(count++);
+        const bool is_known = event.time > known_from;
+        by_sensor_[s].push_back(entries_.size());
+        if (static_cast<int>(s) == withheld_) by_event_[i] = entries_.size();
+        entries_.push_back({.time = event.time,
+                            .sensor = static_cast<int>(s),
+                            .counts = is_known && !is_withheld,
+                            .is_judge = is_known && is_withheld});
+        events_.push_back(i);
+        is_withheld_.push_back(is_withheld);
+      }
+    }
+    for (std::vector<std::size_t>& entries : by_sensor_)
+      std::stable_sort(entries.begin(), entries.end(),
+                       [&](std::size_t a, std::size_t b) { return entries_[a].time < entries_[b].time; });
+  }
+
+  /// The drive with the offsets of a scenario in the place of those that it was read with.
+  logs::Drive shifted(const Settings& settings) const {
+    logs::Drive drive = drive_;
+    const std::size_t outputs = offsets_.size() - inputs_;
+    for (std::size_t k = 0; k < offsets_.size(); ++k) {
+      const double by = offset_at(settings, offsets_[k]) - offset_at(base_, offsets_[k]);
+      if (by == 0.0) continue;
+      const bool is_output = k < outputs;
+      for (const logs::DriveEvent& event : drive.events)
+        if (event.is_output == is_output) drive.values[event.values + (is_output ? k : k - outputs)] += by;
+    }
+    return drive;
+  }
+
+  /// What each sensor says as an event of its own, at the time at which it was measured, all in this order.
+  logs::Drive in_time(const logs::Drive& drive, const std::vector<double>& delays) const {
+    logs::Drive result = drive;
+    result.events.clear();
+    result.values.clear();
+    const auto add = [&](const logs::DriveEvent& event, double time, const auto& value_of) {
+      result.events.push_back(event);
+      result.events.back().time = result.events.back().arrival = time;
+      result.events.back().values = result.values.size();
+      const std::size_t count = event.is_output ? offsets_.size() - inputs_ : inputs_;
+      for (std::size_t j = 0; j < count; ++j) result.values.push_back(value_of(j));
+    };
+    for (const logs::DriveEvent& event : drive.events) {
+      const double* values = drive.values_of(event);
+      if (!event.is_output) {
+        add(event, event.time, [&](std::size_t j) { return values[j]; });
+        continue;
+      }
+      for (std::size_t s = 0; s < sensors_.size(); ++s) {
+        const std::vector<int>& outputs = sensors_[s].outputs;
+        if (std::ranges::all_of(outputs, [&](int j) { return std::isnan(values[j]); })) continue;
+        add(event, event.time - delays[s] + stagger * static_cast<double>(s), [&](std::size_t j) {
+          return std::find(outputs.begin(), outputs.end(), static_cast<int>(j)) != outputs.end() ? values[j] : nothing;
+        });
+      }
+    }
+    std::stable_sort(result.events.begin(), result.events.end(),
+                     [](const logs::DriveEvent& a, const logs::DriveEvent& b) { return a.time < b.time; });
+    return result;
+  }
+
+  /// Those before the first estimate count as `error_cap`.
+  std::vector<double> distances_of(const DriveReplay& replay) const {
+    std::vector<double> distances(entries_.size(), nothing);
+    for (const DrivePrediction& prediction : replay.predictions)
+      distances[by_event_.at(prediction.event)] = prediction.distance;
+    std::int64_t unpredicted = replay.unpredicted;
+    for (std::size_t i = 0; i < entries_.size() && unpredicted > 0; ++i)
+      if (is_withheld_[i] && std::isnan(distances[i])) distances[i] = error_cap, --unpredicted;
+    return distances;
   }
 
   const Host& host_;
-  Settings settings_;
   const logs::Drive& drive_;
-  DriveTuningOptions options_;
-  TuningHooks hooks_;
-  Clock::time_point begin_ = Clock::now();
+  Settings base_;
+  HoldOut judges_;
   std::optional<Eigen::VectorXd> start_;
-  std::vector<Tunable> tunables_;
-  std::mutex mutex_;
-  int evaluations_ = 0;
-  double start_value_ = 0.0, best_ = -std::numeric_limits<double>::infinity();
-  DriveTuning result_;
+  std::vector<Sensor> sensors_;
+  int withheld_ = 0;
+  std::string unit_;
+  std::vector<std::string> offsets_;  ///< keys, of outputs and then of inputs
+  std::size_t inputs_ = 0;
+  std::vector<TunedEntry> entries_;
+  std::vector<std::size_t> events_;                  ///< of the drive, by entry
+  std::vector<bool> is_withheld_;                    ///< by entry
+  std::vector<std::vector<std::size_t>> by_sensor_;  ///< entries in the order of their times
+  std::map<std::size_t, std::size_t> by_event_;      ///< entries of the sensor that is withheld
 };
-
-Json json_of(const AccuracySummary& accuracy) {
-  return {{"sensor", accuracy.sensor}, {"count", accuracy.count}, {"median", accuracy.median}, {"rms", accuracy.rms}};
-}
 
 }  // namespace
 
-DriveTuning tune_on_drive(const Host& host, const Settings& settings, const logs::Drive& drive,
-                          const DriveTuningOptions& options, const TuningHooks& hooks) {
-  return Tuner(host, settings, drive, options, hooks).run();
-}
-
-std::string tuned_yaml(const DriveTuning& tuning, const std::string& origin) {
-  return fmt::format("# Tuned by 'rhec tune' {}.\n{}", origin, scenario_text(tuning.settings));
-}
-
-std::string summary_json(const DriveTuning& tuning) {
-  Json json;
-  json["measurements"] = tuning.measurements;
-  json["log_likelihood"] = {{"before", tuning.log_likelihood_before}, {"after", tuning.log_likelihood_after}};
-  Json& numbers = json["numbers"] = Json::object();
-  for (const TunedNumber& number : tuning.numbers)
-    numbers[number.tunable.name] = {{"before", number.tunable.start},
-                                    {"after", number.value},
-                                    {"error", std::isfinite(number.error) ? Json(number.error) : Json()},
-                                    {"told", number.is_told},
-                                    {"at_bound", number.is_at_bound}};
-  json["held_out"] = {{"before", json_of(tuning.before)}, {"after", json_of(tuning.after)}};
-  json["taken"] = tuning.is_taken;
-  json["evaluations"] = tuning.evaluations;
-  json["stopped"] = tuning.stopped;
-  json["seconds"] = tuning.seconds;
-  return json.dump(2) + "\n";
+LogTuning tune_on_drive(const Host& host, const Settings& settings, const logs::Drive& drive,
+                        const LogTuningOptions& options, const TuningHooks& hooks) {
+  // A signal that is only named takes an offset, too.
+  Settings named = settings;
+  for (const char* const kind : {"outputs", "inputs"}) {
+    const Settings* section = settings.find_path(std::string("signals.") + kind);
+    if (!section || section->kind() != Settings::Kind::map) continue;
+    for (const auto& [name, entry] : section->members()) {
+      if (entry.kind() == Settings::Kind::map ||
+          (entry.number() == std::nullopt && entry.kind() == Settings::Kind::scalar && entry.text() == "none"))
+        continue;
+      Settings whole = Settings::map(entry.origin());
+      whole.add("from", entry);
+      named.set(fmt::format("signals.{}.{}", kind, name), whole);
+    }
+  }
+  const TunedDrive log(host, drive, named, options.hold_out);
+  return LogTuner(named, log, options, hooks).run();
 }
 
 }  // namespace rhec::sim

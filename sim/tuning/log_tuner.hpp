@@ -12,6 +12,7 @@
 #include "rhec/sim/tuning/log_tuning.hpp"
 #include "rhec/sim/tuning/precision.hpp"
 #include "rhec/sim/tuning/search.hpp"
+#include "tuned_log.hpp"
 
 namespace rhec::sim {
 
@@ -20,11 +21,10 @@ inline constexpr double as_good = 2.0;
 /// What a search may take.
 inline constexpr int evaluations_per_number = 30;
 
-/// `tune_on_log`, step by step.
+/// `tune_on_log` and `tune_on_drive`, step by step.
 class LogTuner {
  public:
-  LogTuner(const Host& host, const Settings& settings, const LogTables& tables, const LogTuningOptions& options,
-           const TuningHooks& hooks);
+  LogTuner(const Settings& settings, const TunedLog& log, const LogTuningOptions& options, const TuningHooks& hooks);
   LogTuning run();
 
  private:
@@ -45,14 +45,13 @@ class LogTuner {
   };
 
   int size() const { return static_cast<int>(filter_.tunables.size()); }
-  const std::vector<Variable>& parameters() const;
+  const std::vector<Variable>& parameters() const { return robot_.model()->description().parameters; }
   double seconds() const;
   bool stopped() const;
   void begin(const std::string& stage);
   void tell() const;
 
   // What is looked at.
-  void choose_fixes();
   void make_filter();
   Terms terms_of(const Settings& settings) const;
   Terms terms_at(const Filter& filter, const Eigen::VectorXd& at) const;
@@ -79,16 +78,13 @@ class LogTuner {
   void note_what_is_not_told();
   void find_slices();
   void judge();
-  std::vector<double> residuals_of(const Replay& replayed) const;
 
-  const Host& host_;
+  const TunedLog& log_;
   Settings settings_;
-  const LogTables& tables_;
   LogTuningOptions options_;
   const TuningHooks& hooks_;
-  LogScenario scenario_;
-  RecordedLog log_;                    ///< as the scenario has it
-  std::vector<bool> counts_, judges_;  ///< per fix
+  Robot robot_;               ///< as the scenario has it
+  std::vector<bool> counts_;  ///< by entry; after the first look those that a filter was asked about
   Filter filter_, before_;
   Eigen::VectorXd at_;                  ///< the best so far
   std::optional<Precision> precision_;  ///< none if stopped before

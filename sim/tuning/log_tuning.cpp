@@ -4,17 +4,18 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "rhec/core/base/error.hpp"
 #include "rhec/sim/numbers/random.hpp"
+#include "tuned_tables.hpp"
 
 namespace rhec::sim {
 namespace {
 
-// Ground that is driven before fixes count: until then the filter finds its heading. At most this share of the log.
-constexpr double found_after = 25.0, most_found = 0.1;
 // Another law must gain more than `as_good`, and than so many standard errors of its gain.
 constexpr double gain_errors = 1.64;
 constexpr int evaluations_of_a_law = 60, most_rounds = 12;
@@ -38,16 +39,18 @@ bool is_better(const TriedLaw& law) { return law.gain > as_good && law.gain > ga
 
 }  // namespace
 
-LogTuner::LogTuner(const Host& host, const Settings& settings, const LogTables& tables, const LogTuningOptions& options,
+LogTuner::LogTuner(const Settings& settings, const TunedLog& log, const LogTuningOptions& options,
                    const TuningHooks& hooks)
-    : host_(host), settings_(settings), tables_(tables), options_(options), hooks_(hooks), scenario_(host, settings) {
-  result_.variant = scenario_.name();
-  const Robot& robot = scenario_.variants().front().robot;
-  estimator_ = robot.estimator_options().name;
+    : log_(log), settings_(settings), options_(options), hooks_(hooks), robot_(log.robot(settings)) {
+  const Settings* const name = settings.find("name");
+  result_.variant = name ? name->as_text() : "log";
+  result_.entry_name = log.entry_name(false);
+  result_.entries_name = log.entry_name(true);
+  result_.unit = log.withheld_unit();
+  estimator_ = robot_.estimator_options().name;
   // Windows of blocks have the filter's process noise in their arrival cost.
-  result_.filter = estimator_ == "ekf" || (estimator_ == "rhe" && robot.has_blockings()) ? "ekf" : "bank";
-  log_ = recorded_log(tables_, scenario_);
-  choose_fixes();
+  result_.filter = estimator_ == "ekf" || (estimator_ == "rhe" && robot_.has_blockings()) ? "ekf" : "bank";
+  for (const TunedEntry& entry : log.entries()) counts_.push_back(entry.counts);
   make_filter();
 }
 
@@ -55,12 +58,14 @@ LogTuning LogTuner::run() {
   const Eigen::VectorXd start = Eigen::VectorXd::Zero(size());
   // The scenario's own mistakes show up here, not as a failed search.
   begin("looking at the scenario");
+  const std::vector<Innovation> judged = log_.innovations(filter_.settings, options_.hold_out);
+  for (std::size_t i = 0; i < judged.size(); ++i) counts_[i] = counts_[i] && judged[i].size > 0;
   const Terms first = terms_of(filter_.settings);
   if (first.likelihood.count < least_fixes)
     throw Error(fmt::format(
-        "{}: {} fixes are left to tune on, once those withheld and those before the heading is known are taken off; "
+        "{}: {} {} are left to tune on, once those withheld and those before the heading is known are taken off; "
         "expected at least {}; give a longer log, or withhold fewer",
-        tables_.fixes.name, first.likelihood.count, least_fixes));
+        log_.name(), first.likelihood.count, result_.entries_name, least_fixes));
   result_.fixes = first.likelihood.count;
   result_.log_likelihood_before = first.likelihood.total;
   result_.degrees_before = first.likelihood.degrees;
@@ -94,10 +99,6 @@ LogTuning LogTuner::run() {
   return std::move(result_);
 }
 
-const std::vector<Variable>& LogTuner::parameters() const {
-  return scenario_.variants().front().robot.model()->description().parameters;
-}
-
 double LogTuner::seconds() const { return std::chrono::duration<double>(Clock::now() - began_).count(); }
 
 bool LogTuner::stopped() const {
@@ -115,22 +116,6 @@ void LogTuner::tell() const {
   if (hooks_.progress) hooks_.progress({stage_, evaluations_, best_value_ - start_value_, seconds()});
 }
 
-/// Fixes that are not withheld, from where on the heading should be known.
-void LogTuner::choose_fixes() {
-  const std::vector<DeadReckoning>& rows = log_.rows;
-  const double most = rows.front().time + most_found * (rows.back().time - rows.front().time);
-  double covered = 0.0, from = rows.front().time;
-  for (std::size_t i = 1; i < rows.size() && covered < found_after && rows[i].time < most; ++i) {
-    if (!std::isnan(rows[i].speed)) covered += std::abs(rows[i].speed) * (rows[i].time - rows[i - 1].time);
-    from = rows[i].time;
-  }
-  for (std::size_t i = 0; i < log_.fixes.size(); ++i) {
-    const bool known = log_.fixes[i].time > from;
-    counts_.push_back(known && !options_.hold_out.holds(i));
-    judges_.push_back(known && options_.hold_out.holds(i));
-  }
-}
-
 /// The filter behind the estimator. It has no robust loss: that decides by the fix whether to follow it, and the
 /// likelihood would be torn. The likelihood has tails of its own.
 void LogTuner::make_filter() {
@@ -139,6 +124,7 @@ void LogTuner::make_filter() {
   to.set("noise.adapt", Settings::scalar("false"));
   to.set("estimator.name", Settings::scalar(result_.filter));
   to.set("estimator.robust", Settings::null());
+  to.set("estimator.memory", Settings::null());
   if (result_.filter == "bank") {
     to.set("blocking", Settings::null());
     for (const Variable& parameter : parameters()) {
@@ -148,21 +134,35 @@ void LogTuner::make_filter() {
       to.set(key, law_of("walk", {{"sigma", 0.01 * width_of(parameter)}}));
     }
   }
-  filter_.tunables = tunables_of(host_, LogScenario(host_, to), options_.wishes);
+  filter_.tunables = log_.tunables(to, options_.wishes);
   if (filter_.tunables.empty()) throw Error("nothing is left to tune; keep fewer numbers");
 }
 
-/// The likelihood of the log by a scenario, fix by fix.
+/// The likelihood of the log by a scenario, entry by entry. One that was judged at the start and is not now, such as
+/// the first one behind a delay that has grown, counts as the mean of its sensor: nothing is gained by leaving some
+/// out.
 LogTuner::Terms LogTuner::terms_of(const Settings& settings) const {
-  const LogScenario scenario(host_, settings);
-  const RecordedLog log = recorded_log(tables_, scenario);
-  const std::vector<Innovation> found =
-      innovations(scenario.variants().front().robot, log, scenario.log(), options_.hold_out);
+  const std::vector<Innovation> found = log_.innovations(settings, options_.hold_out);
   Terms terms{log_likelihood(found, counts_), {}};
   terms.terms.resize(std::count(counts_.begin(), counts_.end(), true));
+  std::map<int, std::pair<double, int>> sums;
+  std::vector<double> densities(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!counts_[i] || found[i].size == 0) continue;
+    auto& [sum, count] = sums[log_.entries()[i].sensor];
+    sum += densities[i] = log_density(found[i], terms.likelihood.degrees);
+    ++count;
+  }
   Eigen::Index next = 0;
-  for (std::size_t i = 0; i < found.size(); ++i)
-    if (counts_[i]) terms.terms[next++] = log_density(found[i], terms.likelihood.degrees);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!counts_[i]) continue;
+    if (found[i].size == 0) {
+      const auto& [sum, count] = sums[log_.entries()[i].sensor];
+      densities[i] = count > 0 ? sum / count : -hopeless;
+      terms.likelihood.total += densities[i];
+    }
+    terms.terms[next++] = densities[i];
+  }
   return terms;
 }
 
@@ -223,6 +223,7 @@ void LogTuner::search(double step) {
     for (int i = 1; i < std::max(2, options_.threads); ++i) {
       starts.push_back(at_);
       for (double& coordinate : starts.back()) coordinate += step * random.normal();
+      starts.back() = starts.back().cwiseMax(options.lower).cwiseMin(options.upper);
     }
     const Maximum found =
         maximise([this](const Eigen::VectorXd& at) { return value_at(filter_, at); }, starts, options);
@@ -241,7 +242,7 @@ LogTuner::Trial LogTuner::try_law(const std::string& key, const Settings& law) c
   trial.law = {.key = key, .law = law.find("name")->text()};
   Settings& settings = trial.filter.settings = with_values(filter_.settings, filter_.tunables, at_);
   settings.set(key, law);
-  for (const Tunable& tunable : tunables_of(host_, LogScenario(host_, settings), options_.wishes))
+  for (const Tunable& tunable : log_.tunables(settings, options_.wishes))
     if (tunable.name.starts_with(key)) trial.filter.tunables.push_back(tunable);
   Eigen::VectorXd at = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(trial.filter.tunables.size()));
   if (at.size() > 0) {
@@ -271,7 +272,7 @@ void LogTuner::take(const Trial& trial) {
   const Eigen::VectorXd at = at_;
   for (const Settings::Member& section : trial.filter.settings.members())
     filter_.settings.set(section.first, section.second);
-  filter_.tunables = tunables_of(host_, LogScenario(host_, filter_.settings), options_.wishes);
+  filter_.tunables = log_.tunables(filter_.settings, options_.wishes);
   tried_.clear();
   at_ = Eigen::VectorXd::Zero(size());
   for (int i = 0; i < size(); ++i) {
@@ -315,7 +316,8 @@ void LogTuner::try_laws(const Variable& parameter) {
 
 LogTuning tune_on_log(const Host& host, const Settings& settings, const LogTables& tables,
                       const LogTuningOptions& options, const TuningHooks& hooks) {
-  return LogTuner(host, settings, tables, options, hooks).run();
+  const TunedTables log(host, tables, settings, options.hold_out);
+  return LogTuner(settings, log, options, hooks).run();
 }
 
 }  // namespace rhec::sim

@@ -88,8 +88,9 @@ void draw_slice(Svg& svg, const TunedNumber& number, Point corner, double panel_
 }  // namespace
 
 std::string tuned_yaml(const LogTuning& tuning, const std::string& origin) {
-  std::string text = fmt::format("# Found by 'rhec tune' {}: {} fixes, log likelihood {:.1f} before, {:.1f} after.\n",
-                                 origin, tuning.fixes, tuning.log_likelihood_before, tuning.log_likelihood_after);
+  std::string text =
+      fmt::format("# Found by 'rhec tune' {}: {} {}, log likelihood {:.1f} before, {:.1f} after.\n", origin,
+                  tuning.fixes, tuning.entries_name, tuning.log_likelihood_before, tuning.log_likelihood_after);
   for (const TunedNumber& number : tuning.numbers) {
     text += fmt::format("#   {}: {:.4g}", number.tunable.name, number.value);
     if (std::isfinite(number.error) && number.is_told && !number.is_at_bound)
@@ -105,7 +106,7 @@ std::string summary_json(const LogTuning& tuning) {
   Json json;
   json["variant"] = tuning.variant;
   json["filter"] = tuning.filter;
-  json["fixes"] = tuning.fixes;
+  json[tuning.entries_name] = tuning.fixes;
   json["log_likelihood"] = {{"before", tuning.log_likelihood_before}, {"after", tuning.log_likelihood_after}};
   const auto degrees = [](double value) { return value < normal_degrees ? Json(value) : Json(nullptr); };
   Json& tails = json["degrees_of_freedom"] = Json::object();
@@ -138,8 +139,8 @@ std::string summary_json(const LogTuning& tuning) {
   for (const TriedEstimator& tried : tuning.estimators) {
     Json& entry = estimators.emplace_back() = Json::object();
     entry["name"] = tried.name;
-    entry["median_m"] = tried.median;
-    entry["rmse_capped_m"] = tried.rmse;
+    entry["median_" + tuning.unit] = tried.median;
+    entry["rmse_capped_" + tuning.unit] = tried.rmse;
     entry["taken"] = tried.is_taken;
   }
   Json& confounded = json["confounded"] = Json::array();
@@ -161,6 +162,12 @@ std::string summary_json(const LogTuning& tuning) {
     entry["after_95"] = interval_json(figure.after_interval);
     entry["change_95"] = interval_json(figure.change_interval);
   }
+  Json& sensors = json["sensors"] = Json::array();
+  for (const TunedSensor& sensor : tuning.sensors)
+    sensors.push_back({{"name", sensor.name},
+                       {"expected", sensor.expected},
+                       {"nis_before", sensor.before},
+                       {"nis_after", sensor.after}});
   json["evaluations"] = tuning.evaluations;
   json["stopped"] = tuning.stopped;
   json["seconds"] = tuning.seconds;
@@ -172,7 +179,7 @@ std::string tuning_svg(const LogTuning& tuning) {
   const int rows = (count + columns - 1) / columns;
   const double panel_width = (page_width - 2.0 * margin - (columns - 1) * gap * 0.5) / columns;
   Svg svg(page_width, head + rows * (panel_height + gap + 22.0) + margin);
-  svg.text({margin, 24.0}, "Log likelihood of the fixes about what was found",
+  svg.text({margin, 24.0}, fmt::format("Log likelihood of the {} about what was found", tuning.entries_name),
            R"(font-size="15" font-weight="bold" fill="#222")");
   svg.text(
       {margin, 42.0},

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <fmt/format.h>
 
-#include "rhec/sim/logs/smoothing.hpp"
 #include "rhec/sim/numbers/random.hpp"
 
 #include "judgement.hpp"
@@ -57,16 +57,12 @@ std::vector<HoldOut> LogTuner::rests() const {
   return rests;
 }
 
-/// Errors of the predictions of such a rest. Fixes that are to judge are masked.
+/// Errors of the predictions of such a rest, without those that judge.
 std::vector<double> LogTuner::errors_of(const Settings& settings, const HoldOut& rest) const {
-  const LogScenario scenario(host_, settings);
-  RecordedLog log = recorded_log(tables_, scenario);
-  for (std::size_t i = 0; i < log.fixes.size(); ++i)
-    if (options_.hold_out.holds(i)) log.fixes[i].x = log.fixes[i].y = std::nan("");
   std::vector<double> errors;
-  for (const LoggedEstimate& entry : replay(scenario.variants().front().robot, log, scenario.log(), rest).estimates)
-    if (entry.held_out && counts_[static_cast<std::size_t>(entry.fix)] && !std::isnan(entry.residual))
-      errors.push_back(entry.residual);
+  const std::vector<double> distances = log_.predictions(settings, rest, true);
+  for (std::size_t i = 0; i < distances.size(); ++i)
+    if (log_.entries()[i].counts && !std::isnan(distances[i])) errors.push_back(distances[i]);
   return errors;
 }
 
@@ -76,8 +72,11 @@ void LogTuner::settle() {
   if (stopped() || tried_.empty()) return;
   RandomStream random(2, "settling");
   std::vector<Eigen::VectorXd> near(looks_about, at_);
-  for (Eigen::VectorXd& at : near)
+  const SearchOptions bounds = search_options(filter_, 1.0, 1);
+  for (Eigen::VectorXd& at : near) {
     for (double& coordinate : at) coordinate += nearby * random.normal();
+    at = at.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+  }
   const double best = terms_at(filter_, at_).likelihood.total;
   std::vector<double> squares(near.size());
   in_parallel(looks_about, options_.threads, [&](int i) {
@@ -192,6 +191,13 @@ void LogTuner::choose_estimator() {
     if (filter.find_path("estimator.robust")) filter.set("estimator.robust", Settings::null());
     candidates.push_back({result_.filter + ", tuned", filter});
   }
+  if (result_.filter == "bank") {
+    // Laws that suit the log best need not be better than those that were there.
+    Settings laws = result_.settings;
+    const Settings* const priors = settings_.find_path("estimator.priors");
+    laws.set("estimator.priors", priors ? *priors : Settings::null());
+    candidates.push_back({estimator_ + ", tuned but for its priors", laws});
+  }
   candidates.push_back({estimator_ + ", as it was", settings_});
   const std::vector<HoldOut> withheld = rests();
   std::mutex mutex;
@@ -217,9 +223,10 @@ void LogTuner::choose_estimator() {
   for (TriedEstimator& tried : result_.estimators) tried.is_taken = tried.name == best->name;
   result_.settings = best->settings;
   if (best == &candidates.back())
-    result_.remarks.emplace_back(
-        "The scenario as it was predicts the fixes better than what is most likely by its filter: it is left as it "
-        "was.");
+    result_.remarks.push_back(
+        fmt::format("The scenario as it was predicts the {} better than what is most likely by its filter: it is left "
+                    "as it was.",
+                    result_.entries_name));
 }
 
 void LogTuner::note_what_is_not_told() {
@@ -235,8 +242,8 @@ void LogTuner::note_what_is_not_told() {
   if (!untold.empty())
     result_.remarks.push_back(
         fmt::format("This log tells little of {}: whatever their values (within a few times what "
-                    "the scenario says), the fixes are about as likely. {}.",
-                    fmt::join(untold, "; "),
+                    "the scenario says), the {} are about as likely. {}.",
+                    fmt::join(untold, "; "), result_.entries_name,
                     is_held_ ? "They are as the scenario has them"
                              : "They have their best values all the same, since together they matter"));
   if (precision_ && precision_->roughness > as_good)
@@ -293,51 +300,48 @@ void LogTuner::judge() {
   const Settings* const scenarios[] = {&settings_, &result_.settings};
   const Settings filters[] = {before_.settings, with_values(filter_.settings, filter_.tunables, at_, written_digits)};
   std::vector<double> predicted[2], smoothed[2], densities[2], squares[2];
+  std::vector<SensorSummary> sensors[2];
+  int values[2] = {};  // of a withheld measurement
   in_parallel(2, options_.threads, [&](int k) {
-    const LogScenario scenario(host_, *scenarios[k]);
-    const RecordedLog log = recorded_log(tables_, scenario);
-    const Robot& robot = scenario.variants().front().robot;
-    predicted[k] = residuals_of(replay(robot, log, scenario.log(), options_.hold_out));
-    if (smooths)
-      smoothed[k] = residuals_of(smooth(scenario.name(), robot, log, scenario.log(), options_.hold_out).smoothed);
-    // The filter expects a fix that nothing was tuned on from all before it.
-    const LogScenario filter(host_, filters[k]);
-    const RecordedLog own = recorded_log(tables_, filter);
-    const std::vector<Innovation> found = innovations(filter.variants().front().robot, own, filter.log(), {});
+    predicted[k] = log_.predictions(*scenarios[k], options_.hold_out, false);
+    if (smooths) smoothed[k] = log_.interpolations(*scenarios[k], options_.hold_out);
+    sensors[k] = log_.sensors(*scenarios[k], options_.hold_out);
+    // The filter expects a measurement that nothing was tuned on from all before it.
+    const std::vector<Innovation> found = log_.innovations(filters[k], {});
     const double degrees = k == 0 ? result_.degrees_before : result_.degrees_after;
+    int whole = 0;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      if (log_.entries()[i].is_judge) whole = std::max(whole, found[i].size);
     for (std::size_t i = 0; i < found.size(); ++i) {
-      const bool counts = judges_[i] && found[i].size == 2;
+      const bool counts = log_.entries()[i].is_judge && found[i].size > 0 && found[i].size == whole;
       densities[k].push_back(counts ? log_density(found[i], degrees) : std::nan(""));
       squares[k].push_back(counts ? found[i].squared : std::nan(""));
     }
+    values[k] = whole;
   });
   Pairs pairs;
-  for (const Fix& fix : log_.fixes) pairs.times.push_back(fix.time);
-  const auto add = [&](const char* name, const char* unit, std::vector<double>* of, const Statistic& statistic) {
+  for (const TunedEntry& entry : log_.entries()) pairs.times.push_back(entry.time);
+  const auto add = [&](const std::string& name, const std::string& unit, std::vector<double>* of,
+                       const Statistic& statistic) {
     pairs.before = of[0];
     pairs.after = of[1];
     result_.judged.push_back(compare(name, unit, pairs, statistic, block_seconds));
   };
-  add("withheld fixes: median", "m", predicted, median_of);
-  add("withheld fixes: RMSE (5 m)", "m", predicted, capped_rmse_of);
+  const std::string &unit = result_.unit, withheld = "withheld " + result_.entries_name,
+                    rmse = fmt::format("RMSE ({:g} {})", error_cap, unit);
+  add(withheld + ": median", unit, predicted, median_of);
+  add(withheld + ": " + rmse, unit, predicted, capped_rmse_of);
   if (smooths) {
-    add("smoothed: median", "m", smoothed, median_of);
-    add("smoothed: RMSE (5 m)", "m", smoothed, capped_rmse_of);
+    add("smoothed: median", unit, smoothed, median_of);
+    add("smoothed: " + rmse, unit, smoothed, capped_rmse_of);
   }
-  add("log likelihood of a fix", "", densities, mean_of);
-  add("NIS: median (1.39 if right)", "", squares, median_of);
-  add("NIS: mean (2 if normal)", "", squares, mean_of);
-}
-
-/// Distances of withheld fixes, by their index.
-std::vector<double> LogTuner::residuals_of(const Replay& replayed) const {
-  std::vector<double> residuals(log_.fixes.size(), std::nan(""));
-  for (const LoggedEstimate& entry : replayed.estimates)
-    if (entry.held_out) residuals[static_cast<std::size_t>(entry.fix)] = entry.residual;
-  std::int64_t unpredicted = replayed.unpredicted;  // the first ones
-  for (std::size_t i = 0; i < residuals.size() && unpredicted > 0; ++i)
-    if (options_.hold_out.holds(i)) residuals[i] = error_cap, --unpredicted;
-  return residuals;
+  add("log likelihood of a " + result_.entry_name, "", densities, mean_of);
+  // The median of chi-square with two degrees of freedom.
+  if (values[1] == 2)
+    add(fmt::format("NIS: median ({:.2f} if right)", 2.0 * std::numbers::ln2), "", squares, median_of);
+  add(fmt::format("NIS: mean ({} if normal)", values[1]), "", squares, mean_of);
+  for (std::size_t i = 0; i < sensors[0].size(); ++i)
+    result_.sensors.push_back({sensors[0][i].name, sensors[0][i].expected, sensors[0][i].nis, sensors[1][i].nis});
 }
 
 }  // namespace rhec::sim

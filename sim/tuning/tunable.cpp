@@ -23,6 +23,7 @@ struct Doubts {
   static constexpr double length_factor = 1.4;          ///< of a prior's length: four times
   static constexpr double speed = 0.1;                  ///< [m/s]
   static constexpr double angle = 0.05;                 ///< [rad]
+  static constexpr double turn_rate = 0.02;             ///< [rad/s]
   static constexpr double delay = 0.2;                  ///< [s]
   static constexpr double length = 1.0;                 ///< of a lever arm [m]
 };
@@ -78,6 +79,40 @@ void add_process_noise(const Robot& robot, std::vector<Tunable>& all) {
   }
 }
 
+/// How slip varies: the process noise of a filter, or the numbers of laws that the settings give, and of a loss.
+void add_estimator(const Robot& robot, std::vector<Tunable>& all) {
+  const EstimatorOptions& options = robot.estimator_options();
+  if (options.name == "ekf") {
+    add_process_noise(robot, all);
+  } else {
+    for (const Variable& parameter : robot.model()->description().parameters) {
+      const Settings* prior = options.priors.find(parameter.name);
+      if (!prior || prior->kind() != Settings::Kind::map) continue;
+      for (const auto& [key, value] : prior->members()) {
+        if (!value.number() || !(*value.number() > 0.0) || key == "mean" || key == "mean_sigma") continue;
+        all.push_back(scale_of({fmt::format("estimator.priors.{}.{}", parameter.name, key)}, *value.number(), "",
+                               key == "length" ? Doubts::length_factor : Doubts::factor));
+      }
+    }
+  }
+  if (const Settings* delta = options.robust.find("delta"))
+    all.push_back(scale_of({"estimator.robust.delta"}, delta->as_number(), "sigma", Doubts::length_factor));
+}
+
+/// What is added to what a sensor or an input reads, where it can have a bias that is not estimated: of angles, speeds
+/// and turn rates.
+void add_offset(const Variable& variable, const std::string& kind, const Settings& settings,
+                std::vector<Tunable>& all) {
+  const double doubt = variable.unit == "rad"     ? Doubts::angle
+                       : variable.unit == "m/s"   ? Doubts::speed
+                       : variable.unit == "rad/s" ? Doubts::turn_rate
+                                                  : 0.0;
+  if (doubt == 0.0 || settings.find_path("noise.biases." + variable.name)) return;
+  const std::string key = fmt::format("signals.{}.{}.offset", kind, variable.name);
+  const Settings* given = settings.find_path(key);
+  all.push_back(offset_of(key, given ? given->as_number() : 0.0, variable.unit, doubt));
+}
+
 /// Collects what can be tuned.
 class Finder {
  public:
@@ -86,7 +121,7 @@ class Finder {
 
   std::vector<Tunable> find() {
     add_noise();
-    add_estimator();
+    add_estimator(robot_, all_);
     add_log();
     add_lever_arms(host_, robot_, all_);
     return std::move(all_);
@@ -118,23 +153,6 @@ class Finder {
     sensor("outputs", about().outputs, outputs, {log.steering});
     sensor("inputs", about().inputs, robot_.input_sigmas(), {log.speed});
     sensor("inputs", about().inputs, robot_.input_sigmas(), {log.steering_rate});
-  }
-
-  void add_estimator() {
-    const EstimatorOptions& options = robot_.estimator_options();
-    if (options.name == "ekf") add_process_noise(robot_, all_);
-    for (const Variable& parameter : about().parameters) {
-      if (options.name == "ekf") break;
-      const Settings* prior = options.priors.find(parameter.name);
-      if (!prior || prior->kind() != Settings::Kind::map) continue;
-      for (const auto& [key, value] : prior->members()) {
-        if (!value.number() || !(*value.number() > 0.0) || key == "mean" || key == "mean_sigma") continue;
-        all_.push_back(scale_of({fmt::format("estimator.priors.{}.{}", parameter.name, key)}, *value.number(), "",
-                                key == "length" ? Doubts::length_factor : Doubts::factor));
-      }
-    }
-    if (const Settings* delta = options.robust.find("delta"))
-      all_.push_back(scale_of({"estimator.robust.delta"}, delta->as_number(), "sigma", Doubts::length_factor));
   }
 
   void add_log() {
@@ -256,11 +274,15 @@ std::vector<Tunable> drive_tunables(const Host& host, const Robot& robot, const 
     delay.keys = delays;
     delay.lower = 0.0;  // nothing is stamped before it is measured
     all.push_back(std::move(delay));
+    for (const int j : sensor.outputs) add_offset(about.outputs[static_cast<std::size_t>(j)], "outputs", settings, all);
   }
-  for (std::size_t j = 0; j < robot.input_sigmas().size(); ++j)
-    all.push_back(scale_of({"noise.inputs." + about.inputs[j].name}, robot.input_sigmas()[j], about.inputs[j].unit,
-                           Doubts::factor));
-  add_process_noise(robot, all);
+  for (std::size_t j = 0; j < about.inputs.size() - about.noisy_states.size(); ++j) {
+    if (robot.input_sigmas()[j] > 0.0)
+      all.push_back(scale_of({"noise.inputs." + about.inputs[j].name}, robot.input_sigmas()[j], about.inputs[j].unit,
+                             Doubts::factor));
+    add_offset(about.inputs[j], "inputs", settings, all);
+  }
+  add_estimator(robot, all);
   add_lever_arms(host, robot, all);
   return with_wishes(std::move(all), settings, wishes);
 }

@@ -43,6 +43,14 @@ inputs:
   EXPECT_TRUE(signal(map, "y_gps").from.empty());
 }
 
+TEST(SignalMap, ASignalWithoutASourceIsThatOfItsOwnName) {
+  const SignalMap map = map_of("outputs: {delta: {unit: deg, offset: 0.02}}");
+  EXPECT_TRUE(signal(map, "delta").from.empty());
+  EXPECT_DOUBLE_EQ(signal(map, "delta").factor, M_PI / 180.0);
+  EXPECT_EQ(signal(map, "delta").options.offset, 0.02);
+  EXPECT_THAT(message_of("outputs: {psi_m: {as: heading}}"), HasSubstr("expected a signal"));
+}
+
 TEST(SignalMap, MistakesNameTheirPlaceAndARemedy) {
   EXPECT_THAT(message_of("outputs: {x_pgs: a}"), AllOf(HasSubstr("robot.yaml:1"), HasSubstr("x_gps")));
   EXPECT_THAT(message_of("outputs:\n  delta: {from: a, unit: degrees}"),

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "sim/support/driven_log.hpp"
@@ -35,6 +36,35 @@ TEST_F(DriveSmoothingTest, HindsightIsNearerToTheTruthAndToWhatIsWithheld) {
   }
   EXPECT_LT(after, before);
   EXPECT_TRUE(result.smoothed.estimates.back().sigmas.allFinite());
+}
+
+TEST_F(DriveSmoothingTest, WhatIsStampedLateIsWhereItWasMeasured) {
+  Settings settings = settings_of("skid_steer");
+  apply_assignment(settings, "estimator.name=ekf");
+  apply_assignment(settings, "smoother.solver={name: gn_rti, mode: converge}");
+  drive(settings, "drive.csv");
+  const ReplayScenario scenario(Host(), settings);
+  const logs::Drive punctual = read(scenario.variants().front(), "drive.csv");
+  // Its measurements have stamps that are late by 0.5 s, and are there by then.
+  logs::Drive late = punctual;
+  for (logs::DriveEvent& event : late.events)
+    if (event.is_output) event.time = event.arrival += 0.5;
+  std::stable_sort(late.events.begin(), late.events.end(),
+                   [](const logs::DriveEvent& a, const logs::DriveEvent& b) { return a.arrival < b.arrival; });
+  apply_assignment(settings, "estimator.delays={x_gps: 0.5, y_gps: 0.5, heading: 0.5}");
+  const ReplayScenario delayed(Host(), settings);
+  const auto smoothed = [](const ReplayScenario& of, const logs::Drive& drive) {
+    return smooth_drive("x", of.variants().front().robot, drive, {5, 4}, of.simulated_start());
+  };
+  const SmoothedDriveReplay right = smoothed(scenario, punctual), found = smoothed(delayed, late);
+  ASSERT_EQ(found.smoothed.predictions.size(), right.smoothed.predictions.size());
+  EXPECT_NEAR(found.causal.start, right.causal.start, 1e-9);
+  for (std::size_t i = 0; i < right.smoothed.predictions.size(); ++i) {
+    EXPECT_NEAR(found.smoothed.predictions[i].time, right.smoothed.predictions[i].time, 1e-9);
+    EXPECT_NEAR(found.smoothed.predictions[i].distance, right.smoothed.predictions[i].distance, 1e-3);
+    // The causal ones are predicted from what was there: half a second less of what is measured.
+    EXPECT_LT(found.causal.predictions[i].distance, 0.4);
+  }
 }
 
 }  // namespace drive_smoothing_test

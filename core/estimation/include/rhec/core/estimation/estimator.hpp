@@ -54,6 +54,8 @@ class RHEC_EXPORT Estimator {
   /// next call: the estimate is then predicted from an earlier node, and its report says `deadline`.
   const Estimate& estimate(double time, Clock::time_point deadline = Clock::time_point::max()) noexcept;
   bool has_started() const noexcept { return grid_.count() > 0; }
+  /// Of the first node [s], once it is there: with delays it lies before the first stamp.
+  double start_time() const noexcept { return grid_.start(); }
 
   /// Does work for the next sample in advance; optional, but always saves time later.
   void prepare() noexcept;

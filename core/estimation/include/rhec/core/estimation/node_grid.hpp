@@ -56,6 +56,8 @@ class RHEC_EXPORT NodeGrid {
   void clear() noexcept;
 
   std::int64_t count() const noexcept { return count_; }
+  /// Of the first node of all.
+  double start() const noexcept { return start_; }
   /// Of the newest node: its time, its outputs, and what was measured on the way to it.
   double time() const noexcept { return node(count_ - 1).time; }
   const double* outputs() const noexcept { return outputs_.data(); }
@@ -93,6 +95,7 @@ class RHEC_EXPORT NodeGrid {
   StampedRows measurements_, inputs_;
   std::vector<Node> nodes_;  ///< the newest ones, in a ring
   std::int64_t count_ = 0;
+  double start_ = 0.0;
   double changed_, changed_input_;  ///< stamps of the oldest rows that came behind nodes
   double lost_;                     ///< up to there rows are missing that nodes have used
   std::int64_t dropped_ = 0;

@@ -38,7 +38,7 @@ struct DriveInnovation {
 /// A measurement that was withheld, and what was predicted of it.
 struct DrivePrediction {
   std::size_t event = 0;          ///< of the drive
-  double time = 0.0;              ///< [s]
+  double time = 0.0;              ///< when it was measured [s]: its stamp, less the delay of its sensor
   std::vector<double> residuals;  ///< measured - predicted, by output of the sensor; NaN where it was not measured
   double distance = 0.0;          ///< the norm of those
 };
@@ -50,6 +50,7 @@ struct DriveReplay {
   std::vector<DriveInnovation> innovations;  ///< empty where nobody judges (`estimator.health.watch`)
   Estimator::Counts counts;
   std::vector<double> solve_us;
+  double start = 0.0;    ///< of the first node [s], as in the drive
   double seconds = 0.0;  ///< of the whole replay
   int withheld_sensor = -1;
   std::vector<DrivePrediction> predictions;

@@ -71,6 +71,13 @@ struct Compared {
   std::pair<double, double> before_interval, after_interval, change_interval;
 };
 
+/// Innovations of a sensor by the scenario's own estimator, nothing of which is withheld from it but what judges.
+struct TunedSensor {
+  std::string name;
+  double expected = 0.0;             ///< mean number of values of a measurement: what the NIS is to be
+  double before = 0.0, after = 0.0;  ///< mean NIS, normalised innovation squared
+};
+
 struct LogTuning {
   Settings settings;  ///< the scenario with what was found: complete, one estimator
   std::string variant;
@@ -79,9 +86,12 @@ struct LogTuning {
   std::vector<TriedLaw> laws;
   std::vector<TriedEstimator> estimators;
   std::vector<ConfoundedPair> confounded;
-  std::vector<std::string> remarks;  ///< what cannot be told, in words
-  std::vector<Compared> judged;      ///< by fixes that nothing was tuned on; empty without any
-  int fixes = 0;                     ///< that count in the likelihood
+  std::vector<std::string> remarks;                        ///< what cannot be told, in words
+  std::vector<Compared> judged;                            ///< by fixes that nothing was tuned on; empty without any
+  std::vector<TunedSensor> sensors;                        ///< of a log with the vehicle's own sensors
+  int fixes = 0;                                           ///< or measurements, that count in the likelihood
+  std::string entry_name = "fix", entries_name = "fixes";  ///< what these are called
+  std::string unit = "m";                                  ///< of what is withheld
   double log_likelihood_before = 0.0, log_likelihood_after = 0.0;
   double degrees_before = 0.0, degrees_after = 0.0;  ///< of freedom of Student's t
   int evaluations = 0;
