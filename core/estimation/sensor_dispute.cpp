@@ -22,6 +22,8 @@ constexpr double left_unexplained = 0.5;
 constexpr double convincing = 4.6;
 // Samples of a dispute within which slip may have jumped.
 constexpr int fresh = 2;
+// Slip that has jumped within an interval displaces the vehicle by at least this share of it on the next one again.
+constexpr double goes_on_by = 0.8;
 // A hypothesis that has explained so many samples in a row has learnt how the vehicle moves.
 constexpr int informed = 4;
 // A search that has not explained anything for so long begins anew.
@@ -89,6 +91,32 @@ void SensorWatch::refute(Hypothesis& hypothesis) noexcept {
   if (&hypothesis == slip_.get()) slip_probability_ = 0.0;
 }
 
+/// Beside slip that has just been made anew goes one that is so on the next interval, too.
+void SensorWatch::begin_edge(bool is_new) noexcept {
+  edge_->is_active = is_new && slip_->is_active;
+  if (!edge_->is_active) return;
+  edge_->filter.mean() = slip_->filter.mean();
+  edge_->filter.covariance() = slip_->filter.covariance();
+  for (std::size_t j = 0; j < setup_.parameter_sigmas.size(); ++j)
+    edge_->filter.restart_parameter(static_cast<int>(j), setup_.parameter_sigmas[j]);
+}
+
+/// Whether slip that explains the first sample of a dispute, and not the second, has jumped within the interval before
+/// the first: on the interval behind it the vehicle then slips as much on all of its way, and what is measured is off
+/// farther, in the same direction. A receiver that has jumped stays where it is, or comes back.
+bool SensorWatch::goes_on() noexcept {
+  if (disputed_samples_ != fresh || slip_->explained != 1 || !edge_->is_active || !fits(edge_->filter, raw_.data()))
+    return false;
+  double along = 0.0, first = 0.0;
+  for (std::size_t j = 0; j < raw_.size(); ++j) {
+    const double error = memory_->first_errors[j];
+    if (std::isnan(error) || std::isnan(raw_[j])) continue;
+    along += error * (raw_[j] - own_->filter.expected(static_cast<int>(j)));
+    first += error * error;
+  }
+  return first > 0.0 && along >= (1.0 + goes_on_by) * first;
+}
+
 /// nu' S^-1 nu of the sensors that were rejected, together.
 double SensorWatch::disputed_nis(WalkingFilter& filter) noexcept {
   filter.expect();
@@ -151,6 +179,10 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
   if (!is_disputed_) memory_->was_calm = calm_samples_ >= setup_.calm;
   is_disputed_ = true;
   ++disputed_samples_;
+  for (std::size_t s = 0; s < sensors_.size() && disputed_samples_ == 1; ++s)
+    for (const int j : sensors_[s].outputs)
+      memory_->first_errors[j] =
+          (findings_[s] & reason::rejected) && sees_position(j) ? raw_[j] - own_->filter.expected(j) : Memory::unknown;
   double new_likelihood = Memory::unknown;  // of slip that has jumped just now
   const auto consider = [&](Hypothesis& hypothesis) {
     const bool is_new = !hypothesis.is_active;
@@ -170,7 +202,15 @@ SensorWatch::Finding SensorWatch::settle(double time, const double* outputs) noe
     // Whether the other sensors agree better with a vehicle whose state is what the disputed one says.
     if (&hypothesis == moved_.get() && !is_new && !is_position_disputed())
       hypothesis.evidence += likelihood(hypothesis.filter, false) - likelihood(own_->filter, false);
+    if (&hypothesis == slip_.get() && !is_new && !fits(hypothesis.filter, raw_.data()) && goes_on()) {
+      hypothesis.filter.mean() = edge_->filter.mean();
+      hypothesis.filter.covariance() = edge_->filter.covariance();
+      hypothesis.filter.update(raw_.data());
+      edge_->is_active = false;
+      return;
+    }
     confront(hypothesis, raw_.data(), true);
+    if (&hypothesis == slip_.get()) begin_edge(is_new);
   };
   consider(*slip_);
   consider(*moved_);
@@ -294,7 +334,7 @@ void SensorWatch::end_dispute() noexcept {
   slip_probability_ = 0.0;
   disputed_samples_ = 0;
   if (memory_->second_thought) memory_->second_thought->cancel();
-  for (Hypothesis* each : {slip_.get(), moved_.get(), blind_.get()}) {
+  for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), blind_.get()}) {
     each->is_active = each->is_informed = false;
     each->explained = each->refuted = 0;
   }

@@ -68,6 +68,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
   };
   own_ = make(filter_setup(setup_));
   slip_ = make(filter_setup(setup_));
+  edge_ = make(filter_setup(setup_));
   moved_ = make(filter_setup(setup_));
   blind_ = make(blind_setup(*model, setup_));
   memory_ = std::make_unique<Memory>();
@@ -87,6 +88,7 @@ SensorWatch::SensorWatch(std::shared_ptr<const Model> model, const Setup& setup)
     entry.inputs.assign(model->input_count(), 0.0);
   }
   raw_.assign(model->output_count(), Memory::unknown);
+  memory_->first_errors = raw_;
   input_.assign(model->input_count(), 0.0);
   believed_input_ = input_;
   held_.assign(held_capacity, {0.0, raw_});
@@ -178,6 +180,7 @@ void SensorWatch::advance(double duration, const double* inputs, const double* m
   }
   if (!is_disputed_) return;
   if (slip_->is_active) slip_->filter.predict(inputs, duration);
+  if (edge_->is_active) edge_->filter.predict(inputs, duration);
   if (moved_->is_active) moved_->filter.predict(inputs, duration);
   if (memory_->second_thought && memory_->second_thought->is_active())
     memory_->second_thought->predict(inputs, duration);
@@ -238,7 +241,7 @@ SensorWatch::Finding SensorWatch::judge(double time, double* outputs) noexcept {
       finding = settle(time, outputs);
     } else if (is_disputed_ && std::ranges::any_of(records_, [](const Record& each) { return each.failures > 0; })) {
       // What is disputed was not measured.
-      for (Hypothesis* each : {slip_.get(), moved_.get(), blind_.get()})
+      for (Hypothesis* each : {slip_.get(), edge_.get(), moved_.get(), blind_.get()})
         if (each->is_active) confront(*each, raw_.data(), false);
     } else if (is_any_measured) {
       if (is_disputed_) end_dispute();

@@ -55,6 +55,7 @@ struct SensorWatch::Memory {
   std::unique_ptr<HeadingSearch> search;  ///< null for a vehicle without a heading
   /// The same, of a heading that may be wrong, while it is not known who is.
   std::unique_ptr<HeadingSearch> second_thought;
+  std::vector<double> first_errors;    ///< n_y: by how much rejected outputs were off when the dispute began
   int in_vain = 0;                     ///< samples in a row that it has not explained
   Eigen::LLT<Eigen::MatrixXd> factor;  ///< of a covariance
   Eigen::VectorXd away;                ///< of slip that has jumped from an estimate

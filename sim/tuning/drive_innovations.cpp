@@ -16,8 +16,6 @@ namespace {
 // Beyond so many standard deviations a measurement is not used, this often in a row at most.
 constexpr double farthest = 5.0;
 constexpr int most_refused = 10;
-// Squared innovation where a filter has no numbers any more.
-constexpr double squared_of_lost = 1e12;
 // Times closer than this are one [s].
 constexpr double same_time = 1e-7;
 

@@ -25,7 +25,7 @@ constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 // Ground that is driven before measurements count where a heading is searched; at most this share of the log.
 constexpr double found_after = 25.0, most_found = 0.1;
 // Innovations are those of a measurement whose time is this close [s].
-constexpr double same_time = 2e-6;
+constexpr double same_stamp = 2e-6;
 // Sensors that measure at one time are asked one after the other, this far apart [s]: each is then expected from what
 // the others have said, so that densities multiply.
 constexpr double stagger = 1e-5;
@@ -102,11 +102,11 @@ class TunedDrive final : public TunedLog {
       const auto s = static_cast<std::size_t>(each.sensor);
       const double stamp = each.time + delays[s] - stagger * static_cast<double>(s);
       const std::vector<std::size_t>& candidates = by_sensor_[s];
-      auto at = std::lower_bound(candidates.begin(), candidates.end(), stamp - same_time,
+      auto at = std::lower_bound(candidates.begin(), candidates.end(), stamp - same_stamp,
                                  [&](std::size_t entry, double time) { return entries_[entry].time < time; });
       // Of measurements at one time they come one after the other.
       while (at != candidates.end() && found[*at].size > 0) ++at;
-      if (at != candidates.end() && entries_[*at].time <= stamp + same_time) found[*at] = each.innovation;
+      if (at != candidates.end() && entries_[*at].time <= stamp + same_stamp) found[*at] = each.innovation;
     }
     return found;
   }

@@ -15,8 +15,6 @@ namespace {
 
 // Tails heavier than Cauchy's are no measurement's.
 constexpr double least_degrees = 1.0;
-// Squared innovation where a filter has no numbers any more.
-constexpr double squared_of_lost = 1e12;
 
 /// std::lgamma writes the sign to a variable that all threads share.
 double log_gamma(double x) noexcept {

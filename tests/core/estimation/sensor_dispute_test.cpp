@@ -5,8 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <random>
 #include <string>
+#include <vector>
 
 #include "support/sensor_faults.hpp"
 
@@ -91,6 +94,55 @@ TEST_P(SensorDisputes, SlipThatJumpsIsNoFault) {
     for (const Episode::Sample& sample : episode.during) doubted += sample.health != HealthLevel::ok;
     EXPECT_LE(doubted, 1) << "until the next sample confirms it";
   });
+}
+
+/// On the interval in which it jumps slip is a mixture: what that says does not explain the next interval.
+TEST_P(SensorDisputes, SlipThatJumpsWithinAnIntervalIsFollowed) {
+  constexpr double step = 0.2, speed = 10.0;
+  constexpr int parts = 20, before = 60, after = 20;
+  for (const double share : {0.3, 0.4, 0.5, 0.6})
+    for (int seed = 1; seed <= seeds; ++seed) {
+      SCOPED_TRACE(share);
+      SCOPED_TRACE(seed);
+      std::mt19937_64 random(static_cast<std::uint64_t>(seed));
+      std::normal_distribution<double> noise;
+      const Model& model = *vehicle.model();
+      Eigen::VectorXd truth = Eigen::VectorXd::Zero(model.state_count()), slopes = truth;
+      const auto estimator = vehicle.make_estimator(truth);
+      std::vector<double> outputs(model.output_count());
+      for (int k = 0; k < before + after; ++k) {
+        model.observe({.count = 1, .states = truth.data(), .outputs = outputs.data()});
+        for (std::size_t j = 0; j < outputs.size(); ++j) outputs[j] += vehicle.output_sigmas()[j] * noise(random);
+        estimator->push_measurement(k * step, outputs.data());
+        const Estimate& estimate = estimator->estimate(k * step);
+        const double error = (estimate.state - truth).head(2).norm();
+        const bool is_behind = k > before && k <= before + 2;  // those of which it cannot be known yet
+        EXPECT_LT(error, is_behind ? 2.0 : usual_error) << k;
+        const std::vector<double> inputs{speed, 0.1 * std::sin(0.3 * k)};
+        const std::vector<double> measured{speed + 0.1 * noise(random), inputs[1] + 0.1 * noise(random)};
+        estimator->push_input(k * step, measured.data());
+        for (int i = 0; i < parts; ++i) {
+          const bool is_new = k > before || (k == before && i >= (1.0 - share) * parts);
+          const std::vector<double> slip{is_new ? 0.98 : 0.45, 0.8};
+          model.rates(truth.data(), inputs.data(), slip.data(), slopes.data());
+          truth += slopes * step / parts;
+        }
+      }
+      EXPECT_EQ(estimator->counts().rejected, 0) << "what was held back was right, and is not counted";
+      EXPECT_EQ(estimator->counts().rebased, 0);
+    }
+}
+
+/// A receiver that goes away in two steps is off farther after the second, and then stays: slip would go on.
+TEST_P(SensorDisputes, APositionThatLeavesInTwoStepsIsNotSlip) {
+  for (const double size : {0.4, 0.8, 2.0}) {
+    SCOPED_TRACE(size);
+    expect_each({.spoil = [=](Delivery& d) { d.outputs[0] += d.since == 0 ? size : 2.5 * size; }, .length = 9},
+                [=](const Episode& episode) {
+                  EXPECT_LT(episode.largest_error_during(), 4.0);
+                  EXPECT_LE(episode.samples_to_recover(usual_error), 10);
+                });
+  }
 }
 
 TEST_P(SensorDisputes, APositionThatWasFollowedIsDoubtedForSomeTime) {

@@ -21,7 +21,8 @@ class WalkingFilter;
 /// expected all the time is wider. Who is wrong is then found by filters that assume
 /// different causes, and get all measurements:
 ///   - slip has jumped: the parameters are made anew, once. Where this explains a few samples in a row, the
-///     measurements were right, and are given back as late ones;
+///     measurements were right, and are given back as late ones. Slip that jumps within an interval is another one on
+///     the next: it may be made anew there, too, if the measurements go on in the direction in which they were off;
 ///   - what the sensor measures has moved for good: the states that it sees are made anew, once. Where this explains
 ///     more samples than a transient may last, the estimate follows. After a time in which the sensor had said nothing
 ///     it is rather the estimate that is off, and a few samples are enough;
@@ -148,6 +149,8 @@ class RHEC_EXPORT SensorWatch {
   void confront(Hypothesis& hypothesis, const double* outputs, bool counts) noexcept;
   Finding settle(double time, const double* outputs) noexcept;
   Finding accept(Hypothesis& hypothesis) noexcept;
+  void begin_edge(bool is_new) noexcept;
+  bool goes_on() noexcept;
   void hold_back(double time, const double* outputs) noexcept;
   void acquit(const double* outputs) noexcept;
   void end_dispute() noexcept;
@@ -169,7 +172,7 @@ class RHEC_EXPORT SensorWatch {
   bool is_unobserved_ = false;                 ///< the motion since the last sample is not known
   double usual_volume_ = 0.0;  ///< mean log sqrt(det P) of late, where nothing was missing; NaN: none yet
   int aftermath_ = 0;          ///< estimates since something was missing, counted down
-  std::unique_ptr<Hypothesis> own_, slip_, moved_, blind_;
+  std::unique_ptr<Hypothesis> own_, slip_, edge_, moved_, blind_;  ///< edge_: slip that goes on jumping
   std::unique_ptr<Memory> memory_;
   bool is_active_ = false, is_disputed_ = false, is_blind_ = false;
   double slip_probability_ = 0.0;  ///< that slip has jumped, while that is open

@@ -16,6 +16,9 @@ struct Innovation {
   double log_determinant = 0.0;  ///< of S; [m] per coordinate
 };
 
+/// Squared innovation where a filter has no numbers any more.
+inline constexpr double squared_of_lost = 1e12;
+
 /// Innovations of all fixes that are not withheld, by their index in the log; the others have the size 0. Only fixes
 /// count. The steering's readings are inputs too, by their differences, so that a filter expects them nearly exactly,
 /// whatever their noise. A row of dead reckoning is known from the one before it on: a log is there as a whole, and
